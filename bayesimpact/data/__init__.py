@@ -1,0 +1,1 @@
+"""Recordings and campaigns: what was measured, read and checked."""

@@ -1,0 +1,94 @@
+"""A campaign: the recordings of one rig and what is known of the measuring chain."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Literal
+
+from bayesimpact.data.recording import Recording
+
+
+@dataclass(frozen=True)
+class Smoothing:
+    """A linear filter that the measuring chain applied to the recordings.
+
+    `savgol`: Savitzky-Golay with `window` samples and order `polyorder` (end windows by polynomial
+    fit, as MATLAB's `smooth` and SciPy's `mode="interp"`). `lag`: first-order low pass with
+    `time_constant` in s.
+    """
+
+    kind: Literal["savgol", "lag"]
+    window: int = 0
+    polyorder: int = 0
+    time_constant: float = 0.0
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What campaign.toml says of the measuring chain; None where it says nothing.
+
+    Attributes
+    ----------
+    noise : standard deviation of the raw noise, m (or rad)
+    smoothing : the filter that the recordings passed
+    mass_sd : standard uncertainty of the mass, relative
+    clock_sd : standard uncertainty of the clock rate, relative
+    gain_sd : standard uncertainty of the probe's gain, relative
+    """
+
+    noise: float | None = None
+    smoothing: Smoothing | None = None
+    mass_sd: float = 0.0
+    clock_sd: float = 0.0
+    gain_sd: float = 0.0
+
+
+@dataclass(frozen=True)
+class Beam:
+    """A cantilever obstacle, for the comparison with beam theory (Eq. 7); SI units."""
+
+    length: float
+    width: float
+    thickness: float
+    youngs_modulus: float
+
+    @property
+    def stiffness(self) -> float:
+        """Tip stiffness 3 E I / l^3 of a cantilever, N/m (Tian et al., Eq. 7)."""
+        inertia = self.width * self.thickness**3 / 12
+        return 3 * self.youngs_modulus * inertia / self.length**3
+
+
+@dataclass(frozen=True, eq=False)
+class Campaign:
+    """Recordings of one oscillator, with one or more obstacles.
+
+    Attributes
+    ----------
+    name : title for reports
+    mass : kg, or kg m2 when the recordings are angles
+    recordings : one or more, in the order of campaign.toml
+    stop : False for a plain oscillator without an obstacle
+    measurement : what is known of the measuring chain
+    priors : parameter name -> the table of campaign.toml's [priors], SI; validated
+    beams : case -> geometry of its obstacle, where given
+    sha256 : of campaign.toml and every recording's file; "" for a campaign built in memory
+    """
+
+    name: str
+    mass: float
+    recordings: tuple[Recording, ...]
+    stop: bool = True
+    measurement: Measurement = Measurement()
+    priors: Mapping[str, Mapping[str, Any]] = field(default_factory=lambda: MappingProxyType({}))
+    beams: Mapping[str, Beam] = field(default_factory=lambda: MappingProxyType({}))
+    sha256: str = ""
+    folder: Path | None = None
+
+    @property
+    def cases(self) -> tuple[str, ...]:
+        """Obstacles in order of first appearance; () without a stop."""
+        return tuple(dict.fromkeys(r.case for r in self.recordings)) if self.stop else ()

@@ -1,0 +1,53 @@
+"""One recording of a free decay: checked, immutable, in SI units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Quantity = Literal["displacement", "angle"]
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Equally spaced samples of one free decay.
+
+    Attributes
+    ----------
+    name : file name without its ending; names the nuisance parameters `y0[name]`, ...
+    case : the obstacle that was mounted; "" for a campaign without a stop
+    samples : (n,) read-only, m (or rad when `quantity` is "angle")
+    interval : sampling interval, s
+    start : time of the first sample on the file's own clock, s
+    quantity : what was measured
+    """
+
+    name: str
+    case: str
+    samples: NDArray[np.float64]
+    interval: float
+    start: float = 0.0
+    quantity: Quantity = "displacement"
+
+    def __post_init__(self) -> None:
+        samples = np.array(self.samples, dtype=np.float64)
+        samples.setflags(write=False)
+        object.__setattr__(self, "samples", samples)
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """Time since the first sample, (n,), s."""
+        return np.arange(self.samples.size) * self.interval
+
+    @property
+    def duration(self) -> float:
+        """Time from the first to the last sample, s."""
+        return float((self.samples.size - 1) * self.interval)
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the samples."""
+        return "m" if self.quantity == "displacement" else "rad"

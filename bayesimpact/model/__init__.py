@@ -1,0 +1,1 @@
+"""The oscillator: closed-form motion, events, added effects and the measuring chain."""

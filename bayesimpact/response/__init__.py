@@ -1,0 +1,1 @@
+"""What a free decay shows by itself: backbone and damping from zero crossings."""

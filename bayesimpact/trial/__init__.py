@@ -1,0 +1,1 @@
+"""Blind trials: an independent rig, sealed truths, scored diagnoses."""
