@@ -17,13 +17,15 @@ class Smoothing:
 
     `savgol`: Savitzky-Golay with `window` samples and order `polyorder` (end windows by polynomial
     fit, as MATLAB's `smooth` and SciPy's `mode="interp"`). `lag`: first-order low pass with
-    `time_constant` in s.
+    `time_constant` in s. `declared_window` is what campaign.toml says: one more than `window` when
+    that is even, for an even span was shortened by one sample.
     """
 
     kind: Literal["savgol", "lag"]
     window: int = 0
     polyorder: int = 0
     time_constant: float = 0.0
+    declared_window: int = 0
 
 
 @dataclass(frozen=True)

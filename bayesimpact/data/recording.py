@@ -40,7 +40,7 @@ class Recording:
     @property
     def times(self) -> NDArray[np.float64]:
         """Time since the first sample, (n,), s."""
-        return np.arange(self.samples.size) * self.interval
+        return np.arange(self.samples.size, dtype=np.float64) * self.interval
 
     @property
     def duration(self) -> float:

@@ -1,0 +1,305 @@
+"""Reads a campaign: campaign.toml and its recordings, refused in one message if unusable."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import re
+import tomllib
+from difflib import get_close_matches
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from bayesimpact.data.campaign import Beam, Campaign, Measurement, Smoothing
+from bayesimpact.data.period import rough_period
+from bayesimpact.data.recording import Quantity, Recording
+from bayesimpact.data.schema import (
+    CampaignTable,
+    LagTable,
+    LogUniformTable,
+    MeasurementTable,
+    RecordingTable,
+    UniformTable,
+    parse_campaign,
+)
+from bayesimpact.data.table import read_table
+from bayesimpact.errors import InputError
+
+CAMPAIGN_FILE = "campaign.toml"
+_EFFECT_PARAMETER = re.compile(r"[a-z]\w*\.[a-z]\w*(\[.+\])?")
+
+
+def load_campaign(path: Path | str) -> Campaign:
+    """Read and check a campaign.
+
+    Parameters
+    ----------
+    path : the folder that holds campaign.toml, or that file
+
+    Raises
+    ------
+    InputError
+        for whatever cannot be used: the message names the file, the line or key, what was found and
+        what is accepted.
+    """
+    file = _campaign_file(Path(path))
+    content = _bytes(file, str(file))
+    table = parse_campaign(_parse(file, content), str(file))
+    digest = hashlib.sha256(content)
+    recordings: list[Recording] = []
+    for number, entry in enumerate(table.recording, 1):
+        where = f"{file}, recording {number} ({entry.file})"
+        _check_entry(where, entry, table.stop, recordings)
+        source = file.parent / entry.file
+        data = _bytes(source, f"{where}, key file")
+        digest.update(data)
+        recordings.append(_recording(source, where, entry, table.stop, data))
+    _check_together(str(file), table, recordings)
+    return Campaign(
+        name=table.name,
+        mass=table.mass_kg,
+        recordings=tuple(recordings),
+        stop=table.stop,
+        measurement=_measurement(str(file), table, recordings),
+        priors=MappingProxyType(_priors(str(file), table, recordings)),
+        beams=MappingProxyType(_beams(str(file), table)),
+        sha256=digest.hexdigest(),
+        folder=file.parent,
+    )
+
+
+def _campaign_file(path: Path) -> Path:
+    if path.is_dir():
+        path = path / CAMPAIGN_FILE
+    if not path.is_file():
+        raise InputError(str(path), "no such file", f"a folder with {CAMPAIGN_FILE}, or that file")
+    if path.suffix != ".toml":
+        raise InputError(
+            str(path), "a file that is not .toml", f"a folder with {CAMPAIGN_FILE}, or that file"
+        )
+    return path
+
+
+def _bytes(path: Path, where: str) -> bytes:
+    try:
+        return path.read_bytes()
+    except IsADirectoryError:
+        found = "a folder"
+    except FileNotFoundError:
+        found = "no such file"
+    except OSError as error:
+        found = (error.strerror or str(error)).lower()
+    raise InputError(where, f"{found} at {path}", "a readable file")
+
+
+def _parse(file: Path, content: bytes) -> dict[str, Any]:
+    try:
+        document = tomllib.loads(content.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        found = f"a byte that is not UTF-8 (0x{content[error.start]:02x})"
+        raise InputError(f"{file}, line {line}", found, "TOML in UTF-8") from None
+    except tomllib.TOMLDecodeError as error:
+        text = str(error)
+        place = re.search(r" ?\(at (?:line (\d+), column \d+|end of document)\)", text)
+        last = content.rstrip().count(b"\n") + 1
+        line = int(place.group(1) or last) if place else last
+        found = text.replace(place.group(0), "") if place else text
+        raise InputError(f"{file}, line {line}", f"an error of syntax ({found})", "TOML") from None
+    if isinstance(document.get("priors"), dict):
+        document["priors"] = _dotted(document["priors"])
+    return document
+
+
+def _dotted(tables: dict[str, Any]) -> dict[str, Any]:
+    """TOML reads an unquoted key `effect.parameter` as a table in a table; undo that."""
+    flat: dict[str, Any] = {}
+    for name, value in tables.items():
+        nested = isinstance(value, dict) and value and "distribution" not in value
+        if nested and all(isinstance(inner, dict) for inner in value.values()):
+            flat |= {f"{name}.{key}": inner for key, inner in value.items()}
+        else:
+            flat[name] = value
+    return flat
+
+
+def _check_entry(where: str, entry: RecordingTable, stop: bool, earlier: list[Recording]) -> None:
+    if stop and entry.case is None:
+        accepted = 'the obstacle\'s name, as case = "1"; or stop = false for a rig without obstacle'
+        raise InputError(f"{where}, key case", "nothing", accepted)
+    name = Path(entry.file).stem
+    if name in (recording.name for recording in earlier):
+        found = f'a second recording called "{name}"'
+        accepted = "file names that differ without their endings, for they name the parameters"
+        raise InputError(f"{where}, key file", found, accepted)
+    start, end = entry.start_s, entry.end_s
+    if start is not None and end is not None and start >= end:
+        raise InputError(f"{where}, key end_s", f"{end:g} s", f"a time after start_s = {start:g} s")
+
+
+def _recording(
+    source: Path, where: str, entry: RecordingTable, stop: bool, data: bytes
+) -> Recording:
+    table = read_table(
+        source, data, column=entry.column, unit=entry.unit, sample_rate=entry.sample_rate_hz
+    )
+    # A sample at the very start or end counts in, however its time was rounded.
+    margin = 1e-6
+    size, interval = table.samples.size, table.interval
+    first, stop_at = 0, size
+    if entry.start_s is not None:
+        first = max(0, math.ceil((entry.start_s - table.start) / interval - margin))
+    if entry.end_s is not None:
+        stop_at = min(size, math.floor((entry.end_s - table.start) / interval + margin) + 1)
+    if stop_at - first < 2:
+        asked = f"start_s = {entry.start_s}, end_s = {entry.end_s}"
+        span = f"{table.start:.6g} to {table.start + (size - 1) * interval:.6g} s"
+        key = "start_s" if entry.start_s is not None else "end_s"
+        raise InputError(
+            f"{where}, key {key}", f"no samples left ({asked})", f"times within the file's {span}"
+        )
+    recording = Recording(
+        name=Path(entry.file).stem,
+        case=entry.case if stop and entry.case is not None else "",
+        samples=table.samples[first:stop_at],
+        interval=interval,
+        start=table.start + first * interval,
+        quantity=table.quantity,
+    )
+    _check_motion(str(source), recording)
+    return recording
+
+
+def _check_motion(where: str, recording: Recording) -> None:
+    samples = recording.samples
+    if samples.max() == samples.min():
+        found = f"{samples.size} samples that all equal {samples[0]:.6g} {recording.unit}"
+        raise InputError(where, found, "a free decay, two periods or more")
+    period = rough_period(samples, recording.interval)
+    if period is None or recording.duration < 2.0 * period * (1.0 - 1e-3):
+        found = f"{samples.size} samples over {recording.duration:.4g} s, fewer than two periods"
+        if period is not None:
+            found += f" of about {period:.4g} s"
+        raise InputError(where, found, "a free decay, two periods or more")
+
+
+def _check_together(where: str, table: CampaignTable, recordings: list[Recording]) -> None:
+    quantity = recordings[0].quantity
+    for number, (entry, recording) in enumerate(zip(table.recording, recordings, strict=True), 1):
+        if recording.quantity != quantity:
+            raise InputError(
+                f"{where}, recording {number} ({entry.file})",
+                f"an {recording.quantity}"
+                if recording.quantity == "angle"
+                else f"a {recording.quantity}",
+                f"the quantity of the first recording, {quantity}, throughout",
+            )
+    if table.mass_uncertainty_kg >= table.mass_kg:
+        found = f"{table.mass_uncertainty_kg:g} kg"
+        accepted = f"less than the mass, {table.mass_kg:g} kg"
+        raise InputError(f"{where}, key mass_uncertainty_kg", found, accepted)
+
+
+def _measurement(where: str, table: CampaignTable, recordings: list[Recording]) -> Measurement:
+    given = table.measurement
+    return Measurement(
+        noise=_noise(f"{where}, [measurement]", given, recordings[0].quantity),
+        smoothing=_smoothing(f"{where}, [measurement], smoothing", given, recordings),
+        mass_sd=table.mass_uncertainty_kg / table.mass_kg,
+        clock_sd=given.clock_uncertainty_ppm * 1e-6,
+        gain_sd=given.gain_uncertainty_percent * 1e-2,
+    )
+
+
+def _noise(where: str, given: MeasurementTable, quantity: Quantity) -> float | None:
+    scales = {
+        "displacement": {"noise_um": 1e-6},
+        "angle": {"noise_mrad": 1e-3, "noise_deg": math.pi / 180.0},
+    }
+    levels = {key: getattr(given, key) for keys in scales.values() for key in keys}
+    levels = {key: level for key, level in levels.items() if level is not None}
+    accepted = " or ".join(scales[quantity])
+    if len(levels) > 1:
+        raise InputError(f"{where}, key {list(levels)[1]}", " and ".join(levels), accepted)
+    for key, level in levels.items():
+        if key not in scales[quantity]:
+            raise InputError(
+                f"{where}, key {key}", f"a noise level for recordings of {quantity}", accepted
+            )
+        return float(level * scales[quantity][key])
+    return None
+
+
+def _smoothing(
+    where: str, given: MeasurementTable, recordings: list[Recording]
+) -> Smoothing | None:
+    table = given.smoothing
+    if table is None:
+        return None
+    if isinstance(table, LagTable):
+        return Smoothing(kind="lag", time_constant=table.time_constant_s)
+    window = table.window - 1 + table.window % 2
+    shortest = min(recording.samples.size for recording in recordings)
+    if window > shortest:
+        raise InputError(
+            f"{where}, key window",
+            f"{table.window} samples",
+            f"at most {shortest}, the shortest recording",
+        )
+    if table.polyorder >= window:
+        raise InputError(
+            f"{where}, key polyorder",
+            f"{table.polyorder}",
+            f"a whole number below {window}, the window",
+        )
+    return Smoothing(
+        kind="savgol", window=window, polyorder=table.polyorder, declared_window=table.window
+    )
+
+
+def _beams(where: str, table: CampaignTable) -> dict[str, Beam]:
+    cases = [entry.case for entry in table.recording if table.stop]
+    for case in table.beam:
+        if case not in cases:
+            known = ", ".join(dict.fromkeys(str(c) for c in cases)) or "none (stop = false)"
+            raise InputError(f"{where}, [beam.{case}]", "a case of no recording", f"cases: {known}")
+    return {
+        case: Beam(
+            b.length_mm * 1e-3, b.width_mm * 1e-3, b.thickness_mm * 1e-3, b.youngs_modulus_mpa * 1e6
+        )
+        for case, b in table.beam.items()
+    }
+
+
+def _priors(
+    where: str, table: CampaignTable, recordings: list[Recording]
+) -> dict[str, MappingProxyType[str, Any]]:
+    names = _prior_names(table.stop, recordings)
+    for name, prior in table.priors.items():
+        if name not in names and not _EFFECT_PARAMETER.fullmatch(name):
+            near = get_close_matches(name, names, 1, 0.4)
+            hint = f"did you mean {near[0]}? All: " if near else ""
+            raise InputError(
+                f"{where}, [priors], key {name}",
+                "no parameter of this campaign",
+                f"{hint}{', '.join(names)}, or <effect>.<parameter>",
+            )
+        if isinstance(prior, UniformTable | LogUniformTable) and prior.lower >= prior.upper:
+            raise InputError(
+                f"{where}, [priors] {name}, key upper",
+                f"{prior.upper:g}",
+                f"more than lower = {prior.lower:g}",
+            )
+    return {name: MappingProxyType(prior.model_dump()) for name, prior in table.priors.items()}
+
+
+def _prior_names(stop: bool, recordings: list[Recording]) -> list[str]:
+    """Names a prior may carry: of one parameter, or of all that differ only in the brackets."""
+    names = ["c1", "k1"]
+    if stop:
+        names += ["c2", "g", "k2"]
+        names += [f"k2[{case}]" for case in dict.fromkeys(r.case for r in recordings)]
+    for family in ("y0", "v0", "offset", "sigma"):
+        names += [family, *(f"{family}[{r.name}]" for r in recordings)]
+    return names

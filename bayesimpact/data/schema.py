@@ -1,0 +1,229 @@
+"""What campaign.toml may hold, and how a departure from it is put into words.
+
+Every field's `description` says what is accepted; messages quote it.
+"""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from bayesimpact.errors import InputError
+
+Text = Annotated[str, Field(pattern=r"\S")]
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+POSITIVE = "a number above 0"
+NUMBER = "a number"
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+class RecordingTable(_Table):
+    """One [[recording]]."""
+
+    file: Text = Field(description="a file name relative to campaign.toml, in quotes")
+    case: Text | None = Field(None, description='the obstacle\'s name in quotes, as case = "1"')
+    sample_rate_hz: Positive | None = Field(None, description=f"{POSITIVE}, Hz")
+    column: Text | None = Field(None, description="the name of a column, in quotes")
+    unit: Literal["m", "mm", "um", "rad", "deg"] | None = Field(
+        None, description="m, mm, um, rad or deg, in quotes"
+    )
+    start_s: float | None = Field(None, description=f"{NUMBER}, s on the file's own clock")
+    end_s: float | None = Field(None, description=f"{NUMBER}, s on the file's own clock")
+
+
+class SavgolTable(_Table):
+    """Savitzky-Golay smoothing; an even window loses one sample, as in MATLAB's `smooth`."""
+
+    kind: Literal["savgol"]
+    window: int = Field(ge=3, description="a whole number of samples, 3 or more")
+    polyorder: int = Field(ge=0, description="a whole number, 0 or more and below window")
+
+
+class LagTable(_Table):
+    """A first-order low pass."""
+
+    kind: Literal["lag"]
+    time_constant_s: Positive = Field(description=f"{POSITIVE}, s")
+
+
+class MeasurementTable(_Table):
+    """[measurement]."""
+
+    noise_um: Positive | None = Field(None, description=f"{POSITIVE}, um")
+    noise_mrad: Positive | None = Field(None, description=f"{POSITIVE}, mrad")
+    noise_deg: Positive | None = Field(None, description=f"{POSITIVE}, degrees")
+    smoothing: Annotated[SavgolTable | LagTable, Field(discriminator="kind")] | None = Field(
+        None,
+        description='{ kind = "savgol", window = 21, polyorder = 2 }'
+        ' or { kind = "lag", time_constant_s = 0.001 }',
+    )
+    clock_uncertainty_ppm: NotNegative = Field(0.0, description="a number, 0 or more, ppm")
+    gain_uncertainty_percent: NotNegative = Field(0.0, description="a number, 0 or more, %")
+
+
+class BeamTable(_Table):
+    """One [beam.<case>]: a cantilever."""
+
+    length_mm: Positive = Field(description=f"{POSITIVE}, mm")
+    width_mm: Positive = Field(description=f"{POSITIVE}, mm")
+    thickness_mm: Positive = Field(description=f"{POSITIVE}, mm")
+    youngs_modulus_mpa: Positive = Field(description=f"{POSITIVE}, MPa")
+
+
+class UniformTable(_Table):
+    """Equal density from lower to upper."""
+
+    distribution: Literal["uniform"]
+    lower: float = Field(description=f"{NUMBER} below upper, SI")
+    upper: float = Field(description=f"{NUMBER} above lower, SI")
+
+
+class NormalTable(_Table):
+    """Gaussian."""
+
+    distribution: Literal["normal"]
+    mean: float = Field(description=f"{NUMBER}, SI")
+    sd: Positive = Field(description=f"{POSITIVE}, SI")
+
+
+class HalfNormalTable(_Table):
+    """The positive half of a Gaussian about 0."""
+
+    distribution: Literal["halfnormal"]
+    scale: Positive = Field(description=f"{POSITIVE}, SI")
+
+
+class LogNormalTable(_Table):
+    """Gaussian in the logarithm."""
+
+    distribution: Literal["lognormal"]
+    median: Positive = Field(description=f"{POSITIVE}, SI")
+    sigma: Positive = Field(description=f"{POSITIVE}, standard deviation of the logarithm")
+
+
+class LogUniformTable(_Table):
+    """Equal density of the logarithm from lower to upper."""
+
+    distribution: Literal["loguniform"]
+    lower: Positive = Field(description=f"{POSITIVE} and below upper, SI")
+    upper: Positive = Field(description=f"{POSITIVE} and above lower, SI")
+
+
+PriorTable = Annotated[
+    UniformTable | NormalTable | HalfNormalTable | LogNormalTable | LogUniformTable,
+    Field(discriminator="distribution"),
+]
+
+
+class CampaignTable(_Table):
+    """The whole of campaign.toml."""
+
+    name: Text = Field(description="a title in quotes")
+    mass_kg: Positive = Field(
+        description=f"{POSITIVE}, kg (for an angle: inertia in kg m2, or 1.0)"
+    )
+    mass_uncertainty_kg: NotNegative = Field(0.0, description="a number, 0 or more, kg")
+    stop: bool = Field(True, description="true or false, without quotes")
+    recording: list[RecordingTable] = Field(
+        min_length=1, description='one or more [[recording]], each with file = "..."'
+    )
+    measurement: MeasurementTable = Field(
+        default_factory=lambda: MeasurementTable.model_validate({}),
+        description="a table [measurement]",
+    )
+    priors: dict[str, PriorTable] = Field(
+        default_factory=dict, description="a table [priors] of distributions"
+    )
+    beam: dict[str, BeamTable] = Field(default_factory=dict, description="tables [beam.<case>]")
+
+
+_TAGGED: dict[str, dict[str, type[_Table]]] = {
+    "smoothing": {"savgol": SavgolTable, "lag": LagTable},
+    "distribution": {
+        "uniform": UniformTable,
+        "normal": NormalTable,
+        "halfnormal": HalfNormalTable,
+        "lognormal": LogNormalTable,
+        "loguniform": LogUniformTable,
+    },
+}
+
+
+def parse_campaign(document: dict[str, Any], where: str) -> CampaignTable:
+    """Check a parsed campaign.toml; `where` names the file in the `InputError` that refuses it."""
+    try:
+        return CampaignTable.model_validate(document)
+    except ValidationError as error:
+        # An unknown key first: it is often the misspelt one that another error misses.
+        problems = sorted(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
+        raise _refusal(problems[0], document, where) from None
+
+
+def described(value: Any) -> str:
+    """A value of campaign.toml as a message shows it."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return f'the text "{value}"'
+    if isinstance(value, dict):
+        return "a table" + (
+            f" with {', '.join(map(str, value))}" if value else " with nothing in it"
+        )
+    if isinstance(value, list):
+        return "a list" if value else "an empty list"
+    return str(value)
+
+
+def _refusal(problem: Any, document: dict[str, Any], where: str) -> InputError:
+    table, path, key = _place(tuple(problem["loc"]), document)
+    kind = problem["type"]
+    place = ", ".join([where, *path, f"key {key}"])
+    if kind == "extra_forbidden":
+        near = get_close_matches(key, table.model_fields, 1, 0.5)
+        hint = f"did you mean {near[0]}? All: " if near else ""
+        return InputError(place, "an unknown key", hint + ", ".join(table.model_fields))
+    if kind == "union_tag_invalid":
+        tag = problem["ctx"]["tag"]
+        return InputError(place, f'"{tag}"', str(problem["ctx"]["expected_tags"]).replace("'", '"'))
+    if kind == "union_tag_not_found":
+        return InputError(place, described(problem["input"]), _tag_hint(key))
+    accepted = table.model_fields[key].description or ""
+    found = "nothing" if kind == "missing" else described(problem["input"])
+    return InputError(place, found, accepted)
+
+
+def _tag_hint(key: str) -> str:
+    if key == "smoothing":
+        return MeasurementTable.model_fields["smoothing"].description or ""
+    return f'{{ distribution = "..." }} with one of {", ".join(_TAGGED["distribution"])}'
+
+
+def _place(loc: tuple[Any, ...], document: dict[str, Any]) -> tuple[type[_Table], list[str], str]:
+    """The table at fault, the way to it in words, and the key in it."""
+    first = str(loc[0])
+    if len(loc) == 1:
+        return CampaignTable, [], first
+    if first == "recording":
+        entry = document["recording"][loc[1]]
+        if len(loc) == 2:
+            return CampaignTable, [f"recording {loc[1] + 1}"], first
+        file = f" ({entry['file']})" if isinstance(entry.get("file"), str) else ""
+        return RecordingTable, [f"recording {loc[1] + 1}{file}"], str(loc[2])
+    if first == "measurement":
+        if len(loc) == 2:
+            return MeasurementTable, ["[measurement]"], str(loc[1])
+        tagged = _TAGGED["smoothing"][str(loc[2])]
+        return tagged, ["[measurement]", "smoothing"], str(loc[3])
+    if first == "beam":
+        if len(loc) == 2:
+            return CampaignTable, [f"[beam.{loc[1]}]"], first
+        return BeamTable, [f"[beam.{loc[1]}]"], str(loc[2])
+    if len(loc) == 2:
+        return CampaignTable, [f"[priors] {loc[1]}"], first
+    return _TAGGED["distribution"][str(loc[2])], [f"[priors] {loc[1]}"], str(loc[3])

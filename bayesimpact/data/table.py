@@ -1,0 +1,267 @@
+"""Reads one recording's text file: comment lines, a header row, columns of numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.data.clock import even_interval
+from bayesimpact.data.recording import Quantity
+from bayesimpact.errors import InputError
+
+UNITS: dict[str, tuple[Quantity, float]] = {
+    "m": ("displacement", 1.0),
+    "mm": ("displacement", 1e-3),
+    "um": ("displacement", 1e-6),
+    "rad": ("angle", 1.0),
+    "deg": ("angle", math.pi / 180.0),
+}
+TIME_COLUMNS = {"time_s": 1.0, "time_ms": 1e-3}
+RESPONSE_COLUMNS = {f"{quantity}_{unit}": unit for unit, (quantity, _) in UNITS.items()}
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """What one file holds, in SI units.
+
+    Attributes
+    ----------
+    samples : (n,) m or rad
+    interval : s
+    start : time of the first sample on the file's clock, s; 0 for a file without a time column
+    quantity : "displacement" or "angle"
+    """
+
+    samples: NDArray[np.float64]
+    interval: float
+    start: float
+    quantity: Quantity
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """Where in a row the numbers stand."""
+
+    names: tuple[str, ...]
+    separator: str | None
+    time: int | None
+    response: int
+    unit: str
+
+
+def read_table(
+    path: Path,
+    content: bytes,
+    *,
+    column: str | None = None,
+    unit: str | None = None,
+    sample_rate: float | None = None,
+) -> Table:
+    """Parse the content of a recording's file.
+
+    Parameters
+    ----------
+    path : only for messages
+    content : the file's bytes, UTF-8
+    column, unit : name and unit (a key of `UNITS`) of the response column, where it is not one of
+        `RESPONSE_COLUMNS` or there are several
+    sample_rate : Hz, for a file without a time column
+
+    Raises
+    ------
+    InputError
+        with the file and, where one is at fault, the line.
+    """
+    lines = _lines(path, content)
+    header = next((i for i, line in enumerate(lines) if _is_content(line)), None)
+    if header is None:
+        raise InputError(
+            str(path), "no header row and no samples", "a header row and rows of numbers"
+        )
+    layout = _layout(path, header + 1, lines[header], column, unit)
+    numbers, rows = _numbers(path, lines, header + 1, layout)
+    interval, start = _clock(path, numbers, rows, layout, sample_rate)
+    quantity, factor = UNITS[layout.unit]
+    return Table(numbers[:, -1] * factor, interval, start, quantity)
+
+
+def _is_content(line: str) -> bool:
+    return bool(line.strip()) and not line.lstrip().startswith("#")
+
+
+def _lines(path: Path, content: bytes) -> list[str]:
+    if not content.strip():
+        raise InputError(str(path), "an empty file", "a header row and rows of numbers")
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        found = f"a byte that is not UTF-8 (0x{content[error.start]:02x})"
+        raise InputError(
+            f"{path}, line {line}", found, "a text file in UTF-8, columns of numbers"
+        ) from None
+    if "\0" in text:
+        raise InputError(str(path), "binary content", "a text file in UTF-8, columns of numbers")
+    return text.replace("\r\n", "\n").replace("\r", "\n").replace('"', "").split("\n")
+
+
+def _separator(line: str) -> str | None:
+    return next((mark for mark in (";", "\t", ",") if mark in line), None)
+
+
+def _layout(path: Path, line: int, header: str, column: str | None, unit: str | None) -> _Layout:
+    separator = _separator(header)
+    names = tuple(name.strip() for name in header.strip().split(separator))
+    where = f"{path}, line {line}"
+    if all(_is_number(name) for name in names):
+        accepted = f"a header row with a time column ({', '.join(TIME_COLUMNS)}) and a response"
+        raise InputError(
+            where,
+            f"numbers ({header.strip()}) in place of the header row",
+            f"{accepted} column ({', '.join(RESPONSE_COLUMNS)})",
+        )
+    times = [i for i, name in enumerate(names) if name in TIME_COLUMNS]
+    if len(times) > 1:
+        found = "two time columns: " + ", ".join(names[i] for i in times)
+        raise InputError(where, found, f"one of {', '.join(TIME_COLUMNS)}")
+    time = times[0] if times else None
+    response = _response_column(where, names, column, unit, time)
+    known = RESPONSE_COLUMNS.get(names[response])
+    if unit is not None and known is not None and unit != known:
+        raise InputError(
+            f"{where}, column {names[response]}",
+            f'unit = "{unit}" in campaign.toml',
+            f'unit = "{known}", or no unit',
+        )
+    if unit is None and known is None:
+        accepted = f"with column = ... also unit = ... ({', '.join(UNITS)})"
+        raise InputError(f"{where}, column {names[response]}", "no unit for it", accepted)
+    return _Layout(names, separator, time, response, unit or known or "")
+
+
+def _response_column(
+    where: str, names: Sequence[str], column: str | None, unit: str | None, time: int | None
+) -> int:
+    if column is not None:
+        found = [i for i, name in enumerate(names) if name == column]
+        if len(found) == 1 and found[0] != time:
+            return found[0]
+        state = f'column = "{column}", which is ' + (
+            "the time column" if time in found else f"there {len(found)} times"
+        )
+        others = [name for i, name in enumerate(names) if i != time]
+        raise InputError(where, state, f"one of this file's columns: {', '.join(others)}")
+    known = [i for i, name in enumerate(names) if name in RESPONSE_COLUMNS]
+    if not known and unit is not None:
+        known = [i for i in range(len(names)) if i != time]
+    if len(known) == 1:
+        return known[0]
+    columns = ", ".join(names)
+    if known:
+        raise InputError(
+            where,
+            f"several response columns ({columns})",
+            'one, or column = "..." in campaign.toml',
+        )
+    near = [n for name in names for n in get_close_matches(name, RESPONSE_COLUMNS, 1, 0.75)]
+    accepted = f"one of {', '.join(RESPONSE_COLUMNS)}, or column and unit in campaign.toml"
+    hint = f" (did you mean {near[0]}?)" if near else ""
+    raise InputError(where, f"no response column among {columns}{hint}", accepted)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _numbers(
+    path: Path, lines: list[str], first: int, layout: _Layout
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Time (if any) and response as in the file, (n, 1 or 2), and their line numbers (n,)."""
+    last = len(lines)
+    while last > first and not lines[last - 1].strip():
+        last -= 1
+    body = lines[first:last]
+    if layout.separator != ",":
+        body = _decimal_points(path, body, first)
+    columns = [layout.response] if layout.time is None else [layout.time, layout.response]
+    values: list[list[float]] = []
+    rows: list[int] = []
+    for line, text in enumerate(body, first + 1):
+        if not _is_content(text):
+            if values and not text.strip():
+                raise InputError(f"{path}, line {line}", "an empty line", "a row of numbers")
+            continue
+        values.append(_row(path, line, text, layout, columns))
+        rows.append(line)
+    if len(values) < 2:
+        found = "only a header row" if not values else "one sample"
+        raise InputError(str(path), found, "a header row and rows of numbers")
+    return np.array(values), np.array(rows)
+
+
+def _decimal_points(path: Path, body: list[str], first: int) -> list[str]:
+    """Decimal commas to points, where no comma separates columns; never both in one file."""
+    comma = point = 0
+    for line, text in enumerate(body, first + 1):
+        if _is_content(text):
+            comma = comma or (line if "," in text else 0)
+            point = point or (line if "." in text else 0)
+    if comma and point:
+        found = f"a comma in a number, and a point in line {point}"
+        accepted = "decimal points throughout, or decimal commas throughout"
+        raise InputError(f"{path}, line {comma}", found, accepted)
+    return [text.replace(",", ".") for text in body] if comma else body
+
+
+def _row(path: Path, line: int, text: str, layout: _Layout, columns: list[int]) -> list[float]:
+    fields = text.strip("\n").split(layout.separator)
+    where = f"{path}, line {line}"
+    if len(fields) != len(layout.names):
+        accepted = f"{len(layout.names)} fields as in the header ({', '.join(layout.names)})"
+        if layout.separator == ",":
+            accepted += "; decimal commas need semicolons between the columns"
+        raise InputError(where, f'{len(fields)} fields ("{text.strip()}")', accepted)
+    numbers = []
+    for column in columns:
+        field = fields[column].strip()
+        try:
+            number = float(field)
+        except ValueError:
+            number = math.nan
+        if not math.isfinite(number) or "_" in field:
+            found = f'"{field}"' if field else "an empty field"
+            raise InputError(f"{where}, column {layout.names[column]}", found, "a finite number")
+        numbers.append(number)
+    return numbers
+
+
+def _clock(
+    path: Path,
+    numbers: NDArray[np.float64],
+    rows: NDArray[np.int64],
+    layout: _Layout,
+    sample_rate: float | None,
+) -> tuple[float, float]:
+    """Sampling interval and time of the first sample, s."""
+    if layout.time is None:
+        if sample_rate is None:
+            accepted = f"a column {' or '.join(TIME_COLUMNS)}, or sample_rate_hz in campaign.toml"
+            found = f"no time column among {', '.join(layout.names)}"
+            raise InputError(f"{path}, header row", found, accepted)
+        return 1.0 / sample_rate, 0.0
+    times = numbers[:, 0] * TIME_COLUMNS[layout.names[layout.time]]
+    interval = even_interval(path, times, rows)
+    if sample_rate is not None and abs(sample_rate * interval - 1.0) > 1e-3:
+        found = f"sample_rate_hz = {sample_rate:g}, and a time column at {1 / interval:g} Hz"
+        raise InputError(str(path), found, "a time column, or sample_rate_hz, or both agreeing")
+    return interval, float(times[0])
