@@ -27,10 +27,13 @@ def source_stamp() -> str:
 
 
 def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Decorate a function to be compiled on first call, with `numba.njit`'s options."""
+    """Decorate a function to be compiled on first call, with `numba.njit`'s options.
+
+    Division by zero gives inf or NaN as in NumPy (no check in inner loops), never an exception.
+    """
 
     def decorate(function: Callable[..., Any]) -> Any:
-        return _stamped(numba.njit(cache=True, **options)(function))
+        return _stamped(numba.njit(**{"cache": True, "error_model": "numpy", **options})(function))
 
     return decorate
 

@@ -1,0 +1,176 @@
+"""What an added effect is: parameters, a force law or a change of the oscillator, and words for the report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from types import MappingProxyType
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Scope = Literal["campaign", "case", "recording"]
+Where = Literal["everywhere", "contact"]
+Regime = Literal["free", "contact", "entry", "exit", "everywhere", "measurement"]
+Energy = Literal["conserves", "dissipates", "either", "none"]
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Physical sizes of one campaign, against which the priors of effects are written; SI.
+
+    Attributes
+    ----------
+    mass, stiffness, damping : m, k1, c1 of the fitted base model
+    contact_stiffness, contact_damping : mean k2 and c2 (0 without a stop)
+    amplitude, speed : largest |y| and |v|
+    indentation, impact_speed : largest d and entry speed (0 without impacts)
+    duration, interval : longest recording and its sampling interval, s
+    impacts : largest number of impacts in a recording
+    """
+
+    mass: float
+    stiffness: float
+    damping: float
+    contact_stiffness: float
+    contact_damping: float
+    amplitude: float
+    speed: float
+    indentation: float
+    impact_speed: float
+    duration: float
+    interval: float
+    impacts: int
+
+    @property
+    def force(self) -> float:
+        """Largest elastic force of the suspension, N."""
+        return self.stiffness * self.amplitude
+
+    @property
+    def contact_force(self) -> float:
+        """Largest elastic force of the obstacle, N."""
+        return self.contact_stiffness * self.indentation
+
+
+@dataclass(frozen=True)
+class EffectParameter:
+    """One unknown of an effect.
+
+    Attributes
+    ----------
+    name, unit : unit for displacements; `bayesimpact.model.parameters.angular` translates
+    scale : size that would be plausible, from the campaign's scales: the prior is half-normal (normal
+        when both signs are admissible) about `null` with this scale; for a shape parameter the prior is
+        log-normal about it
+    lower, upper : physical bounds
+    null : value at which the effect vanishes; None for a shape parameter (a depth, a time constant, a
+        frequency), which means nothing while the amplitude is at its null
+    scope : one value for the campaign, per case or per recording
+    grid : for a shape parameter, the values that a scan tries, from the scales
+    circular : a phase, rad
+    """
+
+    name: str
+    unit: str
+    scale: Callable[[Scales], float]
+    lower: float = -np.inf
+    upper: float = np.inf
+    null: float | None = 0.0
+    scope: Scope = "campaign"
+    grid: Callable[[Scales], NDArray[np.float64]] | None = None
+    circular: bool = False
+
+    @property
+    def is_shape(self) -> bool:
+        """True when the parameter has no null value of its own."""
+        return self.null is None
+
+
+@dataclass(frozen=True)
+class Law:
+    """A force on the left-hand side of the equation of motion, as plain functions of floats.
+
+    Each function has the arguments `(y, v, d, t, z, touching, p, q)`: displacement m, velocity m/s,
+    indentation y - g m, time from the recording's first sample s, the law's own state, 1.0 in contact
+    and 0.0 in flight, pointers to the law's parameters (in the effect's order) and to the oscillator's
+    slots (`bayesimpact.model.parameters.SLOTS`). They are compiled one by one to C callbacks, so they
+    may call `math` functions but no other compiled ones.
+
+    Attributes
+    ----------
+    force : N
+    where : evaluated everywhere or in contact only
+    rate : time derivative of the state z (a law with memory), or None
+    surface : a smooth function whose zero is a kink or jump of the force; steps end on it
+    """
+
+    force: Callable[..., float]
+    where: Where = "everywhere"
+    rate: Callable[..., float] | None = None
+    surface: Callable[..., float] | None = None
+
+
+Observe = Callable[
+    [NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]
+]
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One physical effect that the base model leaves out.
+
+    It acts in one or more of four ways: `law` adds a force; `binds` feeds its parameters into slots of
+    the oscillator (dry friction, mass of the obstacle, a gap of its own per recording, ...); `sets`
+    fixes slots; `observe` changes what the probe reads: `observe(y (K, n), t (n,), p (K, n_p)) -> (K, n)`.
+
+    Attributes
+    ----------
+    id, family, title : fixed id, family of near neighbours, a few words
+    equation : as text, for the catalogue and the report
+    regime : where it acts
+    energy : what it does to mechanical energy
+    statement : sentence for the report with `{size}` and `{share}` filled in
+    needs_stop : True when it makes no sense without an obstacle
+    prefer : id of the simpler effect that this one reduces to at its null
+    """
+
+    id: str
+    family: str
+    title: str
+    equation: str
+    regime: Regime
+    energy: Energy
+    statement: str
+    parameters: tuple[EffectParameter, ...] = ()
+    law: Law | None = None
+    binds: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    sets: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    observe: Observe | None = None
+    needs_stop: bool = False
+    prefer: str | None = None
+
+    def parameter(self, name: str) -> EffectParameter:
+        """The parameter called `name`; KeyError when there is none."""
+        for parameter in self.parameters:
+            if parameter.name == name:
+                return parameter
+        raise KeyError(f"{self.id} has no parameter {name!r}")
+
+
+@cache
+def address(function: Callable[..., float]) -> int:
+    """Pointer to a law's function, compiled on first use."""
+    return int(_callback(function).address)
+
+
+@cache
+def _callback(function: Callable[..., float]) -> Any:
+    from numba import types
+
+    from bayesimpact.model.compiled import compiled_callback
+
+    number, pointer = types.float64, types.CPointer(types.float64)
+    return compiled_callback(number(*[number] * 6, pointer, pointer))(function)

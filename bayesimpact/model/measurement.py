@@ -1,0 +1,53 @@
+"""The measuring chain after the probe: linear filters that smooth a recording."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import signal
+
+from bayesimpact.data.campaign import Smoothing
+
+Array = NDArray[np.float64]
+
+
+def smooth(samples: Array, smoothing: Smoothing | None, interval: float) -> Array:
+    """Samples (..., n) after the filter; the ends as the chain treats them.
+
+    Savitzky-Golay: polynomial fits of the end windows (Savitzky and Golay 1964). Lag: exact first-order
+    low pass of a staircase signal, started at rest on the first sample.
+    """
+    if smoothing is None:
+        return samples
+    if smoothing.kind == "savgol":
+        filtered = signal.savgol_filter(
+            samples, smoothing.window, smoothing.polyorder, axis=-1, mode="interp"
+        )
+        return np.asarray(filtered, dtype=np.float64)
+    decay = np.exp(-interval / smoothing.time_constant)
+    state = decay * samples[..., :1]
+    filtered, _ = signal.lfilter([1.0 - decay], [1.0, -decay], samples, axis=-1, zi=state)
+    return np.asarray(filtered, dtype=np.float64)
+
+
+def gain(smoothing: Smoothing | None, interval: float, frequency: Array) -> Array:
+    """Amplitude response of the filter at `frequency` in Hz."""
+    if smoothing is None:
+        return np.ones_like(frequency)
+    angle = 2 * np.pi * frequency * interval
+    if smoothing.kind == "savgol":
+        taps = signal.savgol_coeffs(smoothing.window, smoothing.polyorder)
+        _, response = signal.freqz(taps, worN=angle)
+    else:
+        decay = np.exp(-interval / smoothing.time_constant)
+        _, response = signal.freqz([1.0 - decay], [1.0, -decay], worN=angle)
+    return np.asarray(np.abs(response), dtype=np.float64)
+
+
+def edge(smoothing: Smoothing | None, interval: float) -> int:
+    """Samples at the start of a recording (and, for Savitzky-Golay, at its end) that the filter treats differently."""
+    if smoothing is None:
+        return 0
+    if smoothing.kind == "savgol":
+        return smoothing.window // 2
+    return int(np.ceil(5 * smoothing.time_constant / interval))

@@ -1,0 +1,159 @@
+"""A campaign under a model: from parameter vectors to what the probe would have read, and derivatives.
+
+Without added forces the exact closed-form simulator runs; with them the general one. Either way the chain
+of measurement (sensor effects, rest offset, smoothing) follows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.data.campaign import Campaign, Smoothing
+from bayesimpact.model import measurement
+from bayesimpact.model.effects.effect import Effect, address
+from bayesimpact.model.parameters import BASE_SLOTS, SLOTS, Layout, build_layout, instance_name
+
+Array = NDArray[np.float64]
+_OFFSET = SLOTS.index("offset")
+
+
+@dataclass(frozen=True, eq=False)
+class Oscillator:
+    """The base oscillator of a campaign, with any number of effects added.
+
+    Attributes
+    ----------
+    campaign, effects : what is simulated
+    layout : names of the unknowns and where they enter
+    smoothing : filter of the measuring chain through which simulations pass, or None
+    """
+
+    campaign: Campaign
+    effects: tuple[Effect, ...]
+    layout: Layout
+    smoothing: Smoothing | None = None
+
+    @cached_property
+    def counts(self) -> NDArray[np.int64]:
+        """Samples of every recording, (R,)."""
+        return np.array([r.samples.size for r in self.campaign.recordings], dtype=np.int64)
+
+    @cached_property
+    def starts(self) -> NDArray[np.int64]:
+        """First sample of every recording in the concatenated samples, (R,)."""
+        return np.concatenate([[0], np.cumsum(self.counts)[:-1]]).astype(np.int64)
+
+    @cached_property
+    def intervals(self) -> Array:
+        """Sampling intervals, (R,), s."""
+        return np.array([r.interval for r in self.campaign.recordings])
+
+    @cached_property
+    def samples(self) -> Array:
+        """All recordings one after another, (N,), m."""
+        return np.concatenate([r.samples for r in self.campaign.recordings])
+
+    @cached_property
+    def laws(self) -> NDArray[np.int64]:
+        """Table of force laws for the general simulator, (L, 5)."""
+        rows, first = [], len(SLOTS)
+        for effect in self.effects:
+            law = effect.law
+            if law is not None:
+                addresses = [address(f) if f else 0 for f in (law.force, law.rate, law.surface)]
+                rows.append([*addresses, int(law.where == "contact"), first])
+                first += len(effect.parameters)
+        return np.array(rows, dtype=np.int64).reshape(-1, 5)
+
+    @cached_property
+    def is_base(self) -> bool:
+        """True when every recording is a base oscillator (with parameters of its own, perhaps)."""
+        added = slice(len(BASE_SLOTS), len(SLOTS))
+        return (
+            self.laws.shape[0] == 0
+            and bool(np.all(self.layout.columns[:, added] < 0))
+            and not np.any(self.layout.constants[:, added])
+        )
+
+    @cached_property
+    def sensors(self) -> tuple[tuple[Effect, NDArray[np.int64]], ...]:
+        """Effects of the probe with the (R, n_p) positions of their parameters in theta."""
+        found = []
+        for effect in self.effects:
+            if effect.observe is not None:
+                rows = [
+                    [
+                        self.layout.index(
+                            instance_name(
+                                effect,
+                                p,
+                                {"campaign": None, "case": r.case, "recording": r.name}[p.scope],
+                            )
+                        )
+                        for p in effect.parameters
+                    ]
+                    for r in self.campaign.recordings
+                ]
+                found.append((effect, np.array(rows, dtype=np.int64)))
+        return tuple(found)
+
+    @property
+    def is_plain(self) -> bool:
+        """True when predictions are the base simulator's plus the offset: nothing between it and the data."""
+        return self.is_base and not self.sensors and self.smoothing is None
+
+    def predict(self, theta: Array) -> tuple[Array, ...]:
+        """What the probe would read: per recording (..., n_r), for parameter vectors (..., d).
+
+        Inadmissible parameters give NaN throughout the recordings concerned.
+        """
+        flat = np.atleast_2d(theta)
+        predicted = tuple(self.predict_recording(r, flat) for r in range(self.counts.size))
+        return tuple(p.reshape(*theta.shape[:-1], p.shape[-1]) for p in predicted)
+
+    def predict_recording(self, r: int, theta: Array, count: int | None = None) -> Array:
+        """Readings of recording `r`, (B, n), for parameter vectors (B, d); the first `count` samples."""
+        q = self.layout.slots(theta)[:, r]
+        y = self.motion(r, q, int(self.counts[r]) if count is None else count)
+        times = np.arange(y.shape[1]) * self.intervals[r]
+        for effect, positions in self.sensors:
+            assert effect.observe is not None
+            y = effect.observe(y, times, theta[:, positions[r]])
+        y = y + q[:, _OFFSET, None]
+        return measurement.smooth(y, self.smoothing, float(self.intervals[r]))
+
+    def motion(self, r: int, q: Array, count: int) -> Array:
+        """True displacement of recording `r`, (B, count), m, for slot vectors (B, Q)."""
+        out = np.empty((q.shape[0], count))
+        intervals = np.full(q.shape[0], self.intervals[r])
+        mass = self.campaign.mass
+        if self.is_base:
+            from bayesimpact.model.simulate import trajectories
+
+            codes = trajectories(
+                np.ascontiguousarray(q[:, : len(BASE_SLOTS)]), mass, intervals, out
+            )
+        else:
+            from bayesimpact.model.general import integrate_many
+
+            counts = np.full(q.shape[0], count, dtype=np.int64)
+            codes = integrate_many(np.ascontiguousarray(q), mass, intervals, counts, self.laws, out)
+        out[codes != 0] = np.nan
+        return out
+
+
+def build_oscillator(
+    campaign: Campaign,
+    effects: Sequence[Effect] = (),
+    *,
+    smoothing: Smoothing | None = None,
+    sigma_per_recording: bool = False,
+) -> Oscillator:
+    """The oscillator of a campaign; `smoothing` None takes what campaign.toml declares."""
+    layout = build_layout(campaign, effects, sigma_per_recording=sigma_per_recording)
+    return Oscillator(campaign, tuple(effects), layout, smoothing or campaign.measurement.smoothing)

@@ -1,0 +1,215 @@
+"""Names, units and bounds of all unknowns, and where each of them enters each recording's simulation.
+
+The unknowns of a campaign form one vector theta. A recording is simulated from a short vector q of
+*slots* (`SLOTS`, then the parameters of the force laws). `columns[r, i]` says which element of theta
+feeds slot i of recording r; -1 takes `constants[r, i]`. A damping per obstacle or a gap per recording is
+nothing but another column.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.errors import InputError
+from bayesimpact.model.effects.effect import Effect, EffectParameter
+
+BASE_SLOTS = ("c1", "k1", "c2", "g", "k2", "y0", "v0", "A", "w", "phase", "offset")
+ADDED_SLOTS = ("friction", "contact_mass", "no_tension", "gap_step")
+SLOTS = BASE_SLOTS + ADDED_SLOTS
+
+Role = Literal["physical", "effect", "nuisance", "noise"]
+_SHARED_UNITS = {"c1": "N s/m", "k1": "N/m", "c2": "N s/m", "g": "m"}
+_NUISANCE_UNITS = {"y0": "m", "v0": "m/s", "offset": "m"}
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One element of theta: its name as in the contract, SI unit, role and physical bounds."""
+
+    name: str
+    unit: str
+    role: Role
+    lower: float = -np.inf
+    upper: float = np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """All unknowns of a campaign under a model, and the map from theta to every recording's slots.
+
+    Attributes
+    ----------
+    parameters : the elements of theta in order: physical, effects, nuisances, noise
+    columns : (R, Q) index into theta, or -1
+    constants : (R, Q) values where `columns` is -1
+    """
+
+    parameters: tuple[Parameter, ...]
+    columns: NDArray[np.int64]
+    constants: NDArray[np.float64]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the elements of theta."""
+        return tuple(p.name for p in self.parameters)
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return len(self.parameters)
+
+    def index(self, name: str) -> int:
+        """Position of a parameter; KeyError when the model has none of that name."""
+        try:
+            return self.names.index(name)
+        except ValueError:
+            raise KeyError(name) from None
+
+    def roles(self, *roles: Role) -> NDArray[np.int64]:
+        """Positions of all parameters with one of the given roles."""
+        return np.array(
+            [i for i, p in enumerate(self.parameters) if p.role in roles], dtype=np.int64
+        )
+
+    def slots(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Slot vectors (..., R, Q) of parameter vectors (..., d)."""
+        values: NDArray[np.float64] = theta[..., np.maximum(self.columns, 0)]
+        return np.where(self.columns >= 0, values, self.constants)
+
+
+def build_layout(
+    campaign: Campaign, effects: Sequence[Effect] = (), *, sigma_per_recording: bool = False
+) -> Layout:
+    """Unknowns of `campaign` under the base model with `effects` added.
+
+    Raises `InputError` when two effects claim the same slot or an effect needs an obstacle and there is
+    none.
+    """
+    binds = _binds(campaign, effects)
+    table: list[Parameter] = []
+    position: dict[str, int] = {}
+
+    def add(name: str, unit: str, role: Role, lower: float = -np.inf, upper: float = np.inf) -> int:
+        if name not in position:
+            position[name] = len(table)
+            table.append(Parameter(name, _unit(campaign, unit), role, lower, upper))
+        return position[name]
+
+    _add_physical(campaign, binds, add)
+    for effect in effects:
+        for parameter in effect.parameters:
+            for name in _instances(campaign, effect, parameter):
+                add(name, parameter.unit, "effect", parameter.lower, parameter.upper)
+    for recording in campaign.recordings:
+        for nuisance, unit in _NUISANCE_UNITS.items():
+            add(f"{nuisance}[{recording.name}]", unit, "nuisance")
+    for name in sigma_names(campaign, sigma_per_recording):
+        add(name, "m", "noise", 0.0)
+    columns, constants = _maps(campaign, effects, binds, position)
+    return Layout(tuple(table), columns, constants)
+
+
+def sigma_names(campaign: Campaign, per_recording: bool) -> tuple[str, ...]:
+    """Names of the noise levels: one for the campaign or one per recording."""
+    return tuple(f"sigma[{r.name}]" for r in campaign.recordings) if per_recording else ("sigma",)
+
+
+def angular(unit: str) -> str:
+    """Unit of the same quantity for an angle: m becomes rad, N becomes N m, kg becomes kg m2."""
+    unit = re.sub(r"\bm(?=\d|\b)", "rad", unit)
+    return re.sub(r"\bN\b", "N m", re.sub(r"\bkg\b", "kg m2", unit))
+
+
+def instance_name(effect: Effect, parameter: EffectParameter, key: str | None) -> str:
+    """Name in theta of an effect's parameter; `key` is the case or recording it belongs to."""
+    return f"{effect.id}.{parameter.name}" + ("" if key is None else f"[{key}]")
+
+
+def _unit(campaign: Campaign, unit: str) -> str:
+    return angular(unit) if campaign.recordings[0].quantity == "angle" else unit
+
+
+def _keys(campaign: Campaign, parameter: EffectParameter) -> tuple[str | None, ...]:
+    if parameter.scope == "case":
+        return campaign.cases
+    if parameter.scope == "recording":
+        return tuple(r.name for r in campaign.recordings)
+    return (None,)
+
+
+def _instances(campaign: Campaign, effect: Effect, parameter: EffectParameter) -> tuple[str, ...]:
+    return tuple(instance_name(effect, parameter, key) for key in _keys(campaign, parameter))
+
+
+def _binds(
+    campaign: Campaign, effects: Sequence[Effect]
+) -> dict[str, tuple[Effect, EffectParameter]]:
+    binds: dict[str, tuple[Effect, EffectParameter]] = {}
+    for effect in effects:
+        if effect.needs_stop and not campaign.stop:
+            raise InputError(f"effect {effect.id}", "a campaign without a stop", "stop = true")
+        for slot, name in effect.binds.items():
+            if slot not in SLOTS:
+                raise InputError(f"effect {effect.id}", f"slot {slot!r}", ", ".join(SLOTS))
+            if slot in binds:
+                raise InputError(
+                    f"effect {effect.id}",
+                    f"slot {slot} taken by {binds[slot][0].id}",
+                    "one effect a slot",
+                )
+            binds[slot] = (effect, effect.parameter(name))
+    return binds
+
+
+def _add_physical(campaign: Campaign, binds: object, add: object) -> None:
+    assert isinstance(binds, dict) and callable(add)
+    shared = ("c1", "k1", "c2", "g") if campaign.stop else ("c1", "k1")
+    for name in shared:
+        if name not in binds:
+            lower = -np.inf if name == "g" else 0.0
+            add(name, _SHARED_UNITS[name], "physical", lower)
+    for case in campaign.cases:
+        add(f"k2[{case}]", "N/m", "physical", 0.0)
+
+
+def _maps(
+    campaign: Campaign,
+    effects: Sequence[Effect],
+    binds: dict[str, tuple[Effect, EffectParameter]],
+    position: dict[str, int],
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    law_parameters = [(e, p) for e in effects if e.law is not None for p in e.parameters]
+    shape = (len(campaign.recordings), len(SLOTS) + len(law_parameters))
+    columns = np.full(shape, -1, dtype=np.int64)
+    constants = np.zeros(shape)
+    if not campaign.stop:
+        constants[:, SLOTS.index("g")] = np.inf
+    for effect in effects:
+        for slot, value in effect.sets.items():
+            constants[:, SLOTS.index(slot)] = value
+    for r, recording in enumerate(campaign.recordings):
+        plain = {
+            "k2": f"k2[{recording.case}]",
+            **{n: f"{n}[{recording.name}]" for n in _NUISANCE_UNITS},
+        }
+        for i, slot in enumerate(SLOTS):
+            name = plain.get(slot, slot)
+            if slot in binds:
+                name = _own(binds[slot], recording.case, recording.name)
+            columns[r, i] = position.get(name, -1)
+        for j, owner in enumerate(law_parameters):
+            columns[r, len(SLOTS) + j] = position[_own(owner, recording.case, recording.name)]
+    return columns, constants
+
+
+def _own(owner: tuple[Effect, EffectParameter], case: str, recording: str) -> str:
+    effect, parameter = owner
+    key = {"campaign": None, "case": case, "recording": recording}[parameter.scope]
+    return instance_name(effect, parameter, key)
