@@ -1,0 +1,365 @@
+"""The rig's motion, integrated from event to event with SciPy's DOP853.
+
+An independent twin of the package's own simulators: it shares no code and no method with them.
+Every turning point ends a piece, so the displacement is monotone on a piece, and a surface
+y = const is crossed once or not at all: no impact is lost between two steps, however short. Events
+are located on the integrator's dense output.
+
+When contact ends for a unilateral obstacle (contact_no_tension, obstacle_mass): at the first
+instant at which its reaction falls through zero; a contact in which the reaction never was
+positive (a graze) ends at the gap. After that the mass is free until it has gone below the
+gap. The reaction is m2 y'' + c2 y' + k2 d + whatever other parts act between obstacle and mass.
+
+References: Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I (1993), II.5-6.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import DOP853
+from scipy.optimize import brentq
+
+from bayesimpact.errors import SimulationError
+from bayesimpact.trial.rig_parts import Law, Part, Piece, Site, State
+
+_FLIGHT, _CONTACT, _RELEASED = range(3)  # released: left by a unilateral obstacle, still above g
+_TURN, _SURFACE, _REACTION, _SLIP = range(4)
+_Integrator: Any = DOP853  # its type stubs, where installed, ask for arrays only
+_STALLS = 50  # pieces in a row that may last less than a femtosecond before giving up
+
+Watch = Callable[[float, State], float]
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """The true motion at the sampling instants.
+
+    Attributes
+    ----------
+    times : (n,), s
+    displacement, velocity : (n,), m and m/s
+    touches, leaves : instants at which contacts began and ended, s
+    """
+
+    times: NDArray[np.float64]
+    displacement: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    touches: tuple[float, ...]
+    leaves: tuple[float, ...]
+
+
+def move(
+    site: Site,
+    parts: tuple[Part, ...],
+    times: NDArray[np.float64],
+    *,
+    rtol: float = 1e-12,
+    atol: float = 1e-14,
+) -> Motion:
+    """Integrate the motion of `site` with `parts` added, from t = 0 to the last of `times`.
+
+    Parameters
+    ----------
+    times : (n,), s, increasing, starting at 0 or later
+    rtol, atol : tolerances of DOP853 per step
+
+    Raises
+    ------
+    SimulationError : the integrator failed, or events pile up without progress
+    """
+    run = _Run(site, parts, times, rtol, atol)
+    run.finish()
+    samples = run.samples
+    return Motion(times, samples[0], samples[1], tuple(run.touches), tuple(run.leaves))
+
+
+@dataclass(frozen=True)
+class _Sums:
+    """The forces of one piece: `drive` is all but dry friction, `level` the friction at rest."""
+
+    drive: Law
+    reaction: Watch
+    rhs: Callable[[float, NDArray[np.float64]], State]
+    level: float
+
+
+def _sums(site: Site, parts: tuple[Part, ...], piece: Piece) -> _Sums:
+    c1, k1, c2, k2, gap = site.c1, site.k1, site.c2, site.k2, piece.gap
+    sign, contact = piece.sign, piece.contact
+    carried = site.obstacle_mass if contact else 0.0
+    inertia = site.mass + carried
+    laws = [(p.in_reaction, p.law(piece)) for p in parts if p.law is not None]
+    free = [law for inside, law in laws if law is not None and not inside]
+    pushes = [law for inside, law in laws if law is not None and inside]
+    levels = [p.friction(piece) for p in parts if p.friction is not None]
+    dry = [level for level in levels if level is not None]
+    rates = [p.rates(piece) for p in parts if p.rates is not None]
+
+    def push(t: float, y: float, v: float, state: State) -> float:
+        total = c2 * v + k2 * (y - gap)
+        for law in pushes:
+            total += law(t, y, v, state)
+        return total
+
+    def drive(t: float, y: float, v: float, state: State) -> float:
+        total = c1 * v + k1 * y
+        if contact:
+            total += push(t, y, v, state)
+        for law in free:
+            total += law(t, y, v, state)
+        return total
+
+    def acceleration(t: float, y: float, v: float, state: State) -> float:
+        if sign == 0:
+            return 0.0
+        total = drive(t, y, v, state)
+        for level in dry:
+            total += sign * level(v)
+        return -total / inertia
+
+    def reaction(t: float, state: State) -> float:
+        y, v = state[0], state[1]
+        return push(t, y, v, state) + carried * acceleration(t, y, v, state)
+
+    def rhs(t: float, array: NDArray[np.float64]) -> State:
+        state: State = array.tolist()
+        y, v = state[0], state[1]
+        slope = [v, acceleration(t, y, v, state)]
+        for rate in rates:
+            slope.extend(rate(t, y, v, state))
+        return slope
+
+    return _Sums(drive, reaction, rhs, sum(level(0.0) for level in dry))
+
+
+class _Run:
+    """One recording in progress."""
+
+    def __init__(
+        self,
+        site: Site,
+        parts: tuple[Part, ...],
+        times: NDArray[np.float64],
+        rtol: float,
+        atol: float,
+    ) -> None:
+        self.site, self.parts, self.times = site, parts, times
+        self.rtol, self.atol = rtol, atol
+        self.t = 0.0
+        self.end = float(times[-1])
+        self.state: State = [site.y0, site.v0, *(s for part in parts for s in part.states)]
+        self.samples = np.empty((2, times.size))
+        self.filled = 0
+        self.gap = site.gap
+        self.touches: list[float] = []
+        self.leaves: list[float] = []
+        self.last_sign = 1
+        self.slip = 0  # direction in which friction has just given way
+        self.breaks = sorted(t for part in parts for t in part.times)
+        self.slowest = min((part.period for part in parts), default=inf) / 16
+        self.steps: dict[tuple[int, bool], float] = {}
+        self.mode = self._first_mode()
+
+    def _first_mode(self) -> int:
+        """A recording that starts beyond the gap starts in contact, without an exchange."""
+        if self.site.y0 <= self.gap:
+            return _FLIGHT
+        self.touches.append(0.0)
+        self.mode = _CONTACT
+        sign = 1 if self.site.v0 >= 0 else -1
+        if self.site.unilateral:
+            sums = _sums(self.site, self.parts, self._piece_going(sign))
+            if sums.reaction(0.0, self.state) <= 0:
+                self.touches.clear()
+                return _RELEASED
+        return _CONTACT
+
+    def finish(self) -> None:
+        """Go on to the last sampling instant."""
+        stalls = 0
+        while self.t <= self.end and self.filled < self.times.size:
+            before = self.t
+            self._next_piece()
+            stalls = stalls + 1 if self.t - before < 1e-15 else 0
+            if stalls > _STALLS:
+                raise SimulationError(f"{self.site.name}: no progress at t = {self.t} s")
+
+    def _piece_going(self, sign: int) -> Piece:
+        """The piece that starts here in this direction."""
+        marks = [self.gap]
+        for part in self.parts:
+            marks.extend(part.kinks)
+            marks.extend(self.gap + depth for depth in part.depths)
+        marks.sort()
+        y = self.state[0]
+        at = bisect_right(marks, y) if sign >= 0 else bisect_left(marks, y)
+        low = marks[at - 1] if at > 0 else -inf
+        high = marks[at] if at < len(marks) else inf
+        return Piece(self.mode == _CONTACT, self.gap, sign, low, high)
+
+    def _direction(self) -> int:
+        """Sign of the motion that follows; 0 when dry friction holds the mass."""
+        v = self.state[1]
+        if v != 0:
+            return 1 if v > 0 else -1
+        if self.slip:
+            return self.slip
+        sums = _sums(self.site, self.parts, self._piece_going(-self.last_sign))
+        force = sums.drive(self.t, self.state[0], 0.0, self.state)
+        if abs(force) <= sums.level and sums.level > 0:
+            return 0
+        if force == 0:
+            return -self.last_sign
+        return -1 if force > 0 else 1
+
+    def _next_piece(self) -> None:
+        sign = self._direction()
+        self.slip = 0
+        if self.mode == _FLIGHT and sign > 0 and self.state[0] >= self.gap:
+            self._touch()
+        piece = self._piece_going(sign)
+        sums = _sums(self.site, self.parts, piece)
+        if sign < 0 and self.mode == _CONTACT and self.state[0] <= self.gap and self._pulls(sums):
+            self._leave()  # turned back on the very surface
+            return
+        bound = next((t for t in self.breaks if t > self.t), inf)
+        key = (self.mode, sign == 0)
+        solver: Any = _Integrator(
+            sums.rhs,
+            self.t,
+            self.state,
+            min(bound, self.end + 1.0),
+            rtol=self.rtol,
+            atol=self.atol,
+            first_step=min(self.steps.get(key, 1e-4), min(bound, self.end + 1.0) - self.t),
+            max_step=self.slowest if sign == 0 else inf,
+        )
+        while solver.status == "running":
+            solver.step()
+            if solver.status == "failed":
+                raise SimulationError(f"{self.site.name}: DOP853 failed at t = {solver.t} s")
+            dense = solver.dense_output()
+            ends = (solver.t_old, solver.t, solver.y.tolist())
+            event, t = self._first_event(piece, sums, dense, *ends)
+            self._sample(dense, t)
+            if event is not None:
+                self._arrive(event, t, dense(t).tolist(), piece, sums)
+                return
+            self.steps[key] = solver.t - solver.t_old
+            if solver.t > self.end:
+                break
+        self.t, self.state = float(solver.t), solver.y.tolist()
+
+    def _sample(self, dense: Callable[..., NDArray[np.float64]], until: float) -> None:
+        """Fill in the samples before `until`; the one at the very end of a piece is the next's."""
+        upto = int(np.searchsorted(self.times, until, side="left"))
+        if upto > self.filled:
+            self.samples[:, self.filled : upto] = dense(self.times[self.filled : upto])[:2]
+            self.filled = upto
+
+    def _first_event(
+        self,
+        piece: Piece,
+        sums: _Sums,
+        dense: Callable[..., NDArray[np.float64]],
+        start: float,
+        stop: float,
+        last: State,
+    ) -> tuple[int | None, float]:
+        """The earliest event in a step, or (None, stop); each find narrows the search to `stop`.
+
+        `last` is the state there.
+        """
+        event: int | None = None
+        sign = piece.sign
+        if sign == 0:
+
+            def hold(t: float, state: State) -> float:
+                return sums.level - abs(sums.drive(t, state[0], 0.0, state))
+
+            if hold(stop, last) < 0:
+                event, stop = _SLIP, _crossing(lambda t: hold(t, dense(t).tolist()), start, stop)
+                last = dense(stop).tolist()
+        else:
+            if sign * last[1] <= 0:
+                event, stop = _TURN, _crossing(lambda t: sign * float(dense(t)[1]), start, stop)
+                last = dense(stop).tolist()
+            target = piece.high if sign > 0 else piece.low
+            if sign * (last[0] - target) >= 0:
+                event = _SURFACE
+                stop = _crossing(lambda t: sign * (target - float(dense(t)[0])), start, stop)
+                last = dense(stop).tolist()
+        if piece.contact and self.site.unilateral:
+
+            def reaction(t: float) -> float:
+                return sums.reaction(t, dense(t).tolist())
+
+            if sums.reaction(stop, last) < 0 and reaction(start) > 0:
+                event, stop = _REACTION, _crossing(reaction, start, stop)
+        return event, stop
+
+    def _arrive(self, event: int, t: float, state: State, piece: Piece, sums: _Sums) -> None:
+        """Carry out an event: set exactly what it says, change the mode."""
+        self.t, self.state = t, state
+        if piece.sign:
+            self.last_sign = piece.sign
+        if event == _TURN:
+            state[1] = 0.0
+        elif event == _SLIP:
+            self.slip = -1 if sums.drive(t, state[0], 0.0, state) > 0 else 1
+        elif event == _REACTION:
+            self._leave()
+        else:
+            self._reach(piece, sums)
+
+    def _reach(self, piece: Piece, sums: _Sums) -> None:
+        self.state[0] = piece.high if piece.sign > 0 else piece.low
+        if self.state[0] != self.gap:
+            return
+        if piece.sign > 0 and self.mode == _FLIGHT:
+            self._touch()
+        elif piece.sign < 0 and self.mode == _RELEASED:
+            self.mode = _FLIGHT
+        elif piece.sign < 0 and self.mode == _CONTACT and self._pulls(sums):
+            self._leave()
+
+    def _pulls(self, sums: _Sums) -> bool:
+        """Whether contact ends when the mass goes back through the gap."""
+        return not self.site.unilateral or sums.reaction(self.t, self.state) <= 0
+
+    def _touch(self) -> None:
+        self.touches.append(self.t)
+        self.mode = _CONTACT
+        self.state[1] *= self.site.mass / (self.site.mass + self.site.obstacle_mass)
+
+    def _leave(self) -> None:
+        self.leaves.append(self.t)
+        self.gap = self.site.gap + len(self.leaves) * self.site.gap_step
+        self.mode = _RELEASED if self.state[0] > self.gap else _FLIGHT
+
+
+def _crossing(value: Callable[[float], float], start: float, stop: float) -> float:
+    """Where `value`, positive after `start`, falls to zero; `start` when it never was positive."""
+    if value(stop) == 0:
+        return stop
+    left = start
+    for halvings in range(52):
+        if value(left) > 0:
+            return float(brentq(value, left, stop, xtol=1e-16, rtol=9e-16))
+        left = start + (stop - start) * 2.0 ** -(halvings + 1)
+    return start
+
+
+def sampling(rate: float, duration: float) -> NDArray[np.float64]:
+    """Sampling instants 0, 1/rate, ... before `duration`, (round(rate * duration),), s."""
+    return np.arange(round(rate * duration)) / rate
+
+
+__all__ = ["Motion", "move", "sampling"]
