@@ -10,8 +10,8 @@ from bayesimpact.errors import InputError
 def bundled_campaign(name: str = "paper") -> Path:
     """Folder of a bundled campaign.
 
-    An installed package carries the folders of `data/` as `bayesimpact/bundled`; a checkout has them
-    beside the package.
+    An installed package carries the folders of `data/` as `bayesimpact/bundled`; a checkout has
+    them beside the package.
 
     Raises
     ------

@@ -279,11 +279,11 @@ def _priors(
     for name, prior in table.priors.items():
         if name not in names and not _EFFECT_PARAMETER.fullmatch(name):
             near = get_close_matches(name, names, 1, 0.4)
-            hint = f"did you mean {near[0]}? All: " if near else ""
+            hint = f" (did you mean {near[0]}?)" if near else ""
             raise InputError(
                 f"{where}, [priors], key {name}",
-                "no parameter of this campaign",
-                f"{hint}{', '.join(names)}, or <effect>.<parameter>",
+                f"no parameter of this campaign{hint}",
+                f"{', '.join(names)}, or <effect>.<parameter>",
             )
         if isinstance(prior, UniformTable | LogUniformTable) and prior.lower >= prior.upper:
             raise InputError(

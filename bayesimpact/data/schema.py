@@ -182,26 +182,21 @@ def described(value: Any) -> str:
 
 def _refusal(problem: Any, document: dict[str, Any], where: str) -> InputError:
     table, path, key = _place(tuple(problem["loc"]), document)
+    whole = len(problem["loc"]) > 1 and table is CampaignTable  # an entry itself, not a key in it
+    place = ", ".join([where, *path] if whole else [where, *path, f"key {key}"])
     kind = problem["type"]
-    place = ", ".join([where, *path, f"key {key}"])
     if kind == "extra_forbidden":
         near = get_close_matches(key, table.model_fields, 1, 0.5)
-        hint = f"did you mean {near[0]}? All: " if near else ""
-        return InputError(place, "an unknown key", hint + ", ".join(table.model_fields))
+        hint = f" (did you mean {near[0]}?)" if near else ""
+        return InputError(place, f"an unknown key{hint}", ", ".join(table.model_fields))
     if kind == "union_tag_invalid":
-        tag = problem["ctx"]["tag"]
-        return InputError(place, f'"{tag}"', str(problem["ctx"]["expected_tags"]).replace("'", '"'))
-    if kind == "union_tag_not_found":
-        return InputError(place, described(problem["input"]), _tag_hint(key))
+        tags = str(problem["ctx"]["expected_tags"]).replace("'", '"')
+        return InputError(place, f'"{problem["ctx"]["tag"]}"', tags)
     accepted = table.model_fields[key].description or ""
+    if whole and key == "priors":
+        accepted = f'{{ distribution = "..." }} with one of {", ".join(_TAGGED["distribution"])}'
     found = "nothing" if kind == "missing" else described(problem["input"])
     return InputError(place, found, accepted)
-
-
-def _tag_hint(key: str) -> str:
-    if key == "smoothing":
-        return MeasurementTable.model_fields["smoothing"].description or ""
-    return f'{{ distribution = "..." }} with one of {", ".join(_TAGGED["distribution"])}'
 
 
 def _place(loc: tuple[Any, ...], document: dict[str, Any]) -> tuple[type[_Table], list[str], str]:

@@ -272,3 +272,53 @@ def test_real_recordings(name: str, sizes: list[int], interval: float) -> None:
     for recording in campaign.recordings:
         assert recording.quantity == "angle"
         assert recording.interval == pytest.approx(interval, rel=1e-8)
+
+
+def test_damaged_files_load_or_are_refused(tmp_path: Path) -> None:
+    """Random damage to any file ends in a campaign or in an InputError, in nothing else."""
+    rng = np.random.default_rng(7)
+    good = {"campaign": TOML + ALL_TABLES, "a": csv(decay(60, 0.01), interval=0.01)}
+    scraps = [
+        b"",
+        b'"',
+        b"[",
+        b"]",
+        b"=",
+        b"\n",
+        b",",
+        b";",
+        b".",
+        b"-",
+        b"\xff",
+        b"9" * 400,
+        b"{}",
+    ]
+    loaded = 0
+    for trial in range(400):
+        name = ("campaign", "a")[trial % 2]
+        data = bytearray(good[name].encode())
+        for _ in range(rng.integers(1, 4)):
+            at = int(rng.integers(len(data)))
+            data[at : at + int(rng.integers(0, 9))] = scraps[rng.integers(len(scraps))]
+        files = {**good, name: bytes(data)}
+        write(tmp_path, files["campaign"], a=files["a"], b=csv(decay(60, 0.01), interval=0.01))
+        try:
+            load_campaign(tmp_path)
+            loaded += 1
+        except InputError as error:
+            assert str(tmp_path) in str(error)
+    assert 0 < loaded < 200
+
+
+ALL_TABLES = """
+[measurement]
+noise_um = 5
+smoothing = { kind = "savgol", window = 5, polyorder = 2 }
+[priors]
+k1 = { distribution = "normal", mean = 800, sd = 50.0 }
+[beam.1]
+length_mm = 110
+width_mm = 20
+thickness_mm = 5
+youngs_modulus_mpa = 2.1e5
+"""

@@ -1,0 +1,136 @@
+"""What `bayesimpact check` says: what was read, and what will be estimated."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bayesimpact.data.campaign import Campaign, Measurement
+from bayesimpact.data.period import rough_period
+from bayesimpact.data.recording import Recording
+from bayesimpact.model.parameters import build_layout
+
+BARS = "▁▂▃▄▅▆▇█"
+COLUMNS = 40
+
+
+def campaign_text(campaign: Campaign) -> str:
+    """Recordings, measuring chain, unknowns and priors, as lines for a terminal."""
+    angle = campaign.recordings[0].quantity == "angle"
+    stop = f"stop, cases {', '.join(campaign.cases)}" if campaign.stop else "no stop"
+    blocks = [
+        f"{campaign.name}\n"
+        f"{'inertia' if angle else 'mass'} {campaign.mass:g} {'kg m2' if angle else 'kg'}, {stop}, "
+        f"recordings of {campaign.recordings[0].quantity}, data {campaign.sha256[:12]}",
+        _recordings_block(campaign),
+        _chain_block(campaign.measurement, "rad" if angle else "m"),
+        _unknowns_block(campaign),
+    ]
+    if campaign.beams:
+        rows = [f"  case {c}: {b.stiffness:.5g} N/m" for c, b in campaign.beams.items()]
+        blocks.append("\n".join(["k2 from beam theory (3 E I / l^3)", *rows]))
+    return "\n\n".join(blocks)
+
+
+def campaign_warnings(campaign: Campaign) -> list[str]:
+    """What a user should know before trusting a fit of these recordings."""
+    warnings = []
+    smoothing = campaign.measurement.smoothing
+    if smoothing is not None and smoothing.declared_window > smoothing.window:
+        warnings.append(
+            f"smoothing window {smoothing.declared_window} is even and taken as "
+            f"{smoothing.window}, as MATLAB's smooth does"
+        )
+    for recording in campaign.recordings:
+        warnings += [f"{recording.name}: {text}" for text in _recording_warnings(recording)]
+    return warnings
+
+
+def _recording_warnings(recording: Recording) -> list[str]:
+    period = rough_period(recording.samples, recording.interval)
+    assert period is not None  # load_campaign refuses recordings without one
+    warnings = []
+    per_period = period / recording.interval
+    if per_period < 20:
+        warnings.append(f"only {per_period:.0f} samples per period: contacts are seen poorly")
+    if recording.duration < 5 * period:
+        warnings.append(f"only {recording.duration / period:.1f} periods: damping is seen poorly")
+    rest = np.median(recording.samples[recording.samples.size // 2 :])
+    largest = int(np.argmax(np.abs(recording.samples - rest)))
+    late = largest * recording.interval
+    if late > period:
+        warnings.append(
+            f"the largest excursion comes {late:.3g} s after the first sample: if the recording "
+            f"begins before the release, set start_s = {recording.start + late:.6g}"
+        )
+    return warnings
+
+
+def _recordings_block(campaign: Campaign) -> str:
+    angle = campaign.recordings[0].quantity == "angle"
+    scale, unit = (180 / np.pi, "deg") if angle else (1e3, "mm")
+    head = ["recording", "case", "samples", "Hz", "start s", "length s", "period s"]
+    rows = [[*head, f"first {unit}", f"largest {unit}", "decay"]]
+    for r in campaign.recordings:
+        period = rough_period(r.samples, r.interval)
+        swing = np.abs(r.samples - np.median(r.samples)).max() * scale
+        numbers = [1 / r.interval, r.start, r.duration, period, r.samples[0] * scale, swing]
+        row = [r.name, r.case or "-", str(r.samples.size), *(f"{x:.4g}" for x in numbers)]
+        rows.append([*row, envelope_bars(r)])
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    lines = []
+    for row in rows:
+        cells = [cell.rjust(width) for cell, width in zip(row, widths, strict=True)]
+        cells[0], cells[-1] = row[0].ljust(widths[0]), row[-1]
+        lines.append("  ".join(cells))
+    return "\n".join(lines)
+
+
+def envelope_bars(recording: Recording) -> str:
+    """Largest excursion in equal spans of time of a period or more, as a row of bars."""
+    excursion = np.abs(recording.samples - np.median(recording.samples))
+    period = rough_period(recording.samples, recording.interval) or recording.duration
+    count = min(COLUMNS, max(1, int(recording.duration / period)))
+    spans = np.array_split(excursion, count)
+    heights = np.array([span.max() for span in spans]) / excursion.max()
+    return "".join(BARS[int(h)] for h in np.ceil(heights * len(BARS)).clip(1) - 1)
+
+
+def _chain_block(measurement: Measurement, unit: str) -> str:
+    if measurement.noise is None:
+        noise = "not stated: estimated from the recordings"
+    else:
+        noise = f"{measurement.noise:.3g} {unit} (stated)"
+    smoothing = measurement.smoothing
+    if smoothing is None:
+        filtered = "none stated"
+    elif smoothing.kind == "lag":
+        filtered = f"first-order lag, time constant {smoothing.time_constant:g} s"
+    else:
+        filtered = f"Savitzky-Golay, window {smoothing.window} samples, order {smoothing.polyorder}"
+    sds = f"mass {measurement.mass_sd:.3g}, clock {measurement.clock_sd:.3g}"
+    return "\n".join(
+        [
+            "measuring chain",
+            f"  noise                 {noise}",
+            f"  smoothing             {filtered}",
+            f"  relative uncertainty  {sds}, gain {measurement.gain_sd:.3g}",
+        ]
+    )
+
+
+def _unknowns_block(campaign: Campaign) -> str:
+    parameters = build_layout(campaign).parameters
+    families: dict[tuple[str, str], list[str]] = {}
+    for parameter in parameters:
+        key = (parameter.name.partition("[")[0], parameter.unit)
+        families.setdefault(key, []).append(parameter.name)
+    lines = [f"will be estimated: {len(parameters)} parameters"]
+    for (_, unit), names in families.items():
+        shown = ", ".join(names) if len(names) <= 4 else f"{names[0]} .. {names[-1]} ({len(names)})"
+        lines.append(f"  {shown}  {unit}")
+    lines.append("priors")
+    for name, table in campaign.priors.items():
+        values = ", ".join(f"{k} = {v:g}" for k, v in table.items() if k != "distribution")
+        lines.append(f"  {name}: {table['distribution']}, {values}")
+    lines.append("  wide defaults for " + ("the others" if campaign.priors else "all"))
+    return "\n".join(lines)
