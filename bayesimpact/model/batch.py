@@ -1,0 +1,125 @@
+"""Batches of parameter vectors over all recordings of a campaign, compiled, on one or more cores.
+
+Arguments as in the doors of `simulate`. `rows` and `items` bound the parameter vectors and the
+recordings of one share of the work; every number is computed within one share, in one order, so
+that results do not depend on how the work is shared out.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.model.compiled import compiled
+from bayesimpact.model.kernel import run, workspace
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Span = tuple[int, int]
+
+#: Fewer samples than this are not worth waking other threads for.
+SAMPLES_WORTH_THREADS = 100_000
+
+
+def parts(batch: int, samples: int) -> int:
+    """Return into how many shares a job of `batch` x `samples` samples is cut."""
+    threads = int(numba.get_num_threads())
+    if threads == 1 or batch * samples < SAMPLES_WORTH_THREADS:
+        return 1
+    return min(4 * threads, max(batch, threads))
+
+
+@compiled(error_model="numpy")
+def share(part: int, parts: int, batch: int, recordings: int) -> tuple[Span, Span]:
+    """Return the rows and the recordings of one of `parts` equal shares of the work."""
+    if batch >= parts:
+        return (part * batch // parts, (part + 1) * batch // parts), (0, recordings)
+    return (0, batch), (part * recordings // parts, (part + 1) * recordings // parts)
+
+
+@compiled(error_model="numpy")
+def gather(q: Floats, theta: Floats, columns: Ints, constants: Floats) -> None:
+    """Fill q (11,) of one recording from theta and the constants."""
+    for i in range(11):
+        column = columns[i]
+        q[i] = theta[column] if column >= 0 else constants[i]
+
+
+@compiled(error_model="numpy")
+def sums(
+    theta: Floats, columns: Ints, constants: Floats, mass: float, samples: Floats, starts: Ints,
+    counts: Ints, intervals: Floats, rows: Span, items: Span, sse: Floats, codes: Ints,
+) -> None:  # fmt: skip
+    """Fill one share of `sse` and `codes` (B, R)."""
+    q = np.empty(11)
+    nothing = np.empty(0)
+    no_events = np.empty((0, 2))
+    tables, keys = workspace()
+    for b in range(rows[0], rows[1]):
+        for r in range(items[0], items[1]):
+            gather(q, theta[b], columns[r], constants[r])
+            data = samples[starts[r] : starts[r] + counts[r]]
+            sse[b, r], _, codes[b, r] = run(
+                q, mass, intervals[r], counts[r], data, nothing, nothing, no_events, tables, keys
+            )
+
+
+@compiled(error_model="numpy", parallel=True)
+def sums_in_parts(
+    theta: Floats, columns: Ints, constants: Floats, mass: float, samples: Floats, starts: Ints,
+    counts: Ints, intervals: Floats, parts: int, sse: Floats, codes: Ints,
+) -> None:  # fmt: skip
+    """Fill `sse` and `codes` (B, R), shares in parallel."""
+    for part in numba.prange(parts):
+        rows, items = share(part, parts, sse.shape[0], sse.shape[1])
+        sums(
+            theta, columns, constants, mass, samples, starts, counts, intervals, rows, items,
+            sse, codes,
+        )  # fmt: skip
+
+
+@compiled(error_model="numpy")
+def predict(
+    theta: Floats, columns: Ints, constants: Floats, mass: float, counts: Ints, intervals: Floats,
+    rows: Span, items: Span, values: Floats, codes: Ints,
+) -> None:  # fmt: skip
+    """Fill one share of `values` (B, N) and `codes` (B, R); failed recordings become nan."""
+    q = np.empty(11)
+    nothing = np.empty(0)
+    no_events = np.empty((0, 2))
+    tables, keys = workspace()
+    for b in range(rows[0], rows[1]):
+        start = counts[: items[0]].sum()
+        for r in range(items[0], items[1]):
+            gather(q, theta[b], columns[r], constants[r])
+            out = values[b, start : start + counts[r]]
+            _, _, codes[b, r] = run(
+                q, mass, intervals[r], counts[r], nothing, out, nothing, no_events, tables, keys
+            )
+            if codes[b, r] != 0:
+                out[:] = np.nan
+            start += counts[r]
+
+
+@compiled(error_model="numpy", parallel=True)
+def predict_in_parts(
+    theta: Floats, columns: Ints, constants: Floats, mass: float, counts: Ints, intervals: Floats,
+    parts: int, values: Floats, codes: Ints,
+) -> None:  # fmt: skip
+    """Fill `values` (B, N) and `codes` (B, R), shares in parallel."""
+    for part in numba.prange(parts):
+        rows, items = share(part, parts, codes.shape[0], codes.shape[1])
+        predict(theta, columns, constants, mass, counts, intervals, rows, items, values, codes)
+
+
+@compiled(error_model="numpy")
+def single(
+    q: Floats, mass: float, interval: float, out: Floats, speeds: Floats, events: Floats
+) -> tuple[float, int, int]:
+    """Simulate one recording into `out`, `speeds` and `events`; as `kernel.run`."""
+    tables, keys = workspace()
+    done: tuple[float, int, int] = run(
+        q, mass, interval, out.size, np.empty(0), out, speeds, events, tables, keys
+    )
+    return done

@@ -1,0 +1,288 @@
+"""The base oscillator's compiled entry points, and its one Python door.
+
+    m y'' + c1 y' + k1 y + [c2 y' + k2 (y - g)] H(y - g) = A sin(w t + phase)   (Eq. 6)
+
+Per recording the kernel takes q = (c1, k1, c2, g, k2, y0, v0, A, w, phase, offset), SI units, t = 0
+at the first sample; measured = y + offset. A campaign's parameter vector theta feeds the q of every
+recording: q_i = theta[columns[r, i]], or constants[r, i] where columns[r, i] is -1. No stop: g = inf,
+c2 = k2 = 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from bayesimpact.errors import InputError, SimulationError
+from bayesimpact.model import batch as compiled_batch
+from bayesimpact.model import kernel
+from bayesimpact.model.batch import Floats, Ints
+from bayesimpact.model.kernel import Q
+
+#: What a failure code means.
+CODES: Mapping[int, str] = MappingProxyType(
+    {
+        kernel.OK: "ok",
+        kernel.NOT_FINITE: "a parameter is not finite",
+        kernel.BAD_MASS: "the mass is not positive",
+        kernel.BAD_STIFFNESS: "k1 is not positive",
+        kernel.BAD_DAMPING: "c1 is negative",
+        kernel.BAD_CONTACT: "c2 or k2 is negative",
+        kernel.BAD_GAP: "the gap is not a number, or minus infinity",
+        kernel.BAD_FREQUENCY: "the forcing frequency is negative",
+        kernel.BAD_SAMPLING: "the interval is not positive, or there are no samples",
+        kernel.TOO_MANY_EVENTS: "too many impacts for the number of samples",
+        kernel.SEARCH_FAILED: "the search for the next event did not converge",
+        kernel.OVERFLOW: "the motion overflows",
+    }
+)
+
+
+def sums_of_squares(
+    theta: ArrayLike,
+    columns: ArrayLike,
+    constants: ArrayLike,
+    mass: float,
+    samples: ArrayLike,
+    starts: ArrayLike,
+    counts: ArrayLike,
+    intervals: ArrayLike,
+) -> tuple[Floats, Ints]:
+    """Compare a batch of parameter vectors with all recordings, in one compiled call.
+
+    Parameters
+    ----------
+    theta : (B, d) parameter vectors, SI units
+    columns : (R, 11) where each q of a recording stands in theta; -1: take `constants`
+    constants : (R, 11) values of the q that are not in theta
+    mass : kg
+    samples : (N,) measured displacement, m, of all recordings
+    starts, counts : (R,) first sample and number of samples of every recording
+    intervals : (R,) sampling intervals, s
+
+    Returns
+    -------
+    (B, R) sums of (sample - offset - y)^2, m^2, inf where a simulation failed; (B, R) codes, see
+    `CODES`. The numbers do not depend on the number of threads.
+    """
+    model = _model(theta, columns, constants, intervals, counts)
+    data, first = _floats(samples, 1), _ints(starts, 1)
+    batch, recordings = model.theta.shape[0], model.columns.shape[0]
+    if first.size != recordings:
+        raise InputError("starts", f"{first.size} values", f"{recordings}, one per recording")
+    if np.any(first < 0) or np.any(first + model.counts > data.size):
+        raise InputError("starts", "recordings beyond the samples", f"within 0..{data.size}")
+    sse = np.empty((batch, recordings))
+    codes = np.empty((batch, recordings), dtype=np.int64)
+    parts = compiled_batch.parts(batch, int(model.counts.sum()))
+    arguments = (
+        model.theta, model.columns, model.constants, float(mass), data, first, model.counts,
+        model.intervals,
+    )  # fmt: skip
+    if parts == 1:
+        compiled_batch.sums(*arguments, (0, batch), (0, recordings), sse, codes)
+    else:
+        compiled_batch.sums_in_parts(*arguments, parts, sse, codes)
+    return sse, codes
+
+
+def predictions(
+    theta: ArrayLike,
+    columns: ArrayLike,
+    constants: ArrayLike,
+    mass: float,
+    counts: ArrayLike,
+    intervals: ArrayLike,
+    n_total: int,
+) -> tuple[Floats, Ints]:
+    """Predict what every recording would measure, offset included.
+
+    Parameters as in `sums_of_squares`; n_total is the sum of `counts`. Returns (B, n_total) values,
+    m, recordings one after the other, nan where a simulation failed, and (B, R) codes.
+    """
+    model = _model(theta, columns, constants, intervals, counts)
+    batch, recordings = model.theta.shape[0], model.columns.shape[0]
+    if int(model.counts.sum()) != n_total:
+        raise InputError("n_total", str(n_total), f"the sum of counts, {model.counts.sum()}")
+    values = np.empty((batch, n_total))
+    codes = np.empty((batch, recordings), dtype=np.int64)
+    parts = compiled_batch.parts(batch, n_total)
+    arguments = (
+        model.theta, model.columns, model.constants, float(mass), model.counts, model.intervals
+    )  # fmt: skip
+    if parts == 1:
+        compiled_batch.predict(*arguments, (0, batch), (0, recordings), values, codes)
+    else:
+        compiled_batch.predict_in_parts(*arguments, parts, values, codes)
+    return values, codes
+
+
+def trajectory(q: ArrayLike, mass: float, interval: float, out: Floats) -> int:
+    """Write the displacement (without the offset) of one recording into `out` (n,); return the
+    code.
+
+    q : (11,) parameters in the order of `kernel.Q`, SI units; interval in s; out in m.
+    """
+    values = np.array(q, dtype=np.float64)
+    if values.shape != (11,):
+        raise InputError("q", f"shape {values.shape}", "(11,)")
+    values[10] = 0.0
+    code = compiled_batch.single(
+        values, float(mass), float(interval), out, np.empty(0), np.empty((0, 2))
+    )[2]
+    return int(code)
+
+
+@dataclass(frozen=True, slots=True)
+class Trajectory:
+    """A simulated motion, SI units, read-only arrays.
+
+    times, displacement, velocity : (n,) at the samples
+    impacts : (k, 3) entry time (s), entry speed (m/s) and exit time (s) of every contact that
+    begins after
+        t = 0 and within the recording; nan as exit time of a contact that outlasts it
+    """
+
+    times: Floats
+    displacement: Floats
+    velocity: Floats
+    impacts: Floats
+
+
+def simulate(
+    *,
+    mass: float,
+    c1: float,
+    k1: float,
+    c2: float = 0.0,
+    g: float = np.inf,
+    k2: float = 0.0,
+    y0: float,
+    v0: float,
+    A: float = 0.0,
+    w: float = 0.0,
+    phase: float = 0.0,
+    interval: float,
+    n: int,
+) -> Trajectory:
+    """Simulate one recording exactly.
+
+    Parameters
+    ----------
+    mass : kg
+    c1, k1 : damping (N s/m) and stiffness (N/m) of the oscillator
+    c2, g, k2 : damping (N s/m), gap (m, inf: no stop) and stiffness (N/m) of the stop
+    y0, v0 : displacement (m) and velocity (m/s) at the first sample
+    A, w, phase : the force A sin(w t + phase), N, rad/s, rad
+    interval : s between samples
+    n : number of samples
+
+    Raises
+    ------
+    InputError : an argument is not a number, or not one that the model accepts
+    SimulationError : the motion overflows or has too many impacts
+    """
+    named = {
+        "c1": c1, "k1": k1, "c2": c2, "g": g, "k2": k2, "y0": y0, "v0": v0, "A": A, "w": w,
+        "phase": phase,
+    }  # fmt: skip
+    q = np.array([_number(name, value) for name, value in named.items()] + [0.0])
+    if isinstance(n, bool) or int(n) != n or n < 1:
+        raise InputError("n", repr(n), "a whole number of samples, at least 1")
+    mass, interval = _number("mass", mass), _number("interval", interval)
+    displacement, velocity = np.empty(int(n)), np.empty(int(n))
+    code = int(kernel.check(q, mass, interval, int(n)))
+    if code != kernel.OK:
+        raise InputError("simulate", CODES[code], "see the docstring of `simulate`")
+    events = np.empty((1024, 2))
+    _, count, code = compiled_batch.single(q, mass, interval, displacement, velocity, events)
+    if count > len(events) and code == kernel.OK:
+        events = np.empty((count, 2))
+        _, count, code = compiled_batch.single(q, mass, interval, displacement, velocity, events)
+    if code != kernel.OK:
+        raise SimulationError(CODES[code])
+    events = events[:count]
+    if len(events) and events[0, 1] < 0.0:  # the first event leaves the contact of the start
+        events = events[1:]
+    entries, exits = events[0::2], events[1::2]
+    impacts = np.full((len(entries), 3), np.nan)
+    impacts[:, :2] = entries
+    impacts[: len(exits), 2] = exits[:, 0]
+    times: Floats = np.arange(int(n), dtype=np.float64) * interval
+    for array in (times, displacement, velocity, impacts):
+        array.flags.writeable = False
+    return Trajectory(times, displacement, velocity, impacts)
+
+
+@dataclass(frozen=True, slots=True)
+class _Model:
+    theta: Floats
+    columns: Ints
+    constants: Floats
+    intervals: Floats
+    counts: Ints
+
+
+def _model(
+    theta: ArrayLike,
+    columns: ArrayLike,
+    constants: ArrayLike,
+    intervals: ArrayLike,
+    counts: ArrayLike,
+) -> _Model:
+    model = _Model(
+        _floats(theta, 2), _ints(columns, 2), _floats(constants, 2), _floats(intervals, 1),
+        _ints(counts, 1),
+    )  # fmt: skip
+    recordings = model.columns.shape[0]
+    shapes = (
+        ("columns", model.columns.shape, (recordings, 11)),
+        ("constants", model.constants.shape, (recordings, 11)),
+        ("intervals", model.intervals.shape, (recordings,)),
+        ("counts", model.counts.shape, (recordings,)),
+    )
+    for name, found, expected in shapes:
+        if found != expected:
+            raise InputError(name, f"shape {found}", f"shape {expected}")
+    if model.columns.size and model.columns.max() >= model.theta.shape[1]:
+        raise InputError(
+            "columns",
+            f"index {model.columns.max()}",
+            f"below {model.theta.shape[1]}, theta's width",
+        )
+    return model
+
+
+def _floats(values: ArrayLike, ndim: int) -> Floats:
+    view: Floats = _read_only(np.ascontiguousarray(values, dtype=np.float64), ndim)
+    return view
+
+
+def _ints(values: ArrayLike, ndim: int) -> Ints:
+    view: Ints = _read_only(np.ascontiguousarray(values, dtype=np.int64), ndim)
+    return view
+
+
+def _read_only(array: Any, ndim: int) -> Any:
+    """A read-only view: one compiled version serves writable and read-only arrays."""
+    if array.ndim != ndim:
+        raise InputError("array", f"{array.ndim} dimensions", f"{ndim}")
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
+def _number(name: str, value: object) -> float:
+    if isinstance(value, bool | complex | str) or not np.isscalar(value):
+        raise InputError(name, repr(value), "a number")
+    return float(value)  # type: ignore[arg-type]
+
+
+__all__ = [
+    "CODES", "Q", "Trajectory", "predictions", "simulate", "sums_of_squares", "trajectory",
+]  # fmt: skip
