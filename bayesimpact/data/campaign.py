@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
@@ -94,3 +94,11 @@ class Campaign:
     def cases(self) -> tuple[str, ...]:
         """Obstacles in order of first appearance; () without a stop."""
         return tuple(dict.fromkeys(r.case for r in self.recordings)) if self.stop else ()
+
+    def truncated(self, duration: float) -> Campaign:
+        """The same campaign with only the first `duration` seconds of every recording."""
+        kept = tuple(
+            replace(r, samples=r.samples[: max(2, int(duration / r.interval) + 1)])
+            for r in self.recordings
+        )
+        return replace(self, recordings=kept)

@@ -16,10 +16,13 @@ from numpy.typing import NDArray
 from bayesimpact.data.campaign import Campaign, Smoothing
 from bayesimpact.model import measurement
 from bayesimpact.model.effects.effect import Effect, address
+from bayesimpact.model.general import integrate_many
 from bayesimpact.model.parameters import BASE_SLOTS, SLOTS, Layout, build_layout, instance_name
+from bayesimpact.model.simulate import predictions
 
 Array = NDArray[np.float64]
 _OFFSET = SLOTS.index("offset")
+_IDENTITY = np.arange(len(BASE_SLOTS), dtype=np.int64)[None]  # theta that is already a slot vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +105,12 @@ class Oscillator:
                 found.append((effect, np.array(rows, dtype=np.int64)))
         return tuple(found)
 
+    def recording_columns(self, r: int) -> NDArray[np.int64]:
+        """Positions in theta of everything that recording `r` depends on, sorted, (k,)."""
+        used = [self.layout.columns[r][self.layout.columns[r] >= 0]]
+        used += [positions[r] for _, positions in self.sensors]
+        return np.unique(np.concatenate(used))
+
     @property
     def is_plain(self) -> bool:
         """True when predictions are the base simulator's plus the offset: nothing between it and the data."""
@@ -129,8 +138,6 @@ class Oscillator:
 
     def motion(self, r: int, q: Array, count: int) -> Array:
         """True displacement of recording `r`, (B, count), m, for slot vectors (B, Q)."""
-        out = np.empty((q.shape[0], count))
-        intervals = np.full(q.shape[0], self.intervals[r])
         mass = self.campaign.mass
         if self.is_base:
             from bayesimpact.model.simulate import trajectories

@@ -1,0 +1,106 @@
+"""Default priors: wide, scaled by what the recordings show at a glance, the same for every model of a campaign.
+
+| parameter | default prior |
+|---|---|
+| c1 | uniform, 0 to critical damping of the suspension |
+| k1 | uniform, 0 to 100 times the quick estimate |
+| c2 | uniform, 0 to 20 times critical damping in contact |
+| g, y0, offset | uniform, +- 20 times the largest displacement |
+| v0 | uniform, +- 20 times the largest speed |
+| k2 | uniform, 0 to 1000 times the larger of the quick estimates of k1 and k2 |
+| sigma | log-uniform over eight decades about the estimate; log-normal, 10 %, where campaign.toml states the noise |
+| added effects | half-normal (normal where both signs are admissible) of a physical scale, log-normal for shapes |
+
+Campaign.toml's [priors] replace any of them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.priors import (
+    HalfNormal,
+    LogNormal,
+    LogUniform,
+    Normal,
+    Prior,
+    Priors,
+    Uniform,
+    prior_from_table,
+)
+from bayesimpact.model.effects.effect import Effect, EffectParameter, Scales
+from bayesimpact.model.oscillator import Oscillator
+from bayesimpact.response.estimates import Estimates
+
+SHAPE_WIDTH = 1.5  # of the log-normal prior of a depth, a time constant, a frequency
+
+
+def default_priors(
+    oscillator: Oscillator, estimates: Estimates, noise: Noise, scales: Scales | None = None
+) -> Priors:
+    """One prior per parameter, in the order of the layout; `scales` are needed for added effects."""
+    campaign = oscillator.campaign
+    return Priors(
+        tuple(
+            _stated(campaign, parameter.name)
+            or _default(parameter.name, oscillator, estimates, noise, scales)
+            for parameter in oscillator.layout.parameters
+        )
+    )
+
+
+def _stated(campaign: Campaign, name: str) -> Prior | None:
+    """The campaign's own prior: by the full name, or by the name without its case or recording."""
+    for key in (name, name.split("[")[0]):
+        if key in campaign.priors:
+            return prior_from_table(key, dict(campaign.priors[key]))
+    return None
+
+
+def _default(
+    name: str, oscillator: Oscillator, estimates: Estimates, noise: Noise, scales: Scales | None
+) -> Prior:
+    campaign = oscillator.campaign
+    if "." in name:
+        assert scales is not None
+        effect, parameter = _owner(oscillator, name)
+        return effect_prior(effect, parameter, scales)
+    kind = name.split("[")[0]
+    if kind == "sigma":
+        if campaign.measurement.noise is not None:
+            return LogNormal(campaign.measurement.noise, 0.1)
+        return LogUniform(1e-4 * noise.level, 1e4 * noise.level)
+    reach = 20 * max(float(np.ptp(r.samples)) for r in campaign.recordings)
+    mass, k1 = campaign.mass, estimates.k1
+    stiffest = max([k1, *estimates.k2.values()])
+    ranges = {
+        "c1": (0.0, 2 * np.sqrt(k1 * mass)),
+        "k1": (0.0, 100 * k1),
+        "c2": (0.0, 40 * np.sqrt(stiffest * mass)),
+        "k2": (0.0, 1000 * stiffest),
+        "v0": (-reach * np.sqrt(stiffest / mass), reach * np.sqrt(stiffest / mass)),
+    }
+    return Uniform(*ranges.get(kind, (-reach, reach)))
+
+
+def _owner(oscillator: Oscillator, name: str) -> tuple[Effect, EffectParameter]:
+    effect_id, rest = name.split(".", 1)
+    for effect in oscillator.effects:
+        if effect.id == effect_id:
+            return effect, effect.parameter(rest.split("[")[0])
+    raise KeyError(name)
+
+
+def effect_prior(effect: Effect, parameter: EffectParameter, scales: Scales) -> Prior:
+    """Prior of an effect's parameter at its physical scale."""
+    scale = parameter.scale(scales)
+    if parameter.circular:
+        return Uniform(-2 * np.pi, 4 * np.pi)
+    if parameter.is_shape:
+        return LogNormal(scale, SHAPE_WIDTH)
+    if parameter.lower == parameter.null == 0.0:
+        return HalfNormal(scale)
+    centre = parameter.null if parameter.null is not None else 0.0
+    return Normal(centre, scale)

@@ -1,0 +1,238 @@
+"""From recordings to the mode of the base model: guess, global search on a short window, growing windows, polish.
+
+Long recordings are phase-locked: the misfit has side minima in k1, one per lost cycle. The global search
+(differential evolution with the Metropolis criterion) therefore sees only the first cycles, where there are
+few; its winner and the quick guess are then carried to the full length over windows that double, each a
+least-squares polish with exact derivatives. Both ends are compared, so that a search that failed shows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.inference.defaults import default_priors
+from bayesimpact.inference.fit import Fit, Target, find_mode
+from bayesimpact.inference.likelihood import Likelihood
+from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise_estimate import estimate_noise
+from bayesimpact.inference.priors import Priors
+from bayesimpact.inference.search import Generation, SearchResult, metropolis_differential_evolution
+from bayesimpact.model.derivatives import grams
+from bayesimpact.model.oscillator import Oscillator, build_oscillator
+from bayesimpact.model.parameters import BASE_SLOTS
+from bayesimpact.response.estimates import Estimates, estimate
+
+Array = NDArray[np.float64]
+
+SEARCH_CYCLES = 6.0  # length of the window of the global search
+BOUND_FACTOR = 3.0  # bounds of the search about the guess
+NUISANCE_SLOTS = np.array([BASE_SLOTS.index(s) for s in ("y0", "v0", "offset")])
+_RESIDUAL = len(BASE_SLOTS)  # row of the Gram matrix that belongs to the residual
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """The mode of the base model and how it was found.
+
+    Attributes
+    ----------
+    fit : the better of the two ends
+    estimates : quick estimates from the recordings, the guess
+    noise : estimated from the recordings alone
+    search : the global search, or None when it was left out
+    from_guess, from_search : both ends; they should agree
+    """
+
+    fit: Fit
+    estimates: Estimates
+    noise: Noise
+    search: SearchResult | None
+    from_guess: Fit
+    from_search: Fit | None
+
+    @property
+    def agree(self) -> bool:
+        """True when guess and search ended within 0.1 standard deviations of each other."""
+        if self.from_search is None:
+            return True
+        distance = np.abs(self.from_search.mode - self.from_guess.mode) / self.fit.sd
+        return bool(np.all(distance < 0.1))
+
+
+def identify(
+    campaign: Campaign,
+    *,
+    rng: np.random.Generator,
+    noise: Noise | None = None,
+    search: bool = True,
+    evaluations: int | None = None,
+    sigma_per_recording: bool = False,
+    callback: Callable[[Generation], None] | None = None,
+) -> Identification:
+    """Mode of the base model's posterior for a campaign, nothing given.
+
+    Raises `InputError` when a recording shows no oscillation.
+    """
+    estimates = estimate(campaign)
+    noise = estimate_noise(campaign) if noise is None else noise
+    oscillator = build_oscillator(campaign, sigma_per_recording=sigma_per_recording)
+    priors = default_priors(oscillator, estimates, noise)
+    guess = initial_theta(oscillator, estimates, noise)
+    from_guess = climb(oscillator, priors, noise, guess)
+    result = from_search = None
+    if search:
+        result, start = global_search(
+            oscillator, priors, guess, rng=rng, evaluations=evaluations, callback=callback
+        )
+        from_search = climb(oscillator, priors, noise, start)
+    ends = [fit for fit in (from_guess, from_search) if fit is not None]
+    best = max(ends, key=lambda fit: fit.log_posterior)
+    return Identification(best, estimates, noise, result, from_guess, from_search)
+
+
+def initial_theta(oscillator: Oscillator, estimates: Estimates, noise: Noise) -> Array:
+    """Parameter vector (d,) of the quick estimates."""
+    values = estimates.values
+    known = [values.get(name, noise.level) for name in oscillator.layout.names]
+    return np.array(known)
+
+
+def windows(campaign: Campaign, k1: float) -> list[float]:
+    """Durations of the growing windows, s: a few cycles, doubled up to the longest recording."""
+    longest = max(r.duration for r in campaign.recordings)
+    duration = SEARCH_CYCLES * 2 * np.pi / np.sqrt(k1 / campaign.mass)
+    result = []
+    while duration < 0.75 * longest:
+        result.append(float(duration))
+        duration *= 2
+    return [*result, np.inf]
+
+
+def climb(oscillator: Oscillator, priors: Priors, noise: Noise, start: Array) -> Fit:
+    """Polish over growing windows, from `start` (d,) to the mode of the full recordings."""
+    theta = start
+    k1 = float(start[oscillator.layout.index("k1")])
+    for duration in windows(oscillator.campaign, k1):
+        target = _windowed(oscillator, priors, noise, duration)
+        fit = find_mode(target, theta)
+        if np.isfinite(fit.log_posterior):
+            theta = fit.mode
+    return fit
+
+
+def _windowed(oscillator: Oscillator, priors: Priors, noise: Noise, duration: float) -> Target:
+    if np.isfinite(duration):
+        campaign = oscillator.campaign.truncated(duration)
+        oscillator = Oscillator(
+            campaign, oscillator.effects, oscillator.layout, oscillator.smoothing
+        )
+    return Target(Likelihood(oscillator, noise), priors)
+
+
+def global_search(
+    oscillator: Oscillator,
+    priors: Priors,
+    guess: Array,
+    *,
+    rng: np.random.Generator,
+    factor: float = BOUND_FACTOR,
+    evaluations: int | None = None,
+    callback: Callable[[Generation], None] | None = None,
+) -> tuple[SearchResult, Array]:
+    """Differential evolution on the physical parameters over the first cycles.
+
+    Bounds are the guess divided and multiplied by `factor` (for the gap: the guess plus and minus
+    `factor` times its size, at least a tenth of the motion). Initial conditions and rest readings are not
+    searched: for every candidate they take the values of two Gauss-Newton steps. Returns the search and
+    the full parameter vector (d,) of its winner.
+    """
+    k1 = float(guess[oscillator.layout.index("k1")])
+    duration = SEARCH_CYCLES * 2 * np.pi / np.sqrt(k1 / oscillator.campaign.mass)
+    profile = _Profile(oscillator, guess, duration)
+    lower, upper = profile.bounds(factor)
+    lower = np.maximum(lower, profile.encode(np.maximum(priors.lower, _tiny(guess)), lower))
+    result = metropolis_differential_evolution(
+        profile, lower, upper, rng=rng, evaluations=evaluations or 600 * lower.size, callback=callback
+    )
+    return result, profile.complete(result.best[None])[0]
+
+
+def _tiny(guess: Array) -> Array:
+    return 1e-12 * np.maximum(np.abs(guess), 1e-30)
+
+
+class _Profile:
+    """Profiled objective (N / 2) log S of the physical parameters, nuisances eliminated per recording."""
+
+    def __init__(self, oscillator: Oscillator, guess: Array, duration: float) -> None:
+        layout = oscillator.layout
+        self.short = Oscillator(oscillator.campaign.truncated(duration), (), layout, None)
+        self.guess = guess
+        self.physical = layout.roles("physical")
+        self.positive = np.array([layout.parameters[i].lower == 0.0 for i in self.physical])
+        motion = max(float(np.ptp(r.samples)) for r in oscillator.campaign.recordings)
+        self.reach = np.maximum(np.abs(guess[self.physical]), 0.1 * motion)
+        self.columns = np.ascontiguousarray(layout.columns[:, : len(BASE_SLOTS)])
+        self.constants = np.ascontiguousarray(layout.constants[:, : len(BASE_SLOTS)])
+
+    def bounds(self, factor: float) -> tuple[Array, Array]:
+        centre = self.guess[self.physical]
+        spread = np.where(self.positive, np.log(factor), factor * self.reach)
+        middle = np.where(self.positive, np.log(np.maximum(centre, 1e-300)), centre)
+        return middle - spread, middle + spread
+
+    def encode(self, theta: Array, otherwise: Array) -> Array:
+        """Search coordinates of theta's physical part; `otherwise` where there is no finite one."""
+        value = theta[self.physical]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            coded = np.where(self.positive, np.log(value), value)
+        return np.where(np.isfinite(coded), coded, otherwise)
+
+    def complete(self, x: Array) -> Array:
+        """Full parameter vectors (B, d) for search coordinates (B, p), nuisances at their conditional best."""
+        return self._solve(x)[0]
+
+    def __call__(self, x: Array) -> Array:
+        sums = self._solve(x)[1]
+        n = float(self.short.counts.sum())
+        with np.errstate(divide="ignore"):
+            value = 0.5 * n * np.log(sums)
+        return np.where(np.isfinite(value), value, np.inf)
+
+    def _solve(self, x: Array) -> tuple[Array, Array]:
+        theta = np.repeat(self.guess[None], x.shape[0], axis=0)
+        theta[:, self.physical] = np.where(self.positive, np.exp(x), x)
+        best, lowest = theta, np.full(x.shape[0], np.inf)
+        for _ in range(3):
+            matrices = self._grams(theta)
+            sums = matrices[:, :, _RESIDUAL, _RESIDUAL].sum(axis=1)
+            better = sums < lowest
+            best = np.where(better[:, None], theta, best)
+            lowest = np.where(better, sums, lowest)
+            theta = self._nuisance_step(theta, matrices)
+        return best, lowest
+
+    def _grams(self, theta: Array) -> Array:
+        s = self.short
+        matrices, codes = grams(
+            np.ascontiguousarray(theta), self.columns, self.constants, s.campaign.mass, s.samples, s.starts,
+            s.counts, s.intervals,
+        )  # fmt: skip
+        failed = (codes != 0) | ~np.isfinite(matrices).all(axis=(2, 3))
+        matrices[failed] = np.eye(matrices.shape[-1]) * 1e300
+        return np.asarray(matrices)
+
+    def _nuisance_step(self, theta: Array, matrices: Array) -> Array:
+        block = matrices[:, :, NUISANCE_SLOTS[:, None], NUISANCE_SLOTS[None, :]]
+        right = matrices[:, :, NUISANCE_SLOTS, _RESIDUAL]
+        scale = np.sqrt(np.maximum(np.einsum("brii->bri", block), 1e-300))
+        scaled = block / (scale[..., :, None] * scale[..., None, :]) + 1e-9 * np.eye(3)
+        move = np.linalg.solve(scaled, (right / scale)[..., None])[..., 0] / scale
+        moved = theta.copy()
+        moved[:, self.columns[:, NUISANCE_SLOTS]] += move
+        return moved

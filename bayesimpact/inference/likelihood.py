@@ -1,0 +1,174 @@
+"""Gaussian likelihood of the displacement residuals, and its linearisation.
+
+    log L = sum_r [ -n_r log sigma_r - S_r / (2 sigma_r^2) - (n_r / 2) log 2 pi + log volume_r ]
+
+with S_r the sum of squares of the whitened residual of recording r and n_r its size (see `noise`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.inference.noise import Noise
+from bayesimpact.model.derivatives import trajectories_and_derivatives
+from bayesimpact.model.measurement import smooth
+from bayesimpact.model.oscillator import Oscillator
+from bayesimpact.model.parameters import BASE_SLOTS, SLOTS
+from bayesimpact.model.simulate import sums_of_squares
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+_OFFSET = SLOTS.index("offset")
+_CHUNK_SAMPLES = 4_000_000  # predictions held at once, so that memory stays bounded
+
+
+@dataclass(frozen=True, eq=False)
+class Linearisation:
+    """One recording near a parameter vector, whitened: residual ~ r - J (theta - theta0)[columns].
+
+    Attributes
+    ----------
+    residual : (n,), recorded minus predicted, m
+    jacobian : (n, k), derivative of the prediction
+    columns : (k,), positions in theta
+    """
+
+    residual: Array
+    jacobian: Array
+    columns: Index
+
+
+@dataclass(frozen=True, eq=False)
+class Likelihood:
+    """Likelihood of all recordings under an oscillator and a noise model."""
+
+    oscillator: Oscillator
+    noise: Noise
+
+    @cached_property
+    def sizes(self) -> Array:
+        """Independent numbers per recording, (R,)."""
+        o = self.oscillator
+        return np.array(
+            [self.noise.size(int(n), dt) for n, dt in zip(o.counts, o.intervals, strict=True)],
+            dtype=np.float64,
+        )
+
+    @cached_property
+    def log_volume(self) -> Array:
+        """Log determinant of the whitening per recording, (R,)."""
+        o = self.oscillator
+        pairs = zip(o.counts, o.intervals, strict=True)
+        return np.array([self.noise.log_volume(int(n), dt) for n, dt in pairs])
+
+    @cached_property
+    def sigma_columns(self) -> Index:
+        """Position in theta of every recording's noise level, (R,)."""
+        positions = self.oscillator.layout.roles("noise")
+        return np.resize(positions, self.oscillator.counts.size)
+
+    def misfit(self, theta: Array) -> Array:
+        """Sums of squares of the whitened residuals, (B, R), m2; inf where the parameters are inadmissible."""
+        o = self.oscillator
+        theta = np.ascontiguousarray(np.atleast_2d(theta))
+        if o.is_plain and self.noise.is_white:
+            base = slice(0, len(BASE_SLOTS))
+            columns = np.ascontiguousarray(o.layout.columns[:, base])
+            constants = np.ascontiguousarray(o.layout.constants[:, base])
+            sums, _ = sums_of_squares(
+                theta, columns, constants, o.campaign.mass, o.samples, o.starts, o.counts, o.intervals
+            )
+            return np.asarray(sums)
+        sums = np.empty((theta.shape[0], o.counts.size))
+        for r, n in enumerate(o.counts):
+            size = max(1, _CHUNK_SAMPLES // int(n))
+            for first in range(0, theta.shape[0], size):
+                part = slice(first, first + size)
+                sums[part, r] = self._recording_misfit(r, theta[part])
+        return sums
+
+    def _recording_misfit(self, r: int, theta: Array) -> Array:
+        recording = self.oscillator.campaign.recordings[r]
+        residual = recording.samples - self.oscillator.predict_recording(r, theta)
+        white = self.noise.whiten(residual, recording.interval)
+        sums = np.einsum("bn,bn->b", white, white)
+        return np.where(np.isfinite(sums), sums, np.inf)
+
+    def per_recording(self, theta: Array) -> Array:
+        """Log likelihood of every recording, (B, R); -inf where inadmissible."""
+        theta = np.atleast_2d(theta)
+        sigma = theta[:, self.sigma_columns]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            value = (
+                -self.sizes * (np.log(sigma) + 0.5 * np.log(2 * np.pi))
+                - self.misfit(theta) / (2 * sigma**2)
+                + self.log_volume
+            )
+        return np.where((sigma > 0) & np.isfinite(value), value, -np.inf)
+
+    def __call__(self, theta: Array) -> Array:
+        """Log likelihood, (B,)."""
+        return np.asarray(self.per_recording(theta).sum(axis=1))
+
+    def linearise(self, theta: Array, steps: Array | None = None) -> tuple[Linearisation, ...]:
+        """Whitened residual and Jacobian of every recording at `theta` (d,).
+
+        Derivatives are exact (through the events) for the base oscillator and central differences with
+        `steps` (d,) otherwise; `steps` should be a small fraction of the posterior's standard deviations.
+        """
+        if self.oscillator.is_base and not self.oscillator.sensors:
+            return self._exact(theta)
+        if steps is None:
+            raise ValueError("an oscillator with added effects needs difference steps")
+        recordings = range(self.oscillator.counts.size)
+        return tuple(self._differences(r, theta, steps) for r in recordings)
+
+    def _whitened(self, r: int, predicted: Array, jacobian: Array, columns: Index) -> Linearisation:
+        """Linearisation from a prediction (n,) and derivatives (k, n)."""
+        recording = self.oscillator.campaign.recordings[r]
+        stacked = np.vstack([recording.samples - predicted, jacobian])
+        white = self.noise.whiten(stacked, recording.interval)
+        return Linearisation(white[0], white[1:].T, columns)
+
+    def _exact(self, theta: Array) -> tuple[Linearisation, ...]:
+        o = self.oscillator
+        base = slice(0, len(BASE_SLOTS))
+        columns = np.ascontiguousarray(o.layout.columns[:, base])
+        constants = np.ascontiguousarray(o.layout.constants[:, base])
+        values, slopes, codes = trajectories_and_derivatives(
+            np.ascontiguousarray(theta), columns, constants, o.campaign.mass, o.counts, o.intervals,
+            int(o.counts.sum()),
+        )  # fmt: skip
+        result = []
+        for r, (start, n) in enumerate(zip(o.starts, o.counts, strict=True)):
+            rows = slice(int(start), int(start + n))
+            predicted, jacobian = values[rows], slopes[rows].T
+            if codes[r] != 0:
+                predicted = np.full_like(predicted, np.nan)
+            used = np.flatnonzero(columns[r] >= 0)
+            stacked = smooth(
+                np.vstack([predicted, jacobian[used]]), o.smoothing, float(o.intervals[r])
+            )
+            result.append(self._whitened(r, stacked[0], stacked[1:], columns[r, used]))
+        return tuple(result)
+
+    def _differences(self, r: int, theta: Array, steps: Array) -> Linearisation:
+        o = self.oscillator
+        columns = o.recording_columns(r)
+        lower = np.array([p.lower for p in o.layout.parameters])
+        points, weights = [theta], []
+        for i in columns:
+            one_sided = theta[i] - steps[i] < lower[i]
+            for shift in (1.0, 2.0) if one_sided else (1.0, -1.0):
+                point = theta.copy()
+                point[i] += shift * steps[i]
+                points.append(point)
+            weights.append((-3.0, 4.0, -1.0) if one_sided else (0.0, 1.0, -1.0))
+        values = o.predict_recording(r, np.array(points))
+        w = np.array(weights) / (2 * steps[columns, None])
+        jacobian = w[:, :1] * values[0] + w[:, 1:2] * values[1::2] + w[:, 2:] * values[2::2]
+        return self._whitened(r, values[0], jacobian, columns)

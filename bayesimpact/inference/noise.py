@@ -1,0 +1,122 @@
+"""Noise models as whitening operators: they turn a residual into independent numbers of equal variance.
+
+Whitening is linear, so residuals and derivatives pass through the same operator and every later stage
+(least squares, likelihood, scores) sees white noise. Three kinds:
+
+- white: nothing to do;
+- AR(1): exact in the time domain;
+- band: the recordings were smoothed. What the filter suppressed carries rounding and model error but no
+  information, and its covariance has no inverse; so only the Fourier coefficients below the filter's
+  half-power frequency are used, each divided by what the filter left of the noise (Whittle 1953).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.data.campaign import Smoothing
+from bayesimpact.model.measurement import edge, gain
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Shape of the noise; its level is the unknown `sigma` (or this estimate of it).
+
+    Attributes
+    ----------
+    correlation : between neighbouring raw samples (AR(1)), 0 for white noise
+    smoothing : filter that the noisy recordings passed, or None
+    level : standard deviation of the raw noise as estimated from the recordings alone, m
+    level_error : relative standard error of `level`
+    correlation_error : standard error of `correlation`
+    source : how it was estimated, in words
+    """
+
+    correlation: float = 0.0
+    smoothing: Smoothing | None = None
+    level: float = float("nan")
+    level_error: float = float("nan")
+    correlation_error: float = float("nan")
+    source: str = "assumed"
+
+    @property
+    def is_white(self) -> bool:
+        """True when whitening does nothing."""
+        return self.correlation == 0.0 and self.smoothing is None
+
+    @property
+    def kind(self) -> str:
+        """In words, for reports."""
+        raw = "white" if self.correlation == 0.0 else f"AR(1), correlation {self.correlation:.2f}"
+        return raw if self.smoothing is None else f"{raw}, smoothed ({self.smoothing.kind})"
+
+    def whiten(self, x: Array, interval: float) -> Array:
+        """Whitened x: (..., n) samples to (..., size(n)) numbers of variance sigma^2."""
+        if self.smoothing is not None:
+            return self._band(x, interval)
+        if self.correlation == 0.0:
+            return x
+        white = np.empty_like(x)
+        white[..., 0] = x[..., 0]
+        innovation = x[..., 1:] - self.correlation * x[..., :-1]
+        white[..., 1:] = innovation / np.sqrt(1.0 - self.correlation**2)
+        return white
+
+    def size(self, n: int, interval: float) -> int:
+        """How many independent numbers `n` samples are worth."""
+        if self.smoothing is None:
+            return n
+        return 2 * (self._band_size(n, interval) - 1) + 1
+
+    def log_volume(self, n: int, interval: float) -> float:
+        """Log determinant of the whitening operator (0 for the band, where it is a fixed constant)."""
+        if self.smoothing is not None:
+            return 0.0
+        return -0.5 * (n - 1) * float(np.log1p(-(self.correlation**2)))
+
+    def coloured(self, rng: np.random.Generator, n: int, interval: float, sigma: float) -> Array:
+        """A draw of n samples of raw noise of level `sigma` (before any smoothing), m."""
+        white = rng.standard_normal(n) * sigma
+        if self.correlation == 0.0:
+            return white
+        from scipy.signal import lfilter
+
+        white[1:] *= np.sqrt(1.0 - self.correlation**2)
+        return np.asarray(lfilter([1.0], [1.0, -self.correlation], white), dtype=np.float64)
+
+    def with_smoothing(self, smoothing: Smoothing | None) -> Noise:
+        """The same raw noise behind another filter."""
+        return replace(self, smoothing=smoothing)
+
+    def _interior(self, n: int, interval: float) -> slice:
+        cut = edge(self.smoothing, interval)
+        return slice(cut, n - cut)
+
+    def _spectrum(self, n: int, interval: float) -> Array:
+        inner = self._interior(n, interval)
+        frequency = np.fft.rfftfreq(inner.stop - inner.start, interval)
+        filtered = gain(self.smoothing, interval, frequency) ** 2
+        beyond = np.flatnonzero(filtered < 0.5)
+        frequency = frequency[: beyond[0]] if beyond.size else frequency[:-1]
+        rho, angle = self.correlation, 2 * np.pi * frequency * interval
+        raw = (1 - rho**2) / (1 - 2 * rho * np.cos(angle) + rho**2)
+        return np.asarray(filtered[: frequency.size] * raw)
+
+    def _band_size(self, n: int, interval: float) -> int:
+        return int(self._spectrum(n, interval).size)
+
+    def _band(self, x: Array, interval: float) -> Array:
+        from scipy.fft import rfft
+
+        n = x.shape[-1]
+        spectrum = self._spectrum(n, interval)
+        inner = x[..., self._interior(n, interval)]
+        coefficients = rfft(inner, axis=-1)[..., : spectrum.size]
+        coefficients = coefficients / np.sqrt(0.5 * inner.shape[-1] * spectrum)
+        head = coefficients[..., :1].real / np.sqrt(2.0)
+        return np.concatenate([head, coefficients[..., 1:].real, coefficients[..., 1:].imag], axis=-1)

@@ -1,0 +1,137 @@
+"""Noise level and colour from the recordings alone, before any model of the oscillator is believed.
+
+A recording is cut into windows so short that any oscillation is a polynomial of degree five in them; what
+the polynomials leave is noise. Level and correlation maximise the likelihood of exactly these remainders
+(restricted maximum likelihood, Patterson and Thompson 1971), so no degrees of freedom are counted twice.
+Windows that a kink of an impact disturbs stand out and are left aside.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+from scipy.linalg import null_space, toeplitz
+from scipy.optimize import minimize_scalar
+
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.recording import Recording
+from bayesimpact.inference.noise import Noise
+from bayesimpact.response.swings import rough_period
+
+Array = NDArray[np.float64]
+
+DEGREE = 5
+WINDOWS_PER_PERIOD = (12.0, 9.0, 7.0, 5.5, 4.5)
+SMALLEST, LARGEST = 12, 64
+KEPT = 0.999  # fraction of undisturbed windows that the outlier test keeps
+LEAST_CORRELATION = 0.03  # a weaker AR(1) changes no interval by more than 3 %
+LEAST_GAIN = 6.0  # in log likelihood, to call the noise coloured
+
+
+@dataclass(frozen=True)
+class _Remainder:
+    """What polynomials leave of one window length: (windows, freedom) numbers and their basis."""
+
+    values: Array
+    basis: Array
+
+
+def estimate_noise(campaign: Campaign) -> Noise:
+    """Level and AR(1) correlation of the raw noise, pooled over recordings.
+
+    For recordings that were smoothed the remainders say what the filter left; the raw level is scaled up
+    by the filter's power (see `smoothed_level`).
+    """
+    known, smoothing = campaign.measurement.noise, campaign.measurement.smoothing
+    if smoothing is not None:
+        from bayesimpact.inference.spectrum import smoothed_noise
+
+        noise = smoothed_noise(campaign.recordings, smoothing)
+    else:
+        noise = raw_noise(campaign.recordings)
+    if known is None:
+        return noise
+    return Noise(noise.correlation, smoothing, known, 0.0, noise.correlation_error, "campaign.toml")
+
+
+def raw_noise(recordings: Sequence[Recording]) -> Noise:
+    """Level and correlation from polynomial remainders, for recordings that passed no filter."""
+    chosen = None
+    for per_period in WINDOWS_PER_PERIOD:
+        remainder = _remainder(recordings, per_period)
+        if remainder is None:
+            continue
+        found = _restricted_ml(remainder)
+        if chosen is not None and found.level > chosen.level * (1.02 + 3 * found.level_error):
+            break  # the oscillation itself begins to show
+        chosen = found
+    if chosen is None:
+        raise ValueError("recordings too short for a noise estimate")
+    return chosen
+
+
+def _remainder(recordings: Sequence[Recording], per_period: float) -> _Remainder | None:
+    lengths = [
+        int(np.clip(rough_period(r.samples) / per_period, SMALLEST, LARGEST)) for r in recordings
+    ]
+    length = min(lengths)
+    powers = np.vander(np.linspace(-1, 1, length), DEGREE + 1)
+    basis = null_space(powers.T)
+    rows = []
+    for recording in recordings:
+        count = recording.samples.size // length
+        windows = recording.samples[: count * length].reshape(count, length)
+        rows.append((windows - windows.mean(axis=1, keepdims=True)) @ basis)
+    values = np.concatenate(rows)
+    return _Remainder(values, basis) if values.shape[0] >= 4 else None
+
+
+def _restricted_ml(remainder: _Remainder) -> Noise:
+    values, rho = remainder.values, 0.0
+    kept = values
+    for _ in range(3):  # outlier test and estimate in turn
+        kept = values[_undisturbed(values, _covariance(remainder.basis, rho))]
+        found = minimize_scalar(
+            lambda x: -_log_likelihood(kept, _covariance(remainder.basis, x)),
+            bounds=(-0.6, 0.98),
+            method="bounded",
+        )
+        rho = float(found.x)
+    white = _log_likelihood(kept, np.eye(kept.shape[1]))
+    step = 0.01
+    bend = [_log_likelihood(kept, _covariance(remainder.basis, rho + d)) for d in (-step, 0, step)]
+    error = step / np.sqrt(max(2 * bend[1] - bend[0] - bend[2], 1e-12))
+    if -found.fun - white < LEAST_GAIN or abs(rho) < LEAST_CORRELATION:
+        rho = 0.0
+    level = np.sqrt(_variance(kept, _covariance(remainder.basis, rho)))
+    relative = np.sqrt(0.5 / kept.size)
+    return Noise(rho, None, float(level), float(relative), float(error), "polynomial remainders")
+
+
+def _covariance(basis: Array, rho: float) -> Array:
+    return np.asarray(basis.T @ toeplitz(rho ** np.arange(basis.shape[0])) @ basis)
+
+
+def _energies(values: Array, covariance: Array) -> Array:
+    return np.asarray(np.einsum("wi,ij,wj->w", values, np.linalg.inv(covariance), values))
+
+
+def _undisturbed(values: Array, covariance: Array) -> NDArray[np.bool_]:
+    energy, freedom = _energies(values, covariance), values.shape[1]
+    scale = np.median(energy) / stats.chi2.median(freedom)
+    return np.asarray(energy <= scale * stats.chi2.ppf(KEPT, freedom))
+
+
+def _variance(values: Array, covariance: Array) -> float:
+    return float(_energies(values, covariance).mean() / values.shape[1])
+
+
+def _log_likelihood(values: Array, covariance: Array) -> float:
+    windows, freedom = values.shape
+    _, log_det = np.linalg.slogdet(covariance)
+    spread = freedom * np.log(_variance(values, covariance)) + log_det
+    return float(-0.5 * windows * spread)

@@ -1,0 +1,114 @@
+"""The posterior of one model: emcee started from the mode, and what it predicts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.sample import Chains, sample_posterior
+from bayesimpact.model.measurement import smooth
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Draws from the posterior of a model.
+
+    Attributes
+    ----------
+    fit : the mode from which the sampler started
+    chains : kept draws (ensembles, steps, walkers, d) and the verdict on convergence
+    seed : of the sampler
+    """
+
+    fit: Fit
+    chains: Chains
+    seed: int
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters, in the order of the draws' last axis."""
+        return self.fit.names
+
+    @cached_property
+    def draws(self) -> Array:
+        """All kept draws, (S, d)."""
+        return self.chains.draws.reshape(-1, self.chains.draws.shape[-1])
+
+    def column(self, name: str) -> Array:
+        """Draws of one parameter, (S,)."""
+        return self.draws[:, self.fit.target.oscillator.layout.index(name)]
+
+    def interval(self, name: str, probability: float = 0.9) -> tuple[float, float]:
+        """Central credible interval of one parameter."""
+        tail = 50 * (1 - probability)
+        low, high = np.percentile(self.column(name), [tail, 100 - tail])
+        return float(low), float(high)
+
+    def thinned(self, count: int, rng: np.random.Generator) -> Array:
+        """`count` draws (count, d), without replacement where there are enough."""
+        size = self.draws.shape[0]
+        return self.draws[rng.choice(size, size=min(count, size), replace=False)]
+
+    def predictive(self, r: int, count: int, rng: np.random.Generator) -> Array:
+        """Simulated recordings `r`, (count, n), m: posterior draws with fresh noise, as the probe would read them."""
+        likelihood = self.fit.target.likelihood
+        oscillator, noise = likelihood.oscillator, likelihood.noise
+        theta = self.thinned(count, rng)
+        motion = oscillator.predict_recording(r, theta)
+        recording = oscillator.campaign.recordings[r]
+        sigma = theta[:, likelihood.sigma_columns[r]]
+        draws = np.array(
+            [noise.coloured(rng, motion.shape[1], recording.interval, s) for s in sigma]
+        )
+        return motion + smooth(draws, noise.smoothing, recording.interval)
+
+
+def sample(
+    fit: Fit,
+    *,
+    seed: int = 0,
+    folder: Path | None = None,
+    resume: bool = False,
+    callback: Callable[..., None] | None = None,
+    **settings: Any,
+) -> Posterior:
+    """Sample the posterior around a mode by emcee.
+
+    Parameters
+    ----------
+    fit : mode and curvature
+    seed : of every random number
+    folder : where blocks of the chain are kept, so that `resume` can go on; None keeps nothing
+    callback : called with the sampler's progress after every block
+    settings : further settings of `bayesimpact.inference.sample.sample_posterior`
+
+    Raises
+    ------
+    InputError : `resume` with a chain that belongs to other data or settings
+    """
+    target = fit.target
+    lower = np.array([p.lower for p in target.oscillator.layout.parameters])
+    upper = np.array([p.upper for p in target.oscillator.layout.parameters])
+    chains = sample_posterior(
+        target,
+        fit.mode,
+        fit.covariance,
+        seed=seed,
+        folder=folder,
+        resume=resume,
+        lower=np.maximum(lower, target.priors.lower),
+        upper=np.minimum(upper, target.priors.upper),
+        fingerprint=target.oscillator.campaign.sha256,
+        progress=callback,
+        **settings,
+    )
+    return Posterior(fit, chains, seed)
