@@ -62,6 +62,26 @@ def impulse_response(b: float, K: float, t: float) -> tuple[float, float]:
 
 
 @compiled(error_model="numpy")
+def second_response(b: float, K: float, t: float, S: float, D: float) -> tuple[float, float]:
+    """Return G = S*S and H = S*D = G' (convolutions from 0 to t), given S(t) and D(t).
+
+    -G and -H are the derivatives of S with respect to K and 2 b. G = exp(-b t)(sin x - x cos x) /
+    (2 wd^3) with x = wd t, as a power series in x^2 where the difference would cancel.
+    """
+    z = (K - b * b) * t * t
+    if -1.0 < z < 1.0:
+        term = 1.0 / 6.0  # (-z)^(n - 1) / (2 n + 1)!
+        total = 0.0
+        for n in range(1, 11):
+            total += n * term
+            term *= -z / ((2.0 * n + 2.0) * (2.0 * n + 3.0))
+        G = math.exp(-b * t) * t * t * t * total
+    else:
+        G = (S - t * (D + b * S)) / (2.0 * (K - b * b))
+    return G, 0.5 * t * S - b * G
+
+
+@compiled(error_model="numpy")
 def forced_response(
     b: float, K: float, w: float, t: float, S: float, D: float
 ) -> tuple[float, float]:

@@ -67,8 +67,17 @@ def check(q: Floats, mass: float, interval: float, n: int) -> int:
 
 
 @compiled(error_model="numpy")
-def starts_in_contact(q: Floats, mass: float) -> bool:
+def has_stop(q: Floats) -> bool:
+    """Say whether there is anything to hit."""
+    gap: float = q[3]
+    return gap < math.inf and (q[2] > 0.0 or q[4] > 0.0)
+
+
+@compiled(error_model="numpy")
+def begins_in_contact(q: Floats) -> bool:
     """Say whether motion begins in contact: beyond the stop, or at it and heading into it."""
+    if not has_stop(q):
+        return False
     above: float = q[5] - q[3]
     if above == 0.0:
         above = q[6]
@@ -138,9 +147,9 @@ def run(
     q : (11,) parameters, SI units
     mass, interval, n : kg, s, samples
     data : (n,) measured, m, to be compared with; or empty
-    out : (n,) receives y + offset, m, when `data` is empty
+    out : (n,) receives y + offset, m, when `data` is empty; both empty: events only
     speeds : (n,) receives y', m/s; or empty
-    events : (capacity, 2) receives time (s) and y' (m/s) of the first events; or empty
+    events : (capacity, 2) receives time and velocity of the first events, in intervals; or empty
     tables, keys : from `workspace`; tables of equal regimes are reused from call to call
     """
     code = check(q, mass, interval, n)
@@ -148,14 +157,15 @@ def run(
         return math.inf, 0, code
     square = interval * interval
     g, offset = q[3], q[10]
-    stop = g < math.inf and (q[2] > 0.0 or q[4] > 0.0)
+    stop = has_stop(q)
     w = q[8] * interval
     force = q[7] * square / mass
     forced = force != 0.0
-    contact = stop and starts_in_contact(q, mass)
+    contact = begins_in_contact(q)
     limit = EVENTS_AT_LEAST + EVENTS_PER_SAMPLE * n
 
     t, y, v = 0.0, q[5], q[6] * interval
+    nothing_wanted = data.size == 0 and out.size == 0
     total = 0.0
     count = 0
     i = 0
@@ -190,7 +200,9 @@ def run(
                 return math.inf, count, SEARCH_FAILED
         end = n if t + wait >= n else math.ceil(t + wait)
 
-        if i < end:
+        if i < end and nothing_wanted:
+            i = end
+        elif i < end:
             key = w if forced else _NO_FORCE
             kept = keys[side]
             table = tables[side]
@@ -226,8 +238,8 @@ def run(
         v = sign * v_next
         contact = not contact
         if count < events.shape[0]:
-            events[count, 0] = t * interval
-            events[count, 1] = v / interval
+            events[count, 0] = t
+            events[count, 1] = v
         count += 1
         if count > limit:
             return math.inf, count, TOO_MANY_EVENTS
@@ -238,7 +250,7 @@ def run(
         if not total < math.inf:
             return math.inf, count, OVERFLOW
     else:
-        for j in range(n):
+        for j in range(out.size):
             if not math.isfinite(out[j]):
                 return math.inf, count, OVERFLOW
     return total, count, OK

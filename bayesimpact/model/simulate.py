@@ -4,8 +4,8 @@
 
 Per recording the kernel takes q = (c1, k1, c2, g, k2, y0, v0, A, w, phase, offset), SI units, t = 0
 at the first sample; measured = y + offset. A campaign's parameter vector theta feeds the q of every
-recording: q_i = theta[columns[r, i]], or constants[r, i] where columns[r, i] is -1. No stop: g = inf,
-c2 = k2 = 0.
+recording: q_i = theta[columns[r, i]], or constants[r, i] where columns[r, i] is -1. Without a stop
+g = inf and c2 = k2 = 0.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +20,7 @@ from numpy.typing import ArrayLike
 from bayesimpact.errors import InputError, SimulationError
 from bayesimpact.model import batch as compiled_batch
 from bayesimpact.model import kernel
+from bayesimpact.model.arguments import check_model, check_samples
 from bayesimpact.model.batch import Floats, Ints
 from bayesimpact.model.kernel import Q
 
@@ -70,13 +70,9 @@ def sums_of_squares(
     (B, R) sums of (sample - offset - y)^2, m^2, inf where a simulation failed; (B, R) codes, see
     `CODES`. The numbers do not depend on the number of threads.
     """
-    model = _model(theta, columns, constants, intervals, counts)
-    data, first = _floats(samples, 1), _ints(starts, 1)
+    model = check_model(theta, columns, constants, intervals, counts)
+    data, first = check_samples(samples, starts, model)
     batch, recordings = model.theta.shape[0], model.columns.shape[0]
-    if first.size != recordings:
-        raise InputError("starts", f"{first.size} values", f"{recordings}, one per recording")
-    if np.any(first < 0) or np.any(first + model.counts > data.size):
-        raise InputError("starts", "recordings beyond the samples", f"within 0..{data.size}")
     sse = np.empty((batch, recordings))
     codes = np.empty((batch, recordings), dtype=np.int64)
     parts = compiled_batch.parts(batch, int(model.counts.sum()))
@@ -105,7 +101,7 @@ def predictions(
     Parameters as in `sums_of_squares`; n_total is the sum of `counts`. Returns (B, n_total) values,
     m, recordings one after the other, nan where a simulation failed, and (B, R) codes.
     """
-    model = _model(theta, columns, constants, intervals, counts)
+    model = check_model(theta, columns, constants, intervals, counts)
     batch, recordings = model.theta.shape[0], model.columns.shape[0]
     if int(model.counts.sum()) != n_total:
         raise InputError("n_total", str(n_total), f"the sum of counts, {model.counts.sum()}")
@@ -132,9 +128,10 @@ def trajectory(q: ArrayLike, mass: float, interval: float, out: Floats) -> int:
     if values.shape != (11,):
         raise InputError("q", f"shape {values.shape}", "(11,)")
     values[10] = 0.0
-    code = compiled_batch.single(
-        values, float(mass), float(interval), out, np.empty(0), np.empty((0, 2))
-    )[2]
+    nothing, no_events = np.empty(0), np.empty((0, 2))
+    _, _, code = compiled_batch.single(
+        values, float(mass), float(interval), out, nothing, no_events
+    )
     return int(code)
 
 
@@ -206,7 +203,7 @@ def simulate(
         _, count, code = compiled_batch.single(q, mass, interval, displacement, velocity, events)
     if code != kernel.OK:
         raise SimulationError(CODES[code])
-    events = events[:count]
+    events = events[:count] * (interval, 1.0 / interval)
     if len(events) and events[0, 1] < 0.0:  # the first event leaves the contact of the start
         events = events[1:]
     entries, exits = events[0::2], events[1::2]
@@ -217,64 +214,6 @@ def simulate(
     for array in (times, displacement, velocity, impacts):
         array.flags.writeable = False
     return Trajectory(times, displacement, velocity, impacts)
-
-
-@dataclass(frozen=True, slots=True)
-class _Model:
-    theta: Floats
-    columns: Ints
-    constants: Floats
-    intervals: Floats
-    counts: Ints
-
-
-def _model(
-    theta: ArrayLike,
-    columns: ArrayLike,
-    constants: ArrayLike,
-    intervals: ArrayLike,
-    counts: ArrayLike,
-) -> _Model:
-    model = _Model(
-        _floats(theta, 2), _ints(columns, 2), _floats(constants, 2), _floats(intervals, 1),
-        _ints(counts, 1),
-    )  # fmt: skip
-    recordings = model.columns.shape[0]
-    shapes = (
-        ("columns", model.columns.shape, (recordings, 11)),
-        ("constants", model.constants.shape, (recordings, 11)),
-        ("intervals", model.intervals.shape, (recordings,)),
-        ("counts", model.counts.shape, (recordings,)),
-    )
-    for name, found, expected in shapes:
-        if found != expected:
-            raise InputError(name, f"shape {found}", f"shape {expected}")
-    if model.columns.size and model.columns.max() >= model.theta.shape[1]:
-        raise InputError(
-            "columns",
-            f"index {model.columns.max()}",
-            f"below {model.theta.shape[1]}, theta's width",
-        )
-    return model
-
-
-def _floats(values: ArrayLike, ndim: int) -> Floats:
-    view: Floats = _read_only(np.ascontiguousarray(values, dtype=np.float64), ndim)
-    return view
-
-
-def _ints(values: ArrayLike, ndim: int) -> Ints:
-    view: Ints = _read_only(np.ascontiguousarray(values, dtype=np.int64), ndim)
-    return view
-
-
-def _read_only(array: Any, ndim: int) -> Any:
-    """A read-only view: one compiled version serves writable and read-only arrays."""
-    if array.ndim != ndim:
-        raise InputError("array", f"{array.ndim} dimensions", f"{ndim}")
-    view = array.view()
-    view.flags.writeable = False
-    return view
 
 
 def _number(name: str, value: object) -> float:

@@ -1,0 +1,91 @@
+"""Arguments of the compiled entry points, checked and brought to one type each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from bayesimpact.errors import InputError
+from bayesimpact.model.batch import Floats, Ints
+
+
+@dataclass(frozen=True, slots=True)
+class ModelArguments:
+    """theta (B, d), columns and constants (R, 11), intervals and counts (R,); read-only arrays."""
+
+    theta: Floats
+    columns: Ints
+    constants: Floats
+    intervals: Floats
+    counts: Ints
+
+
+def check_model(
+    theta: ArrayLike,
+    columns: ArrayLike,
+    constants: ArrayLike,
+    intervals: ArrayLike,
+    counts: ArrayLike,
+) -> ModelArguments:
+    """Check shapes and columns (see `simulate`); raises InputError."""
+    model = ModelArguments(
+        floats("theta", theta, 2),
+        ints("columns", columns, 2),
+        floats("constants", constants, 2),
+        floats("intervals", intervals, 1),
+        ints("counts", counts, 1),
+    )
+    recordings = model.columns.shape[0]
+    shapes = (
+        ("columns", model.columns.shape, (recordings, 11)),
+        ("constants", model.constants.shape, (recordings, 11)),
+        ("intervals", model.intervals.shape, (recordings,)),
+        ("counts", model.counts.shape, (recordings,)),
+    )
+    for name, found, expected in shapes:
+        if found != expected:
+            raise InputError(name, f"shape {found}", f"shape {expected}")
+    width = model.theta.shape[1]
+    if recordings and not -1 <= model.columns.min() <= model.columns.max() < width:
+        raise InputError("columns", "an index outside theta", f"-1 to {width - 1}")
+    if recordings and model.counts.min() < 1:
+        raise InputError("counts", "a recording without samples", "at least 1")
+    return model
+
+
+def check_samples(
+    samples: ArrayLike, starts: ArrayLike, model: ModelArguments
+) -> tuple[Floats, Ints]:
+    """Check that every recording lies within the samples; raises InputError."""
+    data, first = floats("samples", samples, 1), ints("starts", starts, 1)
+    if first.size != model.counts.size:
+        raise InputError(
+            "starts", f"{first.size} values", f"{model.counts.size}, one per recording"
+        )
+    if np.any(first < 0) or np.any(first + model.counts > data.size):
+        raise InputError("starts", "recordings beyond the samples", f"within 0..{data.size}")
+    return data, first
+
+
+def floats(name: str, values: ArrayLike, ndim: int) -> Floats:
+    """Return a read-only, contiguous (float64) view or copy of `values`."""
+    view: Floats = _read_only(name, np.ascontiguousarray(values, dtype=np.float64), ndim)
+    return view
+
+
+def ints(name: str, values: ArrayLike, ndim: int) -> Ints:
+    """Return a read-only, contiguous (int64) view or copy of `values`."""
+    view: Ints = _read_only(name, np.ascontiguousarray(values, dtype=np.int64), ndim)
+    return view
+
+
+def _read_only(name: str, array: Any, ndim: int) -> Any:
+    # read-only always, so that one compiled version serves writable and read-only arrays alike
+    if array.ndim != ndim:
+        raise InputError(name, f"{array.ndim} dimensions", str(ndim))
+    view = array.view()
+    view.flags.writeable = False
+    return view

@@ -1,0 +1,228 @@
+"""Exact derivatives of the base oscillator's recordings, through the impacts.
+
+With respect to all eleven q of a recording (see `simulate`); arguments as in `simulate`. First the
+event loop finds the events, then one pass carries the sensitivities from block to block (`sweep`).
+Derivatives with respect to q that are constants (columns -1) are not computed, and left 0.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+from numpy.typing import ArrayLike
+
+from bayesimpact.errors import InputError
+from bayesimpact.model import batch as compiled_batch
+from bayesimpact.model.arguments import check_model, check_samples
+from bayesimpact.model.basis import FORCED, PLAIN
+from bayesimpact.model.batch import Floats, Ints, Span, gather, share
+from bayesimpact.model.compiled import compiled
+from bayesimpact.model.kernel import OK, OVERFLOW, begins_in_contact, run, workspace
+from bayesimpact.model.sweep import sweep
+from bayesimpact.model.tables import LENGTH
+
+#: Events for which there is room at first; a recording with more is run once more.
+EVENTS = 256
+
+
+@compiled(error_model="numpy")
+def basis_workspace(size: int, with_grams: bool) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return empty tables, ends, prefix sums and keys of two regimes for `sweep`."""
+    lengths = LENGTH + 1 if with_grams else 0
+    return (
+        np.empty((2, size, LENGTH)),
+        np.empty((2, 2, size)),
+        np.empty((2, lengths, size, size)),
+        np.full((2, 3), np.nan),
+    )
+
+
+@compiled(error_model="numpy")
+def active_parameters(columns: Ints, forced: bool) -> Ints:
+    """Return the q of one recording (columns (11,)) whose derivatives are wanted, without the
+    offset.
+
+    Without force, frequency and phase have no effect; A has, and is wanted only with `forced`.
+    """
+    count = 0
+    out = np.empty(10, dtype=np.int64)
+    for i in range(10):
+        if columns[i] >= 0 and (forced or i < 7):
+            out[count] = i
+            count += 1
+    return out[:count]
+
+
+@compiled(error_model="numpy")
+def find_events(q: Floats, mass: float, interval: float, n: int, events: Floats) -> tuple:
+    """Return (events, code): all events of one recording, in `events` if there is room."""
+    nothing = np.empty(0)
+    tables, keys = workspace()
+    _, count, code = run(q, mass, interval, n, nothing, nothing, nothing, events, tables, keys)
+    if count > events.shape[0] and code == OK:
+        events = np.empty((count, 2))
+        run(q, mass, interval, n, nothing, nothing, nothing, events, tables, keys)
+    return events[:count], code
+
+
+@compiled(error_model="numpy")
+def gram_share(
+    theta: Floats, columns: Ints, constants: Floats, mass: float, samples: Floats, starts: Ints,
+    counts: Ints, intervals: Floats, size: int, rows: Span, items: Span, out: Floats, codes: Ints,
+) -> None:  # fmt: skip
+    """Fill one share of `out` (B, R, 12, 12) and `codes` (B, R)."""
+    q = np.empty(11)
+    nothing, no_matrix = np.empty(0), np.empty((0, 0))
+    room = np.empty((EVENTS, 2))
+    tables, ends, prefixes, keys = basis_workspace(size, True)
+    for b in range(rows[0], rows[1]):
+        for r in range(items[0], items[1]):
+            gather(q, theta[b], columns[r], constants[r])
+            n = counts[r]
+            gram = out[b, r]
+            gram[:] = 0.0
+            events, code = find_events(q, mass, intervals[r], n, room)
+            if code == OK:
+                sweep(
+                    q, mass, intervals[r], n, events, begins_in_contact(q),
+                    active_parameters(columns[r], size > PLAIN), samples[starts[r] : starts[r] + n],
+                    nothing, no_matrix, gram, tables, ends, prefixes, keys,
+                )  # fmt: skip
+                if not math.isfinite(gram.sum()):
+                    code = OVERFLOW
+            codes[b, r] = code
+            if code != OK:
+                gram[:] = np.nan
+            elif columns[r, 10] < 0:
+                gram[10] = 0.0
+                gram[:, 10] = 0.0
+            for i in range(11):
+                gram[11, i] = gram[i, 11]
+
+
+@compiled(error_model="numpy", parallel=True)
+def gram_parts(
+    theta: Floats, columns: Ints, constants: Floats, mass: float, samples: Floats, starts: Ints,
+    counts: Ints, intervals: Floats, size: int, parts: int, out: Floats, codes: Ints,
+) -> None:  # fmt: skip
+    """Fill `out` (B, R, 12, 12) and `codes` (B, R), shares in parallel."""
+    for part in numba.prange(parts):
+        rows, items = share(part, parts, codes.shape[0], codes.shape[1])
+        gram_share(
+            theta, columns, constants, mass, samples, starts, counts, intervals, size, rows, items,
+            out, codes,
+        )  # fmt: skip
+
+
+@compiled(error_model="numpy")
+def derivative_rows(
+    theta: Floats, columns: Ints, constants: Floats, mass: float, counts: Ints, intervals: Floats,
+    size: int, values: Floats, jacobian: Floats, codes: Ints,
+) -> None:  # fmt: skip
+    """Fill `values` (N,), `jacobian` (N, 11) and `codes` (R,) for one theta (d,)."""
+    q = np.empty(11)
+    nothing, no_matrix = np.empty(0), np.empty((0, 0))
+    room = np.empty((EVENTS, 2))
+    tables, ends, prefixes, keys = basis_workspace(size, False)
+    start = 0
+    for r in range(columns.shape[0]):
+        gather(q, theta, columns[r], constants[r])
+        n = counts[r]
+        mine, rows = values[start : start + n], jacobian[start : start + n]
+        rows[:] = 0.0
+        events, code = find_events(q, mass, intervals[r], n, room)
+        if code == OK:
+            sweep(
+                q, mass, intervals[r], n, events, begins_in_contact(q),
+                active_parameters(columns[r], size > PLAIN), nothing, mine, rows, no_matrix,
+                tables, ends, prefixes, keys,
+            )  # fmt: skip
+            if not (math.isfinite(mine.sum()) and math.isfinite(rows.sum())):
+                code = OVERFLOW
+        codes[r] = code
+        if code != OK:
+            mine[:] = np.nan
+            rows[:] = np.nan
+        elif columns[r, 10] < 0:
+            rows[:, 10] = 0.0
+        start += n
+
+
+def trajectories_and_derivatives(
+    theta: ArrayLike,
+    columns: ArrayLike,
+    constants: ArrayLike,
+    mass: float,
+    counts: ArrayLike,
+    intervals: ArrayLike,
+    n_total: int,
+) -> tuple[Floats, Floats, Ints]:
+    """Predict all recordings, offset included, with the derivatives of every sample.
+
+    theta (d,); the other parameters as in `simulate.predictions`.
+
+    Returns
+    -------
+    (n_total,) values, m; (n_total, 11) derivatives with respect to the q of the recording, SI
+    units, 0 for the q that are constants; (R,) codes. Failed recordings are nan.
+    """
+    model = check_model(np.atleast_2d(np.asarray(theta)), columns, constants, intervals, counts)
+    if len(model.theta) != 1:
+        raise InputError("theta", f"shape {model.theta.shape}", "one parameter vector")
+    if int(model.counts.sum()) != n_total:
+        raise InputError("n_total", str(n_total), f"the sum of counts, {model.counts.sum()}")
+    values, jacobian = np.empty(n_total), np.empty((n_total, 11))
+    codes = np.empty(len(model.columns), dtype=np.int64)
+    derivative_rows(
+        model.theta[0], model.columns, model.constants, float(mass), model.counts, model.intervals,
+        _basis_size(model.columns, model.constants), values, jacobian, codes,
+    )  # fmt: skip
+    return values, jacobian, codes
+
+
+def grams(
+    theta: ArrayLike,
+    columns: ArrayLike,
+    constants: ArrayLike,
+    mass: float,
+    samples: ArrayLike,
+    starts: ArrayLike,
+    counts: ArrayLike,
+    intervals: ArrayLike,
+) -> tuple[Floats, Ints]:
+    """Gram matrices of [J | residual] of every recording, without storing J.
+
+    theta (B, d) or (d,); the other parameters as in `simulate.sums_of_squares`. residual = sample -
+    prediction, and J its prediction's derivative with respect to the eleven q.
+
+    Returns
+    -------
+    (B, R, 12, 12) Gram matrices (SI units; rows of constant q are 0, failed ones nan) and (B, R)
+    codes; without the leading B for a theta (d,).
+    """
+    thetas = np.atleast_2d(np.asarray(theta, dtype=np.float64))
+    model = check_model(thetas, columns, constants, intervals, counts)
+    data, first = check_samples(samples, starts, model)
+    batch, recordings = len(model.theta), len(model.columns)
+    out = np.empty((batch, recordings, 12, 12))
+    codes = np.empty((batch, recordings), dtype=np.int64)
+    arguments = (
+        model.theta, model.columns, model.constants, float(mass), data, first, model.counts,
+        model.intervals, _basis_size(model.columns, model.constants),
+    )  # fmt: skip
+    parts = compiled_batch.parts(batch, int(model.counts.sum()))
+    if parts == 1:
+        gram_share(*arguments, (0, batch), (0, recordings), out, codes)
+    else:
+        gram_parts(*arguments, parts, out, codes)
+    if np.ndim(theta) == 1:
+        return out[0], codes[0]
+    return out, codes
+
+
+def _basis_size(columns: Ints, constants: Floats) -> int:
+    """Derivatives with respect to the force are wanted also where it is 0."""
+    forced = np.any(columns[:, 7] >= 0) or np.any(constants[:, 7] != 0.0)
+    return FORCED if forced else PLAIN
