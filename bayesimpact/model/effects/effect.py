@@ -1,8 +1,9 @@
-"""What an added effect is: parameters, a force law or a change of the oscillator, and words for the report."""
+"""What an added effect is: parameters, a force law or a change of the oscillator, and words."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from types import MappingProxyType
@@ -29,6 +30,8 @@ class Scales:
     indentation, impact_speed : largest d and entry speed (0 without impacts)
     duration, interval : longest recording and its sampling interval, s
     impacts : largest number of impacts in a recording
+    gap : g (0 without a stop)
+    cases, recordings : how many there are
     """
 
     mass: float
@@ -43,6 +46,9 @@ class Scales:
     duration: float
     interval: float
     impacts: int
+    gap: float = 0.0
+    cases: int = 1
+    recordings: int = 1
 
     @property
     def force(self) -> float:
@@ -54,6 +60,21 @@ class Scales:
         """Largest elastic force of the obstacle, N."""
         return self.contact_stiffness * self.indentation
 
+    @property
+    def damping_force(self) -> float:
+        """Largest damping force, N; at least what a damping ratio of 0.05 % gives."""
+        return (self.damping + 1e-3 * (self.stiffness * self.mass) ** 0.5) * self.speed
+
+    @property
+    def natural_frequency(self) -> float:
+        """Natural frequency of free flight, Hz."""
+        return math.sqrt(self.stiffness / self.mass) / (2 * math.pi)
+
+    @property
+    def contact_rate(self) -> float:
+        """Natural frequency against the obstacle alone, rad/s."""
+        return math.sqrt(self.contact_stiffness / self.mass)
+
 
 @dataclass(frozen=True)
 class EffectParameter:
@@ -62,15 +83,20 @@ class EffectParameter:
     Attributes
     ----------
     name, unit : unit for displacements; `bayesimpact.model.parameters.angular` translates
-    scale : size that would be plausible, from the campaign's scales: the prior is half-normal (normal
-        when both signs are admissible) about `null` with this scale; for a shape parameter the prior is
-        log-normal about it
+    scale : size that would be plausible, from the campaign's scales: the prior is half-normal
+        (normal when both signs are admissible) about `null` with this scale; for a shape parameter
+        the prior is log-normal about it
     lower, upper : physical bounds
-    null : value at which the effect vanishes; None for a shape parameter (a depth, a time constant, a
-        frequency), which means nothing while the amplitude is at its null
+    null : value at which the effect vanishes; None for a shape parameter (a depth, a time constant,
+        a frequency), which means nothing while the amplitude is at its null
     scope : one value for the campaign, per case or per recording
     grid : for a shape parameter, the values that a scan tries, from the scales
     circular : a phase, rad
+    fixed : a constant of the law, not an unknown
+    spectral : a frequency, Hz; a scan should try the peaks of the residual's periodogram as well
+    replaces : base parameter (c2, g) in whose place this one stands: the effect vanishes when all
+        its instances equal that parameter; `null` is then None, the prior normal about `centre`
+    centre : centre of that prior, from the scales
     """
 
     name: str
@@ -82,11 +108,15 @@ class EffectParameter:
     scope: Scope = "campaign"
     grid: Callable[[Scales], NDArray[np.float64]] | None = None
     circular: bool = False
+    fixed: float | None = None
+    spectral: bool = False
+    replaces: Literal["c2", "g"] | None = None
+    centre: Callable[[Scales], float] | None = None
 
     @property
     def is_shape(self) -> bool:
-        """True when the parameter has no null value of its own."""
-        return self.null is None
+        """True when the parameter means nothing while the effect is at its null."""
+        return self.null is None and self.replaces is None
 
 
 @dataclass(frozen=True)
@@ -94,25 +124,32 @@ class Law:
     """A force on the left-hand side of the equation of motion, as plain functions of floats.
 
     Each function has the arguments `(y, v, d, t, z, touching, p, q)`: displacement m, velocity m/s,
-    indentation y - g m, time from the recording's first sample s, the law's own state, 1.0 in contact
-    and 0.0 in flight, pointers to the law's parameters (in the effect's order) and to the oscillator's
-    slots (`bayesimpact.model.parameters.SLOTS`). They are compiled one by one to C callbacks, so they
-    may call `math` functions but no other compiled ones.
+    indentation y - g m, time from the recording's first sample s, the law's own state, 1.0 in
+    contact and 0.0 in flight, pointers to the law's parameters (in the effect's order) and to the
+    oscillator's slots (`bayesimpact.model.parameters.SLOTS`). They are compiled one by one to C
+    callbacks, so they may call `math` functions but no other compiled ones.
 
     Attributes
     ----------
     force : N
     where : evaluated everywhere or in contact only
     rate : time derivative of the state z (a law with memory), or None
-    surface : a smooth function whose zero is a kink or jump of the force; steps end on it
+    surface : a smooth function of y or d whose zero is a kink or jump of the force; steps end on it
+    pace : fastest rate at which the force depends on time explicitly, rad/s; steps resolve it
+    kink_at_turn : the force has a kink or jump at v = 0; steps end on turning points
+    rough_at_touch : the force is continuous but not smooth at d = 0; steps begin small there
     """
 
     force: Callable[..., float]
     where: Where = "everywhere"
     rate: Callable[..., float] | None = None
     surface: Callable[..., float] | None = None
+    pace: Callable[..., float] | None = None
+    kink_at_turn: bool = False
+    rough_at_touch: bool = False
 
 
+Numbers = Sequence[float]
 Observe = Callable[
     [NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]
 ]
@@ -122,9 +159,10 @@ Observe = Callable[
 class Effect:
     """One physical effect that the base model leaves out.
 
-    It acts in one or more of four ways: `law` adds a force; `binds` feeds its parameters into slots of
-    the oscillator (dry friction, mass of the obstacle, a gap of its own per recording, ...); `sets`
-    fixes slots; `observe` changes what the probe reads: `observe(y (K, n), t (n,), p (K, n_p)) -> (K, n)`.
+    It acts in one or more of four ways: `law` adds a force; `binds` feeds its parameters into slots
+    of the oscillator (dry friction, mass of the obstacle, a gap of its own per recording, ...);
+    `sets` fixes slots; `observe(y (K, n), t (n,), p (K, n_p)) -> (K, n)` changes what the probe
+    reads.
 
     Attributes
     ----------
@@ -135,6 +173,7 @@ class Effect:
     statement : sentence for the report with `{size}` and `{share}` filled in
     needs_stop : True when it makes no sense without an obstacle
     prefer : id of the simpler effect that this one reduces to at its null
+    condition : what else a campaign must offer (two obstacles, two impacts, ...); None for nothing
     """
 
     id: str
@@ -151,6 +190,13 @@ class Effect:
     observe: Observe | None = None
     needs_stop: bool = False
     prefer: str | None = None
+    condition: Callable[[Scales], bool] | None = None
+
+    def admissible(self, scales: Scales) -> bool:
+        """True when a campaign of these scales could show the effect at all."""
+        if self.needs_stop and scales.impacts == 0:
+            return False
+        return self.condition is None or self.condition(scales)
 
     def parameter(self, name: str) -> EffectParameter:
         """The parameter called `name`; KeyError when there is none."""
@@ -172,5 +218,5 @@ def _callback(function: Callable[..., float]) -> Any:
 
     from bayesimpact.model.compiled import compiled_callback
 
-    number, pointer = types.float64, types.CPointer(types.float64)
+    number, pointer = types.float64, types.CPointer(types.float64)  # type: ignore[no-untyped-call]
     return compiled_callback(number(*[number] * 6, pointer, pointer))(function)

@@ -1,0 +1,60 @@
+"""At its null value every effect is the base model."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from effect_rigs import BY_ID, TestRig, null_values
+
+from bayesimpact.model.effects import EFFECTS
+from bayesimpact.model.oscillator import build_oscillator
+
+RIG = TestRig(duration=3.0)
+PLAIN = TestRig(k2=(), duration=3.0)
+EXACT = {"contact_damping_per_case", "gap_per_recording"}
+# contact_no_tension has no parameter, and obstacle_mass reduces to it
+OTHERS = [e for e in EFFECTS if e.id not in {"contact_no_tension", "obstacle_mass"}]
+
+
+@pytest.mark.parametrize("effect", OTHERS, ids=lambda e: e.id)
+def test_null_is_the_base_model(effect):
+    base = RIG.readings([], {})
+    added = RIG.readings([effect], null_values(effect, RIG))
+    bypassed = effect.id in EXACT or effect.observe is not None
+    for a, b in zip(added, base, strict=True):
+        assert np.abs(b).max() > 1e-3
+        if bypassed:
+            np.testing.assert_array_equal(a, b)
+        else:
+            np.testing.assert_allclose(a, b, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("effect", [e for e in EFFECTS if not e.needs_stop], ids=lambda e: e.id)
+def test_null_without_a_stop(effect):
+    base = PLAIN.readings([], {})
+    added = PLAIN.readings([effect], null_values(effect, PLAIN))
+    for a, b in zip(added, base, strict=True):
+        np.testing.assert_allclose(a, b, rtol=0, atol=1e-13)
+
+
+def test_no_effect_runs_in_the_exact_simulator():
+    assert build_oscillator(RIG.campaign(), []).is_base
+    assert not build_oscillator(RIG.campaign(), [BY_ID["coulomb_friction"]]).is_base
+
+
+def test_a_massless_obstacle_is_one_that_cannot_pull():
+    mass, none = BY_ID["obstacle_mass"], BY_ID["contact_no_tension"]
+    massless = RIG.readings([mass], {"obstacle_mass.mass": 0.0})
+    for a, b in zip(massless, RIG.readings([none], {}), strict=True):
+        np.testing.assert_array_equal(a, b)
+    assert mass.prefer == none.id
+
+
+def test_all_effects_at_once_at_their_nulls():
+    """Together they must not disturb one another either."""
+    values = {}
+    for effect in OTHERS:
+        values |= null_values(effect, RIG)
+    base = RIG.readings([], {})
+    for a, b in zip(RIG.readings(OTHERS, values), base, strict=True):
+        np.testing.assert_allclose(a, b, rtol=0, atol=1e-13)
