@@ -1,0 +1,234 @@
+"""Gap, stiffness and damping of the stop from the observed cycles of one rig.
+
+Each cycle gives three numbers: its length, the ratio of the depths at its two ends and the height
+it reached. A stop shortens the cycle, eats energy and cuts the height; cycles that stay below the
+gap do none of this, which is the knee of the backbone. A coarse grid over gap, stiffness and
+damping finds the valley, least squares on the closed-form cycle its bottom.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from bayesimpact.response.cycles import cycle
+
+Floats = NDArray[np.float64]
+
+STIFFNESS_RATIOS = np.geomspace(0.02, 5000.0, 26)
+DAMPING_RATIOS = np.array([0.003, 0.03, 0.15, 0.6])
+GAP_STEPS = 16
+CYCLES_IN_GRID = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Cycles:
+    """Observed cycles from lower turning point to lower turning point, (n,) each, SI.
+
+    `depth`, `after`: depth below rest at the start and end; `length`: time between; `height`: highest
+    displacement between; `sd_length`, `sd_ratio`, `sd_height`: standard deviations of the length, of
+    ln(after / depth) and of the height; `case`: index of the obstacle.
+    """
+
+    depth: Floats
+    after: Floats
+    length: Floats
+    height: Floats
+    sd_length: Floats
+    sd_ratio: Floats
+    sd_height: Floats
+    case: NDArray[np.intp]
+
+    def take(self, rows: NDArray[np.intp]) -> Cycles:
+        """The cycles with these indices."""
+        fields = {name: getattr(self, name)[rows] for name in self.__dataclass_fields__}
+        return replace(self, **fields)
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """What the cycles say of the stop, with standard errors; (cases,) arrays for `k2`.
+
+    `touched` (cases,): whether any cycle of the case touches. Without, k2 is not known.
+    """
+
+    g: float
+    c2: float
+    k2: Floats
+    c1: float
+    k1: float
+    sd_g: float
+    sd_c2: float
+    sd_k2: Floats
+    sd_c1: float
+    sd_k1: float
+    touched: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Free:
+    """The free oscillator as known from the flights: kg, N s/m, N/m and standard errors."""
+
+    mass: float
+    c1: float
+    k1: float
+    sd_c1: float
+    sd_k1: float
+
+
+def fit_contact(cycles: Cycles, free: Free, cases: int) -> Contact | None:
+    """Estimate the stop.
+
+    Parameters
+    ----------
+    cycles : of all recordings
+    free : the free oscillator; it is refined within its standard errors, because where no swing is
+        free the cycles tell c1 and c2 apart better than the flights do
+    cases : number of obstacles
+
+    Returns
+    -------
+    The estimates, or None when the cycles look no different with a stop than without.
+    """
+    scale = float(cycles.depth.max())
+    starts = _grid(cycles, free, cases, scale)
+    best = None
+    for start in starts:
+        found = least_squares(
+            lambda x: _residuals(x, cycles, free, scale),
+            start,
+            bounds=_bounds(cases, scale, cycles),
+            loss="soft_l1",
+            f_scale=3.0,
+            x_scale=_steps(cases),
+            max_nfev=60,
+        )
+        if best is None or found.cost < best.cost:
+            best = found
+    without = _free_misfit(cycles, free)
+    # Three more unknowns than without a stop; 5 each is far beyond chance.
+    if best is None or np.sum(np.minimum(best.fun**2, 100.0)) > without - 15.0:
+        return None
+    return _contact(best, cycles, free, cases, scale)
+
+
+def _unpack(x: Floats, free: Free, scale: float) -> tuple[float, float, Floats, float, float]:
+    """g, c2, k2, c1, k1 of a point of the search."""
+    c1 = free.c1 + free.sd_c1 * x[2]
+    k1 = free.k1 * float(np.exp(x[3] * free.sd_k1 / free.k1))
+    k2 = k1 * np.exp(x[4:])
+    return scale * x[0], float(np.exp(x[1])), k2, max(c1, 0.0), k1
+
+
+def _residuals(x: Floats, cycles: Cycles, free: Free, scale: float) -> Floats:
+    g, c2, k2, c1, k1 = _unpack(x, free, scale)
+    end = cycle(cycles.depth, free.mass, c1, k1, np.array(c2), np.array(g), k2[cycles.case])
+    rows = _misfits(cycles, end.length, end.depth, end.height)
+    return np.concatenate([rows.ravel(), [x[2] / 2, x[3] / 2]])
+
+
+def _misfits(cycles: Cycles, length: Floats, depth: Floats, height: Floats) -> Floats:
+    """(3, ...) standardised misfits; a cycle that the stop never lets go counts as far off."""
+    ratio = np.log(np.maximum(depth, 1e-300) / cycles.depth)
+    rows = np.stack(
+        [
+            (cycles.length - length) / cycles.sd_length,
+            (np.log(cycles.after / cycles.depth) - ratio) / cycles.sd_ratio,
+            (cycles.height - height) / cycles.sd_height,
+        ]
+    )
+    return np.clip(np.nan_to_num(rows, nan=1e4, posinf=1e4, neginf=-1e4), -1e4, 1e4)
+
+
+def _free_misfit(cycles: Cycles, free: Free) -> float:
+    """Misfit of free cycles, the decay rate fitted to their depths."""
+    never = np.array(np.inf)
+    shortfall = np.log(cycles.depth / cycles.after) * free.k1**0.5 / np.pi * free.mass**0.5
+    for_c1 = max(0.0, float(np.median(shortfall)))
+    sums = []
+    for c1 in (free.c1, for_c1):
+        end = cycle(cycles.depth, free.mass, c1, free.k1, np.array(0.0), never, np.array(0.0))
+        rows = _misfits(cycles, end.length, end.depth, end.height)
+        sums.append(float(np.sum(np.minimum(rows**2, 100.0))))
+    return min(sums)
+
+
+def _grid(cycles: Cycles, free: Free, cases: int, scale: float) -> list[Floats]:
+    """The best starting points of a coarse grid, at up to three gaps."""
+    highest = float(cycles.height.max())
+    lowest = -0.9 * scale if highest <= 0 else 0.0
+    gaps = np.concatenate([np.linspace(lowest, highest, GAP_STEPS)[:-1], -np.array([0.05, 0.2, 0.5]) * scale])
+    cost = np.zeros(gaps.size)
+    choice = np.zeros((gaps.size, cases, 2))
+    for case in range(cases):
+        mine = np.flatnonzero(cycles.case == case)
+        if mine.size == 0:
+            choice[:, case] = [0.0, np.nan]
+            continue
+        rows = mine[np.unique(np.linspace(0, mine.size - 1, CYCLES_IN_GRID).astype(int))]
+        some = cycles.take(rows)
+        shape = (gaps.size, STIFFNESS_RATIOS.size, DAMPING_RATIOS.size, rows.size)
+        g = gaps[:, None, None, None]
+        k2 = free.k1 * STIFFNESS_RATIOS[None, :, None, None]
+        c2 = 2 * DAMPING_RATIOS[:, None] * np.sqrt((free.k1 + k2) * free.mass)
+        args = (np.broadcast_to(a, shape).ravel() for a in (some.depth, c2, g, k2))
+        depth, c2_flat, g_flat, k2_flat = args
+        end = cycle(depth, free.mass, free.c1, free.k1, c2_flat, g_flat, k2_flat)
+        rows3 = _misfits(
+            some, end.length.reshape(shape), end.depth.reshape(shape), end.height.reshape(shape)
+        )
+        misfit = np.sum(np.log1p((rows3 / 10) ** 2), axis=(0, 4)) * mine.size / rows.size
+        flat = misfit.reshape(gaps.size, -1)
+        at = np.argmin(flat, axis=1)
+        cost += flat[np.arange(gaps.size), at]
+        k, z = np.unravel_index(at, misfit.shape[1:])
+        ratio = STIFFNESS_RATIOS[k]
+        choice[:, case, 0] = np.log(ratio)
+        choice[:, case, 1] = np.log(
+            2 * DAMPING_RATIOS[z] * np.sqrt((1 + ratio) * free.k1 * free.mass)
+        )
+    starts = []
+    for row in np.argsort(cost)[:3]:
+        damping = float(np.nanmedian(choice[row, :, 1]))
+        starts.append(np.concatenate([[gaps[row] / scale, damping, 0.0, 0.0], choice[row, :, 0]]))
+    low, high = _bounds(cases, scale, cycles)
+    margin = 1e-6 * (high - low)
+    return [np.clip(start, low + margin, high - margin) for start in starts]
+
+
+def _bounds(cases: int, scale: float, cycles: Cycles) -> tuple[Floats, Floats]:
+    top = max(1.2 * float(cycles.height.max()) / scale, 0.05)
+    low = np.concatenate([[-0.98, -46.0, -6.0, -6.0], np.full(cases, np.log(1e-3))])
+    high = np.concatenate([[top, 46.0, 6.0, 6.0], np.full(cases, np.log(1e5))])
+    return low, high
+
+
+def _steps(cases: int) -> Floats:
+    return np.concatenate([[0.05, 0.3, 1.0, 1.0], np.full(cases, 0.2)])
+
+
+def _contact(found: object, cycles: Cycles, free: Free, cases: int, scale: float) -> Contact:
+    x, jac, fun = np.asarray(found.x), np.asarray(found.jac), np.asarray(found.fun)  # type: ignore[attr-defined]
+    g, c2, k2, c1, k1 = _unpack(x, free, scale)
+    end = cycle(cycles.depth, free.mass, c1, k1, np.array(c2), np.array(g), k2[cycles.case])
+    touched = np.array([bool(end.impact[cycles.case == case].any()) for case in range(cases)])
+    variance = max(1.0, float(np.median(fun**2)) / 0.455)
+    # A direction the data do not fix has no column in the Jacobian: give it a large, finite sd.
+    covariance = np.linalg.inv(jac.T @ jac / variance + np.eye(x.size) * 1e-4)
+    sd = np.sqrt(np.diag(covariance))
+    return Contact(
+        g=g,
+        c2=c2,
+        k2=k2,
+        c1=c1,
+        k1=k1,
+        sd_g=scale * float(sd[0]),
+        sd_c2=c2 * float(np.expm1(min(sd[1], 20.0))),
+        sd_k2=np.where(touched, k2 * np.expm1(np.minimum(sd[4:], 20.0)), np.inf),
+        sd_c1=free.sd_c1 * float(sd[2]),
+        sd_k1=free.sd_k1 * float(sd[3]),
+        touched=touched,
+    )

@@ -1,0 +1,139 @@
+"""The half swings of a decaying signal: where it turns, where it rests, where it passes rest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+from scipy.signal import find_peaks
+
+from bayesimpact.response import local
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class HalfSwings:
+    """Consecutive complete half swings about a level; positions are in samples.
+
+    Attributes
+    ----------
+    crossings : (k + 1,) where the signal passes the level
+    side : (k,) +1 above the level, -1 below
+    peaks : (k,) position of each extreme
+    amplitudes : (k,) distance of each extreme from the level, positive
+    """
+
+    crossings: Floats
+    side: NDArray[np.int_]
+    peaks: Floats
+    amplitudes: Floats
+
+    @property
+    def durations(self) -> Floats:
+        """(k,) time between the crossings of each half swing, samples."""
+        return np.diff(self.crossings)
+
+
+def rough_period(samples: Floats) -> float:
+    """Period of the strongest component, in samples: good to some ten per cent."""
+    # A stop moves the middle of the swings as they decay. In the velocity this drift counts little.
+    velocity = np.gradient(samples)
+    velocity -= velocity.mean()
+    size = 1 << int(np.ceil(np.log2(4 * samples.size)))
+    power = np.abs(np.fft.rfft(velocity * np.hanning(samples.size), size)) ** 2
+    lowest = max(1, int(1.2 * size / samples.size))
+    peak = lowest + int(np.argmax(power[lowest:]))
+    return size / peak
+
+
+def turning_points(samples: Floats, period: float, noise: float) -> tuple[Ints, NDArray[np.int_]]:
+    """Alternating maxima and minima, whatever the level they lie about.
+
+    Returns
+    -------
+    (k,) indices and (k,) signs, +1 for a maximum. A turn counts when the signal comes back by more
+    than six standard deviations of the noise that a running mean over period / 24 leaves.
+    """
+    width = max(1, int(period / 24))
+    smooth = uniform_filter1d(samples, width, mode="nearest") if width > 2 else samples
+    least = 6 * noise / np.sqrt(width)
+    reach = 2 * int(2 * period) + 1
+    high, _ = find_peaks(smooth, prominence=least, wlen=reach)
+    low, _ = find_peaks(-smooth, prominence=least, wlen=reach)
+    index = np.concatenate([high, low])
+    sign = np.concatenate([np.ones(high.size, dtype=int), -np.ones(low.size, dtype=int)])
+    order = np.argsort(index)
+    index, sign = index[order], sign[order]
+    keep: list[int] = []
+    for k in range(index.size):
+        if keep and sign[keep[-1]] == sign[k]:
+            if sign[k] * smooth[index[k]] > sign[k] * smooth[index[keep[-1]]]:
+                keep[-1] = k
+        else:
+            keep.append(k)
+    return index[keep].astype(np.intp), sign[keep]
+
+
+def half_swings(samples: Floats, level: float, period: float, noise: float) -> HalfSwings:
+    """Complete half swings about `level`, until the motion is lost in the noise.
+
+    A crossing counts when the signal goes from four standard deviations of the noise on one side
+    to four on the other (a Schmitt trigger), so that noise near zero makes no double crossings.
+
+    Parameters
+    ----------
+    samples : (n,) signal
+    level : rest reading
+    period : rough period, samples
+    noise : standard deviation of the noise
+    """
+    signal = samples - level
+    threshold = max(4 * noise, 1e-9 * float(np.abs(signal).max(initial=0.0)))
+    strong = np.flatnonzero(np.abs(signal) > threshold)
+    state = np.sign(signal[strong]).astype(int)
+    flips = np.flatnonzero(np.diff(state))
+    if flips.size < 2:
+        return _none()
+    before, after = strong[flips], strong[flips + 1]
+    centre = np.array(
+        [_middle_change(signal, a, b) for a, b in zip(before, after, strict=True)], dtype=np.intp
+    )
+    side = state[flips[:-1] + 1]
+    first, last = centre[:-1] + 1, centre[1:]
+    peaks, values = local.extremes(signal, first, last, side, noise)
+    amplitudes = side * values
+    lengths = (last - first + 1).astype(np.float64)
+    shorter = np.minimum(np.append(lengths, lengths[-1]), np.append(lengths[0], lengths))
+    positions = local.crossings(signal, centre, 0.25 * shorter, noise)
+    count = _sound(np.diff(positions), side, amplitudes, max(6 * noise, 1.5 * threshold))
+    return HalfSwings(positions[: count + 1], side[:count], peaks[:count], amplitudes[:count])
+
+
+def _none() -> HalfSwings:
+    return HalfSwings(np.empty(0), np.empty(0, dtype=int), np.empty(0), np.empty(0))
+
+
+def _middle_change(signal: Floats, before: int, after: int) -> int:
+    """The middle one of the changes of sign between two samples on either side."""
+    changes = np.flatnonzero(np.signbit(signal[before:after]) != np.signbit(signal[before + 1 : after + 1]))
+    return int(before + changes[changes.size // 2])
+
+
+def _sound(durations: Floats, side: NDArray[np.int_], amplitudes: Floats, floor: float) -> int:
+    """How many half swings come before the motion is lost: too small, or a swing overlooked."""
+    count = durations.size
+    small = np.flatnonzero(amplitudes < floor)
+    if small.size:
+        count = int(small[0])
+    for which in (-1, 1):
+        mine = np.flatnonzero(side[:count] == which)
+        for k in range(2, mine.size):
+            usual = float(np.median(durations[mine[max(0, k - 5) : k]]))
+            if durations[mine[k]] > 1.7 * usual:
+                count = min(count, int(mine[k]))
+                break
+    return count
