@@ -1,13 +1,14 @@
-"""The one way in which the package compiles: numba, cached on disk under a stamp of all the model's sources.
+"""The one way in which the package compiles: numba, cached on disk under a stamp of the sources it depends on.
 
 numba's cache notices a change only in the file of the compiled function itself, not in the files of
-the functions it calls. Here they all share one stamp, a hash of every source file below `model/`, so a
-change anywhere compiles everything anew.
+the functions it calls. Here the stamp of a function covers its own file and every file of the package
+that this one imports, directly or not, so a change anywhere below compiles it anew.
 """
 
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -15,15 +16,30 @@ from typing import Any
 
 import numba
 
+_ROOT = Path(__file__).parents[2]
+_IMPORT = re.compile(r"^\s*from (bayesimpact[\w.]*) import (\w+)", re.MULTILINE)
+
 
 @cache
-def source_stamp() -> str:
-    """SHA-256 over every Python file below `model/` (names and contents)."""
+def source_stamp(path: Path) -> str:
+    """SHA-256 over a source file and all files of the package that it imports, directly or not."""
     digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.rglob("*.py")):
-        digest.update(path.name.encode())
-        digest.update(path.read_bytes())
+    for file in sorted(_dependencies(path)):
+        digest.update(file.name.encode())
+        digest.update(file.read_bytes())
     return digest.hexdigest()
+
+
+def _dependencies(path: Path) -> set[Path]:
+    found, waiting = set(), [path]
+    while waiting:
+        file = waiting.pop()
+        if file not in found and file.exists():
+            found.add(file)
+            for module, name in _IMPORT.findall(file.read_text(encoding="utf-8")):
+                folder = _ROOT.joinpath(*module.split("."))
+                waiting += [folder.with_suffix(".py"), folder / f"{name}.py"]
+    return found
 
 
 def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
@@ -50,5 +66,6 @@ def compiled_callback(signature: Any) -> Callable[[Callable[..., Any]], Any]:
 def _stamped(dispatcher: Any) -> Any:
     cache_file = getattr(dispatcher._cache, "_cache_file", None)
     if cache_file is not None:
-        cache_file._source_stamp = source_stamp()
+        path = Path(dispatcher.py_func.__code__.co_filename)
+        cache_file._source_stamp = source_stamp(path)
     return dispatcher

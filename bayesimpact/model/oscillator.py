@@ -140,16 +140,20 @@ class Oscillator:
         """True displacement of recording `r`, (B, count), m, for slot vectors (B, Q)."""
         mass = self.campaign.mass
         if self.is_base:
-            from bayesimpact.model.simulate import trajectories
-
-            codes = trajectories(
-                np.ascontiguousarray(q[:, : len(BASE_SLOTS)]), mass, intervals, out
-            )
+            base = q[:, : len(BASE_SLOTS)].copy()
+            base[:, _OFFSET] = 0.0
+            out, failures = predictions(
+                base, _IDENTITY, np.zeros(_IDENTITY.shape), mass, np.array([count]),
+                self.intervals[r : r + 1], count,
+            )  # fmt: skip
+            codes = failures[:, 0]
         else:
-            from bayesimpact.model.general import integrate_many
-
+            intervals = np.full(q.shape[0], self.intervals[r])
             counts = np.full(q.shape[0], count, dtype=np.int64)
-            codes = integrate_many(np.ascontiguousarray(q), mass, intervals, counts, self.laws, out)
+            out = np.empty((q.shape[0], count))
+            codes = integrate_many(
+                np.ascontiguousarray(q), mass, intervals, counts, self.laws, out
+            )
         out[codes != 0] = np.nan
         return out
 

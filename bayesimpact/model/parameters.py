@@ -105,6 +105,8 @@ def build_layout(
     _add_physical(campaign, binds, add)
     for effect in effects:
         for parameter in effect.parameters:
+            if parameter.fixed is not None:
+                continue
             for name in _instances(campaign, effect, parameter):
                 add(name, parameter.unit, "effect", parameter.lower, parameter.upper)
     for recording in campaign.recordings:
@@ -204,8 +206,11 @@ def _maps(
             if slot in binds:
                 name = _own(binds[slot], recording.case, recording.name)
             columns[r, i] = position.get(name, -1)
-        for j, owner in enumerate(law_parameters):
-            columns[r, len(SLOTS) + j] = position[_own(owner, recording.case, recording.name)]
+        for j, owner in enumerate(law_parameters, start=len(SLOTS)):
+            if owner[1].fixed is None:
+                columns[r, j] = position[_own(owner, recording.case, recording.name)]
+            else:
+                constants[r, j] = owner[1].fixed
     return columns, constants
 
 

@@ -63,7 +63,7 @@ class Scales:
     @property
     def damping_force(self) -> float:
         """Largest damping force, N; at least what a damping ratio of 0.05 % gives."""
-        return (self.damping + 1e-3 * (self.stiffness * self.mass) ** 0.5) * self.speed
+        return (self.damping + 1e-3 * math.sqrt(self.stiffness * self.mass)) * self.speed
 
     @property
     def natural_frequency(self) -> float:

@@ -1,0 +1,37 @@
+"""The stamp of a compiled function changes with every file that it depends on, and with no other."""
+
+from pathlib import Path
+
+import pytest
+
+from bayesimpact.model import compiled
+
+
+@pytest.fixture
+def sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    folder = tmp_path / "bayesimpact" / "model"
+    folder.mkdir(parents=True)
+    (folder / "top.py").write_text("from bayesimpact.model.middle import f\n")
+    (folder / "middle.py").write_text("from bayesimpact.model import bottom\n")
+    (folder / "bottom.py").write_text("x = 1\n")
+    (folder / "other.py").write_text("x = 1\n")
+    monkeypatch.setattr(compiled, "_ROOT", tmp_path)
+    return folder
+
+
+def stamp(path: Path) -> str:
+    compiled.source_stamp.cache_clear()
+    return compiled.source_stamp(path)
+
+
+@pytest.mark.parametrize("name", ["top.py", "middle.py", "bottom.py"])
+def test_a_change_below_changes_the_stamp(sources: Path, name: str) -> None:
+    before = stamp(sources / "top.py")
+    (sources / name).write_text((sources / name).read_text() + "y = 2\n")
+    assert stamp(sources / "top.py") != before
+
+
+def test_a_change_elsewhere_does_not(sources: Path) -> None:
+    before = stamp(sources / "top.py")
+    (sources / "other.py").write_text("x = 2\n")
+    assert stamp(sources / "top.py") == before
