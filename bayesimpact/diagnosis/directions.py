@@ -1,0 +1,155 @@
+"""How every recording would change under a small amount of an effect that the model leaves out.
+
+A direction is the derivative of the prediction with respect to the size of an effect, at the fitted model,
+through simulation, sensor, filter and whitening. Sizes of difference steps are chosen such that the change is
+a fraction of the noise: small enough to be linear, far above rounding.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.diagnosis.extend import extend, replaced_slot, transfer
+from bayesimpact.inference.fit import Fit, Target
+from bayesimpact.model.effects.effect import Effect, EffectParameter, Scales
+from bayesimpact.model.parameters import instance_name
+
+Array = NDArray[np.float64]
+
+CHANGE = 3.0  # norm of the response to a difference step, in units of the noise
+FIRST_STEP = 1e-5  # of a parameter's physical scale, to find the right step
+
+
+@dataclass(frozen=True, eq=False)
+class Direction:
+    """Whitened response, in units of the noise, to one unit of an effect.
+
+    Attributes
+    ----------
+    effect : the effect
+    shapes : values of its shape parameters, by `<effect>.<parameter>`
+    names : the k size parameters, `<effect>.<parameter>[...]`; (the id itself for an effect that is on or off)
+    parts : per recording (n_r, k)
+    one_sided : sizes below the null are not admissible
+    """
+
+    effect: Effect
+    shapes: Mapping[str, float]
+    names: tuple[str, ...]
+    parts: tuple[Array, ...]
+    one_sided: bool
+
+
+def directions(fit: Fit, effects: Iterable[Effect], scales: Scales) -> tuple[Direction, ...]:
+    """Directions of all effects that the fit's model does not contain, one per point of their shape grids.
+
+    Effects with a phase are left to `periodic`, which scans frequencies.
+    """
+    have = {e.id for e in fit.target.oscillator.effects}
+    taken = {slot for e in fit.target.oscillator.effects for slot in e.binds}
+    found = []
+    for effect in effects:
+        possible = fit.target.oscillator.campaign.stop or not effect.needs_stop
+        if effect.id in have or not possible or is_periodic(effect) or taken & set(effect.binds):
+            continue
+        for shapes in _grid(effect, scales):
+            direction = _direction(fit, effect, scales, shapes)
+            if direction is not None:
+                found.append(direction)
+    return tuple(found)
+
+
+def is_periodic(effect: Effect) -> bool:
+    """True for an effect with a phase."""
+    return any(p.circular for p in effect.parameters)
+
+
+def sigma_of(fit: Fit) -> Array:
+    """Noise level of every recording at the fit's mode, (R,), m."""
+    return fit.mode[fit.target.likelihood.sigma_columns]
+
+
+def whitened(target: Target, values: Sequence[Array], sigma: Array) -> tuple[Array, ...]:
+    """Signals (..., n_r) per recording, whitened and in units of the noise."""
+    recordings, noise = target.oscillator.campaign.recordings, target.likelihood.noise
+    rows = zip(values, recordings, sigma, strict=True)
+    return tuple(noise.whiten(v, r.interval) / s for v, r, s in rows)
+
+
+def _grid(effect: Effect, scales: Scales) -> list[dict[str, float]]:
+    shapes = [p for p in effect.parameters if p.is_shape]
+    axes = [p.grid(scales) if p.grid else np.array([p.scale(scales)]) for p in shapes]
+    keys = [f"{effect.id}.{p.name}" for p in shapes]
+    return [dict(zip(keys, map(float, point), strict=True)) for point in itertools.product(*axes)]
+
+
+def size_parameters(target: Target, effect: Effect) -> list[tuple[str, EffectParameter]]:
+    """Names in theta and records of an effect's size parameters."""
+    campaign = target.oscillator.campaign
+    keys = {
+        "campaign": [None],
+        "case": list(campaign.cases),
+        "recording": [r.name for r in campaign.recordings],
+    }
+    sizes = [p for p in effect.parameters if not p.is_shape]
+    return [(instance_name(effect, p, key), p) for p in sizes for key in keys[p.scope]]
+
+
+def _direction(
+    fit: Fit, effect: Effect, scales: Scales, shapes: Mapping[str, float]
+) -> Direction | None:
+    effects = (*fit.target.oscillator.effects, effect)
+    target = extend(fit, effects, scales)
+    layout = target.oscillator.layout
+    theta = transfer(fit, layout, effects, scales, shapes)
+    sigma = sigma_of(fit)
+    sizes = size_parameters(target, effect)
+    if not sizes:
+        change = [b - a for a, b in zip(fit.predicted, target.oscillator.predict(theta), strict=True)]
+        parts = tuple(p[:, None] for p in whitened(target, change, sigma))
+        return Direction(effect, dict(shapes), (effect.id,), parts, True)
+    base = whitened(target, target.oscillator.predict(theta), sigma)
+    columns = []
+    for name, parameter in sizes:
+        response = _response(target, theta, base, sigma, layout.index(name), parameter, scales)
+        if response is None:
+            return None
+        columns.append(response)
+    parts = tuple(np.stack(part, axis=1) for part in zip(*columns, strict=True))
+    names = tuple(name for name, _ in sizes)
+    replaces = replaced_slot(effect, sizes[0][1]) is not None
+    one_sided = sizes[0][1].lower == sizes[0][1].null and not replaces
+    return Direction(effect, dict(shapes), names, parts, one_sided)
+
+
+def _response(
+    target: Target,
+    theta: Array,
+    base: tuple[Array, ...],
+    sigma: Array,
+    index: int,
+    parameter: EffectParameter,
+    scales: Scales,
+) -> tuple[Array, ...] | None:
+    """Whitened change per unit of parameter `index`; None when it changes nothing."""
+    step = FIRST_STEP * parameter.scale(scales)
+    for _ in range(3):
+        moved = theta.copy()
+        moved[index] += step
+        values = whitened(target, target.oscillator.predict(moved), sigma)
+        change = [b - a for a, b in zip(base, values, strict=True)]
+        norm = float(np.sqrt(sum(float(c.ravel() @ c.ravel()) for c in change)))
+        if not np.isfinite(norm):
+            step *= 1e-3
+            continue
+        if norm == 0.0:
+            return None
+        if 0.1 * CHANGE < norm < 10 * CHANGE:
+            break
+        step *= CHANGE / norm
+    return tuple(c / step for c in change)

@@ -1,0 +1,146 @@
+"""From a fit to the same campaign with one more effect: parameter vectors move between layouts by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.inference.defaults import effect_prior
+from bayesimpact.inference.fit import Fit, Target
+from bayesimpact.inference.likelihood import Likelihood
+from bayesimpact.inference.priors import Normal, Prior, Priors
+from bayesimpact.model.effects.effect import Effect, EffectParameter, Scales
+from bayesimpact.model.oscillator import Oscillator, build_oscillator
+from bayesimpact.model.parameters import Layout
+
+Array = NDArray[np.float64]
+
+
+def campaign_scales(fit: Fit) -> Scales:
+    """Physical sizes of a campaign from the fit of its base model."""
+    o = fit.target.oscillator
+    slots = o.layout.slots(fit.mode)
+    c1, k1, c2, gap, k2 = slots[:, :5].T
+    samples = [r.samples for r in o.campaign.recordings]
+    offsets = slots[:, 10]
+    reach = np.array([np.max(np.abs(s - b)) for s, b in zip(samples, offsets, strict=True)])
+    depth = np.array([np.max(s - b) for s, b in zip(samples, offsets, strict=True)]) - gap
+    speed = reach * np.sqrt(k1 / o.campaign.mass)
+    touches = [
+        int(np.sum((s[:-1] - b < g) & (s[1:] - b >= g)))
+        for s, b, g in zip(samples, offsets, gap, strict=True)
+    ]
+    indentation = float(max(depth.max(), 0.0)) if o.campaign.stop else 0.0
+    return Scales(
+        mass=o.campaign.mass,
+        stiffness=float(k1.mean()),
+        damping=float(c1.mean()),
+        contact_stiffness=float(k2.mean()),
+        contact_damping=float(c2.mean()),
+        amplitude=float(reach.max()),
+        speed=float(speed.max()),
+        indentation=indentation,
+        impact_speed=float(speed.max()) if indentation > 0 else 0.0,
+        duration=max(r.duration for r in o.campaign.recordings),
+        interval=float(o.intervals.min()),
+        impacts=max(touches),
+    )
+
+
+def owner(effects: Sequence[Effect], name: str) -> tuple[Effect, EffectParameter]:
+    """Effect and parameter that a name `<effect>.<parameter>[...]` belongs to."""
+    effect_id, rest = name.split(".", 1)
+    for effect in effects:
+        if effect.id == effect_id:
+            return effect, effect.parameter(rest.split("[")[0])
+    raise KeyError(name)
+
+
+def replaced_slot(effect: Effect, parameter: EffectParameter) -> str | None:
+    """The base parameter that an effect's parameter takes the place of (c2 per case: "c2"), or None."""
+    for slot, name in effect.binds.items():
+        if name == parameter.name and slot in ("c1", "k1", "c2", "g"):
+            return slot
+    return None
+
+
+def extend(fit: Fit, effects: Sequence[Effect], scales: Scales) -> Target:
+    """Posterior of the fit's campaign with exactly these `effects`, priors of the shared parameters kept."""
+    old = fit.target
+    per_recording = old.oscillator.layout.roles("noise").size > 1
+    oscillator = build_oscillator(
+        old.oscillator.campaign,
+        effects,
+        smoothing=old.oscillator.smoothing,
+        sigma_per_recording=per_recording,
+    )
+    known = dict(zip(old.oscillator.layout.names, old.priors.parameters, strict=True))
+    priors = [known.get(n) or _prior(fit, effects, n, scales) for n in oscillator.layout.names]
+    return Target(Likelihood(oscillator, old.likelihood.noise), Priors(tuple(priors)))
+
+
+def _prior(fit: Fit, effects: Sequence[Effect], name: str, scales: Scales) -> Prior:
+    if "." not in name:  # a base parameter comes back when the effect that had replaced it leaves
+        slot = name
+        values = [v for n, v in zip(fit.names, fit.mode, strict=True) if n.split(".")[-1].startswith(slot)]
+        centre = float(np.mean(values))
+        return Normal(centre, 10 * max(abs(centre), 1e-12))
+    effect, parameter = owner(effects, name)
+    slot_name = replaced_slot(effect, parameter)
+    if slot_name is not None:
+        centre = base_value(fit, slot_name)
+        return Normal(centre, parameter.scale(scales))
+    return effect_prior(effect, parameter, scales)
+
+
+def base_value(fit: Fit, slot: str) -> float:
+    """Value of a shared base parameter in a fit: itself, or the mean over what replaced it."""
+    layout = fit.target.oscillator.layout
+    column = ("c1", "k1", "c2", "g").index(slot)
+    return float(layout.slots(fit.mode)[:, column].mean())
+
+
+def transfer(
+    fit: Fit, layout: Layout, effects: Sequence[Effect], scales: Scales, shapes: Mapping[str, float]
+) -> Array:
+    """The fit's mode in another layout; new effects at their null, shape parameters from `shapes`.
+
+    `shapes` maps `<effect>.<parameter>` to a value; other shape parameters take their scale.
+    """
+    known = dict(zip(fit.names, fit.mode, strict=True))
+    theta = np.empty(layout.size)
+    for i, name in enumerate(layout.names):
+        theta[i] = known[name] if name in known else _start(fit, effects, name, scales, shapes)
+    return theta
+
+
+def _start(
+    fit: Fit, effects: Sequence[Effect], name: str, scales: Scales, shapes: Mapping[str, float]
+) -> float:
+    if "." not in name:
+        return base_value(fit, name)
+    bare = name.split("[")[0]
+    if name in shapes or bare in shapes:
+        return shapes.get(name, shapes.get(bare, 0.0))
+    effect, parameter = owner(effects, name)
+    slot = replaced_slot(effect, parameter)
+    if slot is not None:
+        return base_value(fit, slot)
+    if parameter.circular:
+        return 0.0
+    return parameter.scale(scales) if parameter.null is None else parameter.null
+
+
+def difference_steps(fit: Fit, target: Target, sizes: Mapping[str, float]) -> Array:
+    """Steps (d,) for differences: a twentieth of the known standard deviations, else from `sizes`."""
+    sd = dict(zip(fit.names, fit.sd, strict=True))
+    names = target.oscillator.layout.names
+    return np.array([0.05 * sd[n] if n in sd else 0.05 * sizes[n] for n in names])
+
+
+def swap(oscillator: Oscillator, effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Effects of the oscillator followed by those that it has not yet."""
+    have = {e.id for e in oscillator.effects}
+    return (*oscillator.effects, *(e for e in effects if e.id not in have))

@@ -1,0 +1,86 @@
+"""An unknown force a(y) + b(y) v as cubic B-splines over the displacement, as an effect like any other.
+
+The conservative part a and the dissipative part b have one coefficient per knot each. With independent normal
+priors of equal width this is a Gaussian process of correlation length about one knot spacing.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.model.effects.effect import Effect, EffectParameter, Law
+
+Array = NDArray[np.float64]
+
+KNOTS = 24
+_HEAD = 3  # number of coefficients, lowest displacement, spacing
+
+
+def force(y, v, d, t, z, touching, p, q):  # type: ignore[no-untyped-def]
+    """Force a(y) + b(y) v, N; p = (n, lowest, spacing, a_1..a_n, b_1..b_n)."""
+    n = int(p[0])
+    x = (y - p[1]) / p[2]
+    if x < 0.0:
+        x = 0.0
+    if x > n - 3.0:
+        x = n - 3.0
+    i = int(x)
+    if i > n - 4:
+        i = n - 4
+    u = x - i
+    w = 1.0 - u
+    w0 = w * w * w / 6.0
+    w1 = (3.0 * u * u * u - 6.0 * u * u + 4.0) / 6.0
+    w2 = (3.0 * w * w * w - 6.0 * w * w + 4.0) / 6.0
+    w3 = u * u * u / 6.0
+    a = w0 * p[3 + i] + w1 * p[4 + i] + w2 * p[5 + i] + w3 * p[6 + i]
+    b = w0 * p[3 + n + i] + w1 * p[4 + n + i] + w2 * p[5 + n + i] + w3 * p[6 + n + i]
+    return a + b * v
+
+
+def spline_basis(y: Array, low: float, spacing: float, count: int) -> Array:
+    """Values (n, count) of the B-splines at displacements (n,)."""
+    x = np.clip((y - low) / spacing, 0.0, count - 3.0)
+    i = np.minimum(x.astype(np.int64), count - 4)
+    u = x - i
+    w = 1.0 - u
+    weights = (w**3, 3 * u**3 - 6 * u**2 + 4, 3 * w**3 - 6 * w**2 + 4, u**3)
+    basis = np.zeros((y.size, count))
+    rows = np.arange(y.size)
+    for k, weight in enumerate(weights):
+        basis[rows, i + k] = weight / 6
+    return basis
+
+
+def learned_force(
+    low: float, high: float, conservative: float, dissipative: float, knots: int = KNOTS
+) -> Effect:
+    """The effect for displacements from `low` to `high` m, with prior widths of a (N) and b (N s/m)."""
+    spacing = (high - low) / (knots - 3)
+
+    def fixed(name: str, unit: str, value: float) -> EffectParameter:
+        return EffectParameter(name, unit, scale=lambda s: 1.0, fixed=value)
+
+    head = (
+        fixed("knots", "1", float(knots)),
+        fixed("lowest", "m", low),
+        fixed("spacing", "m", spacing),
+    )
+    a = tuple(
+        EffectParameter(f"a{i + 1}", "N", scale=lambda s: conservative) for i in range(knots)
+    )
+    b = tuple(
+        EffectParameter(f"b{i + 1}", "N s/m", scale=lambda s: dissipative) for i in range(knots)
+    )
+    return Effect(
+        id="learned_force",
+        family="unknown",
+        title="learned force",
+        equation="a(y) + b(y) v, cubic B-splines",
+        regime="everywhere",
+        energy="either",
+        statement="A force outside the catalogue acts, up to {size} ({share} of the peak elastic force).",
+        parameters=head + a + b,
+        law=Law(force),
+    )

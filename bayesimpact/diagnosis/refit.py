@@ -1,0 +1,150 @@
+"""Full nonlinear refits with added effects, started from what the scores predict."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special, stats
+
+from bayesimpact.diagnosis.extend import (
+    difference_steps,
+    extend,
+    owner,
+    replaced_slot,
+    transfer,
+)
+from bayesimpact.diagnosis.scan import Score
+from bayesimpact.inference.fit import Fit, find_mode
+from bayesimpact.model.effects.effect import Effect, Scales
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A model with added effects, fitted.
+
+    Attributes
+    ----------
+    effects : ids, in the order in which they were added
+    fit : its mode
+    log_evidence : by Laplace's method, with the truncation of bounded parameters
+    """
+
+    effects: tuple[Effect, ...]
+    fit: Fit
+    log_evidence: float
+
+    @property
+    def ids(self) -> tuple[str, ...]:
+        """Ids of the effects."""
+        return tuple(e.id for e in self.effects)
+
+
+def base_candidate(fit: Fit) -> Candidate:
+    """The base model as a candidate."""
+    return Candidate(fit.target.oscillator.effects, fit, log_evidence(fit))
+
+
+def refit(fit: Fit, scores: Sequence[Score], scales: Scales) -> Candidate:
+    """Fit the model of `fit` with the effects of `scores` added."""
+    effects = (*fit.target.oscillator.effects, *(s.effect for s in scores))
+    shapes = {name: value for s in scores for name, value in s.shapes.items()}
+    target = extend(fit, effects, scales)
+    start = transfer(fit, target.oscillator.layout, effects, scales, shapes)
+    _shift(fit, target.oscillator.layout.names, start, scores)
+    sizes = step_sizes(target.oscillator.layout.names, effects, scales, scores)
+    found = find_mode(target, start, steps=difference_steps(fit, target, sizes))
+    return Candidate(effects, found, log_evidence(found))
+
+
+def without(candidate: Candidate, effect: Effect, scales: Scales) -> Candidate:
+    """The candidate's model without one of its effects, refitted."""
+    effects = tuple(e for e in candidate.effects if e.id != effect.id)
+    target = extend(candidate.fit, effects, scales)
+    layout = target.oscillator.layout
+    start = transfer(candidate.fit, layout, effects, scales, {})
+    sizes = step_sizes(layout.names, effects, scales, ())
+    found = find_mode(target, start, steps=difference_steps(candidate.fit, target, sizes))
+    return Candidate(effects, found, log_evidence(found))
+
+
+def step_sizes(
+    names: Sequence[str], effects: Sequence[Effect], scales: Scales, scores: Sequence[Score]
+) -> dict[str, float]:
+    """Expected standard deviations of effect parameters, for difference steps."""
+    sizes: dict[str, float] = {}
+    for name in names:
+        if "." in name:
+            sizes[name] = 1e-4 * owner(effects, name)[1].scale(scales)
+        elif "[" not in name:
+            sizes[name] = 1e-6
+    for score in scores:
+        sizes.update(zip(score.names, map(float, score.size_sd), strict=True))
+    return sizes
+
+
+def _shift(fit: Fit, names: Sequence[str], start: Array, scores: Sequence[Score]) -> None:
+    """Move the start to the sizes that the scores expect, and the shared parameters with them."""
+    position = {name: i for i, name in enumerate(names)}
+    for score in scores:
+        for name, size in zip(score.names, score.size, strict=True):
+            if name in position:
+                null = start[position[name]]
+                start[position[name]] = null + size
+        for name, shift in zip(fit.names, score.bias * fit.sd, strict=True):
+            if name in position:
+                start[position[name]] -= shift
+
+
+def log_evidence(fit: Fit) -> float:
+    """Log marginal likelihood by Laplace's method.
+
+    A parameter with a bound near its mode gets the normal mass that is left inside: Phi of the distance, or,
+    where the mode sits on the bound with a slope, the exact one-dimensional integral of the exponential of a
+    quadratic. Accurate for the near-Gaussian posteriors of this problem (Tierney and Kadane 1986).
+    """
+    lower = np.maximum(
+        fit.target.priors.lower, [p.lower for p in fit.target.oscillator.layout.parameters]
+    )
+    sign, log_det = np.linalg.slogdet(_unit(fit.covariance))
+    scale = np.log(fit.sd).sum()
+    if sign <= 0:
+        return -np.inf
+    value = fit.log_posterior + 0.5 * fit.mode.size * np.log(2 * np.pi) + 0.5 * log_det + scale
+    inside = (fit.mode - lower) / fit.sd
+    for i in np.flatnonzero(inside < 8):
+        value += _boundary(inside[i], i, fit)
+    return float(value)
+
+
+def _unit(covariance: Array) -> Array:
+    sd = np.sqrt(np.diag(covariance))
+    return np.asarray(covariance / np.outer(sd, sd))
+
+
+def _boundary(distance: float, index: int, fit: Fit) -> float:
+    if distance > 1e-6:
+        return float(stats.norm.logcdf(distance))
+    slope = -_gradient(fit)[index] * fit.sd[index]  # of the negative log posterior, per sd, >= 0
+    return float(np.log(special.erfcx(max(slope, 0.0) / np.sqrt(2)) / 2))
+
+
+def _gradient(fit: Fit) -> Array:
+    sigma = fit.mode[fit.target.likelihood.sigma_columns]
+    vector = np.array(fit.target.priors.gradient(fit.mode))
+    for lin, s in zip(fit.linearisation, sigma, strict=True):
+        vector[lin.columns] += lin.jacobian.T @ lin.residual / s**2
+    return vector
+
+
+def effect_values(candidate: Candidate) -> Mapping[str, float]:
+    """Modes of the added effects' parameters."""
+    fit = candidate.fit
+    return {n: float(v) for n, v in zip(fit.names, fit.mode, strict=True) if "." in n}
+
+
+__all__ = ["Candidate", "base_candidate", "log_evidence", "refit", "replaced_slot", "without"]
