@@ -45,6 +45,11 @@ def test_hash_follows_every_file(tmp_path: Path) -> None:
     assert load_campaign(write(tmp_path, TOML + "# end\n")).sha256 != first
 
 
+def test_campaign_file_from_windows(tmp_path: Path) -> None:
+    toml = b"\xef\xbb\xbf" + TOML.replace("\n", "\r\n").encode()
+    assert load_campaign(write(tmp_path, toml)).cases == ("1", "2")
+
+
 def test_integers_stand_for_numbers(tmp_path: Path) -> None:
     assert load_campaign(write(tmp_path, TOML.replace("0.503", "2"))).mass == 2.0
 
