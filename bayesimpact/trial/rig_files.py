@@ -72,7 +72,11 @@ def _measurement(known: Measurement, quantity: str) -> list[str]:
 def _smoothing(smoothing: Smoothing) -> dict[str, Any]:
     if smoothing.kind == "lag":
         return {"kind": "lag", "time_constant_s": smoothing.time_constant}
-    return {"kind": "savgol", "window": smoothing.window, "polyorder": smoothing.polyorder}
+    return {
+        "kind": "savgol",
+        "window": smoothing.declared_window or smoothing.window,
+        "polyorder": smoothing.polyorder,
+    }
 
 
 def _beam(beam: Beam) -> list[str]:

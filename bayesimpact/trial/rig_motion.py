@@ -27,14 +27,13 @@ from scipy.integrate import DOP853
 from scipy.optimize import brentq
 
 from bayesimpact.errors import SimulationError
-from bayesimpact.trial.rig_parts import Law, Part, Piece, Site, State
+from bayesimpact.trial.rig_balance import Balance, balance
+from bayesimpact.trial.rig_parts import Part, Piece, Site, State
 
 _FLIGHT, _CONTACT, _RELEASED = range(3)  # released: left by a unilateral obstacle, still above g
 _TURN, _SURFACE, _REACTION, _SLIP = range(4)
 _Integrator: Any = DOP853  # its type stubs, where installed, ask for arrays only
 _STALLS = 50  # pieces in a row that may last less than a femtosecond before giving up
-
-Watch = Callable[[float, State], float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,67 +75,10 @@ def move(
     """
     run = _Run(site, parts, times, rtol, atol)
     run.finish()
-    samples = run.samples
-    return Motion(times, samples[0], samples[1], tuple(run.touches), tuple(run.leaves))
-
-
-@dataclass(frozen=True)
-class _Sums:
-    """The forces of one piece: `drive` is all but dry friction, `level` the friction at rest."""
-
-    drive: Law
-    reaction: Watch
-    rhs: Callable[[float, NDArray[np.float64]], State]
-    level: float
-
-
-def _sums(site: Site, parts: tuple[Part, ...], piece: Piece) -> _Sums:
-    c1, k1, c2, k2, gap = site.c1, site.k1, site.c2, site.k2, piece.gap
-    sign, contact = piece.sign, piece.contact
-    carried = site.obstacle_mass if contact else 0.0
-    inertia = site.mass + carried
-    laws = [(p.in_reaction, p.law(piece)) for p in parts if p.law is not None]
-    free = [law for inside, law in laws if law is not None and not inside]
-    pushes = [law for inside, law in laws if law is not None and inside]
-    levels = [p.friction(piece) for p in parts if p.friction is not None]
-    dry = [level for level in levels if level is not None]
-    rates = [p.rates(piece) for p in parts if p.rates is not None]
-
-    def push(t: float, y: float, v: float, state: State) -> float:
-        total = c2 * v + k2 * (y - gap)
-        for law in pushes:
-            total += law(t, y, v, state)
-        return total
-
-    def drive(t: float, y: float, v: float, state: State) -> float:
-        total = c1 * v + k1 * y
-        if contact:
-            total += push(t, y, v, state)
-        for law in free:
-            total += law(t, y, v, state)
-        return total
-
-    def acceleration(t: float, y: float, v: float, state: State) -> float:
-        if sign == 0:
-            return 0.0
-        total = drive(t, y, v, state)
-        for level in dry:
-            total += sign * level(v)
-        return -total / inertia
-
-    def reaction(t: float, state: State) -> float:
-        y, v = state[0], state[1]
-        return push(t, y, v, state) + carried * acceleration(t, y, v, state)
-
-    def rhs(t: float, array: NDArray[np.float64]) -> State:
-        state: State = array.tolist()
-        y, v = state[0], state[1]
-        slope = [v, acceleration(t, y, v, state)]
-        for rate in rates:
-            slope.extend(rate(t, y, v, state))
-        return slope
-
-    return _Sums(drive, reaction, rhs, sum(level(0.0) for level in dry))
+    touches, leaves = (
+        tuple(t for t in instants if t <= run.end) for instants in (run.touches, run.leaves)
+    )
+    return Motion(times, run.samples[0], run.samples[1], touches, leaves)
 
 
 class _Run:
@@ -175,8 +117,8 @@ class _Run:
         self.mode = _CONTACT
         sign = 1 if self.site.v0 >= 0 else -1
         if self.site.unilateral:
-            sums = _sums(self.site, self.parts, self._piece_going(sign))
-            if sums.reaction(0.0, self.state) <= 0:
+            forces = balance(self.site, self.parts, self._piece_going(sign))
+            if forces.reaction(0.0, self.state) <= 0:
                 self.touches.clear()
                 return _RELEASED
         return _CONTACT
@@ -205,18 +147,16 @@ class _Run:
         return Piece(self.mode == _CONTACT, self.gap, sign, low, high)
 
     def _direction(self) -> int:
-        """Sign of the motion that follows; 0 when dry friction holds the mass."""
+        """Sign of the motion that follows; 0 while the mass stays at rest."""
         v = self.state[1]
         if v != 0:
             return 1 if v > 0 else -1
         if self.slip:
             return self.slip
-        sums = _sums(self.site, self.parts, self._piece_going(-self.last_sign))
-        force = sums.drive(self.t, self.state[0], 0.0, self.state)
-        if abs(force) <= sums.level and sums.level > 0:
+        forces = balance(self.site, self.parts, self._piece_going(-self.last_sign))
+        force = forces.drive(self.t, self.state[0], 0.0, self.state)
+        if abs(force) <= forces.level:
             return 0
-        if force == 0:
-            return -self.last_sign
         return -1 if force > 0 else 1
 
     def _next_piece(self) -> None:
@@ -225,14 +165,14 @@ class _Run:
         if self.mode == _FLIGHT and sign > 0 and self.state[0] >= self.gap:
             self._touch()
         piece = self._piece_going(sign)
-        sums = _sums(self.site, self.parts, piece)
-        if sign < 0 and self.mode == _CONTACT and self.state[0] <= self.gap and self._pulls(sums):
+        forces = balance(self.site, self.parts, piece)
+        if sign < 0 and self.mode == _CONTACT and self.state[0] <= self.gap and self._pulls(forces):
             self._leave()  # turned back on the very surface
             return
         bound = next((t for t in self.breaks if t > self.t), inf)
         key = (self.mode, sign == 0)
         solver: Any = _Integrator(
-            sums.rhs,
+            forces.rhs,
             self.t,
             self.state,
             min(bound, self.end + 1.0),
@@ -247,10 +187,10 @@ class _Run:
                 raise SimulationError(f"{self.site.name}: DOP853 failed at t = {solver.t} s")
             dense = solver.dense_output()
             ends = (solver.t_old, solver.t, solver.y.tolist())
-            event, t = self._first_event(piece, sums, dense, *ends)
+            event, t = self._first_event(piece, forces, dense, *ends)
             self._sample(dense, t)
             if event is not None:
-                self._arrive(event, t, dense(t).tolist(), piece, sums)
+                self._arrive(event, t, dense(t).tolist(), piece, forces)
                 return
             self.steps[key] = solver.t - solver.t_old
             if solver.t > self.end:
@@ -267,7 +207,7 @@ class _Run:
     def _first_event(
         self,
         piece: Piece,
-        sums: _Sums,
+        forces: Balance,
         dense: Callable[..., NDArray[np.float64]],
         start: float,
         stop: float,
@@ -282,7 +222,7 @@ class _Run:
         if sign == 0:
 
             def hold(t: float, state: State) -> float:
-                return sums.level - abs(sums.drive(t, state[0], 0.0, state))
+                return forces.level - abs(forces.drive(t, state[0], 0.0, state))
 
             if hold(stop, last) < 0:
                 event, stop = _SLIP, _crossing(lambda t: hold(t, dense(t).tolist()), start, stop)
@@ -299,13 +239,13 @@ class _Run:
         if piece.contact and self.site.unilateral:
 
             def reaction(t: float) -> float:
-                return sums.reaction(t, dense(t).tolist())
+                return forces.reaction(t, dense(t).tolist())
 
-            if sums.reaction(stop, last) < 0 and reaction(start) > 0:
+            if forces.reaction(stop, last) < 0 and reaction(start) > 0:
                 event, stop = _REACTION, _crossing(reaction, start, stop)
         return event, stop
 
-    def _arrive(self, event: int, t: float, state: State, piece: Piece, sums: _Sums) -> None:
+    def _arrive(self, event: int, t: float, state: State, piece: Piece, forces: Balance) -> None:
         """Carry out an event: set exactly what it says, change the mode."""
         self.t, self.state = t, state
         if piece.sign:
@@ -313,13 +253,13 @@ class _Run:
         if event == _TURN:
             state[1] = 0.0
         elif event == _SLIP:
-            self.slip = -1 if sums.drive(t, state[0], 0.0, state) > 0 else 1
+            self.slip = -1 if forces.drive(t, state[0], 0.0, state) > 0 else 1
         elif event == _REACTION:
             self._leave()
         else:
-            self._reach(piece, sums)
+            self._reach(piece, forces)
 
-    def _reach(self, piece: Piece, sums: _Sums) -> None:
+    def _reach(self, piece: Piece, forces: Balance) -> None:
         self.state[0] = piece.high if piece.sign > 0 else piece.low
         if self.state[0] != self.gap:
             return
@@ -327,12 +267,12 @@ class _Run:
             self._touch()
         elif piece.sign < 0 and self.mode == _RELEASED:
             self.mode = _FLIGHT
-        elif piece.sign < 0 and self.mode == _CONTACT and self._pulls(sums):
+        elif piece.sign < 0 and self.mode == _CONTACT and self._pulls(forces):
             self._leave()
 
-    def _pulls(self, sums: _Sums) -> bool:
+    def _pulls(self, forces: Balance) -> bool:
         """Whether contact ends when the mass goes back through the gap."""
-        return not self.site.unilateral or sums.reaction(self.t, self.state) <= 0
+        return not self.site.unilateral or forces.reaction(self.t, self.state) <= 0
 
     def _touch(self) -> None:
         self.touches.append(self.t)

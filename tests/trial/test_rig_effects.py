@@ -1,0 +1,348 @@
+"""Every effect and every outside force: equations, null values, energy, closed-form cases."""
+
+from __future__ import annotations
+
+from math import asin, cos, exp, pi, sqrt
+
+import numpy as np
+import pytest
+from naive_rig import NaiveRig
+
+from bayesimpact.trial.bundle import PAPER_RIG
+from bayesimpact.trial.rig import Release, Rig, motion
+from bayesimpact.trial.rig_catalogue import CATALOGUE
+from bayesimpact.trial.rig_outside import OUTSIDE
+
+# strong enough to move the displacement by more than 10 um within 0.35 s
+STRONG = {
+    "contact_damping_indentation": {"coefficient": 300.0},
+    "contact_damping_speed": {"coefficient": 3.0},
+    "contact_damping_per_case": {"c2": {"1": 3.0, "2": 1.0}},
+    "contact_hardening": {"stiffness": 3e8},
+    "contact_power_law": {"exponent": 1.2},
+    "contact_second_stage": {"stiffness": 2000.0, "depth": 0.5e-3},
+    "contact_no_tension": {},
+    "obstacle_mass": {"mass": 0.01},
+    "contact_relaxation": {"stiffness": 600.0, "time": 5e-3},
+    "gap_wear": {"step": 2e-5},
+    "gap_per_recording": {"g": {"r": 1.3e-3}},
+    "coulomb_friction": {"force": 0.4},
+    "quadratic_drag": {"coefficient": 1.0},
+    "spring_quadratic": {"stiffness": 1e4},
+    "spring_cubic": {"stiffness": 3e6},
+    "stiffness_drift": {"rate": 0.1},
+    "harmonic_forcing": {"amplitude": 0.3, "frequency": 9.0, "phase": {"r": 0.7}},
+    "opposite_stop": {"stiffness": 1500.0, "gap": 3e-3},
+    "detent": {"stiffness": 400.0, "place": -1e-3, "width": 1e-3},
+    "hysteresis": {"stiffness": 150.0, "width": 1e-3},
+    "friction_pad": {"force": 0.3, "extra": 0.2, "speed": 0.05, "low": -2e-3, "high": 0.5e-3},
+    "damping_bump": {"coefficient": 2.0, "place": -2e-3, "width": 1e-3},
+    "eddy_brake": {"coefficient": 2.0, "low": -2e-3, "high": -1e-3},
+    "resonator": {"mass": 0.02, "frequency": 30.0, "damping_ratio": 0.05},
+    "damping_drift": {"rate": 3.0},
+    "contact_friction": {"force": 0.4},
+    "contact_preload": {"force": 0.1},
+    "knock": {"impulse": 0.02, "time": 0.1, "width": 0.01},
+}
+SENSOR = ("sensor_drift", "sensor_quadratic", "sensor_cubic", "sensor_hum")
+CHAIN = ("smoothing", "noise_correlated")
+RELEASE = Release("r", "1", -6e-3, 0.01)
+
+
+def test_every_effect_is_in_the_lists_of_these_tests():
+    assert set(STRONG) == (set(CATALOGUE) | set(OUTSIDE)) - set(SENSOR) - set(CHAIN)
+
+
+def against_naive(effects, release, *, duration, step, tolerance):
+    run = motion(PAPER_RIG, release, effects, rate=1 / step, duration=duration)
+    naive = NaiveRig(PAPER_RIG, release, effects).run(duration, step)
+    assert np.abs(run.displacement - naive).max() < tolerance
+    return run
+
+
+@pytest.mark.parametrize("effect", STRONG)
+def test_equation_against_the_naive_twin(effect):
+    # the naive twin loses its order at the root of d^n
+    tolerance = 5e-10 if effect == "contact_power_law" else 1e-11
+    effects = {effect: STRONG[effect]}
+    run = against_naive(effects, RELEASE, duration=0.35, step=1e-4, tolerance=tolerance)
+    base = motion(PAPER_RIG, RELEASE, rate=1e4, duration=0.35)
+    assert np.abs(run.displacement - base.displacement).max() > 1e-5
+
+
+@pytest.mark.parametrize(
+    "combination",
+    [
+        ("contact_damping_indentation", "contact_no_tension", "gap_wear", "quadratic_drag"),
+        ("obstacle_mass", "contact_relaxation", "coulomb_friction", "spring_cubic"),
+        ("contact_second_stage", "contact_damping_speed", "opposite_stop", "stiffness_drift"),
+        ("contact_no_tension", "contact_relaxation", "resonator", "hysteresis", "friction_pad"),
+        ("obstacle_mass", "contact_preload", "contact_friction", "knock", "eddy_brake"),
+        ("contact_damping_per_case", "gap_per_recording", "gap_wear", "contact_hardening"),
+    ],
+)
+def test_combinations_against_the_naive_twin(combination):
+    effects = {effect: STRONG[effect] for effect in combination}
+    against_naive(effects, RELEASE, duration=0.35, step=1e-4, tolerance=1e-11)
+
+
+def test_stick_and_slip_under_forcing_against_the_naive_twin():
+    effects = {
+        "coulomb_friction": {"force": 1.0},
+        "harmonic_forcing": {"amplitude": 2.0, "frequency": 3.0, "phase": {"r": 1.0}},
+        "contact_no_tension": {},
+    }
+    run = against_naive(effects, RELEASE, duration=0.8, step=1e-4, tolerance=1e-11)
+    held = run.velocity == 0
+    assert 1000 < held.sum() < 7000
+    assert np.diff(held.astype(int)).clip(0).sum() >= 3  # it sticks several times
+    assert len(run.touches) > 1
+
+
+NULL = {
+    "contact_damping_indentation": {"coefficient": 0.0},
+    "contact_damping_speed": {"coefficient": 0.0},
+    "contact_damping_per_case": {"c2": {"1": 2.085}},
+    "contact_hardening": {"stiffness": 0.0},
+    "contact_power_law": {"exponent": 1.0},
+    "contact_second_stage": {"stiffness": 0.0, "depth": 1e-4},
+    "contact_relaxation": {"stiffness": 0.0, "time": 1e-3},
+    "gap_wear": {"step": 0.0},
+    "gap_per_recording": {"g": {"r": 1.1e-3}},
+    "coulomb_friction": {"force": 0.0},
+    "quadratic_drag": {"coefficient": 0.0},
+    "spring_quadratic": {"stiffness": 0.0},
+    "spring_cubic": {"stiffness": 0.0},
+    "stiffness_drift": {"rate": 0.0},
+    "harmonic_forcing": {"amplitude": 0.0, "frequency": 9.0, "phase": {"r": 0.7}},
+    "opposite_stop": {"stiffness": 0.0, "gap": 3e-3},
+}
+
+
+@pytest.mark.parametrize("effect", NULL)
+def test_null_value_is_the_base_oscillator(effect):
+    base = motion(PAPER_RIG, RELEASE, rate=1000, duration=1)
+    run = motion(PAPER_RIG, RELEASE, {effect: NULL[effect]}, rate=1000, duration=1)
+    assert np.abs(run.displacement - base.displacement).max() < 1e-12
+
+
+def test_massless_obstacle_is_one_that_cannot_pull():
+    light = motion(PAPER_RIG, RELEASE, {"obstacle_mass": {"mass": 0.0}}, rate=1000, duration=1)
+    none = motion(PAPER_RIG, RELEASE, {"contact_no_tension": {}}, rate=1000, duration=1)
+    assert np.array_equal(light.displacement, none.displacement)
+
+
+LOSSLESS = Rig(mass=0.5, c1=0.0, k1=800.0, c2=0.0, g=1e-3, k2={"1": 5000.0})
+POTENTIALS = {
+    "spring_quadratic": lambda y: 1e4 * y**3 / 3,
+    "spring_cubic": lambda y: 3e6 * y**4 / 4,
+    "opposite_stop": lambda y: 750 * np.minimum(y + 3e-3, 0) ** 2,
+    "detent": lambda y: -200e-6 * np.exp(-(((y + 1e-3) / 1e-3) ** 2)),
+}
+
+
+def energy_in_flight(effect, parameters=None):
+    """Energy, J, at the samples clearly below the gap, first and last included, and the run."""
+    effects = {effect: STRONG[effect] if parameters is None else parameters}
+    run = motion(LOSSLESS, Release("r", "1", -5e-3), effects, rate=2000, duration=2)
+    y, v = run.displacement, run.velocity
+    energy = 0.25 * v**2 + 400 * y**2 + POTENTIALS.get(effect, lambda y: 0 * y)(y)
+    return energy[y < 0.9e-3], run
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        "contact_hardening",
+        "contact_power_law",
+        "contact_second_stage",
+        "contact_no_tension",
+        "contact_preload",
+        "gap_wear",
+        *POTENTIALS,
+    ],
+)
+def test_conservative_effects_keep_the_energy(effect):
+    energy, run = energy_in_flight(effect)
+    assert len(run.touches) > 10
+    assert np.ptp(energy) < 2e-10 * energy[0]
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        "contact_damping_indentation",
+        "contact_damping_speed",
+        "contact_relaxation",
+        "obstacle_mass",
+        "coulomb_friction",
+        "quadratic_drag",
+        "friction_pad",
+        "damping_bump",
+        "eddy_brake",
+        "contact_friction",
+    ],
+)
+def test_dissipative_effects_only_take_energy(effect):
+    energy, _ = energy_in_flight(effect)
+    assert np.diff(energy).max() < 5e-11 * energy[0]
+    assert energy[-1] < 0.9 * energy[0]
+
+
+def test_damping_of_the_other_sign_feeds_the_motion():
+    energy, _ = energy_in_flight("contact_damping_speed", {"coefficient": -1.0})
+    assert np.diff(energy).min() > -5e-11 * energy[0]
+    assert energy[-1] > 1.05 * energy[0]
+
+
+def test_coulomb_friction_takes_2_f_over_k_per_swing_and_holds_at_last():
+    """Exact piecewise-linear decay: swings of equal length, amplitude down by 2 F/k1 each."""
+    rig = Rig(mass=0.5, c1=0.0, k1=800.0)
+    force = 0.3
+    run = motion(
+        rig, Release("r", "", -5e-3), {"coulomb_friction": {"force": force}}, rate=1e4, duration=1.2
+    )
+    swing = pi / sqrt(rig.k1 / rig.mass)
+    place, t, sign = -5e-3, 0.0, 1
+    exact = np.full(run.times.size, np.nan)
+    while abs(rig.k1 * place) > force:
+        centre = -sign * force / rig.k1
+        here = (run.times >= t) & (run.times < t + swing)
+        exact[here] = centre + (place - centre) * np.cos(pi * (run.times[here] - t) / swing)
+        place, t, sign = 2 * centre - place, t + swing, -sign
+    exact[run.times >= t] = place
+    assert 5 < t / swing < 12
+    assert t < 1.0
+    assert np.abs(run.displacement - exact).max() < 1e-12
+    assert (run.velocity[run.times > t + 1e-4] == 0).all()
+
+
+def test_friction_stronger_than_the_forcing_holds_for_good():
+    effects = {
+        "coulomb_friction": {"force": 0.5},
+        "harmonic_forcing": {"amplitude": 0.49, "frequency": 6.0, "phase": {"r": 0.0}},
+    }
+    run = motion(PAPER_RIG, Release("r", "1", 0.0), effects, rate=1000, duration=1)
+    assert np.array_equal(run.displacement, np.zeros(1000))
+    stronger = {**effects, "coulomb_friction": {"force": 0.48}}
+    run = motion(PAPER_RIG, Release("r", "1", 0.0), stronger, rate=10000, duration=1)
+    held = run.times[run.displacement == 0].max()
+    assert held == pytest.approx(asin(0.48 / 0.49) / (2 * pi * 6), abs=1.5e-3)
+
+
+def test_forcing_from_rest_is_transient_plus_steady_motion():
+    rig = Rig(mass=0.5, c1=0.8, k1=800.0)
+    amplitude, frequency, phase = 0.2, 5.0, 0.0
+    forcing = {"amplitude": amplitude, "frequency": frequency, "phase": {"r": phase}}
+    effects = {"harmonic_forcing": forcing}
+    run = motion(rig, Release("r", "", 0.0), effects, rate=500, duration=3)
+    w, b = 2 * pi * frequency, rig.c1 / rig.mass / 2
+    wd = sqrt(rig.k1 / rig.mass - b * b)
+    response = amplitude / (rig.k1 - rig.mass * w * w + 1j * rig.c1 * w)
+    steady = response * np.exp(1j * (w * run.times + phase))
+    y0, v0 = -steady[0].imag, -(1j * w * steady[0]).imag
+    t = run.times
+    free = np.exp(-b * t) * (y0 * np.cos(wd * t) + (v0 + b * y0) / wd * np.sin(wd * t))
+    assert np.abs(run.displacement - steady.imag - free).max() < 1e-12
+
+
+def test_touching_obstacle_shares_its_momentum():
+    """v+ = m v/(m + m2) at touch; at release the mass keeps its velocity, the obstacle is gone."""
+    mass = 0.05
+    run = motion(
+        LOSSLESS,
+        Release("r", "1", -5e-3),
+        {"obstacle_mass": {"mass": mass}},
+        rate=1e5,
+        duration=0.3,
+    )
+    touch, leave = run.touches[0], run.leaves[0]
+    i, j = np.searchsorted(run.times, [touch, leave])
+
+    def velocity_at(instant, samples):  # linear extrapolation over at most two samples
+        fit = np.polyfit(run.times[samples] - instant, run.velocity[samples], 2)
+        return fit[-1]
+
+    before = velocity_at(touch, slice(i - 6, i))
+    after = velocity_at(touch, slice(i, i + 6))
+    speed = sqrt(800 / 0.5 * (5e-3**2 - 1e-3**2))
+    assert before == pytest.approx(speed, rel=1e-9)
+    assert after == pytest.approx(speed * 0.5 / 0.55, rel=1e-9)
+    leaving = velocity_at(leave, slice(j - 6, j))
+    free = velocity_at(leave, slice(j, j + 6))
+    assert free == pytest.approx(leaving, rel=1e-8)
+    # at release the reaction m2 y'' + k2 d vanishes, and the joint motion has kept its energy
+    d = np.interp(leave, run.times, run.displacement) - 1e-3
+    acceleration = -800 * (1e-3 + d) / 0.5
+    assert mass * acceleration + 5000 * d == pytest.approx(0.0, abs=1e-5)
+    joint = 0.275 * leaving**2 + 400 * (1e-3 + d) ** 2 + 2500 * d**2
+    assert joint == pytest.approx(0.275 * after**2 + 400e-6, rel=1e-8)
+
+
+def test_obstacle_that_cannot_pull_lets_go_where_its_force_vanishes():
+    run = motion(PAPER_RIG, RELEASE, {"contact_no_tension": {}}, rate=1e5, duration=0.3)
+    for leave in run.leaves:
+        y = np.interp(leave, run.times, run.displacement)
+        v = np.interp(leave, run.times, run.velocity)
+        assert v < 0
+        assert 5350.156 * (y - 1.1e-3) == pytest.approx(-2.085 * v, rel=1e-5)
+
+
+def test_gap_of_the_ith_contact_is_g_plus_i_steps():
+    run = motion(PAPER_RIG, RELEASE, {"gap_wear": {"step": 2e-5}}, rate=1e5, duration=1)
+    gaps = 1.1e-3 + 2e-5 * np.arange(len(run.touches))
+    assert len(run.touches) > 6
+    at_touch = np.interp(run.touches, run.times, run.displacement)
+    at_leave = np.interp(run.leaves, run.times, run.displacement)
+    assert np.abs(at_touch - gaps).max() < 1e-9
+    assert np.abs(at_leave - gaps[: at_leave.size]).max() < 1e-9
+
+
+def test_shrinking_gap_does_not_touch_again_on_the_way_back():
+    run = motion(PAPER_RIG, RELEASE, {"gap_wear": {"step": -2e-5}}, rate=1000, duration=1)
+    assert np.diff(run.touches).min() > 0.08
+
+
+def test_fast_relaxation_is_a_damper_and_slow_relaxation_a_spring():
+    stiffness = {"1": PAPER_RIG.k2["1"] + 500.0}
+    spring = Rig(0.503, 0.148, 808.556, 2.085, 1.1e-3, stiffness)
+    damper = Rig(0.503, 0.148, 808.556, 2.085 + 0.5, 1.1e-3, {"1": PAPER_RIG.k2["1"]})
+    for rig, kz, tau, tolerance in ((spring, 500.0, 1e4, 1e-8), (damper, 5e4, 1e-5, 2e-6)):
+        effects = {"contact_relaxation": {"stiffness": kz, "time": tau}}
+        run = motion(PAPER_RIG, RELEASE, effects, rate=1000, duration=0.5)
+        limit = motion(rig, RELEASE, rate=1000, duration=0.5)
+        base = motion(PAPER_RIG, RELEASE, rate=1000, duration=0.5)
+        assert np.abs(run.displacement - limit.displacement).max() < tolerance
+        assert np.abs(run.displacement - base.displacement).max() > 50 * tolerance
+
+
+def test_stiffness_drift_moves_the_frequency():
+    rig = Rig(mass=0.5, c1=0.0, k1=800.0)
+    effects = {"stiffness_drift": {"rate": 0.02}}
+    run = motion(rig, Release("r", "", -5e-3), effects, rate=2000, duration=6)
+    rising = run.times[1:][(run.displacement[1:] > 0) & (run.displacement[:-1] <= 0)]
+    frequency = 1 / np.diff(rising)
+    middle = (rising[1:] + rising[:-1]) / 2
+    expected = sqrt(1600) / 2 / pi * np.sqrt(1 + 0.02 * middle)
+    assert frequency == pytest.approx(expected, rel=5e-3)
+    assert frequency[-1] / frequency[0] == pytest.approx(expected[-1] / expected[0], rel=8e-3)
+
+
+def test_knock_hands_over_its_impulse():
+    effects = {"knock": {"impulse": 0.02, "time": 0.1, "width": 1e-4}}
+    rig = Rig(mass=0.5, c1=0.0, k1=800.0)
+    run = motion(rig, Release("r", "", 0.0), effects, rate=1000, duration=0.2)
+    assert (run.displacement[:100] == 0).all()
+    # the sample at 0.101 s comes 0.95 ms after the middle of the knock
+    assert run.velocity[101] == pytest.approx(0.02 / 0.5 * cos(40 * 0.95e-3), rel=1e-5)
+
+
+def test_detent_pulls_towards_its_place():
+    """Equilibrium of k1 y + a x exp(-x^2/w^2) = 0 under strong damping."""
+    rig = Rig(mass=0.5, c1=60.0, k1=800.0)
+    effects = {"detent": {"stiffness": 4000.0, "place": 1e-3, "width": 1e-3}}
+    run = motion(rig, Release("r", "", 0.5e-3), effects, rate=100, duration=3)
+    y = run.displacement[-1]
+    assert 0.5e-3 < y < 1e-3
+    x = y - 1e-3
+    assert 800 * y + 4000 * x * exp(-((x / 1e-3) ** 2)) == pytest.approx(0.0, abs=1e-9)
