@@ -1,0 +1,512 @@
+"""Sampling: right answers, an honest verdict, and a resumed chain equal to the uninterrupted."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+
+import emcee
+import numpy as np
+import pytest
+from scipy.special import digamma, polygamma
+
+import bayesimpact.inference.chainfile as chainfile
+import bayesimpact.inference.run as run_module
+import bayesimpact.inference.sample as sample_module
+from bayesimpact.errors import InputError, SimulationError
+from bayesimpact.inference.convergence import autocorrelation_time
+from bayesimpact.inference.ensemble import Target, advance, random_streams, start
+from bayesimpact.inference.sample import sample_posterior
+
+SIZES = np.geomspace(1e-6, 1e3, 6)  # as unlike as g in m and k1 in N/m
+
+
+def correlated(dimension=6):
+    rng = np.random.default_rng(1)
+    basis = np.linalg.qr(rng.standard_normal((dimension, dimension)))[0]
+    sizes = np.geomspace(SIZES[0], SIZES[-1], dimension)
+    covariance = (basis * np.geomspace(1.0, 100.0, dimension)) @ basis.T
+    covariance *= sizes * sizes[:, None]
+    mode = 1e3 * sizes
+    inverse = np.linalg.inv(np.linalg.cholesky(covariance))
+
+    def log_posterior(theta):
+        return -0.5 * np.square((theta - mode) @ inverse.T).sum(axis=1)
+
+    return log_posterior, mode, covariance
+
+
+class Interrupted:
+    """A log posterior that is interrupted at one of its calls; every row on its own."""
+
+    def __init__(self, call=None, act=None):
+        self.calls = 0
+        self.call = call
+        self.act = act
+
+    def __call__(self, theta):
+        self.calls += 1
+        if self.calls == self.call:
+            self.act()
+        x = theta - 1.0
+        return -0.5 * np.square(x).sum(axis=1) - 0.02 * x[:, 0] ** 4
+
+
+def interrupt():
+    raise KeyboardInterrupt
+
+
+def small(function, **options):
+    """A short run of three parameters: 100 burn-in steps and up to 120 kept ones."""
+    defaults = {"seed": 5, "walkers": 10, "block": 20, "max_steps": 120, "target_ess": 1e9}
+    return sample_posterior(function, np.ones(3), np.eye(3), **(defaults | options))
+
+
+def assert_same(first, second):
+    assert first.draws.tobytes() == second.draws.tobytes()
+    assert first.log_posterior.tobytes() == second.log_posterior.tobytes()
+    assert first.convergence.reasons == second.convergence.reasons
+    np.testing.assert_array_equal(first.acceptance, second.acceptance)
+    for name, shares in first.move_acceptance.items():
+        np.testing.assert_array_equal(shares, second.move_acceptance[name])
+
+
+@pytest.fixture(scope="module")
+def uninterrupted():
+    return small(Interrupted())
+
+
+def test_gaussian_of_very_different_sizes():
+    log_posterior, mode, covariance = correlated()
+    chains = sample_posterior(log_posterior, mode, covariance, seed=0)
+    record = chains.convergence
+    assert chains.converged
+    assert chains.draws.shape == (2, chains.steps - chains.discarded, 32, 6)
+    sd = np.sqrt(np.diag(covariance))
+    error = 1.0 / np.sqrt(record.ess_bulk)
+    assert (np.abs((chains.flat.mean(axis=0) - mode) / sd) < 4.0 * error).all()
+    # A variance has relative error sqrt(2/ESS); its ESS is below that of the mean by up to 3 here.
+    ratio = chains.flat.var(axis=0) / sd**2
+    assert (np.abs(ratio - 1.0) < 4.0 * np.sqrt(6.0) * error).all()
+    np.testing.assert_allclose(
+        chains.log_posterior.ravel(), log_posterior(chains.flat), rtol=1e-6, atol=1e-6
+    )
+    assert record.steps > 50.0 * record.tau.max()
+    assert record.ess_bulk.min() >= 2000.0
+    assert record.rhat.max() < 1.01
+    assert chains.acceptance.shape == (2,)
+    assert chains.move_acceptance["independence"].min() > 0.7
+
+
+def test_skewed_posterior_from_its_laplace_approximation():
+    """Logarithms of gamma variates: mode and curvature miss the mean by 0.2 sd."""
+    shape, dimension = 6.0, 7
+
+    def log_posterior(y):
+        return (shape * (y - np.expm1(y))).sum(axis=1)
+
+    covariance = np.eye(dimension) / shape
+    chains = sample_posterior(log_posterior, np.zeros(dimension), covariance, seed=3)
+    assert chains.converged
+    sd = np.sqrt(polygamma(1, shape))
+    bias = (chains.flat.mean(axis=0) - digamma(shape) + np.log(shape)) / sd
+    assert (np.abs(bias) < 4.0 / np.sqrt(chains.convergence.ess_bulk)).all()
+    assert chains.flat.std(axis=0) == pytest.approx(np.full(dimension, sd), rel=0.06)
+
+
+def test_posterior_far_wider_than_its_laplace_approximation():
+    """The proposal learns from the burn-in; three parameters are 5 sd wider than stated."""
+    sd = np.array([5.0, 5.0, 5.0, 1.0, 1.0])
+
+    def log_posterior(x):
+        return -0.5 * np.square(x / sd).sum(axis=1)
+
+    chains = sample_posterior(log_posterior, np.zeros(5), np.eye(5), seed=0)
+    assert chains.converged
+    assert chains.move_acceptance["independence"].min() > 0.3
+    assert chains.flat.std(axis=0) == pytest.approx(sd, rel=0.07)
+
+
+def test_two_modes():
+    """Overlapping modes of unequal mass; the Laplace approximation knows only one."""
+
+    def log_posterior(x):
+        rest = -0.5 * np.square(x[:, 1:]).sum(axis=1)
+        near, far = -0.5 * x[:, 0] ** 2, -0.5 * (x[:, 0] - 5.0) ** 2
+        return rest + np.logaddexp(np.log(0.4) + near, np.log(0.6) + far)
+
+    chains = sample_posterior(log_posterior, np.zeros(4), np.eye(4), seed=2)
+    assert chains.converged
+    error = np.sqrt(0.24 / chains.convergence.ess_bulk[0])
+    assert abs((chains.flat[:, 0] > 2.5).mean() - 0.6) < 4.0 * error
+
+
+def test_bounds_hold_and_are_not_crossed_by_calls():
+    """Half-normal in the first parameter, whose mode lies on the bound."""
+    lower = np.array([0.0, -np.inf])
+
+    def log_posterior(x):
+        assert (x >= lower).all()
+        return -0.5 * np.square(x).sum(axis=1)
+
+    chains = sample_posterior(
+        log_posterior, np.zeros(2), np.eye(2), seed=1, lower=lower, upper=np.array([np.inf, 3.0])
+    )
+    assert chains.converged
+    assert chains.flat[:, 0].min() >= 0.0
+    assert chains.flat[:, 1].max() <= 3.0
+    error = np.sqrt(1.0 - 2.0 / np.pi) / np.sqrt(chains.convergence.ess_bulk[0])
+    assert abs(chains.flat[:, 0].mean() - np.sqrt(2.0 / np.pi)) < 4.0 * error
+
+
+def test_no_walker_starts_or_ends_inadmissible():
+    def log_posterior(x):
+        values = -0.5 * np.square(x).sum(axis=1)
+        values[x[:, 0] + x[:, 1] > 0.5] = -np.inf
+        return values
+
+    chains = sample_posterior(log_posterior, np.zeros(3), np.eye(3), seed=1, max_steps=100)
+    assert np.isfinite(chains.log_posterior).all()
+
+
+def test_start_is_feasible_and_the_second_one_is_wider():
+    _, mode, covariance = correlated()
+    target = Target(
+        lambda x: np.where(x[:, 0] > mode[0], 0.0, -np.inf),
+        mode,
+        np.linalg.cholesky(covariance),
+        np.full(6, -np.inf),
+        np.full(6, np.inf),
+    )
+    narrow, wide = (
+        start(target, stream, 400, wide=k > 0) for k, stream in enumerate(random_streams(0, 2))
+    )
+    for snapshot in (narrow, wide):
+        assert np.isfinite(snapshot.log_posterior).all()
+        assert (target.theta(snapshot.walkers)[:, 0] > mode[0]).all()
+    assert np.abs(wide.walkers[:, 1:]).mean() > 1.3 * np.abs(narrow.walkers[:, 1:]).mean()
+
+
+def test_same_seed_same_chain_whatever_the_global_state(uninterrupted):
+    np.random.seed(1)  # noqa: NPY002
+    before = np.random.get_state()[1].copy()  # noqa: NPY002
+    again = small(Interrupted())
+    assert_same(again, uninterrupted)
+    np.testing.assert_array_equal(before, np.random.get_state()[1])  # noqa: NPY002
+    other = small(Interrupted(), seed=6)
+    assert not np.array_equal(other.draws, again.draws)
+    assert np.unique(again.draws[:, 0, :, 0]).size == 20  # ensembles share no stream
+
+
+def test_advancing_in_parts_equals_advancing_at_once():
+    target = Target(Interrupted(), np.ones(3), np.eye(3), np.full(3, -9.0), np.full(3, 9.0))
+    first = start(target, random_streams(0, 1)[0], 8, wide=False)
+    kept = first.walkers.copy()
+    at_once, stretch = advance(first, target, 30)
+    middle, early = advance(first, target, 11)
+    end, late = advance(middle, target, 19)
+    np.testing.assert_array_equal(first.walkers, kept)  # snapshots are not written to
+    np.testing.assert_array_equal(np.concatenate([early.draws, late.draws]), stretch.draws)
+    np.testing.assert_array_equal(end.walkers, at_once.walkers)
+    np.testing.assert_array_equal(early.tally + late.tally, stretch.tally)
+
+
+def count_calls():
+    function = Interrupted()
+    small(function)
+    return function.calls
+
+
+@pytest.mark.parametrize("share", [0.02, 0.2, 0.4, 0.55, 0.7, 0.85, 0.99])
+def test_interrupted_anywhere_and_resumed(share, tmp_path, uninterrupted, capfd):
+    at = int(share * count_calls())
+    with pytest.raises(KeyboardInterrupt):
+        small(Interrupted(at, interrupt), folder=tmp_path)
+    chains = small(Interrupted(), folder=tmp_path, resume=True)
+    assert_same(chains, uninterrupted)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_interrupted_twice_and_between_blocks(tmp_path, uninterrupted):
+    with pytest.raises(KeyboardInterrupt):
+        small(Interrupted(150, interrupt), folder=tmp_path)
+
+    def stop(progress):
+        if progress.steps == 60:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        small(Interrupted(), folder=tmp_path, resume=True, progress=stop)
+    assert_same(small(Interrupted(), folder=tmp_path, resume=True), uninterrupted)
+
+
+def test_killed_while_writing(tmp_path, monkeypatch, uninterrupted):
+    """The file that was being written is not there, or not renamed yet."""
+    rename, renamed = os.replace, []
+
+    def killed(source, destination):
+        renamed.append(destination)
+        if len(renamed) == 6:
+            raise KeyboardInterrupt
+        rename(source, destination)
+
+    monkeypatch.setattr(chainfile.os, "replace", killed)
+    with pytest.raises(KeyboardInterrupt):
+        small(Interrupted(), folder=tmp_path)
+    monkeypatch.undo()
+    assert list(tmp_path.glob("*.unfinished"))
+    assert_same(small(Interrupted(), folder=tmp_path, resume=True), uninterrupted)
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+sys.path.insert(0, {tests!r})
+from test_sample import Interrupted, small
+small(Interrupted({call}, lambda: os.kill(os.getpid(), signal.SIGKILL)), folder=Path({folder!r}))
+"""
+
+
+@pytest.mark.parametrize(("share", "threads"), [(0.3, 1), (0.8, 2)])
+def test_killed_process_with_another_number_of_threads(share, threads, tmp_path, uninterrupted):
+    call = int(share * count_calls())
+    tests = os.path.dirname(__file__)
+    script = KILLED.format(tests=tests, call=call, folder=str(tmp_path))
+    environment = {
+        **os.environ,
+        "OPENBLAS_NUM_THREADS": str(threads),
+        "OMP_NUM_THREADS": str(threads),
+    }
+    done = subprocess.run([sys.executable, "-c", script], env=environment, check=False)
+    assert done.returncode == -signal.SIGKILL
+    assert_same(small(Interrupted(), folder=tmp_path, resume=True), uninterrupted)
+
+
+def test_resuming_with_nothing_saved_starts(tmp_path, uninterrupted):
+    assert_same(small(Interrupted(), folder=tmp_path / "new", resume=True), uninterrupted)
+
+
+def test_resuming_a_finished_run_computes_nothing_new(tmp_path, uninterrupted):
+    small(Interrupted(), folder=tmp_path)
+    function = Interrupted()
+    assert_same(small(function, folder=tmp_path, resume=True), uninterrupted)
+    assert function.calls == 2  # the check that the walkers still have their values
+
+
+def test_starting_anew_forgets_the_saved_run(tmp_path, uninterrupted):
+    small(Interrupted(), folder=tmp_path, seed=9, max_steps=200)
+    assert_same(small(Interrupted(), folder=tmp_path), uninterrupted)
+    assert_same(small(Interrupted(), folder=tmp_path, resume=True), uninterrupted)
+
+
+def test_more_steps_later_equals_more_steps_at_once(tmp_path):
+    early = small(Interrupted(), folder=tmp_path, max_steps=40)
+    assert not early.converged
+    later = small(Interrupted(), folder=tmp_path, max_steps=200, resume=True)
+    assert_same(later, small(Interrupted(), max_steps=200))
+
+
+def test_thinning_bounds_memory_and_survives_resuming(tmp_path, monkeypatch):
+    monkeypatch.setattr(run_module, "STORED_STEPS", 30)
+    whole = small(Interrupted(), max_steps=160)
+    assert whole.thin == 8
+    assert whole.draws.shape[1] + whole.discarded // 8 == 20
+    assert whole.convergence.steps == 160 - whole.discarded
+    with pytest.raises(KeyboardInterrupt):
+        small(Interrupted(330, interrupt), folder=tmp_path, max_steps=160)
+    assert_same(small(Interrupted(), folder=tmp_path, max_steps=160, resume=True), whole)
+
+
+def test_thinned_draws_are_every_other_of_the_full_ones(monkeypatch):
+    full = small(Interrupted())
+    monkeypatch.setattr(run_module, "STORED_STEPS", 60)
+    thinned = small(Interrupted())
+    assert (full.discarded, thinned.discarded, thinned.thin) == (0, 0, 2)
+    np.testing.assert_array_equal(thinned.draws, full.draws[:, 1::2])
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"fingerprint": "other data"}, "fingerprint = 'some data'"),
+        ({"seed": 6}, "seed = 5"),
+        ({"walkers": 12}, "walkers = 10"),
+        ({"block": 10}, "block = 20"),
+        ({"ensembles": 3}, "ensembles = 2"),
+        ({"upper": np.full(3, 10.0)}, "upper"),
+    ],
+)
+def test_resuming_with_other_settings_is_refused(options, words, tmp_path):
+    saved = {"folder": tmp_path, "fingerprint": "some data", "max_steps": 20}
+    small(Interrupted(), **saved)
+    with pytest.raises(InputError, match=words):
+        small(Interrupted(), **{**saved, **options}, resume=True)
+
+
+def test_resuming_another_posterior_is_refused(tmp_path):
+    small(Interrupted(), folder=tmp_path, max_steps=20)
+    with pytest.raises(InputError, match="other values now"):
+        small(lambda x: Interrupted()(x) + 0.01, folder=tmp_path, max_steps=20, resume=True)
+    with pytest.raises(InputError, match="standard deviations away"):
+        sample_posterior(
+            Interrupted(),
+            np.full(3, 1.5),
+            np.eye(3),
+            seed=5,
+            walkers=10,
+            block=20,
+            folder=tmp_path,
+            resume=True,
+        )
+
+
+def test_last_bits_of_mode_and_covariance_do_not_matter_on_resuming(tmp_path, uninterrupted):
+    with pytest.raises(KeyboardInterrupt):
+        small(Interrupted(200, interrupt), folder=tmp_path)
+    chains = sample_posterior(
+        Interrupted(),
+        np.nextafter(np.ones(3), 2.0),
+        np.eye(3) * (1.0 + 1e-15),
+        seed=5,
+        walkers=10,
+        block=20,
+        max_steps=120,
+        target_ess=1e9,
+        folder=tmp_path,
+        resume=True,
+    )
+    assert_same(chains, uninterrupted)
+
+
+def test_a_damaged_file_is_named(tmp_path):
+    small(Interrupted(), folder=tmp_path, max_steps=20)
+    damaged = tmp_path / "block-000001.npz"
+    damaged.write_bytes(damaged.read_bytes()[:200])
+    with pytest.raises(InputError, match="block-000001"):
+        small(Interrupted(), folder=tmp_path, resume=True)
+
+
+def test_saved_files_hold_no_pickles(tmp_path):
+    small(Interrupted(), folder=tmp_path, max_steps=20)
+    paths = list(tmp_path.glob("*.npz"))
+    assert len(paths) == 5  # start, three rounds of burn-in, one block
+    for path in paths:
+        with np.load(path, allow_pickle=False) as content:
+            assert all(not content[name].dtype.hasobject for name in content.files)
+
+
+def test_not_converged_is_said_with_reasons(uninterrupted):
+    assert not uninterrupted.converged
+    assert not uninterrupted.convergence.converged
+    assert "effective sample size" in " ".join(uninterrupted.convergence.reasons)
+    assert uninterrupted.steps == 120
+
+
+def test_ensembles_that_settle_in_different_places_do_not_converge(monkeypatch):
+    """Two modes 60 sd apart, an ensemble in each; the first never hears of the second mode."""
+
+    def log_posterior(x):
+        rest = -0.5 * np.square(x[:, 1:]).sum(axis=1)
+        return rest - 0.5 * np.square(x[:, 0] - np.where(x[:, 0] > 30.0, 60.0, 0.0))
+
+    def apart(target, random, walkers, *, wide):
+        snapshot = start(target, random, walkers, wide=False)
+        moved = snapshot.walkers + np.array([60.0 * wide, 0.0])
+        return replace(snapshot, walkers=moved, log_posterior=target(moved))
+
+    monkeypatch.setattr(sample_module, "start", apart)
+    chains = sample_posterior(
+        log_posterior, np.zeros(2), np.eye(2), seed=0, max_steps=300, names=("here", "there")
+    )
+    far = (chains.draws[..., 0] > 30.0).mean(axis=(1, 2))
+    assert far[0] == 0.0
+    assert far[1] > 0.3
+    assert not chains.converged
+    assert "ensembles disagree" in " ".join(chains.convergence.reasons)
+    assert "(here;" in " ".join(chains.convergence.reasons)
+
+
+def test_progress_is_told_after_every_block():
+    seen = []
+    small(Interrupted(), progress=seen.append)
+    assert [report.steps for report in seen] == [0, 0, 0, 20, 40, 60, 80, 100, 120]
+    assert [report.burning for report in seen[:3]] == [True, True, False]
+    assert seen[-1].max_steps == 120
+    assert seen[-1].tau is not None
+
+
+def test_rarely_accepted_proposals_lengthen_the_burn_in():
+    """A curved, narrow valley in 12 dimensions."""
+
+    def log_posterior(x):
+        valley = (x[:, 1:] - 2.0 * x[:, :1] ** 2) / 0.05
+        return -0.5 * (x[:, 0] ** 2 + np.square(valley).sum(axis=1))
+
+    covariance = np.diag([1.0] + [0.0025] * 11)
+    chains = sample_posterior(
+        log_posterior, np.zeros(12), covariance, seed=0, block=16, max_steps=50
+    )
+    assert chains.burn_in == 8 + 8 + 16 + 32 + 64 + 128 + 256
+    assert not chains.converged
+
+
+def test_nan_is_an_error_that_names_the_place():
+    def log_posterior(x):
+        values = -0.5 * np.square(x).sum(axis=1)
+        values[x[:, 0] > 1.0] = np.nan
+        return values
+
+    with pytest.raises(SimulationError, match="log posterior is nan at"):
+        sample_posterior(log_posterior, np.zeros(2), np.eye(2), seed=0)
+
+
+def test_no_admissible_start():
+    def log_posterior(x):
+        return np.where((x == 0.0).all(axis=1), 0.0, -np.inf)
+
+    with pytest.raises(SimulationError, match="no admissible start"):
+        sample_posterior(log_posterior, np.zeros(2), np.eye(2), seed=0)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"seed": -1}, "seed"),
+        ({"walkers": 11}, "even number >= 6"),
+        ({"walkers": 4}, "even number >= 6"),
+        ({"ensembles": 1}, "at least 2 independent"),
+        ({"block": 2}, "block"),
+        ({"max_steps": 0}, "max_steps"),
+        ({"names": ("a",)}, "3 names"),
+        ({"lower": np.full(3, 2.0)}, "inadmissible point"),
+    ],
+)
+def test_bad_arguments(options, words):
+    with pytest.raises(InputError, match=words):
+        small(Interrupted(), **options)
+
+
+def test_far_more_effective_draws_per_call_than_the_stretch_move():
+    """Worst autocorrelation time in 12 dimensions; emcee's tau ~ 8 d for the stretch move."""
+    dimension = 12
+
+    def log_posterior(x):
+        return -0.5 * np.square(x).sum(axis=1)
+
+    chains = sample_posterior(log_posterior, np.zeros(dimension), np.eye(dimension), seed=0)
+    sampler = emcee.EnsembleSampler(26, dimension, log_posterior, vectorize=True)
+    random = np.random.RandomState(0)
+    first = random.standard_normal((26, dimension))
+    sampler.run_mcmc(emcee.State(first, random_state=random.get_state()), 3000)
+    plain = autocorrelation_time(sampler.get_chain()[None]).max()
+    assert chains.convergence.tau.max() < 2.5
+    assert plain > 25.0 * chains.convergence.tau.max()
+
+
+def test_records_are_frozen(uninterrupted):
+    with pytest.raises(AttributeError):
+        uninterrupted.seed = 1
+    assert replace(uninterrupted, seed=1).seed == 1
