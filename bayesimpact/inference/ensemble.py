@@ -172,11 +172,9 @@ def advance(snapshot: Snapshot, target: Target, steps: int) -> tuple[Snapshot, S
     sampler.log_prob_fn = target
     # emcee ignores an invalid random state silently; this one raises.
     np.random.RandomState(0).set_state(snapshot.random)
+    # run_mcmc copies what it is given, so that the snapshot stays as it is.
     state = emcee.State(
-        snapshot.walkers,
-        log_prob=snapshot.log_posterior,
-        random_state=snapshot.random,
-        copy=True,
+        snapshot.walkers, log_prob=snapshot.log_posterior, random_state=snapshot.random
     )
     end = sampler.run_mcmc(state, steps, skip_initial_state_check=True)
     tally = np.array([(move.proposed, move.accepted) for move, _ in moves], dtype=np.int64)

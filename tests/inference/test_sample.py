@@ -18,7 +18,7 @@ import bayesimpact.inference.run as run_module
 import bayesimpact.inference.sample as sample_module
 from bayesimpact.errors import InputError, SimulationError
 from bayesimpact.inference.convergence import autocorrelation_time
-from bayesimpact.inference.ensemble import Target, advance, random_streams, start
+from bayesimpact.inference.ensemble import Stretch, Target, adapt, advance, random_streams, start
 from bayesimpact.inference.sample import sample_posterior
 
 SIZES = np.geomspace(1e-6, 1e3, 6)  # as unlike as g in m and k1 in N/m
@@ -212,6 +212,33 @@ def test_advancing_in_parts_equals_advancing_at_once():
     np.testing.assert_array_equal(np.concatenate([early.draws, late.draws]), stretch.draws)
     np.testing.assert_array_equal(end.walkers, at_once.walkers)
     np.testing.assert_array_equal(early.tally + late.tally, stretch.tally)
+
+
+def test_adapting_learns_centre_scatter_and_share():
+    """A stretch of independent draws around (3, 0) with standard deviations (2, 0.5)."""
+    target = Target(Interrupted(), np.ones(2), np.eye(2), np.full(2, -9.0), np.full(2, 9.0))
+    first = start(target, random_streams(0, 1)[0], 40, wide=False)
+    rng = np.random.default_rng(0)
+    draws = rng.standard_normal((100, 40, 2)) * [2.0, 0.5] + [3.0, 0.0]
+    tally = np.array([[2000, 1800], [1000, 1000], [500, 100], [300, 50], [200, 50]])
+    later = adapt(first, Stretch(draws, np.zeros((100, 40)), tally))
+    frame = later.mixture.frames[1]
+    np.testing.assert_allclose(frame.centre, [3.0, 0.0], atol=0.15)
+    np.testing.assert_allclose(frame.factor @ frame.factor.T, np.diag([4.0, 0.25]), atol=0.3)
+    assert later.mixture.weights[1].sum() > 0.8
+    assert later.mixture.weights.sum() == pytest.approx(1.0)
+    assert later.share == pytest.approx(0.85)
+    poor = adapt(first, Stretch(draws, np.zeros((100, 40)), tally * [1, 0]))
+    assert poor.share < 0.3
+
+
+def test_acceptance_is_the_share_of_walkers_that_moved(uninterrupted):
+    """No step is rejected into the same place, and none accepted without a move."""
+    moved = (np.diff(uninterrupted.draws, axis=1) != 0.0).any(axis=3)
+    # The first of the 120 kept steps is not in the differences.
+    np.testing.assert_allclose(
+        uninterrupted.acceptance, moved.mean(axis=(1, 2)), atol=1.0 / uninterrupted.steps
+    )
 
 
 def count_calls():
