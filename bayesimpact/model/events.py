@@ -18,7 +18,7 @@ from bayesimpact.model.flow import advance, advance_forced, forced_response, imp
 #: Iterations after which a search gives up (never seen; bisection alone needs about 60).
 MAX_ITERATIONS = 200
 #: Steps of the forced search after which it gives up.
-MAX_STEPS = 1_000_000
+MAX_STEPS = 200_000
 
 
 @compiled(error_model="numpy")

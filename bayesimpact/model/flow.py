@@ -23,6 +23,8 @@ from bayesimpact.model.compiled import compiled
 
 #: Below this share of K + w^2 the forcing counts as near resonance.
 NEAR_RESONANCE = 0.05
+#: Before this much of a radian has passed, forced motion is a power series.
+EARLY = 0.5
 
 
 @compiled(error_model="numpy")
@@ -82,6 +84,21 @@ def second_response(b: float, K: float, t: float, S: float, D: float) -> tuple[f
 
 
 @compiled(error_model="numpy")
+def _forced_series(beta: float, K: float, w: float, square: float) -> tuple[float, float]:
+    """Return E and F at time 1, beta, K and w per unit of time, times `square`."""
+    E = F = e0 = e1 = f0 = f1 = 0.0  # e, f: terms n and n + 1
+    cos, sin = square, 0.0  # term n of the force
+    for n in range(16):
+        both = 1.0 / ((n + 1.0) * (n + 2.0))
+        drag = beta * (n + 1.0)
+        e0, e1 = e1, (cos - drag * e1 - K * e0) * both
+        f0, f1 = f1, (sin - drag * f1 - K * f0) * both
+        E, F = E + e1, F + f1
+        cos, sin = -w * sin / (n + 1.0), w * cos / (n + 1.0)
+    return E, F
+
+
+@compiled(error_model="numpy")
 def forced_response(
     b: float, K: float, w: float, t: float, S: float, D: float
 ) -> tuple[float, float]:
@@ -90,8 +107,10 @@ def forced_response(
     Real and imaginary part of z(t), z'' + 2 b z' + K z = exp(i w t). Away from resonance
     z = (exp(i w t) - C - i w S) / (K - w^2 + 2 i b w) with C = D + 2 b S. Near resonance both sides
     of that fraction vanish, and the divided difference (exp(i w t) - exp(l t)) / (i w - l) over the
-    characteristic root l is evaluated by expm1 instead.
+    characteristic root l is evaluated by expm1 instead; early on, the power series is.
     """
+    if (math.sqrt(K) + 2.0 * b + w) * t < EARLY:
+        return _forced_series(2.0 * b * t, K * t * t, w * t, t * t)
     below = K - w * w
     across = 2.0 * b * w
     cos = math.cos(w * t)

@@ -1,0 +1,150 @@
+"""Derivatives through the impacts against differences of the 50-digit twin."""
+
+from __future__ import annotations
+
+import math
+
+import mpmath as mp
+import naive
+import numpy as np
+import pytest
+import systems
+from test_simulate import campaign
+
+from bayesimpact.errors import InputError
+from bayesimpact.model.derivatives import grams, trajectories_and_derivatives
+from bayesimpact.model.simulate import predictions, sums_of_squares
+
+EVERY = np.arange(11)[None]
+BASE = {
+    "c1": 0.148, "k1": 808.556, "c2": 2.085, "g": 1.1e-3, "k2": 5350.156, "y0": -6.5e-3, "v0": 0.01,
+    "A": 0.0, "w": 20.0, "phase": 0.3, "offset": 1e-4,
+}  # fmt: skip
+W1 = math.sqrt(808.556 / 0.503)
+CASES = {
+    "rig": {},
+    "overdamped contact": {"c2": 300.0},
+    "preloaded": {"g": -1e-3},
+    "preloaded, over-damped": {"g": -1e-3, "c2": 250.0},
+    "gap zero": {"g": 0.0},
+    "start in contact": {"y0": 4e-3},
+    "start in preloaded contact": {"y0": -5e-4, "g": -1e-3, "v0": -0.2},
+    "no contact": {"g": 0.5},
+    "no stop": {"g": math.inf, "c2": 0.0, "k2": 0.0},
+    "undamped": {"c1": 0.0, "c2": 0.0},
+    "overdamped flight": {"c1": 60.0, "v0": 2.0},
+    "critical flight": {"c1": 2 * math.sqrt(808.556 * 0.503), "v0": 2.0},
+    "forced": {"A": 2.0, "w": 38.0},
+    "force about to appear": {"A": 0.0, "w": 38.0},
+    "forced at resonance": {"A": 0.5, "w": W1, "c1": 0.0},
+    "forced near resonance": {"A": 0.5, "w": W1 * (1 + 1e-7), "c1": 1e-3},
+    "forced, preloaded, over-damped": {"A": 2.0, "w": 70.0, "g": -1e-3, "c2": 250.0},
+    "constant force": {"A": 0.5, "w": 0.0},
+}
+
+
+def analytic(q, mass, interval, n):
+    values, jacobian, codes = trajectories_and_derivatives(
+        q, EVERY, np.zeros((1, 11)), mass, [n], [interval], n
+    )
+    assert codes[0] == 0
+    return values, jacobian
+
+
+def differences(q, mass, interval, n):
+    """Central differences of the twin, exact to about 20 digits."""
+    out = np.zeros((n, 11))
+    for i in range(10):
+        if not math.isfinite(q[i]):
+            continue
+        step = mp.mpf(max(abs(q[i]), 1e-3)) * mp.mpf(10) ** -16
+        sides = []
+        for sign in (1, -1):
+            with mp.workdps(70):
+                moved = [mp.mpf(x) for x in q]
+                moved[i] += sign * step
+                sides.append(naive.twin(moved, mass, interval, n).displacement)
+        with mp.workdps(70):
+            out[:, i] = [float((a - b) / (2 * step)) for a, b in zip(*sides, strict=True)]
+    out[:, 10] = 1.0
+    return out
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_derivatives(case):
+    q = np.array(list((BASE | CASES[case]).values()))
+    n, interval = 25, 1.3e-2
+    values, jacobian = analytic(q, 0.503, interval, n)
+    exact = differences(q, 0.503, interval, n)
+    scale = np.abs(exact).max(0)
+    # what a column's unit of change moves, relative to what the parameter itself has moved
+    errors = np.abs(jacobian - exact).max(0) / np.where(scale > 0, scale, 1.0)
+    assert np.all(errors < 1e-11), dict(zip(BASE, errors, strict=True))
+    whole = predictions(q[None], EVERY, np.zeros((1, 11)), 0.503, [n], [interval], n)[0][0]
+    np.testing.assert_allclose(values, whole, atol=1e-15)
+
+
+def test_derivatives_of_random_systems():
+    rng = np.random.default_rng(11)
+    for _ in range(4):
+        system = systems.draw(rng, n=25)
+        _, jacobian = analytic(system.q, system.mass, system.interval, system.n)
+        exact = differences(system.q, system.mass, system.interval, system.n)
+        scale = np.abs(exact).max(0)
+        errors = np.abs(jacobian - exact).max(0) / np.where(scale > 0, scale, 1.0)
+        assert np.all(errors < 1e-10), (system, errors)
+
+
+def test_grams_are_products_of_derivatives_and_residuals():
+    theta, columns, constants, mass, samples, starts, counts, intervals = campaign(n=700)
+    columns = columns.copy()
+    columns[:, 7:10] = -1
+    columns[4, [0, 10]] = -1  # not every recording has every column
+    constants[4, 0], constants[5, 7:10] = 0.2, (0.7, 30.0, 1.0)
+    found, codes = grams(theta, columns, constants, mass, samples, starts, counts, intervals)
+    values, jacobian, _ = trajectories_and_derivatives(
+        theta, columns, constants, mass, counts, intervals, counts.sum()
+    )
+    assert not codes.any() and found.shape == (9, 12, 12)
+    assert not jacobian[starts[4] : starts[5], [0, 10]].any()
+    for r in range(9):
+        here = slice(starts[r], starts[r] + counts[r])
+        both = np.column_stack([jacobian[here], samples[here] - values[here]])
+        exact = both.T @ both
+        scale = np.sqrt(np.outer(np.diag(exact), np.diag(exact))) + 1e-300
+        assert np.all(np.abs(found[r] - exact) <= 3e-14 * scale)
+    sse, _ = sums_of_squares(
+        theta[None], columns, constants, mass, samples, starts, counts, intervals
+    )
+    np.testing.assert_allclose(found[:, 11, 11], sse[0], rtol=1e-13)
+    batch, _ = grams(
+        np.tile(theta, (30, 1)), columns, constants, mass, samples, starts, counts, intervals
+    )
+    np.testing.assert_array_equal(batch[17], found)
+
+
+def test_force_columns_are_wanted_where_the_force_is_null():
+    q = np.array(list((BASE | {"A": 0.0, "w": 38.0}).values()))
+    _, jacobian = analytic(q, 0.503, 1e-3, 300)
+    assert np.abs(jacobian[:, 7]).max() > 0 and not jacobian[:, 8:10].any()
+
+
+def test_failures_are_codes():
+    theta, columns, constants, mass, samples, starts, counts, intervals = campaign()
+    columns = columns.copy()
+    columns[:, 7:10] = -1
+    theta[5] = -1.0
+    found, codes = grams(theta, columns, constants, mass, samples, starts, counts, intervals)
+    values, jacobian, again = trajectories_and_derivatives(
+        theta, columns, constants, mass, counts, intervals, counts.sum()
+    )
+    np.testing.assert_array_equal(codes, again)
+    np.testing.assert_array_equal(codes != 0, np.arange(9) % 3 == 1)
+    assert np.isnan(found[1]).all() and np.isfinite(found[0]).all()
+    assert (
+        np.isnan(jacobian[starts[1] : starts[2]]).all() and np.isfinite(values[: starts[1]]).all()
+    )
+    with pytest.raises(InputError):
+        trajectories_and_derivatives(
+            np.tile(theta, (2, 1)), columns, constants, mass, counts, intervals, counts.sum()
+        )
