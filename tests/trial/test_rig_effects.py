@@ -78,6 +78,7 @@ def test_equation_against_the_naive_twin(effect):
         ("contact_second_stage", "contact_damping_speed", "opposite_stop", "stiffness_drift"),
         ("contact_no_tension", "contact_relaxation", "resonator", "hysteresis", "friction_pad"),
         ("obstacle_mass", "contact_preload", "contact_friction", "knock", "eddy_brake"),
+        ("contact_second_stage", "gap_wear"),
         ("contact_damping_per_case", "gap_per_recording", "gap_wear", "contact_hardening"),
     ],
 )
@@ -286,6 +287,26 @@ def test_obstacle_that_cannot_pull_lets_go_where_its_force_vanishes():
         v = np.interp(leave, run.times, run.velocity)
         assert v < 0
         assert 5350.156 * (y - 1.1e-3) == pytest.approx(-2.085 * v, rel=1e-5)
+
+
+def test_pushing_obstacle_follows_the_mass_beyond_the_gap():
+    effects = {"contact_no_tension": {}, "contact_preload": {"force": 1.0}}
+    run = against_naive(effects, RELEASE, duration=0.35, step=1e-4, tolerance=1e-11)
+    assert np.interp(run.leaves[0], run.times, run.displacement) < 1.1e-3 - 1e-5
+
+
+def test_released_mass_is_free_until_it_has_been_below_the_gap():
+    """A stiffly damped, preloaded stop: the mass turns round above the gap and flies on."""
+    rig = Rig(mass=0.5, c1=0.0, k1=800.0, c2=20.0, g=-5e-3, k2={"1": 5000.0})
+    for y0 in (-4.79e-3, -4.81e-3):  # in contact, and with a reaction that would pull
+        run = motion(
+            rig, Release("r", "1", y0, -0.05), {"contact_no_tension": {}}, rate=1000, duration=1
+        )
+        assert run.touches == ((0.0,) if y0 > -4.8e-3 else ())
+        assert len(run.leaves) == len(run.touches)
+        energy = 0.25 * run.velocity[2:] ** 2 + 400 * run.displacement[2:] ** 2
+        assert np.ptp(energy) < 1e-10 * energy[0]
+        assert run.displacement.max() > 4.5e-3
 
 
 def test_gap_of_the_ith_contact_is_g_plus_i_steps():
