@@ -102,3 +102,11 @@ class Campaign:
             for r in self.recordings
         )
         return replace(self, recordings=kept)
+
+    def thinned(self, interval: float) -> Campaign:
+        """The same campaign with samples left out, so that they are about `interval` seconds apart."""
+        kept = []
+        for r in self.recordings:
+            step = max(1, int(interval / r.interval))
+            kept.append(replace(r, samples=r.samples[::step], interval=r.interval * step))
+        return replace(self, recordings=tuple(kept))

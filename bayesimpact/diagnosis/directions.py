@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 
 CHANGE = 3.0  # norm of the response to a difference step, in units of the noise
 FIRST_STEP = 1e-5  # of a parameter's physical scale, to find the right step
+INVISIBLE = 1e-6  # a response below this at the first step is rounding, not physics
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +37,7 @@ class Direction:
     names : the k size parameters, `<effect>.<parameter>[...]`; (the id itself for an effect that is on or off)
     parts : per recording (n_r, k)
     one_sided : sizes below the null are not admissible
+    contrast : only differences between the k sizes mean something; the model has their common value
     """
 
     effect: Effect
@@ -43,6 +45,7 @@ class Direction:
     names: tuple[str, ...]
     parts: tuple[Array, ...]
     one_sided: bool
+    contrast: bool = False
 
 
 def directions(fit: Fit, effects: Iterable[Effect], scales: Scales) -> tuple[Direction, ...]:
@@ -124,7 +127,7 @@ def _direction(
     names = tuple(name for name, _ in sizes)
     replaces = replaced_slot(effect, sizes[0][1]) is not None
     one_sided = sizes[0][1].lower == sizes[0][1].null and not replaces
-    return Direction(effect, dict(shapes), names, parts, one_sided)
+    return Direction(effect, dict(shapes), names, parts, one_sided, replaces)
 
 
 def _response(
@@ -143,13 +146,11 @@ def _response(
         moved[index] += step
         values = whitened(target, target.oscillator.predict(moved), sigma)
         change = [b - a for a, b in zip(base, values, strict=True)]
-        norm = float(np.sqrt(sum(float(c.ravel() @ c.ravel()) for c in change)))
-        if not np.isfinite(norm):
-            step *= 1e-3
-            continue
-        if norm == 0.0:
+        with np.errstate(over="ignore", invalid="ignore"):
+            norm = float(np.sqrt(sum(float(c.ravel() @ c.ravel()) for c in change)))
+        if norm < INVISIBLE or not np.isfinite(norm):
             return None
         if 0.1 * CHANGE < norm < 10 * CHANGE:
             break
-        step *= CHANGE / norm
+        step = min(step * CHANGE / norm, parameter.scale(scales))
     return tuple(c / step for c in change)

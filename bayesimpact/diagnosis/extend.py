@@ -46,6 +46,9 @@ def campaign_scales(fit: Fit) -> Scales:
         duration=max(r.duration for r in o.campaign.recordings),
         interval=float(o.intervals.min()),
         impacts=max(touches),
+        gap=float(gap.mean()) if o.campaign.stop else 0.0,
+        cases=len(o.campaign.cases),
+        recordings=len(o.campaign.recordings),
     )
 
 

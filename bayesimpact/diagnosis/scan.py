@@ -108,7 +108,7 @@ def score_directions(
     groups = tuple(
         np.arange(end - len(d.names), end) for d, end in zip(found, ends, strict=True)
     )
-    tests = [_Test(projection, g, d.one_sided) for g, d in zip(groups, found, strict=True)]
+    tests = [_Test(projection, g, d) for g, d in zip(groups, found, strict=True)]
     scores = tuple(
         _score(fit, projection, d, g, test)
         for d, g, test in zip(found, groups, tests, strict=True)
@@ -118,28 +118,37 @@ def score_directions(
 
 
 class _Test:
-    """Test statistic of one group of columns, the same for data and for simulated scores."""
+    """Test statistic of one direction, the same for data and for simulated scores."""
 
-    def __init__(self, projection: Projection, group: NDArray[np.int64], one_sided: bool) -> None:
-        block = projection.information[np.ix_(group, group)]
+    def __init__(
+        self, projection: Projection, group: NDArray[np.int64], direction: Direction
+    ) -> None:
+        basis = _contrasts(group.size) if direction.contrast else np.eye(group.size)
+        block = basis.T @ projection.information[np.ix_(group, group)] @ basis
         scale = np.sqrt(np.maximum(np.diag(block), 1e-300))
         values, vectors = np.linalg.eigh(block / np.outer(scale, scale))
         kept = values > RANK_TOLERANCE * max(values[-1], 1e-300)
-        self.group, self.one_sided, self.rank = group, one_sided and group.size == 1, int(kept.sum())
-        self.weights = (vectors[:, kept] / np.sqrt(values[kept])) / scale[:, None]
-        self.size_map = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T / np.outer(scale, scale)
+        root = basis @ (vectors[:, kept] / np.sqrt(values[kept]) / scale[:, None])
+        self.group, self.rank = group, int(kept.sum())
+        self.one_sided = direction.one_sided and group.size == 1
+        self.weights, self.size_map = root, root @ root.T
 
     def whitened(self, score: Array) -> Array:
         """Independent standard normal numbers (..., rank) from scores (..., K)."""
         return np.asarray(score[..., self.group] @ self.weights)
 
     def p_values(self, score: Array) -> Array:
-        """p-value of this group alone for scores (..., K)."""
+        """p-value of this direction alone for scores (..., K)."""
         w = self.whitened(score)
-        if self.group.size == 1:
+        if self.rank == 1:
             z = w[..., 0]
             return np.asarray(stats.norm.sf(z) if self.one_sided else 2 * stats.norm.sf(np.abs(z)))
         return np.asarray(stats.chi2.sf(np.sum(w * w, axis=-1), self.rank))
+
+
+def _contrasts(size: int) -> Array:
+    """Orthonormal basis (size, size - 1) of differences."""
+    return np.linalg.qr(np.eye(size) - 1.0 / size)[0][:, : size - 1]
 
 
 def _score(
@@ -150,7 +159,7 @@ def _score(
     size = test.size_map @ projection.score[group]
     sd = np.sqrt(np.diag(test.size_map))
     gain = 0.5 * float(w @ w)
-    if direction.one_sided and group.size == 1:
+    if test.one_sided:
         gain *= float(w[0] > 0)
     z = float(w[0]) if group.size == 1 else float(stats.norm.isf(max(p_value, 1e-300) / 2))
     bias = projection.absorbed[:, group] @ size / fit.sd

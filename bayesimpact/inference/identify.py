@@ -25,11 +25,13 @@ from bayesimpact.inference.search import Generation, SearchResult, metropolis_di
 from bayesimpact.model.derivatives import grams
 from bayesimpact.model.oscillator import Oscillator, build_oscillator
 from bayesimpact.model.parameters import BASE_SLOTS
+from bayesimpact.model.simulate import sums_of_squares
 from bayesimpact.response.estimates import Estimates, estimate
 
 Array = NDArray[np.float64]
 
 SEARCH_CYCLES = 6.0  # length of the window of the global search
+SEARCH_SAMPLES = 300  # of each recording in that window; more add nothing but time
 BOUND_FACTOR = 3.0  # bounds of the search about the guess
 NUISANCE_SLOTS = np.array([BASE_SLOTS.index(s) for s in ("y0", "v0", "offset")])
 _RESIDUAL = len(BASE_SLOTS)  # row of the Gram matrix that belongs to the residual
@@ -171,7 +173,8 @@ class _Profile:
 
     def __init__(self, oscillator: Oscillator, guess: Array, duration: float) -> None:
         layout = oscillator.layout
-        self.short = Oscillator(oscillator.campaign.truncated(duration), (), layout, None)
+        short = oscillator.campaign.truncated(duration).thinned(duration / SEARCH_SAMPLES)
+        self.short = Oscillator(short, (), layout, None)
         self.guess = guess
         self.physical = layout.roles("physical")
         self.positive = np.array([layout.parameters[i].lower == 0.0 for i in self.physical])
@@ -208,14 +211,23 @@ class _Profile:
         theta = np.repeat(self.guess[None], x.shape[0], axis=0)
         theta[:, self.physical] = np.where(self.positive, np.exp(x), x)
         best, lowest = theta, np.full(x.shape[0], np.inf)
-        for _ in range(3):
-            matrices = self._grams(theta)
-            sums = matrices[:, :, _RESIDUAL, _RESIDUAL].sum(axis=1)
+        for last in (False, False, True):
+            matrices = None if last else self._grams(theta)
+            sums = self._sums(theta) if matrices is None else matrices[..., _RESIDUAL, _RESIDUAL].sum(axis=1)
             better = sums < lowest
             best = np.where(better[:, None], theta, best)
             lowest = np.where(better, sums, lowest)
-            theta = self._nuisance_step(theta, matrices)
+            if matrices is not None:
+                theta = self._nuisance_step(theta, matrices)
         return best, lowest
+
+    def _sums(self, theta: Array) -> Array:
+        s = self.short
+        sums, _ = sums_of_squares(
+            np.ascontiguousarray(theta), self.columns, self.constants, s.campaign.mass, s.samples, s.starts,
+            s.counts, s.intervals,
+        )  # fmt: skip
+        return np.asarray(sums.sum(axis=1))
 
     def _grams(self, theta: Array) -> Array:
         s = self.short

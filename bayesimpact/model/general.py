@@ -396,3 +396,12 @@ def integrate_many(q, mass, intervals, counts, laws, out):
     for k in prange(q.shape[0]):
         codes[k] = integrate(q[k], mass, intervals[k], laws, out[k, : counts[k]])
     return codes
+
+
+@compiled()
+def integrate_few(q, mass, intervals, counts, laws, out):
+    """The same on one thread."""
+    codes = np.zeros(q.shape[0], dtype=np.int64)
+    for k in range(q.shape[0]):
+        codes[k] = integrate(q[k], mass, intervals[k], laws, out[k, : counts[k]])
+    return codes

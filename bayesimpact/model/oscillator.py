@@ -16,13 +16,11 @@ from numpy.typing import NDArray
 from bayesimpact.data.campaign import Campaign, Smoothing
 from bayesimpact.model import measurement
 from bayesimpact.model.effects.effect import Effect, address
-from bayesimpact.model.general import integrate_many
+from bayesimpact.model.motions import general_motions, motions
 from bayesimpact.model.parameters import BASE_SLOTS, SLOTS, Layout, build_layout, instance_name
-from bayesimpact.model.simulate import predictions
 
 Array = NDArray[np.float64]
 _OFFSET = SLOTS.index("offset")
-_IDENTITY = np.arange(len(BASE_SLOTS), dtype=np.int64)[None]  # theta that is already a slot vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,40 +120,37 @@ class Oscillator:
         Inadmissible parameters give NaN throughout the recordings concerned.
         """
         flat = np.atleast_2d(theta)
-        predicted = tuple(self.predict_recording(r, flat) for r in range(self.counts.size))
+        recordings = np.arange(self.counts.size)
+        motions = self._motions(np.tile(recordings, flat.shape[0]), self.layout.slots(flat))
+        rows = motions.reshape(flat.shape[0], recordings.size, -1)
+        predicted = [
+            self._read(r, rows[:, r, : self.counts[r]], flat) for r in range(recordings.size)
+        ]
         return tuple(p.reshape(*theta.shape[:-1], p.shape[-1]) for p in predicted)
 
-    def predict_recording(self, r: int, theta: Array, count: int | None = None) -> Array:
-        """Readings of recording `r`, (B, n), for parameter vectors (B, d); the first `count` samples."""
-        q = self.layout.slots(theta)[:, r]
-        y = self.motion(r, q, int(self.counts[r]) if count is None else count)
-        times = np.arange(y.shape[1]) * self.intervals[r]
+    def predict_recording(self, r: int, theta: Array) -> Array:
+        """Readings of recording `r`, (B, n), for parameter vectors (B, d)."""
+        q = self.layout.slots(theta)[:, r : r + 1]
+        return self._read(r, self._motions(np.full(theta.shape[0], r), q), theta)
+
+    def _read(self, r: int, motion: Array, theta: Array) -> Array:
+        """Sensor, rest offset and filter on true displacements (B, n) of recording `r`."""
+        times = np.arange(motion.shape[1]) * self.intervals[r]
         for effect, positions in self.sensors:
             assert effect.observe is not None
-            y = effect.observe(y, times, theta[:, positions[r]])
-        y = y + q[:, _OFFSET, None]
-        return measurement.smooth(y, self.smoothing, float(self.intervals[r]))
+            motion = effect.observe(motion, times, theta[:, positions[r]])
+        offset = self.layout.slots(theta)[:, r, _OFFSET]
+        return measurement.smooth(motion + offset[:, None], self.smoothing, float(self.intervals[r]))
 
-    def motion(self, r: int, q: Array, count: int) -> Array:
-        """True displacement of recording `r`, (B, count), m, for slot vectors (B, Q)."""
-        mass = self.campaign.mass
+    def _motions(self, recordings: NDArray[np.int64], slots: Array) -> Array:
+        """True displacements, one row per recording index and slot vector (K in all), m; NaN where it fails."""
+        q = np.ascontiguousarray(slots.reshape(recordings.size, -1))
         if self.is_base:
-            base = q[:, : len(BASE_SLOTS)].copy()
-            base[:, _OFFSET] = 0.0
-            out, failures = predictions(
-                base, _IDENTITY, np.zeros(_IDENTITY.shape), mass, np.array([count]),
-                self.intervals[r : r + 1], count,
-            )  # fmt: skip
-            codes = failures[:, 0]
-        else:
-            intervals = np.full(q.shape[0], self.intervals[r])
-            counts = np.full(q.shape[0], count, dtype=np.int64)
-            out = np.empty((q.shape[0], count))
-            codes = integrate_many(
-                np.ascontiguousarray(q), mass, intervals, counts, self.laws, out
-            )
-        out[codes != 0] = np.nan
-        return out
+            base = np.ascontiguousarray(q[:, : len(BASE_SLOTS)])
+            return motions(base, self.campaign.mass, self.counts[recordings], self.intervals[recordings])
+        return general_motions(
+            q, self.campaign.mass, self.counts[recordings], self.intervals[recordings], self.laws
+        )
 
 
 def build_oscillator(

@@ -1,0 +1,211 @@
+"""Where in (displacement, velocity) a force is missing: a Gaussian process on the force, seen through the oscillator.
+
+The unexplained force is a(y) + b(y) v with B-spline coefficients of independent normal priors. Each coefficient's
+response is simulated, whitened and projected off everything the model fits, so what remains of the misfit is
+explained by force, not by displacement errors that an earlier force left behind. In the linearised problem the
+coefficients' posterior and the evidence are closed forms; the prior widths maximise the evidence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.diagnosis.directions import sigma_of, whitened
+from bayesimpact.diagnosis.learned import KNOTS, learned_force, spline_basis
+from bayesimpact.diagnosis.projection import Projection, project
+from bayesimpact.inference.fit import Fit
+from bayesimpact.model.effects.effect import Effect, Scales
+from bayesimpact.model.measurement import smooth
+from bayesimpact.model.motions import general_motions
+from bayesimpact.model.oscillator import Oscillator
+from bayesimpact.model.parameters import SLOTS
+
+Array = NDArray[np.float64]
+
+WIDTHS = np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 13)])  # of a and b, relative to the elastic force
+NULL_DRAWS = 1000
+_OFFSET = SLOTS.index("offset")
+
+
+@dataclass(frozen=True, eq=False)
+class MissingForce:
+    """Posterior of the unexplained force in the linearised problem.
+
+    Attributes
+    ----------
+    effect : the learned force with these prior widths, to be put back into the simulator
+    knots : number of coefficients of a and of b
+    low, spacing : first displacement and knot distance, m
+    mean, covariance : of the 2 knots coefficients (a in N, then b in N s/m)
+    log_evidence : of the force over no force
+    p_value : of the largest log evidence, against its simulated law under the model
+    projection : scores of the coefficients
+    """
+
+    effect: Effect
+    knots: int
+    low: float
+    spacing: float
+    mean: Array
+    covariance: Array
+    log_evidence: float
+    p_value: float
+    projection: Projection
+
+    def parts(self, y: Array) -> tuple[Array, Array]:
+        """Conservative a(y) N and dissipative b(y) N s/m at displacements (n,)."""
+        basis = spline_basis(y, self.low, self.spacing, self.knots)
+        return basis @ self.mean[: self.knots], basis @ self.mean[self.knots :]
+
+    def spread(self, y: Array) -> tuple[Array, Array]:
+        """Posterior standard deviations of a(y) and b(y) at displacements (n,)."""
+        basis, n = spline_basis(y, self.low, self.spacing, self.knots), self.knots
+        a = np.einsum("ni,ij,nj->n", basis, self.covariance[:n, :n], basis)
+        b = np.einsum("ni,ij,nj->n", basis, self.covariance[n:, n:], basis)
+        return np.sqrt(np.maximum(a, 0)), np.sqrt(np.maximum(b, 0))
+
+    def force(self, y: Array, v: Array) -> Array:
+        """Mean force at points of the trajectory (n,), N."""
+        a, b = self.parts(y)
+        return a + b * v
+
+
+def missing_force(
+    fit: Fit, scales: Scales, *, rng: np.random.Generator, knots: int = KNOTS
+) -> MissingForce:
+    """Posterior of the force that the fit's model leaves out."""
+    low, high = motion_range(fit)
+    effect = learned_force(low, high, scales.force, scales.force / scales.speed, knots)
+    responses = basis_responses(fit, effect, knots, scales)
+    projection = project(fit, responses)
+    unit = np.concatenate([np.full(knots, scales.force), np.full(knots, scales.force / scales.speed)])
+    evidence = _Evidence(projection.information, unit, knots)
+    best, (width_a, width_b) = evidence.maximum(projection.score)
+    draws = evidence.null_draws(rng, NULL_DRAWS)
+    null = np.array([evidence.maximum(d)[0] for d in draws])
+    mean, covariance = evidence.posterior(projection.score, width_a, width_b)
+    final = learned_force(
+        low, high, width_a * scales.force, width_b * scales.force / scales.speed, knots
+    )
+    p_value = float((1 + np.sum(null >= best)) / (1 + NULL_DRAWS))
+    spacing = (high - low) / (knots - 3)
+    return MissingForce(final, knots, low, spacing, mean, covariance, best, p_value, projection)
+
+
+def motion_range(fit: Fit) -> tuple[float, float]:
+    """Smallest and largest displacement of all fitted recordings about their rest, m."""
+    oscillator = fit.target.oscillator
+    offsets = oscillator.layout.slots(fit.mode)[:, _OFFSET]
+    moved = [p - b for p, b in zip(fit.predicted, offsets, strict=True)]
+    return float(min(m.min() for m in moved)), float(max(m.max() for m in moved))
+
+
+def basis_responses(fit: Fit, effect: Effect, knots: int, scales: Scales) -> tuple[Array, ...]:
+    """Whitened responses, in units of the noise, to one unit of every coefficient: per recording (n_r, 2 knots)."""
+    oscillator, sigma = fit.target.oscillator, sigma_of(fit)
+    head = [p.fixed for p in effect.parameters if p.fixed is not None]
+    table = _with_law(oscillator, effect)
+    slots = oscillator.layout.slots(fit.mode)
+    step = np.repeat([scales.force, scales.force / scales.speed], knots)
+    result = []
+    for r, recording in enumerate(oscillator.campaign.recordings):
+        q = np.concatenate([slots[r], head, np.zeros(2 * knots)])
+        n = recording.samples.size
+        first = _change(oscillator, table, q, step * 1e-7, r, n, knots)
+        white = whitened_one(fit, r, first, sigma)
+        norms = np.sqrt(np.einsum("kn,kn->k", white, white))
+        scale = np.where(norms > 0, 1e-7 * np.minimum(1.0 / np.maximum(norms, 1e-12), 1e6), 1e-7)
+        change = _change(oscillator, table, q, step * scale, r, n, knots)
+        result.append((whitened_one(fit, r, change, sigma) / (step * scale)[:, None]).T)
+    return tuple(result)
+
+
+def whitened_one(fit: Fit, r: int, values: Array, sigma: Array) -> Array:
+    """Filtered, whitened signals (k, n) of one recording in units of the noise."""
+    oscillator, noise = fit.target.oscillator, fit.target.likelihood.noise
+    interval = oscillator.campaign.recordings[r].interval
+    return noise.whiten(smooth(values, oscillator.smoothing, interval), interval) / sigma[r]
+
+
+def _with_law(oscillator: Oscillator, effect: Effect) -> NDArray[np.int64]:
+    from bayesimpact.model.effects.effect import address
+
+    assert effect.law is not None
+    first = len(SLOTS) + sum(len(e.parameters) for e in oscillator.effects if e.law is not None)
+    row = np.array([[address(effect.law.force), 0, 0, 0, first]], dtype=np.int64)
+    return np.concatenate([oscillator.laws, row])
+
+
+def _change(
+    oscillator: Oscillator,
+    laws: NDArray[np.int64],
+    q: Array,
+    steps: Array,
+    r: int,
+    n: int,
+    knots: int,
+) -> Array:
+    points = np.repeat(q[None], 2 * knots + 1, axis=0)
+    columns = q.size - 2 * knots + np.arange(2 * knots)
+    points[1 + np.arange(2 * knots), columns] += steps
+    intervals = np.full(points.shape[0], oscillator.intervals[r])
+    counts = np.full(points.shape[0], n, dtype=np.int64)
+    out = general_motions(points, oscillator.campaign.mass, counts, intervals, laws)
+    return np.asarray(out[1:] - out[0])
+
+
+class _Evidence:
+    """Closed-form evidence of normal coefficients with information S about them."""
+
+    def __init__(self, information: Array, unit: Array, knots: int) -> None:
+        self.knots, self.unit = knots, unit
+        self.scaled = information * np.outer(unit, unit)
+        grid = [(a, b) for a in WIDTHS for b in WIDTHS if a > 0 or b > 0]
+        self.pairs = grid
+        self.factors = [self._factor(a, b) for a, b in grid]
+
+    def _factor(self, a: float, b: float) -> tuple[Array, float]:
+        width = np.repeat([a, b], self.knots)
+        values, vectors = np.linalg.eigh(self.scaled * np.outer(width, width))
+        values = np.maximum(values, 0.0)
+        return (vectors.T * width) / np.sqrt(1.0 + values)[:, None], 0.5 * float(np.log1p(values).sum())
+
+    def maximum(self, score: Array) -> tuple[float, tuple[float, float]]:
+        """Largest log evidence over the widths, and the widths."""
+        scaled = score * self.unit
+        gains = [0.5 * float(np.sum((f @ scaled) ** 2)) - penalty for f, penalty in self.factors]
+        best = int(np.argmax(gains))
+        return gains[best], self.pairs[best]
+
+    def posterior(self, score: Array, a: float, b: float) -> tuple[Array, Array]:
+        """Mean and covariance of the coefficients."""
+        factor, _ = self._factor(a, b)
+        root = factor.T * self.unit[:, None]
+        covariance = root @ root.T
+        return covariance @ score, covariance
+
+    def null_draws(self, rng: np.random.Generator, count: int) -> Array:
+        """Scores under the model, (count, K)."""
+        values, vectors = np.linalg.eigh(self.scaled)
+        root = vectors * np.sqrt(np.maximum(values, 0.0)) / self.unit[:, None]
+        return np.asarray(rng.standard_normal((count, values.size)) @ root.T)
+
+
+def trajectory_points(fit: Fit) -> Sequence[tuple[Array, Array]]:
+    """Displacement and velocity of the fitted motion at the samples, per recording, m and m/s."""
+    oscillator = fit.target.oscillator
+    offsets = oscillator.layout.slots(fit.mode)[:, _OFFSET]
+    points = []
+    for predicted, offset, interval in zip(
+        fit.predicted, offsets, oscillator.intervals, strict=True
+    ):
+        y = predicted - offset
+        points.append((y, np.gradient(y, interval)))
+    return points
+
+
+__all__ = ["MissingForce", "missing_force", "motion_range", "trajectory_points", "whitened"]

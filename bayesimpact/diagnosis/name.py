@@ -1,0 +1,213 @@
+"""What is missing: refits of every admissible effect, forward selection, backward elimination, rivals.
+
+Models are compared by their evidence times a prior that pays for multiplicity: each added effect costs
+log(2 K) for a catalogue of K, so that a large catalogue makes no false names likelier. Full refits rank the
+effects; scores only give their starting points, because signs and bounds are physics and decide between
+near-opposites that scores cannot tell apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from bayesimpact.diagnosis.force import MissingForce, missing_force
+from bayesimpact.diagnosis.pairs import promising_pairs
+from bayesimpact.diagnosis.refit import Candidate, base_candidate, refit, without
+from bayesimpact.diagnosis.scan import Scan, Score, scan
+from bayesimpact.inference.fit import Fit
+from bayesimpact.model.effects.effect import Effect, Scales
+
+ALPHA = 0.005  # of each of the two tests that ask whether anything is missing
+DECISIVE = 5.5  # nats of log odds that a name needs over every rival (2 ln odds of 11)
+MOST_EFFECTS = 3
+WORTH_A_REFIT = 4.0  # expected gain in log likelihood, nats
+PAIRS = 4  # refitted at the first step
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """One model on the way, and whether anything is missing from it.
+
+    Attributes
+    ----------
+    candidate : the model
+    scan : scores of everything it lacks
+    force : the force that it leaves unexplained
+    """
+
+    candidate: Candidate
+    scan: Scan
+    force: MissingForce
+
+    @property
+    def is_white(self) -> bool:
+        """True when neither the catalogue nor an unknown force explains anything more."""
+        return self.scan.p_value >= ALPHA and self.force.p_value >= ALPHA
+
+
+@dataclass(frozen=True, eq=False)
+class Naming:
+    """The outcome of the search for names.
+
+    Attributes
+    ----------
+    base, chosen : first and last state
+    tried : every model that was fitted, best first
+    prior_cost : nats per added effect
+    """
+
+    base: State
+    chosen: State
+    tried: tuple[Candidate, ...]
+    prior_cost: float
+    steps: tuple[str, ...] = field(default=())
+
+    def log_odds(self, candidate: Candidate) -> float:
+        """Log posterior odds of a model against the base model."""
+        return (
+            candidate.log_evidence
+            - self.base.candidate.log_evidence
+            - self.prior_cost * len(candidate.effects)
+        )
+
+    def rivals(self) -> tuple[Candidate, ...]:
+        """Models that lack one of the chosen effects and come within the decisive odds."""
+        chosen = self.chosen.candidate
+        floor = self.log_odds(chosen) - DECISIVE
+        return tuple(
+            c
+            for c in self.tried
+            if self.log_odds(c) > floor
+            and not set(chosen.ids) <= set(c.ids)
+            and not _is_elaboration(c, chosen)
+        )
+
+    def probability(self, effect_id: str) -> float:
+        """Probability that an effect is part of the model, over all models tried."""
+        odds = np.array([self.log_odds(c) for c in self.tried])
+        weight = np.exp(odds - odds.max())
+        have = np.array([effect_id in c.ids for c in self.tried])
+        return float(weight[have].sum() / weight.sum())
+
+
+def name(
+    fit: Fit,
+    effects: Sequence[Effect],
+    scales: Scales,
+    *,
+    rng: np.random.Generator,
+    progress: Progress | None = None,
+) -> Naming:
+    """Find the effects that the base model of `fit` leaves out."""
+    search = _Search(effects, scales, rng, progress or (lambda message: None))
+    state = base = search.examine(base_candidate(fit))
+    while not state.is_white and len(state.candidate.effects) < MOST_EFFECTS:
+        better = search.extended(state, first=state is base)
+        if better is None:
+            break
+        state = search.examine(better)
+    state = search.eliminated(state)
+    search.compare_rivals(state)
+    return search.naming(base, state)
+
+
+class _Search:
+    """The models fitted so far."""
+
+    def __init__(
+        self,
+        effects: Sequence[Effect],
+        scales: Scales,
+        rng: np.random.Generator,
+        progress: Progress,
+    ) -> None:
+        self.effects, self.scales, self.rng, self.progress = effects, scales, rng, progress
+        self.cost = float(np.log(2 * len(effects)))
+        self.tried: dict[frozenset[str], Candidate] = {}
+
+    def keep(self, candidate: Candidate) -> Candidate:
+        key = frozenset(candidate.ids)
+        held = self.tried.get(key)
+        if held is None or candidate.log_evidence > held.log_evidence:
+            self.tried[key] = candidate
+        return self.tried[key]
+
+    def examine(self, candidate: Candidate) -> State:
+        self.progress("scoring what " + (" + ".join(candidate.ids) or "the base model") + " lacks")
+        candidate = self.keep(candidate)
+        found = scan(candidate.fit, self.effects, self.scales, rng=self.rng)
+        force = missing_force(candidate.fit, self.scales, rng=self.rng)
+        return State(candidate, found, force)
+
+    def extended(self, state: State, first: bool) -> Candidate | None:
+        """The best model with one more effect (or a pair, at the first step), when it is worth its cost."""
+        scores = [s for s in state.scan.best() if s.gain > WORTH_A_REFIT]
+        found = [self.fit_more(state.candidate, [score]) for score in scores]
+        if first and state.candidate.effects == ():
+            best_single = max((c.log_evidence for c in found), default=-np.inf)
+            for pair in promising_pairs(state.scan, count=PAIRS):
+                expected = state.candidate.log_evidence + pair.gain
+                if expected > best_single + self.cost:
+                    found.append(self.fit_more(state.candidate, pair.scores))
+        if not found:
+            return None
+        best = max(found, key=self.worth)
+        return best if self.worth(best) > self.worth(state.candidate) else None
+
+    def fit_more(self, candidate: Candidate, scores: Sequence[Score]) -> Candidate:
+        key = frozenset((*candidate.ids, *(s.effect.id for s in scores)))
+        if key not in self.tried:
+            self.progress("fitting " + " + ".join((*candidate.ids, *(s.effect.id for s in scores))))
+            self.keep(refit(candidate.fit, scores, self.scales))
+        return self.tried[key]
+
+    def worth(self, candidate: Candidate) -> float:
+        return candidate.log_evidence - self.cost * len(candidate.effects)
+
+    def eliminated(self, state: State) -> State:
+        """Leave out effects that are not worth their cost, the least useful first."""
+        while len(state.candidate.effects) > 1:
+            smaller = [self.drop(state.candidate, e) for e in state.candidate.effects]
+            best = max(smaller, key=self.worth)
+            if self.worth(best) < self.worth(state.candidate):
+                return state
+            state = self.examine(best)
+        return state
+
+    def drop(self, candidate: Candidate, effect: Effect) -> Candidate:
+        key = frozenset(i for i in candidate.ids if i != effect.id)
+        if key not in self.tried:
+            self.progress("without " + effect.id)
+            self.keep(without(candidate, effect, self.scales))
+        return self.tried[key]
+
+    def compare_rivals(self, state: State) -> None:
+        """Put every other effect in the place of each chosen one (for pairs and triples)."""
+        chosen = state.candidate
+        if len(chosen.effects) < 2:
+            return
+        for effect in chosen.effects:
+            rest = self.drop(chosen, effect)
+            scores = scan(rest.fit, self.effects, self.scales, rng=self.rng).best()
+            held = max((s.gain for s in scores if s.effect.id == effect.id), default=0.0)
+            for score in scores:
+                if score.effect.id != effect.id and score.gain > 0.5 * held - 10:
+                    self.fit_more(rest, [score])
+
+    def naming(self, base: State, chosen: State) -> Naming:
+        tried = tuple(sorted(self.tried.values(), key=self.worth, reverse=True))
+        best = tried[0]
+        if set(best.ids) != set(chosen.candidate.ids) and len(best.effects) <= MOST_EFFECTS:
+            chosen = self.examine(best)
+        return Naming(base, chosen, tried, self.cost)
+
+
+def _is_elaboration(candidate: Candidate, chosen: Candidate) -> bool:
+    """True when the candidate only refines the chosen model: an effect whose null is the chosen one's."""
+    extra = [e for e in candidate.effects if e.id not in chosen.ids]
+    return bool(extra) and all(e.prefer in chosen.ids for e in extra)

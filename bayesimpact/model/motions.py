@@ -1,0 +1,46 @@
+"""Many trajectories in one compiled call: one row per slot vector, whatever recording it belongs to."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.model.general import integrate_few, integrate_many
+from bayesimpact.model.parameters import BASE_SLOTS
+from bayesimpact.model.simulate import predictions
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+_OFFSET = BASE_SLOTS.index("offset")
+_THREADING_PAYS = 4  # trajectories; fewer are done sooner than threads wake up
+
+
+def motions(q: Array, mass: float, counts: Counts, intervals: Array) -> Array:
+    """True displacements (K, max counts), m, of base oscillators with slots (K, 11).
+
+    Rows are NaN where the parameters are inadmissible, and beyond their own count.
+    """
+    base = q.copy()
+    base[:, _OFFSET] = 0.0
+    columns = np.arange(base.size, dtype=np.int64).reshape(base.shape)
+    total = int(counts.sum())
+    flat, codes = predictions(
+        base.reshape(1, -1), columns, np.zeros(base.shape), mass, counts, intervals, total
+    )
+    out = np.full((q.shape[0], int(counts.max())), np.nan)
+    out[np.arange(out.shape[1]) < counts[:, None]] = flat[0]
+    out[codes[0] != 0] = np.nan
+    return out
+
+
+def general_motions(
+    q: Array, mass: float, counts: Counts, intervals: Array, laws: NDArray[np.int64]
+) -> Array:
+    """The same for oscillators with added effects: slots (K, Q), table of laws (L, 5)."""
+    out = np.empty((q.shape[0], int(counts.max())))
+    integrate = integrate_many if q.shape[0] >= _THREADING_PAYS else integrate_few
+    codes = integrate(q, mass, intervals, counts, laws, out)
+    out[np.arange(out.shape[1]) >= counts[:, None]] = np.nan
+    out[codes != 0] = np.nan
+    return out
