@@ -8,6 +8,7 @@ damping finds the valley, least squares on the closed-form cycle its bottom.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -46,6 +47,12 @@ class Cycles:
         """The cycles with these indices."""
         fields = {name: getattr(self, name)[rows] for name in self.__dataclass_fields__}
         return replace(self, **fields)
+
+    @staticmethod
+    def joined(parts: Sequence[Cycles]) -> Cycles:
+        """The cycles of several sets, one after the other."""
+        names = Cycles.__dataclass_fields__
+        return Cycles(*(np.concatenate([getattr(p, name) for p in parts]) for name in names))
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,11 +133,11 @@ def _unpack(x: Floats, free: Free, scale: float) -> tuple[float, float, Floats, 
 def _residuals(x: Floats, cycles: Cycles, free: Free, scale: float) -> Floats:
     g, c2, k2, c1, k1 = _unpack(x, free, scale)
     end = cycle(cycles.depth, free.mass, c1, k1, np.array(c2), np.array(g), k2[cycles.case])
-    rows = _misfits(cycles, end.length, end.depth, end.height)
+    rows = misfits(cycles, end.length, end.depth, end.height)
     return np.concatenate([rows.ravel(), [x[2] / 2, x[3] / 2]])
 
 
-def _misfits(cycles: Cycles, length: Floats, depth: Floats, height: Floats) -> Floats:
+def misfits(cycles: Cycles, length: Floats, depth: Floats, height: Floats) -> Floats:
     """(3, ...) standardised misfits; a cycle that the stop never lets go counts as far off."""
     ratio = np.log(np.maximum(depth, 1e-300) / cycles.depth)
     rows = np.stack(
@@ -151,16 +158,16 @@ def _free_misfit(cycles: Cycles, free: Free) -> float:
     sums = []
     for c1 in (free.c1, for_c1):
         end = cycle(cycles.depth, free.mass, c1, free.k1, np.array(0.0), never, np.array(0.0))
-        rows = _misfits(cycles, end.length, end.depth, end.height)
+        rows = misfits(cycles, end.length, end.depth, end.height)
         sums.append(float(np.sum(np.minimum(rows**2, 100.0))))
     return min(sums)
 
 
 def _grid(cycles: Cycles, free: Free, cases: int, scale: float) -> list[Floats]:
     """The best starting points of a coarse grid, at up to three gaps."""
-    highest = float(cycles.height.max())
-    lowest = -0.9 * scale if highest <= 0 else 0.0
-    gaps = np.concatenate([np.linspace(lowest, highest, GAP_STEPS)[:-1], -np.array([0.05, 0.2, 0.5]) * scale])
+    # Below zero as well: a gap of nothing must not sit at the edge of the grid.
+    highest = max(float(cycles.height.max()), 0.02 * scale)
+    gaps = np.concatenate([scale * np.array([-0.3, -0.1, -0.03]), np.linspace(0.0, highest, GAP_STEPS)[:-1]])
     cost = np.zeros(gaps.size)
     choice = np.zeros((gaps.size, cases, 2))
     for case in range(cases):
@@ -177,7 +184,7 @@ def _grid(cycles: Cycles, free: Free, cases: int, scale: float) -> list[Floats]:
         args = (np.broadcast_to(a, shape).ravel() for a in (some.depth, c2, g, k2))
         depth, c2_flat, g_flat, k2_flat = args
         end = cycle(depth, free.mass, free.c1, free.k1, c2_flat, g_flat, k2_flat)
-        rows3 = _misfits(
+        rows3 = misfits(
             some, end.length.reshape(shape), end.depth.reshape(shape), end.height.reshape(shape)
         )
         misfit = np.sum(np.log1p((rows3 / 10) ** 2), axis=(0, 4)) * mine.size / rows.size

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 
@@ -35,37 +35,37 @@ class CycleEnd:
 
 
 def cycle(
-    depth: Floats, mass: float, c1: float, k1: float, c2: Floats, g: Floats, k2: Floats
+    depth: Floats, mass: float, c1: ArrayLike, k1: ArrayLike, c2: ArrayLike, g: ArrayLike, k2: ArrayLike
 ) -> CycleEnd:
     """Follow cycles of m y'' + c1 y' + k1 y + [c2 y' + k2 (y - g)] H(y - g) = 0 from y = -depth.
 
     Parameters
     ----------
     depth : (n,) m, positive; the cycle starts there at rest, away from the stop
-    mass, c1, k1 : kg, N s/m, N/m, the same for all cycles; free motion must be underdamped
-    c2, g, k2 : (n,) N s/m, m, N/m; g may be negative (a preloaded stop)
+    mass : kg
+    c1, k1 : (n,) or one for all, N s/m, N/m; free motion must be underdamped
+    c2, g, k2 : likewise, N s/m, m, N/m; g may be negative (a preloaded stop), and so may c2 and k2
+        (beyond y = g the oscillator gets softer) as long as c1 + c2 and k1 + k2 do not
 
     Returns
     -------
     CycleEnd of (n,) arrays.
     """
-    depth, c2, g, k2 = np.broadcast_arrays(depth, c2, g, k2)
+    depth, c1, k1, c2, g, k2 = np.broadcast_arrays(depth, c1, k1, c2, g, k2)
     b, w0 = c1 / (2 * mass), np.sqrt(k1 / mass)
-    w = np.sqrt(w0**2 - b**2)
+    w = np.sqrt(np.maximum(w0**2 - b**2, 1e-6 * w0**2))
     half = np.pi / w
-    top = depth * np.exp(-b * half)
-    length = np.full(depth.shape, 2 * half)
-    after = depth * np.exp(-2 * b * half)
-    height = top.astype(np.float64)
-    hit = np.flatnonzero((top > g) & (k2 + c2 > 0) & (g > -depth))
+    height = np.asarray(depth * np.exp(-b * half))
+    length, after = 2 * half, depth * np.exp(-2 * b * half)
+    hit = np.flatnonzero((height > g) & ((k2 != 0) | (c2 != 0)) & (g > -depth))
     if hit.size:
-        d, gap = depth[hit], g[hit]
-        free = (np.full(hit.size, b), np.full(hit.size, w0**2))
-        start = np.arccos(np.clip(-gap / d, -1.0, 1.0)) / w
-        touch = _solve(*free, -d, np.zeros_like(d), gap, np.zeros_like(d), half + 0 * d, start, 1)
-        speed = _motion(*free, -d, np.zeros_like(d), touch)[1]
-        stay, peak, leave = _contact(mass, c1 + c2[hit], k1, k2[hit], gap, speed)
-        home, deep = _to_minimum(b, w, gap, leave)
+        d, gap, still = depth[hit], g[hit], np.zeros(hit.size)
+        free = (b[hit], w0[hit] ** 2)
+        start = np.arccos(np.clip(-gap / d, -1.0, 1.0)) / w[hit]
+        touch = _solve(*free, -d, still, gap, still, half[hit], start, 1)
+        speed = _motion(*free, -d, still, touch)[1]
+        stay, peak, leave = _contact(mass, c1[hit] + c2[hit], k1[hit], k2[hit], gap, speed)
+        home, deep = _to_minimum(b[hit], w[hit], gap, leave)
         length[hit], after[hit], height[hit] = touch + stay + home, deep, peak
     lost = g <= -depth
     length[lost] = after[lost] = height[lost] = np.nan
@@ -75,7 +75,7 @@ def cycle(
 
 
 def _contact(
-    mass: float, c: Floats, k1: float, k2: Floats, g: Floats, speed: Floats
+    mass: float, c: Floats, k1: Floats, k2: Floats, g: Floats, speed: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """Time on the stop, highest displacement, velocity when leaving."""
     b, square = c / (2 * mass), (k1 + k2) / mass
@@ -103,7 +103,7 @@ def _contact(
     return stay, centre + highest, leave
 
 
-def _to_minimum(b: float, w: float, g: Floats, speed: Floats) -> tuple[Floats, Floats]:
+def _to_minimum(b: Floats, w: Floats, g: Floats, speed: Floats) -> tuple[Floats, Floats]:
     """Time from leaving the stop (speed < 0) to the next minimum, and its depth."""
     p, q = g, (speed + b * g) / w
     phase = np.arctan2(w * q - b * p, w * p + b * q) % np.pi
@@ -143,7 +143,8 @@ def _solve(
         value, slope = _motion(b, square, u, v, t)
         before = sign * (value - target) < 0
         low, high = np.where(before, t, low), np.where(before, high, t)
-        step = t - (value - target) / np.where(slope == 0, np.inf, slope)
+        with np.errstate(over="ignore"):
+            step = t - (value - target) / np.where(slope == 0, np.inf, slope)
         inside = (step >= low) & (step <= high)
         last, t = t, np.where(inside, step, 0.5 * (low + high))
         if np.all(np.abs(t - last) <= 1e-13 * np.abs(t)):

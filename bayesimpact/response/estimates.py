@@ -9,7 +9,7 @@ wrong phase.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -18,7 +18,15 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.errors import InputError
 from bayesimpact.response.contact import Contact, Free, fit_contact
 from bayesimpact.response.flight import Flight
-from bayesimpact.response.observe import Observed, look, observe_cycles, observe_flights, with_tails
+from bayesimpact.response.observe import (
+    Observed,
+    look,
+    observe_cycles,
+    observe_decay,
+    observe_flights,
+    with_tails,
+)
+from bayesimpact.response.preloaded import estimate_preloaded, is_preloaded
 from bayesimpact.response.release import Oscillator, release
 
 
@@ -74,7 +82,10 @@ def estimate(campaign: Campaign) -> Estimates:
     InputError : the recordings show no oscillation that can be told from the noise
     """
     observed = look(campaign)
-    flight = observe_flights(observed, campaign.stop)
+    if campaign.stop:
+        observed, flight = observe_flights(observed)
+    else:
+        flight = observe_decay(observed)
     if flight is None:
         raise InputError(
             f"campaign {campaign.name!r}",
@@ -82,11 +93,17 @@ def estimate(campaign: Campaign) -> Estimates:
             "free decays of two periods or more",
         )
     contact, impacts = None, [0] * len(campaign.recordings)
+    if campaign.stop and is_preloaded(observed):
+        found = estimate_preloaded(campaign, observed)
+        if found is not None:
+            flight = replace(flight, offsets=found.offsets, sd_offset=found.sd_offset)
+            return _collect(campaign, observed, flight, found.contact, found.impacts)
     if campaign.stop:
+        cases = [campaign.cases.index(r.case) for r in campaign.recordings]
         # Twice: the first gap tells where the free tails begin, these sharpen the decay rate, and
         # the second estimate of the stop needs that.
         for _ in range(2):
-            cycles, owner = observe_cycles(campaign, observed, flight)
+            cycles, owner = observe_cycles(cases, observed, flight)
             free = _free(campaign.mass, flight)
             contact = fit_contact(cycles, free, len(campaign.cases)) if owner.size else None
             flight, impacts = with_tails(observed, flight, cycles, owner, contact, campaign.mass)

@@ -209,12 +209,14 @@ class _Blocks:
         self.middles = np.array(middles)
         self.owner = np.array(owner, dtype=np.intp)
         self.sizes = np.array(sizes, dtype=np.intp)
+        self.reach = 0.5 * np.array([x[-1] - x[0] for x in times])
         self.starts = np.concatenate([[0], np.cumsum(self.sizes)[:-1]]).astype(np.intp)
         self.fixed = None if fixed is None else np.asarray(fixed, dtype=np.float64)
 
     def _project(self, w: float, b: float) -> tuple[Floats, Floats, Floats, Floats]:
         """Orthonormal pair of columns per arc, and the triangular factor between (p, q) and it."""
-        envelope = np.exp(-b * self.times)
+        # The envelope is one where it is largest, so that no decay rate overflows on a long arc.
+        envelope = np.exp(-b * self.times - self._spread(abs(b) * self.reach))
         cosine, sine = envelope * np.cos(w * self.times), envelope * np.sin(w * self.times)
         r11 = np.sqrt(self._sum(cosine**2))
         first = cosine / self._spread(r11)
@@ -260,6 +262,7 @@ class _Blocks:
         z1, z2 = self._sum(first * signal), self._sum(second * signal)
         q = z2 / r22
         p = (z1 - upper[1] * q) / upper[0]
-        table = np.column_stack([self.middles, p, q])
+        scale = np.exp(-abs(b) * self.reach)
+        table = np.column_stack([self.middles, p * scale, q * scale])
         waves = tuple(table[self.owner == r] for r in range(self.recordings))
         return offsets, waves, spread

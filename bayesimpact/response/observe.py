@@ -52,6 +52,12 @@ class Observed:
         return 2 * np.pi / float(np.median([p * dt for p, dt in pairs]))
 
 
+    def take(self, rows: Sequence[int]) -> Observed:
+        """Only the recordings with these indices."""
+        parts = {name: [getattr(self, name)[r] for r in rows] for name in self.__dataclass_fields__}
+        return replace(self, **parts)
+
+
 def look(campaign: Campaign) -> Observed:
     """Period, noise, rest reading and flights of every recording."""
     samples = [r.samples for r in campaign.recordings]
@@ -59,62 +65,44 @@ def look(campaign: Campaign) -> Observed:
     periods = [rough_period(x) for x in samples]
     noises = [local.noise_level(x, p) for x, p in zip(samples, periods, strict=True)]
     rests = [rest_position(*args) for args in zip(samples, periods, noises, strict=True)]
-    first = Observed(samples, intervals, periods, noises, rests, [[] for _ in samples])
-    if not campaign.stop:
-        return replace(first, arcs=[[(0, x.size)] for x in samples])
-    return replace(first, arcs=_flight_arcs(first))
+    first = Observed(samples, intervals, periods, noises, rests, [[(0, x.size)] for x in samples])
+    return with_arcs(first) if campaign.stop else first
 
 
-def _flight_arcs(observed: Observed) -> list[list[Arc]]:
-    """Arcs below rest; of a preloaded stop only as far down as the flight is seen to be free."""
-    count = len(observed.samples)
-    arcs = [
-        lower_arcs(observed.samples[r], observed.rests[r], observed.periods[r], observed.noises[r])
-        for r in range(count)
-    ]
-    if not any(_preloaded(observed, r) for r in range(count)):
-        return arcs
-    # The stop reaches below rest by an unknown depth. Deeper arcs are free for sure but short, so
-    # take the shallowest at which the fit is as good as at any.
-    deepest = min(observed.size(r) for r in range(count))
-    trials = []
-    for depth in np.linspace(0.05, 0.7, 8) * deepest:
-        cut = [
-            _below(arcs[r], observed.samples[r], observed.rests[r] - depth, observed.periods[r])
-            for r in range(count)
-        ]
-        flight = solve_flight(observed.samples, cut, observed.intervals, observed.omega)
-        if flight is not None:
-            trials.append((flight.rms, cut))
-    if not trials:
-        return arcs
-    best = min(rms for rms, _ in trials)
-    return next(cut for rms, cut in trials if rms <= 1.15 * best)
+def with_arcs(observed: Observed, depth: float = 0.1) -> Observed:
+    """The same with the arcs below rest, by this fraction of their depth, as flights."""
+    o = observed
+    rows = zip(o.samples, o.rests, o.periods, o.noises, strict=True)
+    return replace(o, arcs=[lower_arcs(*row, depth=depth) for row in rows])
 
 
-def _preloaded(observed: Observed, r: int) -> bool:
-    """Whether lower half swings get shorter as the motion decays: the stop holds them at rest."""
-    swings = half_swings(
-        observed.samples[r], observed.rests[r], observed.periods[r], observed.noises[r]
-    )
-    lower = swings.durations[swings.side < 0]
-    return bool(lower.size >= 6 and lower[:2].mean() > 1.08 * np.median(lower[-3:]))
+def observe_flights(observed: Observed) -> tuple[Observed, Flight | None]:
+    """The free oscillator from the flights of all recordings.
+
+    Arcs that reach into the stop (of a preloaded rig that does not come to rest) do not fit. So
+    deeper ones are tried, and taken when they fit much better.
+
+    Returns
+    -------
+    The recordings with the arcs that were taken, and the fit; None when there is not enough to fit.
+    """
+    best, flight = observed, _fit(observed)
+    for depth in (0.35, 0.6):
+        if flight is not None and flight.rms < 1.5 * max(observed.noises):
+            break
+        deeper = with_arcs(observed, depth)
+        other = _fit(deeper)
+        if other is not None and (flight is None or other.rms < 0.5 * flight.rms):
+            best, flight = deeper, other
+    return best, flight
 
 
-def _below(arcs: Sequence[Arc], samples: Floats, level: float, period: float) -> list[Arc]:
-    """The parts of arcs below an absolute level."""
-    kept: list[Arc] = []
-    for first, end in arcs:
-        deep = np.flatnonzero(samples[first:end] < level)
-        if deep.size >= max(6, period / 12):
-            kept.append((first + int(deep[0]), first + int(deep[-1]) + 1))
-    return kept
+def _fit(observed: Observed) -> Flight | None:
+    return solve_flight(observed.samples, observed.arcs, observed.intervals, observed.omega)
 
 
-def observe_flights(observed: Observed, stop: bool) -> Flight | None:
-    """The free oscillator from the flights of all recordings; without a stop from all samples."""
-    if stop:
-        return solve_flight(observed.samples, observed.arcs, observed.intervals, observed.omega)
+def observe_decay(observed: Observed) -> Flight | None:
+    """The oscillator without a stop, from all samples; None without an oscillation."""
     rates, weights = [], []
     for r, samples in enumerate(observed.samples):
         swings = half_swings(samples, observed.rests[r], observed.periods[r], observed.noises[r])
@@ -128,16 +116,22 @@ def observe_flights(observed: Observed, stop: bool) -> Flight | None:
     if not rates:
         return None
     omega = float(np.average(rates, weights=weights))
-    return solve_flight(
-        observed.samples, observed.arcs, observed.intervals, omega, scan=1.05
-    )
+    return solve_flight(observed.samples, observed.arcs, observed.intervals, omega, scan=1.05)
 
 
-def observe_cycles(campaign: Campaign, observed: Observed, flight: Flight) -> tuple[Cycles, Ints]:
-    """Cycles between neighbouring flights of all recordings, and the recording of each."""
+def observe_cycles(
+    cases: Sequence[int], observed: Observed, flight: Flight
+) -> tuple[Cycles, Ints]:
+    """Cycles between neighbouring flights of all recordings, and the recording of each.
+
+    Parameters
+    ----------
+    cases : per recording, the index of its obstacle
+    observed, flight : recordings and the fit of their flights
+    """
     rows: list[list[float]] = []
     owner: list[int] = []
-    for r, recording in enumerate(campaign.recordings):
+    for r, case in enumerate(cases):
         times, depths = flight.minima(r)
         arcs = observed.arcs[r]
         noise = max(observed.noises[r], flight.rms)
@@ -163,7 +157,7 @@ def observe_cycles(campaign: Campaign, observed: Observed, flight: Flight) -> tu
                     float(np.hypot(error / flight.omega, 3e-4 * length)),
                     float(np.hypot(error, 2e-3)),
                     float(np.hypot(noise, (3e-3 + coarse) * depths[j])),
-                    campaign.cases.index(recording.case),
+                    case,
                 ]
             )
             owner.append(r)
@@ -200,8 +194,6 @@ def with_tails(
         stop = (np.array(contact.c2), np.array(contact.g), contact.k2[cycles.case])
         impact = cycle(1.01 * cycles.depth, mass, contact.c1, contact.k1, *stop).impact
     impacts = [int(np.sum(impact & (owner == r))) for r in range(count)]
-    if contact is not None and contact.g < 0:
-        return flight, impacts
     joined: list[list[Arc]] = []
     for r in range(count):
         arcs, hits = list(observed.arcs[r]), np.flatnonzero(impact[owner == r])

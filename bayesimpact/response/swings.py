@@ -40,14 +40,21 @@ class HalfSwings:
 
 def rough_period(samples: Floats) -> float:
     """Period of the strongest component, in samples: good to some ten per cent."""
-    # A stop moves the middle of the swings as they decay. In the velocity this drift counts little.
-    velocity = np.gradient(samples)
-    velocity -= velocity.mean()
-    size = 1 << int(np.ceil(np.log2(4 * samples.size)))
-    power = np.abs(np.fft.rfft(velocity * np.hanning(samples.size), size)) ** 2
-    lowest = max(1, int(1.2 * size / samples.size))
+    settled = float(np.median(samples[-max(samples.size // 5, 1) :]))
+    size = np.abs(samples - settled)
+    # Only the part with motion: a decay that dies early must not drown in the noise after it.
+    last = int(np.flatnonzero(size > 0.05 * size.max())[-1]) if size.any() else 0
+    active = samples[: min(samples.size, max(16, int(1.2 * last)))]
+    fade = np.cos(0.5 * np.pi * np.arange(active.size) / active.size) ** 2
+    points = 1 << int(np.ceil(np.log2(4 * active.size)))
+    power = np.abs(np.fft.rfft((active - settled) * fade, points)) ** 2
+    # A stop moves the middle of the swings as they decay: in the velocity this drift counts little,
+    # but white noise would count more than the motion, so its floor goes first.
+    floor = float(np.median(power[power.size // 2 :]))
+    power = np.maximum(power - 30 * floor, 0.0) * np.arange(power.size) ** 2.0
+    lowest = max(1, int(1.2 * points / active.size))
     peak = lowest + int(np.argmax(power[lowest:]))
-    return size / peak
+    return points / peak
 
 
 def turning_points(samples: Floats, period: float, noise: float) -> tuple[Ints, NDArray[np.int_]]:
