@@ -22,9 +22,11 @@ from bayesimpact.inference.moves import MOVE_NAMES
 Array = NDArray[np.float64]
 
 STORED_STEPS = 1000  # per ensemble; beyond, every other stored step is dropped
-_FULL_ROUNDS = 3  # of burn-in, in any case
-_MOST_ROUNDS = 7  # when the independence proposal is rarely accepted
-_POOR = 0.15
+# Rounds of burn-in: how many are enough depends on how often the independence proposals of the last
+# one were accepted in the ensemble that accepts least.
+_FEW_ROUNDS, _GOOD = 2, 0.7
+_ROUNDS = 3
+_MOST_ROUNDS, _POOR = 7, 0.15
 
 
 class Trace:
@@ -122,14 +124,18 @@ class Run:
             return
         self.rounds += 1
         self.burn_in += int(content["burn_in"])
-        poor = min(acceptance(tally) for tally in content["tally"]) < _POOR
-        enough = _MOST_ROUNDS if poor else _FULL_ROUNDS
+        accepted = min(acceptance(tally) for tally in content["tally"])
+        enough = _ROUNDS
+        if accepted >= _GOOD:
+            enough = _FEW_ROUNDS
+        elif accepted < _POOR:
+            enough = _MOST_ROUNDS
         self.burning = self.rounds < enough
 
     def _round_length(self) -> int:
-        if self.rounds < _FULL_ROUNDS - 1:
+        if self.rounds < _FEW_ROUNDS:
             return self.block // 2
-        return self.block << (self.rounds - _FULL_ROUNDS + 1)
+        return self.block << (self.rounds - _FEW_ROUNDS)
 
     def due(self) -> bool:
         """Is it time to look? After 1, 2, 3, ... then every fifth part more blocks."""

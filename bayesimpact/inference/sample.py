@@ -142,10 +142,11 @@ def sample_posterior(
     """Samples a posterior from its mode and curvature until independent ensembles agree.
 
     The first ensemble starts from the Laplace Gaussian, the others from a Student-t half as wide
-    again; each has its own random stream and its own proposal. Burn-in: three rounds (block/2,
-    block/2, block steps), up to four longer ones when independence proposals are rarely accepted.
-    Kept: all further steps, but for the first 10 autocorrelation times of the whole run (burn-in
-    included), or the first half should only the second half pass.
+    again; each has its own random stream and its own proposal. Burn-in: two rounds of block/2 steps
+    where independence proposals are mostly accepted, else a third of block steps, and where they
+    are rarely accepted four more, each twice as long as the last. Kept: all further steps, but for
+    the first 10 autocorrelation times of the whole run (burn-in included), or the first half
+    should only the second half pass.
 
     Parameters
     ----------

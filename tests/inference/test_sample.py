@@ -60,7 +60,7 @@ def interrupt():
 
 
 def small(function, **options):
-    """A short run of three parameters: 100 burn-in steps and up to 120 kept ones."""
+    """A short run of three parameters: 20 steps of burn-in, up to 120 kept ones."""
     defaults = {"seed": 5, "walkers": 10, "block": 20, "max_steps": 120, "target_ess": 1e9}
     return sample_posterior(function, np.ones(3), np.eye(3), **(defaults | options))
 
@@ -276,7 +276,7 @@ def test_killed_while_writing(tmp_path, monkeypatch, uninterrupted):
 
     def killed(source, destination):
         renamed.append(destination)
-        if len(renamed) == 6:
+        if len(renamed) == 5:
             raise KeyboardInterrupt
         rename(source, destination)
 
@@ -351,8 +351,9 @@ def test_thinned_draws_are_every_other_of_the_full_ones(monkeypatch):
     full = small(Interrupted())
     monkeypatch.setattr(run_module, "STORED_STEPS", 60)
     thinned = small(Interrupted())
-    assert (full.discarded, thinned.discarded, thinned.thin) == (0, 0, 2)
-    np.testing.assert_array_equal(thinned.draws, full.draws[:, 1::2])
+    assert (full.discarded, full.thin, thinned.thin) == (0, 1, 2)
+    kept = full.draws[:, thinned.discarded + 1 :: 2]  # steps are counted from 1
+    np.testing.assert_array_equal(thinned.draws, kept)
 
 
 @pytest.mark.parametrize(
@@ -419,7 +420,7 @@ def test_a_damaged_file_is_named(tmp_path):
 def test_saved_files_hold_no_pickles(tmp_path):
     small(Interrupted(), folder=tmp_path, max_steps=20)
     paths = list(tmp_path.glob("*.npz"))
-    assert len(paths) == 5  # start, three rounds of burn-in, one block
+    assert len(paths) == 4  # start, two rounds of burn-in, one block
     for path in paths:
         with np.load(path, allow_pickle=False) as content:
             assert all(not content[name].dtype.hasobject for name in content.files)
@@ -459,8 +460,8 @@ def test_ensembles_that_settle_in_different_places_do_not_converge(monkeypatch):
 def test_progress_is_told_after_every_block():
     seen = []
     small(Interrupted(), progress=seen.append)
-    assert [report.steps for report in seen] == [0, 0, 0, 20, 40, 60, 80, 100, 120]
-    assert [report.burning for report in seen[:3]] == [True, True, False]
+    assert [report.steps for report in seen] == [0, 0, 20, 40, 60, 80, 100, 120]
+    assert [report.burning for report in seen[:2]] == [True, False]
     assert seen[-1].max_steps == 120
     assert seen[-1].tau is not None
 
