@@ -103,12 +103,13 @@ def check(campaign: Path, out: Path | None, seed: int, quiet: bool) -> None:
     for the sake of scripts that pass it to every command.
     """
     from bayesimpact.data.read import load_campaign
-    from bayesimpact.report.check_text import campaign_text, campaign_warnings
+    from bayesimpact.report.check_text import campaign_text, campaign_warnings, measured_noise
 
     loaded = load_campaign(campaign)
+    noise = measured_noise(loaded)
     if not quiet:
-        click.echo(campaign_text(loaded))
-    for warning in campaign_warnings(loaded):
+        click.echo(campaign_text(loaded, noise))
+    for warning in campaign_warnings(loaded, noise):
         click.echo(f"warning: {warning}", err=True)
     if out is not None:
         from bayesimpact.report.check_figure import campaign_figure

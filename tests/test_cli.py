@@ -80,20 +80,28 @@ def test_wrong_usage_is_bad_input(arguments: list[str], run: Run) -> None:
     assert code == 2 and err.startswith("Usage:")
 
 
+def noisy(n: int = 600, interval: float = 2e-3, seed: int = 1) -> np.ndarray:
+    """A decay with white noise of 5 um."""
+    return decay(n, interval) + 5e-6 * np.random.default_rng(seed).standard_normal(n)
+
+
 def test_check_says_what_was_read_and_what_will_be_estimated(run: Run, tmp_path: Path) -> None:
     toml = TOML.replace("b.csv", "c.csv") + (
         '[measurement]\nnoise_um = 5\nsmoothing = { kind = "savgol", window = 21, polyorder = 2 }\n'
         '[priors]\nk1 = { distribution = "normal", mean = 800, sd = 50 }\n'
         "[beam.1]\nlength_mm = 110\nwidth_mm = 20\nthickness_mm = 5\nyoungs_modulus_mpa = 2.1e5\n"
     )
-    write(tmp_path, toml, b=None, c=csv(decay(1500, 1e-3), interval=1e-3, start=0.25))
+    write(
+        tmp_path, toml, a=csv(noisy()), b=None, c=csv(noisy(1500, 1e-3), interval=1e-3, start=0.25)
+    )
     before = tree(tmp_path)
     code, out, err = run("check", tmp_path)
     assert (code, err) == (0, "")
     lines = {line.split()[0]: line.split() for line in out.splitlines() if line.strip()}
-    # name, case, samples, Hz, start, length, period, first and largest in mm
-    assert lines["a"][:8] == ["a", "1", "600", "500", "0", "1.198", "0.1563", "-6"]
-    assert lines["c"][:8] == ["c", "2", "1500", "1000", "0.25", "1.499", "0.1563", "-6"]
+    # name, case, samples, Hz, start, length, period; then first and largest in mm
+    assert lines["a"][:7] == ["a", "1", "600", "500", "0", "1.198", "0.1563"]
+    assert lines["c"][:7] == ["c", "2", "1500", "1000", "0.25", "1.499", "0.1563"]
+    assert [float(x) for x in lines["a"][7:9]] == pytest.approx([-6.0, 6.0], rel=0.05)
     assert "will be estimated: 13 parameters" in out
     for words in ("k2[1], k2[2]  N/m", "y0[a], y0[c]  m", "v0[a], v0[c]  m/s", "sigma  m"):
         assert words in out
@@ -113,11 +121,24 @@ def test_check_saves_its_plot(run: Run, tmp_path: Path) -> None:
 
 
 def test_quiet_check_prints_warnings_only(run: Run, tmp_path: Path) -> None:
-    assert run("check", write(tmp_path), "--quiet") == (0, "", "")
+    files = {"a": csv(noisy()), "b": csv(noisy(seed=2))}
+    assert run("check", write(tmp_path, **files), "--quiet") == (0, "", "")
     toml = TOML + '[measurement]\nsmoothing = { kind = "savgol", window = 20, polyorder = 2 }\n'
-    code, out, err = run("check", write(tmp_path, toml), "--quiet")
+    code, out, err = run("check", write(tmp_path, toml, **files), "--quiet")
     assert (code, out) == (0, "")
     assert err.startswith("warning: smoothing window 20 is even and taken as 19")
+
+
+@pytest.mark.parametrize(("stated", "warned"), [(5.0, False), (20.0, True), (1.0, True)])
+def test_stated_noise_is_compared_with_the_recordings(
+    stated: float, warned: bool, run: Run, tmp_path: Path
+) -> None:
+    toml = f"{TOML}[measurement]\nnoise_um = {stated}\n"
+    code, out, err = run("check", write(tmp_path, toml, a=csv(noisy()), b=csv(noisy(seed=2))))
+    (line,) = (line for line in out.splitlines() if "raw noise" in line)
+    # 1,200 samples fix the level to 2 %, part of them spent on the polynomials.
+    assert float(line.split()[2]) == pytest.approx(5e-6, rel=0.15)
+    assert code == 0 and ("noise is stated as" in err) == warned
 
 
 def test_recording_that_starts_before_the_release(run: Run, tmp_path: Path) -> None:

@@ -4,17 +4,27 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayesimpact.data.campaign import Campaign, Measurement
+from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.period import rough_period
 from bayesimpact.data.recording import Recording
+from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise_estimate import raw_noise
 from bayesimpact.model.parameters import build_layout
 
 BARS = "▁▂▃▄▅▆▇█"
 COLUMNS = 40
 
 
-def campaign_text(campaign: Campaign) -> str:
-    """Recordings, measuring chain, unknowns and priors, as lines for a terminal."""
+def measured_noise(campaign: Campaign) -> Noise | None:
+    """Noise as the recordings alone show it, whatever is stated; None where a filter hides it."""
+    return raw_noise(campaign.recordings) if campaign.measurement.smoothing is None else None
+
+
+def campaign_text(campaign: Campaign, noise: Noise | None) -> str:
+    """Recordings, measuring chain, unknowns and priors, as lines for a terminal.
+
+    `noise` is what `measured_noise` found.
+    """
     angle = campaign.recordings[0].quantity == "angle"
     stop = f"stop, cases {', '.join(campaign.cases)}" if campaign.stop else "no stop"
     blocks = [
@@ -22,7 +32,7 @@ def campaign_text(campaign: Campaign) -> str:
         f"{'inertia' if angle else 'mass'} {campaign.mass:g} {'kg m2' if angle else 'kg'}, {stop}, "
         f"recordings of {campaign.recordings[0].quantity}, data {campaign.sha256[:12]}",
         _recordings_block(campaign),
-        _chain_block(campaign.measurement, "rad" if angle else "m"),
+        _chain_block(campaign, noise),
         _unknowns_block(campaign),
     ]
     if campaign.beams:
@@ -31,9 +41,15 @@ def campaign_text(campaign: Campaign) -> str:
     return "\n\n".join(blocks)
 
 
-def campaign_warnings(campaign: Campaign) -> list[str]:
+def campaign_warnings(campaign: Campaign, noise: Noise | None) -> list[str]:
     """What a user should know before trusting a fit of these recordings."""
     warnings = []
+    stated = campaign.measurement.noise
+    if stated is not None and noise is not None and not 1 / 1.5 < noise.level / stated < 1.5:
+        warnings.append(
+            f"noise is stated as {stated:.3g}, the recordings show about {noise.level:.3g} "
+            f"{campaign.recordings[0].unit}"
+        )
     smoothing = campaign.measurement.smoothing
     if smoothing is not None and smoothing.declared_window > smoothing.window:
         warnings.append(
@@ -95,11 +111,14 @@ def envelope_bars(recording: Recording) -> str:
     return "".join(BARS[int(h)] for h in np.ceil(heights * len(BARS)).clip(1) - 1)
 
 
-def _chain_block(measurement: Measurement, unit: str) -> str:
-    if measurement.noise is None:
-        noise = "not stated: estimated from the recordings"
-    else:
-        noise = f"{measurement.noise:.3g} {unit} (stated)"
+def _chain_block(campaign: Campaign, noise: Noise | None) -> str:
+    measurement, unit = campaign.measurement, campaign.recordings[0].unit
+    levels = []
+    if noise is not None:
+        levels.append(f"{noise.level:.3g} {unit}, {noise.kind} (from the recordings alone)")
+    if measurement.noise is not None:
+        levels.append(f"{measurement.noise:.3g} {unit} (stated)")
+    level = "; ".join(levels) or "estimated before the fit"
     smoothing = measurement.smoothing
     if smoothing is None:
         filtered = "none stated"
@@ -111,7 +130,7 @@ def _chain_block(measurement: Measurement, unit: str) -> str:
     return "\n".join(
         [
             "measuring chain",
-            f"  noise                 {noise}",
+            f"  raw noise             {level}",
             f"  smoothing             {filtered}",
             f"  relative uncertainty  {sds}, gain {measurement.gain_sd:.3g}",
         ]
