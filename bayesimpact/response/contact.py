@@ -31,7 +31,8 @@ class Cycles:
 
     `depth`, `after`: depth below rest at the start and end; `length`: time between; `height`: highest
     displacement between; `sd_length`, `sd_ratio`, `sd_height`: standard deviations of the length, of
-    ln(after / depth) and of the height; `case`: index of the obstacle.
+    ln(after / depth) and of the height; `slope`: change of the rest reading per relative change of the
+    free frequency; `case`: index of the obstacle.
     """
 
     depth: Floats
@@ -41,12 +42,24 @@ class Cycles:
     sd_length: Floats
     sd_ratio: Floats
     sd_height: Floats
+    slope: Floats
     case: NDArray[np.intp]
 
     def take(self, rows: NDArray[np.intp]) -> Cycles:
         """The cycles with these indices."""
         fields = {name: getattr(self, name)[rows] for name in self.__dataclass_fields__}
         return replace(self, **fields)
+
+    def moved(self, relative: float) -> Cycles:
+        """Depths and heights about the rest readings that belong to another free frequency."""
+        by = self.slope * relative
+        floor = 0.05 * self.depth
+        return replace(
+            self,
+            depth=np.maximum(self.depth + by, floor),
+            after=np.maximum(self.after + by, floor),
+            height=self.height - by,
+        )
 
     @staticmethod
     def joined(parts: Sequence[Cycles]) -> Cycles:
@@ -107,7 +120,7 @@ def fit_contact(cycles: Cycles, free: Free, cases: int) -> Contact | None:
         found = least_squares(
             lambda x: _residuals(x, cycles, free, scale),
             start,
-            bounds=_bounds(cases, scale, cycles),
+            bounds=_bounds(cases, scale, cycles, free),
             loss="soft_l1",
             f_scale=3.0,
             x_scale=_steps(cases),
@@ -132,9 +145,10 @@ def _unpack(x: Floats, free: Free, scale: float) -> tuple[float, float, Floats, 
 
 def _residuals(x: Floats, cycles: Cycles, free: Free, scale: float) -> Floats:
     g, c2, k2, c1, k1 = _unpack(x, free, scale)
-    end = cycle(cycles.depth, free.mass, c1, k1, np.array(c2), np.array(g), k2[cycles.case])
+    cycles = cycles.moved(0.5 * float(np.log(k1 / free.k1)))
+    end = cycle(cycles.depth, free.mass, c1, k1, c2, g, k2[cycles.case])
     rows = misfits(cycles, end.length, end.depth, end.height)
-    return np.concatenate([rows.ravel(), [x[2] / 2, x[3] / 2]])
+    return np.concatenate([rows.ravel(), x[2:4]])
 
 
 def misfits(cycles: Cycles, length: Floats, depth: Floats, height: Floats) -> Floats:
@@ -152,12 +166,11 @@ def misfits(cycles: Cycles, length: Floats, depth: Floats, height: Floats) -> Fl
 
 def _free_misfit(cycles: Cycles, free: Free) -> float:
     """Misfit of free cycles, the decay rate fitted to their depths."""
-    never = np.array(np.inf)
     shortfall = np.log(cycles.depth / cycles.after) * free.k1**0.5 / np.pi * free.mass**0.5
     for_c1 = max(0.0, float(np.median(shortfall)))
     sums = []
     for c1 in (free.c1, for_c1):
-        end = cycle(cycles.depth, free.mass, c1, free.k1, np.array(0.0), never, np.array(0.0))
+        end = cycle(cycles.depth, free.mass, c1, free.k1, 0.0, np.inf, 0.0)
         rows = misfits(cycles, end.length, end.depth, end.height)
         sums.append(float(np.sum(np.minimum(rows**2, 100.0))))
     return min(sums)
@@ -201,15 +214,16 @@ def _grid(cycles: Cycles, free: Free, cases: int, scale: float) -> list[Floats]:
     for row in np.argsort(cost)[:3]:
         damping = float(np.nanmedian(choice[row, :, 1]))
         starts.append(np.concatenate([[gaps[row] / scale, damping, 0.0, 0.0], choice[row, :, 0]]))
-    low, high = _bounds(cases, scale, cycles)
+    low, high = _bounds(cases, scale, cycles, free)
     margin = 1e-6 * (high - low)
     return [np.clip(start, low + margin, high - margin) for start in starts]
 
 
-def _bounds(cases: int, scale: float, cycles: Cycles) -> tuple[Floats, Floats]:
+def _bounds(cases: int, scale: float, cycles: Cycles, free: Free) -> tuple[Floats, Floats]:
     top = max(1.2 * float(cycles.height.max()) / scale, 0.05)
-    low = np.concatenate([[-0.98, -46.0, -6.0, -6.0], np.full(cases, np.log(1e-3))])
-    high = np.concatenate([[top, 46.0, 6.0, 6.0], np.full(cases, np.log(1e5))])
+    critical = float(np.log(2 * np.sqrt(free.k1 * free.mass)))
+    low = np.concatenate([[-0.98, critical - 7.0, -6.0, -6.0], np.full(cases, np.log(1e-3))])
+    high = np.concatenate([[top, critical + 9.0, 6.0, 6.0], np.full(cases, np.log(1e5))])
     return low, high
 
 
@@ -220,7 +234,7 @@ def _steps(cases: int) -> Floats:
 def _contact(found: object, cycles: Cycles, free: Free, cases: int, scale: float) -> Contact:
     x, jac, fun = np.asarray(found.x), np.asarray(found.jac), np.asarray(found.fun)  # type: ignore[attr-defined]
     g, c2, k2, c1, k1 = _unpack(x, free, scale)
-    end = cycle(cycles.depth, free.mass, c1, k1, np.array(c2), np.array(g), k2[cycles.case])
+    end = cycle(cycles.depth, free.mass, c1, k1, c2, g, k2[cycles.case])
     touched = np.array([bool(end.impact[cycles.case == case].any()) for case in range(cases)])
     variance = max(1.0, float(np.median(fun**2)) / 0.455)
     # A direction the data do not fix has no column in the Jacobian: give it a large, finite sd.

@@ -33,6 +33,8 @@ class Flight:
     rms : root mean square of the residuals
     sd_omega, sd_decay : standard errors for white residuals
     sd_offset : standard error of the offsets, all alike
+    offset_slope : (recordings,) change of the offset per relative change of omega: short arcs tell
+        depth below rest and frequency apart only together
     waves : per recording, (arcs, 3): time of the arc's middle since the first sample in s, p, q
     """
 
@@ -43,6 +45,7 @@ class Flight:
     sd_omega: float
     sd_decay: float
     sd_offset: float
+    offset_slope: Floats
     waves: tuple[Floats, ...]
 
     def minima(self, recording: int) -> tuple[Floats, Floats]:
@@ -159,14 +162,18 @@ def solve_flight(
     covariance = np.linalg.pinv(found.jac.T @ found.jac) * relative**2
     rms = relative * unit
     offsets, waves, spread = blocks.solve(w, b)
+    step = 1e-4
+    slope = (blocks.solve(w * (1 + step), b)[0] - blocks.solve(w * (1 - step), b)[0]) / (2 * step)
+    sd_omega = float(np.sqrt(covariance[0, 0]))
     return Flight(
         omega=w,
         decay=b,
         offsets=offsets,
         rms=rms,
-        sd_omega=float(np.sqrt(covariance[0, 0])) * w,
+        sd_omega=sd_omega * w,
         sd_decay=float(np.sqrt(covariance[1, 1])) * start,
-        sd_offset=rms * spread,
+        sd_offset=float(np.hypot(rms * spread, sd_omega * np.abs(slope).max())),
+        offset_slope=slope,
         waves=waves,
     )
 

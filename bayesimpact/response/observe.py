@@ -157,13 +157,14 @@ def observe_cycles(
                     float(np.hypot(error / flight.omega, 3e-4 * length)),
                     float(np.hypot(error, 2e-3)),
                     float(np.hypot(noise, (3e-3 + coarse) * depths[j])),
+                    float(flight.offset_slope[r]),
                     case,
                 ]
             )
             owner.append(r)
-    table = np.array(rows).reshape(-1, 8)
-    columns = [table[:, k] for k in range(7)]
-    return Cycles(*columns, table[:, 7].astype(np.intp)), np.array(owner, dtype=np.intp)
+    table = np.array(rows).reshape(-1, 9)
+    columns = [table[:, k] for k in range(8)]
+    return Cycles(*columns, table[:, 8].astype(np.intp)), np.array(owner, dtype=np.intp)
 
 
 def _height(observed: Observed, r: int, between: Arc) -> float:
