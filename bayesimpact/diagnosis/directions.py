@@ -113,7 +113,9 @@ def _direction(
     sigma = sigma_of(fit)
     sizes = size_parameters(target, effect)
     if not sizes:
-        change = [b - a for a, b in zip(fit.predicted, target.oscillator.predict(theta), strict=True)]
+        change = [
+            b - a for a, b in zip(fit.predicted, target.oscillator.predict(theta), strict=True)
+        ]
         parts = tuple(p[:, None] for p in whitened(target, change, sigma))
         return Direction(effect, dict(shapes), (effect.id,), parts, True)
     base = whitened(target, target.oscillator.predict(theta), sigma)

@@ -87,7 +87,9 @@ def extend(fit: Fit, effects: Sequence[Effect], scales: Scales) -> Target:
 def _prior(fit: Fit, effects: Sequence[Effect], name: str, scales: Scales) -> Prior:
     if "." not in name:  # a base parameter comes back when the effect that had replaced it leaves
         slot = name
-        values = [v for n, v in zip(fit.names, fit.mode, strict=True) if n.split(".")[-1].startswith(slot)]
+        values = [
+            v for n, v in zip(fit.names, fit.mode, strict=True) if n.split(".")[-1].startswith(slot)
+        ]
         centre = float(np.mean(values))
         return Normal(centre, 10 * max(abs(centre), 1e-12))
     effect, parameter = owner(effects, name)

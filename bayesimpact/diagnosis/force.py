@@ -26,7 +26,9 @@ from bayesimpact.model.parameters import SLOTS
 
 Array = NDArray[np.float64]
 
-WIDTHS = np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 13)])  # of a and b, relative to the elastic force
+WIDTHS = np.concatenate(
+    [[0.0], np.geomspace(1e-6, 1.0, 13)]
+)  # of a and b, relative to the elastic force
 NULL_DRAWS = 1000
 _OFFSET = SLOTS.index("offset")
 
@@ -82,7 +84,9 @@ def missing_force(
     effect = learned_force(low, high, scales.force, scales.force / scales.speed, knots)
     responses = basis_responses(fit, effect, knots, scales)
     projection = project(fit, responses)
-    unit = np.concatenate([np.full(knots, scales.force), np.full(knots, scales.force / scales.speed)])
+    unit = np.concatenate(
+        [np.full(knots, scales.force), np.full(knots, scales.force / scales.speed)]
+    )
     evidence = _Evidence(projection.information, unit, knots)
     best, (width_a, width_b) = evidence.maximum(projection.score)
     draws = evidence.null_draws(rng, NULL_DRAWS)
@@ -172,7 +176,9 @@ class _Evidence:
         width = np.repeat([a, b], self.knots)
         values, vectors = np.linalg.eigh(self.scaled * np.outer(width, width))
         values = np.maximum(values, 0.0)
-        return (vectors.T * width) / np.sqrt(1.0 + values)[:, None], 0.5 * float(np.log1p(values).sum())
+        return (vectors.T * width) / np.sqrt(1.0 + values)[:, None], 0.5 * float(
+            np.log1p(values).sum()
+        )
 
     def maximum(self, score: Array) -> tuple[float, tuple[float, float]]:
         """Largest log evidence over the widths, and the widths."""

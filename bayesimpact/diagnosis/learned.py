@@ -67,9 +67,7 @@ def learned_force(
         fixed("lowest", "m", low),
         fixed("spacing", "m", spacing),
     )
-    a = tuple(
-        EffectParameter(f"a{i + 1}", "N", scale=lambda s: conservative) for i in range(knots)
-    )
+    a = tuple(EffectParameter(f"a{i + 1}", "N", scale=lambda s: conservative) for i in range(knots))
     b = tuple(
         EffectParameter(f"b{i + 1}", "N s/m", scale=lambda s: dissipative) for i in range(knots)
     )

@@ -87,6 +87,17 @@ class Naming:
             and not _is_elaboration(c, chosen)
         )
 
+    def prefers_learned_force(self) -> bool:
+        """True when one free force explains the misfit decisively better than the chosen combination.
+
+        A combination of many terms that imitates one local force loses to that force.
+        """
+        chosen = self.chosen.candidate
+        return (
+            len(chosen.effects) > 1
+            and self.base.force.log_evidence > self.log_odds(chosen) + DECISIVE
+        )
+
     def probability(self, effect_id: str) -> float:
         """Probability that an effect is part of the model, over all models tried."""
         odds = np.array([self.log_odds(c) for c in self.tried])

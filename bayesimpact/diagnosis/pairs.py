@@ -41,7 +41,9 @@ def _gain(scan: Scan, i: int, j: int) -> tuple[float, bool]:
     size = np.linalg.pinv(scaled, rcond=1e-6, hermitian=True) @ (part.score / scale)
     gain = 0.5 * float(size @ (part.score / scale))
     ends = np.cumsum([0, scan.groups[i].size, scan.groups[j].size])
-    for direction, low, high in zip((scan.found[i], scan.found[j]), ends[:-1], ends[1:], strict=True):
+    for direction, low, high in zip(
+        (scan.found[i], scan.found[j]), ends[:-1], ends[1:], strict=True
+    ):
         if direction.one_sided and np.any(size[low:high] < 0):
             return gain, False
     return gain, True

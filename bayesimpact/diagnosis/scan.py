@@ -84,17 +84,13 @@ class Scan:
         return tuple(sorted(by_id.values(), key=lambda s: -s.gain))
 
 
-def scan(
-    fit: Fit, effects: Sequence[Effect], scales: Scales, *, rng: np.random.Generator
-) -> Scan:
+def scan(fit: Fit, effects: Sequence[Effect], scales: Scales, *, rng: np.random.Generator) -> Scan:
     """Score every effect that the fit's model does not contain."""
     found = directions(fit, effects, scales)
     return score_directions(fit, found, rng=rng)
 
 
-def score_directions(
-    fit: Fit, found: tuple[Direction, ...], *, rng: np.random.Generator
-) -> Scan:
+def score_directions(fit: Fit, found: tuple[Direction, ...], *, rng: np.random.Generator) -> Scan:
     """Scores of given directions on a fit."""
     if not found:
         empty = np.zeros(0)
@@ -105,13 +101,10 @@ def score_directions(
     ]
     projection = project(fit, parts)
     ends = np.cumsum([len(d.names) for d in found])
-    groups = tuple(
-        np.arange(end - len(d.names), end) for d, end in zip(found, ends, strict=True)
-    )
+    groups = tuple(np.arange(end - len(d.names), end) for d, end in zip(found, ends, strict=True))
     tests = [_Test(projection, g, d) for g, d in zip(groups, found, strict=True)]
     scores = tuple(
-        _score(fit, projection, d, g, test)
-        for d, g, test in zip(found, groups, tests, strict=True)
+        _score(fit, projection, d, g, test) for d, g, test in zip(found, groups, tests, strict=True)
     )
     p_value = _corrected(projection, tests, min(s.p_value for s in scores), rng)
     return Scan(scores, p_value, projection, groups, found)

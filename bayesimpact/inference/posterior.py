@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -107,8 +108,22 @@ def sample(
         resume=resume,
         lower=np.maximum(lower, target.priors.lower),
         upper=np.minimum(upper, target.priors.upper),
-        fingerprint=target.oscillator.campaign.sha256,
+        fingerprint=_fingerprint(fit),
+        names=fit.names,
         progress=callback,
         **settings,
     )
     return Posterior(fit, chains, seed)
+
+
+def _fingerprint(fit: Fit) -> str:
+    """What a saved chain must belong to: data, parameters, priors, noise."""
+    target = fit.target
+    parts = (
+        target.oscillator.campaign.sha256,
+        ",".join(fit.names),
+        repr(target.priors.parameters),
+        repr(target.likelihood.noise),
+        repr(target.oscillator.smoothing),
+    )
+    return hashlib.sha256("|".join(parts).encode()).hexdigest()

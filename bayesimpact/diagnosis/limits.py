@@ -1,0 +1,96 @@
+"""What can be ruled out: how large every effect that was not found could still be, and what that would do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from bayesimpact.diagnosis.scan import Scan, Score
+from bayesimpact.inference.fit import Fit
+from bayesimpact.model.effects.effect import Scales
+
+Array = NDArray[np.float64]
+
+PRACTICAL = 0.1  # of the prior scale: a size that would matter in practice
+DETECTED = 3.5  # standard errors at which the corrected test answers
+Answer = Literal["present", "absent", "negligible", "cannot tell"]
+
+
+@dataclass(frozen=True, eq=False)
+class Limit:
+    """What the recordings say of an effect that was not found.
+
+    Attributes
+    ----------
+    effect_id, parameter, unit : which size
+    upper95 : with 95 % probability the size (its magnitude where both signs are admissible) is below
+    detection : size that would stand out by five standard errors
+    power : probability that the practical size would have been detected
+    answer : in a word
+    bias : largest shift that a size at the limit would put on a parameter, in its standard deviations
+    biased : which parameter that is
+    k2_bias : the same for the obstacles' stiffnesses, 0 without a stop
+    """
+
+    effect_id: str
+    parameter: str
+    unit: str
+    upper95: float
+    detection: float
+    power: float
+    answer: Answer
+    bias: float
+    biased: str
+    k2_bias: float
+
+
+def limits(fit: Fit, scan: Scan, scales: Scales) -> tuple[Limit, ...]:
+    """Limits of all effects in a scan."""
+    return tuple(_limit(fit, score, scan, scales) for score in scan.best() if "." in score.names[0])
+
+
+def _limit(fit: Fit, score: Score, scan: Scan, scales: Scales) -> Limit:
+    direction = next(d for d, s in zip(scan.found, scan.scores, strict=True) if s is score)
+    name = score.names[0].split(".", 1)[1].split("[")[0]
+    parameter = score.effect.parameter(name)
+    size, sd = np.atleast_1d(score.size), np.atleast_1d(score.size_sd)
+    upper = float(np.max([upper_limit(m, s, direction.one_sided) for m, s in zip(size, sd, strict=True)]))
+    practical = PRACTICAL * parameter.scale(scales)
+    power = float(stats.norm.sf(DETECTED - practical / sd[0]))
+    column = scan.groups[scan.scores.index(score)][0]
+    shift = np.abs(scan.projection.absorbed[:, column]) * upper / fit.sd
+    shared = fit.target.oscillator.layout.roles("physical")
+    worst = int(shared[np.argmax(shift[shared])])
+    k2 = [i for i in shared if fit.names[i].startswith("k2")]
+    return Limit(
+        score.effect.id,
+        name,
+        parameter.unit,
+        upper,
+        score.limit,
+        power,
+        _answer(score, upper, practical, power),
+        float(shift[worst]),
+        fit.names[worst],
+        float(shift[k2].max()) if k2 else 0.0,
+    )
+
+
+def upper_limit(mean: float, sd: float, one_sided: bool, probability: float = 0.95) -> float:
+    """Quantile of the size's magnitude, normal about `mean`, cut at zero when one-sided."""
+    if one_sided:
+        below = stats.norm.cdf(-mean / sd)
+        return float(mean + sd * stats.norm.ppf(below + probability * (1 - below)))
+    return float(abs(mean) + sd * stats.norm.ppf(probability))
+
+
+def _answer(score: Score, upper: float, practical: float, power: float) -> Answer:
+    if abs(score.z) > DETECTED:
+        return "present" if abs(float(score.size[0])) >= practical else "negligible"
+    if upper < practical:
+        return "absent"
+    return "absent" if power >= 0.8 else "cannot tell"

@@ -1,0 +1,77 @@
+"""Physics outside the catalogue: the missing force is learned, inside the simulator, together with the parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.diagnosis.extend import difference_steps, extend, transfer
+from bayesimpact.diagnosis.force import trajectory_points
+from bayesimpact.diagnosis.learned import spline_basis
+from bayesimpact.diagnosis.name import State
+from bayesimpact.inference.fit import Fit, find_mode
+from bayesimpact.model.effects.effect import Scales
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class ForceShape:
+    """A learned force along the displacement.
+
+    Attributes
+    ----------
+    displacement : (n,), m
+    conservative, dissipative : a(y) N and b(y) N s/m, (n,)
+    conservative_rms, dissipative_rms : of a and of b v along the motion, N
+    """
+
+    displacement: Array
+    conservative: Array
+    dissipative: Array
+    conservative_rms: float
+    dissipative_rms: float
+
+
+def learn_force(state: State, scales: Scales) -> Fit:
+    """Fit the parameters and the coefficients of a free force a(y) + b(y) v together."""
+    fit, force = state.candidate.fit, state.force
+    effects = (*fit.target.oscillator.effects, force.effect)
+    target = extend(fit, effects, scales)
+    names = target.oscillator.layout.names
+    start = transfer(fit, target.oscillator.layout, effects, scales, {})
+    coefficients = coefficient_names(force.knots)
+    sd = np.sqrt(np.maximum(np.diag(force.covariance), 0.0))
+    for coefficient, mean in zip(coefficients, force.mean, strict=True):
+        start[names.index(coefficient)] = mean
+    for name, shift in zip(fit.names, force.projection.absorbed @ force.mean, strict=True):
+        start[names.index(name)] -= shift
+    floor = 1e-9 * np.repeat([scales.force, scales.force / scales.speed], force.knots)
+    sizes = dict(zip(coefficients, np.maximum(sd, floor), strict=True))
+    return find_mode(target, start, steps=difference_steps(fit, target, sizes), max_iterations=15)
+
+
+def coefficient_names(knots: int) -> tuple[str, ...]:
+    """Names of the coefficients in theta, conservative ones first."""
+    return tuple(f"learned_force.{part}{i + 1}" for part in "ab" for i in range(knots))
+
+
+def shape(fit: Fit, state: State, points: int = 200) -> ForceShape:
+    """The learned force of a fit along the displacement."""
+    force = state.force
+    values = dict(zip(fit.names, fit.mode, strict=True))
+    coefficients = np.array([values[n] for n in coefficient_names(force.knots)])
+    a, b = coefficients[: force.knots], coefficients[force.knots :]
+    y = np.linspace(force.low, force.low + force.spacing * (force.knots - 3), points)
+    basis = spline_basis(y, force.low, force.spacing, force.knots)
+    along = [
+        (spline_basis(x, force.low, force.spacing, force.knots), v)
+        for x, v in trajectory_points(fit)
+    ]
+    conservative = np.concatenate([m @ a for m, _ in along])
+    dissipative = np.concatenate([(m @ b) * v for m, v in along])
+    return ForceShape(
+        y, basis @ a, basis @ b, float(np.std(conservative)), float(np.sqrt(np.mean(dissipative**2)))
+    )

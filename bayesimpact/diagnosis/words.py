@@ -1,0 +1,85 @@
+"""The diagnosis in words that a lab person understands."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from bayesimpact.diagnosis.locate import Location
+from bayesimpact.inference.fit import Fit
+from bayesimpact.model.effects.effect import Effect, Scales
+
+_REGIMES = {
+    "free": "in the suspension, wherever the mass moves",
+    "contact": "in contact with the obstacle",
+    "entry": "where contact begins",
+    "exit": "where contact ends",
+    "everywhere": "throughout the motion",
+    "measurement": "in the measuring chain, not in the mechanics",
+}
+
+
+def statement(effect: Effect, size: str, share: float, shift: Mapping[str, float]) -> str:
+    """One sentence on an effect: what it is, how large, what ignoring it did."""
+    text = effect.statement.format(size=size, share=f"{100 * share:.2g} %")
+    if not shift:
+        return text
+    worst = max(shift, key=lambda name: abs(shift[name]))
+    return f"{text} Ignoring it moved {worst} by {shift[worst]:+.1f} of its standard deviations."
+
+
+def sizes(effect: Effect, before: Fit, after: Fit, scales: Scales) -> tuple[str, float]:
+    """Size of an effect as text (a force, or a length for the measuring chain) and relative to its yardstick."""
+    change = np.concatenate([a - b for a, b in zip(after.predicted, before.predicted, strict=True)])
+    reach = float(np.max(np.abs(change)))
+    values = [
+        f"{n.split('.', 1)[1]} = {v:.3g} {p.unit}".rstrip()
+        for n, v, p in zip(after.names, after.mode, after.target.oscillator.layout.parameters, strict=True)
+        if n.startswith(effect.id + ".")
+    ]
+    return ", ".join(values[:4]) or f"{1e6 * reach:.2g} um of trajectory", reach / scales.amplitude
+
+
+def parameter_shifts(before: Fit, after: Fit) -> dict[str, float]:
+    """Shift of the shared parameters that the added physics undid, in standard deviations of the base fit."""
+    new = dict(zip(after.names, after.mode, strict=True))
+    physical = before.target.oscillator.layout.roles("physical")
+    return {
+        before.names[i]: float((before.mode[i] - new[before.names[i]]) / before.sd[i])
+        for i in physical
+        if before.names[i] in new
+    }
+
+
+def summary(
+    verdict: str,
+    effects: tuple[Effect, ...],
+    statements: tuple[str, ...],
+    location: Location | None,
+    alternatives: tuple[str, ...],
+    shifts: Mapping[str, float],
+    detectable: str,
+) -> str:
+    """One paragraph."""
+    if verdict == "adequate":
+        return f"Nothing is missing: the base model describes the recordings down to the noise. {detectable}"
+    assert location is not None
+    place = _REGIMES[location.regime]
+    stiffness = [name for name in shifts if name.startswith("k2")] or list(shifts)
+    worst = max(stiffness, key=lambda n: abs(shifts[n]), default="")
+    cost = f" It had moved {worst} by {abs(shifts[worst]):.1f} of its standard deviations." if worst else ""
+    if verdict == "unknown":
+        low, high = (1e3 * x for x in location.displacement)
+        return (
+            f"Something is missing that the catalogue does not hold. It acts {place}, mostly between "
+            f"{low:.2f} and {high:.2f} mm, with {location.force_rms:.2g} N rms.{cost}"
+        )
+    titles = " and ".join(e.title for e in effects)
+    if verdict == "ambiguous":
+        others = ", ".join(alternatives)
+        return (
+            f"Something is missing {place}; the likeliest is {titles}, but the recordings cannot tell it "
+            f"from {others}.{cost}"
+        )
+    return f"The base model leaves out {titles}, {place}. {' '.join(statements)}{cost}"
