@@ -118,3 +118,127 @@ def check(campaign: Path, out: Path | None, seed: int, quiet: bool) -> None:
         campaign_figure(loaded).savefig(file)
         if not quiet:
             click.echo(f"plot: {file}")
+
+
+def telling(quiet: bool) -> Callable[[str], None]:
+    """Progress in words on stderr, with the seconds since the start; nothing when quiet."""
+    import time
+
+    began = time.perf_counter()
+
+    def say(message: str) -> None:
+        if not quiet:
+            click.echo(f"[{time.perf_counter() - began:6.1f} s] {message}", err=True)
+
+    return say
+
+
+def finish(ctx: click.Context, outcome: Any, out: Path, quiet: bool) -> None:
+    """Say how it ended; exit code 3 when something did not converge."""
+    if not quiet:
+        if outcome.diagnosis is not None:
+            click.echo(f"{outcome.diagnosis['verdict']}: {outcome.diagnosis['summary']}")
+        else:
+            click.echo(outcome.results.headline or outcome.results.verdict)
+        click.echo(f"report: {out / 'report.html'}")
+    if not outcome.converged:
+        click.echo("bayesimpact: not converged; the report says what did not", err=True)
+        ctx.exit(NOT_CONVERGED)
+
+
+@main.command()
+@campaign_argument
+@out_option(required=True)
+@common
+@click.pass_context
+def fit(ctx: click.Context, campaign: Path, out: Path, seed: int, quiet: bool) -> None:
+    """Find the mode: differential evolution with the Metropolis criterion, then a polish."""
+    from bayesimpact.data.read import load_campaign
+
+    loaded = load_campaign(campaign)
+    from bayesimpact.workflow import fit_campaign
+
+    command = f"bayesimpact fit {campaign} --out {out} --seed {seed}"
+    outcome = fit_campaign(loaded, made_folder(out), seed=seed, command=command, say=telling(quiet))
+    finish(ctx, outcome, out, quiet)
+
+
+@main.command()
+@campaign_argument
+@out_option(required=True)
+@click.option("--resume", is_flag=True, help="Go on with the chain that DIR holds.")
+@common
+@click.pass_context
+def sample(
+    ctx: click.Context, campaign: Path, out: Path, resume: bool, seed: int, quiet: bool
+) -> None:
+    """Sample the posterior by emcee; the backbone is the posterior-predictive check."""
+    from bayesimpact.data.read import load_campaign
+
+    loaded = load_campaign(campaign)
+    from bayesimpact.workflow import sample_campaign
+
+    command = f"bayesimpact sample {campaign} --out {out} --seed {seed}"
+    outcome = sample_campaign(
+        loaded, made_folder(out), seed=seed, resume=resume, command=command, say=telling(quiet)
+    )
+    finish(ctx, outcome, out, quiet)
+
+
+@main.command()
+@campaign_argument
+@out_option(required=True)
+@click.option("--quick", is_flag=True, help="No sampling: intervals from the mode's curvature.")
+@common
+@click.pass_context
+def diagnose(
+    ctx: click.Context, campaign: Path, out: Path, quick: bool, seed: int, quiet: bool
+) -> None:
+    """Locate, name, model and show what the base model leaves out of CAMPAIGN."""
+    from bayesimpact.data.read import load_campaign
+
+    loaded = load_campaign(campaign)
+    from bayesimpact.workflow import diagnose_campaign
+
+    command = f"bayesimpact diagnose {campaign} --out {out} --seed {seed}"
+    outcome = diagnose_campaign(
+        loaded, made_folder(out), seed=seed, quick=quick, command=command, say=telling(quiet)
+    )
+    finish(ctx, outcome, out, quiet)
+
+
+@main.command()
+@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@common
+def report(folder: Path, seed: int, quiet: bool) -> None:
+    """Write the report of whatever DIR holds, from its files alone."""
+    from bayesimpact.report.write import rewrite_report
+
+    page = rewrite_report(folder)
+    if not quiet:
+        click.echo(f"report: {page}")
+
+
+@main.command()
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    default=Path("bayesimpact-demo"),
+    show_default=True,
+    metavar="DIR",
+    help="Folder for the results; made if absent.",
+)
+@common
+@click.pass_context
+def demo(ctx: click.Context, out: Path, seed: int, quiet: bool) -> None:
+    """The main job on the bundled campaign, from raw recordings to posterior and report."""
+    from bayesimpact.data.bundled import bundled_campaign
+    from bayesimpact.data.read import load_campaign
+
+    loaded = load_campaign(bundled_campaign("paper"))
+    from bayesimpact.workflow import sample_campaign
+
+    outcome = sample_campaign(
+        loaded, made_folder(out), seed=seed, command="bayesimpact demo", say=telling(quiet)
+    )
+    finish(ctx, outcome, out, quiet)

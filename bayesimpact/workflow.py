@@ -1,0 +1,155 @@
+"""What the commands do, as functions: from a campaign to a folder of results."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.diagnosis.document import document
+from bayesimpact.diagnosis.loop import Diagnosis, diagnose
+from bayesimpact.inference.identify import Identification, identify
+from bayesimpact.inference.posterior import Posterior, sample
+from bayesimpact.report.archive import write_text
+from bayesimpact.report.build import results_from_fit, results_from_posterior, versions
+from bayesimpact.report.results import Results
+from bayesimpact.report.write import write_fit, write_posterior, write_results
+
+DIAGNOSIS_FILE = "diagnosis.json"
+CHAIN_FOLDER = "chain"
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What a command made.
+
+    Attributes
+    ----------
+    results : everything the report shows
+    converged : False when the search or the sampler did not
+    diagnosis : the content of diagnosis.json, where there is one
+    """
+
+    results: Results
+    converged: bool
+    diagnosis: dict[str, Any] | None = None
+
+
+def fit_campaign(
+    campaign: Campaign, out: Path, *, seed: int = 0, command: str = "", say: Say = print
+) -> Outcome:
+    """Mode of the base model: fit.json, figures and report in `out`."""
+    began = time.perf_counter()
+    say("searching the mode")
+    identification = identify(campaign, rng=np.random.default_rng(seed))
+    seconds = time.perf_counter() - began
+    say("writing the report")
+    results = write_fit(identification, out, seed=seed, command=command, seconds=seconds)
+    return Outcome(results, identification.fit.converged)
+
+
+def sample_campaign(
+    campaign: Campaign,
+    out: Path,
+    *,
+    seed: int = 0,
+    resume: bool = False,
+    command: str = "",
+    say: Say = print,
+) -> Outcome:
+    """Posterior of the base model: posterior.nc, figures and report in `out`; the chain is kept in `out`/chain."""
+    began = time.perf_counter()
+    say("searching the mode")
+    identification = identify(campaign, rng=np.random.default_rng(seed))
+    posterior = sampled(identification, seed, out / CHAIN_FOLDER, resume, say)
+    seconds = time.perf_counter() - began
+    say("writing the report")
+    results = write_posterior(posterior, identification, out, command=command, seconds=seconds)
+    return Outcome(results, identification.fit.converged and posterior.chains.converged)
+
+
+def sampled(
+    identification: Identification, seed: int, folder: Path | None, resume: bool, say: Say
+) -> Posterior:
+    """Posterior around the mode of an identification, with progress in words."""
+    say("sampling the posterior")
+    return sample(identification.fit, seed=seed, folder=folder, resume=resume)
+
+
+def diagnose_campaign(
+    campaign: Campaign,
+    out: Path,
+    *,
+    seed: int = 0,
+    quick: bool = False,
+    command: str = "",
+    say: Say = print,
+) -> Outcome:
+    """The whole loop: diagnosis.json, posterior.nc (before and after), figures and report in `out`."""
+    began = time.perf_counter()
+    diagnosis = diagnose(campaign, rng=np.random.default_rng(seed), search=not quick, progress=say)
+    before = after = None
+    if not quick:
+        say("sampling both models")
+        before = sample(diagnosis.before, seed=seed)
+        after = (
+            before if diagnosis.after is diagnosis.before else sample(diagnosis.after, seed=seed)
+        )
+    content = document(
+        diagnosis,
+        seed=seed,
+        seconds=time.perf_counter() - began,
+        versions=versions(),
+        draws_before=None if before is None else before.draws,
+        draws_after=None if after is None else after.draws,
+    )
+    say("writing the report")
+    results = _write_diagnosis(diagnosis, content, before, after, out, seed, command)
+    sure = all(p is None or p.chains.converged for p in (before, after))
+    return Outcome(results, diagnosis.after.converged and sure, content)
+
+
+def _write_diagnosis(
+    diagnosis: Diagnosis,
+    content: dict[str, Any],
+    before: Posterior | None,
+    after: Posterior | None,
+    out: Path,
+    seed: int,
+    command: str,
+) -> Results:
+    out.mkdir(parents=True, exist_ok=True)
+    write_text(out / DIAGNOSIS_FILE, json.dumps(_strict(content), indent=1))
+    seconds = float(content["seconds"])
+    if after is None:
+        final = replace(diagnosis.identification, fit=diagnosis.after, search=None)
+        results = results_from_fit(final, seed=seed, command=command, seconds=seconds)
+    else:
+        write_posterior(
+            after, diagnosis.identification, out, before=before, command=command, seconds=seconds
+        )
+        results = results_from_posterior(
+            after, diagnosis.identification, before=before, command=command, seconds=seconds
+        )
+    return write_results(replace(results, diagnosis=content), out)
+
+
+def _strict(value: Any) -> Any:
+    """The same with numbers that JSON does not know as null, and NumPy scalars as plain ones."""
+    if isinstance(value, dict):
+        return {k: _strict(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_strict(v) for v in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value
