@@ -1,0 +1,280 @@
+"""From live fits and posteriors to `Results`: the one place where the report touches the model."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from importlib import metadata
+
+import numpy as np
+
+from bayesimpact.data.campaign import Campaign, Smoothing
+from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.identify import Identification
+from bayesimpact.inference.noise import Noise as NoiseModel
+from bayesimpact.inference.posterior import Posterior
+from bayesimpact.model.measurement import gain
+from bayesimpact.report import checks
+from bayesimpact.report.published import references as published_values
+from bayesimpact.report.results import (
+    BackboneSummary,
+    Chain,
+    Draws,
+    EffectSummary,
+    Noise,
+    Provenance,
+    RecordingResult,
+    Results,
+    SamplerSummary,
+    SearchSummary,
+)
+from bayesimpact.report.rows import build_rows
+
+PACKAGES = ("bayesimpact", "numpy", "scipy", "numba", "emcee", "arviz")
+DRAWS_KEPT = 4000
+TRACE_STEPS = 400
+TRACE_WALKERS = 6
+
+
+def results_from_fit(
+    identification: Identification,
+    *,
+    seed: int = 0,
+    command: str = "",
+    seconds: float = float("nan"),
+    references: Mapping[str, Mapping[str, float]] | None = None,
+) -> Results:
+    """Results of a fit: intervals are those of the Laplace approximation at the mode.
+
+    Parameters
+    ----------
+    identification : of `inference.identify`
+    seed, command, seconds : for the provenance
+    references : label -> parameter -> value to set beside; None takes published values and beams
+    """
+    return _results(
+        identification.fit,
+        identification.noise,
+        search=_search(identification),
+        provenance=_provenance(identification.fit, seed, command, seconds),
+        references=references,
+    )
+
+
+def results_from_posterior(
+    posterior: Posterior,
+    identification: Identification | None = None,
+    *,
+    backbone: BackboneSummary | None = None,
+    before: Posterior | None = None,
+    command: str = "",
+    seconds: float = float("nan"),
+    references: Mapping[str, Mapping[str, float]] | None = None,
+) -> Results:
+    """Results of a posterior: intervals are percentiles of its draws.
+
+    Parameters
+    ----------
+    posterior : of `inference.posterior`, of the base model or with effects
+    identification : how the mode was found; None leaves the search out
+    backbone : posterior-predictive check of the backbone
+    before : posterior without the effects, drawn beside this one
+    command, seconds, references : as in `results_from_fit`
+    """
+    fit = posterior.fit
+    return _results(
+        fit,
+        fit.target.likelihood.noise,
+        search=None if identification is None else _search(identification),
+        provenance=_provenance(fit, posterior.seed, command, seconds),
+        references=references,
+        posterior=posterior,
+        backbone=backbone,
+        before=None if before is None else _draws(before, "model without added effects"),
+    )
+
+
+def _results(
+    fit: Fit,
+    noise: NoiseModel,
+    *,
+    search: SearchSummary | None,
+    provenance: Provenance,
+    references: Mapping[str, Mapping[str, float]] | None,
+    posterior: Posterior | None = None,
+    backbone: BackboneSummary | None = None,
+    before: Draws | None = None,
+) -> Results:
+    oscillator = fit.target.oscillator
+    campaign = oscillator.campaign
+    m = campaign.measurement
+    chain = Chain(_smoothing(oscillator.smoothing), m.mass_sd, m.clock_sd, m.gain_sd)
+    beside = published_values(campaign) if references is None else references
+    draws = None if posterior is None else posterior.draws
+    summary = Results(
+        name=campaign.name,
+        mass=campaign.mass,
+        stop=campaign.stop,
+        quantity=campaign.recordings[0].quantity,
+        recordings=_recordings(fit),
+        rows=build_rows(fit, draws, chain, beside),
+        effects=tuple(
+            EffectSummary(e.id, e.title, e.equation, e.statement) for e in oscillator.effects
+        ),
+        noise=Noise(noise.kind, noise.level, noise.level_error, noise.correlation, noise.source),
+        chain=chain,
+        verdict="",
+        headline="",
+        reduced_chi2=fit.reduced_chi2,
+        chi2_z=_chi2_z(fit),
+        log_posterior=fit.log_posterior,
+        covariance=fit.covariance,
+        fit_converged=fit.converged,
+        search=search,
+        sampler=None if posterior is None else _sampler(posterior),
+        draws=None if posterior is None else _draws(posterior, "posterior"),
+        backbone=backbone,
+        checks=(),
+        provenance=provenance,
+        before=before,
+    )
+    return checks.judged(summary)
+
+
+def _recordings(fit: Fit) -> tuple[RecordingResult, ...]:
+    likelihood = fit.target.likelihood
+    recordings = fit.target.oscillator.campaign.recordings
+    shared = (fit.mode.size - 1) / len(recordings)  # parameters per recording
+    found = []
+    for r, (recording, predicted) in enumerate(zip(recordings, fit.predicted, strict=True)):
+        freedom = max(float(likelihood.sizes[r]) - shared, 1.0)
+        found.append(
+            RecordingResult(
+                name=recording.name,
+                case=recording.case,
+                interval=recording.interval,
+                start=recording.start,
+                samples=np.asarray(recording.samples),
+                predicted=np.asarray(predicted),
+                sigma=float(fit.mode[likelihood.sigma_columns[r]]),
+                noise_rms=_noise_rms(likelihood.noise, recording.interval),
+                reduced_chi2=float(fit.sums[r]) / likelihood.noise.level**2 / freedom,
+                whiteness_p=checks.whiteness(
+                    fit.linearisation[r].residual, likelihood.noise.smoothing is not None
+                ),
+            )
+        )
+    return tuple(found)
+
+
+def _noise_rms(noise: NoiseModel, interval: float) -> float:
+    """Root mean square of the noise behind the measuring chain's filter, m."""
+    if noise.smoothing is None:
+        return noise.level
+    frequency = np.linspace(0.0, 0.5 / interval, 4001)
+    rho, cosine = noise.correlation, np.cos(2 * np.pi * frequency * interval)
+    raw = (1 - rho**2) / (1 - 2 * rho * cosine + rho**2)
+    passed = gain(noise.smoothing, interval, frequency) ** 2
+    return noise.level * float(np.sqrt(np.mean(passed * raw)))
+
+
+def _chi2_z(fit: Fit) -> float:
+    """Distance of the reduced chi2 from 1 in standard errors, those of the noise level included."""
+    likelihood = fit.target.likelihood
+    freedom = float(likelihood.sizes.sum()) - (fit.mode.size - 1)
+    error = likelihood.noise.level_error
+    level = error if np.isfinite(error) else 0.0
+    return (fit.reduced_chi2 - 1) / float(np.sqrt(2 / freedom + 4 * level**2))
+
+
+def _search(identification: Identification) -> SearchSummary | None:
+    result = identification.search
+    if result is None or identification.from_search is None:
+        return None
+    ends = identification.from_search.mode - identification.from_guess.mode
+    history = result.history
+    return SearchSummary(
+        evaluations=history.evaluations.astype(np.float64),
+        best=history.best,
+        median=history.median,
+        spread=history.spread,
+        temperature=history.temperature,
+        stopped=result.stopped,
+        agree=identification.agree,
+        distance=float(np.max(np.abs(ends) / identification.fit.sd)),
+    )
+
+
+def _of_interest(fit: Fit) -> list[int]:
+    return [int(i) for i in fit.target.oscillator.layout.roles("physical", "effect")]
+
+
+def _draws(posterior: Posterior, label: str) -> Draws:
+    parameters = posterior.fit.target.oscillator.layout.parameters
+    columns = _of_interest(posterior.fit)
+    step = max(1, posterior.draws.shape[0] // DRAWS_KEPT)
+    return Draws(
+        label=label,
+        names=tuple(parameters[i].name for i in columns),
+        units=tuple(parameters[i].unit for i in columns),
+        values=posterior.draws[::step, columns],
+    )
+
+
+def _sampler(posterior: Posterior) -> SamplerSummary:
+    chains, record = posterior.chains, posterior.chains.convergence
+    parameters = posterior.fit.target.oscillator.layout.parameters
+    columns = _of_interest(posterior.fit)
+    ensembles, stored, walkers, _ = chains.draws.shape
+    every = max(1, -(-stored // TRACE_STEPS))
+    shown = np.linspace(0, walkers - 1, min(walkers, TRACE_WALKERS)).astype(int)
+    return SamplerSummary(
+        converged=chains.converged,
+        reasons=record.reasons,
+        names=posterior.names,
+        tau=record.tau,
+        ess_bulk=record.ess_bulk,
+        ess_tail=record.ess_tail,
+        rhat=record.rhat,
+        ensembles=ensembles,
+        steps=chains.steps - chains.discarded,
+        walkers=walkers,
+        draws=ensembles * stored * walkers,
+        acceptance=float(np.mean(chains.acceptance)),
+        trace_names=tuple(posterior.names[i] for i in columns),
+        trace_units=tuple(parameters[i].unit for i in columns),
+        traces=chains.draws[:, ::every][:, :, shown][..., columns],
+        trace_steps=np.arange(0, stored, every, dtype=np.float64) * chains.thin,
+    )
+
+
+def _smoothing(smoothing: Smoothing | None) -> str:
+    if smoothing is None:
+        return ""
+    if smoothing.kind == "lag":
+        return f"first-order lag, time constant {smoothing.time_constant * 1e3:g} ms"
+    return f"Savitzky-Golay, {smoothing.window} samples, order {smoothing.polyorder}"
+
+
+def _provenance(fit: Fit, seed: int, command: str, seconds: float) -> Provenance:
+    campaign: Campaign = fit.target.oscillator.campaign
+    return Provenance(
+        command=command,
+        seed=seed,
+        date=datetime.now(UTC).isoformat(timespec="seconds"),
+        data_sha256=campaign.sha256,
+        versions=versions(),
+        seconds=seconds,
+    )
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python and of what the numbers depend on."""
+    found = {"python": platform.python_version()}
+    for package in PACKAGES:
+        try:
+            found[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            found[package] = "not installed"
+    return found

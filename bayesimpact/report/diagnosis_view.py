@@ -1,0 +1,187 @@
+"""The story of a diagnosis as rows of text, from the content of diagnosis.json."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import isfinite
+from typing import Any
+
+from markupsafe import Markup
+
+from bayesimpact.report.rows import Z90
+from bayesimpact.report.tables import signed, span, symbol
+from bayesimpact.report.units import decimals, number, p_value, readable, significant, typeset
+
+Rows = list[dict[str, Any]]
+
+VERDICTS = {
+    "adequate": "Nothing is missing",
+    "named": "What is missing is named",
+    "ambiguous": "Several effects fit alike",
+    "unknown": "The missing physics is outside the catalogue",
+}
+_REGIMES = {
+    "free": "free flight",
+    "contact": "contact with the stop",
+    "entry": "the beginning of contact",
+    "exit": "the end of contact",
+    "everywhere": "everywhere",
+    "measurement": "the measuring chain",
+}
+_FIT_ROWS = {
+    "rms_m": ("residual rms", "m"),
+    "reduced_chi2": ("reduced χ²", ""),
+    "whiteness_p": ("whiteness p", "p"),
+    "held_out_log_score": ("held-out log score", ""),
+}
+
+
+def diagnosis_view(diagnosis: Mapping[str, Any] | None, *, angle: bool) -> dict[str, Any] | None:
+    """Everything that the section on the diagnosis shows; None without one."""
+    if diagnosis is None:
+        return None
+    unit = "rad" if angle else "m"
+    before, after = (diagnosis.get("parameters", {}).get(k, {}) for k in ("before", "after"))
+    return {
+        "verdict": VERDICTS.get(diagnosis["verdict"], diagnosis["verdict"]),
+        "location": _location(diagnosis.get("location"), unit),
+        "effects": [_effect(effect) for effect in diagnosis.get("effects", [])],
+        "alternatives": [
+            {
+                "id": other["id"],
+                "probability": _probability(other["probability"]),
+                "evidence": _plain(other["delta_log_evidence"], 1),
+            }
+            for other in diagnosis.get("alternatives", [])
+        ],
+        "fit": _fit(diagnosis.get("fit", {}), unit),
+        "held_out": _held_out(diagnosis.get("fit", {})),
+        "parameters": [_shift(name, before[name], after[name]) for name in before if name in after],
+        "limits": [_limit(limit) for limit in diagnosis.get("limits", [])],
+    }
+
+
+def _location(location: Mapping[str, Any] | None, unit: str) -> list[tuple[str, str]]:
+    """Lines on the place, in words and ranges."""
+    if not location:
+        return []
+    regime = str(location["regime"])
+    share = location.get("share")
+    part = "" if share is None else f" ({significant(100 * share, 2)} % of what is unexplained)"
+    rows = [("regime", _REGIMES.get(regime, regime) + part)]
+    ranges = (
+        ("displacement_m", "displacement", unit),
+        ("velocity_m_s", "velocity", f"{unit}/s"),
+        ("time_s", "time", "s"),
+    )
+    for key, words, si in ranges:
+        if location.get(key):
+            rows.append((words, _range(location[key], si)))
+    for key in ("cases", "recordings"):
+        if location.get(key):
+            rows.append((key, ", ".join(str(x) for x in location[key])))
+    if location.get("force_rms_n") is not None:
+        rows.append(
+            ("force, rms", _amount(location["force_rms_n"], "N m" if unit == "rad" else "N"))
+        )
+    return rows
+
+
+def _range(ends: Sequence[float], unit: str) -> str:
+    low, high = ends
+    shown = readable(unit, max(abs(low), abs(high)))
+    places = decimals((high - low) * shown.scale)
+    return f"{span(low, high, shown.scale, places)} {typeset(shown.unit)}"
+
+
+def _amount(value: float, unit: str) -> str:
+    shown = readable(unit, abs(value))
+    return f"{significant(value * shown.scale, 3)} {typeset(shown.unit)}"
+
+
+def _effect(effect: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        "id": effect["id"],
+        "family": effect.get("family", ""),
+        "statement": effect.get("statement", ""),
+        "probability": _probability(effect.get("probability")),
+        "evidence": _plain(effect.get("delta_log_evidence"), 1),
+        "parameters": [
+            (symbol(name), _estimate(content))
+            for name, content in effect.get("parameters", {}).items()
+        ],
+    }
+
+
+def _estimate(content: Mapping[str, Any]) -> str:
+    """Median with its 90 % interval and unit."""
+    low, high = content["ci90"]
+    half = 0.5 * (high - low)
+    shown = readable(content["unit"], max(abs(content["median"]), half))
+    places = decimals(half * shown.scale)
+    value = number(content["median"] * shown.scale, places)
+    return f"{value} ({span(low, high, shown.scale, places)}) {typeset(shown.unit)}".rstrip()
+
+
+def _probability(p: float | None) -> str:
+    if p is None or not isfinite(p):
+        return "–"
+    return "> 0.999" if p > 0.999 else p_value(p)
+
+
+def _plain(value: float | None, places: int) -> str:
+    return "–" if value is None else signed(value, places)
+
+
+def _fit(fit: Mapping[str, Any], unit: str) -> list[tuple[str, str, str]]:
+    """Figure of merit, before, after."""
+    before, after = fit.get("before") or {}, fit.get("after") or {}
+    return [
+        (words, _merit(before.get(key), kind, unit), _merit(after.get(key), kind, unit))
+        for key, (words, kind) in _FIT_ROWS.items()
+        if before.get(key) is not None or after.get(key) is not None
+    ]
+
+
+def _merit(value: float | None, kind: str, unit: str) -> str:
+    if value is None:
+        return "–"
+    if kind == "m":
+        return _amount(value, unit)
+    return p_value(value) if kind == "p" else significant(value, 4)
+
+
+def _held_out(fit: Mapping[str, Any]) -> str:
+    gain = fit.get("held_out_gain") or {}
+    value, error = gain.get("value"), gain.get("se")
+    if value is None or error is None:
+        return ""
+    words = (
+        f"On recordings held out, the log score changes by {signed(value, 1)} ± {number(error, 1)} "
+        "(standard error)"
+    )
+    return f"{words}: an improvement." if value > 2 * error else f"{words}: no clear improvement."
+
+
+def _shift(
+    name: str, before: Mapping[str, Any], after: Mapping[str, Any]
+) -> dict[str, str | Markup]:
+    """A parameter before and after, and the shift in standard deviations of before."""
+    sd = (before["ci90"][1] - before["ci90"][0]) / (2 * Z90)
+    moved = (after["median"] - before["median"]) / sd if sd > 0 else float("nan")
+    return {
+        "symbol": symbol(name),
+        "before": _estimate(before),
+        "after": _estimate(after),
+        "shift": signed(moved, 1) if abs(moved) < 1000 else f"{significant(moved, 2)}",
+    }
+
+
+def _limit(limit: Mapping[str, Any]) -> dict[str, str]:
+    """An effect that was not found and how large it could still be."""
+    upper = limit.get("upper95")
+    return {
+        "id": str(limit["id"]),
+        "parameter": str(limit.get("parameter", "")).replace("_", " "),
+        "upper": "–" if upper is None else _amount(float(upper), str(limit.get("unit", ""))),
+    }

@@ -1,0 +1,1 @@
+"""Figures of the report: the only place, beside the plot of `check`, that uses matplotlib."""

@@ -1,0 +1,19 @@
+"""Figures of a diagnosis; drawn from `Results.diagnosis` and `Results.diagnosis_arrays`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from matplotlib.figure import Figure
+
+from bayesimpact.report.results import Results
+
+DRAWERS: tuple[Callable[[Results], Mapping[str, Figure]], ...] = ()
+"""Functions from results to figures by name; each returns {} when its arrays are not there."""
+
+
+def diagnosis_figures(results: Results) -> dict[str, Figure]:
+    """Figures by name; {} without a diagnosis."""
+    if results.diagnosis is None:
+        return {}
+    return {name: figure for draw in DRAWERS for name, figure in draw(results).items()}

@@ -1,0 +1,147 @@
+"""Recordings, fit and residuals, as Figs 9 to 11 of Tian et al."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.gridspec import GridSpec
+
+from bayesimpact.report.figures.style import (
+    GREY,
+    MODEL,
+    ORANGE,
+    RECORDED,
+    WIDTH,
+    label,
+    polyline,
+    response,
+    response_word,
+    styled,
+)
+from bayesimpact.report.results import RecordingResult, Results
+from bayesimpact.report.units import display
+
+MOST = 12
+"""Recordings shown; a table in the report has all of them."""
+PER_PAGE = 3
+CLOSE_UP_CYCLES = 3.0
+_ROW, _TOP, _BOTTOM = 2.75, 0.55, 0.5  # in
+
+
+def shown_recordings(results: Results) -> tuple[RecordingResult, ...]:
+    """All recordings, or the worst-fitted ones of every case in turn where there are too many."""
+    if len(results.recordings) <= MOST:
+        return results.recordings
+    by_case: dict[str, list[RecordingResult]] = {}
+    for recording in sorted(results.recordings, key=lambda r: -r.reduced_chi2):
+        by_case.setdefault(recording.case, []).append(recording)
+    chosen: list[RecordingResult] = []
+    depth = 0
+    while len(chosen) < MOST:
+        chosen += [rs[depth] for rs in by_case.values() if len(rs) > depth]
+        depth += 1
+    names = {r.name for r in chosen[:MOST]}
+    return tuple(r for r in results.recordings if r.name in names)
+
+
+def recording_figures(results: Results) -> Mapping[str, Figure]:
+    """Figures by name, `PER_PAGE` recordings of one case on each."""
+    figures = {}
+    for case in dict.fromkeys(r.case for r in results.recordings):
+        mine = [r for r in shown_recordings(results) if r.case == case]
+        pages = [mine[i : i + PER_PAGE] for i in range(0, len(mine), PER_PAGE)]
+        for page, recordings in enumerate(pages, 1):
+            name = f"fit_case_{case}" if case else "fit"
+            figures[name + (f"_{page}" if len(pages) > 1 else "")] = _page(results, recordings)
+    return figures
+
+
+@styled
+def _page(results: Results, recordings: Sequence[RecordingResult]) -> Figure:
+    height = _ROW * len(recordings) + _TOP + _BOTTOM
+    figure = Figure(figsize=(WIDTH, height), dpi=150)
+    # Placed by hand: a layout engine takes longer than all the drawing.
+    outer = GridSpec(len(recordings), 1, figure, hspace=0.25, left=0.075, right=0.978,
+                     bottom=_BOTTOM / height, top=1 - _TOP / height)  # fmt: skip
+    period = _period(results)
+    for i, recording in enumerate(recordings):
+        grid = outer[i].subgridspec(
+            2, 2, height_ratios=[2.0, 1.0], width_ratios=[2.1, 1.0], hspace=0.12, wspace=0.09
+        )
+        whole = figure.add_subplot(grid[0, 0])
+        below = figure.add_subplot(grid[1, 0], sharex=whole)
+        near = figure.add_subplot(grid[0, 1], sharey=whole)
+        near_below = figure.add_subplot(grid[1, 1], sharex=near, sharey=below)
+        _motion(whole, results, recording, dots=False)
+        _motion(near, results, recording, dots=True)
+        _residual(below, results, recording)
+        _residual(near_below, results, recording)
+        end = recording.times[-1]
+        close = min(end, _release(recording) + CLOSE_UP_CYCLES * period)
+        whole.set_xlim(0, end)
+        near.set_xlim(max(0.0, close - CLOSE_UP_CYCLES * period), close)
+        case = f", case {recording.case}" if recording.case else ""
+        whole.set_title(f"{recording.name}{case}", loc="left", fontweight="bold")
+        near.set_title("close-up", loc="left")
+        for axis in (whole, near):
+            axis.tick_params(labelbottom=False)
+        if i == len(recordings) - 1:
+            for axis in (below, near_below):
+                axis.set_xlabel(label("time since the first sample", "s"))
+        for axis in (near, near_below):
+            axis.tick_params(labelleft=False)
+            axis.set_ylabel("")
+        if i == 0:
+            _legend(figure, near, below)
+    figure.align_ylabels()
+    return figure
+
+
+def _legend(figure: Figure, motion: Axes, residual: Axes) -> None:
+    found: dict[str, Artist] = {}
+    for axis in (motion, residual):
+        for handle, words in zip(*axis.get_legend_handles_labels(), strict=True):
+            found.setdefault(words, handle)
+    figure.legend(found.values(), found.keys(), loc="upper right", ncols=4, markerscale=2)
+
+
+def _period(results: Results) -> float:
+    """Period of free motion, s."""
+    return float(2 * np.pi * np.sqrt(results.mass / results.row("k1").median))
+
+
+def _release(recording: RecordingResult) -> float:
+    """When the motion is largest first, s: earlier samples are of less interest."""
+    size = np.abs(recording.predicted - recording.predicted.mean())
+    return float(recording.times[int(np.argmax(size > 0.9 * size.max()))])
+
+
+def _motion(axis: Axes, results: Results, recording: RecordingResult, *, dots: bool) -> None:
+    shown = response(results)
+    t, y, fit = recording.times, recording.samples * shown.scale, recording.predicted * shown.scale
+    if dots:
+        axis.plot(t, y, ".", color=RECORDED, ms=4.5, mew=0, label="recorded", rasterized=True)
+    else:
+        axis.plot(*polyline(t, y), ".", color=RECORDED, ms=2.0, mew=0, rasterized=True)
+    axis.plot(*polyline(t, fit), color=MODEL, lw=0.8, label="model at the mode")
+    if results.stop and np.isfinite(results.row("g").median):
+        level = results.row("g").median + results.row(f"offset[{recording.name}]").median
+        axis.axhline(level * shown.scale, color=GREY, lw=0.8, ls=(0, (4, 3)), label="stop")
+    axis.set_ylabel(label(response_word(results), shown.unit))
+    axis.grid(axis="y")
+
+
+def _residual(axis: Axes, results: Results, recording: RecordingResult) -> None:
+    shown = display(results.unit, max(recording.rms, recording.noise_rms))
+    r = recording.residual * shown.scale
+    axis.plot(*polyline(recording.times, r), color="#555555", lw=0.45, rasterized=True)
+    band = 2 * recording.noise_rms * shown.scale
+    for level in (-band, band):
+        axis.axhline(level, color=ORANGE, lw=0.9, label="± 2 standard deviations of the noise")
+    limit = 1.08 * max(float(np.max(np.abs(r))), 1.1 * band)
+    axis.set_ylim(-limit, limit)
+    axis.set_ylabel(label("residual", shown.unit))

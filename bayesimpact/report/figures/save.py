@@ -1,0 +1,75 @@
+"""All figures of some results, and their files."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from pathlib import Path
+
+import matplotlib
+from matplotlib.figure import Figure
+
+from bayesimpact.report.archive import atomic
+from bayesimpact.report.figures.backbone import backbone_figures
+from bayesimpact.report.figures.corner import corner_figure
+from bayesimpact.report.figures.diagnosis import diagnosis_figures
+from bayesimpact.report.figures.recordings import recording_figures
+from bayesimpact.report.figures.search import search_figure
+from bayesimpact.report.figures.style import STYLE
+from bayesimpact.report.figures.traces import trace_figure
+from bayesimpact.report.published import PUBLISHED
+from bayesimpact.report.results import Results
+
+DPI = 150
+
+
+def all_figures(results: Results) -> dict[str, Figure]:
+    """Every figure that the results allow, by the name of its file."""
+    figures = dict(diagnosis_figures(results))
+    figures |= recording_figures(results)
+    if results.draws is not None:
+        truths = {
+            r.name: r.references[PUBLISHED] for r in results.rows if PUBLISHED in r.references
+        }
+        figures["corner"] = corner_figure(
+            results.draws, before=results.before, truths=truths, truth_label=PUBLISHED
+        )
+    figures |= backbone_figures(results)
+    if results.search is not None:
+        figures["search"] = search_figure(results.search)
+    if results.sampler is not None:
+        figures["traces"] = trace_figure(results.sampler)
+    return figures
+
+
+def save_figures(figures: Mapping[str, Figure], folder: Path) -> dict[str, bytes]:
+    """Write NAME.png (150 dpi) and NAME.pdf for every figure into a folder, made if absent.
+
+    Returns
+    -------
+    The PNG files' content by name, for the page.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    pictures = {}
+    with matplotlib.rc_context(STYLE):
+        for name, figure in figures.items():
+            safe = file_name(name)
+            pictures[name] = png(figure)
+            figure.set_layout_engine("none")  # laid out once is enough
+            with atomic(folder / f"{safe}.png") as temporary:
+                temporary.write_bytes(pictures[name])
+            with atomic(folder / f"{safe}.pdf") as temporary:
+                figure.savefig(temporary, metadata={"CreationDate": None})
+    return pictures
+
+
+def png(figure: Figure) -> bytes:
+    """A figure as a PNG file."""
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=DPI)
+    return stream.getvalue()
+
+
+def file_name(name: str) -> str:
+    """A file name for a figure that carries a case's name: letters, digits, - and _ only."""
+    return "".join(c if c.isalnum() or c in "-_" else "_" for c in name)

@@ -1,0 +1,160 @@
+"""How all figures look: colours told apart by everyone, units on every axis, no pyplot."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import wraps
+from typing import Any, ParamSpec, TypeVar
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from bayesimpact.report.results import Results
+from bayesimpact.report.units import Display, decimals, display, number, readable, typeset
+
+Array = NDArray[np.float64]
+P = ParamSpec("P")
+R = TypeVar("R")
+
+# Okabe and Ito (2008), Color Universal Design.
+BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
+YELLOW, BLUE, RED, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
+GREY = "#8A8A8A"
+RECORDED, MODEL = SKY, RED
+CYCLE = (BLUE, RED, GREEN, PURPLE, ORANGE, SKY, BLACK)
+
+WIDTH = 10.0
+"""Width of a figure, in."""
+
+STYLE: dict[Any, Any] = {
+    "font.size": 9.0,
+    "font.family": "DejaVu Sans",
+    "axes.titlesize": 9.0,
+    "axes.labelsize": 9.0,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "legend.fontsize": 8.0,
+    "legend.frameon": False,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.7,
+    "axes.edgecolor": "#444444",
+    "xtick.color": "#444444",
+    "ytick.color": "#444444",
+    "axes.labelcolor": "#222222",
+    "grid.color": "#D9D9D9",
+    "grid.linewidth": 0.5,
+    "lines.linewidth": 1.0,
+    "axes.formatter.useoffset": False,
+    "axes.unicode_minus": True,
+    "pdf.fonttype": 42,
+    "path.simplify_threshold": 0.5,
+}
+
+_POINTS = 1500  # columns of pixels across a panel, about
+
+
+def styled(draw: Callable[P, R]) -> Callable[P, R]:
+    """Draw under the package's style, without changing anybody else's."""
+
+    @wraps(draw)
+    def inner(*args: P.args, **kwargs: P.kwargs) -> R:
+        with matplotlib.rc_context(STYLE):
+            return draw(*args, **kwargs)
+
+    return inner
+
+
+def new_figure(height: float, width: float = WIDTH) -> Figure:
+    """An empty figure of the package's width; height in in."""
+    return Figure(figsize=(width, height), layout="constrained", dpi=150)
+
+
+def response(results: Results) -> Display:
+    """How displacements (or angles) are shown: mm (or rad)."""
+    return Display(1.0, "rad") if results.quantity == "angle" else Display(1e3, "mm")
+
+
+def response_word(results: Results) -> str:
+    """What was recorded, for an axis."""
+    return "angle" if results.quantity == "angle" else "displacement"
+
+
+def label(words: str, unit: str) -> str:
+    """Axis label with its unit: "time (s)"."""
+    shown = typeset(unit)
+    return f"{words} ({shown})" if shown else words
+
+
+def polyline(x: Array, y: Array, columns: int = _POINTS) -> tuple[Array, Array]:
+    """A line through (n,) points, some 2 to 4 for every column of a panel where there are more.
+
+    Long signals keep the smallest and the largest value of every block, in the order in which they
+    come, so that no peak is lost.
+    """
+    block = x.size // columns
+    if block < 4:
+        return x, y
+    whole = x.size // block * block
+    grid = y[:whole].reshape(-1, block)
+    ends = np.sort(np.stack([grid.argmin(axis=1), grid.argmax(axis=1)], axis=1), axis=1)
+    index = (np.arange(grid.shape[0])[:, None] * block + ends).ravel()
+    index = np.append(index, np.arange(whole, x.size))
+    return x[index], y[index]
+
+
+def symbol(name: str) -> str:
+    """A parameter's name in mathtext: "k2[1]" becomes "$k_2$[1]"."""
+    base, _, key = name.partition("[")
+    key = key.rstrip("]")
+    if "." in base:
+        base = base.partition(".")[2].replace("_", " ")
+    elif base == "sigma":
+        base = r"$\sigma$"
+    elif base[-1].isdigit():
+        base = f"${base[:-1]}_{base[-1]}$"
+    else:
+        base = f"${base}$" if len(base) == 1 else base
+    return f"{base}[{key}]" if key else base
+
+
+@dataclass(frozen=True)
+class Scaled:
+    """An axis for values that may differ only in their last digits.
+
+    Attributes
+    ----------
+    offset, scale : plotted = (value - offset) * scale
+    quantity, unit : what is plotted, as "k2 - 5350.4 N/m", and in which unit
+    """
+
+    offset: float
+    scale: float
+    quantity: str
+    unit: str
+
+    @property
+    def label(self) -> str:
+        """For an axis, on one line or two."""
+        return label(self.quantity + ("\n" if self.offset else ""), self.unit).replace("\n ", "\n")
+
+    def __call__(self, values: Array) -> Array:
+        """Values in SI as plotted."""
+        return np.asarray((values - self.offset) * self.scale)
+
+
+def scaled(name: str, unit: str, values: Array) -> Scaled:
+    """The axis on which draws of a parameter can be read: from zero, or from their middle."""
+    centre, spread = float(np.median(values)), float(np.ptp(values)) / 4
+    if not spread > 0 or abs(centre) < 50 * spread:
+        shown = readable(unit, float(np.max(np.abs(values))) if values.size else 0.0)
+        return Scaled(0.0, shown.scale, symbol(name), shown.unit)
+    about, fine = display(unit, abs(centre)), readable(unit, spread)
+    places = decimals(spread * about.scale, 1)
+    offset = round(centre * about.scale, places) / about.scale
+    sign = "\N{MINUS SIGN}" if offset > 0 else "+"
+    middle = f"{number(abs(offset) * about.scale, places)} {typeset(about.unit)}"
+    return Scaled(offset, fine.scale, f"{symbol(name)} {sign} {middle}", fine.unit)

@@ -1,0 +1,367 @@
+"""Everything a report needs, as plain arrays and strings: nothing here refers to a live model.
+
+A report is written from a `Results` alone, so it can be made again from files, on another machine,
+without the recordings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+STATUSES = ("passed", "failed", "note")
+
+
+@dataclass(frozen=True, eq=False)
+class RecordingResult:
+    """One recording and what the fit makes of it.
+
+    Attributes
+    ----------
+    name, case : as in the campaign; case is "" without a stop
+    interval, start : s
+    samples, predicted : (n,) recorded, and read from the model at the mode; m (or rad)
+    sigma : noise level of the fit, before any smoothing, m
+    noise_rms : root mean square that the independently estimated noise has in the recording, m
+    reduced_chi2 : whitened misfit against the noise level estimated from the recordings alone
+    whiteness_p : p-value that the whitened residual is white
+    """
+
+    name: str
+    case: str
+    interval: float
+    start: float
+    samples: Array
+    predicted: Array
+    sigma: float
+    noise_rms: float
+    reduced_chi2: float
+    whiteness_p: float
+
+    @property
+    def times(self) -> Array:
+        """Time since the first sample, (n,), s."""
+        return np.arange(self.samples.size, dtype=np.float64) * self.interval
+
+    @property
+    def residual(self) -> Array:
+        """Recorded minus predicted, (n,), m."""
+        return self.samples - self.predicted
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the residual, m."""
+        return float(np.sqrt(np.mean(self.residual**2)))
+
+    @property
+    def share(self) -> float:
+        """Root mean square of the residual over that of the signal about its mean."""
+        return self.rms / float(np.std(self.samples))
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One unknown, in SI units.
+
+    Attributes
+    ----------
+    name, unit, role : as in the contract; role is physical, effect, nuisance or noise
+    meaning : in a few words
+    mode, sd : where the posterior is highest, standard deviation there (Laplace)
+    median, ci90 : of the posterior (of the Laplace approximation where there are no draws)
+    total90 : `ci90` widened by the stated uncertainties of mass, clock and gain
+    ratio : (median, low, high) over the mass; NaN unless the parameter scales with the mass
+    ratio_unit : of `ratio`
+    references : published or theoretical values by label
+    prior : in words
+    posterior_sd : of the draws; NaN without
+    """
+
+    name: str
+    unit: str
+    role: str
+    meaning: str
+    mode: float
+    sd: float
+    median: float
+    ci90: tuple[float, float]
+    total90: tuple[float, float]
+    ratio: tuple[float, float, float]
+    ratio_unit: str
+    references: Mapping[str, float]
+    prior: str
+    posterior_sd: float = float("nan")
+
+
+@dataclass(frozen=True, eq=False)
+class SearchSummary:
+    """History of the global search, one entry per generation, and where it and the guess ended.
+
+    Attributes
+    ----------
+    evaluations, best, median, spread, temperature : (G,), see `inference.search.History`
+    stopped : "converged" or "budget"
+    agree : guess and search ended at the same mode
+    distance : largest distance between the two ends, standard deviations
+    """
+
+    evaluations: Array
+    best: Array
+    median: Array
+    spread: Array
+    temperature: Array
+    stopped: str
+    agree: bool
+    distance: float
+
+
+@dataclass(frozen=True, eq=False)
+class SamplerSummary:
+    """What the sampler did and whether it converged.
+
+    Attributes
+    ----------
+    converged, reasons : the verdict, and what speaks against it in words
+    names : d parameters
+    tau, ess_bulk, ess_tail, rhat : (d,) see `inference.convergence.ConvergenceRecord`
+    ensembles, steps, walkers, draws : kept
+    acceptance : fraction of accepted proposals
+    trace_names, trace_units : p parameters whose traces are kept
+    traces : (ensembles, T, walkers shown, p), SI
+    trace_steps : (T,) step of the sampler of every kept point
+    """
+
+    converged: bool
+    reasons: tuple[str, ...]
+    names: tuple[str, ...]
+    tau: Array
+    ess_bulk: Array
+    ess_tail: Array
+    rhat: Array
+    ensembles: int
+    steps: int
+    walkers: int
+    draws: int
+    acceptance: float
+    trace_names: tuple[str, ...]
+    trace_units: tuple[str, ...]
+    traces: Array
+    trace_steps: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Draws:
+    """Draws of some parameters for pictures.
+
+    Attributes
+    ----------
+    label : whose posterior it is
+    names, units : p parameters
+    values : (S, p), SI
+    """
+
+    label: str
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """One branch of a recording's backbone and the band of simulated ones.
+
+    Attributes
+    ----------
+    recording, case : whose
+    branch : "upper" (towards the stop) or "lower"
+    times, amplitude, frequency, damping_ratio : (k,) as recorded; s, m, Hz, 1
+    frequency_band, damping_band : (k, 3) lower end, median and upper end at the same swings
+    """
+
+    recording: str
+    case: str
+    branch: str
+    times: Array
+    amplitude: Array
+    frequency: Array
+    damping_ratio: Array
+    frequency_band: Array
+    damping_band: Array
+
+
+@dataclass(frozen=True, eq=False)
+class BackboneSummary:
+    """Recorded backbones against simulated ones.
+
+    Attributes
+    ----------
+    curves : of every recording and branch
+    probability : of the bands
+    labels : a case, or "all", for each of the following
+    inside : (n,) fraction of the recorded points inside the bands
+    p_values : (n,) posterior-predictive
+    replicates : simulated recordings per recording
+    """
+
+    curves: tuple[Curve, ...]
+    probability: float
+    labels: tuple[str, ...]
+    inside: Array
+    p_values: Array
+    replicates: int
+
+
+@dataclass(frozen=True)
+class Check:
+    """One line of the checklist: status is "passed", "failed" or "note" (for information)."""
+
+    title: str
+    status: str
+    finding: str
+    meaning: str = ""
+
+
+@dataclass(frozen=True)
+class EffectSummary:
+    """An effect that the model includes beside the base oscillator."""
+
+    id: str
+    title: str
+    equation: str
+    statement: str = ""
+
+
+@dataclass(frozen=True)
+class Noise:
+    """The noise as estimated from the recordings alone; level in m (or rad)."""
+
+    kind: str
+    level: float
+    level_error: float
+    correlation: float
+    source: str
+
+
+@dataclass(frozen=True)
+class Chain:
+    """What campaign.toml says of the measuring chain; uncertainties are relative standard ones."""
+
+    smoothing: str
+    mass_sd: float
+    clock_sd: float
+    gain_sd: float
+
+    @property
+    def stated(self) -> bool:
+        """True when any of the three is stated."""
+        return max(self.mass_sd, self.clock_sd, self.gain_sd) > 0
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where the numbers come from: enough to make them again."""
+
+    command: str
+    seed: int
+    date: str
+    data_sha256: str
+    versions: Mapping[str, str]
+    seconds: float = float("nan")
+
+
+@dataclass(frozen=True, eq=False)
+class Results:
+    """All results of one campaign.
+
+    Attributes
+    ----------
+    name, mass, stop, quantity : of the campaign; mass in kg (kg m2 for angles)
+    recordings, rows : what was measured; what was found
+    effects : added to the base oscillator
+    noise, chain : of the measurement
+    verdict : "adequate", "slight", "inadequate" or "overestimated" (see `checks.judge`)
+    headline : the verdict in words
+    reduced_chi2, chi2_z : misfit of all recordings against the independent noise level, and its
+        distance from 1 in standard errors
+    log_posterior : at the mode
+    covariance : (d, d) Laplace, in the order of `rows`, SI
+    fit_converged : the climb to the mode came to rest
+    search, sampler, draws, backbone : None where there are none
+    before : draws under the model without the effects, for comparison
+    checks : the checklist
+    diagnosis : content of diagnosis.json, and arrays for its figures
+    """
+
+    name: str
+    mass: float
+    stop: bool
+    quantity: str
+    recordings: tuple[RecordingResult, ...]
+    rows: tuple[Row, ...]
+    effects: tuple[EffectSummary, ...]
+    noise: Noise
+    chain: Chain
+    verdict: str
+    headline: str
+    reduced_chi2: float
+    chi2_z: float
+    log_posterior: float
+    covariance: Array
+    fit_converged: bool
+    search: SearchSummary | None
+    sampler: SamplerSummary | None
+    draws: Draws | None
+    backbone: BackboneSummary | None
+    checks: tuple[Check, ...]
+    provenance: Provenance
+    before: Draws | None = None
+    diagnosis: Mapping[str, Any] | None = None
+    diagnosis_arrays: Mapping[str, Array] = field(default_factory=dict)
+
+    @property
+    def cases(self) -> tuple[str, ...]:
+        """Obstacles in order of first appearance; () without a stop."""
+        return tuple(dict.fromkeys(r.case for r in self.recordings)) if self.stop else ()
+
+    @property
+    def kind(self) -> str:
+        """What the intervals come from: "posterior" (draws) or "fit" (Laplace)."""
+        return "fit" if self.draws is None else "posterior"
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the recordings."""
+        return "m" if self.quantity == "displacement" else "rad"
+
+    @property
+    def rms(self) -> float:
+        """Root mean square residual over all samples, m (or rad)."""
+        return float(np.sqrt(np.mean(np.concatenate([r.residual for r in self.recordings]) ** 2)))
+
+    @property
+    def share(self) -> float:
+        """Root mean square residual over that of the signals about their means."""
+        signal = np.concatenate([r.samples - r.samples.mean() for r in self.recordings])
+        return self.rms / float(np.sqrt(np.mean(signal**2)))
+
+    @property
+    def failed(self) -> tuple[Check, ...]:
+        """Checks that failed."""
+        return tuple(c for c in self.checks if c.status == "failed")
+
+    def row(self, name: str) -> Row:
+        """The row of one unknown; KeyError when there is none."""
+        for row in self.rows:
+            if row.name == name:
+                return row
+        raise KeyError(name)
+
+    def select(self, *roles: str) -> tuple[Row, ...]:
+        """Rows with one of the given roles."""
+        return tuple(row for row in self.rows if row.role in roles)

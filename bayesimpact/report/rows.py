@@ -1,0 +1,109 @@
+"""The table of unknowns: estimates, intervals, ratios to the mass, what to compare them with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+
+import numpy as np
+
+from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.priors import Prior
+from bayesimpact.model.parameters import Parameter
+from bayesimpact.report.results import Array, Chain, Row
+from bayesimpact.report.units import dimensions, per_mass_unit, significant
+
+Z90 = 1.6448536269514722  # 95 % quantile of the standard normal distribution
+
+_MEANINGS = {
+    "c1": "damping of the suspension",
+    "k1": "stiffness of the suspension",
+    "c2": "damping of the stop",
+    "g": "gap, from true rest to the stop",
+    "k2": "stiffness of the stop",
+    "y0": "displacement at the first sample",
+    "v0": "velocity at the first sample",
+    "offset": "rest reading of the probe",
+    "sigma": "noise of the probe",
+}
+
+
+def build_rows(
+    fit: Fit, draws: Array | None, chain: Chain, references: Mapping[str, Mapping[str, float]]
+) -> tuple[Row, ...]:
+    """One row per parameter; `draws` (S, d), or None for the Laplace approximation."""
+    campaign = fit.target.oscillator.campaign
+    angle = campaign.recordings[0].quantity == "angle"
+    titles = {e.id: e.title for e in fit.target.oscillator.effects}
+    rows = []
+    for i, parameter in enumerate(fit.target.oscillator.layout.parameters):
+        mode, sd = float(fit.mode[i]), float(fit.sd[i])
+        if draws is None:
+            low, high = max(mode - Z90 * sd, parameter.lower), min(mode + Z90 * sd, parameter.upper)
+            median, posterior_sd = mode, float("nan")
+        else:
+            low, median, high = (float(x) for x in np.percentile(draws[:, i], [5, 50, 95]))
+            posterior_sd = float(np.std(draws[:, i]))
+        ci90 = (low, high)
+        # A phase is no displacement, even where displacements are angles.
+        unit = "-" if parameter.name.partition("[")[0].endswith(".phase") else parameter.unit
+        ratio_unit = per_mass_unit(unit, angle=angle)
+        nothing = (float("nan"),) * 3
+        over = (median / campaign.mass, low / campaign.mass, high / campaign.mass)
+        rows.append(
+            Row(
+                name=parameter.name,
+                unit=parameter.unit,
+                role=parameter.role,
+                meaning=meaning(parameter, titles),
+                mode=mode,
+                sd=sd,
+                median=median,
+                ci90=ci90,
+                total90=widened(median, ci90, unit, chain, angle=angle),
+                ratio=over if ratio_unit else nothing,
+                ratio_unit=ratio_unit,
+                references={
+                    label: float(values[parameter.name])
+                    for label, values in references.items()
+                    if parameter.name in values
+                },
+                prior=prior_text(fit.target.priors.parameters[i]),
+                posterior_sd=posterior_sd,
+            )
+        )
+    return tuple(rows)
+
+
+def widened(
+    median: float, ci90: tuple[float, float], unit: str, chain: Chain, *, angle: bool
+) -> tuple[float, float]:
+    """A 90 % interval widened by the uncertainties of mass, clock and gain, in quadrature.
+
+    The three are independent of one another and of the statistical error; how much each counts
+    follows from the unit (`report.units`).
+    """
+    spread = dimensions(unit, angle=angle).spread(chain.mass_sd, chain.clock_sd, chain.gain_sd)
+    systematic = Z90 * abs(median) * spread
+    return (
+        median - float(np.hypot(median - ci90[0], systematic)),
+        median + float(np.hypot(ci90[1] - median, systematic)),
+    )
+
+
+def meaning(parameter: Parameter, titles: Mapping[str, str]) -> str:
+    """What a parameter is, in a few words; `titles` of the effects by id."""
+    base, _, key = parameter.name.partition("[")
+    key = key.rstrip("]")
+    if "." in base:
+        effect, _, own = base.partition(".")
+        words = f"{titles.get(effect, effect)}: {own.replace('_', ' ')}"
+    else:
+        words = _MEANINGS.get(base, base)
+    return f"{words}, case {key}" if key and base == "k2" else words + (f", {key}" if key else "")
+
+
+def prior_text(prior: Prior) -> str:
+    """A prior in words, SI units: "uniform, lower = 0, upper = 8.09e+04"."""
+    numbers = [f"{f.name} {significant(getattr(prior, f.name))}" for f in fields(prior)]  # type: ignore[arg-type]
+    return f"{prior.kind}: {', '.join(numbers)}"

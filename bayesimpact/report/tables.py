@@ -1,0 +1,226 @@
+"""Rows of the report's tables, as text: every number with the digits that its error allows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+
+import numpy as np
+from markupsafe import Markup, escape
+
+from bayesimpact.report.results import Results, Row
+from bayesimpact.report.rows import Z90
+from bayesimpact.report.units import (
+    MINUS,
+    decimals,
+    display,
+    number,
+    p_value,
+    readable,
+    significant,
+    typeset,
+)
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A value, a smaller remark beneath it."""
+
+    text: str
+    remark: str = ""
+
+
+@dataclass(frozen=True)
+class ParameterView:
+    """One parameter as the table shows it."""
+
+    symbol: Markup
+    meaning: str
+    unit: str
+    median: str
+    interval: str
+    total: str
+    ratio: str
+    ratio_interval: str
+    ratio_unit: str
+    references: tuple[Cell, ...]
+    prior: str
+
+
+def symbol(name: str) -> Markup:
+    """A parameter's name for HTML: "k2[1]" with an italic k and a lowered 2."""
+    base, bracket, key = name.partition("[")
+    if "." in base:
+        effect, _, own = base.partition(".")
+        html = Markup("<span class=effect>{}.</span>{}").format(effect, own)
+    elif base == "sigma":
+        html = Markup("<i>σ</i>")
+    elif base[-1].isdigit():
+        html = Markup("<i>{}</i><sub>{}</sub>").format(base[:-1], base[-1])
+    elif len(base) == 1:
+        html = Markup("<i>{}</i>").format(base)
+    else:
+        html = escape(base)
+    return html + escape(bracket + key)
+
+
+def span(low: float, high: float, scale: float, places: int) -> str:
+    """Both ends of an interval."""
+    return f"{number(low * scale, places)} to {number(high * scale, places)}"
+
+
+def parameter_views(results: Results, rows: tuple[Row, ...]) -> list[ParameterView]:
+    """Rows of the table of parameters; reference cells in the order of `reference_labels`."""
+    labels = reference_labels(rows)
+    return [_view(row, labels) for row in rows]
+
+
+def reference_labels(rows: tuple[Row, ...]) -> list[str]:
+    """Labels of all reference values, in order of first appearance."""
+    return list(dict.fromkeys(label for row in rows for label in row.references))
+
+
+def _view(row: Row, labels: list[str]) -> ParameterView:
+    low, high = row.ci90
+    half = 0.5 * (high - low)
+    shown = readable(row.unit, max(abs(row.median), half))
+    places = decimals(half * shown.scale)
+    total_places = decimals(0.5 * (row.total90[1] - row.total90[0]) * shown.scale)
+    ratio, ratio_low, ratio_high = row.ratio
+    ratio_places = decimals(0.5 * (ratio_high - ratio_low))
+    return ParameterView(
+        symbol=symbol(row.name),
+        meaning=row.meaning,
+        unit=typeset(shown.unit),
+        median=number(row.median * shown.scale, places),
+        interval=span(low, high, shown.scale, places),
+        total=span(*row.total90, shown.scale, total_places),
+        ratio=number(ratio, ratio_places) if row.ratio_unit else "",
+        ratio_interval=span(ratio_low, ratio_high, 1.0, ratio_places) if row.ratio_unit else "",
+        ratio_unit=typeset(row.ratio_unit),
+        references=tuple(_reference(row, label, shown.scale, places) for label in labels),
+        prior=row.prior,
+    )
+
+
+def _reference(row: Row, label: str, scale: float, places: int) -> Cell:
+    """A value to compare with, and how far the median lies from it."""
+    if label not in row.references:
+        return Cell("")
+    value = row.references[label]
+    written = significant(value * scale, 7).rstrip("0").rstrip(".")
+    text = written if "." in written else number(value * scale, 0)
+    return Cell(text, deviation(row, value))
+
+
+def deviation(row: Row, value: float) -> str:
+    """Median minus a reference: in standard deviations when near, in per cent when far."""
+    sd = row.posterior_sd if isfinite(row.posterior_sd) else row.sd
+    off = row.median - value
+    if sd > 0 and abs(off) < 10 * sd:
+        return f"{signed(off / sd, 1)} sd"
+    return f"{signed(100 * off / abs(value), 2)} %" if value else ""
+
+
+def signed(value: float, places: int) -> str:
+    """A number with its sign."""
+    text = number(value, places)
+    return text if text.startswith(MINUS) else f"+{text}"
+
+
+def recording_views(results: Results) -> list[dict[str, str]]:
+    """Rows of the table of recordings."""
+    scale = 1.0 if results.quantity == "angle" else 1e3
+    rows = []
+    for r in results.recordings:
+        shown = display(results.unit, max(results.rms, results.noise.level))
+        rows.append(
+            {
+                "name": r.name,
+                "case": r.case,
+                "samples": number(r.samples.size, 0),
+                "rate": significant(1 / r.interval, 4),
+                "duration": significant((r.samples.size - 1) * r.interval, 3),
+                "largest": significant(float(np.max(np.abs(r.samples))) * scale, 3),
+                "rms": significant(r.rms * shown.scale, 3),
+                "share": significant(100 * r.share, 2),
+                "chi2": significant(r.reduced_chi2, 3),
+                "white": p_value(r.whiteness_p),
+            }
+        )
+    return rows
+
+
+def residual_unit(results: Results) -> str:
+    """Unit of the residuals in the table of recordings."""
+    return typeset(display(results.unit, max(results.rms, results.noise.level)).unit)
+
+
+def release_views(results: Results) -> list[dict[str, str]]:
+    """Initial conditions and rest readings of every recording: median ± half of the interval."""
+    columns = release_columns(results)
+    rows = []
+    for r in results.recordings:
+        cells = {"name": r.name, "case": r.case}
+        for key, (scale, _) in columns.items():
+            row = results.row(f"{key}[{r.name}]")
+            half = 0.5 * (row.ci90[1] - row.ci90[0]) * scale
+            places = decimals(half)
+            cells[key] = f"{number(row.median * scale, places)} ± {number(half, places)}"
+        rows.append(cells)
+    return rows
+
+
+def release_columns(results: Results) -> dict[str, tuple[float, str]]:
+    """Nuisance -> (scale, unit) that suits all recordings."""
+    columns = {}
+    for key in ("y0", "v0", "offset"):
+        rows = [row for row in results.rows if row.name.startswith(f"{key}[")]
+        if rows:
+            size = float(np.max([max(abs(row.median), Z90 * row.sd) for row in rows]))
+            shown = display(rows[0].unit, size)
+            columns[key] = (shown.scale, typeset(shown.unit))
+    return columns
+
+
+def sampler_views(results: Results) -> list[dict[str, str | Markup]]:
+    """Convergence figures of the parameters of interest, and the worst of all the others."""
+    s = results.sampler
+    if s is None:
+        return []
+    shown = [
+        i for i, name in enumerate(s.names) if results.row(name).role in ("physical", "effect")
+    ]
+    others = [i for i in range(len(s.names)) if i not in shown]
+    rows = [(symbol(s.names[i]), [i]) for i in shown]
+    if others:
+        rows.append((Markup("worst of {} others").format(len(others)), others))
+    return [
+        {
+            "symbol": words,
+            "tau": significant(float(s.tau[index].max()), 2),
+            "bulk": number(float(s.ess_bulk[index].min()), 0),
+            "tail": number(float(s.ess_tail[index].min()), 0),
+            "rhat": number(float(s.rhat[index].max()), 4),
+        }
+        for words, index in rows
+    ]
+
+
+def prior_views(results: Results) -> list[tuple[str | Markup, str]]:
+    """Parameter and prior; nuisances that share one prior on one row."""
+    views: dict[tuple[str, str], list[Row]] = {}
+    for row in results.rows:
+        shared = row.role in ("nuisance", "noise")
+        views.setdefault(
+            (row.name.partition("[")[0] if shared else row.name, row.prior), []
+        ).append(row)
+    return [
+        (
+            symbol(rows[0].name)
+            if len(rows) == 1
+            else symbol(key) + Markup(" of {} recordings").format(len(rows)),
+            prior,
+        )
+        for (key, prior), rows in views.items()
+    ]
