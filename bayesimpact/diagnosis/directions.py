@@ -1,8 +1,8 @@
 """How every recording would change under a small amount of an effect that the model leaves out.
 
-A direction is the derivative of the prediction with respect to the size of an effect, at the fitted model,
-through simulation, sensor, filter and whitening. Sizes of difference steps are chosen such that the change is
-a fraction of the noise: small enough to be linear, far above rounding.
+A direction is the derivative of the prediction with respect to the size of an effect, at the fitted
+model, through simulation, sensor, filter and whitening. Sizes of difference steps are chosen such
+that the change is a fraction of the noise: small enough to be linear, far above rounding.
 """
 
 from __future__ import annotations
@@ -34,7 +34,8 @@ class Direction:
     ----------
     effect : the effect
     shapes : values of its shape parameters, by `<effect>.<parameter>`
-    names : the k size parameters, `<effect>.<parameter>[...]`; (the id itself for an effect that is on or off)
+    names : the k size parameters, `<effect>.<parameter>[...]`; (the id itself for an effect that is
+        on or off)
     parts : per recording (n_r, k)
     one_sided : sizes below the null are not admissible
     contrast : only differences between the k sizes mean something; the model has their common value
@@ -49,7 +50,7 @@ class Direction:
 
 
 def directions(fit: Fit, effects: Iterable[Effect], scales: Scales) -> tuple[Direction, ...]:
-    """Directions of all effects that the fit's model does not contain, one per point of their shape grids.
+    """Directions of all effects that the fit's model lacks, one per point of their shape grids.
 
     Effects with a phase are left to `periodic`, which scans frequencies.
     """
@@ -94,7 +95,7 @@ def _grid(effect: Effect, scales: Scales) -> list[dict[str, float]]:
 def size_parameters(target: Target, effect: Effect) -> list[tuple[str, EffectParameter]]:
     """Names in theta and records of an effect's size parameters."""
     campaign = target.oscillator.campaign
-    keys = {
+    keys: dict[str, list[str | None]] = {
         "campaign": [None],
         "case": list(campaign.cases),
         "recording": [r.name for r in campaign.recordings],

@@ -1,4 +1,4 @@
-"""diagnosis.json: the diagnosis as scripts outside the project read it (schema bayesimpact/diagnosis/1)."""
+"""diagnosis.json: the diagnosis as scripts read it (schema bayesimpact/diagnosis/1)."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ def document(
 
     Parameters
     ----------
-    draws_before, draws_after : posterior draws (S, d) of both models; None takes the normal approximation
+    draws_before, draws_after : posterior draws (S, d) of both models; None takes the normal
+        approximation
     """
     d = diagnosis
     noise = d.identification.noise
@@ -217,14 +218,17 @@ def _parameters(
 
 
 def _add_means(fit: Fit, result: dict[str, dict[str, Any]]) -> None:
-    """A base parameter that an effect replaced per obstacle or recording is reported as their mean."""
+    """Report a base parameter that an effect split per obstacle or recording as their mean."""
     names = fit.target.oscillator.layout.names
     for base in ("c2", "g"):
-        members = [i for i, n in enumerate(names) if n.split(".")[-1].startswith(base + "[") and "." in n]
+        members = [
+            i for i, n in enumerate(names) if n.split(".")[-1].startswith(base + "[") and "." in n
+        ]
         if base not in result and members:
             weights = np.zeros(fit.mode.size)
             weights[members] = 1 / len(members)
-            middle, sd = float(weights @ fit.mode), float(np.sqrt(weights @ fit.covariance @ weights))
+            middle = float(weights @ fit.mode)
+            sd = float(np.sqrt(weights @ fit.covariance @ weights))
             unit = fit.target.oscillator.layout.parameters[members[0]].unit
             result[base] = {
                 "unit": unit,

@@ -1,4 +1,4 @@
-"""From a fit to the same campaign with one more effect: parameter vectors move between layouts by name."""
+"""From a fit to the same campaign with one more effect: parameters move between layouts by name."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def owner(effects: Sequence[Effect], name: str) -> tuple[Effect, EffectParameter
 
 
 def replaced_slot(effect: Effect, parameter: EffectParameter) -> str | None:
-    """The base parameter that an effect's parameter takes the place of (c2 per case: "c2"), or None."""
+    """The base parameter that an effect's parameter replaces (c2 per case: "c2"), or None."""
     for slot, name in effect.binds.items():
         if name == parameter.name and slot in ("c1", "k1", "c2", "g"):
             return slot
@@ -70,7 +70,7 @@ def replaced_slot(effect: Effect, parameter: EffectParameter) -> str | None:
 
 
 def extend(fit: Fit, effects: Sequence[Effect], scales: Scales) -> Target:
-    """Posterior of the fit's campaign with exactly these `effects`, priors of the shared parameters kept."""
+    """Posterior of the fit's campaign with exactly these `effects`; shared priors are kept."""
     old = fit.target
     per_recording = old.oscillator.layout.roles("noise").size > 1
     oscillator = build_oscillator(
@@ -139,7 +139,7 @@ def _start(
 
 
 def difference_steps(fit: Fit, target: Target, sizes: Mapping[str, float]) -> Array:
-    """Steps (d,) for differences: a twentieth of the known standard deviations, else from `sizes`."""
+    """Steps (d,) for differences: a twentieth of the known standard deviations or of `sizes`."""
     sd = dict(zip(fit.names, fit.sd, strict=True))
     names = target.oscillator.layout.names
     return np.array([0.05 * sd[n] if n in sd else 0.05 * sizes[n] for n in names])

@@ -1,9 +1,10 @@
-"""Where in (displacement, velocity) a force is missing: a Gaussian process on the force, seen through the oscillator.
+"""Where in (displacement, velocity) a force is missing: a Gaussian process on the force.
 
-The unexplained force is a(y) + b(y) v with B-spline coefficients of independent normal priors. Each coefficient's
-response is simulated, whitened and projected off everything the model fits, so what remains of the misfit is
-explained by force, not by displacement errors that an earlier force left behind. In the linearised problem the
-coefficients' posterior and the evidence are closed forms; the prior widths maximise the evidence.
+The unexplained force is a(y) + b(y) v with B-spline coefficients of independent normal priors. Each
+coefficient's response is simulated, whitened and projected off everything the model fits, so what
+remains of the misfit is explained by force, not by displacement errors that an earlier force left
+behind. In the linearised problem the coefficients' posterior and the evidence are closed forms; the
+prior widths maximise the evidence.
 """
 
 from __future__ import annotations
@@ -109,7 +110,7 @@ def motion_range(fit: Fit) -> tuple[float, float]:
 
 
 def basis_responses(fit: Fit, effect: Effect, knots: int, scales: Scales) -> tuple[Array, ...]:
-    """Whitened responses, in units of the noise, to one unit of every coefficient: per recording (n_r, 2 knots)."""
+    """Whitened responses (noise = 1) to a unit of each coefficient: per recording (n, 2 knots)."""
     oscillator, sigma = fit.target.oscillator, sigma_of(fit)
     head = [p.fixed for p in effect.parameters if p.fixed is not None]
     table = _with_law(oscillator, effect)
@@ -132,7 +133,8 @@ def whitened_one(fit: Fit, r: int, values: Array, sigma: Array) -> Array:
     """Filtered, whitened signals (k, n) of one recording in units of the noise."""
     oscillator, noise = fit.target.oscillator, fit.target.likelihood.noise
     interval = oscillator.campaign.recordings[r].interval
-    return noise.whiten(smooth(values, oscillator.smoothing, interval), interval) / sigma[r]
+    filtered = smooth(values, oscillator.smoothing, interval)
+    return np.asarray(noise.whiten(filtered, interval) / sigma[r])
 
 
 def _with_law(oscillator: Oscillator, effect: Effect) -> NDArray[np.int64]:

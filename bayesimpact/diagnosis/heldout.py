@@ -1,7 +1,7 @@
 """Does the added physics predict recordings that it has not seen?
 
-Each recording is predicted from the others after its own first tenth has fixed its initial conditions. The
-predictive density is a ratio of evidences, so nothing is plugged in:
+Each recording is predicted from the others after its own first tenth has fixed its initial
+conditions. The predictive density is a ratio of evidences, so nothing is plugged in:
 
     log p(rest of r | others, first tenth of r) = log Z(all) - log Z(all, r cut to its first tenth).
 

@@ -1,8 +1,9 @@
 """Intervals that hold even when something stays unexplained.
 
-What the fitted model leaves unexplained is a force with a posterior of its own (`force`). Had it been modelled, the
-parameters would have moved by what they now absorb of it: a shift and an extra covariance, both closed forms
-in the linearised problem. Where no force is left both vanish and the intervals are the ordinary ones.
+What the fitted model leaves unexplained is a force with a posterior of its own (`force`). Had it
+been modelled, the parameters would have moved by what they now absorb of it: a shift and an extra
+covariance, both closed forms in the linearised problem. Where no force is left both vanish and the
+intervals are the ordinary ones.
 """
 
 from __future__ import annotations

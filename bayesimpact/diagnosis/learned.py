@@ -1,7 +1,8 @@
-"""An unknown force a(y) + b(y) v as cubic B-splines over the displacement, as an effect like any other.
+"""An unknown force a(y) + b(y) v, cubic B-splines over the displacement, as an effect like any.
 
-The conservative part a and the dissipative part b have one coefficient per knot each. With independent normal
-priors of equal width this is a Gaussian process of correlation length about one knot spacing.
+The conservative part a and the dissipative part b have one coefficient per knot each. With
+independent normal priors of equal width this is a Gaussian process of correlation length about one
+knot spacing.
 """
 
 from __future__ import annotations
@@ -56,7 +57,7 @@ def spline_basis(y: Array, low: float, spacing: float, count: int) -> Array:
 def learned_force(
     low: float, high: float, conservative: float, dissipative: float, knots: int = KNOTS
 ) -> Effect:
-    """The effect for displacements from `low` to `high` m, with prior widths of a (N) and b (N s/m)."""
+    """The effect for displacements `low` to `high` m; prior widths of a in N, of b in N s/m."""
     spacing = (high - low) / (knots - 3)
 
     def fixed(name: str, unit: str, value: float) -> EffectParameter:
@@ -78,7 +79,9 @@ def learned_force(
         equation="a(y) + b(y) v, cubic B-splines",
         regime="everywhere",
         energy="either",
-        statement="A force outside the catalogue acts, up to {size} ({share} of the peak elastic force).",
+        statement=(
+            "A force outside the catalogue acts, up to {size} ({share} of the peak elastic force)."
+        ),
         parameters=head + a + b,
         law=Law(force),
     )

@@ -1,4 +1,4 @@
-"""What can be ruled out: how large every effect that was not found could still be, and what that would do."""
+"""What can be ruled out: how large an effect that was not found could be, and what it would do."""
 
 from __future__ import annotations
 
@@ -27,11 +27,13 @@ class Limit:
     Attributes
     ----------
     effect_id, parameter, unit : which size
-    upper95 : with 95 % probability the size (its magnitude where both signs are admissible) is below
+    upper95 : with 95 % probability the size (its magnitude where both signs are admissible) is
+        below
     detection : size that would stand out by five standard errors
     power : probability that the practical size would have been detected
     answer : in a word
-    bias : largest shift that a size at the limit would put on a parameter, in its standard deviations
+    bias : largest shift that a size at the limit would put on a parameter, in its standard
+        deviations
     biased : which parameter that is
     k2_bias : the same for the obstacles' stiffnesses, 0 without a stop
     """
@@ -50,7 +52,9 @@ class Limit:
 
 def limits(fit: Fit, scan: Scan, scales: Scales) -> tuple[Limit, ...]:
     """Limits of all effects in a scan."""
-    return tuple(_limit(fit, score, scan, scales) for score in scan.best() if "." in score.names[0])
+    scored = {id(s) for s in scan.scores[: len(scan.groups)]}
+    chosen = [s for s in scan.best() if id(s) in scored and "." in s.names[0]]
+    return tuple(_limit(fit, score, scan, scales) for score in chosen)
 
 
 def _limit(fit: Fit, score: Score, scan: Scan, scales: Scales) -> Limit:
@@ -58,7 +62,9 @@ def _limit(fit: Fit, score: Score, scan: Scan, scales: Scales) -> Limit:
     name = score.names[0].split(".", 1)[1].split("[")[0]
     parameter = score.effect.parameter(name)
     size, sd = np.atleast_1d(score.size), np.atleast_1d(score.size_sd)
-    upper = float(np.max([upper_limit(m, s, direction.one_sided) for m, s in zip(size, sd, strict=True)]))
+    upper = float(
+        np.max([upper_limit(m, s, direction.one_sided) for m, s in zip(size, sd, strict=True)])
+    )
     practical = PRACTICAL * parameter.scale(scales)
     power = float(stats.norm.sf(DETECTED - practical / sd[0]))
     column = scan.groups[scan.scores.index(score)][0]

@@ -1,9 +1,9 @@
 """Where the model misses: regime, displacement, velocity, time, obstacles and recordings.
 
-Two views. The missing force, integrated along the recorded motion, says where in (displacement, velocity) the
-force acts. The gain in log likelihood of the best extension over the base says when and in which recordings it
-shows. A mismatch of the measuring chain is no force: it is told apart by comparing the evidence of a free force
-with that of a free distortion of the probe's reading.
+Two views. The missing force, integrated along the recorded motion, says where in (displacement,
+velocity) the force acts. The gain in log likelihood of the best extension over the base says when
+and in which recordings it shows. A mismatch of the measuring chain is no force: it is told apart by
+comparing the evidence of a free force with that of a free distortion of the probe's reading.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ def regime_seen(contact_share: float) -> Regime:
 
 
 def gain_by_time(base: Fit, better: Fit) -> Array:
-    """Gain in log likelihood of `better` over `base` per recording and time bin, (R, TIME_BINS), nats."""
+    """Gain in log likelihood of `better` over `base`, nats, per recording and time bin."""
     rows = []
     pairs = zip(base.linearisation, better.linearisation, sigma_of(base), strict=True)
     smoothed = base.target.likelihood.noise.smoothing is not None
@@ -161,7 +161,9 @@ def _where(base: Fit, gain: Array) -> tuple[tuple[str, ...], tuple[str, ...]]:
     share = np.cumsum(per_recording[order]) / max(per_recording.sum(), 1e-300)
     count = int(np.searchsorted(share, 0.9)) + 1
     kept = [recordings[i] for i in order[:count]]
-    cases = tuple(dict.fromkeys(r.case for r in kept)) if base.target.oscillator.campaign.stop else ()
+    cases = (
+        tuple(dict.fromkeys(r.case for r in kept)) if base.target.oscillator.campaign.stop else ()
+    )
     return tuple(r.name for r in kept), cases
 
 

@@ -1,4 +1,4 @@
-"""The whole loop: fit the base model, ask whether anything is missing, locate, name, model, show."""
+"""The loop: fit the base model, ask whether anything is missing, locate, name, model, show."""
 
 from __future__ import annotations
 
@@ -38,7 +38,8 @@ class Diagnosis:
     verdict : adequate, named, ambiguous or unknown
     identification : of the base model
     naming : all models that were tried
-    before, after : base fit and the fit that the verdict stands for (the learned force when unknown)
+    before, after : base fit and the fit that the verdict stands for (the learned force when
+        unknown)
     effects : that `after` adds, most important first; empty when adequate or unknown
     alternatives : models that fit alike, when ambiguous
     location : None when adequate

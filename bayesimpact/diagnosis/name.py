@@ -1,9 +1,9 @@
-"""What is missing: refits of every admissible effect, forward selection, backward elimination, rivals.
+"""What is missing: refits of admissible effects, forward selection, backward elimination, rivals.
 
-Models are compared by their evidence times a prior that pays for multiplicity: each added effect costs
-log(2 K) for a catalogue of K, so that a large catalogue makes no false names likelier. Full refits rank the
-effects; scores only give their starting points, because signs and bounds are physics and decide between
-near-opposites that scores cannot tell apart.
+Models are compared by their evidence times a prior that pays for multiplicity: each added effect
+costs log(2 K) for a catalogue of K, so that a large catalogue makes no false names likelier. Full
+refits rank the effects; scores only give their starting points, because signs and bounds are
+physics and decide between near-opposites that scores cannot tell apart.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ class Naming:
         )
 
     def prefers_learned_force(self) -> bool:
-        """True when one free force explains the misfit decisively better than the chosen combination.
+        """True when one free force beats the chosen combination decisively.
 
         A combination of many terms that imitates one local force loses to that force.
         """
@@ -156,7 +156,7 @@ class _Search:
         return State(candidate, found, force)
 
     def extended(self, state: State, first: bool) -> Candidate | None:
-        """The best model with one more effect (or a pair, at the first step), when it is worth its cost."""
+        """The best model with one more effect (at first also a pair), when it is worth its cost."""
         scores = [s for s in state.scan.best() if s.gain > WORTH_A_REFIT]
         found = [self.fit_more(state.candidate, [score]) for score in scores]
         if first and state.candidate.effects == ():
@@ -219,6 +219,6 @@ class _Search:
 
 
 def _is_elaboration(candidate: Candidate, chosen: Candidate) -> bool:
-    """True when the candidate only refines the chosen model: an effect whose null is the chosen one's."""
+    """True when the candidate only refines the chosen model (`Effect.prefer`)."""
     extra = [e for e in candidate.effects if e.id not in chosen.ids]
     return bool(extra) and all(e.prefer in chosen.ids for e in extra)

@@ -1,4 +1,4 @@
-"""Pairs of effects, ranked in the linearised problem: all of them at once from one information matrix."""
+"""Pairs of effects, ranked in the linearised problem from one information matrix."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from bayesimpact.diagnosis.scan import Scan, Score
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """Two effects and the gain in log likelihood that the linearised problem expects of both together."""
+    """Two effects and the gain in log likelihood expected of both together, nats."""
 
     scores: tuple[Score, Score]
     gain: float
@@ -21,7 +21,7 @@ class Pair:
 def promising_pairs(scan: Scan, *, count: int) -> tuple[Pair, ...]:
     """The `count` best pairs whose gain is not explained by one of the two alone."""
     best = {id(s) for s in scan.best()}
-    chosen = [i for i, s in enumerate(scan.scores) if id(s) in best]
+    chosen = [i for i, s in enumerate(scan.scores[: len(scan.groups)]) if id(s) in best]
     pairs = []
     for i, j in itertools.combinations(chosen, 2):
         first, second = scan.scores[i], scan.scores[j]

@@ -1,14 +1,15 @@
 """Scores: what is left of a direction once the model's own parameters have absorbed what they can.
 
-With J the whitened derivatives of the prediction with respect to everything the model fits (base parameters,
-initial conditions, rest readings) and D the directions, the part of D that refitting cannot imitate is
+With J the whitened derivatives of the prediction with respect to everything the model fits (base
+parameters, initial conditions, rest readings) and D the directions, the part of D that refitting
+cannot imitate is
 
     D_perp = D - J (J'J)^-1 J'D,     S = D_perp' D_perp,     b = D_perp' r.
 
-Under the model b ~ N(0, S); an effect of size s shifts it by S s. So z = b / sqrt(S) is a score (Lagrange
-multiplier) test, b / S the expected size, 1 / sqrt(S) its standard error, and (J'J)^-1 J'D b / S the bias that
-ignoring the effect puts on the model's parameters (Saris, Satorra and Sorbom 1987 call the size the expected
-parameter change).
+Under the model b ~ N(0, S); an effect of size s shifts it by S s. So z = b / sqrt(S) is a score
+(Lagrange multiplier) test, b / S the expected size, 1 / sqrt(S) its standard error, and (J'J)^-1
+J'D b / S the bias that ignoring the effect puts on the model's parameters (Saris, Satorra and
+Sorbom 1987 call the size the expected parameter change).
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ class Projection:
 
 
 def project(fit: Fit, parts: Sequence[Array]) -> Projection:
-    """Project direction columns (per recording (n_r, K), whitened, in units of the noise) off the model."""
+    """Project direction columns (per recording (n_r, K), whitened, noise = 1) off the model."""
     size, sigma = fit.mode.size, sigma_of(fit)
     columns = parts[0].shape[1]
     rows = [

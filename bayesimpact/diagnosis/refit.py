@@ -103,9 +103,10 @@ def _shift(fit: Fit, names: Sequence[str], start: Array, scores: Sequence[Score]
 def log_evidence(fit: Fit) -> float:
     """Log marginal likelihood by Laplace's method.
 
-    A parameter with a bound near its mode gets the normal mass that is left inside: Phi of the distance, or,
-    where the mode sits on the bound with a slope, the exact one-dimensional integral of the exponential of a
-    quadratic. Accurate for the near-Gaussian posteriors of this problem (Tierney and Kadane 1986).
+    A parameter with a bound near its mode gets the normal mass that is left inside: Phi of the
+    distance, or, where the mode sits on the bound with a slope, the exact one-dimensional integral
+    of the exponential of a quadratic. Accurate for the near-Gaussian posteriors of this problem
+    (Tierney and Kadane 1986).
     """
     lower = np.maximum(
         fit.target.priors.lower, [p.lower for p in fit.target.oscillator.layout.parameters]
@@ -116,8 +117,8 @@ def log_evidence(fit: Fit) -> float:
         return -np.inf
     value = fit.log_posterior + 0.5 * fit.mode.size * np.log(2 * np.pi) + 0.5 * log_det + scale
     inside = (fit.mode - lower) / fit.sd
-    for i in np.flatnonzero(inside < 8):
-        value += _boundary(inside[i], i, fit)
+    for i in np.flatnonzero(inside < 8).tolist():
+        value += _boundary(float(inside[i]), i, fit)
     return float(value)
 
 

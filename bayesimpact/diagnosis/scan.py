@@ -1,15 +1,15 @@
 """Is anything missing at all? One score per effect, one p-value for all of them together.
 
-Every direction gives a p-value of its own (normal, half-normal where only one sign is physical, chi-squared
-where an effect has a size per obstacle or recording). The smallest one is judged against its own law under
-the model, simulated from the joint normal law of all scores: neighbours that overlap are not counted twice
-(maxT of Westfall and Young 1993, with Gaussian multipliers).
+Every direction gives a p-value of its own (normal, half-normal where only one sign is physical,
+chi-squared where an effect has a size per obstacle or recording). The smallest one is judged
+against its own law under the model, simulated from the joint normal law of all scores: neighbours
+that overlap are not counted twice (maxT of Westfall and Young 1993, with Gaussian multipliers).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +38,8 @@ class Score:
     p_value : of this score alone
     size, size_sd : expected size of every size parameter and its standard error, (k,)
     limit : detection limit of the first size, LIMIT_SD standard errors
-    bias : shift of the model's parameters that ignoring this size causes, (d,), in their standard deviations
+    bias : shift of the model's parameters that ignoring this size causes, (d,), in their standard
+        deviations
     kept : fraction of the response that refitting the model cannot imitate
     gain : expected gain in log likelihood
     names : of the size parameters
@@ -86,8 +87,13 @@ class Scan:
 
 def scan(fit: Fit, effects: Sequence[Effect], scales: Scales, *, rng: np.random.Generator) -> Scan:
     """Score every effect that the fit's model does not contain."""
-    found = directions(fit, effects, scales)
-    return score_directions(fit, found, rng=rng)
+    from bayesimpact.diagnosis.periodic import periodic_scores
+
+    single = score_directions(fit, directions(fit, effects, scales), rng=rng)
+    periodic = periodic_scores(fit, effects, scales)
+    families = [single.p_value, *(s.p_value for s in periodic)]
+    p_value = min(1.0, len(families) * min(families))
+    return replace(single, scores=(*single.scores, *periodic), p_value=p_value)
 
 
 def score_directions(fit: Fit, found: tuple[Direction, ...], *, rng: np.random.Generator) -> Scan:

@@ -1,4 +1,4 @@
-"""Physics outside the catalogue: the missing force is learned, inside the simulator, together with the parameters."""
+"""Physics outside the catalogue: the missing force is learned together with the parameters."""
 
 from __future__ import annotations
 
@@ -73,5 +73,9 @@ def shape(fit: Fit, state: State, points: int = 200) -> ForceShape:
     conservative = np.concatenate([m @ a for m, _ in along])
     dissipative = np.concatenate([(m @ b) * v for m, v in along])
     return ForceShape(
-        y, basis @ a, basis @ b, float(np.std(conservative)), float(np.sqrt(np.mean(dissipative**2)))
+        y,
+        basis @ a,
+        basis @ b,
+        float(np.std(conservative)),
+        float(np.sqrt(np.mean(dissipative**2))),
     )

@@ -1,4 +1,4 @@
-"""Is a residual white? Reported beside the verdict, never deciding it: refitting hides what is missing."""
+"""Is a residual white? Reported, never deciding: refitting hides what is missing."""
 
 from __future__ import annotations
 

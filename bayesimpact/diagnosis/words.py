@@ -30,19 +30,21 @@ def statement(effect: Effect, size: str, share: float, shift: Mapping[str, float
 
 
 def sizes(effect: Effect, before: Fit, after: Fit, scales: Scales) -> tuple[str, float]:
-    """Size of an effect as text (a force, or a length for the measuring chain) and relative to its yardstick."""
+    """Size of an effect as text, and how far it moves the trajectory, relative to the amplitude."""
     change = np.concatenate([a - b for a, b in zip(after.predicted, before.predicted, strict=True)])
     reach = float(np.max(np.abs(change)))
     values = [
         f"{n.split('.', 1)[1]} = {v:.3g} {p.unit}".rstrip()
-        for n, v, p in zip(after.names, after.mode, after.target.oscillator.layout.parameters, strict=True)
+        for n, v, p in zip(
+            after.names, after.mode, after.target.oscillator.layout.parameters, strict=True
+        )
         if n.startswith(effect.id + ".")
     ]
     return ", ".join(values[:4]) or f"{1e6 * reach:.2g} um of trajectory", reach / scales.amplitude
 
 
 def parameter_shifts(before: Fit, after: Fit) -> dict[str, float]:
-    """Shift of the shared parameters that the added physics undid, in standard deviations of the base fit."""
+    """Shifts of shared parameters that the added physics undid, in the base fit's deviations."""
     new = dict(zip(after.names, after.mode, strict=True))
     physical = before.target.oscillator.layout.roles("physical")
     return {
@@ -63,23 +65,28 @@ def summary(
 ) -> str:
     """One paragraph."""
     if verdict == "adequate":
-        return f"Nothing is missing: the base model describes the recordings down to the noise. {detectable}"
+        found = "Nothing is missing: the base model describes the recordings down to the noise."
+        return f"{found} {detectable}".strip()
     assert location is not None
     place = _REGIMES[location.regime]
     stiffness = [name for name in shifts if name.startswith("k2")] or list(shifts)
     worst = max(stiffness, key=lambda n: abs(shifts[n]), default="")
-    cost = f" It had moved {worst} by {abs(shifts[worst]):.1f} of its standard deviations." if worst else ""
+    cost = (
+        f" It had moved {worst} by {abs(shifts[worst]):.1f} of its standard deviations."
+        if worst
+        else ""
+    )
     if verdict == "unknown":
         low, high = (1e3 * x for x in location.displacement)
         return (
-            f"Something is missing that the catalogue does not hold. It acts {place}, mostly between "
-            f"{low:.2f} and {high:.2f} mm, with {location.force_rms:.2g} N rms.{cost}"
+            f"Something is missing that the catalogue does not hold. It acts {place}, mostly "
+            f"between {low:.2f} and {high:.2f} mm, with {location.force_rms:.2g} N rms.{cost}"
         )
     titles = " and ".join(e.title for e in effects)
     if verdict == "ambiguous":
         others = ", ".join(alternatives)
         return (
-            f"Something is missing {place}; the likeliest is {titles}, but the recordings cannot tell it "
-            f"from {others}.{cost}"
+            f"Something is missing {place}; the likeliest is {titles}, but the recordings cannot "
+            f"tell it from {others}.{cost}"
         )
     return f"The base model leaves out {titles}, {place}. {' '.join(statements)}{cost}"

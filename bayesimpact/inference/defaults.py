@@ -1,4 +1,4 @@
-"""Default priors: wide, scaled by what the recordings show at a glance, the same for every model of a campaign.
+"""Default priors: wide, scaled by what the recordings show, the same for every model of a campaign.
 
 | parameter | default prior |
 |---|---|
@@ -8,8 +8,8 @@
 | g, y0, offset | uniform, +- 20 times the largest displacement |
 | v0 | uniform, +- 20 times the largest speed |
 | k2 | uniform, 0 to 1000 times the larger of the quick estimates of k1 and k2 |
-| sigma | log-uniform over eight decades about the estimate; log-normal, 10 %, where campaign.toml states the noise |
-| added effects | half-normal (normal where both signs are admissible) of a physical scale, log-normal for shapes |
+| sigma | log-uniform, eight decades about the estimate; log-normal, 10 %, about a stated noise |
+| added effects | half-normal (normal with both signs) of a physical scale, log-normal for shapes |
 
 Campaign.toml's [priors] replace any of them.
 """
@@ -40,7 +40,7 @@ SHAPE_WIDTH = 1.5  # of the log-normal prior of a depth, a time constant, a freq
 def default_priors(
     oscillator: Oscillator, estimates: Estimates, noise: Noise, scales: Scales | None = None
 ) -> Priors:
-    """One prior per parameter, in the order of the layout; `scales` are needed for added effects."""
+    """One prior per parameter in the order of the layout; added effects need `scales`."""
     campaign = oscillator.campaign
     return Priors(
         tuple(

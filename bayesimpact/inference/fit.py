@@ -1,11 +1,12 @@
-"""The mode of a posterior and its curvature: Levenberg-Marquardt on whitened residuals, noise level profiled out.
+"""The mode of a posterior and its curvature: Levenberg-Marquardt with the noise level profiled out.
 
 For a given motion the best noise level has a one-dimensional optimum, so the search runs on
 
-    f(theta) = sum_r [ n_r log sigma_r + S_r(theta) / (2 sigma_r^2) ] - log prior,   sigma at its optimum,
+    f(theta) = sum_r [ n_r log sigma_r + S_r(theta) / (2 sigma_r^2) ] - log prior,   sigma at its
+    optimum,
 
-whose Gauss-Newton matrix is J'J / sigma^2 plus the priors' curvature (Levenberg 1944; Marquardt 1963). Raw sums
-of squares would span nine decades; f spans a few thousand nats.
+whose Gauss-Newton matrix is J'J / sigma^2 plus the priors' curvature (Levenberg 1944; Marquardt
+1963). Raw sums of squares would span nine decades; f spans a few thousand nats.
 """
 
 from __future__ import annotations
@@ -86,7 +87,7 @@ class Fit:
 
     @property
     def reduced_chi2(self) -> float:
-        """Misfit against the noise level that was estimated from the recordings alone, per degree of freedom."""
+        """Misfit per degree of freedom against the noise level estimated from recordings alone."""
         likelihood = self.target.likelihood
         freedom = float(likelihood.sizes.sum()) - (self.mode.size - 1)
         return float(self.sums.sum() / likelihood.noise.level**2 / freedom)
@@ -112,7 +113,7 @@ class Fit:
 def normal_equations(
     linearisation: tuple[Linearisation, ...], sigma: Array, size: int
 ) -> tuple[Array, Array]:
-    """J'J / sigma^2 (size, size) and J'r / sigma^2 (size,), summed over recordings with noise `sigma` (R,)."""
+    """J'J / sigma^2 (size, size) and J'r / sigma^2 (size,), summed; noise levels `sigma` (R,)."""
     matrix, vector = np.zeros((size, size)), np.zeros(size)
     for part, level in zip(linearisation, sigma, strict=True):
         scaled = part.jacobian / level
@@ -132,21 +133,21 @@ def find_mode(
     """Climb from `start` (d,) to the nearest mode.
 
     `steps` (d,) are difference steps for models without exact derivatives; they are refreshed to a
-    twentieth of the standard deviations as these become known. The noise levels in `start` are ignored.
-    Stops when a step is below `tolerance` standard deviations.
+    twentieth of the standard deviations as these become known. The noise levels in `start` are
+    ignored. Stops when a step is below `tolerance` standard deviations.
     """
     climb = _Climb(target, steps)
     theta, value, sums = climb.evaluate(start)
     damping, converged, iterations = 1e-3, False, 0
     while iterations < max_iterations and not converged:
         iterations += 1
-        linearisation, matrix, vector = climb.linear(theta)
+        _, matrix, vector = climb.linear(theta)
         if not (np.isfinite(matrix).all() and np.isfinite(vector).all()):
             break
         for _ in range(12):
             step = climb.step(theta, matrix, vector, damping)
             trial, trial_value, trial_sums = climb.evaluate(theta + step)
-            size = float(np.sqrt(max(step @ matrix @ step, 0.0)))
+            size = float(np.sqrt(np.maximum(step @ matrix @ step, 0.0)))
             if trial_value <= value:
                 theta, value, sums = trial, trial_value, trial_sums
                 damping = max(damping * 0.1, 1e-12)
@@ -174,7 +175,7 @@ class _Climb:
         self.upper = np.minimum(target.priors.upper, physical[:, 1])
 
     def evaluate(self, theta: Array) -> tuple[Array, float, Array]:
-        """Theta moved inside its bounds with the best noise levels, f there, sums of squares (R,)."""
+        """Theta moved inside its bounds, with the best noise levels; f there; sums of squares."""
         theta = np.clip(theta, self.lower, self.upper)
         sums = self.target.likelihood.misfit(theta)[0]
         if not np.isfinite(sums).all():
@@ -194,7 +195,9 @@ class _Climb:
         likelihood, priors = self.target.likelihood, self.target.priors
         parts = likelihood.linearise(theta, self.steps)
         matrix, vector = normal_equations(parts, theta[likelihood.sigma_columns], theta.size)
-        matrix -= np.diag(np.where(np.isin(np.arange(theta.size), self.noise), 0, priors.hessian(theta)))
+        matrix -= np.diag(
+            np.where(np.isin(np.arange(theta.size), self.noise), 0, priors.hessian(theta))
+        )
         vector += priors.gradient(theta)
         if self.steps is not None and np.isfinite(matrix).all():
             known = np.diag(matrix)[self.moving] > 0
@@ -236,13 +239,11 @@ class _Climb:
             information = 3 * sums[mine].sum() / level**4 - sizes[mine].sum() / level**2
             prior = self.target.priors.hessian(theta)[column]
             matrix[column, column] = max(information - prior, sizes[mine].sum() / level**2)
-        return Fit(
-            self.target, theta, inverse(matrix), -value, sums, converged, iterations, parts
-        )
+        return Fit(self.target, theta, inverse(matrix), -value, sums, converged, iterations, parts)
 
 
 def best_sigma(target: Target, sums: Array) -> Array:
-    """Noise levels (one per noise parameter) that maximise the posterior for sums of squares (R,), m."""
+    """Noise levels, one per noise parameter, m, that maximise the posterior for `sums` (R,)."""
     likelihood, layout = target.likelihood, target.oscillator.layout
     result = []
     for column in layout.roles("noise"):
@@ -250,7 +251,7 @@ def best_sigma(target: Target, sums: Array) -> Array:
         n, s = likelihood.sizes[mine].sum(), max(float(sums[mine].sum()), 1e-300)
         prior = target.priors.parameters[column]
         log_sigma = 0.5 * np.log(s / n)
-        for _ in range(20):  # Newton in log sigma; the likelihood dominates, so it converges at once
+        for _ in range(20):  # Newton in log sigma
             sigma = np.exp(log_sigma)
             slope = -n + s / sigma**2
             bend = -2 * s / sigma**2

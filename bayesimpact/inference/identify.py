@@ -1,9 +1,10 @@
-"""From recordings to the mode of the base model: guess, global search on a short window, growing windows, polish.
+"""From recordings to the mode: guess, global search on a short window, growing windows, polish.
 
-Long recordings are phase-locked: the misfit has side minima in k1, one per lost cycle. The global search
-(differential evolution with the Metropolis criterion) therefore sees only the first cycles, where there are
-few; its winner and the quick guess are then carried to the full length over windows that double, each a
-least-squares polish with exact derivatives. Both ends are compared, so that a search that failed shows.
+Long recordings are phase-locked: the misfit has side minima in k1, one per lost cycle. The global
+search (differential evolution with the Metropolis criterion) therefore sees only the first cycles,
+where there are few; its winner and the quick guess are then carried to the full length over windows
+that double, each a least-squares polish with exact derivatives. Both ends are compared, so that a
+search that failed shows.
 """
 
 from __future__ import annotations
@@ -149,9 +150,9 @@ def global_search(
     """Differential evolution on the physical parameters over the first cycles.
 
     Bounds are the guess divided and multiplied by `factor` (for the gap: the guess plus and minus
-    `factor` times its size, at least a tenth of the motion). Initial conditions and rest readings are not
-    searched: for every candidate they take the values of two Gauss-Newton steps. Returns the search and
-    the full parameter vector (d,) of its winner.
+    `factor` times its size, at least a tenth of the motion). Initial conditions and rest readings
+    are not searched: for every candidate they take the values of two Gauss-Newton steps. Returns
+    the search and the full parameter vector (d,) of its winner.
     """
     k1 = float(guess[oscillator.layout.index("k1")])
     duration = SEARCH_CYCLES * 2 * np.pi / np.sqrt(k1 / oscillator.campaign.mass)
@@ -159,7 +160,12 @@ def global_search(
     lower, upper = profile.bounds(factor)
     lower = np.maximum(lower, profile.encode(np.maximum(priors.lower, _tiny(guess)), lower))
     result = metropolis_differential_evolution(
-        profile, lower, upper, rng=rng, evaluations=evaluations or 600 * lower.size, callback=callback
+        profile,
+        lower,
+        upper,
+        rng=rng,
+        evaluations=evaluations or 600 * lower.size,
+        callback=callback,
     )
     return result, profile.complete(result.best[None])[0]
 
@@ -169,7 +175,7 @@ def _tiny(guess: Array) -> Array:
 
 
 class _Profile:
-    """Profiled objective (N / 2) log S of the physical parameters, nuisances eliminated per recording."""
+    """Profiled objective (N / 2) log S of the physical parameters, nuisances eliminated."""
 
     def __init__(self, oscillator: Oscillator, guess: Array, duration: float) -> None:
         layout = oscillator.layout
@@ -197,7 +203,7 @@ class _Profile:
         return np.where(np.isfinite(coded), coded, otherwise)
 
     def complete(self, x: Array) -> Array:
-        """Full parameter vectors (B, d) for search coordinates (B, p), nuisances at their conditional best."""
+        """Parameter vectors (B, d) for search coordinates (B, p), nuisances at their best."""
         return self._solve(x)[0]
 
     def __call__(self, x: Array) -> Array:
@@ -213,7 +219,11 @@ class _Profile:
         best, lowest = theta, np.full(x.shape[0], np.inf)
         for last in (False, False, True):
             matrices = None if last else self._grams(theta)
-            sums = self._sums(theta) if matrices is None else matrices[..., _RESIDUAL, _RESIDUAL].sum(axis=1)
+            sums = (
+                self._sums(theta)
+                if matrices is None
+                else matrices[..., _RESIDUAL, _RESIDUAL].sum(axis=1)
+            )
             better = sums < lowest
             best = np.where(better[:, None], theta, best)
             lowest = np.where(better, sums, lowest)
@@ -224,16 +234,16 @@ class _Profile:
     def _sums(self, theta: Array) -> Array:
         s = self.short
         sums, _ = sums_of_squares(
-            np.ascontiguousarray(theta), self.columns, self.constants, s.campaign.mass, s.samples, s.starts,
-            s.counts, s.intervals,
+            np.ascontiguousarray(theta), self.columns, self.constants, s.campaign.mass, s.samples,
+            s.starts, s.counts, s.intervals,
         )  # fmt: skip
         return np.asarray(sums.sum(axis=1))
 
     def _grams(self, theta: Array) -> Array:
         s = self.short
         matrices, codes = grams(
-            np.ascontiguousarray(theta), self.columns, self.constants, s.campaign.mass, s.samples, s.starts,
-            s.counts, s.intervals,
+            np.ascontiguousarray(theta), self.columns, self.constants, s.campaign.mass, s.samples,
+            s.starts, s.counts, s.intervals,
         )  # fmt: skip
         failed = (codes != 0) | ~np.isfinite(matrices).all(axis=(2, 3))
         matrices[failed] = np.eye(matrices.shape[-1]) * 1e300

@@ -72,7 +72,7 @@ class Likelihood:
         return np.resize(positions, self.oscillator.counts.size)
 
     def misfit(self, theta: Array) -> Array:
-        """Sums of squares of the whitened residuals, (B, R), m2; inf where the parameters are inadmissible."""
+        """Sums of squares of the whitened residuals, (B, R), m2; inf where inadmissible."""
         o = self.oscillator
         theta = np.ascontiguousarray(np.atleast_2d(theta))
         if o.is_plain and self.noise.is_white:
@@ -80,7 +80,14 @@ class Likelihood:
             columns = np.ascontiguousarray(o.layout.columns[:, base])
             constants = np.ascontiguousarray(o.layout.constants[:, base])
             sums, _ = sums_of_squares(
-                theta, columns, constants, o.campaign.mass, o.samples, o.starts, o.counts, o.intervals
+                theta,
+                columns,
+                constants,
+                o.campaign.mass,
+                o.samples,
+                o.starts,
+                o.counts,
+                o.intervals,
             )
             return np.asarray(sums)
         sums = np.empty((theta.shape[0], o.counts.size))
@@ -117,8 +124,9 @@ class Likelihood:
     def linearise(self, theta: Array, steps: Array | None = None) -> tuple[Linearisation, ...]:
         """Whitened residual and Jacobian of every recording at `theta` (d,).
 
-        Derivatives are exact (through the events) for the base oscillator and central differences with
-        `steps` (d,) otherwise; `steps` should be a small fraction of the posterior's standard deviations.
+        Derivatives are exact (through the events) for the base oscillator and central differences
+        with `steps` (d,) otherwise; `steps` should be a small fraction of the posterior's standard
+        deviations.
         """
         if self.oscillator.is_base and not self.oscillator.sensors:
             return self._exact(theta)

@@ -1,13 +1,14 @@
-"""Noise models as whitening operators: they turn a residual into independent numbers of equal variance.
+"""Noise models as whitening operators: a residual becomes independent numbers of equal variance.
 
-Whitening is linear, so residuals and derivatives pass through the same operator and every later stage
-(least squares, likelihood, scores) sees white noise. Three kinds:
+Whitening is linear, so residuals and derivatives pass through the same operator and every later
+stage (least squares, likelihood, scores) sees white noise. Three kinds:
 
 - white: nothing to do;
 - AR(1): exact in the time domain;
-- band: the recordings were smoothed. What the filter suppressed carries rounding and model error but no
-  information, and its covariance has no inverse; so only the Fourier coefficients below the filter's
-  half-power frequency are used, each divided by what the filter left of the noise (Whittle 1953).
+- band: the recordings were smoothed. What the filter suppressed carries rounding and model error,
+  no information, and its covariance has no inverse; so only the Fourier coefficients below the
+  filter's half-power frequency are used, each divided by what the filter left of the noise (Whittle
+  1953).
 """
 
 from __future__ import annotations
@@ -74,7 +75,7 @@ class Noise:
         return 2 * (self._band_size(n, interval) - 1) + 1
 
     def log_volume(self, n: int, interval: float) -> float:
-        """Log determinant of the whitening operator (0 for the band, where it is a fixed constant)."""
+        """Log determinant of the whitening operator (0 for the band: there it is a constant)."""
         if self.smoothing is not None:
             return 0.0
         return -0.5 * (n - 1) * float(np.log1p(-(self.correlation**2)))
@@ -99,7 +100,7 @@ class Noise:
 
     def _spectrum(self, n: int, interval: float) -> Array:
         inner = self._interior(n, interval)
-        frequency = np.fft.rfftfreq(inner.stop - inner.start, interval)
+        frequency: Array = np.fft.rfftfreq(inner.stop - inner.start, interval).astype(np.float64)
         filtered = gain(self.smoothing, interval, frequency) ** 2
         beyond = np.flatnonzero(filtered < 0.5)
         frequency = frequency[: beyond[0]] if beyond.size else frequency[:-1]
@@ -119,4 +120,6 @@ class Noise:
         coefficients = rfft(inner, axis=-1)[..., : spectrum.size]
         coefficients = coefficients / np.sqrt(0.5 * inner.shape[-1] * spectrum)
         head = coefficients[..., :1].real / np.sqrt(2.0)
-        return np.concatenate([head, coefficients[..., 1:].real, coefficients[..., 1:].imag], axis=-1)
+        return np.concatenate(
+            [head, coefficients[..., 1:].real, coefficients[..., 1:].imag], axis=-1
+        )

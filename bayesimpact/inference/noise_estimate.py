@@ -1,9 +1,9 @@
 """Noise level and colour from the recordings alone, before any model of the oscillator is believed.
 
-A recording is cut into windows so short that any oscillation is a polynomial of degree five in them; what
-the polynomials leave is noise. Level and correlation maximise the likelihood of exactly these remainders
-(restricted maximum likelihood, Patterson and Thompson 1971), so no degrees of freedom are counted twice.
-Windows that a kink of an impact disturbs stand out and are left aside.
+A recording is cut into windows so short that any oscillation is a polynomial of degree five in
+them; what the polynomials leave is noise. Level and correlation maximise the likelihood of exactly
+these remainders (restricted maximum likelihood, Patterson and Thompson 1971), so no degrees of
+freedom are counted twice. Windows that a kink of an impact disturbs stand out and are left aside.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ class _Remainder:
 def estimate_noise(campaign: Campaign) -> Noise:
     """Level and AR(1) correlation of the raw noise, pooled over recordings.
 
-    For recordings that were smoothed the remainders say what the filter left; the raw level is scaled up
-    by the filter's power (see `smoothed_level`).
+    For recordings that were smoothed the remainders say what the filter left; the raw level is
+    scaled up by the filter's power (see `smoothed_level`).
     """
     known, smoothing = campaign.measurement.noise, campaign.measurement.smoothing
     if smoothing is not None:
@@ -95,21 +95,25 @@ def _restricted_ml(remainder: _Remainder) -> Noise:
     kept = values
     for _ in range(3):  # outlier test and estimate in turn
         kept = values[_undisturbed(values, _covariance(remainder.basis, rho))]
-        found = minimize_scalar(
-            lambda x: -_log_likelihood(kept, _covariance(remainder.basis, x)),
-            bounds=(-0.6, 0.98),
-            method="bounded",
-        )
-        rho = float(found.x)
+        rho, best = _best_correlation(kept, remainder.basis)
     white = _log_likelihood(kept, np.eye(kept.shape[1]))
     step = 0.01
     bend = [_log_likelihood(kept, _covariance(remainder.basis, rho + d)) for d in (-step, 0, step)]
     error = step / np.sqrt(max(2 * bend[1] - bend[0] - bend[2], 1e-12))
-    if -found.fun - white < LEAST_GAIN or abs(rho) < LEAST_CORRELATION:
+    if best - white < LEAST_GAIN or abs(rho) < LEAST_CORRELATION:
         rho = 0.0
     level = np.sqrt(_variance(kept, _covariance(remainder.basis, rho)))
     relative = np.sqrt(0.5 / kept.size)
     return Noise(rho, None, float(level), float(relative), float(error), "polynomial remainders")
+
+
+def _best_correlation(values: Array, basis: Array) -> tuple[float, float]:
+    found = minimize_scalar(
+        lambda rho: -_log_likelihood(values, _covariance(basis, rho)),
+        bounds=(-0.6, 0.98),
+        method="bounded",
+    )
+    return float(found.x), -float(found.fun)
 
 
 def _covariance(basis: Array, rho: float) -> Array:

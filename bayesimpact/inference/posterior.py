@@ -42,11 +42,11 @@ class Posterior:
     @cached_property
     def draws(self) -> Array:
         """All kept draws, (S, d)."""
-        return self.chains.draws.reshape(-1, self.chains.draws.shape[-1])
+        return np.asarray(self.chains.draws.reshape(-1, self.chains.draws.shape[-1]))
 
     def column(self, name: str) -> Array:
         """Draws of one parameter, (S,)."""
-        return self.draws[:, self.fit.target.oscillator.layout.index(name)]
+        return np.asarray(self.draws[:, self.fit.target.oscillator.layout.index(name)])
 
     def interval(self, name: str, probability: float = 0.9) -> tuple[float, float]:
         """Central credible interval of one parameter."""
@@ -60,7 +60,7 @@ class Posterior:
         return self.draws[rng.choice(size, size=min(count, size), replace=False)]
 
     def predictive(self, r: int, count: int, rng: np.random.Generator) -> Array:
-        """Simulated recordings `r`, (count, n), m: posterior draws with fresh noise, as the probe would read them."""
+        """Simulated recordings `r`, (count, n), m: posterior draws with fresh noise, as read."""
         likelihood = self.fit.target.likelihood
         oscillator, noise = likelihood.oscillator, likelihood.noise
         theta = self.thinned(count, rng)

@@ -14,8 +14,8 @@ Array = NDArray[np.float64]
 def smooth(samples: Array, smoothing: Smoothing | None, interval: float) -> Array:
     """Samples (..., n) after the filter; the ends as the chain treats them.
 
-    Savitzky-Golay: polynomial fits of the end windows (Savitzky and Golay 1964). Lag: exact first-order
-    low pass of a staircase signal, started at rest on the first sample.
+    Savitzky-Golay: polynomial fits of the end windows (Savitzky and Golay 1964). Lag: exact
+    first-order low pass of a staircase signal, started at rest on the first sample.
     """
     if smoothing is None:
         return samples
@@ -45,7 +45,7 @@ def gain(smoothing: Smoothing | None, interval: float, frequency: Array) -> Arra
 
 
 def edge(smoothing: Smoothing | None, interval: float) -> int:
-    """Samples at the start of a recording (and, for Savitzky-Golay, at its end) that the filter treats differently."""
+    """Samples at an end of a recording that the filter treats differently."""
     if smoothing is None:
         return 0
     if smoothing.kind == "savgol":

@@ -1,4 +1,4 @@
-"""Many trajectories in one compiled call: one row per slot vector, whatever recording it belongs to."""
+"""Many trajectories in one compiled call: one row per slot vector, whatever its recording."""
 
 from __future__ import annotations
 

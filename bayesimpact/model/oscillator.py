@@ -1,7 +1,7 @@
-"""A campaign under a model: from parameter vectors to what the probe would have read, and derivatives.
+"""A campaign under a model: from parameter vectors to what the probe would have read.
 
-Without added forces the exact closed-form simulator runs; with them the general one. Either way the chain
-of measurement (sensor effects, rest offset, smoothing) follows.
+Without added forces the exact closed-form simulator runs; with them the general one. Either way the
+chain of measurement (sensor effects, rest offset, smoothing) follows.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ class Oscillator:
 
     @property
     def is_plain(self) -> bool:
-        """True when predictions are the base simulator's plus the offset: nothing between it and the data."""
+        """True when predictions are the base simulator's plus the offset, and nothing else."""
         return self.is_base and not self.sensors and self.smoothing is None
 
     def predict(self, theta: Array) -> tuple[Array, ...]:
@@ -121,7 +121,7 @@ class Oscillator:
         """
         flat = np.atleast_2d(theta)
         recordings = np.arange(self.counts.size)
-        motions = self._motions(np.tile(recordings, flat.shape[0]), self.layout.slots(flat))
+        motions = self.motions_of(np.tile(recordings, flat.shape[0]), self.layout.slots(flat))
         rows = motions.reshape(flat.shape[0], recordings.size, -1)
         predicted = [
             self._read(r, rows[:, r, : self.counts[r]], flat) for r in range(recordings.size)
@@ -131,7 +131,7 @@ class Oscillator:
     def predict_recording(self, r: int, theta: Array) -> Array:
         """Readings of recording `r`, (B, n), for parameter vectors (B, d)."""
         q = self.layout.slots(theta)[:, r : r + 1]
-        return self._read(r, self._motions(np.full(theta.shape[0], r), q), theta)
+        return self._read(r, self.motions_of(np.full(theta.shape[0], r), q), theta)
 
     def _read(self, r: int, motion: Array, theta: Array) -> Array:
         """Sensor, rest offset and filter on true displacements (B, n) of recording `r`."""
@@ -140,14 +140,18 @@ class Oscillator:
             assert effect.observe is not None
             motion = effect.observe(motion, times, theta[:, positions[r]])
         offset = self.layout.slots(theta)[:, r, _OFFSET]
-        return measurement.smooth(motion + offset[:, None], self.smoothing, float(self.intervals[r]))
+        return measurement.smooth(
+            motion + offset[:, None], self.smoothing, float(self.intervals[r])
+        )
 
-    def _motions(self, recordings: NDArray[np.int64], slots: Array) -> Array:
-        """True displacements, one row per recording index and slot vector (K in all), m; NaN where it fails."""
+    def motions_of(self, recordings: NDArray[np.int64], slots: Array) -> Array:
+        """True displacements, m, a row per recording index and slot vector; NaN where it fails."""
         q = np.ascontiguousarray(slots.reshape(recordings.size, -1))
         if self.is_base:
             base = np.ascontiguousarray(q[:, : len(BASE_SLOTS)])
-            return motions(base, self.campaign.mass, self.counts[recordings], self.intervals[recordings])
+            return motions(
+                base, self.campaign.mass, self.counts[recordings], self.intervals[recordings]
+            )
         return general_motions(
             q, self.campaign.mass, self.counts[recordings], self.intervals[recordings], self.laws
         )

@@ -1,9 +1,9 @@
-"""Names, units and bounds of all unknowns, and where each of them enters each recording's simulation.
+"""Names, units and bounds of all unknowns, and where each enters each recording's simulation.
 
 The unknowns of a campaign form one vector theta. A recording is simulated from a short vector q of
-*slots* (`SLOTS`, then the parameters of the force laws). `columns[r, i]` says which element of theta
-feeds slot i of recording r; -1 takes `constants[r, i]`. A damping per obstacle or a gap per recording is
-nothing but another column.
+*slots* (`SLOTS`, then the parameters of the force laws). `columns[r, i]` says which element of
+theta feeds slot i of recording r; -1 takes `constants[r, i]`. A damping per obstacle or a gap per
+recording is nothing but another column.
 """
 
 from __future__ import annotations
@@ -89,8 +89,8 @@ def build_layout(
 ) -> Layout:
     """Unknowns of `campaign` under the base model with `effects` added.
 
-    Raises `InputError` when two effects claim the same slot or an effect needs an obstacle and there is
-    none.
+    Raises `InputError` when two effects claim the same slot or an effect needs an obstacle and
+    there is none.
     """
     binds = _binds(campaign, effects)
     table: list[Parameter] = []
