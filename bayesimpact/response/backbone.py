@@ -95,8 +95,8 @@ def backbone(
     samples : (n,) displacement in m or angle in rad
     interval : sampling interval, s
     rest : reading at rest; None estimates it from the recording
-    average : order N of the moving average over frequencies and times (Eq. 2); the amplitude is then
-        the envelope, straight between the extremes, at the averaged time (Eq. 3)
+    average : order N of the moving average over frequencies and times (Eq. 2); the amplitude is
+        then the envelope, straight between the extremes, at the averaged time (Eq. 3)
     noise : standard deviation of the noise, in the unit of the samples; None estimates it. Swings
         below six times this are not used
     estimator, damping : see above
@@ -107,7 +107,7 @@ def backbone(
 
     Raises
     ------
-    InputError : samples not finite or fewer than 16, interval or noise not positive, average below 1
+    InputError : samples not finite or fewer than 16; interval, noise or average out of range
     """
     signal = _checked(samples, interval, average, noise)
     period = rough_period(signal)

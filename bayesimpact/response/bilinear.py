@@ -1,7 +1,8 @@
 """The undamped oscillator with a one-sided linear stop: its backbone in closed form.
 
-Free motion is a piece of a circle in the phase plane (scaled by the free frequency), contact a piece of another one about the
-equilibrium with the stop. The times on both follow from arcs; no approximation.
+Free motion is an arc in the phase plane (velocity scaled by the free frequency), contact an arc of
+another circle, about the equilibrium with the stop. The times on both follow from their angles; no
+approximation.
 """
 
 from __future__ import annotations

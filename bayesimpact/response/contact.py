@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from bayesimpact.response.cycles import cycle
+from bayesimpact.response.squares import Minimum, least
 
 Floats = NDArray[np.float64]
 
@@ -29,10 +29,10 @@ CYCLES_IN_GRID = 16
 class Cycles:
     """Observed cycles from lower turning point to lower turning point, (n,) each, SI.
 
-    `depth`, `after`: depth below rest at the start and end; `length`: time between; `height`: highest
-    displacement between; `sd_length`, `sd_ratio`, `sd_height`: standard deviations of the length, of
-    ln(after / depth) and of the height; `slope`: change of the rest reading per relative change of the
-    free frequency; `case`: index of the obstacle.
+    `depth`, `after`: depth below rest at the start and end; `length`: time between; `height`:
+    highest displacement between; `sd_length`, `sd_ratio`, `sd_height`: standard deviations of the
+    length, of ln(after / depth) and of the height; `slope`: change of the rest reading per relative
+    change of the free frequency; `case`: index of the obstacle.
     """
 
     depth: Floats
@@ -44,6 +44,13 @@ class Cycles:
     sd_height: Floats
     slope: Floats
     case: NDArray[np.intp]
+
+    @staticmethod
+    def from_table(table: Floats) -> Cycles:
+        """From an (n, 9) table, columns in the order of the fields."""
+        depth, after, length, height, sd_length, sd_ratio, sd_height, slope, case = table.T
+        whole = case.astype(np.intp)
+        return Cycles(depth, after, length, height, sd_length, sd_ratio, sd_height, slope, whole)
 
     def take(self, rows: NDArray[np.intp]) -> Cycles:
         """The cycles with these indices."""
@@ -99,7 +106,9 @@ class Free:
     sd_k1: float
 
 
-def fit_contact(cycles: Cycles, free: Free, cases: int) -> Contact | None:
+def fit_contact(
+    cycles: Cycles, free: Free, cases: int, start: Contact | None = None
+) -> Contact | None:
     """Estimate the stop.
 
     Parameters
@@ -108,29 +117,25 @@ def fit_contact(cycles: Cycles, free: Free, cases: int) -> Contact | None:
     free : the free oscillator; it is refined within its standard errors, because where no swing is
         free the cycles tell c1 and c2 apart better than the flights do
     cases : number of obstacles
+    start : an earlier estimate to start from; None looks on a grid
 
     Returns
     -------
     The estimates, or None when the cycles look no different with a stop than without.
     """
     scale = float(cycles.depth.max())
-    starts = _grid(cycles, free, cases, scale)
-    best = None
-    for start in starts:
-        found = least_squares(
-            lambda x: _residuals(x, cycles, free, scale),
-            start,
-            bounds=_bounds(cases, scale, cycles, free),
-            loss="soft_l1",
-            f_scale=3.0,
-            x_scale=_steps(cases),
-            max_nfev=60,
-        )
-        if best is None or found.cost < best.cost:
-            best = found
+    starts = _grid(cycles, free, cases, scale) if start is None else [_point(start, scale)]
+    best = least(
+        lambda x: _residuals(x, cycles, free, scale),
+        starts,
+        scale=np.concatenate([[0.05, 0.3, 1.0, 1.0], np.full(cases, 0.2)]),
+        bounds=_bounds(cases, scale, cycles, free),
+        robust=3.0,
+        evaluations=60,
+    )
     without = _free_misfit(cycles, free)
     # Three more unknowns than without a stop; 5 each is far beyond chance.
-    if best is None or np.sum(np.minimum(best.fun**2, 100.0)) > without - 15.0:
+    if capped(best.residuals) > without - 15.0:
         return None
     return _contact(best, cycles, free, cases, scale)
 
@@ -164,6 +169,16 @@ def misfits(cycles: Cycles, length: Floats, depth: Floats, height: Floats) -> Fl
     return np.clip(np.nan_to_num(rows, nan=1e4, posinf=1e4, neginf=-1e4), -1e4, 1e4)
 
 
+def capped(rows: Floats) -> float:
+    """Sum of squares in which no single misfit counts more than a hundred."""
+    return float(np.sum(np.minimum(rows**2, 100.0)))
+
+
+def typical_variance(rows: Floats) -> float:
+    """Variance of misfits from their median square (0.455 for unit variance); 1 at least."""
+    return max(1.0, float(np.median(rows**2)) / 0.455)
+
+
 def _free_misfit(cycles: Cycles, free: Free) -> float:
     """Misfit of free cycles, the decay rate fitted to their depths."""
     shortfall = np.log(cycles.depth / cycles.after) * free.k1**0.5 / np.pi * free.mass**0.5
@@ -172,7 +187,7 @@ def _free_misfit(cycles: Cycles, free: Free) -> float:
     for c1 in (free.c1, for_c1):
         end = cycle(cycles.depth, free.mass, c1, free.k1, 0.0, np.inf, 0.0)
         rows = misfits(cycles, end.length, end.depth, end.height)
-        sums.append(float(np.sum(np.minimum(rows**2, 100.0))))
+        sums.append(capped(rows))
     return min(sums)
 
 
@@ -180,7 +195,9 @@ def _grid(cycles: Cycles, free: Free, cases: int, scale: float) -> list[Floats]:
     """The best starting points of a coarse grid, at up to three gaps."""
     # Below zero as well: a gap of nothing must not sit at the edge of the grid.
     highest = max(float(cycles.height.max()), 0.02 * scale)
-    gaps = np.concatenate([scale * np.array([-0.3, -0.1, -0.03]), np.linspace(0.0, highest, GAP_STEPS)[:-1]])
+    gaps = np.concatenate(
+        [scale * np.array([-0.3, -0.1, -0.03]), np.linspace(0.0, highest, GAP_STEPS)[:-1]]
+    )
     cost = np.zeros(gaps.size)
     choice = np.zeros((gaps.size, cases, 2))
     for case in range(cases):
@@ -214,9 +231,13 @@ def _grid(cycles: Cycles, free: Free, cases: int, scale: float) -> list[Floats]:
     for row in np.argsort(cost)[:3]:
         damping = float(np.nanmedian(choice[row, :, 1]))
         starts.append(np.concatenate([[gaps[row] / scale, damping, 0.0, 0.0], choice[row, :, 0]]))
-    low, high = _bounds(cases, scale, cycles, free)
-    margin = 1e-6 * (high - low)
-    return [np.clip(start, low + margin, high - margin) for start in starts]
+    return starts
+
+
+def _point(contact: Contact, scale: float) -> Floats:
+    """The point of the search that an estimate stands for."""
+    k2 = np.log(contact.k2 / contact.k1)
+    return np.concatenate([[contact.g / scale, np.log(contact.c2), 0.0, 0.0], k2])
 
 
 def _bounds(cases: int, scale: float, cycles: Cycles, free: Free) -> tuple[Floats, Floats]:
@@ -227,19 +248,11 @@ def _bounds(cases: int, scale: float, cycles: Cycles, free: Free) -> tuple[Float
     return low, high
 
 
-def _steps(cases: int) -> Floats:
-    return np.concatenate([[0.05, 0.3, 1.0, 1.0], np.full(cases, 0.2)])
-
-
-def _contact(found: object, cycles: Cycles, free: Free, cases: int, scale: float) -> Contact:
-    x, jac, fun = np.asarray(found.x), np.asarray(found.jac), np.asarray(found.fun)  # type: ignore[attr-defined]
-    g, c2, k2, c1, k1 = _unpack(x, free, scale)
+def _contact(best: Minimum, cycles: Cycles, free: Free, cases: int, scale: float) -> Contact:
+    g, c2, k2, c1, k1 = _unpack(best.x, free, scale)
     end = cycle(cycles.depth, free.mass, c1, k1, c2, g, k2[cycles.case])
     touched = np.array([bool(end.impact[cycles.case == case].any()) for case in range(cases)])
-    variance = max(1.0, float(np.median(fun**2)) / 0.455)
-    # A direction the data do not fix has no column in the Jacobian: give it a large, finite sd.
-    covariance = np.linalg.inv(jac.T @ jac / variance + np.eye(x.size) * 1e-4)
-    sd = np.sqrt(np.diag(covariance))
+    sd = best.spread(typical_variance(best.residuals), 1e-4)
     return Contact(
         g=g,
         c2=c2,

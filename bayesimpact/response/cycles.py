@@ -35,7 +35,13 @@ class CycleEnd:
 
 
 def cycle(
-    depth: Floats, mass: float, c1: ArrayLike, k1: ArrayLike, c2: ArrayLike, g: ArrayLike, k2: ArrayLike
+    depth: Floats,
+    mass: float,
+    c1: ArrayLike,
+    k1: ArrayLike,
+    c2: ArrayLike,
+    g: ArrayLike,
+    k2: ArrayLike,
 ) -> CycleEnd:
     """Follow cycles of m y'' + c1 y' + k1 y + [c2 y' + k2 (y - g)] H(y - g) = 0 from y = -depth.
 

@@ -105,7 +105,8 @@ def estimate(campaign: Campaign) -> Estimates:
         for _ in range(2):
             cycles, owner = observe_cycles(cases, observed, flight)
             free = _free(campaign.mass, flight)
-            contact = fit_contact(cycles, free, len(campaign.cases)) if owner.size else None
+            if owner.size:
+                contact = fit_contact(cycles, free, len(campaign.cases), contact)
             flight, impacts = with_tails(observed, flight, cycles, owner, contact, campaign.mass)
         if contact is not None:
             relative = 0.5 * float(np.log(contact.k1 / _free(campaign.mass, flight).k1))
@@ -142,7 +143,9 @@ def _collect(
             for case, value, hit in zip(campaign.cases, contact.k2, contact.touched, strict=True)
         }
         sd |= {"c1": contact.sd_c1, "k1": contact.sd_k1, "c2": contact.sd_c2, "g": contact.sd_g}
-        sd |= {f"k2[{case}]": float(s) for case, s in zip(campaign.cases, contact.sd_k2, strict=True)}
+        sd |= {
+            f"k2[{case}]": float(s) for case, s in zip(campaign.cases, contact.sd_k2, strict=True)
+        }
     elif campaign.stop:
         # Never touched: the gap is at least what was reached; nothing tells of the stop itself.
         g = max(float((x - o).max()) for x, o in zip(observed.samples, flight.offsets, strict=True))

@@ -1,9 +1,9 @@
 """Free flights: decaying sines with one frequency and one decay rate, fitted all at once.
 
-Away from the stop the reading is offset + exp(-b t) (p cos wt + q sin wt). Frequency w, decay rate b and the offset of every
-recording are shared by all its flights, p and q belong to one flight each. For given w and b the
-rest is linear and solved in closed form (variable projection, Golub and Pereyra 1973), so that
-only two unknowns are searched, whatever the number of flights.
+Away from the stop the reading is offset + exp(-b t) (p cos wt + q sin wt). All flights share the
+frequency w and the decay rate b, those of one recording its offset; p and q are their own. For
+given w and b the rest is linear and solved in closed form (variable projection, Golub and Pereyra
+1973), so that only two unknowns are searched, whatever the number of flights.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
+from bayesimpact.response.squares import least
 from bayesimpact.response.swings import turning_points
 
 Floats = NDArray[np.float64]
@@ -153,25 +153,22 @@ def solve_flight(
     def residuals(x: Floats) -> Floats:
         return blocks.residuals(start * np.exp(x[0]), start * x[1]) / unit
 
-    found = least_squares(
-        residuals, [0.0, 0.0], bounds=([-0.5, -0.05], [0.5, 0.5]), x_scale=0.01, max_nfev=40
-    )
+    found = least(residuals, [[0.0, 0.0]], scale=0.01, bounds=([-0.5, -0.05], [0.5, 0.5]))
     w, b = start * float(np.exp(found.x[0])), start * float(found.x[1])
     freedom = max(1, blocks.values.size - 2 * blocks.arc_count - 3)
-    relative = float(np.sqrt(np.sum(found.fun**2) / freedom))
-    covariance = np.linalg.pinv(found.jac.T @ found.jac) * relative**2
-    rms = relative * unit
+    variance = float(np.sum(found.residuals**2)) / freedom
+    rms = float(np.sqrt(variance)) * unit
+    sd_omega, sd_decay = found.spread(variance)
     offsets, waves, spread = blocks.solve(w, b)
     step = 1e-4
     slope = (blocks.solve(w * (1 + step), b)[0] - blocks.solve(w * (1 - step), b)[0]) / (2 * step)
-    sd_omega = float(np.sqrt(covariance[0, 0]))
     return Flight(
         omega=w,
         decay=b,
         offsets=offsets,
         rms=rms,
-        sd_omega=sd_omega * w,
-        sd_decay=float(np.sqrt(covariance[1, 1])) * start,
+        sd_omega=float(sd_omega) * w,
+        sd_decay=float(sd_decay) * start,
         sd_offset=float(np.hypot(rms * spread, sd_omega * np.abs(slope).max())),
         offset_slope=slope,
         waves=waves,

@@ -126,7 +126,10 @@ def extremes(
     (k,) positions in samples and (k,) values of the signal there.
     """
     peak = np.array(
-        [a + int(np.argmax(s * samples[a : b + 1])) for a, b, s in zip(first, last, sign, strict=True)],
+        [
+            a + int(np.argmax(s * samples[a : b + 1]))
+            for a, b, s in zip(first, last, sign, strict=True)
+        ],
         dtype=np.intp,
     )
     position, value = _three_point(samples, peak)
@@ -158,7 +161,7 @@ def _slack(freedom: int) -> float:
 def _value_and_slope(coefficients: Floats, x: Floats) -> tuple[Floats, Floats]:
     value = polynomial.polyval(x, coefficients.T, tensor=False)
     slope = polynomial.polyval(x, polynomial.polyder(coefficients.T), tensor=False)
-    return value, slope
+    return np.asarray(value, dtype=np.float64), np.asarray(slope, dtype=np.float64)
 
 
 def _tops(coefficients: Floats) -> tuple[Floats, Floats]:
@@ -184,7 +187,9 @@ def _three_point(samples: Floats, peak: Ints) -> tuple[Floats, Floats]:
     spline = _spline(samples)
     for _ in range(3):
         curvature = spline(position, 2)
-        step = np.where(curvature == 0, 0.0, spline(position, 1) / np.where(curvature == 0, 1, curvature))
+        step = np.where(
+            curvature == 0, 0.0, spline(position, 1) / np.where(curvature == 0, 1, curvature)
+        )
         position = np.clip(position - np.clip(step, -0.3, 0.3), inner - 1.0, inner + 1.0)
     return position, np.asarray(spline(position), dtype=np.float64)
 

@@ -51,7 +51,6 @@ class Observed:
         pairs = zip(self.periods, self.intervals, strict=True)
         return 2 * np.pi / float(np.median([p * dt for p, dt in pairs]))
 
-
     def take(self, rows: Sequence[int]) -> Observed:
         """Only the recordings with these indices."""
         parts = {name: [getattr(self, name)[r] for r in rows] for name in self.__dataclass_fields__}
@@ -119,9 +118,7 @@ def observe_decay(observed: Observed) -> Flight | None:
     return solve_flight(observed.samples, observed.arcs, observed.intervals, omega, scan=1.05)
 
 
-def observe_cycles(
-    cases: Sequence[int], observed: Observed, flight: Flight
-) -> tuple[Cycles, Ints]:
+def observe_cycles(cases: Sequence[int], observed: Observed, flight: Flight) -> tuple[Cycles, Ints]:
     """Cycles between neighbouring flights of all recordings, and the recording of each.
 
     Parameters
@@ -163,8 +160,7 @@ def observe_cycles(
             )
             owner.append(r)
     table = np.array(rows).reshape(-1, 9)
-    columns = [table[:, k] for k in range(8)]
-    return Cycles(*columns, table[:, 8].astype(np.intp)), np.array(owner, dtype=np.intp)
+    return Cycles.from_table(table), np.array(owner, dtype=np.intp)
 
 
 def _height(observed: Observed, r: int, between: Arc) -> float:
@@ -202,9 +198,7 @@ def with_tails(
         if last < len(arcs) - 1:
             arcs = [*arcs[:last], (arcs[last][0], observed.samples[r].size)]
         joined.append(arcs)
-    better = solve_flight(
-        observed.samples, joined, observed.intervals, flight.omega, scan=1.0
-    )
+    better = solve_flight(observed.samples, joined, observed.intervals, flight.omega, scan=1.0)
     if better is None or better.rms > 1.5 * max(flight.rms, max(observed.noises)):
         return flight, impacts
     return waves_of(better, observed.samples, observed.arcs, observed.intervals), impacts

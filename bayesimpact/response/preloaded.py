@@ -1,9 +1,9 @@
 """Quick estimates for a preloaded stop (g < 0): the mass rests against it.
 
 Mirrored at rest such a rig is an ordinary one: what was "on the stop" is its free motion, with
-stiffness k1 + k2 and damping c1 + c2, and swings that leave the stop meet something softer, by k2 and c2,
-at the distance h = -g k1 / (k1 + k2) from rest. So the flights and cycles of the mirrored recordings are
-read like any other; only the rest reading and the meaning of the numbers differ.
+stiffness k1 + k2 and damping c1 + c2, and swings that leave the stop meet something softer, by k2
+and c2, at the distance h = -g k1 / (k1 + k2) from rest. So flights and cycles of the mirrored
+recordings are read like any other; only the rest reading and the meaning of the numbers differ.
 """
 
 from __future__ import annotations
@@ -12,13 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from bayesimpact.data.campaign import Campaign
-from bayesimpact.response.contact import Contact, Cycles, misfits
+from bayesimpact.response.contact import Contact, Cycles, capped, misfits, typical_variance
 from bayesimpact.response.cycles import cycle
-from bayesimpact.response.flight import Flight
 from bayesimpact.response.observe import Observed, observe_cycles, observe_flights, with_arcs
+from bayesimpact.response.squares import least
 from bayesimpact.response.swings import half_swings
 
 Floats = NDArray[np.float64]
@@ -26,8 +25,9 @@ Ints = NDArray[np.intp]
 
 
 def is_preloaded(observed: Observed) -> bool:
-    """Whether the swings away from the stop get shorter as the motion decays, not those towards it."""
-    upper, lower = [], []
+    """Whether the swings away from the stop, and only those, get shorter with the decay."""
+    upper: list[float] = []
+    lower: list[float] = []
     for r, samples in enumerate(observed.samples):
         swings = half_swings(samples, observed.rests[r], observed.periods[r], observed.noises[r])
         for side, ratios in ((1, upper), (-1, lower)):
@@ -42,7 +42,7 @@ def is_preloaded(observed: Observed) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Preloaded:
-    """The stop, the true rest readings (of y = 0) with their standard error, impacts per recording."""
+    """The stop, the readings of y = 0 with their standard error, impacts per recording."""
 
     contact: Contact
     offsets: Floats
@@ -140,23 +140,18 @@ def _fit(mirror: _Mirror) -> tuple[Floats, Floats] | None:
         for share in (0.1, 0.5, 0.9)
     ]
     cost = [float(np.sum(np.log1p((_residuals(x, mirror) / 10) ** 2))) for x in grid]
-    bounds = ([1e-4, 1e-4, 0.0, -6.0], [1.2, 0.9999, 1.0, 6.0])
-    best = None
-    for row in np.argsort(cost)[:3]:
-        found = least_squares(
-            _residuals, grid[row], args=(mirror,), bounds=bounds, loss="soft_l1", f_scale=3.0,
-            x_scale=[0.1, 0.1, 0.3, 1.0], max_nfev=60,
-        )  # fmt: skip
-        if best is None or found.cost < best.cost:
-            best = found
-    assert best is not None
+    best = least(
+        lambda x: _residuals(x, mirror),
+        [grid[row] for row in np.argsort(cost)[:3]],
+        scale=[0.1, 0.1, 0.3, 1.0],
+        bounds=([1e-4, 1e-4, 0.0, -6.0], [1.2, 0.9999, 1.0, 6.0]),
+        robust=3.0,
+        evaluations=60,
+    )
     linear = _residuals(np.array([1.2, 0.5, 0.5, 0.0]), mirror)
-    gain = np.sum(np.minimum(linear**2, 100.0)) - np.sum(np.minimum(best.fun**2, 100.0))
-    if gain < 15:
+    if capped(best.residuals) > capped(linear) - 15.0:
         return None
-    variance = max(1.0, float(np.median(best.fun**2)) / 0.455)
-    covariance = np.linalg.inv(best.jac.T @ best.jac / variance + np.eye(4) * 1e-4)
-    return np.asarray(best.x), np.sqrt(np.diag(covariance))
+    return best.x, best.spread(typical_variance(best.residuals), 1e-4)
 
 
 def _result(

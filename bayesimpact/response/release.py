@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from bayesimpact.errors import SimulationError
 from bayesimpact.model.simulate import simulate
+from bayesimpact.response.squares import least
 
 Floats = NDArray[np.float64]
 
@@ -88,23 +88,25 @@ def _simulated(
     size, rate = float(np.abs(signal).max()), float(np.sqrt(o.k1 / o.mass))
 
     def misfit(x: Floats) -> Floats:
+        y0, v0 = float(x[0]) * size, float(x[1]) * size * rate
         try:
             motion = simulate(
                 mass=o.mass, c1=o.c1, k1=o.k1, c2=o.c2, g=o.g, k2=o.k2,
-                y0=float(x[0]), v0=float(x[1]) * rate, interval=interval, n=signal.size,
+                y0=y0, v0=v0, interval=interval, n=signal.size,
             )  # fmt: skip
         except SimulationError:
             return np.full(signal.size, 1e3)
         return np.asarray((motion.displacement - signal) / size)
 
-    best = None
-    for speed in (start[1] / rate, 0.0, 0.7 * size, -0.7 * size):
-        found = least_squares(
-            misfit, [signal[0], speed], x_scale=size, diff_step=1e-6, max_nfev=25, gtol=1e-14
-        )
-        if best is None or found.cost < 0.5 * best.cost:
-            best = found
-    assert best is not None
+    speeds = (start[1] / rate, 0.0, 0.7 * size, -0.7 * size)
+    best = least(
+        misfit,
+        [[signal[0] / size, speed / size] for speed in speeds],
+        scale=1.0,
+        favour=0.5,
+        evaluations=25,
+    )
     level = max(noise / size, float(np.sqrt(2 * best.cost / signal.size)))
-    sd = level * np.sqrt(np.diag(np.linalg.pinv(best.jac.T @ best.jac)))
-    return float(best.x[0]), float(best.x[1]) * rate, float(sd[0]), float(sd[1]) * rate
+    y0, v0 = best.x * size
+    sd_y0, sd_v0 = best.spread(level**2) * size
+    return float(y0), float(v0) * rate, float(sd_y0), float(sd_v0) * rate

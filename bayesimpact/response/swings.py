@@ -126,7 +126,9 @@ def _none() -> HalfSwings:
 
 def _middle_change(signal: Floats, before: int, after: int) -> int:
     """The middle one of the changes of sign between two samples on either side."""
-    changes = np.flatnonzero(np.signbit(signal[before:after]) != np.signbit(signal[before + 1 : after + 1]))
+    changes = np.flatnonzero(
+        np.signbit(signal[before:after]) != np.signbit(signal[before + 1 : after + 1])
+    )
     return int(before + changes[changes.size // 2])
 
 
