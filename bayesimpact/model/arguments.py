@@ -10,6 +10,10 @@ from numpy.typing import ArrayLike
 
 from bayesimpact.errors import InputError
 from bayesimpact.model.batch import Floats, Ints
+from bayesimpact.model.compiled import compiled
+
+#: No recording is longer.
+MANY = 2**62
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,9 +53,9 @@ def check_model(
         if found != expected:
             raise InputError(name, f"shape {found}", f"shape {expected}")
     width = model.theta.shape[1]
-    if recordings and not -1 <= model.columns.min() <= model.columns.max() < width:
+    if not within(model.columns.reshape(-1), -1, width - 1):
         raise InputError("columns", "an index outside theta", f"-1 to {width - 1}")
-    if recordings and model.counts.min() < 1:
+    if not within(model.counts, 1, MANY):
         raise InputError("counts", "a recording without samples", "at least 1")
     return model
 
@@ -65,9 +69,18 @@ def check_samples(
         raise InputError(
             "starts", f"{first.size} values", f"{model.counts.size}, one per recording"
         )
-    if np.any(first < 0) or np.any(first + model.counts > data.size):
+    if not (within(first, 0, MANY) and within(first + model.counts, 0, data.size)):
         raise InputError("starts", "recordings beyond the samples", f"within 0..{data.size}")
     return data, first
+
+
+@compiled()
+def within(values: Ints, low: int, high: int) -> bool:
+    """Say whether all values (n,) lie in [low, high]; the reductions of numpy take microseconds."""
+    for value in values:  # noqa: SIM110
+        if value < low or value > high:
+            return False
+    return True
 
 
 def floats(name: str, values: ArrayLike, ndim: int) -> Floats:
@@ -87,5 +100,5 @@ def _read_only(name: str, array: Any, ndim: int) -> Any:
     if array.ndim != ndim:
         raise InputError(name, f"{array.ndim} dimensions", str(ndim))
     view = array.view()
-    view.flags.writeable = False
+    view.setflags(write=False)
     return view

@@ -37,7 +37,7 @@ ONE, S_, D_, G_, H_, E_, F_, X_, XR, P_, PR, US, UC = range(FORCED)
 TERMS = 18
 
 
-@compiled(error_model="numpy")
+@compiled()
 def late_responses(
     b: float, K: float, w: float, t: float
 ) -> tuple[float, float, float, float, float, float, float, float]:
@@ -97,7 +97,7 @@ def late_responses(
     return X, XR, P, PR, Us, UsR, Uc, UcR
 
 
-@compiled(error_model="numpy")
+@compiled()
 def fill_basis(
     value: Floats, rate: Floats, b: float, K: float, w: float, forced: bool, t: float
 ) -> None:
@@ -117,7 +117,7 @@ def fill_basis(
         value[US], value[UC], rate[US], rate[UC] = Us, Uc, UsR, UcR
 
 
-@compiled(error_model="numpy")
+@compiled()
 def fill_table(
     table: Floats, value: Floats, rate: Floats, b: float, K: float, w: float, forced: bool
 ) -> None:
@@ -149,7 +149,7 @@ def fill_table(
         a *= 2
 
 
-@compiled(error_model="numpy")
+@compiled()
 def _extend_forced(
     table: Floats, v: Floats, r: Floats, beta: float, K: float, w: float, a: int, count: int
 ) -> None:

@@ -30,7 +30,7 @@ def parts(batch: int, samples: int) -> int:
     return min(4 * threads, max(batch, threads))
 
 
-@compiled(error_model="numpy")
+@compiled()
 def share(part: int, parts: int, batch: int, recordings: int) -> tuple[Span, Span]:
     """Return the rows and the recordings of one of `parts` equal shares of the work."""
     if batch >= parts:
@@ -38,7 +38,7 @@ def share(part: int, parts: int, batch: int, recordings: int) -> tuple[Span, Spa
     return (0, batch), (part * recordings // parts, (part + 1) * recordings // parts)
 
 
-@compiled(error_model="numpy")
+@compiled()
 def gather(q: Floats, theta: Floats, columns: Ints, constants: Floats) -> None:
     """Fill q (11,) of one recording from theta and the constants."""
     for i in range(11):
@@ -46,7 +46,7 @@ def gather(q: Floats, theta: Floats, columns: Ints, constants: Floats) -> None:
         q[i] = theta[column] if column >= 0 else constants[i]
 
 
-@compiled(error_model="numpy")
+@compiled()
 def sums(
     theta: Floats, columns: Ints, constants: Floats, mass: float, samples: Floats, starts: Ints,
     counts: Ints, intervals: Floats, rows: Span, items: Span, sse: Floats, codes: Ints,
@@ -55,17 +55,28 @@ def sums(
     q = np.empty(11)
     nothing = np.empty(0)
     no_events = np.empty((0, 2))
-    tables, keys = workspace()
+    tables, series, keys, history = workspace()
     for b in range(rows[0], rows[1]):
         for r in range(items[0], items[1]):
             gather(q, theta[b], columns[r], constants[r])
             data = samples[starts[r] : starts[r] + counts[r]]
             sse[b, r], _, codes[b, r] = run(
-                q, mass, intervals[r], counts[r], data, nothing, nothing, no_events, tables, keys
+                q,
+                mass,
+                intervals[r],
+                counts[r],
+                data,
+                nothing,
+                nothing,
+                no_events,
+                tables,
+                series,
+                keys,
+                history,
             )
 
 
-@compiled(error_model="numpy", parallel=True)
+@compiled(parallel=True)
 def sums_in_parts(
     theta: Floats, columns: Ints, constants: Floats, mass: float, samples: Floats, starts: Ints,
     counts: Ints, intervals: Floats, parts: int, sse: Floats, codes: Ints,
@@ -79,7 +90,7 @@ def sums_in_parts(
         )  # fmt: skip
 
 
-@compiled(error_model="numpy")
+@compiled()
 def predict(
     theta: Floats, columns: Ints, constants: Floats, mass: float, counts: Ints, intervals: Floats,
     rows: Span, items: Span, values: Floats, codes: Ints,
@@ -88,21 +99,32 @@ def predict(
     q = np.empty(11)
     nothing = np.empty(0)
     no_events = np.empty((0, 2))
-    tables, keys = workspace()
+    tables, series, keys, history = workspace()
     for b in range(rows[0], rows[1]):
         start = counts[: items[0]].sum()
         for r in range(items[0], items[1]):
             gather(q, theta[b], columns[r], constants[r])
             out = values[b, start : start + counts[r]]
             _, _, codes[b, r] = run(
-                q, mass, intervals[r], counts[r], nothing, out, nothing, no_events, tables, keys
+                q,
+                mass,
+                intervals[r],
+                counts[r],
+                nothing,
+                out,
+                nothing,
+                no_events,
+                tables,
+                series,
+                keys,
+                history,
             )
             if codes[b, r] != 0:
                 out[:] = np.nan
             start += counts[r]
 
 
-@compiled(error_model="numpy", parallel=True)
+@compiled(parallel=True)
 def predict_in_parts(
     theta: Floats, columns: Ints, constants: Floats, mass: float, counts: Ints, intervals: Floats,
     parts: int, values: Floats, codes: Ints,
@@ -113,13 +135,24 @@ def predict_in_parts(
         predict(theta, columns, constants, mass, counts, intervals, rows, items, values, codes)
 
 
-@compiled(error_model="numpy")
+@compiled()
 def single(
     q: Floats, mass: float, interval: float, out: Floats, speeds: Floats, events: Floats
 ) -> tuple[float, int, int]:
     """Simulate one recording into `out`, `speeds` and `events`; as `kernel.run`."""
-    tables, keys = workspace()
+    tables, series, keys, history = workspace()
     done: tuple[float, int, int] = run(
-        q, mass, interval, out.size, np.empty(0), out, speeds, events, tables, keys
+        q,
+        mass,
+        interval,
+        out.size,
+        np.empty(0),
+        out,
+        speeds,
+        events,
+        tables,
+        series,
+        keys,
+        history,
     )
     return done

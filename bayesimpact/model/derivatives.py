@@ -27,7 +27,7 @@ from bayesimpact.model.tables import LENGTH
 EVENTS = 256
 
 
-@compiled(error_model="numpy")
+@compiled()
 def basis_workspace(size: int, with_grams: bool) -> tuple[Floats, Floats, Floats, Floats]:
     """Return empty tables, ends, prefix sums and keys of two regimes for `sweep`."""
     lengths = LENGTH + 1 if with_grams else 0
@@ -39,7 +39,7 @@ def basis_workspace(size: int, with_grams: bool) -> tuple[Floats, Floats, Floats
     )
 
 
-@compiled(error_model="numpy")
+@compiled()
 def active_parameters(columns: Ints, forced: bool) -> Ints:
     """Return the q of one recording (columns (11,)) whose derivatives are wanted, without the
     offset.
@@ -55,19 +55,21 @@ def active_parameters(columns: Ints, forced: bool) -> Ints:
     return out[:count]
 
 
-@compiled(error_model="numpy")
+@compiled()
 def find_events(q: Floats, mass: float, interval: float, n: int, events: Floats) -> tuple:
     """Return (events, code): all events of one recording, in `events` if there is room."""
     nothing = np.empty(0)
-    tables, keys = workspace()
-    _, count, code = run(q, mass, interval, n, nothing, nothing, nothing, events, tables, keys)
+    tables, series, keys, history = workspace()
+    _, count, code = run(
+        q, mass, interval, n, nothing, nothing, nothing, events, tables, series, keys, history
+    )
     if count > events.shape[0] and code == OK:
         events = np.empty((count, 2))
-        run(q, mass, interval, n, nothing, nothing, nothing, events, tables, keys)
+        run(q, mass, interval, n, nothing, nothing, nothing, events, tables, series, keys, history)
     return events[:count], code
 
 
-@compiled(error_model="numpy")
+@compiled()
 def gram_share(
     theta: Floats, columns: Ints, constants: Floats, mass: float, samples: Floats, starts: Ints,
     counts: Ints, intervals: Floats, size: int, rows: Span, items: Span, out: Floats, codes: Ints,
@@ -102,7 +104,7 @@ def gram_share(
                 gram[11, i] = gram[i, 11]
 
 
-@compiled(error_model="numpy", parallel=True)
+@compiled(parallel=True)
 def gram_parts(
     theta: Floats, columns: Ints, constants: Floats, mass: float, samples: Floats, starts: Ints,
     counts: Ints, intervals: Floats, size: int, parts: int, out: Floats, codes: Ints,
@@ -116,7 +118,7 @@ def gram_parts(
         )  # fmt: skip
 
 
-@compiled(error_model="numpy")
+@compiled()
 def derivative_rows(
     theta: Floats, columns: Ints, constants: Floats, mass: float, counts: Ints, intervals: Floats,
     size: int, values: Floats, jacobian: Floats, codes: Ints,

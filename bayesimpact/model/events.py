@@ -21,7 +21,7 @@ MAX_ITERATIONS = 200
 MAX_STEPS = 200_000
 
 
-@compiled(error_model="numpy")
+@compiled()
 def rising_stretch(b: float, K: float, z: float, v: float, horizon: float) -> tuple[float, float]:
     """Return the first stretch (low, high) of [0, horizon] on which unforced z(t) rises.
 
@@ -60,7 +60,7 @@ def rising_stretch(b: float, K: float, z: float, v: float, horizon: float) -> tu
     return low, min(high, horizon)
 
 
-@compiled(error_model="numpy")
+@compiled()
 def next_crossing(
     b: float, K: float, z: float, v: float, level: float, horizon: float
 ) -> tuple[float, float]:
@@ -84,8 +84,10 @@ def next_crossing(
     top, _ = advance(b, K, z, v, S, D)
     if not top > level:
         return math.inf, 0.0
-    S, D = impulse_response(b, K, low)
-    bottom, _ = advance(b, K, z, v, S, D)
+    bottom = z
+    if low > 0.0:
+        S, D = impulse_response(b, K, low)
+        bottom, _ = advance(b, K, z, v, S, D)
     # exact between the turning points of an undamped motion
     share = (level - bottom) / (top - bottom)
     t = low + (high - low) * math.acos(1.0 - 2.0 * min(max(share, 0.0), 1.0)) / math.pi
@@ -111,7 +113,7 @@ def next_crossing(
     return math.nan, 0.0
 
 
-@compiled(error_model="numpy")
+@compiled()
 def next_crossing_forced(
     b: float, K: float, w: float, z: float, v: float, fs: float, fc: float, level: float,
     horizon: float,

@@ -27,7 +27,7 @@ NEAR_RESONANCE = 0.05
 EARLY = 0.5
 
 
-@compiled(error_model="numpy")
+@compiled()
 def impulse_response(b: float, K: float, t: float) -> tuple[float, float]:
     """Return S(t) and D(t) = S'(t) of u'' + 2 b u' + K u = 0 from u = 0, u' = 1.
 
@@ -63,7 +63,7 @@ def impulse_response(b: float, K: float, t: float) -> tuple[float, float]:
     return S, decay * (1.0 - lost) - slow * S
 
 
-@compiled(error_model="numpy")
+@compiled()
 def second_response(b: float, K: float, t: float, S: float, D: float) -> tuple[float, float]:
     """Return G = S*S and H = S*D = G' (convolutions from 0 to t), given S(t) and D(t).
 
@@ -83,7 +83,7 @@ def second_response(b: float, K: float, t: float, S: float, D: float) -> tuple[f
     return G, 0.5 * t * S - b * G
 
 
-@compiled(error_model="numpy")
+@compiled()
 def _forced_series(beta: float, K: float, w: float, square: float) -> tuple[float, float]:
     """Return E and F at time 1, beta, K and w per unit of time, times `square`."""
     E = F = e0 = e1 = f0 = f1 = 0.0  # e, f: terms n and n + 1
@@ -98,7 +98,7 @@ def _forced_series(beta: float, K: float, w: float, square: float) -> tuple[floa
     return E, F
 
 
-@compiled(error_model="numpy")
+@compiled()
 def forced_response(
     b: float, K: float, w: float, t: float, S: float, D: float
 ) -> tuple[float, float]:
@@ -110,7 +110,8 @@ def forced_response(
     characteristic root l is evaluated by expm1 instead; early on, the power series is.
     """
     if (math.sqrt(K) + 2.0 * b + w) * t < EARLY:
-        return _forced_series(2.0 * b * t, K * t * t, w * t, t * t)
+        E, F = _forced_series(2.0 * b * t, K * t * t, w * t, t * t)
+        return E, F
     below = K - w * w
     across = 2.0 * b * w
     cos = math.cos(w * t)
@@ -145,13 +146,13 @@ def forced_response(
     return z.real, z.imag
 
 
-@compiled(error_model="numpy")
+@compiled(forceinline=True, fastmath={"contract"})
 def advance(b: float, K: float, u: float, v: float, S: float, D: float) -> tuple[float, float]:
     """Return (u, u') after the unforced motion with impulse response S, D from (u, v)."""
     return D * u + S * (v + 2.0 * b * u), D * v - S * (K * u)
 
 
-@compiled(error_model="numpy")
+@compiled(forceinline=True, fastmath={"contract"})
 def advance_forced(
     b: float, K: float, w: float, u: float, v: float, fs: float, fc: float,
     S: float, D: float, E: float, F: float,

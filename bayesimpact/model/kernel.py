@@ -13,10 +13,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.model.blocks import squares, squares_forced, write
 from bayesimpact.model.compiled import compiled
 from bayesimpact.model.events import next_crossing, next_crossing_forced
-from bayesimpact.model.flow import advance, advance_forced, forced_response, impulse_response
-from bayesimpact.model.tables import LENGTH, ROWS, fill
+from bayesimpact.model.flow import advance_forced, forced_response, impulse_response
+from bayesimpact.model.quick import fast_lane
+from bayesimpact.model.tables import LENGTH, ROWS, SLOW, TERMS, fill, fill_series
 
 Floats = NDArray[np.float64]
 
@@ -43,7 +45,7 @@ EVENTS_PER_SAMPLE = 50
 _NO_FORCE = -1.0
 
 
-@compiled(error_model="numpy")
+@compiled()
 def check(q: Floats, mass: float, interval: float, n: int) -> int:
     """Return OK or the code of the first thing wrong with the arguments of `run`."""
     for i in range(11):
@@ -66,14 +68,14 @@ def check(q: Floats, mass: float, interval: float, n: int) -> int:
     return OK
 
 
-@compiled(error_model="numpy")
+@compiled()
 def has_stop(q: Floats) -> bool:
     """Say whether there is anything to hit."""
     gap: float = q[3]
     return gap < math.inf and (q[2] > 0.0 or q[4] > 0.0)
 
 
-@compiled(error_model="numpy")
+@compiled()
 def begins_in_contact(q: Floats) -> bool:
     """Say whether motion begins in contact: beyond the stop, or at it and heading into it."""
     if not has_stop(q):
@@ -86,59 +88,30 @@ def begins_in_contact(q: Floats) -> bool:
     return above > 0.0
 
 
-@compiled(error_model="numpy")
-def write(
-    out: Floats, speeds: Floats, first: int, end: int, shift: float, table: Floats,
-    b: float, K: float, w: float, u: float, v: float, fs: float, fc: float,
+@compiled()
+def workspace() -> tuple[Floats, Floats, Floats, Floats]:
+    """Return empty tables and series of two regimes, the keys of what they hold, and a history."""
+    tables, series = np.empty((2, ROWS, LENGTH + 1)), np.empty((2, 2, TERMS))
+    return tables, series, np.full((2, 3), np.nan), np.empty((2, 5))
+
+
+@compiled()
+def prepare(
+    tables: Floats, series: Floats, keys: Floats, side: int, b: float, K: float, w: float,
+    forced: bool,
 ) -> None:  # fmt: skip
-    """Write positions (and velocities, if `speeds` has room) of one block, samples first..end-1."""
-    S, D, E, F = table[0], table[1], table[2], table[3]
-    m = v + 2.0 * b * u
-    if fs == 0.0 and fc == 0.0:
-        for j in range(end - first):
-            out[first + j] = shift + D[j] * u + S[j] * m
-    else:
-        for j in range(end - first):
-            out[first + j] = shift + D[j] * u + S[j] * m + fs * E[j] + fc * F[j]
-    if speeds.size:
-        for j in range(end - first):
-            speeds[first + j] = D[j] * v - S[j] * K * u
-        if fs != 0.0 or fc != 0.0:
-            for j in range(end - first):
-                speeds[first + j] += fs * (S[j] - w * F[j]) + fc * w * E[j]
+    """Fill tables and series of one regime, unless they hold it already."""
+    force = w if forced else _NO_FORCE
+    if keys[side, 0] != b or keys[side, 1] != K or keys[side, 2] != force:
+        fill(tables[side], b, K, w, forced)
+        fill_series(series[side], b, K)
+        keys[side, 0], keys[side, 1], keys[side, 2] = b, K, force
 
 
-@compiled(error_model="numpy", fastmath={"reassoc", "contract"})
-def squares(
-    data: Floats, first: int, end: int, shift: float, table: Floats,
-    b: float, u: float, v: float, fs: float, fc: float,
-) -> float:  # fmt: skip
-    """Return the sum of squared residuals of one block, samples first..end-1."""
-    S, D, E, F = table[0], table[1], table[2], table[3]
-    m = v + 2.0 * b * u
-    total = 0.0
-    segment = data[first:end]
-    if fs == 0.0 and fc == 0.0:
-        for j in range(segment.size):
-            r = segment[j] - shift - (D[j] * u + S[j] * m)
-            total += r * r
-    else:
-        for j in range(segment.size):
-            r = segment[j] - shift - (D[j] * u + S[j] * m + fs * E[j] + fc * F[j])
-            total += r * r
-    return total
-
-
-@compiled(error_model="numpy")
-def workspace() -> tuple[Floats, Floats]:
-    """Return empty tables of two regimes and the keys of what they hold."""
-    return np.empty((2, ROWS, LENGTH + 1)), np.full((2, 3), np.nan)
-
-
-@compiled(error_model="numpy")
+@compiled()
 def run(
     q: Floats, mass: float, interval: float, n: int, data: Floats, out: Floats, speeds: Floats,
-    events: Floats, tables: Floats, keys: Floats,
+    events: Floats, tables: Floats, series: Floats, keys: Floats, history: Floats,
 ) -> tuple[float, int, int]:  # fmt: skip
     """Simulate one recording; return (sum of squares, events, code).
 
@@ -150,46 +123,54 @@ def run(
     out : (n,) receives y + offset, m, when `data` is empty; both empty: events only
     speeds : (n,) receives y', m/s; or empty
     events : (capacity, 2) receives time and velocity of the first events, in intervals; or empty
-    tables, keys : from `workspace`; tables of equal regimes are reused from call to call
+    tables, series, keys, history : from `workspace`; kept from call to call, so that tables of
+        equal regimes are used again
     """
     code = check(q, mass, interval, n)
     if code != OK:
         return math.inf, 0, code
-    square = interval * interval
     g, offset = q[3], q[10]
     stop = has_stop(q)
     w = q[8] * interval
-    force = q[7] * square / mass
+    per_mass = interval * interval / mass
+    force = q[7] * per_mass
     forced = force != 0.0
     contact = begins_in_contact(q)
     limit = EVENTS_AT_LEAST + EVENTS_PER_SAMPLE * n
+    compared, written = data.size > 0, out.size > 0
+
+    b_flight, K_flight = 0.5 * q[0] * interval / mass, q[1] * per_mass
+    b_contact, K_contact = 0.5 * (q[0] + q[2]) * interval / mass, (q[1] + q[4]) * per_mass
+    rest_contact = q[4] * g / (q[1] + q[4]) if stop else 0.0
+    prepare(tables, series, keys, 0, b_flight, K_flight, w, forced)
+    if stop:
+        prepare(tables, series, keys, 1, b_contact, K_contact, w, forced)
+    slow = max(2.0 * b_flight + math.sqrt(K_flight), 2.0 * b_contact + math.sqrt(K_contact)) < SLOW
+    quick = stop and slow and not forced
 
     t, y, v = 0.0, q[5], q[6] * interval
-    nothing_wanted = data.size == 0 and out.size == 0
     total = 0.0
     count = 0
     i = 0
     while True:
+        if quick and count > 0:
+            contact, t, v, i, count, passed = fast_lane(
+                tables, series, history, b_flight, K_flight, b_contact, K_contact, rest_contact,
+                g, offset, n, limit, contact, t, v, i, count, data, out, speeds, events,
+            )  # fmt: skip
+            total += passed
         if contact:
-            stiffness = q[1] + q[4]
-            b = 0.5 * (q[0] + q[2]) * interval / mass
-            rest = q[4] * g / stiffness
-            sign, side = -1.0, 1
+            side, sign, b, K, rest = 1, -1.0, b_contact, K_contact, rest_contact
         else:
-            stiffness = q[1]
-            b = 0.5 * q[0] * interval / mass
-            rest = 0.0
-            sign, side = 1.0, 0
-        K = stiffness * square / mass
+            side, sign, b, K, rest = 0, 1.0, b_flight, K_flight, 0.0
         u = y - rest
         fs = fc = 0.0
         if forced:
-            fs = force * math.sin(w * t + q[9])
-            fc = force * math.cos(w * t + q[9])
+            fs, fc = force * math.sin(w * t + q[9]), force * math.cos(w * t + q[9])
+
         wait, v_next = math.inf, 0.0
         if stop:
-            left = n - 1 - t
-            level = sign * (g - rest)
+            level, left = sign * (g - rest), n - 1 - t
             if forced:
                 wait, v_next = next_crossing_forced(
                     b, K, w, sign * u, sign * v, sign * fs, sign * fc, level, left
@@ -200,37 +181,31 @@ def run(
                 return math.inf, count, SEARCH_FAILED
         end = n if t + wait >= n else math.ceil(t + wait)
 
-        if i < end and nothing_wanted:
-            i = end
-        elif i < end:
-            key = w if forced else _NO_FORCE
-            kept = keys[side]
-            table = tables[side]
-            if kept[0] != b or kept[1] != K or kept[2] != key:
-                fill(table, b, K, w, forced)
-                kept[0], kept[1], kept[2] = b, K, key
+        if i < end and (compared or written):
             S, D = impulse_response(b, K, i - t)
+            E = F = 0.0
             if forced:
                 E, F = forced_response(b, K, w, i - t, S, D)
+            while True:
                 u, v = advance_forced(b, K, w, u, v, fs, fc, S, D, E, F)
-            else:
-                u, v = advance(b, K, u, v, S, D)
-            while i < end:
-                stop_at = min(i + LENGTH, end)
                 if forced:
-                    fs = force * math.sin(w * i + q[9])
-                    fc = force * math.cos(w * i + q[9])
-                if data.size:
-                    total += squares(data, i, stop_at, rest + offset, table, b, u, v, fs, fc)
+                    fs, fc = force * math.sin(w * i + q[9]), force * math.cos(w * i + q[9])
+                block = min(i + LENGTH, end)
+                if not compared:
+                    write(out, speeds, i, block, rest + offset, tables, side, b, K, w, u, v, fs, fc)
+                elif forced:
+                    total += squares_forced(
+                        data, i, block, rest + offset, tables, side, b, u, v, fs, fc
+                    )
                 else:
-                    write(out, speeds, i, stop_at, rest + offset, table, b, K, w, u, v, fs, fc)
-                S, D = table[0, LENGTH], table[1, LENGTH]
+                    total += squares(data, i, block, rest + offset, tables, side, b, u, v)
+                i = block
+                if i == end:
+                    break
+                S, D = tables[side, 0, LENGTH], tables[side, 1, LENGTH]
                 if forced:
-                    E, F = table[2, LENGTH], table[3, LENGTH]
-                    u, v = advance_forced(b, K, w, u, v, fs, fc, S, D, E, F)
-                else:
-                    u, v = advance(b, K, u, v, S, D)
-                i = stop_at
+                    E, F = tables[side, 2, LENGTH], tables[side, 3, LENGTH]
+        i = end
         if i >= n:
             break
         t += wait
@@ -246,7 +221,7 @@ def run(
     if speeds.size:
         for j in range(n):
             speeds[j] /= interval
-    if data.size:
+    if compared:
         if not total < math.inf:
             return math.inf, count, OVERFLOW
     else:

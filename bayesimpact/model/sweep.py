@@ -48,7 +48,7 @@ ROWS = 12
 C1, K1, C2, G, K2, Y0, V0, A, W, PHASE, OFFSET = range(11)
 
 
-@compiled(error_model="numpy")
+@compiled()
 def coefficients(
     out: Floats, active: Ints, q: Floats, mass: float, interval: float, contact: bool, forced: bool,
     t: float, y: float, v: float, dy: Floats, dv: Floats,
@@ -107,7 +107,7 @@ def coefficients(
         row[E_], row[F_] = fs, fc
 
 
-@compiled(error_model="numpy")
+@compiled()
 def carry(
     coef: Floats, value: Floats, rate: Floats, active: Ints, dy: Floats, dv: Floats
 ) -> tuple[float, float]:
@@ -125,7 +125,7 @@ def carry(
     return y, v
 
 
-@compiled(error_model="numpy")
+@compiled()
 def write_block(
     coef: Floats, table: Floats, first: int, end: int, offset: float, active: Ints,
     values: Floats, jacobian: Floats,
@@ -143,7 +143,7 @@ def write_block(
             jacobian[first + j, i] = a
 
 
-@compiled(error_model="numpy")
+@compiled()
 def prefix_grams(prefix: Floats, table: Floats) -> None:
     """Fill `prefix` (LENGTH + 1, basis, basis): sums over j < n of products of table rows."""
     size = table.shape[0]
@@ -154,7 +154,7 @@ def prefix_grams(prefix: Floats, table: Floats) -> None:
                 prefix[n + 1, k, m] = prefix[n, k, m] + table[k, n] * table[m, n]
 
 
-@compiled(error_model="numpy", fastmath={"reassoc", "contract"})
+@compiled(fastmath={"reassoc", "contract"})
 def add_block(
     coef: Floats, table: Floats, prefix: Floats, data: Floats, offset: float, active: Ints,
     moments: Floats, gram: Floats,
@@ -189,7 +189,7 @@ def add_block(
                 gram[i, h] += a * coef[h, k]
 
 
-@compiled(error_model="numpy")
+@compiled()
 def sweep(
     q: Floats, mass: float, interval: float, n: int, events: Floats, begins_in_contact: bool,
     active: Ints, data: Floats, values: Floats, jacobian: Floats, gram: Floats,

@@ -1,9 +1,10 @@
-"""The motion of one regime at every multiple of the sampling interval, computed once and used for
-all.
+"""What is worth computing once per regime: its motion at every sample, and close to any time.
 
-Row 0 to 3 of a table hold S, D, E and F of `flow` at t = 0, 1, ..., LENGTH sampling intervals (E
-and F only with forcing). Every sample between two events is then a product of the table and the
-state at the first of them: no sample waits for the one before it.
+Time is counted in sampling intervals. Row 0 to 3 of a table hold S, D, E and F of `flow` at 0, 1,
+..., LENGTH (E and F only with forcing): every sample between two events is then a product of the
+table and the state at the first of them, and no sample waits for the one before it. The series hold
+the Taylor coefficients of S and D at 0: with them and the table, motion of slow regimes is known at
+any time without exp, sin or cos.
 """
 
 from __future__ import annotations
@@ -16,13 +17,18 @@ from numpy.typing import NDArray
 from bayesimpact.model.compiled import compiled
 from bayesimpact.model.flow import forced_response, impulse_response
 
+Floats = NDArray[np.float64]
+
 #: Samples that one table serves; a longer stretch is cut into blocks of this length.
 LENGTH = 128
 ROWS = 4
+#: Coefficients of S / t and D; at |t| <= 1 and rates sqrt(K) + 2 b below SLOW the rest is < 1e-17.
+TERMS = 13
+SLOW = 0.25
 
 
-@compiled(error_model="numpy")
-def fill(table: NDArray[np.float64], b: float, K: float, w: float, forced: bool) -> None:
+@compiled()
+def fill(table: Floats, b: float, K: float, w: float, forced: bool) -> None:
     """Fill `table` (ROWS, LENGTH + 1) for one regime; b, K and w per sampling interval.
 
     Exact values at 1, 2, 4, ..., then every stretch [a, 2 a) from [0, a) by the addition theorem,
@@ -49,3 +55,35 @@ def fill(table: NDArray[np.float64], b: float, K: float, w: float, forced: bool)
             S[a + j] = Sa * D[j] + Ca * S[j]
             D[a + j] = Da * D[j] - KSa * S[j]
         a *= 2
+
+
+@compiled()
+def fill_series(series: Floats, b: float, K: float) -> None:
+    """Fill `series` (2, TERMS): S = t sum(series[0, n] t^n), D = sum(series[1, n] t^n)."""
+    S, D = series[0], series[1]
+    before, now = 0.0, 1.0  # Taylor coefficients n and n + 1 of S
+    for n in range(TERMS):
+        S[n] = now
+        D[n] = (n + 1.0) * now
+        before, now = now, -(2.0 * b * (n + 1.0) * now + K * before) / ((n + 1.0) * (n + 2.0))
+
+
+@compiled(forceinline=True, fastmath={"contract"})
+def polynomial(series: Floats, side: int, row: int, t: float) -> float:
+    """Return sum(series[side, row, n] t^n), grouped in pairs so that terms do not wait."""
+    t2 = t * t
+    t4 = t2 * t2
+    low = series[side, row, 0] + series[side, row, 1] * t
+    low += (series[side, row, 2] + series[side, row, 3] * t) * t2
+    middle = series[side, row, 4] + series[side, row, 5] * t
+    middle += (series[side, row, 6] + series[side, row, 7] * t) * t2
+    high = series[side, row, 8] + series[side, row, 9] * t
+    high += (series[side, row, 10] + series[side, row, 11] * t) * t2
+    total: float = low + t4 * (middle + t4 * (high + t4 * series[side, row, 12]))
+    return total
+
+
+@compiled(forceinline=True, fastmath={"contract"})
+def nearby(series: Floats, side: int, t: float) -> tuple[float, float]:
+    """Return S(t) and D(t) for |t| <= 1 from series[side]."""
+    return t * polynomial(series, side, 0, t), polynomial(series, side, 1, t)
