@@ -17,7 +17,7 @@ from typing import Any
 import numba
 
 _ROOT = Path(__file__).parents[2]
-_IMPORT = re.compile(r"^\s*from (bayesimpact[\w.]*) import (\w+)", re.MULTILINE)
+_IMPORT = re.compile(r"^\s*from (bayesimpact[\w.]*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
 
 
 @cache
@@ -36,9 +36,10 @@ def _dependencies(path: Path) -> set[Path]:
         file = waiting.pop()
         if file not in found and file.exists():
             found.add(file)
-            for module, name in _IMPORT.findall(file.read_text(encoding="utf-8")):
+            for module, names in _IMPORT.findall(file.read_text(encoding="utf-8")):
                 folder = _ROOT.joinpath(*module.split("."))
-                waiting += [folder.with_suffix(".py"), folder / f"{name}.py"]
+                waiting.append(folder.with_suffix(".py"))
+                waiting += [folder / f"{name}.py" for name in re.findall(r"\w+", names)]
     return found
 
 

@@ -11,8 +11,8 @@ from bayesimpact.model import compiled
 def sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder = tmp_path / "bayesimpact" / "model"
     folder.mkdir(parents=True)
-    (folder / "top.py").write_text("from bayesimpact.model.middle import f\n")
-    (folder / "middle.py").write_text("from bayesimpact.model import bottom\n")
+    (folder / "top.py").write_text("from bayesimpact.model.middle import (\n    f,\n)\n")
+    (folder / "middle.py").write_text("from bayesimpact.model import absent, bottom\n")
     (folder / "bottom.py").write_text("x = 1\n")
     (folder / "other.py").write_text("x = 1\n")
     monkeypatch.setattr(compiled, "_ROOT", tmp_path)
