@@ -95,8 +95,9 @@ class Noise:
         return replace(self, smoothing=smoothing)
 
     def _interior(self, n: int, interval: float) -> slice:
-        cut = edge(self.smoothing, interval)
-        return slice(cut, n - cut)
+        cut = min(edge(self.smoothing, interval), n // 4)
+        lags = self.smoothing is not None and self.smoothing.kind == "lag"
+        return slice(cut, n if lags else n - cut)  # a lag has no second end
 
     def _spectrum(self, n: int, interval: float) -> Array:
         inner = self._interior(n, interval)

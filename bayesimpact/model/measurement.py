@@ -15,18 +15,29 @@ def smooth(samples: Array, smoothing: Smoothing | None, interval: float) -> Arra
     """Samples (..., n) after the filter; the ends as the chain treats them.
 
     Savitzky-Golay: polynomial fits of the end windows (Savitzky and Golay 1964). Lag: exact
-    first-order low pass of a staircase signal, started at rest on the first sample.
+    first-order low pass of a staircase signal, started at rest on the first sample. A signal
+    of NaN stays NaN.
     """
     if smoothing is None:
         return samples
     if smoothing.kind == "savgol":
-        filtered = signal.savgol_filter(
-            samples, smoothing.window, smoothing.polyorder, axis=-1, mode="interp"
-        )
-        return np.asarray(filtered, dtype=np.float64)
+        return _savgol(samples, smoothing.window, smoothing.polyorder)
     decay = np.exp(-interval / smoothing.time_constant)
     state = decay * samples[..., :1]
     filtered, _ = signal.lfilter([1.0 - decay], [1.0, -decay], samples, axis=-1, zi=state)
+    return np.asarray(filtered, dtype=np.float64)
+
+
+def _savgol(samples: Array, window: int, order: int) -> Array:
+    # SciPy fits the end windows with LAPACK, which refuses NaN, and whose last bit depends on the
+    # number of rows; a resumed sampler needs the same bits
+    filtered = signal.savgol_filter(samples, window, order, axis=-1, mode="constant")
+    half = window // 2
+    place = np.linspace(-1.0, 1.0, window)
+    basis = np.linalg.qr(np.vander(place, order + 1))[0]
+    ends = np.einsum("hk,wk->hw", basis[:half], basis)
+    for read, out in ((samples, filtered), (samples[..., ::-1], filtered[..., ::-1])):
+        out[..., :half] = np.einsum("...w,hw->...h", read[..., :window], ends)
     return np.asarray(filtered, dtype=np.float64)
 
 
