@@ -119,7 +119,7 @@ class Oscillator:
 
         Inadmissible parameters give NaN throughout the recordings concerned.
         """
-        flat = np.atleast_2d(theta)
+        flat = theta.reshape(-1, theta.shape[-1])
         recordings = np.arange(self.counts.size)
         motions = self.motions_of(np.tile(recordings, flat.shape[0]), self.layout.slots(flat))
         rows = motions.reshape(flat.shape[0], recordings.size, -1)
