@@ -1,0 +1,173 @@
+"""Scans over frequency: a harmonic force on the mass, a hum in the probe's signal.
+
+Both have an amplitude and, in every recording, a phase; while the amplitude is zero the phases mean nothing, so each
+frequency is tested with a free sine and cosine per recording: 2 R numbers, chi-squared under the model once the
+fitted parameters are projected off. The smallest p-value pays for the number of independent frequencies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+from scipy.signal import czt
+
+from bayesimpact.diagnosis.directions import is_periodic, sigma_of
+from bayesimpact.diagnosis.force import whitened_one
+from bayesimpact.diagnosis.scan import LIMIT_SD, Score
+from bayesimpact.inference.fit import Fit, inverse
+from bayesimpact.model.effects.effect import Effect, Scales
+from bayesimpact.model.parameters import SLOTS
+
+Array = NDArray[np.float64]
+
+RESPONSE_REACH = 3.0  # forcing is looked for up to so many times the natural frequency in contact
+_FORCE, _OMEGA, _PHASE = (SLOTS.index(s) for s in ("A", "w", "phase"))
+
+
+@dataclass(frozen=True, eq=False)
+class _Blocks:
+    """One recording at F frequencies: sine and cosine columns against each other, J and the residual."""
+
+    own: Array  # (F, 2, 2)
+    absorbed: Array  # (F, k, 2)
+    score: Array  # (F, 2)
+    columns: NDArray[np.int64]  # (k,)
+
+
+def periodic_scores(fit: Fit, effects: Sequence[Effect], scales: Scales) -> tuple[Score, ...]:
+    """The best frequency of every periodic effect that the fit's model does not contain.
+
+    Their p-values are corrected for the number of frequencies.
+    """
+    have = {e.id for e in fit.target.oscillator.effects}
+    found = []
+    for effect in effects:
+        if effect.id in have or not is_periodic(effect):
+            continue
+        score = _best_frequency(fit, effect, scales)
+        if score is not None:
+            found.append(score)
+    return tuple(found)
+
+
+def frequencies(fit: Fit, effect: Effect, scales: Scales) -> Array:
+    """Frequencies to scan, Hz: two per resolution of the longest recording."""
+    spacing = 0.5 / scales.duration
+    nyquist = 0.5 / float(fit.target.oscillator.intervals.max())
+    if effect.observe is None:
+        stiffest = (scales.stiffness + scales.contact_stiffness) / scales.mass
+        nyquist = min(0.9 * nyquist, RESPONSE_REACH * np.sqrt(stiffest) / (2 * np.pi))
+    return np.arange(2 * spacing, nyquist, spacing)
+
+
+def _best_frequency(fit: Fit, effect: Effect, scales: Scales) -> Score | None:
+    grid = frequencies(fit, effect, scales)
+    recordings = range(len(fit.linearisation))
+    if effect.observe is not None:
+        if fit.target.likelihood.noise.smoothing is not None:
+            return None  # the filter's band holds too few coefficients for a search of lines
+        blocks = [_line_blocks(fit, r, grid) for r in recordings]
+    else:
+        blocks = [_response_blocks(fit, r, grid, scales) for r in recordings]
+    statistic, sizes, information = _statistics(fit, blocks)
+    best = int(np.argmax(statistic))
+    freedom = 2 * len(blocks)
+    alone = float(stats.chi2.sf(statistic[best], freedom))
+    p_value = float(min(1.0, alone * grid.size))
+    amplitudes = np.hypot(sizes[best, 0::2], sizes[best, 1::2])
+    weight = 0.5 * (np.diag(information[best])[0::2] + np.diag(information[best])[1::2])
+    amplitude = float(np.sum(weight * amplitudes) / np.sum(weight))
+    sd = float(1 / np.sqrt(weight.sum()))
+    return Score(
+        effect,
+        _shapes(fit, effect, float(grid[best]), sizes[best]),
+        float(stats.norm.isf(max(p_value, 1e-300) / 2)),
+        p_value,
+        np.array([amplitude]),
+        np.array([sd]),
+        LIMIT_SD * sd,
+        np.zeros(fit.mode.size),
+        1.0,
+        0.5 * float(statistic[best]) - float(np.log(grid.size)) - 0.5 * freedom,
+        (f"{effect.id}.amplitude",),
+    )
+
+
+def _shapes(fit: Fit, effect: Effect, frequency: float, sizes: Array) -> dict[str, float]:
+    phases = np.arctan2(sizes[1::2], sizes[0::2]) % (2 * np.pi)
+    recordings = fit.target.oscillator.campaign.recordings
+    shapes = {f"{effect.id}.frequency": frequency}
+    for recording, phase in zip(recordings, phases, strict=True):
+        shapes[f"{effect.id}.phase[{recording.name}]"] = float(phase)
+    return shapes
+
+
+def _statistics(fit: Fit, blocks: Sequence[_Blocks]) -> tuple[Array, Array, Array]:
+    """Chi-squared (F,), sizes (F, 2 R) of sine and cosine, information (F, 2 R, 2 R)."""
+    count, width = blocks[0].score.shape[0], 2 * len(blocks)
+    sigma = sigma_of(fit)
+    matrix = np.diag(np.maximum(np.nan_to_num(-fit.target.priors.hessian(fit.mode)), 0.0))
+    noise = fit.target.oscillator.layout.roles("noise")
+    matrix[noise, noise] = 0.0
+    for part, s in zip(fit.linearisation, sigma, strict=True):
+        matrix[np.ix_(part.columns, part.columns)] += part.jacobian.T @ part.jacobian / s**2
+    shared = np.zeros((count, fit.mode.size, width))
+    information = np.zeros((count, width, width))
+    score = np.zeros((count, width))
+    for r, block in enumerate(blocks):
+        at = slice(2 * r, 2 * r + 2)
+        shared[:, block.columns, at] = block.absorbed
+        information[:, at, at] = block.own
+        score[:, at] = block.score
+    information -= np.einsum("fdi,de,fej->fij", shared, inverse(matrix), shared, optimize=True)
+    information = 0.5 * (information + information.transpose(0, 2, 1))
+    scale = np.sqrt(np.maximum(np.einsum("fii->fi", information), 1e-300))
+    scaled = information / (scale[:, :, None] * scale[:, None, :])
+    sizes = (
+        np.linalg.solve(scaled + 1e-9 * np.eye(width), (score / scale)[..., None])[..., 0] / scale
+    )
+    return np.einsum("fi,fi->f", sizes, score), sizes, information
+
+
+def _line_blocks(fit: Fit, r: int, grid: Array) -> _Blocks:
+    """A hum of one metre: Fourier sums of the whitened residual and derivatives."""
+    part, sigma = fit.linearisation[r], sigma_of(fit)[r]
+    interval = float(fit.target.oscillator.intervals[r])
+    stacked = np.vstack([part.residual, part.jacobian.T]) / sigma
+    step = 2 * np.pi * interval * (grid[1] - grid[0])
+    first = 2 * np.pi * interval * grid[0]
+    sums = czt(stacked, grid.size, np.exp(-1j * step), np.exp(1j * first), axis=-1)
+    gain = _whitening_gain(fit, grid, interval) / sigma
+    pairs = np.stack([-sums.imag, sums.real], axis=-1) * gain[:, None]  # (1 + k, F, 2)
+    n = part.residual.size
+    own = np.repeat((0.5 * n * gain**2)[:, None, None] * np.eye(2), 1, axis=0)
+    return _Blocks(own, pairs[1:].transpose(1, 0, 2), pairs[0], part.columns)
+
+
+def _whitening_gain(fit: Fit, grid: Array, interval: float) -> Array:
+    rho = fit.target.likelihood.noise.correlation
+    angle = 2 * np.pi * grid * interval
+    return np.sqrt((1 - 2 * rho * np.cos(angle) + rho**2) / (1 - rho**2))
+
+
+def _response_blocks(fit: Fit, r: int, grid: Array, scales: Scales) -> _Blocks:
+    """A force of one newton: simulated responses to its sine and cosine."""
+    oscillator, sigma = fit.target.oscillator, sigma_of(fit)
+    part = fit.linearisation[r]
+    slots = oscillator.layout.slots(fit.mode)[r]
+    size = 1e-3 * float(sigma[r]) * scales.stiffness
+    q = np.tile(slots, (2 * grid.size + 1, 1))
+    q[1:, _FORCE] = size
+    q[1:, _OMEGA] = np.repeat(2 * np.pi * grid, 2)
+    q[1:, _PHASE] = np.tile([0.0, 0.5 * np.pi], grid.size)
+    motion = oscillator.motions_of(np.full(q.shape[0], r), q)
+    change = whitened_one(fit, r, motion[1:] - motion[0], sigma) / size
+    pairs = change.reshape(grid.size, 2, -1)
+    own = np.einsum("fin,fjn->fij", pairs, pairs)
+    absorbed = np.einsum("nk,fin->fki", part.jacobian / sigma[r], pairs, optimize=True)
+    score = pairs @ (part.residual / sigma[r])
+    return _Blocks(own, absorbed, score, part.columns)

@@ -1,0 +1,236 @@
+"""Smoothed recordings: which filter they passed, and what noise it left.
+
+A Savitzky-Golay filter leaves its signature in the noise: nulls at frequencies that depend on window and order
+only. Above the frequencies of the motion the periodogram is noise, so the filters of a family are compared by the
+Whittle likelihood of its ordinates (Whittle 1953), against white and AR(1) noise. The level is estimated where
+the information is, in the passband, from swings on the free side: a half swing is a sinusoid whatever the obstacle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import signal, stats
+from scipy.linalg import null_space, toeplitz
+from scipy.optimize import minimize, minimize_scalar
+
+from bayesimpact.data.campaign import Smoothing
+from bayesimpact.data.recording import Recording
+from bayesimpact.inference.noise import Noise
+from bayesimpact.model.measurement import gain
+from bayesimpact.response.swings import rough_period
+
+Array = NDArray[np.float64]
+
+WINDOWS = range(5, 62, 2)
+ORDERS = (2, 4)
+ABOVE = 10.0  # times the lowest frequency of the motion: noise only
+DECISIVE = 20.0  # nats that a filter needs over white and AR(1) noise
+LEAST_ORDINATES = 40
+LEAST_FIT = 1e-4  # p-value of the scatter about the filter's spectrum
+STRONG = 0.3  # of the largest variance: combinations of a half swing that the filter let pass
+
+
+Spectra = list[tuple[Array, Array, float]]  # frequencies Hz, ordinates, sampling interval s
+
+
+@dataclass(frozen=True)
+class Fingerprint:
+    """The filter that the noise spectrum proves.
+
+    Attributes
+    ----------
+    smoothing : window and order
+    log_ratio : log likelihood over the better of white and AR(1) noise
+    nulls : the filter's first nulls, Hz
+    """
+
+    smoothing: Smoothing
+    log_ratio: float
+    nulls: tuple[float, ...]
+
+
+def find_smoothing(recordings: Sequence[Recording]) -> Fingerprint | None:
+    """The Savitzky-Golay filter that the recordings passed, or None when the spectrum proves none.
+
+    Each filter is judged from just below its first null on, so that no motion can pass for a passband.
+    """
+    spectra = [_periodogram(r) for r in recordings]
+    shortest = min(r.samples.size for r in recordings)
+    best: Fingerprint | None = None
+    for window in WINDOWS:
+        for order in ORDERS:
+            if order >= window - 1 or window > 0.2 * shortest:
+                continue
+            smoothing = Smoothing("savgol", window, order)
+            found = nulls(smoothing, recordings[0].interval)
+            stopband = _above(spectra, 0.8 * found[0]) if found else []
+            if sum(p.size for _, p, _ in stopband) < LEAST_ORDINATES:
+                continue
+            ratio = _filtered(stopband, smoothing) - max(_white(stopband), _ar1(stopband))
+            if ratio > (best.log_ratio if best else DECISIVE):
+                best = Fingerprint(smoothing, ratio, found)
+    if best is None or not _explains(_above(spectra, 0.8 * best.nulls[0]), best.smoothing):
+        return None
+    return best
+
+
+def _above(spectra: Spectra, frequency: float) -> Spectra:
+    return [(f[f > frequency], p[f > frequency], dt) for f, p, dt in spectra]
+
+
+def nulls(smoothing: Smoothing, interval: float, count: int = 3) -> tuple[float, ...]:
+    """First frequencies at which the filter lets nothing pass, Hz."""
+    frequency = np.linspace(0, 0.5 / interval, 4000)
+    response = gain(smoothing, interval, frequency)
+    inner = (response[1:-1] < response[:-2]) & (response[1:-1] <= response[2:])
+    return tuple(float(f) for f in frequency[1:-1][inner][:count])
+
+
+def smoothed_noise(recordings: Sequence[Recording], smoothing: Smoothing) -> Noise:
+    """Raw noise level behind a known filter, from half swings on the free side.
+
+    Frequency and decay of the swings are those that leave the least.
+    """
+    groups = [_half_swings(r) for r in recordings]
+    groups = [g for g in groups if g is not None]
+    if not groups:
+        raise ValueError("too few half swings for a noise estimate")
+
+    def energy(x: Array) -> float:
+        return sum(_passed(rows, times, smoothing, r, x)[0] for r, rows, times in groups)
+
+    # windows end where the motion crosses its median, which lies on the free side: the swing is longer
+    first = 0.9 * np.pi / max(2 * times[-1] for _, _, times in groups)
+    start = first * np.array([[1.0, 0.0], [0.9, 0.0], [1.0, 0.01]])
+    options = {"initial_simplex": start, "xatol": 1e-5 * first, "fatol": 1e-3, "maxiter": 200}
+    best = minimize(energy, start[0], method="Nelder-Mead", options=options).x
+    parts = [_passed(rows, times, smoothing, r, best) for r, rows, times in groups]
+    freedom = sum(f for _, f in parts)
+    level = float(np.sqrt(sum(e for e, _ in parts) / freedom))
+    return Noise(0.0, smoothing, level, float(np.sqrt(0.5 / freedom)), 0.0, "half swings")
+
+
+Swings = tuple[Recording, Array, Array]
+
+
+def _half_swings(recording: Recording) -> Swings | None:
+    """Windows (W, n) about the lower turning points, and times (n,) from their middles, s."""
+    centred = recording.samples - np.median(recording.samples)
+    below = centred < 0
+    turns = np.flatnonzero(np.diff(below.astype(int)))
+    spans = [j - i for i, j in zip(turns[:-1], turns[1:], strict=True) if below[i + 1]]
+    if not spans:
+        return None
+    half_period = float(np.median([s for s in spans if s > 0.5 * max(spans)]))
+    length = int(half_period)
+    starts = _swings(recording.samples, length)
+    if length < 8 or not starts:
+        return None
+    times = (np.arange(length) - 0.5 * (length - 1)) * recording.interval
+    return recording, np.array([recording.samples[s : s + length] for s in starts]), times
+
+
+def _passed(
+    rows: Array, times: Array, smoothing: Smoothing, recording: Recording, x: Array
+) -> tuple[float, int]:
+    """Energy over the filter's power, and degrees of freedom, that sinusoids leave in its passband.
+
+    x: angular frequency, rad/s, and decay rate, 1/s.
+    """
+    decay = np.exp(-x[1] * times)
+    motion = [decay * np.cos(x[0] * times), decay * np.sin(x[0] * times)]
+    basis = null_space(np.vstack([np.ones(times.size), *motion]))
+    values, vectors = np.linalg.eigh(
+        basis.T @ _covariance(smoothing, recording, times.size) @ basis
+    )
+    strong = values > STRONG * values[-1]
+    numbers = (rows - rows.mean(axis=1, keepdims=True)) @ basis @ vectors[:, strong]
+    energy = np.sum(numbers**2 / values[strong], axis=1)
+    freedom = int(strong.sum())
+    scale = np.median(energy) / stats.chi2.median(freedom)
+    kept = energy <= scale * stats.chi2.ppf(0.999, freedom)
+    return float(energy[kept].sum()), int(kept.sum()) * freedom
+
+
+def _swings(samples: Array, length: int) -> list[int]:
+    """Starts of windows centred on the turning points of the free (lower) side."""
+    centred = samples - np.median(samples)
+    deep = -centred > 0.2 * np.max(np.abs(centred))
+    edges = np.flatnonzero(np.diff(deep.astype(int)))
+    starts = []
+    for low, high in zip(edges[:-1], edges[1:], strict=True):
+        if deep[low + 1]:
+            start = low + 1 + int(np.argmin(centred[low + 1 : high + 1])) - length // 2
+            if start >= 0 and start + length <= samples.size:
+                starts.append(start)
+    return starts
+
+
+def _covariance(smoothing: Smoothing, recording: Recording, length: int) -> Array:
+    size = 8 * length
+    frequency = np.fft.rfftfreq(size, recording.interval)
+    power = gain(smoothing, recording.interval, frequency) ** 2
+    return np.asarray(toeplitz(np.fft.irfft(power, size)[:length]))
+
+
+def _periodogram(recording: Recording) -> tuple[Array, Array, float]:
+    """Frequencies above the motion, periodogram ordinates there, sampling interval."""
+    interval = recording.interval
+    frequency, power = signal.periodogram(
+        recording.samples, 1 / interval, window="hann", detrend="linear"
+    )
+    lowest = ABOVE / (rough_period(recording.samples) * interval)
+    # neighbours of a Hann window overlap: every second ordinate is nearly independent
+    chosen = np.flatnonzero((frequency > lowest) & (frequency < 0.49 / interval))[::2]
+    return frequency[chosen], power[chosen], interval
+
+
+def _log_likelihood(power: Array, expected: Array) -> float:
+    return -float(np.sum(np.log(expected) + power / expected))
+
+
+def _white(spectra: Spectra) -> float:
+    power = np.concatenate([p for _, p, _ in spectra])
+    return _log_likelihood(power, np.full(power.size, power.mean()))
+
+
+def _ar1(spectra: Spectra) -> float:
+    def negative(rho: float) -> float:
+        shapes = [1 / (1 - 2 * rho * np.cos(2 * np.pi * f * dt) + rho**2) for f, _, dt in spectra]
+        shape, power = np.concatenate(shapes), np.concatenate([p for _, p, _ in spectra])
+        return -_log_likelihood(power, shape * np.mean(power / shape))
+
+    return -float(minimize_scalar(negative, bounds=(-0.9, 0.999), method="bounded").fun)
+
+
+def _explains(spectra: Spectra, smoothing: Smoothing) -> bool:
+    """True when the ordinates scatter about the filter's spectrum as a periodogram must (exponentially)."""
+    level, floor = _levels(spectra, smoothing)
+    shape = np.concatenate([gain(smoothing, dt, f) ** 2 for f, _, dt in spectra])
+    power = np.concatenate([p for _, p, _ in spectra])
+    return bool(stats.kstest(power / (level * shape + floor), "expon").pvalue > LEAST_FIT)
+
+
+def _filtered(spectra: Spectra, smoothing: Smoothing) -> float:
+    """Best log likelihood of filtered white noise on a white floor (rounding)."""
+    level, floor = _levels(spectra, smoothing)
+    shape = np.concatenate([gain(smoothing, dt, f) ** 2 for f, _, dt in spectra])
+    return _log_likelihood(np.concatenate([p for _, p, _ in spectra]), level * shape + floor)
+
+
+def _levels(spectra: Spectra, smoothing: Smoothing) -> Array:
+    """Power of the filtered noise and of the floor that fit the ordinates best."""
+    shapes = [gain(smoothing, dt, f) ** 2 for f, _, dt in spectra]
+    shape, power = np.concatenate(shapes), np.concatenate([p for _, p, _ in spectra])
+
+    def negative(x: Array) -> float:
+        return -_log_likelihood(power, np.exp(x[0]) * shape + np.exp(x[1]))
+
+    level = float(np.mean(power) / np.mean(shape))
+    start = np.log([level, max(1e-3 * level, float(np.quantile(power, 0.05)))])
+    found = minimize(negative, start, method="Nelder-Mead", options={"maxiter": 120})
+    return np.asarray(np.exp(found.x))
