@@ -3,7 +3,8 @@
 A recording is cut into windows so short that any oscillation is a polynomial of degree five in
 them; what the polynomials leave is noise. Level and correlation maximise the likelihood of exactly
 these remainders (restricted maximum likelihood, Patterson and Thompson 1971), so no degrees of
-freedom are counted twice. Windows that a kink of an impact disturbs stand out and are left aside.
+freedom are counted twice. Where there is a stop, only swings on its free side count: impacts are
+kinks that no polynomial follows. Windows that something else disturbs stand out and are left aside.
 """
 
 from __future__ import annotations
@@ -19,17 +20,20 @@ from scipy.optimize import minimize_scalar
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.recording import Recording
+from bayesimpact.errors import InputError
 from bayesimpact.inference.noise import Noise
 from bayesimpact.response.swings import rough_period
 
 Array = NDArray[np.float64]
 
 DEGREE = 5
-WINDOWS_PER_PERIOD = (12.0, 9.0, 7.0, 5.5, 4.5)
+WINDOWS_PER_PERIOD = (12.0, 9.0, 7.0, 5.5, 4.5, 3.6, 3.0)
 SMALLEST, LARGEST = 12, 64
 KEPT = 0.999  # fraction of undisturbed windows that the outlier test keeps
+MARGIN = 0.05  # of the largest displacement, below rest: the free side, where no impact is
+LEAST_NUMBERS = 60  # remainders that the free side must give
 LEAST_CORRELATION = 0.03  # a weaker AR(1) changes no interval by more than 3 %
-LEAST_GAIN = 6.0  # in log likelihood, to call the noise coloured
+LEAST_GAIN = 4.0  # in log likelihood, to call the noise coloured: 1 false call in 200
 
 
 @dataclass(frozen=True)
@@ -59,7 +63,10 @@ def estimate_noise(campaign: Campaign) -> Noise:
 
 
 def raw_noise(recordings: Sequence[Recording]) -> Noise:
-    """Level and correlation from polynomial remainders, for recordings that passed no filter."""
+    """Level and correlation from polynomial remainders, for recordings that passed no filter.
+
+    Raises `InputError` when the recordings are too short.
+    """
     chosen = None
     for per_period in WINDOWS_PER_PERIOD:
         remainder = _remainder(recordings, per_period)
@@ -70,7 +77,8 @@ def raw_noise(recordings: Sequence[Recording]) -> Noise:
             break  # the oscillation itself begins to show
         chosen = found
     if chosen is None:
-        raise ValueError("recordings too short for a noise estimate")
+        total = sum(r.samples.size for r in recordings)
+        raise InputError("noise estimate", f"{total} samples in all", f"at least {5 * SMALLEST}")
     return chosen
 
 
@@ -81,13 +89,28 @@ def _remainder(recordings: Sequence[Recording], per_period: float) -> _Remainder
     length = min(lengths)
     powers = np.vander(np.linspace(-1, 1, length), DEGREE + 1)
     basis = null_space(powers.T)
-    rows = []
-    for recording in recordings:
-        count = recording.samples.size // length
-        windows = recording.samples[: count * length].reshape(count, length)
-        rows.append((windows - windows.mean(axis=1, keepdims=True)) @ basis)
+    side = any(r.case for r in recordings)
+    rows = [_windows(r.samples, length, side) @ basis for r in recordings]
     values = np.concatenate(rows)
+    if (
+        values.size < LEAST_NUMBERS and side
+    ):  # hardly any free swing: take the windows at the stop too
+        values = np.concatenate([_windows(r.samples, length, False) @ basis for r in recordings])
     return _Remainder(values, basis) if values.shape[0] >= 4 else None
+
+
+def _windows(samples: Array, length: int, side: bool) -> Array:
+    """Windows (count, length) of a recording; with `side`, only those on a stop's free side."""
+    settled = float(np.median(samples[-max(samples.size // 5, 1) :]))
+    centred = samples - settled
+    free = centred < -MARGIN * np.abs(centred).max() if side else np.ones(samples.size, dtype=bool)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], free, [False]]).astype(np.int8)))
+    starts = [
+        first + (end - first) % length // 2 + np.arange((end - first) // length) * length
+        for first, end in edges.reshape(-1, 2)
+    ]
+    first = np.concatenate([np.zeros(0, dtype=np.int64), *starts])
+    return np.asarray(centred[first[:, None] + np.arange(length)])
 
 
 def _restricted_ml(remainder: _Remainder) -> Noise:
@@ -97,14 +120,30 @@ def _restricted_ml(remainder: _Remainder) -> Noise:
         kept = values[_undisturbed(values, _covariance(remainder.basis, rho))]
         rho, best = _best_correlation(kept, remainder.basis)
     white = _log_likelihood(kept, np.eye(kept.shape[1]))
-    step = 0.01
-    bend = [_log_likelihood(kept, _covariance(remainder.basis, rho + d)) for d in (-step, 0, step)]
-    error = step / np.sqrt(max(2 * bend[1] - bend[0] - bend[2], 1e-12))
+    error = _correlation_error(kept, remainder.basis, rho)
     if best - white < LEAST_GAIN or abs(rho) < LEAST_CORRELATION:
         rho = 0.0
     level = np.sqrt(_variance(kept, _covariance(remainder.basis, rho)))
-    relative = np.sqrt(0.5 / kept.size)
-    return Noise(rho, None, float(level), float(relative), float(error), "polynomial remainders")
+    relative = np.sqrt(
+        0.5 / kept.size + (rho != 0.0) * (error * _lean(kept, remainder.basis, rho)) ** 2
+    )
+    return Noise(rho, None, float(level), float(relative), error, "polynomial remainders")
+
+
+def _correlation_error(values: Array, basis: Array, rho: float) -> float:
+    """Standard error of the correlation, from the bend of the likelihood."""
+    step = min(0.01, 0.5 * (1.0 - abs(rho)))
+    low, middle, high = (
+        _log_likelihood(values, _covariance(basis, rho + d)) for d in (-step, 0.0, step)
+    )
+    return float(step / np.sqrt(max(2 * middle - low - high, step**2)))
+
+
+def _lean(values: Array, basis: Array, rho: float) -> float:
+    """Derivative of the log level by the correlation: an error of one is an error of the other."""
+    step = min(0.01, 0.5 * (1.0 - abs(rho)))
+    low, high = (_variance(values, _covariance(basis, rho + d)) for d in (-step, step))
+    return float(0.25 * np.log(high / low) / step)
 
 
 def _best_correlation(values: Array, basis: Array) -> tuple[float, float]:
