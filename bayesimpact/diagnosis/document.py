@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.diagnosis.refit import Candidate
+from bayesimpact.diagnosis.smoothing import filter_parameters, filter_words
 from bayesimpact.diagnosis.whiteness import whiteness_p
 from bayesimpact.diagnosis.words import parameter_shifts, sizes, statement, summary
 from bayesimpact.inference.fit import Fit
@@ -112,6 +113,8 @@ def _detectable(d: Diagnosis) -> str:
 
 
 def _statement(d: Diagnosis, effect: Effect) -> str:
+    if d.filtered is not None and effect.id == "smoothing":
+        return effect.statement.format(size=filter_words(d.filtered))
     size, share = sizes(effect, d.before, d.after, d.scales)
     return statement(effect, size, share, parameter_shifts(d.before, d.after))
 
@@ -135,6 +138,15 @@ def _location(d: Diagnosis) -> dict[str, Any] | None:
 
 
 def _effect(d: Diagnosis, effect: Effect, text: str, draws: Array | None) -> dict[str, Any]:
+    if d.filtered is not None and effect.id == "smoothing":
+        return {
+            "id": effect.id,
+            "family": effect.family,
+            "statement": text,
+            "probability": 1.0,
+            "delta_log_evidence": d.filtered.log_ratio,
+            "parameters": dict(filter_parameters(d.filtered)),
+        }
     chosen = d.naming.chosen.candidate
     without = set(chosen.ids) - {effect.id}
     smaller = next((c for c in d.naming.tried if set(c.ids) == without), d.naming.base.candidate)

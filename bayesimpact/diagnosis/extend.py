@@ -140,7 +140,8 @@ def _start(
 
 def difference_steps(fit: Fit, target: Target, sizes: Mapping[str, float]) -> Array:
     """Steps (d,) for differences: a twentieth of the known standard deviations or of `sizes`."""
-    sd = dict(zip(fit.names, fit.sd, strict=True))
+    known = zip(fit.names, fit.sd, np.abs(fit.mode), strict=True)
+    sd = {n: s if s > 0 else 1e-6 * max(m, 1e-6) for n, s, m in known}
     names = target.oscillator.layout.names
     return np.array([0.05 * sd[n] if n in sd else 0.05 * sizes[n] for n in names])
 

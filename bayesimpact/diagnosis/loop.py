@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -18,13 +18,18 @@ from bayesimpact.diagnosis.limits import Limit, limits
 from bayesimpact.diagnosis.locate import Location, locate
 from bayesimpact.diagnosis.name import Naming, name
 from bayesimpact.diagnosis.refit import Candidate
+from bayesimpact.diagnosis.smoothing import proved_smoothing, with_smoothing
 from bayesimpact.diagnosis.unknown import learn_force
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification, identify
+from bayesimpact.inference.spectrum import Fingerprint
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.effects.effect import Effect, Scales
 
 Array = NDArray[np.float64]
+GROSS = 3.0  # base residual over noise from which on a misfit is no longer concealed
+NEARLY_ALL = 0.9  # of the squared residual
+
 Verdict = Literal["adequate", "named", "ambiguous", "unknown"]
 Progress = Callable[[str], None]
 
@@ -48,6 +53,7 @@ class Diagnosis:
     limits : of effects that were not found
     honest : parameters of `after` with what stays unexplained carried into their intervals
     scales : physical sizes of the campaign
+    filtered : the filter that the noise spectrum proves and campaign.toml does not declare
     """
 
     verdict: Verdict
@@ -64,6 +70,7 @@ class Diagnosis:
     limits: tuple[Limit, ...]
     honest: Widened
     scales: Scales
+    filtered: Fingerprint | None = None
 
 
 def diagnose(
@@ -91,7 +98,14 @@ def diagnose(
     say = progress or (lambda message: None)
     say("fitting the base model")
     identification = identify(campaign, rng=rng, search=search)
-    return diagnose_fit(identification, rng=rng, effects=effects, progress=say)
+    filtered = proved_smoothing(campaign)
+    if filtered is None:
+        return diagnose_fit(identification, rng=rng, effects=effects, progress=say)
+    say("the noise spectrum proves a filter: fitting through it")
+    measurement = replace(campaign.measurement, smoothing=filtered.smoothing)
+    through = identify(replace(campaign, measurement=measurement), rng=rng, search=False)
+    found = diagnose_fit(through, rng=rng, effects=effects, progress=say)
+    return with_smoothing(found, identification, filtered)
 
 
 def diagnose_fit(
@@ -141,13 +155,27 @@ def diagnose_fit(
 
 
 def judge(naming: Naming) -> Verdict:
-    """The verdict that the evidence supports."""
+    """The verdict that the evidence supports.
+
+    What remains beside the chosen effects must be white. One exception: where the base model misses by
+    far more than the noise, effects that explain nearly all of it are named although something small
+    remains (which the summary says).
+    """
     chosen = naming.chosen
     if not chosen.candidate.effects:
         return "adequate" if chosen.is_white else "unknown"
-    if not chosen.is_white or naming.prefers_learned_force():
+    if naming.prefers_learned_force():
+        return "unknown"
+    if not chosen.is_white and not explains_gross_misfit(naming):
         return "unknown"
     return "ambiguous" if naming.rivals() else "named"
+
+
+def explains_gross_misfit(naming: Naming) -> bool:
+    """True when the base residual dwarfs the noise and the chosen effects take nearly all of it away."""
+    base, chosen = naming.base.candidate.fit, naming.chosen.candidate.fit
+    gross = base.reduced_chi2 > GROSS**2
+    return gross and (base.reduced_chi2 - chosen.reduced_chi2) > NEARLY_ALL * base.reduced_chi2
 
 
 def ordered(naming: Naming, effects: tuple[Effect, ...]) -> tuple[Effect, ...]:

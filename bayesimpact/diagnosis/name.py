@@ -24,6 +24,7 @@ ALPHA = 0.005  # of each of the two tests that ask whether anything is missing
 DECISIVE = 5.5  # nats of log odds that a name needs over every rival (2 ln odds of 11)
 MOST_EFFECTS = 3
 WORTH_A_REFIT = 4.0  # expected gain in log likelihood, nats
+BEAM = 3  # models that are extended further while the best one is not white
 PAIRS = 4  # refitted at the first step
 
 Progress = Callable[[str], None]
@@ -117,11 +118,15 @@ def name(
     """Find the effects that the base model of `fit` leaves out."""
     search = _Search(effects, scales, rng, progress or (lambda message: None))
     state = base = search.examine(base_candidate(fit))
+    beam = [base]
     while not state.is_white and len(state.candidate.effects) < MOST_EFFECTS:
-        better = search.extended(state, first=state is base)
-        if better is None:
+        better = [c for s in beam for c in search.extended(s)]
+        better = sorted({c.ids: c for c in better}.values(), key=search.worth, reverse=True)
+        if not better or search.worth(better[0]) <= search.worth(state.candidate):
             break
-        state = search.examine(better)
+        state = search.examine(better[0])
+        if not state.is_white:
+            beam = [state, *(search.examine(c) for c in better[1:BEAM])]
     state = search.eliminated(state)
     search.compare_rivals(state)
     return search.naming(base, state)
@@ -140,6 +145,7 @@ class _Search:
         self.effects, self.scales, self.rng, self.progress = effects, scales, rng, progress
         self.cost = float(np.log(2 * len(effects)))
         self.tried: dict[frozenset[str], Candidate] = {}
+        self.states: dict[frozenset[str], State] = {}
 
     def keep(self, candidate: Candidate) -> Candidate:
         key = frozenset(candidate.ids)
@@ -151,24 +157,25 @@ class _Search:
     def examine(self, candidate: Candidate) -> State:
         self.progress("scoring what " + (" + ".join(candidate.ids) or "the base model") + " lacks")
         candidate = self.keep(candidate)
+        if frozenset(candidate.ids) in self.states:
+            return self.states[frozenset(candidate.ids)]
         found = scan(candidate.fit, self.effects, self.scales, rng=self.rng)
         force = missing_force(candidate.fit, self.scales, rng=self.rng)
-        return State(candidate, found, force)
+        state = State(candidate, found, force)
+        self.states[frozenset(candidate.ids)] = state
+        return state
 
-    def extended(self, state: State, first: bool) -> Candidate | None:
-        """The best model with one more effect (at first also a pair), when it is worth its cost."""
+    def extended(self, state: State) -> list[Candidate]:
+        """Models with one more effect; from the base model on also the most promising pairs."""
         scores = [s for s in state.scan.best() if s.gain > WORTH_A_REFIT]
         found = [self.fit_more(state.candidate, [score]) for score in scores]
-        if first and state.candidate.effects == ():
+        if not state.candidate.effects:
             best_single = max((c.log_evidence for c in found), default=-np.inf)
             for pair in promising_pairs(state.scan, count=PAIRS):
                 expected = state.candidate.log_evidence + pair.gain
                 if expected > best_single + self.cost:
                     found.append(self.fit_more(state.candidate, pair.scores))
-        if not found:
-            return None
-        best = max(found, key=self.worth)
-        return best if self.worth(best) > self.worth(state.candidate) else None
+        return found
 
     def fit_more(self, candidate: Candidate, scores: Sequence[Score]) -> Candidate:
         key = frozenset((*candidate.ids, *(s.effect.id for s in scores)))

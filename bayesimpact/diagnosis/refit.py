@@ -108,6 +108,8 @@ def log_evidence(fit: Fit) -> float:
     of the exponential of a quadratic. Accurate for the near-Gaussian posteriors of this problem
     (Tierney and Kadane 1986).
     """
+    if not np.isfinite(fit.log_posterior) or not np.isfinite(fit.sd).all():
+        return -np.inf
     lower = np.maximum(
         fit.target.priors.lower, [p.lower for p in fit.target.oscillator.layout.parameters]
     )

@@ -203,7 +203,7 @@ class _Climb:
             known = np.diag(matrix)[self.moving] > 0
             spread = marginal_sd(matrix[np.ix_(self.moving, self.moving)])
             self.steps = self.steps.copy()
-            better = known & np.isfinite(spread)
+            better = known & np.isfinite(spread) & (spread > 0)
             self.steps[self.moving[better]] = 0.05 * spread[better]
         return parts, matrix, vector
 
@@ -232,6 +232,9 @@ class _Climb:
 
     def fit(self, theta: Array, value: float, sums: Array, converged: bool, iterations: int) -> Fit:
         parts, matrix, _ = self.linear(theta)
+        if not np.isfinite(matrix).all():  # not a mode of anything: the caller sees its value
+            unknown = np.full(matrix.shape, np.nan)
+            return Fit(self.target, theta, unknown, -np.inf, sums, False, iterations, parts)
         sizes, sigma = self.target.likelihood.sizes, theta[self.target.likelihood.sigma_columns]
         for column in np.unique(self.target.likelihood.sigma_columns):
             mine = self.target.likelihood.sigma_columns == column

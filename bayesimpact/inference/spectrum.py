@@ -1,13 +1,15 @@
 """Smoothed recordings: which filter they passed, and what noise it left.
 
-A Savitzky-Golay filter leaves its signature in the noise: nulls at frequencies that depend on window and order
-only. Above the frequencies of the motion the periodogram is noise, so the filters of a family are compared by the
-Whittle likelihood of its ordinates (Whittle 1953), against white and AR(1) noise. The level is estimated where
-the information is, in the passband, from swings on the free side: a half swing is a sinusoid whatever the obstacle.
+A Savitzky-Golay filter leaves its signature in the noise: nulls at frequencies that depend on window
+and order only. Above the frequencies of the motion the periodogram is noise, so filters are compared
+by the Whittle likelihood of its ordinates (Whittle 1953), against AR(1) noise and a power law. The
+level is estimated where the information is, in the passband, from swings on the free side: a half
+swing is a sinusoid whatever the obstacle.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -56,7 +58,7 @@ class Fingerprint:
 def find_smoothing(recordings: Sequence[Recording]) -> Fingerprint | None:
     """The Savitzky-Golay filter that the recordings passed, or None when the spectrum proves none.
 
-    Each filter is judged from just below its first null on, so that no motion can pass for a passband.
+    Each filter is judged from just below its first null on: no motion can pass for a passband.
     """
     spectra = [_periodogram(r) for r in recordings]
     shortest = min(r.samples.size for r in recordings)
@@ -70,7 +72,7 @@ def find_smoothing(recordings: Sequence[Recording]) -> Fingerprint | None:
             stopband = _above(spectra, 0.8 * found[0]) if found else []
             if sum(p.size for _, p, _ in stopband) < LEAST_ORDINATES:
                 continue
-            ratio = _filtered(stopband, smoothing) - max(_white(stopband), _ar1(stopband))
+            ratio = _filtered(stopband, smoothing) - max(_ar1(stopband), _falling(stopband))
             if ratio > (best.log_ratio if best else DECISIVE):
                 best = Fingerprint(smoothing, ratio, found)
     if best is None or not _explains(_above(spectra, 0.8 * best.nulls[0]), best.smoothing):
@@ -103,7 +105,7 @@ def smoothed_noise(recordings: Sequence[Recording], smoothing: Smoothing) -> Noi
     def energy(x: Array) -> float:
         return sum(_passed(rows, times, smoothing, r, x)[0] for r, rows, times in groups)
 
-    # windows end where the motion crosses its median, which lies on the free side: the swing is longer
+    # windows end where the motion crosses its median, on the free side: the whole swing is longer
     first = 0.9 * np.pi / max(2 * times[-1] for _, _, times in groups)
     start = first * np.array([[1.0, 0.0], [0.9, 0.0], [1.0, 0.01]])
     options = {"initial_simplex": start, "xatol": 1e-5 * first, "fatol": 1e-3, "maxiter": 200}
@@ -122,7 +124,7 @@ def _half_swings(recording: Recording) -> Swings | None:
     centred = recording.samples - np.median(recording.samples)
     below = centred < 0
     turns = np.flatnonzero(np.diff(below.astype(int)))
-    spans = [j - i for i, j in zip(turns[:-1], turns[1:], strict=True) if below[i + 1]]
+    spans = [j - i for i, j in itertools.pairwise(turns) if below[i + 1]]
     if not spans:
         return None
     half_period = float(np.median([s for s in spans if s > 0.5 * max(spans)]))
@@ -162,7 +164,7 @@ def _swings(samples: Array, length: int) -> list[int]:
     deep = -centred > 0.2 * np.max(np.abs(centred))
     edges = np.flatnonzero(np.diff(deep.astype(int)))
     starts = []
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in itertools.pairwise(edges):
         if deep[low + 1]:
             start = low + 1 + int(np.argmin(centred[low + 1 : high + 1])) - length // 2
             if start >= 0 and start + length <= samples.size:
@@ -193,9 +195,18 @@ def _log_likelihood(power: Array, expected: Array) -> float:
     return -float(np.sum(np.log(expected) + power / expected))
 
 
-def _white(spectra: Spectra) -> float:
+def _falling(spectra: Spectra) -> float:
+    """Best log likelihood of a power law on a white floor: what the motion itself may leave up here."""
+    frequency = np.concatenate([f for f, _, _ in spectra])
     power = np.concatenate([p for _, p, _ in spectra])
-    return _log_likelihood(power, np.full(power.size, power.mean()))
+    relative = np.log(frequency / frequency.min())
+
+    def negative(x: Array) -> float:
+        return -_log_likelihood(power, np.exp(x[0] - x[2] * relative) + np.exp(x[1]))
+
+    level = float(np.log(power.mean()))
+    start = np.array([level, level - 1.0, 4.0])
+    return -float(minimize(negative, start, method="Nelder-Mead", options={"maxiter": 200}).fun)
 
 
 def _ar1(spectra: Spectra) -> float:
@@ -208,7 +219,7 @@ def _ar1(spectra: Spectra) -> float:
 
 
 def _explains(spectra: Spectra, smoothing: Smoothing) -> bool:
-    """True when the ordinates scatter about the filter's spectrum as a periodogram must (exponentially)."""
+    """True when the ordinates scatter about the filter's spectrum as they must (exponentially)."""
     level, floor = _levels(spectra, smoothing)
     shape = np.concatenate([gain(smoothing, dt, f) ** 2 for f, _, dt in spectra])
     power = np.concatenate([p for _, p, _ in spectra])

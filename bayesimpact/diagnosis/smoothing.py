@@ -1,0 +1,90 @@
+"""A filter that nobody declared: proved by the noise spectrum, then part of the model like any effect."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.diagnosis.locate import Location
+from bayesimpact.inference.identify import Identification
+from bayesimpact.inference.spectrum import Fingerprint, find_smoothing
+from bayesimpact.model.effects.effect import Effect
+
+if TYPE_CHECKING:
+    from bayesimpact.diagnosis.loop import Diagnosis
+
+SMOOTHING = Effect(
+    id="smoothing",
+    family="sensor",
+    title="smoothing by the measuring chain",
+    equation="the simulated signal passes the same filter",
+    regime="measurement",
+    energy="none",
+    statement="The chain smoothed the recordings: {size}.",
+)
+
+
+def proved_smoothing(campaign: Campaign) -> Fingerprint | None:
+    """The filter that the recordings prove and campaign.toml does not declare, or None."""
+    if campaign.measurement.smoothing is not None:
+        return None
+    return find_smoothing(campaign.recordings)
+
+
+def with_smoothing(
+    found: Diagnosis, identification: Identification, filtered: Fingerprint
+) -> Diagnosis:
+    """The diagnosis made through the filter, told from the fit that knew nothing of it."""
+    location = found.location or _everywhere(identification)
+    return replace(
+        found,
+        verdict="named" if found.verdict == "adequate" else found.verdict,
+        identification=replace(found.identification, search=identification.search),
+        before=identification.fit,
+        effects=(SMOOTHING, *found.effects),
+        location=location,
+        filtered=filtered,
+    )
+
+
+def filter_words(filtered: Fingerprint) -> str:
+    """The filter in words."""
+    s = filtered.smoothing
+    nulls = ", ".join(f"{f:.1f}" for f in filtered.nulls)
+    return f"Savitzky-Golay over {s.window} samples, order {s.polyorder} (nulls at {nulls} Hz)"
+
+
+def filter_parameters(filtered: Fingerprint) -> Mapping[str, Mapping[str, Any]]:
+    """Window and order as parameters of diagnosis.json."""
+    s = filtered.smoothing
+    values = {"smoothing.window": s.window, "smoothing.order": s.polyorder}
+    return {
+        name: {"unit": "samples" if "window" in name else "1", "median": v, "ci90": [v, v]}
+        for name, v in values.items()
+    }
+
+
+def _everywhere(identification: Identification) -> Location:
+    import numpy as np
+
+    fit = identification.fit
+    campaign = fit.target.oscillator.campaign
+    samples = np.concatenate([r.samples for r in campaign.recordings])
+    speed = max(
+        float(np.max(np.abs(np.gradient(r.samples, r.interval)))) for r in campaign.recordings
+    )
+    return Location(
+        regime="measurement",
+        share=1.0,
+        displacement=(float(samples.min()), float(samples.max())),
+        velocity=(-speed, speed),
+        time=(0.0, max(r.duration for r in campaign.recordings)),
+        recordings=tuple(r.name for r in campaign.recordings),
+        cases=campaign.cases,
+        force_rms=0.0,
+        contact_share=0.0,
+        agrees=True,
+        gain=np.zeros((len(campaign.recordings), 1)),
+    )
