@@ -6,6 +6,7 @@ import platform
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from importlib import metadata
+from typing import Any
 
 import numpy as np
 
@@ -16,8 +17,10 @@ from bayesimpact.inference.noise import Noise as NoiseModel
 from bayesimpact.inference.posterior import Posterior
 from bayesimpact.model.measurement import gain
 from bayesimpact.report import checks
+from bayesimpact.report.backbones import backbone_summary
 from bayesimpact.report.published import references as published_values
 from bayesimpact.report.results import (
+    Array,
     BackboneSummary,
     Chain,
     Draws,
@@ -44,6 +47,8 @@ def results_from_fit(
     command: str = "",
     seconds: float = float("nan"),
     references: Mapping[str, Mapping[str, float]] | None = None,
+    diagnosis: Mapping[str, Any] | None = None,
+    diagnosis_arrays: Mapping[str, Array] | None = None,
 ) -> Results:
     """Results of a fit: intervals are those of the Laplace approximation at the mode.
 
@@ -52,6 +57,7 @@ def results_from_fit(
     identification : of `inference.identify`
     seed, command, seconds : for the provenance
     references : label -> parameter -> value to set beside; None takes published values and beams
+    diagnosis, diagnosis_arrays : content of diagnosis.json, and arrays for its figures
     """
     return _results(
         identification.fit,
@@ -59,6 +65,7 @@ def results_from_fit(
         search=_search(identification),
         provenance=_provenance(identification.fit, seed, command, seconds),
         references=references,
+        diagnosis=(diagnosis, diagnosis_arrays),
     )
 
 
@@ -66,11 +73,13 @@ def results_from_posterior(
     posterior: Posterior,
     identification: Identification | None = None,
     *,
-    backbone: BackboneSummary | None = None,
+    backbone: bool = True,
     before: Posterior | None = None,
     command: str = "",
     seconds: float = float("nan"),
     references: Mapping[str, Mapping[str, float]] | None = None,
+    diagnosis: Mapping[str, Any] | None = None,
+    diagnosis_arrays: Mapping[str, Array] | None = None,
 ) -> Results:
     """Results of a posterior: intervals are percentiles of its draws.
 
@@ -78,11 +87,12 @@ def results_from_posterior(
     ----------
     posterior : of `inference.posterior`, of the base model or with effects
     identification : how the mode was found; None leaves the search out
-    backbone : posterior-predictive check of the backbone
-    before : posterior without the effects, drawn beside this one
-    command, seconds, references : as in `results_from_fit`
+    backbone : simulate recordings for the posterior-predictive check of the backbone
+    before : posterior without the effects, shown beside this one
+    command, seconds, references, diagnosis, diagnosis_arrays : as in `results_from_fit`
     """
     fit = posterior.fit
+    rng = np.random.default_rng([posterior.seed, 2])
     return _results(
         fit,
         fit.target.likelihood.noise,
@@ -90,8 +100,10 @@ def results_from_posterior(
         provenance=_provenance(fit, posterior.seed, command, seconds),
         references=references,
         posterior=posterior,
-        backbone=backbone,
-        before=None if before is None else _draws(before, "model without added effects"),
+        backbone=backbone_summary(posterior, rng) if backbone else None,
+        before=before,
+        before_backbone=backbone_summary(before, rng) if backbone and before is not None else None,
+        diagnosis=(diagnosis, diagnosis_arrays),
     )
 
 
@@ -104,7 +116,9 @@ def _results(
     references: Mapping[str, Mapping[str, float]] | None,
     posterior: Posterior | None = None,
     backbone: BackboneSummary | None = None,
-    before: Draws | None = None,
+    before: Posterior | None = None,
+    before_backbone: BackboneSummary | None = None,
+    diagnosis: tuple[Mapping[str, Any] | None, Mapping[str, Array] | None] = (None, None),
 ) -> Results:
     oscillator = fit.target.oscillator
     campaign = oscillator.campaign
@@ -137,7 +151,10 @@ def _results(
         backbone=backbone,
         checks=(),
         provenance=provenance,
-        before=before,
+        before=None if before is None else _draws(before, "without added effects"),
+        before_backbone=before_backbone,
+        diagnosis=diagnosis[0],
+        diagnosis_arrays=diagnosis[1] or {},
     )
     return checks.judged(summary)
 

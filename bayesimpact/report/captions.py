@@ -46,16 +46,18 @@ def _corner(results: Results) -> str:
 
 def _backbone(results: Results) -> str:
     return (
-        "Backbone curves: amplitude against instantaneous frequency (above), and how far "
-        "recorded frequencies lie from the median of simulated ones (below). Dots: recorded, all "
-        "releases of a case together; bands: simulated."
+        "Backbone curves. Above: amplitude against instantaneous frequency, all releases of a case "
+        "together; dots recorded, bands simulated (often narrower than a dot). Below: how far "
+        "recorded frequencies lie from the median of simulated ones, in half-widths of the band, "
+        "which the grey stripe shows."
     )
 
 
 def _damping(results: Results) -> str:
     return (
-        "Damping ratio against time (above), and its distance from the median of simulated ones "
-        "(below). Early values belong to the impacts, late ones to free motion."
+        "Damping ratio (Eq. 5: averaged from the first swing to the time shown). Above: dots "
+        "recorded, bands simulated, one curve per release. Below: how far recorded ratios lie from "
+        "the median of simulated ones, in half-widths of the band."
     )
 
 

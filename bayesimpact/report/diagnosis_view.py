@@ -8,9 +8,18 @@ from typing import Any
 
 from markupsafe import Markup
 
+from bayesimpact.report.results import Results
 from bayesimpact.report.rows import Z90
 from bayesimpact.report.tables import signed, span, symbol
-from bayesimpact.report.units import decimals, number, p_value, readable, significant, typeset
+from bayesimpact.report.units import (
+    decimals,
+    number,
+    p_value,
+    p_words,
+    readable,
+    significant,
+    typeset,
+)
 
 Rows = list[dict[str, Any]]
 
@@ -28,6 +37,7 @@ _REGIMES = {
     "everywhere": "everywhere",
     "measurement": "the measuring chain",
 }
+_NUISANCES = ("y0", "v0", "offset", "sigma")
 _FIT_ROWS = {
     "rms_m": ("residual rms", "m"),
     "reduced_chi2": ("reduced χ²", ""),
@@ -36,11 +46,11 @@ _FIT_ROWS = {
 }
 
 
-def diagnosis_view(diagnosis: Mapping[str, Any] | None, *, angle: bool) -> dict[str, Any] | None:
+def diagnosis_view(results: Results) -> dict[str, Any] | None:
     """Everything that the section on the diagnosis shows; None without one."""
+    diagnosis, unit = results.diagnosis, results.unit
     if diagnosis is None:
         return None
-    unit = "rad" if angle else "m"
     before, after = (diagnosis.get("parameters", {}).get(k, {}) for k in ("before", "after"))
     return {
         "verdict": VERDICTS.get(diagnosis["verdict"], diagnosis["verdict"]),
@@ -54,9 +64,13 @@ def diagnosis_view(diagnosis: Mapping[str, Any] | None, *, angle: bool) -> dict[
             }
             for other in diagnosis.get("alternatives", [])
         ],
-        "fit": _fit(diagnosis.get("fit", {}), unit),
+        "fit": _fit(diagnosis.get("fit", {}), unit) + _backbones(results),
         "held_out": _held_out(diagnosis.get("fit", {})),
-        "parameters": [_shift(name, before[name], after[name]) for name in before if name in after],
+        "parameters": [
+            _shift(name, before[name], after[name])
+            for name in before
+            if name in after and name.partition("[")[0] not in _NUISANCES
+        ],
         "limits": [_limit(limit) for limit in diagnosis.get("limits", [])],
     }
 
@@ -113,14 +127,17 @@ def _effect(effect: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _estimate(content: Mapping[str, Any]) -> str:
-    """Median with its 90 % interval and unit."""
+def _estimate(content: Mapping[str, Any], *, median: bool = True) -> str:
+    """Median with its 90 % interval and unit, or the interval alone."""
     low, high = content["ci90"]
     half = 0.5 * (high - low)
     shown = readable(content["unit"], max(abs(content["median"]), half))
     places = decimals(half * shown.scale)
+    ends = span(low, high, shown.scale, places)
+    if not median:
+        return f"{ends} {typeset(shown.unit)}".rstrip()
     value = number(content["median"] * shown.scale, places)
-    return f"{value} ({span(low, high, shown.scale, places)}) {typeset(shown.unit)}".rstrip()
+    return f"{value} ({ends}) {typeset(shown.unit)}".rstrip()
 
 
 def _probability(p: float | None) -> str:
@@ -151,6 +168,15 @@ def _merit(value: float | None, kind: str, unit: str) -> str:
     return p_value(value) if kind == "p" else significant(value, 4)
 
 
+def _backbones(results: Results) -> list[tuple[str, str, str]]:
+    """Recorded backbone points inside the bands of both models."""
+    before, after = results.before_backbone, results.backbone
+    if before is None or after is None:
+        return []
+    cells = [f"{100 * b.inside[-1]:.0f} %, {p_words(b.p_values[-1])}" for b in (before, after)]
+    return [("backbone inside its band", cells[0], cells[1])]
+
+
 def _held_out(fit: Mapping[str, Any]) -> str:
     gain = fit.get("held_out_gain") or {}
     value, error = gain.get("value"), gain.get("se")
@@ -160,7 +186,8 @@ def _held_out(fit: Mapping[str, Any]) -> str:
         f"On recordings held out, the log score changes by {signed(value, 1)} ± {number(error, 1)} "
         "(standard error)"
     )
-    return f"{words}: an improvement." if value > 2 * error else f"{words}: no clear improvement."
+    improved = gain.get("improved", value > 2 * error)
+    return f"{words}: an improvement." if improved else f"{words}: no clear improvement."
 
 
 def _shift(
@@ -173,15 +200,23 @@ def _shift(
         "symbol": symbol(name),
         "before": _estimate(before),
         "after": _estimate(after),
+        "honest": _estimate(after | {"ci90": after["ci90_honest"]}, median=False)
+        if after.get("ci90_honest")
+        else "",
         "shift": signed(moved, 1) if abs(moved) < 1000 else f"{significant(moved, 2)}",
     }
 
 
 def _limit(limit: Mapping[str, Any]) -> dict[str, str]:
     """An effect that was not found and how large it could still be."""
-    upper = limit.get("upper95")
+    unit, hidden = str(limit.get("unit", "")), limit.get("hidden_bias") or {}
+    upper, detection = limit.get("upper95"), limit.get("detection_limit")
+    bias = hidden.get("sd")
     return {
         "id": str(limit["id"]),
         "parameter": str(limit.get("parameter", "")).replace("_", " "),
-        "upper": "–" if upper is None else _amount(float(upper), str(limit.get("unit", ""))),
+        "upper": "–" if upper is None else _amount(float(upper), unit),
+        "detection": "" if detection is None else _amount(float(detection), unit),
+        "answer": str(limit.get("answer", "")),
+        "bias": "" if bias is None else f"{significant(abs(bias), 2)} sd of {hidden['parameter']}",
     }

@@ -72,7 +72,7 @@ def _context(results: Results, pictures: Mapping[str, bytes]) -> dict[str, Any]:
     return {
         "r": results,
         "css": Markup((TEMPLATES / "style.css").read_text(encoding="utf-8")),
-        "d": diagnosis_view(results.diagnosis, angle=results.quantity == "angle"),
+        "d": diagnosis_view(results),
         "angle": results.quantity == "angle",
         "kind_words": words.kind_words(results),
         "byline": words.byline(results),

@@ -203,9 +203,9 @@ class BackboneSummary:
     ----------
     curves : of every recording and branch
     probability : of the bands
-    labels : a case, or "all", for each of the following
+    labels : cases, then "all" where there is more than one (or none), for each of the following
     inside : (n,) fraction of the recorded points inside the bands
-    p_values : (n,) posterior-predictive
+    p_values : (n,) posterior-predictive; the last is over everything
     replicates : simulated recordings per recording
     """
 
@@ -293,7 +293,7 @@ class Results:
     covariance : (d, d) Laplace, in the order of `rows`, SI
     fit_converged : the climb to the mode came to rest
     search, sampler, draws, backbone : None where there are none
-    before : draws under the model without the effects, for comparison
+    before, before_backbone : draws and backbone check of the model without the effects
     checks : the checklist
     diagnosis : content of diagnosis.json, and arrays for its figures
     """
@@ -321,6 +321,7 @@ class Results:
     checks: tuple[Check, ...]
     provenance: Provenance
     before: Draws | None = None
+    before_backbone: BackboneSummary | None = None
     diagnosis: Mapping[str, Any] | None = None
     diagnosis_arrays: Mapping[str, Array] = field(default_factory=dict)
 

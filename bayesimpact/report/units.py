@@ -161,6 +161,11 @@ def significant(value: float, digits: int = 3) -> str:
     return f"{number(value / 10.0**size, digits - 1)}{THIN}×{THIN}10{exponent}"
 
 
+def p_words(p: float) -> str:
+    """A p-value in a sentence: "p = 0.35", "p < 0.001"."""
+    return f"p {p_value(p)}" if p < 0.001 else f"p = {p_value(p)}"
+
+
 def p_value(p: float) -> str:
     """A p-value for a table."""
     if not isfinite(p):

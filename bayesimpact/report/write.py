@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from bayesimpact.inference.identify import Identification
 from bayesimpact.inference.posterior import Posterior
@@ -13,7 +14,7 @@ from bayesimpact.report.build import results_from_fit, results_from_posterior
 from bayesimpact.report.figures.save import all_figures, save_figures
 from bayesimpact.report.groups import inference_groups
 from bayesimpact.report.html import render
-from bayesimpact.report.results import BackboneSummary, Results
+from bayesimpact.report.results import Array, Results
 
 REPORT_FILE = "report.html"
 POSTERIOR_FILE = "posterior.nc"
@@ -54,10 +55,18 @@ def write_fit(
     command: str = "",
     seconds: float = float("nan"),
     references: Mapping[str, Mapping[str, float]] | None = None,
+    diagnosis: Mapping[str, Any] | None = None,
+    diagnosis_arrays: Mapping[str, Array] | None = None,
 ) -> Results:
     """Write the results of a fit; parameters as in `build.results_from_fit`."""
     results = results_from_fit(
-        identification, seed=seed, command=command, seconds=seconds, references=references
+        identification,
+        seed=seed,
+        command=command,
+        seconds=seconds,
+        references=references,
+        diagnosis=diagnosis,
+        diagnosis_arrays=diagnosis_arrays,
     )
     return write_results(results, folder)
 
@@ -67,11 +76,12 @@ def write_posterior(
     identification: Identification | None,
     folder: Path,
     *,
-    backbone: BackboneSummary | None = None,
     before: Posterior | None = None,
     command: str = "",
     seconds: float = float("nan"),
     references: Mapping[str, Mapping[str, float]] | None = None,
+    diagnosis: Mapping[str, Any] | None = None,
+    diagnosis_arrays: Mapping[str, Array] | None = None,
 ) -> Results:
     """Write the results of sampling, and posterior.nc for ArviZ.
 
@@ -80,11 +90,12 @@ def write_posterior(
     results = results_from_posterior(
         posterior,
         identification,
-        backbone=backbone,
         before=before,
         command=command,
         seconds=seconds,
         references=references,
+        diagnosis=diagnosis,
+        diagnosis_arrays=diagnosis_arrays,
     )
     folder.mkdir(parents=True, exist_ok=True)
     archive_arviz.write_posterior(

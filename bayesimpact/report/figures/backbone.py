@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -21,12 +22,14 @@ from bayesimpact.report.figures.style import (
     styled,
 )
 from bayesimpact.report.results import BackboneSummary, Curve, Results
+from bayesimpact.report.units import p_words
 
 PER_PAGE = 3
 MOST = 12
 """Cases shown."""
 _COLOURS = {"upper": RED, "lower": BLUE}
-_BRANCHES = {"upper": "upper, towards the stop", "lower": "lower"}
+_BRANCHES = {"upper": "above rest", "lower": "below rest"}
+_BAND: dict[str, Any] = {"alpha": 0.3, "lw": 0}
 
 
 def backbone_figures(results: Results) -> Mapping[str, Figure]:
@@ -47,65 +50,67 @@ def backbone_figures(results: Results) -> Mapping[str, Figure]:
 @styled
 def _backbone(results: Results, summary: BackboneSummary, cases: Sequence[str]) -> Figure:
     """Amplitude against frequency; below, how far recorded frequencies are from simulated ones."""
-    figure, panels = _grid(cases, [2.0, 1.0], height=5.4)
+    figure, panels = _grid(cases)
     shown = response(results)
     for column, case in enumerate(cases):
         top, bottom = panels[:, column]
         for curve in _curves(summary, case):
             colour, amplitude = _COLOURS[curve.branch], curve.amplitude * shown.scale
-            low, middle, high = curve.frequency_band.T
+            low, _, high = curve.frequency_band.T
             order = np.argsort(amplitude)
-            top.fill_betweenx(
-                amplitude[order], low[order], high[order], color=colour, alpha=0.3, lw=0
-            )
+            top.fill_betweenx(amplitude[order], low[order], high[order], color=colour, **_BAND)
             top.plot(curve.frequency, amplitude, ".", color=colour, ms=3.5, mew=0)
-            _deviation(bottom, amplitude, 1e3 * (curve.frequency - middle),
-                       1e3 * (low - middle), 1e3 * (high - middle), colour)  # fmt: skip
+            off = deviation(curve.frequency, curve.frequency_band)
+            bottom.plot(amplitude, off, ".", color=colour, ms=3.5, mew=0)
         _title(top, summary, case)
         top.set_xlabel(label("frequency", "Hz"))
-        top.grid()
         bottom.set_xlabel(label("amplitude", shown.unit))
-        bottom.grid()
-        if column == 0:
-            top.set_ylabel(label("amplitude", shown.unit))
-            bottom.set_ylabel("recorded \N{MINUS SIGN} simulated (mHz)")
-    _limit(panels[1])
-    _legend(figure, summary)
+    panels[0, 0].set_ylabel(label("amplitude", shown.unit))
+    _finish(figure, panels, summary)
     return figure
 
 
 @styled
 def _damping(results: Results, summary: BackboneSummary, cases: Sequence[str]) -> Figure:
-    """Damping ratio against time, and below how far recorded ones lie from simulated ones."""
-    figure, panels = _grid(cases, [2.0, 1.0], height=5.4)
+    """Damping ratio against time; below, how far recorded ones are from simulated ones."""
+    figure, panels = _grid(cases)
     for column, case in enumerate(cases):
         top, bottom = panels[:, column]
         for curve in _curves(summary, case):
             colour, t = _COLOURS[curve.branch], curve.times
-            low, middle, high = 100 * curve.damping_band.T
-            top.fill_between(t, low, high, color=colour, alpha=0.3, lw=0)
+            low, _, high = 100 * curve.damping_band.T
+            top.fill_between(t, low, high, color=colour, **_BAND)
             top.plot(t, 100 * curve.damping_ratio, ".", color=colour, ms=3.5, mew=0)
-            _deviation(bottom, t, 100 * curve.damping_ratio - middle, low - middle, high - middle,
-                       colour)  # fmt: skip
+            off = deviation(curve.damping_ratio, curve.damping_band)
+            bottom.plot(t, off, ".", color=colour, ms=3.5, mew=0)
         _title(top, summary, case)
-        top.grid()
-        bottom.grid()
         bottom.set_xlabel(label("time since the first sample", "s"))
-        if column == 0:
-            top.set_ylabel("damping ratio (%)")
-            bottom.set_ylabel("recorded \N{MINUS SIGN} simulated (%)")
-    _limit(panels[1])
-    _legend(figure, summary)
+    panels[0, 0].set_ylabel("damping ratio (%)")
+    _finish(figure, panels, summary)
     return figure
 
 
-def _grid(
-    cases: Sequence[str], heights: Sequence[float], height: float
-) -> tuple[Figure, np.ndarray]:
-    width = {1: 5.5, 2: 8.0}.get(len(cases), 10.0)
-    figure = new_figure(height, width)
-    ratios = {"height_ratios": heights}
-    panels = figure.subplots(2, len(cases), squeeze=False, sharey="row", gridspec_kw=ratios)
+def deviation(recorded: Array, band: Array) -> Array:
+    """Recorded minus median in half-widths of the band: inside means between -1 and 1.
+
+    Parameters
+    ----------
+    recorded : (k,)
+    band : (k, 3) lower end, median, upper end
+    """
+    low, middle, high = band.T
+    off = recorded - middle
+    half = np.where(off > 0, high - middle, middle - low)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where(half > 0, off / half, np.where(off == 0, 0.0, np.nan))
+
+
+def _grid(cases: Sequence[str]) -> tuple[Figure, np.ndarray]:
+    figure = new_figure(5.4, {1: 5.5, 2: 8.0}.get(len(cases), 10.0))
+    ratios = {"height_ratios": [2.0, 1.0]}
+    panels = figure.subplots(
+        2, len(cases), squeeze=False, sharex="row", sharey="row", gridspec_kw=ratios
+    )
     return figure, panels
 
 
@@ -113,29 +118,27 @@ def _curves(summary: BackboneSummary, case: str) -> list[Curve]:
     return [c for c in summary.curves if c.case == case and c.times.size]
 
 
-def _deviation(axis: Axes, x: Array, off: Array, low: Array, high: Array, colour: str) -> None:
-    order = np.argsort(x)
-    axis.fill_between(x[order], low[order], high[order], color=colour, alpha=0.18, lw=0)
-    axis.plot(x, off, ".", color=colour, ms=3.0, mew=0)
-
-
-def _limit(row: np.ndarray) -> None:
-    """Common limits that hold nearly all points; the last small swings would squeeze the others."""
-    points = [line.get_ydata() for axis in row for line in axis.lines]
-    values = np.concatenate([np.asarray(p, dtype=float) for p in points]) if points else np.zeros(1)
-    values = np.abs(values[np.isfinite(values)])
-    if values.size and values.max() > 0:
-        limit = 1.3 * float(np.percentile(values, 97))
-        for axis in row:
-            axis.set_ylim(-limit, limit)
-            axis.axhline(0.0, color=GREY, lw=0.6)
+def _finish(figure: Figure, panels: np.ndarray, summary: BackboneSummary) -> None:
+    """What all panels have in common: grid, the band below, the legend."""
+    for axis in panels.flat:
+        axis.grid()
+    for axis in panels[1]:
+        axis.axhspan(-1.0, 1.0, color="#E4E4E4", lw=0, zorder=0)
+    points = [
+        np.asarray(line.get_ydata(), dtype=float) for axis in panels[1] for line in axis.lines
+    ]
+    sizes = np.abs(np.concatenate(points)) if points else np.zeros(0)
+    limit = max(2.5, 1.1 * float(np.nanmax(sizes, initial=0.0)))
+    panels[1, 0].set_ylim(-limit, limit)
+    panels[1, 0].set_ylabel("recorded \N{MINUS SIGN} simulated\n(half-widths of the band)")
+    _legend(figure, summary)
 
 
 def _title(axis: Axes, summary: BackboneSummary, case: str) -> None:
     words = f"case {case}" if case else "all recordings"
     if (case or "all") in summary.labels:
         k = summary.labels.index(case or "all")
-        words += f": {100 * summary.inside[k]:.0f} % inside, p = {summary.p_values[k]:.2g}"
+        words += f": {100 * summary.inside[k]:.0f} % inside, {p_words(summary.p_values[k])}"
     axis.set_title(words, loc="left")
 
 

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
+from bayesimpact.inference.convergence import quiet_arviz
 from bayesimpact.report.figures.style import BLACK, BLUE, ORANGE, Scaled, scaled, styled, symbol
 from bayesimpact.report.results import Array, Draws
 from bayesimpact.report.units import decimals, display, number, typeset
@@ -155,6 +156,7 @@ def _panel(
 
 
 def _pair(axis: Axes, cloud: _Cloud, i: int, j: int) -> None:
+    quiet_arviz()  # corner imports it, aloud
     import corner
 
     corner.hist2d(

@@ -1,0 +1,139 @@
+"""The verdict, the checklist and the tests of whiteness."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+from synthetic import make_results
+
+from bayesimpact.report.checks import judge, judged
+from bayesimpact.report.results import EffectSummary
+from bayesimpact.report.whiteness import flat_spectrum, whiteness
+
+
+@pytest.mark.parametrize(
+    ("chi2", "z", "verdict"),
+    [
+        (1.0, 0.1, "adequate"),
+        (1.05, 2.9, "adequate"),
+        (1.05, 3.1, "slight"),
+        (1.43, 40.0, "slight"),
+        (1.45, 40.0, "inadequate"),
+        (1.45, 2.0, "adequate"),
+        (1e4, 1e5, "inadequate"),
+        (float("nan"), float("nan"), "inadequate"),
+        (0.95, -4.9, "adequate"),
+        (0.5, -50.0, "overestimated"),
+    ],
+)
+def test_verdict(chi2: float, z: float, verdict: str) -> None:
+    assert judge(chi2, z) == verdict
+
+
+def test_adequate_in_words() -> None:
+    results = make_results()
+    assert results.verdict == "adequate" and results.failed == ()
+    assert "describes these recordings down to the noise" in results.headline
+    assert "5.00\N{NO-BREAK SPACE}µm" in results.headline
+    assert results.headline.endswith("The sampler converged.")
+
+
+def test_a_linear_oscillator_that_does_not_fit_is_said_so_first() -> None:
+    results = make_results(2, stop=False, excess=30.0)
+    assert results.verdict == "inadequate"
+    assert results.headline.startswith("A linear oscillator does not fit these recordings.")
+    share = 100 * results.rms / np.std(np.concatenate([r.samples for r in results.recordings]))
+    assert f"{share:.1f} % of the signal unexplained" in results.headline
+    assert "about 30 times what noise" in results.headline
+    assert [c.title for c in results.failed] == ["Misfit against the independent noise estimate"]
+
+
+def test_effects_are_named_in_the_verdict() -> None:
+    effects = tuple(EffectSummary(i, t, "") for i, t in (("a", "dry friction"), ("b", "drag")))
+    results = judged(replace(make_results(excess=3.0), effects=effects))
+    assert results.headline.startswith(
+        "The impact oscillator with dry friction and drag does not fit"
+    )
+
+
+def test_slight_misfit_warns_about_the_intervals() -> None:
+    results = make_results(3, n=6000, excess=1.1)
+    assert results.verdict == "slight"
+    excess = 100 * (np.sqrt(results.reduced_chi2) - 1)
+    assert 9 < excess < 11 and f"to {excess:#.2g}".rstrip(".") + " % above" in results.headline
+    assert "more than their intervals" in results.headline
+
+
+def test_what_went_wrong_in_the_computation_is_said() -> None:
+    results = make_results(converged=False)
+    assert "has not converged: the intervals are provisional" in results.headline
+    assert results.search is not None
+    apart = judged(replace(results, search=replace(results.search, agree=False, distance=8.0)))
+    assert "ended in different places" in apart.headline
+    stuck = judged(replace(apart, fit_converged=False))
+    assert "did not come to rest" in stuck.headline
+    assert [c.title for c in stuck.failed] == [
+        "The climb to the mode came to rest",
+        "Guess and global search end at the same mode",
+        "The sampler converged",
+    ]
+
+
+def test_backbone_outside_its_band_fails() -> None:
+    results = make_results()
+    assert results.backbone is not None
+    low = replace(results.backbone, p_values=np.array([0.4, 0.3, 0.0009]))
+    failed = judged(replace(results, backbone=low)).failed
+    assert [c.title for c in failed] == ["Recorded backbones lie where simulated ones do"]
+    assert failed[0].finding == (
+        "case 1: 91 % inside, p = 0.40; case 2: 91 % inside, p = 0.30; all: 91 % inside, p < 0.001"
+    )
+
+
+def test_posterior_that_is_not_gaussian_is_a_note() -> None:
+    results = make_results()
+    wide = replace(results.rows[1], posterior_sd=2 * results.rows[1].sd)
+    rows = (results.rows[0], wide, *results.rows[2:])
+    (check,) = [c for c in judged(replace(results, rows=rows)).checks if "curvature" in c.title]
+    assert check.status == "note" and "1.00 to 2.00; furthest from 1: k1" in check.finding
+
+
+def series(rho: float, n: int, rng: np.random.Generator) -> np.ndarray:
+    x = rng.standard_normal(n)
+    for i in range(1, n):
+        x[i] += rho * x[i - 1]
+    return x
+
+
+def coefficients(x: np.ndarray, keep: int) -> np.ndarray:
+    """Mean, real and imaginary parts, as the band-limited whitening gives them."""
+    f = np.fft.rfft(x)[:keep] / np.sqrt(0.5 * x.size)
+    return np.concatenate([f[:1].real / np.sqrt(2), f[1:].real, f[1:].imag])
+
+
+@pytest.mark.parametrize("banded", [False, True])
+def test_whiteness_is_uniform_on_noise(banded: bool) -> None:
+    rng = np.random.default_rng(3)
+    p = []
+    for _ in range(400):
+        x = rng.standard_normal(1000)
+        p.append(whiteness(coefficients(x, 120) if banded else x, banded))
+    assert stats.kstest(p, "uniform").pvalue > 0.001
+
+
+@pytest.mark.parametrize("banded", [False, True])
+def test_whiteness_sees_colour(banded: bool) -> None:
+    rng = np.random.default_rng(4)
+    found = 0
+    for _ in range(20):
+        x = series(0.4, 2000, rng)
+        found += whiteness(coefficients(x, 800) if banded else x, banded) < 0.01
+    assert found == 20
+
+
+def test_nothing_to_test() -> None:
+    assert np.isnan(flat_spectrum(np.zeros(10)))
+    assert np.isnan(flat_spectrum(np.ones(2)))

@@ -1,0 +1,200 @@
+"""Figures: what is on them, at every number of recordings; files; nobody's style is changed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from synthetic import make_results
+
+from bayesimpact.report.figures.backbone import deviation
+from bayesimpact.report.figures.corner import corner_figure
+from bayesimpact.report.figures.recordings import MOST, recording_figures, shown_recordings
+from bayesimpact.report.figures.save import all_figures, file_name, png, save_figures
+from bayesimpact.report.figures.style import polyline, scaled, symbol
+from bayesimpact.report.html import png_size
+from bayesimpact.report.results import Draws, Results
+
+
+def titles(figure: Figure) -> list[str]:
+    return [axis.get_title(loc="left") for axis in figure.axes]
+
+
+def axis_labels(figure: Figure) -> set[str]:
+    found = {axis.get_xlabel() for axis in figure.axes} | {
+        axis.get_ylabel() for axis in figure.axes
+    }
+    return found - {""}
+
+
+def test_all_figures() -> None:
+    figures = all_figures(make_results(3, 2))
+    assert list(figures) == [
+        "fit_case_1", "fit_case_2", "corner", "backbone", "damping", "search", "traces",
+    ]  # fmt: skip
+    assert list(all_figures(make_results(1, stop=False, sampled=False))) == ["fit", "search"]
+
+
+def test_axes_carry_units() -> None:
+    figures = all_figures(make_results(2, 1))
+    for name in ("fit_case_1", "backbone", "damping", "corner"):
+        for text in axis_labels(figures[name]):
+            assert text.endswith(")") and "(" in text, f"{name}: {text}"
+    assert "displacement (mm)" in axis_labels(figures["fit_case_1"])
+    assert "residual (µm)" in axis_labels(figures["fit_case_1"])
+    assert "frequency (Hz)" in axis_labels(figures["backbone"])
+
+
+def test_angles_are_in_rad() -> None:
+    results = replace(make_results(1, stop=False), quantity="angle")
+    labels = axis_labels(all_figures(results)["fit"])
+    assert "angle (rad)" in labels and not any("m)" in text.replace("µrad", "") for text in labels)
+
+
+def test_stop_is_drawn_where_the_probe_reads_it() -> None:
+    results = make_results(1, 1)
+    motion = recording_figures(results)["fit_case_1"].axes[0]
+    levels = [line.get_ydata()[0] for line in motion.lines if len(line.get_ydata()) == 2]
+    assert levels == [pytest.approx(1e3 * (1.1e-3 + 9.5e-6))]
+
+
+def test_every_recording_is_shown_once_up_to_the_limit() -> None:
+    results = make_results(MOST, 3, n=200)
+    shown = [t for f in recording_figures(results).values() for t in titles(f) if "case" in t]
+    assert sorted(shown) == sorted(f"{r.name}, case {r.case}" for r in results.recordings)
+    assert set(recording_figures(results)) == {
+        f"fit_case_{c}_{p}" for c in (1, 2, 3) for p in (1, 2)
+    }
+
+
+def test_fifty_recordings_show_the_worst_of_every_case() -> None:
+    results = make_results(50, 5, n=100)
+    worst = replace(results.recordings[48], reduced_chi2=9.0)
+    results = replace(results, recordings=(*results.recordings[:48], worst, results.recordings[49]))
+    shown = shown_recordings(results)
+    assert len(shown) == MOST and worst in shown
+    assert {r.case for r in shown} == set(results.cases)
+    assert len({r.name for r in shown}) == MOST
+
+
+@pytest.mark.parametrize("count", [1, 9])
+def test_nothing_overlaps(count: int) -> None:
+    """Titles and labels of one page's panels keep clear of one another and of the edge."""
+    results = make_results(count, 3 if count > 1 else 1, n=300)
+    for figure in all_figures(results).values():
+        png(figure)
+        boxes = []
+        for axis in figure.axes:
+            texts = [axis.xaxis.label, axis.yaxis.label, axis.title, axis._left_title]
+            if axis.xaxis.get_tick_params()["labelbottom"]:
+                low, high = axis.get_xlim()
+                ticks = zip(axis.get_xticks(), axis.get_xticklabels(), strict=True)
+                texts += [text for place, text in ticks if low <= place <= high]
+            boxes += [(t.get_text(), t.get_window_extent()) for t in texts if t.get_text().strip()]
+        width, height = figure.bbox.size
+        for i, (text, box) in enumerate(boxes):
+            assert box.x0 > -1 and box.y0 > -1 and box.x1 < width + 1 and box.y1 < height + 1, text
+            for other, second in boxes[i + 1 :]:
+                apart = (
+                    box.x1 <= second.x0 + 1 or second.x1 <= box.x0 + 1
+                    or box.y1 <= second.y0 + 1 or second.y1 <= box.y0 + 1
+                )  # fmt: skip
+                assert apart, f"{text!r} on {other!r}"
+
+
+def test_deviation_is_in_half_widths() -> None:
+    band = np.array([[1.0, 2.0, 4.0]] * 4)
+    assert deviation(np.array([2.0, 4.0, 1.0, 0.0]), band).tolist() == [0.0, 1.0, -1.0, -2.0]
+    flat = deviation(np.array([2.0, 3.0, np.nan]), np.full((3, 3), 2.0))
+    assert flat[0] == 0.0 and np.isnan(flat[1:]).all()
+
+
+def two_posteriors() -> tuple[Draws, Draws]:
+    rng = np.random.default_rng(0)
+    after = Draws("after", ("k1", "drag.coefficient"), ("N/m", "N s2/m2"),
+                  rng.standard_normal((500, 2)) * [3e-3, 1e-5] + [808.5, 2e-4])  # fmt: skip
+    before = Draws("before", ("k1",), ("N/m",), rng.standard_normal((500, 1)) * 2e-3 + 808.9)
+    return after, before
+
+
+def test_corner_of_two_posteriors_shows_both() -> None:
+    after, before = two_posteriors()
+    figure = corner_figure(after, before=before)
+    first = figure.axes[0]
+    low, high = first.get_xlim()
+    axis = scaled("k1", "N/m", np.concatenate([after.values[:, 0], before.values[:, 0]]))
+    for values in (after.values[:, 0], before.values[:, 0]):
+        middle = float(axis(np.median(values)))
+        assert low < middle < high
+    assert [t.get_text() for t in figure.legends[0].get_texts()] == ["before", "after"]
+
+
+def test_corner_marks_a_near_truth_and_leaves_a_far_one_out() -> None:
+    after, _ = two_posteriors()
+    near = corner_figure(after, truths={"k1": 808.51}, truth_label="Table 2")
+    axis = scaled("k1", "N/m", after.values[:, 0])
+    low, high = near.axes[0].get_xlim()
+    assert low < float(axis(np.array(808.51))) < high
+    far = corner_figure(after, truths={"k1": 900.0})
+    low, high = far.axes[0].get_xlim()
+    assert not low < float(axis(np.array(900.0))) < high
+
+
+def test_corner_of_one_parameter_and_of_a_constant() -> None:
+    rng = np.random.default_rng(1)
+    one = Draws("posterior", ("k1",), ("N/m",), rng.standard_normal((300, 1)))
+    assert len(corner_figure(one).axes) == 1
+    values = np.column_stack([rng.standard_normal(300), np.full(300, 2.0)])
+    png(corner_figure(Draws("posterior", ("k1", "c1"), ("N/m", "N s/m"), values)))
+
+
+def test_axis_reads_from_the_last_digits() -> None:
+    values = 808.5552 + 2.8e-3 * np.random.default_rng(2).standard_normal(1000)
+    axis = scaled("k1", "N/m", values)
+    assert axis.label.startswith("$k_1$ \N{MINUS SIGN} 808.55") and axis.label.endswith("(mN/m)")
+    assert np.allclose(axis(values), (values - axis.offset) * 1e3)
+    wide = scaled("k2[1]", "N/m", values * np.linspace(0.5, 2, 1000))
+    assert wide.offset == 0.0 and wide.label == "$k_2$[1] (N/m)"
+
+
+def test_symbols() -> None:
+    assert symbol("k2[beam 1]") == "$k_2$[beam 1]"
+    assert symbol("sigma") == r"$\sigma$"
+    assert symbol("coulomb_friction.force") == "force"
+
+
+def test_thinned_line_keeps_every_peak() -> None:
+    rng = np.random.default_rng(5)
+    x, y = np.arange(60_001.0), rng.standard_normal(60_001)
+    y[31_234], y[60_000] = 50.0, -50.0
+    short_x, short_y = polyline(x, y, 500)
+    assert short_x.size < 1200
+    assert short_y.max() == 50.0 and short_y.min() == -50.0
+    assert np.all(np.diff(short_x) >= 0)
+    assert np.array_equal(y[short_x.astype(int)], short_y)
+    assert polyline(x[:900], y[:900], 500)[1].size == 900
+
+
+def test_files(tmp_path: Path) -> None:
+    results = replace(make_results(1, 1, n=200), draws=None, backbone=None, sampler=None)
+    pictures = save_figures(all_figures(results), tmp_path / "figures")
+    assert sorted(f.name for f in (tmp_path / "figures").iterdir()) == [
+        "fit_case_1.pdf", "fit_case_1.png", "search.pdf", "search.png",
+    ]  # fmt: skip
+    for name, data in pictures.items():
+        assert (tmp_path / "figures" / f"{name}.png").read_bytes() == data
+        assert data.startswith(b"\x89PNG") and png_size(data)[0] == 1500
+        assert (tmp_path / "figures" / f"{name}.pdf").read_bytes().startswith(b"%PDF")
+    assert file_name('fit_case_1/2 "ß"') == "fit_case_1_2__ß_"
+
+
+def test_style_stays_inside(tmp_path: Path) -> None:
+    before = dict(matplotlib.rcParams)
+    results: Results = make_results(1, 1, n=200)
+    figures = all_figures(results)
+    save_figures({"search": figures["search"]}, tmp_path)
+    assert dict(matplotlib.rcParams) == before

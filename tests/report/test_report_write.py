@@ -1,0 +1,206 @@
+"""From recordings to a folder of results: part of the bundled campaign, and a misfit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from synthetic import make_results
+
+from bayesimpact.data.bundled import bundled_campaign
+from bayesimpact.data.campaign import Campaign, Measurement
+from bayesimpact.data.read import load_campaign
+from bayesimpact.data.recording import Recording
+from bayesimpact.errors import InputError
+from bayesimpact.inference.identify import Identification, identify
+from bayesimpact.inference.posterior import Posterior, sample
+from bayesimpact.report import archive_arviz
+from bayesimpact.report.archive import load_results
+from bayesimpact.report.archive_arviz import open_arviz, read_posterior
+from bayesimpact.report.backbones import backbone_summary
+from bayesimpact.report.build import results_from_fit, results_from_posterior
+from bayesimpact.report.groups import inference_groups
+from bayesimpact.report.rows import Z90
+from bayesimpact.report.write import (
+    POSTERIOR_FILE,
+    REPORT_FILE,
+    rewrite_report,
+    write_fit,
+    write_posterior,
+    write_results,
+)
+from bayesimpact.response.backbone import backbone
+
+
+@pytest.fixture(scope="module")
+def identification() -> Identification:
+    """Two cases of the bundled campaign, 1.2 s."""
+    whole = load_campaign(bundled_campaign())
+    chosen = tuple(r for r in whole.recordings if r.name in ("case1_a", "case3_b"))
+    campaign = replace(whole, recordings=chosen, measurement=Measurement(mass_sd=1e-3)).truncated(
+        1.2
+    )
+    return identify(campaign, rng=np.random.default_rng(1), evaluations=400)
+
+
+@pytest.fixture(scope="module")
+def posterior(identification: Identification) -> Posterior:
+    return sample(identification.fit, seed=3, target_ess=300.0)
+
+
+def test_fit_in_numbers(identification: Identification) -> None:
+    results = results_from_fit(identification, seed=5, command="bayesimpact fit x")
+    fit = identification.fit
+    assert results.kind == "fit" and results.draws is None and results.sampler is None
+    assert results.verdict == "adequate"
+    for i, row in enumerate(results.rows):
+        assert (row.name, row.mode, row.median) == (fit.names[i], fit.mode[i], fit.mode[i])
+        assert row.ci90[1] - row.mode == pytest.approx(Z90 * fit.sd[i], rel=1e-9)
+    assert results.reduced_chi2 == fit.reduced_chi2
+    assert results.rms == pytest.approx(fit.rms)
+    weights = [r.samples.size for r in results.recordings]
+    mean = np.average([r.reduced_chi2 for r in results.recordings], weights=weights)
+    assert mean == pytest.approx(fit.reduced_chi2, rel=1e-9)
+    # 2 (n - d) degrees of freedom: a few standard errors about 1
+    assert abs(results.chi2_z) < 4
+    assert results.provenance.seed == 5 and "numpy" in results.provenance.versions
+    assert results.search is not None and results.search.agree
+
+
+def test_mass_widens_stiffness_and_not_lengths(identification: Identification) -> None:
+    results = results_from_fit(identification)
+    k1, gap = results.row("k1"), results.row("g")
+    half = np.hypot(k1.ci90[1] - k1.median, Z90 * 1e-3 * k1.median)
+    assert k1.total90[1] - k1.median == pytest.approx(half) and half > 1.3
+    assert gap.total90 == pytest.approx(gap.ci90)
+    assert k1.ratio[0] == k1.median / 0.503 and np.isnan(gap.ratio[0])
+
+
+def test_references_of_the_bundled_campaign(identification: Identification) -> None:
+    row = results_from_fit(identification).row("k2[1]")
+    assert row.references["Table 2"] == 5350.156
+    assert row.references["beam theory"] == pytest.approx(5276.3, rel=1e-4)
+    other = results_from_fit(identification, references={}).row("k2[1]")
+    assert other.references == {}
+
+
+def test_posterior_in_numbers(posterior: Posterior, identification: Identification) -> None:
+    results = results_from_posterior(posterior, identification, backbone=False)
+    assert results.kind == "posterior" and results.sampler is not None
+    column = posterior.column("k2[3]")
+    row = results.row("k2[3]")
+    assert (row.ci90[0], row.median, row.ci90[1]) == tuple(np.percentile(column, [5, 50, 95]))
+    assert results.draws is not None and results.draws.names[-1] == "k2[3]"
+    assert set(results.draws.values[:, -1]) <= set(column)
+    assert results.sampler.names == posterior.names
+    assert np.array_equal(
+        results.sampler.traces[1, :, 0, 1],
+        posterior.chains.draws[1, :, 0, 1][: len(results.sampler.trace_steps)],
+    )
+
+
+def test_folder_of_a_posterior(
+    posterior: Posterior, identification: Identification, tmp_path: Path
+) -> None:
+    results = write_posterior(posterior, identification, tmp_path, command="x", before=posterior)
+    names = {f.name for f in tmp_path.iterdir()}
+    assert names == {"results.nc", "fit.json", POSTERIOR_FILE, REPORT_FILE, "figures"}
+    assert load_results(tmp_path).headline == results.headline
+    assert read_posterior(tmp_path / POSTERIOR_FILE, "before").groups["posterior"]
+
+
+def test_report_again_from_files_alone(tmp_path: Path) -> None:
+    write_results(make_results(1, 1, n=200, sampled=False), tmp_path)
+    page = (tmp_path / REPORT_FILE).read_text()
+    (tmp_path / REPORT_FILE).unlink()
+    assert rewrite_report(tmp_path) == tmp_path / REPORT_FILE
+    assert (tmp_path / REPORT_FILE).read_text() == page
+
+
+def test_posterior_file(
+    posterior: Posterior, identification: Identification, tmp_path: Path
+) -> None:
+    provenance = results_from_posterior(posterior, backbone=False).provenance
+    archive_arviz.write_posterior(
+        tmp_path / POSTERIOR_FILE, inference_groups(posterior, provenance)
+    )
+    data = open_arviz(tmp_path / POSTERIOR_FILE)
+    drawn = data["posterior"]
+    assert list(drawn["k2"].coords["case"].values) == ["1", "3"]
+    assert drawn["k2"].attrs["units"] == "N/m"
+    assert list(drawn["y0"].coords["recording"].values) == ["case1_a", "case3_b"]
+    assert drawn.sizes["chain"] == 2
+    likelihood = data["log_likelihood"]["displacement"]
+    assert likelihood.sizes["recording"] == 2 and likelihood.sizes["draw"] == drawn.sizes["draw"]
+    plain = read_posterior(tmp_path / POSTERIOR_FILE)
+    assert plain.attrs["seed"] == 3 and plain.attrs["data_sha256"] != ""
+    # One draw's log likelihood, from its parameters
+    target = posterior.fit.target
+    theta = posterior.chains.draws[1, 0, 0]
+    assert float(drawn["k1"][1, 0]) == theta[posterior.names.index("k1")]
+    expected = target.likelihood.per_recording(theta[None])[0]
+    assert np.allclose(likelihood.values[1, 0], expected, rtol=1e-12)
+    predicted = data["posterior_predictive"]["case1_a"].values[0]
+    recorded = identification.fit.target.oscillator.campaign.recordings[0].samples
+    # Simulated recordings differ from the real one by the noise of both.
+    assert np.std(predicted - recorded) == pytest.approx(5e-6 * np.sqrt(2), rel=0.05)
+    observed = data["observed_data"]["case1_a"]
+    assert np.array_equal(observed.values, recorded)
+
+
+def test_backbones_of_a_model_that_fits(posterior: Posterior) -> None:
+    summary = backbone_summary(posterior, np.random.default_rng(4))
+    assert summary is not None and summary.labels == ("1", "3", "all")
+    # Some 100 points a case in bands of 90 %, correlated: five standard errors are about 0.2.
+    assert np.all(summary.inside > 0.7)
+    assert summary.p_values[-1] > 0.01
+    curve = next(c for c in summary.curves if c.recording == "case3_b" and c.branch == "upper")
+    recording = posterior.fit.target.oscillator.campaign.recordings[1]
+    rest = float(np.median(posterior.column("offset[case3_b]")))
+    own = backbone(recording.samples, recording.interval, rest=rest).upper
+    index = np.searchsorted(own.times, curve.times)
+    assert np.array_equal(own.frequency[index], curve.frequency)
+    assert np.array_equal(own.amplitude[index], curve.amplitude)
+    assert np.array_equal(own.damping_ratio[index], curve.damping_ratio, equal_nan=True)
+    low, middle, high = curve.frequency_band.T
+    assert np.all((low <= middle) & (middle <= high))
+
+
+def test_backbones_of_a_model_that_does_not() -> None:
+    found = identify(softening_pendulum(), rng=np.random.default_rng(1), search=False)
+    summary = backbone_summary(sample(found.fit, target_ess=200.0), np.random.default_rng(4))
+    assert summary is not None and summary.labels == ("all",)
+    assert summary.p_values[-1] < 0.01 and summary.inside[-1] < 0.5
+
+
+def softening_pendulum() -> Campaign:
+    """A pendulum swinging to 60 degrees: no linear oscillator."""
+    t = np.arange(2000) * 2.5e-3
+    motion = solve_ivp(
+        lambda _, s: [s[1], -0.6 * s[1] - 110 * np.sin(s[0])], (0, t[-1]), [1.0, 0.0], "DOP853", t,
+        rtol=1e-9, atol=1e-9,
+    )  # fmt: skip
+    noise = 5e-4 * np.random.default_rng(2).standard_normal(t.size)
+    recording = Recording("swing", "", motion.y[0] + noise, 2.5e-3, quantity="angle")
+    return Campaign("pendulum", 1.0, (recording,), stop=False)
+
+
+def test_report_of_a_linear_oscillator_that_does_not_fit(tmp_path: Path) -> None:
+    found = identify(softening_pendulum(), rng=np.random.default_rng(1), search=False)
+    results = write_fit(found, tmp_path, seed=1)
+    assert results.verdict == "inadequate"
+    page = (tmp_path / REPORT_FILE).read_text()
+    body = page.index('class="verdict bad"')
+    start = page.index("A linear oscillator does not fit these recordings.")
+    assert body < start < page.index('id="parameters"')
+    assert results.search is None and 'id="search"' not in page
+    assert not (tmp_path / POSTERIOR_FILE).exists()
+
+
+def test_report_of_an_empty_folder(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no results"):
+        rewrite_report(tmp_path)
+    assert list(tmp_path.iterdir()) == []
