@@ -144,10 +144,11 @@ def find_mode(
         _, matrix, vector = climb.linear(theta)
         if not (np.isfinite(matrix).all() and np.isfinite(vector).all()):
             break
+        whole = climb.step(theta, matrix, vector, 0.0)
+        size = float(np.sqrt(np.maximum(whole @ matrix @ whole, 0.0)))  # damping must not hide it
         for _ in range(12):
             step = climb.step(theta, matrix, vector, damping)
             trial, trial_value, trial_sums = climb.evaluate(theta + step)
-            size = float(np.sqrt(np.maximum(step @ matrix @ step, 0.0)))
             if trial_value <= value:
                 theta, value, sums = trial, trial_value, trial_sums
                 damping = max(damping * 0.1, 1e-12)
@@ -254,13 +255,14 @@ def best_sigma(target: Target, sums: Array) -> Array:
         n, s = likelihood.sizes[mine].sum(), max(float(sums[mine].sum()), 1e-300)
         prior = target.priors.parameters[column]
         log_sigma = 0.5 * np.log(s / n)
-        for _ in range(20):  # Newton in log sigma
+        for _ in range(60):  # Newton in log sigma
             sigma = np.exp(log_sigma)
             slope = -n + s / sigma**2
             bend = -2 * s / sigma**2
-            inside = prior.support[0] < sigma < prior.support[1]
-            if inside:
-                slope += float(prior.gradient(sigma)) * sigma
+            if prior.support[0] < sigma < prior.support[1]:
+                pull = float(prior.gradient(sigma)) * sigma
+                slope += pull
+                bend = min(bend + pull + float(prior.curvature(sigma)) * sigma**2, 0.1 * bend)
             change = -slope / bend
             log_sigma += float(np.clip(change, -1, 1))
             if abs(change) < 1e-12:
