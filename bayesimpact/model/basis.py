@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.model.compiled import compiled
 from bayesimpact.model.flow import forced_response, impulse_response, second_response
-from bayesimpact.model.tables import LENGTH
+from bayesimpact.model.tables import LENGTH, TERMS, fill_series, nearby, polynomial
 
 Floats = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ FORCED = 13
 ONE, S_, D_, G_, H_, E_, F_, X_, XR, P_, PR, US, UC = range(FORCED)
 
 #: Terms of the power series in `late_responses`; |rate t| <= 1/2 there, so the rest is below 1e-20.
-TERMS = 18
+LATE_TERMS = 18
 
 
 @compiled()
@@ -58,7 +58,7 @@ def late_responses(
     X = XR = P = PR = Us = UsR = Uc = UcR = 0.0
     cos, sin, cos_before, sin_before = 1.0, 0.0, 0.0, 0.0  # terms n and n - 1 of the series
     e0 = e1 = f0 = f1 = x0 = x1 = p0 = p1 = s0 = s1 = c0 = c1 = 0.0  # terms n and n + 1
-    for n in range(TERMS):
+    for n in range(LATE_TERMS):
         both = 1.0 / ((n + 1.0) * (n + 2.0))
         drag = bh * (n + 1.0)
         e2 = (hh * cos - drag * e1 - Kh * e0) * both
@@ -115,6 +115,44 @@ def fill_basis(
         value[X_], value[XR], rate[X_], rate[XR] = X, XR_, XR_, E - beta * XR_ - K * X
         value[P_], value[PR], rate[P_], rate[PR] = P, PR_, PR_, F - beta * PR_ - K * P
         value[US], value[UC], rate[US], rate[UC] = Us, Uc, UsR, UcR
+
+
+@compiled()
+def fill_basis_series(series: Floats, b: float, K: float) -> None:
+    """Fill `series` (3, TERMS): Taylor coefficients of S / t, D and G / t^3."""
+    fill_series(series, b, K)
+    before, now = 0.0, 1.0 / 6.0  # coefficients n + 2 and n + 3 of G
+    for n in range(TERMS):
+        series[2, n] = now
+        drag, both = 2.0 * b * (n + 3.0), (n + 3.0) * (n + 4.0)
+        before, now = (
+            now,
+            (series[0, n + 1] - drag * now - K * before) / both if n + 1 < TERMS else 0.0,
+        )
+
+
+@compiled(forceinline=True, fastmath={"contract"})
+def plain_basis(
+    tables: Floats, series: Floats, side: int, b: float, K: float, slow: bool, t: float
+) -> tuple[float, float, float, float]:
+    """Return S, D, G, H at 0 <= t <= LENGTH: of slow regimes from the table and Taylor series."""
+    if not slow:
+        S, D = impulse_response(b, K, t)
+        G, H = second_response(b, K, t, S, D)
+        return S, D, G, H
+    j = min(math.floor(t + 0.5), LENGTH - 1)
+    t -= j
+    s, d = nearby(series, side, t)
+    g = t * t * t * polynomial(series, side, 2, t)
+    h = 0.5 * t * s - b * g
+    S, D, G, H = tables[side, S_, j], tables[side, D_, j], tables[side, G_, j], tables[side, H_, j]
+    C = D + 2.0 * b * S
+    return (
+        S * d + C * s,
+        D * d - K * S * s,
+        G * d + (H + 2.0 * b * G) * s + C * g + S * h,
+        H * d - K * G * s + D * h + S * (s - K * g),
+    )
 
 
 @compiled()

@@ -2,7 +2,7 @@
 
 With respect to all eleven q of a recording (see `simulate`); arguments as in `simulate`. First the
 event loop finds the events, then one pass carries the sensitivities from block to block (`sweep`).
-Derivatives with respect to q that are constants (columns -1) are not computed, and left 0.
+Derivatives with respect to q that are constants (columns -1) are left 0.
 """
 
 from __future__ import annotations
@@ -20,46 +20,36 @@ from bayesimpact.model.basis import FORCED, PLAIN
 from bayesimpact.model.batch import Floats, Ints, Span, gather, share
 from bayesimpact.model.compiled import compiled
 from bayesimpact.model.kernel import OK, OVERFLOW, begins_in_contact, run, workspace
-from bayesimpact.model.sweep import sweep
-from bayesimpact.model.tables import LENGTH
+from bayesimpact.model.sweep import Lanes, desk, sweep
 
 #: Events for which there is room at first; a recording with more is run once more.
 EVENTS = 256
 
 
 @compiled()
-def basis_workspace(size: int, with_grams: bool) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return empty tables, ends, prefix sums and keys of two regimes for `sweep`."""
-    lengths = LENGTH + 1 if with_grams else 0
-    return (
-        np.empty((2, size, LENGTH)),
-        np.empty((2, 2, size)),
-        np.empty((2, lengths, size, size)),
-        np.full((2, 3), np.nan),
-    )
+def wanted(active: Lanes, columns: Ints, forced: bool) -> Lanes:
+    """Return those q of one recording, columns (11,), whose derivatives are wanted, in `active`.
 
-
-@compiled()
-def active_parameters(columns: Ints, forced: bool) -> Ints:
-    """Return the q of one recording (columns (11,)) whose derivatives are wanted, without the
-    offset.
-
-    Without force, frequency and phase have no effect; A has, and is wanted only with `forced`.
+    The force's are only there with the basis for it.
     """
     count = 0
-    out = np.empty(10, dtype=np.int64)
-    for i in range(10):
-        if columns[i] >= 0 and (forced or i < 7):
-            out[count] = i
+    for i in range(11):
+        if columns[i] >= 0 and (forced or i < 7 or i == 10):
+            active[count] = i
             count += 1
-    return out[:count]
+    return active[:count]
 
 
 @compiled()
-def find_events(q: Floats, mass: float, interval: float, n: int, events: Floats) -> tuple:
-    """Return (events, code): all events of one recording, in `events` if there is room."""
+def find_events(
+    q: Floats, mass: float, interval: float, n: int, events: Floats, tables: Floats,
+    series: Floats, keys: Floats, history: Floats,
+) -> tuple[Floats, int]:  # fmt: skip
+    """Return (events, code): all events of one recording, in `events` if there is room.
+
+    tables, series, keys, history : from `kernel.workspace`
+    """
     nothing = np.empty(0)
-    tables, series, keys, history = workspace()
     _, count, code = run(
         q, mass, interval, n, nothing, nothing, nothing, events, tables, series, keys, history
     )
@@ -77,31 +67,30 @@ def gram_share(
     """Fill one share of `out` (B, R, 12, 12) and `codes` (B, R)."""
     q = np.empty(11)
     nothing, no_matrix = np.empty(0), np.empty((0, 0))
-    room = np.empty((EVENTS, 2))
-    tables, ends, prefixes, keys = basis_workspace(size, True)
+    active = np.empty(11, dtype=np.uint64)
+    first_events = np.empty((EVENTS, 2))
+    tables, series, keys, history = workspace()
+    room = desk(size, True)
     for b in range(rows[0], rows[1]):
         for r in range(items[0], items[1]):
             gather(q, theta[b], columns[r], constants[r])
             n = counts[r]
             gram = out[b, r]
             gram[:] = 0.0
-            events, code = find_events(q, mass, intervals[r], n, room)
+            events, code = find_events(
+                q, mass, intervals[r], n, first_events, tables, series, keys, history
+            )
             if code == OK:
                 sweep(
                     q, mass, intervals[r], n, events, begins_in_contact(q),
-                    active_parameters(columns[r], size > PLAIN), samples[starts[r] : starts[r] + n],
-                    nothing, no_matrix, gram, tables, ends, prefixes, keys,
+                    wanted(active, columns[r], size > PLAIN), samples[starts[r] : starts[r] + n],
+                    nothing, no_matrix, gram, room,
                 )  # fmt: skip
                 if not math.isfinite(gram.sum()):
                     code = OVERFLOW
             codes[b, r] = code
             if code != OK:
                 gram[:] = np.nan
-            elif columns[r, 10] < 0:
-                gram[10] = 0.0
-                gram[:, 10] = 0.0
-            for i in range(11):
-                gram[11, i] = gram[i, 11]
 
 
 @compiled(parallel=True)
@@ -126,20 +115,23 @@ def derivative_rows(
     """Fill `values` (N,), `jacobian` (N, 11) and `codes` (R,) for one theta (d,)."""
     q = np.empty(11)
     nothing, no_matrix = np.empty(0), np.empty((0, 0))
-    room = np.empty((EVENTS, 2))
-    tables, ends, prefixes, keys = basis_workspace(size, False)
+    active = np.empty(11, dtype=np.uint64)
+    first_events = np.empty((EVENTS, 2))
+    tables, series, keys, history = workspace()
+    room = desk(size, False)
     start = 0
     for r in range(columns.shape[0]):
         gather(q, theta, columns[r], constants[r])
         n = counts[r]
         mine, rows = values[start : start + n], jacobian[start : start + n]
         rows[:] = 0.0
-        events, code = find_events(q, mass, intervals[r], n, room)
+        events, code = find_events(
+            q, mass, intervals[r], n, first_events, tables, series, keys, history
+        )
         if code == OK:
             sweep(
                 q, mass, intervals[r], n, events, begins_in_contact(q),
-                active_parameters(columns[r], size > PLAIN), nothing, mine, rows, no_matrix,
-                tables, ends, prefixes, keys,
+                wanted(active, columns[r], size > PLAIN), nothing, mine, rows, no_matrix, room,
             )  # fmt: skip
             if not (math.isfinite(mine.sum()) and math.isfinite(rows.sum())):
                 code = OVERFLOW
@@ -147,8 +139,6 @@ def derivative_rows(
         if code != OK:
             mine[:] = np.nan
             rows[:] = np.nan
-        elif columns[r, 10] < 0:
-            rows[:, 10] = 0.0
         start += n
 
 

@@ -73,7 +73,7 @@ def differences(q, mass, interval, n):
 @pytest.mark.parametrize("case", CASES)
 def test_derivatives(case):
     q = np.array(list((BASE | CASES[case]).values()))
-    n, interval = 25, 1.3e-2
+    n, interval = 16, 2.1e-2
     values, jacobian = analytic(q, 0.503, interval, n)
     exact = differences(q, 0.503, interval, n)
     scale = np.abs(exact).max(0)

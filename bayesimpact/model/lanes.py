@@ -1,0 +1,181 @@
+"""Derivatives with respect to every q, side by side: coefficients, their travel, their products.
+
+The derivative with respect to q_i is a row of coefficients over the `basis`: stack[i, slot], one
+slot per block. Blocks lie one behind the other, so that the Gram matrix of a whole recording is a
+few long dot products. `active` lists the q that are wanted (unsigned: numba then leaves out the
+check for negative indices); dy and dv (11,) are the derivatives of displacement and velocity at the
+time.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.model.basis import D_, E_, F_, G_, H_, ONE, P_, PLAIN, PR, S_, UC, US, X_, XR
+from bayesimpact.model.compiled import compiled
+
+Floats = NDArray[np.float64]
+Lanes = NDArray[np.uint64]
+
+C1, K1, C2, G, K2, Y0, V0, A, W, PHASE, OFFSET = range(11)
+RESIDUAL = 11
+
+
+@compiled()
+def fill_slopes(slopes: Floats, q: Floats, mass: float, interval: float) -> None:
+    """Fill `slopes` (2, 3, 11): derivatives of 2 b, K and rest of flight and contact.
+
+    An offset of the sensor is a shift of displacement, rest and gap alike.
+    """
+    per_mass = interval * interval / mass
+    slopes[:] = 0.0
+    slopes[:, 0, C1] = interval / mass
+    slopes[1, 0, C2] = interval / mass
+    slopes[:, 1, K1] = per_mass
+    slopes[1, 1, K2] = per_mass
+    slopes[:, 2, OFFSET] = 1.0
+    stiffness = q[K1] + q[K2]
+    if q[G] < math.inf:
+        slopes[1, 2, K1] = -q[K2] * q[G] / stiffness / stiffness
+        slopes[1, 2, K2] = q[K1] * q[G] / stiffness / stiffness
+        slopes[1, 2, G] = q[K2] / stiffness
+
+
+@compiled(forceinline=True, fastmath={"contract"})
+def fill_coefficients(
+    stack: Floats, slot: int, active: Lanes, slopes: Floats, side: int, beta: float, K: float,
+    u: float, v: float, dy: Floats, dv: Floats,
+) -> None:  # fmt: skip
+    """Write the PLAIN coefficients of the motion from (u, v), relative to the rest."""
+    m = v + beta * u
+    pull = K * u
+    for i in active:
+        beta_i, K_i, rest_i = slopes[side, 0, i], slopes[side, 1, i], slopes[side, 2, i]
+        du = dy[i] - rest_i
+        of_S = dv[i] + beta * du
+        stack[i, slot, ONE] = rest_i
+        stack[i, slot, S_] = of_S
+        stack[i, slot, D_] = du
+        stack[i, slot, G_] = beta_i * pull - K_i * m
+        stack[i, slot, H_] = -beta_i * v - K_i * u
+
+
+@compiled()
+def fill_forced_coefficients(
+    stack: Floats, slot: int, active: Lanes, slopes: Floats, side: int, q: Floats, mass: float,
+    interval: float, t: float,
+) -> tuple[float, float]:  # fmt: skip
+    """Write the other coefficients; return the force's sine and cosine part (per mass) at t."""
+    per_mass = interval * interval / mass
+    angle = q[W] * interval * t + q[PHASE]
+    sin, cos = math.sin(angle) * per_mass, math.cos(angle) * per_mass
+    fs, fc = q[A] * sin, q[A] * cos
+    for i in active:
+        for k in range(E_, UC + 1):
+            stack[i, slot, k] = 0.0
+        beta_i, K_i = slopes[side, 0, i], slopes[side, 1, i]
+        stack[i, slot, X_], stack[i, slot, XR] = -K_i * fs, -beta_i * fs
+        stack[i, slot, P_], stack[i, slot, PR] = -K_i * fc, -beta_i * fc
+        if i == A:
+            stack[i, slot, E_], stack[i, slot, F_] = sin, cos
+        elif i == W:
+            stack[i, slot, E_], stack[i, slot, F_] = fc * interval * t, -fs * interval * t
+            stack[i, slot, US], stack[i, slot, UC] = -interval * fs, interval * fc
+        elif i == PHASE:
+            stack[i, slot, E_], stack[i, slot, F_] = fc, -fs
+    return fs, fc
+
+
+@compiled(forceinline=True, fastmath={"contract"})
+def carry(
+    stack: Floats, slot: int, active: Lanes, beta: float, K: float, S: float, D: float, G: float,
+    H: float, dy: Floats, dv: Floats,
+) -> None:  # fmt: skip
+    """Bring (dy, dv) to the time at which the PLAIN basis is 1, S, D, G, H."""
+    D_rate = -beta * D - K * S
+    H_rate = S - beta * H - K * G
+    for i in active:
+        a, b, c = stack[i, slot, 0], stack[i, slot, 1], stack[i, slot, 2]
+        d, e = stack[i, slot, 3], stack[i, slot, 4]
+        dy[i] = a + b * S + c * D + d * G + e * H
+        dv[i] = b * D + c * D_rate + d * H + e * H_rate
+
+
+@compiled(forceinline=True, fastmath={"contract"})
+def carry_forced(
+    stack: Floats, slot: int, active: Lanes, value: Floats, rate: Floats, dy: Floats, dv: Floats
+) -> None:
+    """Add to (dy, dv) what the rest of the basis brings, given its values and rates of change."""
+    for i in active:
+        for k in range(PLAIN, value.size):
+            dy[i] += stack[i, slot, k] * value[k]
+            dv[i] += stack[i, slot, k] * rate[k]
+
+
+@compiled(forceinline=True, fastmath={"contract"})
+def multiply(
+    stack: Floats,
+    products: Floats,
+    slot: int,
+    active: Lanes,
+    prefixes: Floats,
+    side: int,
+    count: int,
+) -> None:
+    """Write into `products` the rows of a block times the sums over its `count` samples."""
+    size = prefixes.shape[2]
+    if size > PLAIN:
+        for i in active:
+            for k in range(size):
+                total = 0.0
+                for m in range(size):
+                    total += prefixes[side, count, k, m] * stack[i, slot, m]
+                products[i, slot, k] = total
+        return
+    w = prefixes[side, count]
+    w00, w01, w02, w03, w04 = w[0, 0], w[0, 1], w[0, 2], w[0, 3], w[0, 4]
+    w11, w12, w13, w14 = w[1, 1], w[1, 2], w[1, 3], w[1, 4]
+    w22, w23, w24, w33, w34, w44 = w[2, 2], w[2, 3], w[2, 4], w[3, 3], w[3, 4], w[4, 4]
+    for i in active:
+        a, b, c = stack[i, slot, 0], stack[i, slot, 1], stack[i, slot, 2]
+        d, e = stack[i, slot, 3], stack[i, slot, 4]
+        products[i, slot, 0] = w00 * a + w01 * b + w02 * c + w03 * d + w04 * e
+        products[i, slot, 1] = w01 * a + w11 * b + w12 * c + w13 * d + w14 * e
+        products[i, slot, 2] = w02 * a + w12 * b + w22 * c + w23 * d + w24 * e
+        products[i, slot, 3] = w03 * a + w13 * b + w23 * c + w33 * d + w34 * e
+        products[i, slot, 4] = w04 * a + w14 * b + w24 * c + w34 * d + w44 * e
+
+
+@compiled(fastmath={"reassoc", "contract", "nsz"})
+def dot(a: Floats, b: Floats) -> float:
+    """Return the scalar product of two vectors."""
+    total = 0.0
+    for j in range(a.size):
+        total += a[j] * b[j]
+    return total
+
+
+@compiled()
+def add_products(
+    gram: Floats, stack: Floats, products: Floats, moments: Floats, slots: int, active: Lanes
+) -> None:
+    """Add the slots' products of J with J and with the residual to `gram` (12, 12)."""
+    width = stack.shape[1] * stack.shape[2]
+    count = slots * stack.shape[2]
+    rows, weighted, residuals = stack.reshape(-1), products.reshape(-1), moments.reshape(-1)
+    for i in active:
+        first = np.int64(i) * width
+        mine = rows[first : first + count]
+        for h in active:
+            if h >= i:
+                other = np.int64(h) * width
+                total = dot(mine, weighted[other : other + count])
+                gram[i, h] += total
+                if h > i:
+                    gram[h, i] += total
+        total = dot(mine, residuals[:count])
+        gram[i, RESIDUAL] += total
+        gram[RESIDUAL, i] += total

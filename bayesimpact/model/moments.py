@@ -1,0 +1,102 @@
+"""What the samples of a block contribute: residuals times the basis, or rows of J.
+
+The residuals' products with the basis are all that the samples are needed for; the basis's products
+with itself are summed once per regime (`prefix_grams`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.model.basis import D_, E_, F_, G_, H_, ONE, S_
+from bayesimpact.model.compiled import compiled
+
+Floats = NDArray[np.float64]
+Lanes = NDArray[np.uint64]
+
+
+@compiled()
+def prefix_grams(prefixes: Floats, tables: Floats, side: int) -> None:
+    """Fill prefixes[side] (LENGTH + 1, basis, basis): sums over j < n of products of table rows."""
+    size = tables.shape[1]
+    for k in range(size):
+        for m in range(k, size):
+            total = 0.0
+            prefixes[side, 0, k, m] = prefixes[side, 0, m, k] = 0.0
+            for n in range(tables.shape[2]):
+                total += tables[side, k, n] * tables[side, m, n]
+                prefixes[side, n + 1, k, m] = prefixes[side, n + 1, m, k] = total
+
+
+@compiled(fastmath={"reassoc", "contract", "nsz"})
+def plain_moments(
+    moments: Floats, slot: int, tables: Floats, side: int, data: Floats, first: int, end: int,
+    shift: float, u: float, m: float,
+) -> float:  # fmt: skip
+    """Write into moments[slot] the residuals of samples first..end-1 times the PLAIN basis.
+
+    Returns the sum of their squares. u, m : coefficients of D and S in the motion.
+    """
+    one = g = h = s = d = total = 0.0
+    # unsigned: numba then leaves out the check for negative indices, and the loop vectorises
+    i, j, count, step = np.uint64(first), np.uint64(0), np.uint64(end - first), np.uint64(1)
+    row_S, row_D, row_G, row_H = np.uint64(S_), np.uint64(D_), np.uint64(G_), np.uint64(H_)
+    while j < count:
+        S, D = tables[side, row_S, j], tables[side, row_D, j]
+        r = data[i + j] - shift - (D * u + S * m)
+        one += r
+        s += r * S
+        d += r * D
+        g += r * tables[side, row_G, j]
+        h += r * tables[side, row_H, j]
+        total += r * r
+        j += step
+    moments[slot, ONE], moments[slot, S_], moments[slot, D_] = one, s, d
+    moments[slot, G_], moments[slot, H_] = g, h
+    return total
+
+
+@compiled(fastmath={"reassoc", "contract", "nsz"})
+def forced_moments(
+    moments: Floats, slot: int, tables: Floats, side: int, data: Floats, first: int, end: int,
+    shift: float, u: float, m: float, fs: float, fc: float,
+) -> float:  # fmt: skip
+    """As `plain_moments`, with a force, for the whole basis."""
+    table = tables[side]
+    moments[slot] = 0.0
+    total = 0.0
+    for j in range(end - first):
+        r = data[first + j] - shift - (table[D_, j] * u + table[S_, j] * m)
+        r -= table[E_, j] * fs + table[F_, j] * fc
+        total += r * r
+        for k in range(table.shape[0]):
+            moments[slot, k] += r * table[k, j]
+    return total
+
+
+@compiled(fastmath={"contract"})
+def write_rows(
+    stack: Floats, slot: int, active: Lanes, tables: Floats, side: int, shift: float, u: float,
+    m: float, fs: float, fc: float, values: Floats, jacobian: Floats,
+) -> None:  # fmt: skip
+    """Write the values (n,) and the rows of J (n, 11) of one block."""
+    table = tables[side]
+    for j in range(values.size):
+        values[j] = shift + table[D_, j] * u + table[S_, j] * m
+    if table.shape[0] > E_:
+        for j in range(values.size):
+            values[j] += fs * table[E_, j] + fc * table[F_, j]
+    for i in active:
+        for j in range(values.size):
+            total = (
+                stack[i, slot, ONE]
+                + stack[i, slot, S_] * table[S_, j]
+                + stack[i, slot, D_] * table[D_, j]
+            )
+            jacobian[j, i] = (
+                total + stack[i, slot, G_] * table[G_, j] + stack[i, slot, H_] * table[H_, j]
+            )
+        for k in range(E_, table.shape[0]):
+            for j in range(values.size):
+                jacobian[j, i] += stack[i, slot, k] * table[k, j]
