@@ -110,16 +110,19 @@ def backbone(
     InputError : samples not finite or fewer than 16; interval, noise or average out of range
     """
     signal = _checked(samples, interval, average, noise)
+    for name, choice, known in (
+        ("estimator", estimator, ("half", "centred")),
+        ("damping", damping, ("reference", "local")),
+    ):
+        if choice not in known:
+            raise InputError(name, repr(choice), " or ".join(known))
     period = rough_period(signal)
     level = local.noise_level(signal, period) if noise is None else float(noise)
     zero = rest_position(signal, period, level) if rest is None else float(rest)
     swings = half_swings(signal, zero, period, level)
-    branches = [
-        _branch(*pick(swings, side), interval, average, damping)
-        for pick in (_halves if estimator == "half" else _centred,)
-        for side in (1, -1)
-    ]
-    return Backbone(branches[0], branches[1], zero, level)
+    pick = _halves if estimator == "half" else _centred
+    upper, lower = (_branch(*pick(swings, s), interval, average, damping) for s in (1, -1))
+    return Backbone(upper, lower, zero, level)
 
 
 def _checked(samples: ArrayLike, interval: float, average: int, noise: float | None) -> Floats:

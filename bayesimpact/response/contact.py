@@ -19,10 +19,10 @@ from bayesimpact.response.squares import Minimum, least
 
 Floats = NDArray[np.float64]
 
-STIFFNESS_RATIOS = np.geomspace(0.02, 5000.0, 26)
-DAMPING_RATIOS = np.array([0.003, 0.03, 0.15, 0.6])
+STIFFNESS_RATIOS = np.geomspace(0.02, 5000.0, 20)
+DAMPING_RATIOS = np.array([0.005, 0.05, 0.4])
 GAP_STEPS = 16
-CYCLES_IN_GRID = 16
+CYCLES_IN_GRID = 9
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,17 +125,22 @@ def fit_contact(
     """
     scale = float(cycles.depth.max())
     starts = _grid(cycles, free, cases, scale) if start is None else [_point(start, scale)]
-    best = least(
-        lambda x: _residuals(x, cycles, free, scale),
-        starts,
-        scale=np.concatenate([[0.05, 0.3, 1.0, 1.0], np.full(cases, 0.2)]),
-        bounds=_bounds(cases, scale, cycles, free),
-        robust=3.0,
-        evaluations=60,
-    )
-    without = _free_misfit(cycles, free)
-    # Three more unknowns than without a stop; 5 each is far beyond chance.
-    if capped(best.residuals) > without - 15.0:
+
+    def descend(points: list[Floats], evaluations: int) -> Minimum:
+        return least(
+            lambda x: _residuals(x, cycles, free, scale),
+            points,
+            scale=np.concatenate([[0.05, 0.3, 1.0, 1.0], np.full(cases, 0.2)]),
+            bounds=_bounds(cases, scale, cycles, free),
+            robust=3.0,
+            evaluations=evaluations,
+            tolerance=1e-5,
+        )
+
+    # A few steps tell which start lies in the right valley.
+    best = descend([descend(starts, 8).x], 60)
+    # Three unknowns more than without a stop, at least; 5 for each is far beyond chance.
+    if capped(best.residuals) > _free_misfit(cycles, free) - 5.0 * (2 + cases):
         return None
     return _contact(best, cycles, free, cases, scale)
 
@@ -180,15 +185,19 @@ def typical_variance(rows: Floats) -> float:
 
 
 def _free_misfit(cycles: Cycles, free: Free) -> float:
-    """Misfit of free cycles, the decay rate fitted to their depths."""
-    shortfall = np.log(cycles.depth / cycles.after) * free.k1**0.5 / np.pi * free.mass**0.5
-    for_c1 = max(0.0, float(np.median(shortfall)))
-    sums = []
-    for c1 in (free.c1, for_c1):
-        end = cycle(cycles.depth, free.mass, c1, free.k1, 0.0, np.inf, 0.0)
-        rows = misfits(cycles, end.length, end.depth, end.height)
-        sums.append(capped(rows))
-    return min(sums)
+    """Misfit without a stop, with the free oscillator refined in the same way."""
+
+    def residuals(x: Floats) -> Floats:
+        # A gap beyond reach leaves c1 and k1, the third and fourth coordinate.
+        return _residuals(np.array([np.inf, 0.0, x[0], x[1], 0.0]), everywhere, free, 1.0)
+
+    everywhere = replace(cycles, case=np.zeros(cycles.case.size, dtype=np.intp))
+    # By the median loss of depth per cycle, should the flights tell little of c1.
+    losses = np.log(cycles.depth / cycles.after) / np.pi * np.sqrt(free.k1 * free.mass)
+    start = (float(np.median(losses)) - free.c1) / free.sd_c1
+    bounds = ([-6.0, -6.0], [6.0, 6.0])
+    starts = [[0.0, 0.0], [start, 0.0]]
+    return capped(least(residuals, starts, scale=1.0, bounds=bounds, robust=3.0).residuals)
 
 
 def _grid(cycles: Cycles, free: Free, cases: int, scale: float) -> list[Floats]:

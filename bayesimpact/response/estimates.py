@@ -103,11 +103,11 @@ def estimate(campaign: Campaign) -> Estimates:
         # Twice: the first gap tells where the free tails begin, these sharpen the decay rate, and
         # the second estimate of the stop needs that.
         for _ in range(2):
-            cycles, owner = observe_cycles(cases, observed, flight)
+            cycles, places = observe_cycles(cases, observed, flight)
             free = _free(campaign.mass, flight)
-            if owner.size:
+            if len(places):
                 contact = fit_contact(cycles, free, len(campaign.cases), contact)
-            flight, impacts = with_tails(observed, flight, cycles, owner, contact, campaign.mass)
+            flight, impacts = with_tails(observed, flight, cycles, places, contact, campaign.mass)
         if contact is not None:
             relative = 0.5 * float(np.log(contact.k1 / _free(campaign.mass, flight).k1))
             flight = replace(flight, offsets=flight.offsets + relative * flight.offset_slope)

@@ -45,10 +45,20 @@ def noise_level(samples: Floats, period: float) -> float:
         centres = np.arange(half, n - half, half)
         _, rms = fit(samples, centres, half, 4)
         level = max(level, float(np.median(rms)))
-    # Rounding to a grid of step q leaves at least q / sqrt(12), also where differences are zero.
+    return max(level, _rounding(samples) / math.sqrt(12))
+
+
+def _rounding(samples: Floats) -> float:
+    """Step of the grid that the samples are rounded to; 0 without one.
+
+    Rounding noise may leave most differences at zero, so that their median does not show it.
+    """
     steps = np.abs(np.diff(samples))
     steps = steps[steps > 0]
-    return max(level, float(steps.min()) / math.sqrt(12) if steps.size else 0.0)
+    if steps.size == 0:
+        return 0.0
+    parts = steps / steps.min()
+    return float(steps.min()) if np.mean(np.abs(parts - np.rint(parts)) < 0.05) > 0.95 else 0.0
 
 
 def fit(samples: Floats, centres: Ints, half: int, degree: int) -> tuple[Floats, Floats]:

@@ -119,66 +119,72 @@ def observe_decay(observed: Observed) -> Flight | None:
 
 
 def observe_cycles(cases: Sequence[int], observed: Observed, flight: Flight) -> tuple[Cycles, Ints]:
-    """Cycles between neighbouring flights of all recordings, and the recording of each.
+    """Cycles between neighbouring flights of all recordings.
 
     Parameters
     ----------
     cases : per recording, the index of its obstacle
     observed, flight : recordings and the fit of their flights
+
+    Returns
+    -------
+    The cycles, and (n, 2) the recording of each and the number of the flight that it starts from.
     """
-    rows: list[list[float]] = []
-    owner: list[int] = []
+    tables, places = [np.empty((0, 9))], [np.empty((0, 2), dtype=np.intp)]
     for r, case in enumerate(cases):
-        times, depths = flight.minima(r)
-        arcs = observed.arcs[r]
-        noise = max(observed.noises[r], flight.rms)
-        for j in range(len(arcs) - 1):
-            between = arcs[j][1], arcs[j + 1][0] - 1
-            length = float(times[j + 1] - times[j])
-            shallow = min(depths[j], depths[j + 1]) < 4 * noise
-            if shallow or between[1] - between[0] < 2 or not 0 < length < 6 * np.pi / flight.omega:
-                continue
-            height = _height(observed, r, between) - float(flight.offsets[r])
-            spread = [
-                noise * np.sqrt(2 / (b - a)) / d
-                for (a, b), d in zip(arcs[j : j + 2], depths[j : j + 2], strict=True)
-            ]
-            error = float(np.hypot(*spread))
-            coarse = 2.0 / (between[1] - between[0]) ** 2
-            rows.append(
-                [
-                    depths[j],
-                    depths[j + 1],
-                    length,
-                    height,
-                    float(np.hypot(error / flight.omega, 3e-4 * length)),
-                    float(np.hypot(error, 2e-3)),
-                    float(np.hypot(noise, (3e-3 + coarse) * depths[j])),
-                    float(flight.offset_slope[r]),
-                    case,
-                ]
-            )
-            owner.append(r)
-    table = np.array(rows).reshape(-1, 9)
-    return Cycles.from_table(table), np.array(owner, dtype=np.intp)
+        table, first = _cycles_of(observed, flight, r)
+        tables.append(np.column_stack([table, np.full(first.size, float(case))]))
+        places.append(np.column_stack([np.full(first.size, r), first]))
+    return Cycles.from_table(np.concatenate(tables)), np.concatenate(places)
 
 
-def _height(observed: Observed, r: int, between: Arc) -> float:
-    """Highest reading between two flights."""
-    first, last = np.array([between[0]]), np.array([between[1]])
-    _, value = local.extremes(observed.samples[r], first, last, np.array([1]), observed.noises[r])
-    return float(value[0])
+def _cycles_of(observed: Observed, flight: Flight, r: int) -> tuple[Floats, Ints]:
+    """The first eight columns of `Cycles` for one recording, and the flights they start from."""
+    times, depths = flight.minima(r)
+    arcs = np.array(observed.arcs[r], dtype=np.intp).reshape(-1, 2)
+    noise = max(observed.noises[r], flight.rms)
+    length, between = np.diff(times), arcs[1:, 0] - 1 - arcs[:-1, 1]
+    clear = np.minimum(depths[:-1], depths[1:]) >= 4 * noise
+    k = np.flatnonzero(clear & (between >= 2) & (length > 0) & (length < 6 * np.pi / flight.omega))
+    if k.size == 0:
+        return np.empty((0, 8)), k
+    _, high = local.extremes(
+        observed.samples[r], arcs[k, 1], arcs[k + 1, 0] - 1, np.ones(k.size, int), noise
+    )
+    # Amplitude and phase of a sine from m samples of it: sd about sqrt(2 / m) of the noise.
+    spread = noise * np.sqrt(2 / (arcs[:, 1] - arcs[:, 0])) / depths
+    error = np.hypot(spread[k], spread[k + 1])
+    # The floors keep small misfits of the model from counting; a coarsely sampled top is uncertain.
+    coarse = 3e-3 + 2.0 / between[k] ** 2
+    columns = [
+        depths[k],
+        depths[k + 1],
+        length[k],
+        high - flight.offsets[r],
+        np.hypot(error / flight.omega, 3e-4 * length[k]),
+        np.hypot(error, 2e-3),
+        np.hypot(noise, coarse * depths[k]),
+        np.full(k.size, flight.offset_slope[r]),
+    ]
+    return np.column_stack(columns), k
 
 
 def with_tails(
     observed: Observed,
     flight: Flight,
     cycles: Cycles,
-    owner: Ints,
+    places: Ints,
     contact: Contact | None,
     mass: float,
 ) -> tuple[Flight, list[int]]:
     """Fit the flights again with every free tail as one long flight; and count the impacts.
+
+    Parameters
+    ----------
+    observed, flight : recordings and the fit of their flights
+    cycles, places : as from `observe_cycles`
+    contact : the stop, None for none
+    mass : kg
 
     Returns
     -------
@@ -186,15 +192,16 @@ def with_tails(
     recording.
     """
     count = len(observed.samples)
-    impact = np.zeros(owner.size, dtype=bool)
-    if contact is not None and owner.size:
-        stop = (np.array(contact.c2), np.array(contact.g), contact.k2[cycles.case])
+    impact = np.zeros(len(places), dtype=bool)
+    if contact is not None and len(places):
+        stop = (contact.c2, contact.g, contact.k2[cycles.case])
         impact = cycle(1.01 * cycles.depth, mass, contact.c1, contact.k1, *stop).impact
-    impacts = [int(np.sum(impact & (owner == r))) for r in range(count)]
+    hits = [places[impact & (places[:, 0] == r), 1] for r in range(count)]
+    impacts = [here.size for here in hits]
     joined: list[list[Arc]] = []
     for r in range(count):
-        arcs, hits = list(observed.arcs[r]), np.flatnonzero(impact[owner == r])
-        last = int(hits[-1]) + 1 if hits.size else 0
+        arcs = list(observed.arcs[r])
+        last = int(hits[r][-1]) + 1 if hits[r].size else 0
         if last < len(arcs) - 1:
             arcs = [*arcs[:last], (arcs[last][0], observed.samples[r].size)]
         joined.append(arcs)

@@ -83,8 +83,8 @@ def estimate_preloaded(campaign: Campaign, observed: Observed) -> Preloaded | No
         some, flight = observe_flights(mirrored.take(rows))
         if flight is None:
             return None
-        cycles, owner = observe_cycles([0] * len(rows), some, flight)
-        parts.append((replace(cycles, case=np.full(owner.size, index)), np.array(rows)[owner]))
+        cycles, places = observe_cycles([index] * len(rows), some, flight)
+        parts.append((cycles, np.array(rows)[places[:, 0]]))
         stiffness.append(campaign.mass * (flight.omega**2 + flight.decay**2))
         damping.append(2 * campaign.mass * flight.decay)
         spread.append(2 * campaign.mass * flight.sd_decay)

@@ -47,6 +47,7 @@ def least(
     robust: float | None = None,
     favour: float = 1.0,
     evaluations: int = 40,
+    tolerance: float = 1e-8,
 ) -> Minimum:
     """The lowest minimum found from several starting points (trust region, SciPy).
 
@@ -59,6 +60,7 @@ def least(
     robust : residuals beyond this count linearly instead of by their square
     favour : a later start wins when its cost is below this fraction of the best so far
     evaluations : at most, per start
+    tolerance : stop when a step changes cost or point by less than this, relative
     """
     low, high = (np.asarray(b, dtype=np.float64) for b in bounds)
     best: Minimum | None = None
@@ -74,6 +76,8 @@ def least(
             x_scale=np.asarray(scale, dtype=np.float64),
             loss="linear" if robust is None else "soft_l1",
             f_scale=robust or 1.0,
+            ftol=tolerance,
+            xtol=tolerance,
             gtol=1e-12,
             max_nfev=evaluations,
         )

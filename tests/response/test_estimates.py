@@ -1,0 +1,225 @@
+"""Quick estimates over many random rigs, and over the special ones."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import pytest
+from rigs import PAPER, Rig, paper_motion, random_rig
+from scipy.signal import savgol_filter
+
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.recording import Recording
+from bayesimpact.errors import InputError
+from bayesimpact.response.estimates import Estimates, estimate
+
+STIFFNESS = {"1": 5350.156, "2": 4776.275, "3": 2959.249}
+
+
+def wrong(rig: Rig, found: Estimates) -> set[str]:
+    """Kinds of parameters that are further off than a start of the identification may be."""
+    values, bad = found.values, set()
+    for name, true in rig.truth.items():
+        kind, ratio = name.split("[")[0], values[name] / true if true else np.nan
+        size, speed = rig.amplitude, rig.amplitude * np.sqrt(rig.truth["k1"] / rig.campaign.mass)
+        good = {
+            "k1": lambda r=ratio: abs(r - 1) < 0.03,
+            "c1": lambda r=ratio: 1 / 3 < r < 3,
+            "c2": lambda r=ratio: 1 / 3 < r < 3,
+            "k2": lambda r=ratio: 1 / 2 < r < 2,
+            "g": lambda n=name, t=true: abs(values[n] - t) < max(0.3 * abs(t), 3 * rig.noise),
+            "y0": lambda n=name, t=true, s=size: abs(values[n] - t) < 0.03 * s + 4 * rig.noise,
+            "v0": lambda n=name, t=true, v=speed: abs(values[n] - t) < 0.1 * v,
+            "offset": lambda n=name, t=true, s=size: abs(values[n] - t) < 0.01 * s + rig.noise,
+        }[kind]
+        if not good():
+            bad.add(kind)
+    return bad
+
+
+Found = list[tuple[Rig, Estimates]]
+
+
+def all_of(rigs: list[Rig]) -> Found:
+    return [(rig, estimate(rig.campaign)) for rig in rigs]
+
+
+def failures(found: Found) -> dict[str, int]:
+    return dict(Counter(kind for pair in found for kind in wrong(*pair)))
+
+
+@pytest.fixture(scope="module")
+def hundred() -> Found:
+    return all_of([random_rig(seed) for seed in range(100)])
+
+
+def paper_campaign(
+    n: int = 6000, sigma: float = 5e-6, smooth: bool = False, **changed: float
+) -> Campaign:
+    """Nine recordings like the paper's, (optionally) smoothed as its authors did."""
+    rng = np.random.default_rng(5)
+    recordings = []
+    for case, k2 in STIFFNESS.items():
+        for name, y0 in (("a", -6.5e-3), ("b", -5e-3), ("c", -4e-3)):
+            motion = paper_motion(n, k2=k2, y0=y0, **changed)
+            samples = motion + 1e-5 + sigma * rng.standard_normal(n)
+            if smooth:
+                samples = savgol_filter(samples, 19, 2)
+            recordings.append(Recording(f"case{case}_{name}", case, samples, 1e-3))
+    return Campaign("paper", PAPER["mass"], tuple(recordings))
+
+
+def test_a_hundred_random_rigs(hundred: Found) -> None:
+    """None of 350 rigs drawn much like these failed in development."""
+    counts = failures(hundred)
+    assert all(count <= 3 for count in counts.values()), counts
+
+
+def test_the_errors_are_of_the_size_they_say(hundred: Found) -> None:
+    """Standardised errors neither vanish nor explode; floors make them rather too large."""
+    ratios = np.array(
+        [
+            abs(found.values[name] - true) / found.sd[name]
+            for rig, found in hundred
+            for name, true in rig.truth.items()
+            if name in ("k1", "c1", "g") or name.startswith("k2")
+        ]
+    )
+    assert 0.02 < np.median(ratios) < 1.5
+    assert np.mean(ratios > 6) < 0.05
+
+
+def test_random_rigs_without_a_stop() -> None:
+    found = all_of([random_rig(seed, stop=False) for seed in range(20)])
+    assert not failures(found)
+    first = found[0][1]
+    assert first.g == np.inf
+    assert first.c2 == 0.0
+    assert not first.k2
+    assert "g" not in first.values
+
+
+def test_random_rigs_without_a_gap() -> None:
+    counts = failures(all_of([random_rig(seed, gap=0.0) for seed in range(12)]))
+    assert all(count <= 1 for count in counts.values()), counts
+
+
+def test_random_preloaded_rigs() -> None:
+    """Harder: at rest the mass touches, and flights are few. Most must still be right."""
+    rigs = [random_rig(seed, gap=-0.05) for seed in range(15)]
+    found = [estimate(rig.campaign) for rig in rigs]
+    off = [abs(e.k1 / rig.truth["k1"] - 1) for e, rig in zip(found, rigs, strict=True)]
+    assert np.sum(np.array(off) > 0.03) <= 3
+    assert np.median(off) < 0.01
+    below = [e.g < 0 for e in found]
+    assert np.mean(below) > 0.8
+
+
+def test_random_rigs_that_never_touch() -> None:
+    for seed in range(8):
+        rig = random_rig(seed, gap=1.2)
+        if any(rig.truth[n] > 0.6 * rig.amplitude for n in rig.truth if n.startswith("y0")):
+            continue  # released from inside the stop
+        found = estimate(rig.campaign)
+        assert abs(found.k1 / rig.truth["k1"] - 1) < 0.03
+        reached = max(
+            float((r.samples - rig.truth[f"offset[{r.name}]"]).max())
+            for r in rig.campaign.recordings
+        )
+        assert found.g == pytest.approx(reached, abs=0.02 * rig.amplitude)
+        assert all(np.isinf(found.sd[n]) for n in ("g", "c2", "k2[0]"))
+        assert sum(found.impacts.values()) == 0
+
+
+def test_paper_campaign() -> None:
+    found = estimate(paper_campaign())
+    assert found.k1 == pytest.approx(PAPER["k1"], rel=1e-4)
+    assert found.c1 == pytest.approx(PAPER["c1"], rel=0.02)
+    assert found.g == pytest.approx(PAPER["g"], rel=1e-3)
+    assert found.c2 == pytest.approx(PAPER["c2"], rel=0.03)
+    for case, k2 in STIFFNESS.items():
+        assert found.k2[case] == pytest.approx(k2, rel=5e-3)
+    for name, value in found.offset.items():
+        assert value == pytest.approx(1e-5, abs=1e-6)
+        assert found.noise[name] == pytest.approx(5e-6, rel=0.1)
+        assert 20 < found.impacts[name] < 45
+    assert found.y0["case1_a"] == pytest.approx(-6.5e-3, abs=1e-5)
+    assert found.v0["case1_a"] == pytest.approx(0.0, abs=5e-4)
+
+
+def test_smoothed_recordings() -> None:
+    """The paper's filter clips the contacts by 10 um: the estimates bear it."""
+    found = estimate(paper_campaign(sigma=1e-5, smooth=True))
+    assert found.k1 == pytest.approx(PAPER["k1"], rel=1e-3)
+    assert found.g == pytest.approx(PAPER["g"], rel=0.02)
+    for case, k2 in STIFFNESS.items():
+        assert found.k2[case] == pytest.approx(k2, rel=0.05)
+
+
+def test_impacts_to_the_end_of_the_recording() -> None:
+    found = estimate(paper_campaign(n=1200))
+    assert found.k1 == pytest.approx(PAPER["k1"], rel=2e-3)
+    assert found.g == pytest.approx(PAPER["g"], rel=0.02)
+    assert found.k2["1"] == pytest.approx(STIFFNESS["1"], rel=0.05)
+
+
+def test_a_single_recording_of_three_periods() -> None:
+    samples = paper_motion(450) + 5e-6 * np.random.default_rng(0).standard_normal(450)
+    campaign = Campaign("short", PAPER["mass"], (Recording("a", "1", samples, 1e-3),))
+    found = estimate(campaign)
+    assert found.k1 == pytest.approx(PAPER["k1"], rel=0.03)
+    assert found.g == pytest.approx(PAPER["g"], rel=0.3)
+    assert STIFFNESS["1"] / 2 < found.k2["1"] < STIFFNESS["1"] * 2
+
+
+def test_different_rates_and_lengths_in_one_campaign() -> None:
+    rng = np.random.default_rng(1)
+    recordings = tuple(
+        Recording(
+            str(i), "1", paper_motion(n, dt) + 5e-6 * rng.standard_normal(n), dt, start=3.0 * i
+        )
+        for i, (n, dt) in enumerate([(1200, 5e-3), (3000, 1e-3), (40_000, 5e-5)])
+    )
+    found = estimate(Campaign("mixed", PAPER["mass"], recordings))
+    assert found.k1 == pytest.approx(PAPER["k1"], rel=1e-3)
+    assert found.k2["1"] == pytest.approx(PAPER["k2"], rel=0.05)
+
+
+def test_a_case_that_never_touches_is_said_so() -> None:
+    rng = np.random.default_rng(2)
+    recordings = tuple(
+        Recording(case, case, paper_motion(y0=y0) + 5e-6 * rng.standard_normal(6000), 1e-3)
+        for case, y0 in (("hit", -6e-3), ("miss", -1e-3))
+    )
+    found = estimate(Campaign("two", PAPER["mass"], recordings))
+    assert np.isfinite(found.sd["k2[hit]"])
+    assert np.isinf(found.sd["k2[miss]"])
+    assert found.k2["miss"] == pytest.approx(found.k2["hit"])
+    assert found.impacts["miss"] == 0
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1e3])
+def test_the_unit_does_not_matter(unit: float) -> None:
+    """Lengths in another unit: k1, k2, c1, c2 stay, the others scale."""
+    campaign = paper_campaign(n=1500)
+    scaled = Campaign(
+        "scaled",
+        campaign.mass,
+        tuple(
+            Recording(r.name, r.case, unit * np.asarray(r.samples), r.interval)
+            for r in campaign.recordings
+        ),
+    )
+    one, other = estimate(campaign), estimate(scaled)
+    for name, value in one.values.items():
+        factor = 1.0 if name[:2] in ("k1", "c1", "k2", "c2") else unit
+        assert other.values[name] == pytest.approx(factor * value, rel=1e-3, abs=1e-6 * factor)
+
+
+@pytest.mark.parametrize("stop", [True, False])
+def test_noise_alone_is_refused(stop: bool) -> None:
+    noise = 1e-6 * np.random.default_rng(0).standard_normal(2000)
+    campaign = Campaign("noise", 1.0, (Recording("a", "1", noise, 1e-3),), stop)
+    with pytest.raises(InputError, match="no oscillation"):
+        estimate(campaign)
