@@ -1,1 +1,67 @@
-"""Bayesian identification of impacting systems, and a diagnosis of what a model leaves out."""
+"""Bayesian identification of impacting systems, and a diagnosis of what a model leaves out.
+
+    import bayesimpact as bi
+    campaign = bi.load("data/paper")
+    found = bi.fit(campaign)
+    posterior = bi.sample(found.fit)
+    bi.corner(posterior)
+
+Importing the package imports nothing heavy; each name is loaded when it is first used.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from bayesimpact.data.campaign import Campaign as Campaign
+    from bayesimpact.data.read import load_campaign as load
+    from bayesimpact.data.recording import Recording as Recording
+    from bayesimpact.diagnosis.loop import diagnose as diagnose
+    from bayesimpact.inference.identify import identify as fit
+    from bayesimpact.inference.posterior import sample as sample
+    from bayesimpact.model.effects import EFFECTS as EFFECTS
+    from bayesimpact.model.effects import Effect as Effect
+    from bayesimpact.model.simulate import simulate as simulate
+    from bayesimpact.report.figures.corner import posterior_corner as corner
+    from bayesimpact.response.backbone import backbone as backbone
+
+_NAMES = {
+    "Campaign": ("bayesimpact.data.campaign", "Campaign"),
+    "Recording": ("bayesimpact.data.recording", "Recording"),
+    "load": ("bayesimpact.data.read", "load_campaign"),
+    "simulate": ("bayesimpact.model.simulate", "simulate"),
+    "backbone": ("bayesimpact.response.backbone", "backbone"),
+    "fit": ("bayesimpact.inference.identify", "identify"),
+    "sample": ("bayesimpact.inference.posterior", "sample"),
+    "corner": ("bayesimpact.report.figures.corner", "posterior_corner"),
+    "diagnose": ("bayesimpact.diagnosis.loop", "diagnose"),
+    "EFFECTS": ("bayesimpact.model.effects", "EFFECTS"),
+    "Effect": ("bayesimpact.model.effects", "Effect"),
+}
+
+__all__ = [
+    "EFFECTS",
+    "Campaign",
+    "Effect",
+    "Recording",
+    "backbone",
+    "corner",
+    "diagnose",
+    "fit",
+    "load",
+    "sample",
+    "simulate",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _NAMES:
+        raise AttributeError(f"module 'bayesimpact' has no attribute {name!r}")
+    module, attribute = _NAMES[name]
+    return getattr(import_module(module), attribute)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

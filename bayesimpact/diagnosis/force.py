@@ -89,9 +89,9 @@ def missing_force(
         [np.full(knots, scales.force), np.full(knots, scales.force / scales.speed)]
     )
     evidence = _Evidence(projection.information, unit, knots)
-    best, (width_a, width_b) = evidence.maximum(projection.score)
-    draws = evidence.null_draws(rng, NULL_DRAWS)
-    null = np.array([evidence.maximum(d)[0] for d in draws])
+    found, which = evidence.maximum(projection.score[None])
+    best, (width_a, width_b) = float(found[0]), evidence.pairs[which[0]]
+    null, _ = evidence.maximum(evidence.null_draws(rng, NULL_DRAWS))
     mean, covariance = evidence.posterior(projection.score, width_a, width_b)
     final = learned_force(
         low, high, width_a * scales.force, width_b * scales.force / scales.speed, knots
@@ -182,12 +182,13 @@ class _Evidence:
             np.log1p(values).sum()
         )
 
-    def maximum(self, score: Array) -> tuple[float, tuple[float, float]]:
-        """Largest log evidence over the widths, and the widths."""
-        scaled = score * self.unit
-        gains = [0.5 * float(np.sum((f @ scaled) ** 2)) - penalty for f, penalty in self.factors]
-        best = int(np.argmax(gains))
-        return gains[best], self.pairs[best]
+    def maximum(self, scores: Array) -> tuple[Array, NDArray[np.intp]]:
+        """Largest log evidence over the widths and which pair gives it, for scores (n, K): (n,) each."""
+        scaled = (scores * self.unit).T
+        gains = np.array(
+            [0.5 * np.sum((f @ scaled) ** 2, axis=0) - penalty for f, penalty in self.factors]
+        )
+        return gains.max(axis=0), gains.argmax(axis=0)
 
     def posterior(self, score: Array, a: float, b: float) -> tuple[Array, Array]:
         """Mean and covariance of the coefficients."""

@@ -24,6 +24,8 @@ ALPHA = 0.005  # of each of the two tests that ask whether anything is missing
 DECISIVE = 5.5  # nats of log odds that a name needs over every rival (2 ln odds of 11)
 MOST_EFFECTS = 3
 WORTH_A_REFIT = 4.0  # expected gain in log likelihood, nats
+NEAR_BEST = 0.3  # of the best expected gain, less a margin: below that no refit makes a rival
+NEAR_MARGIN = 10.0  # nats
 BEAM = 3  # models that are extended further while the best one is not white
 PAIRS = 4  # refitted at the first step
 
@@ -167,7 +169,7 @@ class _Search:
 
     def extended(self, state: State) -> list[Candidate]:
         """Models with one more effect; from the base model on also the most promising pairs."""
-        scores = [s for s in state.scan.best() if s.gain > WORTH_A_REFIT]
+        scores = worth_a_refit(state.scan)
         found = [self.fit_more(state.candidate, [score]) for score in scores]
         if not state.candidate.effects:
             best_single = max((c.log_evidence for c in found), default=-np.inf)
@@ -211,10 +213,9 @@ class _Search:
             return
         for effect in chosen.effects:
             rest = self.drop(chosen, effect)
-            scores = scan(rest.fit, self.effects, self.scales, rng=self.rng).best()
-            held = max((s.gain for s in scores if s.effect.id == effect.id), default=0.0)
+            scores = worth_a_refit(scan(rest.fit, self.effects, self.scales, rng=self.rng))
             for score in scores:
-                if score.effect.id != effect.id and score.gain > 0.5 * held - 10:
+                if score.effect.id != effect.id:
                     self.fit_more(rest, [score])
 
     def naming(self, base: State, chosen: State) -> Naming:
@@ -223,6 +224,14 @@ class _Search:
         if set(best.ids) != set(chosen.candidate.ids) and len(best.effects) <= MOST_EFFECTS:
             chosen = self.examine(best)
         return Naming(base, chosen, tried, self.cost)
+
+
+def worth_a_refit(scan: Scan) -> list[Score]:
+    """Effects whose score promises something, and not far less than the best one."""
+    scores = scan.best()
+    most = max((s.gain for s in scores), default=0.0)
+    floor = max(WORTH_A_REFIT, NEAR_BEST * most - NEAR_MARGIN)
+    return [s for s in scores if s.gain > floor]
 
 
 def _is_elaboration(candidate: Candidate, chosen: Candidate) -> bool:

@@ -24,7 +24,7 @@ from bayesimpact.model.parameters import SLOTS
 
 Array = NDArray[np.float64]
 
-RESPONSE_REACH = 3.0  # forcing is looked for up to so many times the natural frequency in contact
+RESPONSE_REACH = 2.0  # forcing is looked for up to so many times the natural frequency in contact
 _FORCE, _OMEGA, _PHASE = (SLOTS.index(s) for s in ("A", "w", "phase"))
 
 
@@ -55,8 +55,8 @@ def periodic_scores(fit: Fit, effects: Sequence[Effect], scales: Scales) -> tupl
 
 
 def frequencies(fit: Fit, effect: Effect, scales: Scales) -> Array:
-    """Frequencies to scan, Hz: two per resolution of the longest recording."""
-    spacing = 0.5 / scales.duration
+    """Frequencies to scan, Hz: finer than the resolution of the longest recording."""
+    spacing = (0.5 if effect.observe is not None else 0.75) / scales.duration
     nyquist = 0.5 / float(fit.target.oscillator.intervals.max())
     if effect.observe is None:
         stiffest = (scales.stiffness + scales.contact_stiffness) / scales.mass

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
@@ -72,7 +73,48 @@ def paper_campaign() -> Campaign:
     )
 
 
-CAMPAIGNS: Mapping[str, Callable[[], Campaign]] = {"paper": paper_campaign}
+CONCEALED_EFFECTS: Mapping[str, Mapping[str, float]] = {
+    "contact_damping_speed": {"coefficient": 0.06},
+    "gap_wear": {"step": 8e-8},
+}
+"""What `data/concealed` hides: damping that grows with the speed of indentation, a bolt that wears."""
+
+
+def concealed_campaign() -> Campaign:
+    """The paper's campaign again, from a rig with two effects that the paper suspects of its own."""
+    rng = np.random.default_rng(20231101)
+    releases = paper_releases(rng)
+    offsets = {release.name: float(10e-6 * rng.standard_normal()) for release in releases}
+    return make_campaign(
+        "Impact rig, three beams (simulated; something is concealed)",
+        PAPER_RIG,
+        releases,
+        CONCEALED_EFFECTS,
+        chain=Chain(noise=5e-6, offsets=offsets),
+        rate=1000.0,
+        duration=6.0,
+        rng=rng,
+        beams=PAPER_BEAMS,
+    )
+
+
+def concealed_truth() -> dict[str, object]:
+    """The content of truth.json."""
+    rig = PAPER_RIG
+    parameters = {"c1": rig.c1, "k1": rig.k1, "c2": rig.c2, "g": rig.g}
+    parameters |= {f"k2[{case}]": value for case, value in rig.k2.items()}
+    effects = {
+        f"{effect}.{name}": value
+        for effect, values in CONCEALED_EFFECTS.items()
+        for name, value in values.items()
+    }
+    return {"effects": list(CONCEALED_EFFECTS), "parameters": parameters | effects}
+
+
+CAMPAIGNS: Mapping[str, Callable[[], Campaign]] = {
+    "paper": paper_campaign,
+    "concealed": concealed_campaign,
+}
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -84,6 +126,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     folder = chosen.out or Path(__file__).resolve().parents[2] / "data" / chosen.campaign
     comment = f"Made by: python -m bayesimpact.trial.bundle {chosen.campaign}"
     write_campaign(folder, CAMPAIGNS[chosen.campaign](), decimals=DECIMALS, comment=comment)
+    if chosen.campaign == "concealed":
+        truth = json.dumps(concealed_truth(), indent=1)
+        (folder / "truth.json").write_text(truth + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
