@@ -1,0 +1,143 @@
+"""`bayesimpact trial`. Heavy imports happen when it runs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+
+def _listed(text: str | None) -> tuple[str, ...] | None:
+    return None if text is None else tuple(part.strip() for part in text.split(",") if part.strip())
+
+
+OPTIONS: tuple[Callable[[Callable[..., None]], Callable[..., None]], ...] = (
+    click.option("--number", type=click.IntRange(min=1), default=20, show_default=True,
+                 help="How many trials; they have the seeds SEED, SEED + 1, ..."),
+    click.option("--kinds", metavar="A,B", help="control, single, pair, outside; in turn. [all]"),
+    click.option("--effects", metavar="A,B", help="Effects of the catalogue to plant. [all]"),
+    click.option("--outside", metavar="A,B", help="Forces outside the catalogue to plant. [all]"),
+    click.option("--strength", nargs=2, type=float, metavar="LOW HIGH",
+                 help="Range of sizes in detection limits. [1.5 6]"),
+    click.option("--rig", metavar="A,B",
+                 help="paper, soft, stiff, fast, slow, one, five, plain, small. [all but small]"),
+    click.option("--noise", metavar="A,B", help="white, ar1, smoothed. [all]"),
+    click.option("--no-search", is_flag=True, help="Diagnose without the global search."),
+    click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True,
+                 help="Processes of a local Dask cluster; 1 stays in this process."),
+    click.option("--scheduler", metavar="ADDRESS", help="A Dask scheduler to use instead."),
+    click.option("--out", type=click.Path(file_okay=False, path_type=Path), metavar="DIR",
+                 default=Path("trials"), show_default=True,
+                 help="Folder of the run; one that was interrupted goes on."),
+    click.option("--keep", is_flag=True, help="Leave the campaigns on disk."),
+    click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True,
+                 help="Seed of the first trial. Same seed and options, same trial."),
+    click.option("--quiet", is_flag=True, help="Print nothing but warnings and errors."),
+)  # fmt: skip
+
+
+def _options(function: Callable[..., None]) -> Callable[..., None]:
+    for option in reversed(OPTIONS):
+        function = option(function)
+    return function
+
+
+@click.command()
+@_options
+def trial(
+    number: int,
+    kinds: str | None,
+    effects: str | None,
+    outside: str | None,
+    strength: tuple[float, float] | None,
+    rig: str | None,
+    noise: str | None,
+    no_search: bool,
+    workers: int,
+    scheduler: str | None,
+    out: Path,
+    keep: bool,
+    seed: int,
+    quiet: bool,
+) -> None:
+    """Blind trials: conceal effects in simulated recordings, diagnose them, score the answers.
+
+    An independent rig records the campaigns. All truths are sealed (SHA-256) before the first
+    diagnosis. One trial again, bit for bit: the same options with --number 1 and its seed.
+    """
+    one_thread_each()
+    from bayesimpact.trial.run import run_trials, write
+    from bayesimpact.trial.settings import Settings
+    from bayesimpact.trial.stamp import stamped
+    from bayesimpact.trial.table import summary_text
+
+    given: dict[str, Any] = {
+        "kinds": _listed(kinds),
+        "effects": _listed(effects),
+        "outside": _listed(outside),
+        "strength": strength,
+        "benches": _listed(rig),
+        "noises": _listed(noise),
+    }
+    settings = Settings(**{k: v for k, v in given.items() if v is not None}, search=not no_search)
+    bars = _Bars(number, quiet)
+    results = run_trials(
+        settings,
+        range(seed, seed + number),
+        out,
+        workers=workers,
+        scheduler=scheduler,
+        keep=keep,
+        sealed=bars.sealed,
+        step=bars.step,
+    )
+    bars.close()
+    summary = stamped(results, settings, range(seed, seed + number))
+    write(out / "summary.json", _json(summary))
+    text = summary_text(summary)
+    write(out / "summary.txt", text)
+    if not quiet:
+        click.echo(text, nl=False)
+
+
+def one_thread_each() -> None:
+    """Linear algebra on one thread: sums then round alike everywhere. Before NumPy loads."""
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ[name] = "1"
+
+
+def _json(content: Any) -> str:
+    import json
+
+    return json.dumps(content, indent=1, allow_nan=False) + "\n"
+
+
+class _Bars:
+    """One progress bar per stage, on standard error."""
+
+    def __init__(self, number: int, quiet: bool) -> None:
+        self.number, self.quiet = number, quiet
+        self.stage, self.bar = "", None
+
+    def step(self, stage: str, count: int) -> None:
+        from tqdm import tqdm
+
+        if stage != self.stage:
+            self.close()
+            self.stage = stage
+            self.bar = tqdm(total=self.number, desc=stage, unit="trial", disable=self.quiet)
+        if self.bar is not None:
+            self.bar.update(count)
+
+    def sealed(self, digest: str) -> None:
+        self.close()
+        if not self.quiet:
+            click.echo(f"sealed: seals.txt, SHA-256 {digest}")
+
+    def close(self) -> None:
+        if self.bar is not None:
+            self.bar.close()
+            self.bar = None

@@ -1,0 +1,315 @@
+"""How every effect is planted: shapes drawn at random, one size left free, and where it acts.
+
+A `Form` turns a size into the effect's numbers, SI, as the rig takes them. Sizes are found later,
+in units of what the campaign could detect; `start` is a size that is certainly small.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from math import pi
+from types import MappingProxyType
+
+import numpy as np
+
+from bayesimpact.trial.benches import Design, log_uniform
+from bayesimpact.trial.rig import Effects, Parameters
+
+Rng = np.random.Generator
+
+
+@dataclass(frozen=True)
+class Form:
+    """An effect with its shape drawn and its size open.
+
+    Attributes
+    ----------
+    build : size -> numbers; the size carries the sign
+    start : a small size; 0 for an effect that is on or off
+    reference : what is present at size zero, where that is not the base model
+    place : displacements between which a local force acts, m, or None
+    largest : the size beyond which the effect is no longer physical
+    """
+
+    build: Callable[[float], Parameters]
+    start: float
+    reference: Effects = field(default_factory=lambda: MappingProxyType({}))
+    place: tuple[float, float] | None = None
+    largest: float = np.inf
+
+
+@dataclass(frozen=True)
+class Plant:
+    """How an effect is drawn.
+
+    Attributes
+    ----------
+    regimes : places that are right: free, contact, everywhere, measurement
+    form : draws its shape for a design
+    obstacles, recordings : how many it needs at least
+    slot : effects with the same slot exclude each other
+    """
+
+    regimes: tuple[str, ...]
+    form: Callable[[Design, Rng], Form]
+    obstacles: int = 0
+    recordings: int = 1
+    slot: str = ""
+
+    def fits(self, cases: int, recordings: int) -> bool:
+        """Whether a campaign with so many obstacles and recordings can show it."""
+        return cases >= self.obstacles and recordings >= self.recordings
+
+
+def _sign(rng: Rng) -> float:
+    return float(rng.choice([-1.0, 1.0]))
+
+
+def _one(name: str, scale: Callable[[Design], float], signed: bool = False) -> Callable[..., Form]:
+    """An effect with one number, small against its natural scale."""
+
+    def form(design: Design, rng: Rng) -> Form:
+        sign = _sign(rng) if signed else 1.0
+        return Form(lambda size: {name: sign * size}, 1e-4 * scale(design), largest=scale(design))
+
+    return form
+
+
+def _exponent(design: Design, rng: Rng) -> Form:
+    sign = _sign(rng)
+    return Form(lambda size: {"exponent": 1 + sign * size}, 1e-4, largest=0.4)
+
+
+def _per_case(design: Design, rng: Rng) -> Form:
+    keys = list(design.rig.k2)
+    shares = _contrast(len(keys), rng)
+    c2 = design.rig.c2
+
+    def build(size: float) -> Parameters:
+        return {"c2": {k: c2 + size * s for k, s in zip(keys, shares, strict=True)}}
+
+    return Form(build, 1e-4 * c2, largest=0.9 * c2 / max(-shares.min(), 1e-9))
+
+
+def _gaps(design: Design, rng: Rng) -> Form:
+    keys = [r.name for r in design.releases]
+    shares = _contrast(len(keys), rng)
+    gap = design.rig.g
+
+    def build(size: float) -> Parameters:
+        return {"g": {k: gap + size * s for k, s in zip(keys, shares, strict=True)}}
+
+    return Form(build, 1e-5 * design.indentation, largest=0.2 * design.indentation)
+
+
+def _contrast(size: int, rng: Rng) -> np.ndarray:
+    """Differences with mean zero and root mean square one, (size,)."""
+    values = rng.standard_normal(size)
+    values -= values.mean()
+    return np.asarray(values / np.sqrt(np.mean(values**2)))
+
+
+def _second_stage(design: Design, rng: Rng) -> Form:
+    at = design.indentation * rng.uniform(0.25, 0.65)
+    k2 = design.contact_stiffness
+    return Form(lambda size: {"stiffness": size, "depth": at}, 1e-4 * k2, largest=2 * k2)
+
+
+def _relaxation(design: Design, rng: Rng) -> Form:
+    time = log_uniform(rng, (0.1, 1.0)) / design.contact_omega
+    k2 = design.contact_stiffness
+    return Form(lambda size: {"stiffness": size, "time": time}, 1e-4 * k2, largest=k2)
+
+
+def _obstacle_mass(design: Design, rng: Rng) -> Form:
+    mass = design.rig.mass
+    reference: Effects = {"contact_no_tension": {}}
+    return Form(lambda size: {"mass": size}, 1e-5 * mass, reference, largest=0.3 * mass)
+
+
+def _forcing(design: Design, rng: Rng) -> Form:
+    side = (0.4, 0.85) if rng.random() < 0.5 else (1.2, 4.0)
+    frequency = design.omega / (2 * pi) * log_uniform(rng, side)
+    phases = {r.name: float(rng.uniform(0, 2 * pi)) for r in design.releases}
+    force = design.rig.k1 * design.amplitude
+
+    def build(size: float) -> Parameters:
+        return {"amplitude": size, "frequency": frequency, "phase": phases}
+
+    return Form(build, 1e-5 * force, largest=0.2 * force)
+
+
+def _opposite_stop(design: Design, rng: Rng) -> Form:
+    gap = design.amplitude * rng.uniform(0.5, 0.85)
+    k1 = design.rig.k1
+    return Form(lambda size: {"stiffness": size, "gap": gap}, 1e-4 * k1, largest=5 * k1)
+
+
+def _hum(design: Design, rng: Rng) -> Form:
+    below = [f for f in (50.0, 60.0, 100.0, 150.0) if f < 0.4 * design.rate]
+    frequency = float(rng.choice(below or [0.2 * design.rate])) * (1 + 1e-3 * rng.standard_normal())
+    phases = {r.name: float(rng.uniform(0, 2 * pi)) for r in design.releases}
+    reach = design.amplitude
+
+    def build(size: float) -> Parameters:
+        return {"amplitude": size, "frequency": frequency, "phase": phases}
+
+    return Form(build, 1e-6 * reach, largest=0.05 * reach)
+
+
+def _smoothing(design: Design, rng: Rng) -> Form:
+    """An undeclared Savitzky-Golay filter; on or off, its window drawn."""
+    contact = pi / design.contact_omega * design.rate
+    window = 2 * int(rng.integers(3, max(4, int(min(10.0, 0.35 * contact)) + 1))) + 1
+    return Form(lambda size: {"window": window, "order": 2}, 0.0)
+
+
+CATALOGUE_PLANTS: Mapping[str, Plant] = {
+    "contact_damping_indentation": Plant(
+        ("contact",), _one("coefficient", lambda d: d.contact_stiffness / d.speed), 1
+    ),
+    "contact_damping_speed": Plant(
+        ("contact",),
+        _one("coefficient", lambda d: d.contact_stiffness * d.indentation / d.speed**2),
+        1,
+    ),
+    "contact_damping_per_case": Plant(("contact",), _per_case, 2, slot="c2"),
+    "contact_hardening": Plant(
+        ("contact",),
+        _one("stiffness", lambda d: 0.3 * d.contact_stiffness / d.indentation**2, signed=True),
+        1,
+    ),
+    "contact_power_law": Plant(("contact",), _exponent, 1),
+    "contact_second_stage": Plant(("contact",), _second_stage, 1),
+    "contact_no_tension": Plant(("contact",), lambda d, r: Form(lambda s: {}, 0.0), 1, slot="end"),
+    "contact_relaxation": Plant(("contact",), _relaxation, 1),
+    "obstacle_mass": Plant(("contact",), _obstacle_mass, 1, slot="end"),
+    "gap_wear": Plant(("contact",), _one("step", lambda d: 0.1 * d.indentation), 1, slot="wear"),
+    "gap_per_recording": Plant(("contact",), _gaps, 1, 2, slot="g"),
+    "coulomb_friction": Plant(("free",), _one("force", lambda d: 0.1 * d.rig.k1 * d.amplitude)),
+    "quadratic_drag": Plant(("free",), _one("coefficient", lambda d: 10 * d.rig.c1 / d.speed)),
+    "spring_quadratic": Plant(
+        ("free",), _one("stiffness", lambda d: 0.3 * d.rig.k1 / d.amplitude, signed=True)
+    ),
+    "spring_cubic": Plant(
+        ("free",), _one("stiffness", lambda d: 0.3 * d.rig.k1 / d.amplitude**2, signed=True)
+    ),
+    "stiffness_drift": Plant(
+        ("free",), _one("rate", lambda d: 0.3 / d.duration, signed=True), slot="k1"
+    ),
+    "harmonic_forcing": Plant(("everywhere", "free"), _forcing),
+    "opposite_stop": Plant(("free",), _opposite_stop),
+    "sensor_drift": Plant(
+        ("measurement",), _one("rate", lambda d: 0.3 * d.amplitude / d.duration, signed=True)
+    ),
+    "sensor_quadratic": Plant(
+        ("measurement",), _one("gain", lambda d: 0.3 / d.amplitude, signed=True)
+    ),
+    "sensor_cubic": Plant(
+        ("measurement",), _one("gain", lambda d: 0.3 / d.amplitude**2, signed=True)
+    ),
+    "sensor_hum": Plant(("measurement",), _hum),
+    "smoothing": Plant(("measurement",), _smoothing, slot="smoothing"),
+}
+"""Every effect of the catalogue that may be planted, by its id."""
+
+
+def _local(design: Design, rng: Rng) -> tuple[float, float]:
+    """Place and width of a local force on the free side, m."""
+    place = -design.amplitude * rng.uniform(0.2, 0.55)
+    return place, design.amplitude * rng.uniform(0.05, 0.12)
+
+
+def _detent(design: Design, rng: Rng) -> Form:
+    place, width = _local(design, rng)
+    sign, k1 = _sign(rng), design.rig.k1
+    return Form(
+        lambda size: {"stiffness": sign * size, "place": place, "width": width},
+        1e-4 * k1,
+        place=(place - 1.5 * width, place + 1.5 * width),
+        largest=2 * k1,
+    )
+
+
+def _hysteresis(design: Design, rng: Rng) -> Form:
+    width, k1 = design.amplitude * rng.uniform(0.1, 0.4), design.rig.k1
+    return Form(lambda size: {"stiffness": size, "width": width}, 1e-4 * k1, largest=k1)
+
+
+def _friction_pad(design: Design, rng: Rng) -> Form:
+    place, width = _local(design, rng)
+    extra, speed = rng.uniform(0.5, 2.0), 0.1 * design.speed
+    force = design.rig.k1 * design.amplitude
+    return Form(
+        lambda size: {
+            "force": size, "extra": extra * size, "speed": speed,
+            "low": place - width, "high": place + width,
+        },
+        1e-5 * force,
+        place=(place - width, place + width),
+        largest=0.1 * force,
+    )  # fmt: skip
+
+
+def _bump(design: Design, rng: Rng) -> Form:
+    place, width = _local(design, rng)
+    c1 = design.rig.c1
+    return Form(
+        lambda size: {"coefficient": size, "place": place, "width": width},
+        1e-3 * c1,
+        place=(place - 1.5 * width, place + 1.5 * width),
+        largest=100 * c1,
+    )
+
+
+def _brake(design: Design, rng: Rng) -> Form:
+    place, width = _local(design, rng)
+    low, high, c1 = place - 2 * width, place + 2 * width, design.rig.c1
+    return Form(
+        lambda size: {"coefficient": size, "low": low, "high": high},
+        1e-3 * c1,
+        place=(low, high),
+        largest=100 * c1,
+    )
+
+
+def _resonator(design: Design, rng: Rng) -> Form:
+    frequency = design.omega / (2 * pi) * rng.uniform(1.5, 4.0)
+    ratio, mass = rng.uniform(0.01, 0.05), design.rig.mass
+    return Form(
+        lambda size: {"mass": size, "frequency": frequency, "damping_ratio": ratio},
+        1e-5 * mass,
+        largest=0.2 * mass,
+    )
+
+
+def _knock(design: Design, rng: Rng) -> Form:
+    time, width = design.duration * rng.uniform(0.2, 0.6), 0.5 * pi / design.omega
+    sign, scale = _sign(rng), design.rig.mass * design.speed
+    return Form(
+        lambda size: {"impulse": sign * size, "time": time, "width": width},
+        1e-5 * scale,
+        largest=0.3 * scale,
+    )
+
+
+_ANYWHERE = ("free", "everywhere")
+
+OUTSIDE_PLANTS: Mapping[str, Plant] = {
+    "detent": Plant(("free",), _detent),
+    "hysteresis": Plant(_ANYWHERE, _hysteresis),
+    "friction_pad": Plant(("free",), _friction_pad),
+    "damping_bump": Plant(("free",), _bump),
+    "eddy_brake": Plant(("free",), _brake),
+    "resonator": Plant(("free", "everywhere", "contact"), _resonator),
+    "damping_drift": Plant(_ANYWHERE, _one("rate", lambda d: 3 / d.duration)),
+    "contact_friction": Plant(
+        ("contact",), _one("force", lambda d: 0.1 * d.contact_stiffness * d.indentation), 1
+    ),
+    "contact_preload": Plant(
+        ("contact",), _one("force", lambda d: 0.1 * d.contact_stiffness * d.indentation), 1
+    ),
+    "knock": Plant(_ANYWHERE, _knock),
+}
+"""Every force outside the catalogue that may be planted."""

@@ -1,0 +1,277 @@
+"""Many trials: all truths are sealed first, then the campaigns diagnosed, then the seals opened.
+
+Work goes to the processes of a Dask cluster (one of this machine, or any by its address) or stays
+in this process. Workers get what they need by value and return what they found, so a cluster needs
+no shared disk; only this process writes files, each in one piece, and a run that was killed goes on
+where it stopped.
+
+    DIR/settings.json        what was drawn from
+    DIR/sealed/17.json       the truth of trial 17
+    DIR/seals.txt            their SHA-256, in the format of sha256sum
+    DIR/campaigns/17/        the campaign, until it has been scored
+    DIR/trials/17.json       seal, answer and score
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import traceback
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from bayesimpact.errors import InputError
+from bayesimpact.trial.settings import Settings, settings_from
+
+Job = tuple[Any, ...]
+Step = Callable[[str, int], None]
+"""(stage, trials done just now)."""
+
+THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+AHEAD = 3  # jobs per worker that wait in the cluster
+
+
+def draw_job(settings: Settings, seed: int) -> dict[str, Any]:
+    """On a worker: the text of a trial's truth and its campaign's files, or what went wrong."""
+    from bayesimpact.trial.blind import campaign_files, sealed_text
+    from bayesimpact.trial.draw import draw
+
+    try:
+        drawn = draw(settings, seed)
+        files = campaign_files(drawn.campaign, drawn.truth["rounding_m"])
+        return {"truth": sealed_text(drawn.truth), "files": files}
+    except Exception:
+        return {"failed": traceback.format_exc()}
+
+
+def answer_job(files: Mapping[str, str], search: bool) -> dict[str, Any]:
+    """On a worker that sees only files: the diagnosis, or what went wrong."""
+    from bayesimpact.trial.blind import answer
+
+    try:
+        return {"answer": answer(files, search=search)}
+    except Exception:
+        return {"failed": traceback.format_exc()}
+
+
+def run_trials(
+    settings: Settings,
+    seeds: Sequence[int],
+    out: Path,
+    *,
+    workers: int = 1,
+    scheduler: str | None = None,
+    keep: bool = False,
+    sealed: Callable[[str], None] | None = None,
+    step: Step | None = None,
+) -> list[dict[str, Any]]:
+    """Draw, seal, diagnose, open and score -> the results in the order of `seeds`.
+
+    Parameters
+    ----------
+    workers : processes of a local cluster; 1 stays in this process
+    scheduler : address of a Dask scheduler to use instead
+    keep : leave the campaigns on disk
+    sealed : called once, with the SHA-256 of seals.txt, before the first diagnosis
+    step : called when trials are drawn or diagnosed
+
+    Raises
+    ------
+    InputError : `out` holds a run with other settings, or a truth that no longer fits its seal
+    """
+    store = Store(out, settings)
+    say = step or (lambda stage, count: None)
+    with executor(workers, scheduler) as spread:
+        missing = [seed for seed in seeds if not store.is_drawn(seed)]
+        say("drawing", len(seeds) - len(missing))
+        for seed, drawn in spread(draw_job, ((seed, (settings, seed)) for seed in missing)):
+            store.keep_drawn(seed, drawn)
+            say("drawing", 1)
+        digest = store.publish(seeds)
+        if sealed is not None:
+            sealed(digest)
+        missing = [seed for seed in seeds if not store.is_finished(seed)]
+        say("diagnosing", len(seeds) - len(missing))
+        jobs = ((seed, (store.files(seed), settings.search)) for seed in missing)
+        for seed, answered in spread(answer_job, jobs):
+            store.finish(seed, answered, keep)
+            say("diagnosing", 1)
+    return [store.result(seed) for seed in seeds]
+
+
+class Store:
+    """The folder of a run."""
+
+    def __init__(self, out: Path, settings: Settings) -> None:
+        self.out = out
+        known = out / "settings.json"
+        if known.exists() and settings_from(json.loads(known.read_text())) != settings:
+            raise InputError(
+                f"{known}", "a run with other settings", "the same ones, or a new folder"
+            )
+        for name in ("sealed", "campaigns", "trials"):
+            (out / name).mkdir(parents=True, exist_ok=True)
+        write(known, json.dumps(settings.document(), indent=1) + "\n")
+
+    def is_finished(self, seed: int) -> bool:
+        """Whether the trial has been scored or has failed."""
+        return self._result(seed).exists()
+
+    def is_drawn(self, seed: int) -> bool:
+        """Whether truth and campaign are there, or no longer needed."""
+        whole = self._truth(seed).exists() and (self._campaign(seed) / "campaign.toml").exists()
+        return whole or self.is_finished(seed)
+
+    def keep_drawn(self, seed: int, drawn: Mapping[str, Any]) -> None:
+        """Store truth and campaign; campaign.toml last, as the sign that all is there."""
+        if "failed" in drawn:
+            self._finish(seed, {"failed": drawn["failed"], "stage": "drawing"})
+            return
+        write(self._truth(seed), drawn["truth"])
+        folder = self._campaign(seed)
+        folder.mkdir(exist_ok=True)
+        for name in sorted(drawn["files"], key=lambda n: n == "campaign.toml"):
+            write(folder / name, drawn["files"][name])
+
+    def publish(self, seeds: Sequence[int]) -> str:
+        """Write seals.txt; its SHA-256 seals all truths at once."""
+        from bayesimpact.trial.blind import seal
+
+        known = self.seals()
+        for seed in seeds:
+            if self._truth(seed).exists():
+                digest = seal(self._truth(seed).read_text(encoding="utf-8"))
+                if known.setdefault(seed, digest) != digest:
+                    raise InputError(f"{self._truth(seed)}", f"SHA-256 {digest}", known[seed])
+        text = "".join(f"{known[seed]}  sealed/{seed}.json\n" for seed in sorted(known))
+        write(self.out / "seals.txt", text)
+        return seal(text)
+
+    def seals(self) -> dict[int, str]:
+        """Seed -> SHA-256 of its truth, as published."""
+        file = self.out / "seals.txt"
+        lines = file.read_text().splitlines() if file.exists() else []
+        return {int(Path(line.split()[1]).stem): line.split()[0] for line in lines}
+
+    def files(self, seed: int) -> dict[str, str]:
+        """The campaign as texts."""
+        folder = self._campaign(seed)
+        return {f.name: f.read_text(encoding="utf-8") for f in sorted(folder.iterdir())}
+
+    def finish(self, seed: int, answered: Mapping[str, Any], keep: bool) -> None:
+        """Open the seal, score, store."""
+        from bayesimpact.trial.blind import open_seal
+        from bayesimpact.trial.score import score
+
+        promised = self.seals()[seed]
+        truth = open_seal(self._truth(seed).read_text(encoding="utf-8"), promised)
+        result: dict[str, Any] = {"seal": promised, "truth": truth, **answered}
+        if "answer" in answered:
+            try:
+                result["score"] = score(truth, answered["answer"])
+            except Exception:
+                result |= {"failed": traceback.format_exc(), "stage": "scoring"}
+        else:
+            result["stage"] = "diagnosing"
+        self._finish(seed, result)
+        if not keep:
+            shutil.rmtree(self._campaign(seed))
+
+    def result(self, seed: int) -> dict[str, Any]:
+        """What is stored of a finished trial."""
+        content: dict[str, Any] = json.loads(self._result(seed).read_text(encoding="utf-8"))
+        return content
+
+    def _finish(self, seed: int, result: Mapping[str, Any]) -> None:
+        content = {"schema": "bayesimpact/trial/1", "seed": seed, **result}
+        write(self._result(seed), json.dumps(content, indent=1, allow_nan=False) + "\n")
+
+    def _truth(self, seed: int) -> Path:
+        return self.out / "sealed" / f"{seed}.json"
+
+    def _campaign(self, seed: int) -> Path:
+        return self.out / "campaigns" / str(seed)
+
+    def _result(self, seed: int) -> Path:
+        return self.out / "trials" / f"{seed}.json"
+
+
+def write(file: Path, text: str) -> None:
+    """Write a file in one piece: whoever looks sees the old one or the new one."""
+    part = file.with_name(file.name + ".part")
+    part.write_text(text, encoding="utf-8", newline="\n")
+    os.replace(part, file)
+
+
+Spread = Callable[[Callable[..., Any], Iterator[tuple[int, Job]]], Iterator[tuple[int, Any]]]
+
+
+@contextmanager
+def executor(workers: int, scheduler: str | None) -> Iterator[Spread]:
+    """A way to run jobs (key, arguments) -> (key, result), as they finish."""
+    if scheduler is None and workers <= 1:
+        yield here
+        return
+    import distributed
+
+    make: Any = distributed.Client  # its signatures carry no types
+    local: Any = distributed.LocalCluster
+
+    if scheduler is not None:
+        with make(scheduler) as client:
+            yield _on(client)
+        return
+    one = dict.fromkeys(THREADS, "1")
+    with (
+        local(n_workers=workers, threads_per_worker=1, dashboard_address=None, env=one) as cluster,
+        make(cluster) as client,
+    ):
+        yield _on(client)
+
+
+def here(
+    function: Callable[..., Any], jobs: Iterator[tuple[int, Job]]
+) -> Iterator[tuple[int, Any]]:
+    """Jobs one after another, in this process."""
+    for key, arguments in jobs:
+        yield key, function(*arguments)
+
+
+def _on(client: Any) -> Spread:
+    import distributed
+
+    completed: Any = distributed.as_completed
+
+    def spread(
+        function: Callable[..., Any], jobs: Iterator[tuple[int, Job]]
+    ) -> Iterator[tuple[int, Any]]:
+        waiting: dict[Any, int] = {}
+        done: Any = completed()
+        room = AHEAD * max(1, len(client.scheduler_info()["workers"]))
+
+        def more() -> None:
+            while len(waiting) < room:
+                job = next(jobs, None)
+                if job is None:
+                    return
+                future = client.submit(function, *job[1], pure=False)
+                waiting[future] = job[0]
+                done.add(future)
+
+        more()
+        while waiting:
+            future = next(done)
+            key = waiting.pop(future)
+            result = future.result() if future.status == "finished" else _lost(future)
+            more()
+            yield key, result
+
+    return spread
+
+
+def _lost(future: Any) -> dict[str, str]:
+    """A job whose worker died (out of memory, say)."""
+    return {"failed": f"the worker was lost: {future.exception()!r}"}

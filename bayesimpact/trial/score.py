@@ -1,0 +1,131 @@
+"""One opened trial: was the answer right?
+
+Verdicts against truths:
+
+| truth | right | wrong |
+|---|---|---|
+| control | quiet (adequate) | false alarm (anything else) |
+| effects of the catalogue | named (all, and no other) | wrong name, missed |
+| a force outside it | unknown | wrong name, missed |
+
+Ambiguous, and unknown for effects of the catalogue, are abstentions: neither.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+NORMAL_90 = 1.6448536269514722
+QUIET = ("noise_correlated",)  # reported beside a verdict, never a name
+BASE = ("c1", "k1", "c2", "g", "k2")
+
+
+def score(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> dict[str, Any]:
+    """Score an answer (the content of diagnosis.json) against the opened truth."""
+    planted = [p["id"] for p in truth["planted"]]
+    named = [e["id"] for e in answer["effects"] if e["id"] not in QUIET]
+    outcome = judge(truth["kind"], planted, answer["verdict"], named)
+    sets = [set(named), *(set(a["id"].split(" + ")) for a in answer["alternatives"])]
+    return {
+        "truth": " + ".join(sorted(planted)) or "control",
+        "verdict": answer["verdict"],
+        "named": " + ".join(sorted(named)) or answer["verdict"],
+        "outcome": outcome,
+        "right": outcome in ("quiet", "named", "unknown outside"),
+        "confident_wrong": outcome == "wrong name",
+        "truth_in_set": answer["verdict"] in ("named", "ambiguous") and set(planted) in sets,
+        "strengths": [p["strength"] for p in truth["planted"]],
+        "concealed": concealed(truth, answer),
+        "place": place(truth, answer),
+        "sizes": sizes(truth, answer) if outcome == "named" else {},
+        "coverage": coverage(truth, answer),
+        "held_out_gain": answer["fit"]["held_out_gain"]["value"],
+        "held_out_se": answer["fit"]["held_out_gain"]["se"],
+        "seconds": answer["seconds"],
+    }
+
+
+def judge(kind: str, planted: list[str], verdict: str, named: list[str]) -> str:
+    """The outcome in two words."""
+    if kind == "control":
+        return "quiet" if verdict == "adequate" else "false alarm"
+    if verdict == "adequate":
+        return "missed"
+    if kind == "outside":
+        return {"unknown": "unknown outside", "ambiguous": "ambiguous"}.get(verdict, "wrong name")
+    if verdict == "named":
+        return "named" if set(named) == set(planted) else "wrong name"
+    return "ambiguous" if verdict == "ambiguous" else "called unknown"
+
+
+def concealed(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> float:
+    """Rms of the base fit over the rms of the true noise, minus one."""
+    return float(answer["fit"]["before"]["rms_m"] / truth["noise_rms_m"] - 1)
+
+
+def place(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> bool | None:
+    """Whether the place is right: a regime of the truth; for a local force a range that meets it.
+
+    None where there is no place to find, or none was given.
+    """
+    location = answer["location"]
+    if not truth["planted"] or location is None:
+        return None
+    found = {"entry": "contact", "exit": "contact"}.get(location["regime"], location["regime"])
+    regimes = {r for p in truth["planted"] for r in p["regimes"]}
+    if found not in regimes:
+        return False
+    low, high = location["displacement_m"]
+    places = [p["place_m"] for p in truth["planted"] if p["place_m"] is not None]
+    return all(low <= far and near <= high for near, far in places)
+
+
+def flat(effect: str, parameters: Mapping[str, Any]) -> dict[str, float]:
+    """An effect's numbers by their full names."""
+    result: dict[str, float] = {}
+    for name, value in parameters.items():
+        if isinstance(value, Mapping):
+            result.update({f"{effect}.{name}[{key}]": float(v) for key, v in value.items()})
+        else:
+            result[f"{effect}.{name}"] = float(value)
+    return result
+
+
+def sizes(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> dict[str, bool]:
+    """Planted parameter -> whether its 90 % interval holds the truth; phases modulo a turn."""
+    result = {}
+    values = {n: v for e in answer["effects"] for n, v in e["parameters"].items()}
+    for planted in truth["planted"]:
+        for name, true in flat(planted["id"], planted["parameters"]).items():
+            if name in values:
+                low, high = values[name]["ci90"]
+                if ".phase" in name:
+                    true += 2 * np.pi * np.round((0.5 * (low + high) - true) / (2 * np.pi))
+                result[name] = bool(low <= true <= high)
+    return result
+
+
+def coverage(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Base parameter -> inside its 90 % interval, and error in standard deviations, three ways."""
+    result: dict[str, dict[str, Any]] = {}
+    before, after = answer["parameters"]["before"], answer["parameters"]["after"]
+    for name, true in truth["parameters"].items():
+        if name.split("[")[0] not in BASE:
+            continue
+        row: dict[str, Any] = {}
+        for label, table, key in (
+            ("before", before, "ci90"),
+            ("after", after, "ci90"),
+            ("honest", after, "ci90_honest"),
+        ):
+            interval = table.get(name, {}).get(key)
+            if interval is not None:
+                low, high = interval
+                sd = max((high - low) / (2 * NORMAL_90), 1e-300)
+                row[label] = bool(low <= true <= high)
+                row[f"{label}_error"] = float((0.5 * (low + high) - true) / sd)
+        result[name] = row
+    return result
