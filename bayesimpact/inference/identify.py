@@ -150,15 +150,14 @@ def global_search(
     """Differential evolution on the physical parameters over the first cycles.
 
     Bounds are the guess divided and multiplied by `factor` (for the gap: the guess plus and minus
-    `factor` times its size, at least a tenth of the motion). Initial conditions and rest readings
-    are not searched: for every candidate they take the values of two Gauss-Newton steps. Returns
-    the search and the full parameter vector (d,) of its winner.
+    `factor` times its size, at least a tenth of the motion), cut to the priors. Initial conditions
+    and rest readings are not searched: for every candidate they take the values of two Gauss-Newton
+    steps. Returns the search and the full parameter vector (d,) of its winner.
     """
     k1 = float(guess[oscillator.layout.index("k1")])
     duration = SEARCH_CYCLES * 2 * np.pi / np.sqrt(k1 / oscillator.campaign.mass)
     profile = _Profile(oscillator, guess, duration)
-    lower, upper = profile.bounds(factor)
-    lower = np.maximum(lower, profile.encode(np.maximum(priors.lower, _tiny(guess)), lower))
+    lower, upper = _within(priors, profile, guess, *profile.bounds(factor))
     result = metropolis_differential_evolution(
         profile,
         lower,
@@ -170,8 +169,17 @@ def global_search(
     return result, profile.complete(result.best[None])[0]
 
 
-def _tiny(guess: Array) -> Array:
-    return 1e-12 * np.maximum(np.abs(guess), 1e-30)
+def _within(
+    priors: Priors, profile: _Profile, guess: Array, lower: Array, upper: Array
+) -> tuple[Array, Array]:
+    """Bounds cut to the priors' supports; a support beyond them is searched whole."""
+    tiny = 1e-12 * np.maximum(np.abs(guess), 1e-30)
+    low = profile.encode(np.maximum(priors.lower, tiny), lower)
+    high = profile.encode(priors.upper, upper)
+    beyond = (low >= upper) | (high <= lower)
+    return np.where(beyond, low, np.maximum(low, lower)), np.where(
+        beyond, high, np.minimum(high, upper)
+    )
 
 
 class _Profile:
