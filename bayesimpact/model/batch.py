@@ -11,8 +11,10 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.model.blocks import Sink
 from bayesimpact.model.compiled import compiled
-from bayesimpact.model.kernel import run, workspace
+from bayesimpact.model.kernel import run
+from bayesimpact.model.tables import shelf
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -55,25 +57,13 @@ def sums(
     q = np.empty(11)
     nothing = np.empty(0)
     no_events = np.empty((0, 2))
-    tables, series, keys, history = workspace()
+    mine = shelf()
     for b in range(rows[0], rows[1]):
         for r in range(items[0], items[1]):
             gather(q, theta[b], columns[r], constants[r])
             data = samples[starts[r] : starts[r] + counts[r]]
-            sse[b, r], _, codes[b, r] = run(
-                q,
-                mass,
-                intervals[r],
-                counts[r],
-                data,
-                nothing,
-                nothing,
-                no_events,
-                tables,
-                series,
-                keys,
-                history,
-            )
+            sink = Sink(data, nothing, nothing, no_events)
+            sse[b, r], _, codes[b, r] = run(q, mass, intervals[r], counts[r], sink, mine)
 
 
 @compiled(parallel=True)
@@ -99,26 +89,14 @@ def predict(
     q = np.empty(11)
     nothing = np.empty(0)
     no_events = np.empty((0, 2))
-    tables, series, keys, history = workspace()
+    mine = shelf()
     for b in range(rows[0], rows[1]):
         start = counts[: items[0]].sum()
         for r in range(items[0], items[1]):
             gather(q, theta[b], columns[r], constants[r])
             out = values[b, start : start + counts[r]]
-            _, _, codes[b, r] = run(
-                q,
-                mass,
-                intervals[r],
-                counts[r],
-                nothing,
-                out,
-                nothing,
-                no_events,
-                tables,
-                series,
-                keys,
-                history,
-            )
+            sink = Sink(nothing, out, nothing, no_events)
+            _, _, codes[b, r] = run(q, mass, intervals[r], counts[r], sink, mine)
             if codes[b, r] != 0:
                 out[:] = np.nan
             start += counts[r]
@@ -139,20 +117,7 @@ def predict_in_parts(
 def single(
     q: Floats, mass: float, interval: float, out: Floats, speeds: Floats, events: Floats
 ) -> tuple[float, int, int]:
-    """Simulate one recording into `out`, `speeds` and `events`; as `kernel.run`."""
-    tables, series, keys, history = workspace()
-    done: tuple[float, int, int] = run(
-        q,
-        mass,
-        interval,
-        out.size,
-        np.empty(0),
-        out,
-        speeds,
-        events,
-        tables,
-        series,
-        keys,
-        history,
-    )
+    """Simulate one recording into `out`, `speeds` and `events` (see `Sink`); as `kernel.run`."""
+    sink = Sink(np.empty(0), out, speeds, events)
+    done: tuple[float, int, int] = run(q, mass, interval, out.size, sink, shelf())
     return done

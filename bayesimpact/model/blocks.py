@@ -1,17 +1,37 @@
-"""What becomes of a block: samples of one regime, a product of the table and one state.
+"""What becomes of the samples of one regime: products of the table and one state.
 
-u and v are the position relative to the rest, and the velocity, at the block's first sample; fs and
-fc the force there (see `flow`); `shift` is added to the position.
+u and v are the position relative to the rest, and the velocity, at the first sample; fs and fc the
+force there (see `flow`); `shift` is added to the position.
 """
 
 from __future__ import annotations
+
+import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.model.compiled import compiled
+from bayesimpact.model.flow import advance_forced, forced_response, impulse_response
+from bayesimpact.model.scaled import Scaled
+from bayesimpact.model.tables import LENGTH
 
 Floats = NDArray[np.float64]
+
+
+class Sink(NamedTuple):
+    """Where a simulated recording goes; every array may be empty.
+
+    data (n,) : measured displacement, m, to be compared with
+    out (n,), speeds (n,) : receive y + offset, m, and y', per interval, when `data` is empty
+    events (capacity, 2) : receives times and velocities of the first events, in intervals
+    """
+
+    data: Floats
+    out: Floats
+    speeds: Floats
+    events: Floats
 
 
 @compiled()
@@ -67,3 +87,41 @@ def squares_forced(
         r = data[first + j] - shift - (D[j] * u + S[j] * m + fs * E[j] + fc * F[j])
         total += r * r
     return total
+
+
+@compiled()
+def pass_samples(
+    sink: Sink, tables: Floats, side: int, motion: Scaled, b: float, K: float, rest: float,
+    t: float, u: float, v: float, i: int, end: int,
+) -> float:  # fmt: skip
+    """Write or compare samples i..end-1 of a stretch that starts at (u, v) at time t <= i.
+
+    Returns their sum of squared residuals, if they were compared.
+    """
+    compared = sink.data.size > 0
+    if i >= end or not (compared or sink.out.size > 0):
+        return 0.0
+    w, force = motion.w, motion.force
+    shift = rest + motion.offset
+    total = E = F = fs = fc = 0.0
+    S, D = impulse_response(b, K, i - t)
+    if force != 0.0:
+        fs, fc = force * math.sin(w * t + motion.phase), force * math.cos(w * t + motion.phase)
+        E, F = forced_response(b, K, w, i - t, S, D)
+    while True:
+        u, v = advance_forced(b, K, w, u, v, fs, fc, S, D, E, F)
+        if force != 0.0:
+            fs, fc = force * math.sin(w * i + motion.phase), force * math.cos(w * i + motion.phase)
+        block = min(i + LENGTH, end)
+        if not compared:
+            write(sink.out, sink.speeds, i, block, shift, tables, side, b, K, w, u, v, fs, fc)
+        elif force != 0.0:
+            total += squares_forced(sink.data, i, block, shift, tables, side, b, u, v, fs, fc)
+        else:
+            total += squares(sink.data, i, block, shift, tables, side, b, u, v)
+        if block == end:
+            return total
+        i = block
+        S, D = tables[side, 0, LENGTH], tables[side, 1, LENGTH]
+        if force != 0.0:
+            E, F = tables[side, 2, LENGTH], tables[side, 3, LENGTH]

@@ -18,9 +18,12 @@ from bayesimpact.model import batch as compiled_batch
 from bayesimpact.model.arguments import check_model, check_samples
 from bayesimpact.model.basis import FORCED, PLAIN
 from bayesimpact.model.batch import Floats, Ints, Span, gather, share
+from bayesimpact.model.blocks import Sink
 from bayesimpact.model.compiled import compiled
-from bayesimpact.model.kernel import OK, OVERFLOW, begins_in_contact, run, workspace
+from bayesimpact.model.kernel import run
+from bayesimpact.model.scaled import OK, OVERFLOW, begins_in_contact
 from bayesimpact.model.sweep import Lanes, desk, sweep
+from bayesimpact.model.tables import Shelf, shelf
 
 #: Events for which there is room at first; a recording with more is run once more.
 EVENTS = 256
@@ -42,20 +45,14 @@ def wanted(active: Lanes, columns: Ints, forced: bool) -> Lanes:
 
 @compiled()
 def find_events(
-    q: Floats, mass: float, interval: float, n: int, events: Floats, tables: Floats,
-    series: Floats, keys: Floats, history: Floats,
-) -> tuple[Floats, int]:  # fmt: skip
-    """Return (events, code): all events of one recording, in `events` if there is room.
-
-    tables, series, keys, history : from `kernel.workspace`
-    """
+    q: Floats, mass: float, interval: float, n: int, events: Floats, mine: Shelf
+) -> tuple[Floats, int]:
+    """Return (events, code): all events of one recording, in `events` if there is room."""
     nothing = np.empty(0)
-    _, count, code = run(
-        q, mass, interval, n, nothing, nothing, nothing, events, tables, series, keys, history
-    )
+    _, count, code = run(q, mass, interval, n, Sink(nothing, nothing, nothing, events), mine)
     if count > events.shape[0] and code == OK:
         events = np.empty((count, 2))
-        run(q, mass, interval, n, nothing, nothing, nothing, events, tables, series, keys, history)
+        run(q, mass, interval, n, Sink(nothing, nothing, nothing, events), mine)
     return events[:count], code
 
 
@@ -69,7 +66,7 @@ def gram_share(
     nothing, no_matrix = np.empty(0), np.empty((0, 0))
     active = np.empty(11, dtype=np.uint64)
     first_events = np.empty((EVENTS, 2))
-    tables, series, keys, history = workspace()
+    mine = shelf()
     room = desk(size, True)
     for b in range(rows[0], rows[1]):
         for r in range(items[0], items[1]):
@@ -77,9 +74,7 @@ def gram_share(
             n = counts[r]
             gram = out[b, r]
             gram[:] = 0.0
-            events, code = find_events(
-                q, mass, intervals[r], n, first_events, tables, series, keys, history
-            )
+            events, code = find_events(q, mass, intervals[r], n, first_events, mine)
             if code == OK:
                 sweep(
                     q, mass, intervals[r], n, events, begins_in_contact(q),
@@ -117,27 +112,25 @@ def derivative_rows(
     nothing, no_matrix = np.empty(0), np.empty((0, 0))
     active = np.empty(11, dtype=np.uint64)
     first_events = np.empty((EVENTS, 2))
-    tables, series, keys, history = workspace()
+    mine = shelf()
     room = desk(size, False)
     start = 0
     for r in range(columns.shape[0]):
         gather(q, theta, columns[r], constants[r])
         n = counts[r]
-        mine, rows = values[start : start + n], jacobian[start : start + n]
+        own, rows = values[start : start + n], jacobian[start : start + n]
         rows[:] = 0.0
-        events, code = find_events(
-            q, mass, intervals[r], n, first_events, tables, series, keys, history
-        )
+        events, code = find_events(q, mass, intervals[r], n, first_events, mine)
         if code == OK:
             sweep(
                 q, mass, intervals[r], n, events, begins_in_contact(q),
-                wanted(active, columns[r], size > PLAIN), nothing, mine, rows, no_matrix, room,
+                wanted(active, columns[r], size > PLAIN), nothing, own, rows, no_matrix, room,
             )  # fmt: skip
-            if not (math.isfinite(mine.sum()) and math.isfinite(rows.sum())):
+            if not (math.isfinite(own.sum()) and math.isfinite(rows.sum())):
                 code = OVERFLOW
         codes[r] = code
         if code != OK:
-            mine[:] = np.nan
+            own[:] = np.nan
             rows[:] = np.nan
         start += n
 

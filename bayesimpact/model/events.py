@@ -14,6 +14,7 @@ import math
 
 from bayesimpact.model.compiled import compiled
 from bayesimpact.model.flow import advance, advance_forced, forced_response, impulse_response
+from bayesimpact.model.scaled import Scaled
 
 #: Iterations after which a search gives up (never seen; bisection alone needs about 60).
 MAX_ITERATIONS = 200
@@ -162,3 +163,26 @@ def next_crossing_forced(
         if not t <= horizon:
             return math.inf, 0.0
     return math.nan, 0.0
+
+
+@compiled()
+def next_event(
+    motion: Scaled, contact: bool, b: float, K: float, rest: float, t: float, u: float, v: float,
+    horizon: float,
+) -> tuple[float, float]:  # fmt: skip
+    """Return (wait, y' then) of the next event after time t; inf if none, nan on failure.
+
+    u, v : y - rest and y' at t, in the regime b, K, rest
+    horizon : how long to look
+    """
+    sign = -1.0 if contact else 1.0
+    level = sign * (motion.gap - rest)
+    if motion.force == 0.0:
+        wait, speed = next_crossing(b, K, sign * u, sign * v, level, horizon)
+    else:
+        angle = motion.w * t + motion.phase
+        fs, fc = sign * motion.force * math.sin(angle), sign * motion.force * math.cos(angle)
+        wait, speed = next_crossing_forced(
+            b, K, motion.w, sign * u, sign * v, fs, fc, level, horizon
+        )
+    return wait, sign * speed

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from bayesimpact.model.basis import D_, E_, F_, G_, H_, ONE, P_, PLAIN, PR, S_, UC, US, X_, XR
 from bayesimpact.model.compiled import compiled
+from bayesimpact.model.scaled import C1, C2, K1, K2, OFFSET, PHASE, A, G, W
 
 Floats = NDArray[np.float64]
 Lanes = NDArray[np.uint64]
 
-C1, K1, C2, G, K2, Y0, V0, A, W, PHASE, OFFSET = range(11)
 RESIDUAL = 11
 
 

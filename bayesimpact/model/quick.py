@@ -16,10 +16,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.model.blocks import squares, write
+from bayesimpact.model.blocks import Sink, squares, write
 from bayesimpact.model.compiled import compiled
 from bayesimpact.model.flow import advance
-from bayesimpact.model.tables import LENGTH, nearby
+from bayesimpact.model.scaled import Scaled
+from bayesimpact.model.tables import LENGTH, Shelf, nearby
 
 Floats = NDArray[np.float64]
 
@@ -82,17 +83,19 @@ def remember(history: Floats, side: int, wait: float) -> None:
 
 @compiled(fastmath={"contract"})
 def fast_lane(
-    tables: Floats, series: Floats, history: Floats, b_flight: float, K_flight: float,
-    b_contact: float, K_contact: float, rest_contact: float, g: float, offset: float,
-    n: int, limit: int, contact: bool, t: float, v: float, i: int, count: int,
-    data: Floats, out: Floats, speeds: Floats, events: Floats,
+    shelf: Shelf, sink: Sink, motion: Scaled, n: int, limit: int,
+    contact: bool, t: float, v: float, i: int, count: int,
 ) -> tuple[bool, float, float, int, int, float]:  # fmt: skip
-    """Carry the motion from an event at (t, g, v) to the last event that the fast lane settles.
+    """Carry the motion from an event at (t, gap, v) to the last event that the fast lane settles.
 
-    Arguments as in `kernel.run`; i is the first sample at or after t, `count` the events so far.
+    i is the first sample at or after t, `count` the events so far, `limit` how many there may be.
     Returns (contact, t, v, i, count) there and the sum of squares of the samples passed.
     """
+    tables, series, history = shelf.tables, shelf.series, shelf.history
+    data, out, speeds, events = sink.data, sink.out, sink.speeds, sink.events
     compared, written = data.size > 0, out.size > 0
+    b_flight, K_flight, b_contact, K_contact = motion[:4]
+    gap, rest_contact, offset = motion.gap, motion.rest, motion.offset
     safe_flight, safe_contact = (
         second_trough(b_flight, K_flight),
         second_trough(b_contact, K_contact),
@@ -103,10 +106,10 @@ def fast_lane(
     while count < limit:
         if contact:
             side, b, K, rest, safe = 1, b_contact, K_contact, rest_contact, safe_contact
-            u, v, level = g - rest, -fall, rest - g
+            u, v, level = gap - rest, -fall, rest - gap
         else:
             side, b, K, rest, safe = 0, b_flight, K_flight, 0.0, safe_flight
-            u, v, level = g, fall, g
+            u, v, level = gap, fall, gap
 
         # z at the table's sample next to the expected end, and the time from there to the end
         guess = expect(history, side)

@@ -2,10 +2,10 @@
 
     m y'' + c1 y' + k1 y + [c2 y' + k2 (y - g)] H(y - g) = A sin(w t + phase)   (Eq. 6)
 
-Per recording the kernel takes q = (c1, k1, c2, g, k2, y0, v0, A, w, phase, offset), SI units, t = 0
-at the first sample; measured = y + offset. A campaign's parameter vector theta feeds the q of every
-recording: q_i = theta[columns[r, i]], or constants[r, i] where columns[r, i] is -1. Without a stop
-g = inf and c2 = k2 = 0.
+Per recording the simulator takes q = (c1, k1, c2, g, k2, y0, v0, A, w, phase, offset), SI units, t
+= 0 at the first sample; measured = y + offset. A campaign's parameter vector theta feeds the q of
+every recording: q_i = theta[columns[r, i]], or constants[r, i] where columns[r, i] is -1. Without a
+stop g = inf and c2 = k2 = 0.
 """
 
 from __future__ import annotations
@@ -19,26 +19,26 @@ from numpy.typing import ArrayLike
 
 from bayesimpact.errors import InputError, SimulationError
 from bayesimpact.model import batch as compiled_batch
-from bayesimpact.model import kernel
+from bayesimpact.model import scaled
 from bayesimpact.model.arguments import check_model, check_samples
 from bayesimpact.model.batch import Floats, Ints
-from bayesimpact.model.kernel import Q
+from bayesimpact.model.scaled import Q
 
 #: What a failure code means.
 CODES: Mapping[int, str] = MappingProxyType(
     {
-        kernel.OK: "ok",
-        kernel.NOT_FINITE: "a parameter is not finite",
-        kernel.BAD_MASS: "the mass is not positive",
-        kernel.BAD_STIFFNESS: "k1 is not positive",
-        kernel.BAD_DAMPING: "c1 is negative",
-        kernel.BAD_CONTACT: "c2 or k2 is negative",
-        kernel.BAD_GAP: "the gap is not a number, or minus infinity",
-        kernel.BAD_FREQUENCY: "the forcing frequency is negative",
-        kernel.BAD_SAMPLING: "the interval is not positive, or there are no samples",
-        kernel.TOO_MANY_EVENTS: "too many impacts for the number of samples",
-        kernel.SEARCH_FAILED: "the search for the next event did not converge",
-        kernel.OVERFLOW: "the motion overflows",
+        scaled.OK: "ok",
+        scaled.NOT_FINITE: "a parameter is not finite",
+        scaled.BAD_MASS: "the mass is not positive",
+        scaled.BAD_STIFFNESS: "k1 is not positive",
+        scaled.BAD_DAMPING: "c1 is negative",
+        scaled.BAD_CONTACT: "c2 or k2 is negative",
+        scaled.BAD_GAP: "the gap is not a number, or minus infinity",
+        scaled.BAD_FREQUENCY: "the forcing frequency is negative",
+        scaled.BAD_SAMPLING: "the interval is not positive, or there are no samples",
+        scaled.TOO_MANY_EVENTS: "too many impacts for the number of samples",
+        scaled.SEARCH_FAILED: "the search for the next event did not converge",
+        scaled.OVERFLOW: "the motion overflows",
     }
 )
 
@@ -122,7 +122,7 @@ def trajectory(q: ArrayLike, mass: float, interval: float, out: Floats) -> int:
     """Write the displacement (without the offset) of one recording into `out` (n,); return the
     code.
 
-    q : (11,) parameters in the order of `kernel.Q`, SI units; interval in s; out in m.
+    q : (11,) parameters in the order of `scaled.Q`, SI units; interval in s; out in m.
     """
     values = np.array(q, dtype=np.float64)
     if values.shape != (11,):
@@ -193,16 +193,17 @@ def simulate(
         raise InputError("n", repr(n), "a whole number of samples, at least 1")
     mass, interval = _number("mass", mass), _number("interval", interval)
     displacement, velocity = np.empty(int(n)), np.empty(int(n))
-    code = int(kernel.check(q, mass, interval, int(n)))
-    if code != kernel.OK:
+    code = int(scaled.check(q, mass, interval, int(n)))
+    if code != scaled.OK:
         raise InputError("simulate", CODES[code], "see the docstring of `simulate`")
     events = np.empty((1024, 2))
     _, count, code = compiled_batch.single(q, mass, interval, displacement, velocity, events)
-    if count > len(events) and code == kernel.OK:
+    if count > len(events) and code == scaled.OK:
         events = np.empty((count, 2))
         _, count, code = compiled_batch.single(q, mass, interval, displacement, velocity, events)
-    if code != kernel.OK:
+    if code != scaled.OK:
         raise SimulationError(CODES[code])
+    velocity /= interval
     events = events[:count] * (interval, 1.0 / interval)
     if len(events) and events[0, 1] < 0.0:  # the first event leaves the contact of the start
         events = events[1:]

@@ -24,16 +24,7 @@ from bayesimpact.model import basis
 from bayesimpact.model.basis import fill_basis, fill_basis_series, fill_table, plain_basis
 from bayesimpact.model.compiled import compiled
 from bayesimpact.model.lanes import (
-    C1,
-    C2,
-    K1,
-    K2,
-    OFFSET,
     RESIDUAL,
-    V0,
-    Y0,
-    G,
-    W,
     add_products,
     carry,
     carry_forced,
@@ -43,6 +34,7 @@ from bayesimpact.model.lanes import (
     multiply,
 )  # fmt: skip
 from bayesimpact.model.moments import forced_moments, plain_moments, prefix_grams, write_rows
+from bayesimpact.model.scaled import C1, C2, K1, K2, OFFSET, V0, Y0, G, W
 from bayesimpact.model.tables import LENGTH, SLOW, TERMS
 
 Floats = NDArray[np.float64]

@@ -10,6 +10,7 @@ any time without exp, sin or cos.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,45 @@ LENGTH = 128
 ROWS = 4
 #: Coefficients of S / t and D; at |t| <= 1 and rates sqrt(K) + 2 b below SLOW the rest is < 1e-17.
 TERMS = 13
+#: Key, in place of a frequency, of a table without E and F.
+UNFORCED = -1.0
 SLOW = 0.25
+
+
+class Shelf(NamedTuple):
+    """What is kept from recording to recording, for flight and contact.
+
+    tables (2, ROWS, LENGTH + 1), series (2, 2, TERMS) : of the regimes last met
+    keys (2, 3) : their b, K and w
+    history (2, 5) : how long the regimes lasted (see `quick`)
+    """
+
+    tables: Floats
+    series: Floats
+    keys: Floats
+    history: Floats
+
+
+@compiled()
+def shelf() -> Shelf:
+    """Return an empty shelf."""
+    return Shelf(
+        np.empty((2, ROWS, LENGTH + 1)),
+        np.empty((2, 2, TERMS)),
+        np.full((2, 3), np.nan),
+        np.empty((2, 5)),
+    )
+
+
+@compiled()
+def prepare(shelf: Shelf, side: int, b: float, K: float, w: float, forced: bool) -> None:
+    """Fill the tables and series of one regime, unless they hold it already."""
+    keys = shelf.keys
+    force = w if forced else UNFORCED
+    if keys[side, 0] != b or keys[side, 1] != K or keys[side, 2] != force:
+        fill(shelf.tables[side], b, K, w, forced)
+        fill_series(shelf.series[side], b, K)
+        keys[side, 0], keys[side, 1], keys[side, 2] = b, K, force
 
 
 @compiled()

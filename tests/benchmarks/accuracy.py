@@ -26,7 +26,7 @@ import naive
 import systems
 
 from bayesimpact.model.derivatives import find_events, trajectories_and_derivatives
-from bayesimpact.model.kernel import workspace
+from bayesimpact.model.tables import shelf
 from bayesimpact.model.simulate import simulate
 
 SEED = 7
@@ -47,7 +47,7 @@ def measure(system: systems.System) -> Accuracy:
     q, mass, interval, n = system.q, system.mass, system.interval, system.n
     twin = naive.twin(q, mass, interval, n)
     motion = simulate(**system.arguments)
-    events, code = find_events(q, mass, interval, n, np.empty((64, 2)), *workspace())
+    events, code = find_events(q, mass, interval, n, np.empty((64, 2)), shelf())
     assert code == 0
     scale = float(max(abs(y) for y in twin.displacement)) or 1.0
     pairs = zip(motion.displacement, twin.displacement, strict=True)

@@ -15,7 +15,7 @@ import pytest
 import systems
 
 from bayesimpact.model.derivatives import find_events
-from bayesimpact.model.kernel import workspace
+from bayesimpact.model.tables import shelf
 
 TOLERANCE = 1e-11
 
@@ -23,7 +23,7 @@ TOLERANCE = 1e-11
 def worst_excess(system: systems.System) -> tuple[float, int]:
     """Largest breach of a regime, relative to the amplitude; and the number of events."""
     q, mass = system.q, system.mass
-    events, code = find_events(q, mass, system.interval, system.n, np.empty((64, 2)), *workspace())
+    events, code = find_events(q, mass, system.interval, system.n, np.empty((64, 2)), shelf())
     assert code == 0, system
     w1 = math.sqrt(q[1] / mass)
     end = (system.n - 1) * system.interval
