@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.diagnosis.directions import sigma_of
-from bayesimpact.inference.fit import Fit, inverse
+from bayesimpact.inference.fit import Fit, inverse, weak_information
 
 Array = NDArray[np.float64]
 
@@ -61,7 +61,7 @@ def project(fit: Fit, parts: Sequence[Array]) -> Projection:
     ]
     curvature = -fit.target.priors.hessian(fit.mode)
     curvature[fit.target.oscillator.layout.roles("noise")] = 0.0
-    curvature = np.maximum(np.nan_to_num(curvature), 0.0)
+    curvature = np.maximum(np.nan_to_num(curvature), weak_information(fit.target.priors))
     matrix = np.diag(curvature)
     for jacobian, _, where, _ in rows:
         matrix[np.ix_(where, where)] += jacobian.T @ jacobian

@@ -102,5 +102,6 @@ def effect_prior(effect: Effect, parameter: EffectParameter, scales: Scales) -> 
         return LogNormal(scale, SHAPE_WIDTH)
     if parameter.lower == parameter.null == 0.0:
         return HalfNormal(scale)
-    centre = parameter.null if parameter.null is not None else 0.0
-    return Normal(centre, scale)
+    if parameter.centre is not None:
+        return Normal(parameter.centre(scales), scale)
+    return Normal(parameter.null or 0.0, scale)

@@ -199,6 +199,7 @@ class _Climb:
         matrix -= np.diag(
             np.where(np.isin(np.arange(theta.size), self.noise), 0, priors.hessian(theta))
         )
+        matrix += np.diag(weak_information(priors))
         vector += priors.gradient(theta)
         if self.steps is not None and np.isfinite(matrix).all():
             known = np.diag(matrix)[self.moving] > 0
@@ -269,6 +270,16 @@ def best_sigma(target: Target, sums: Array) -> Array:
                 break
         result.append(np.clip(np.exp(log_sigma), *prior.support))
     return np.array(result)
+
+
+def weak_information(priors: Priors) -> Array:
+    """Inverse variances (d,) of the flat priors, 0 for the others.
+
+    Next to what the recordings say it is nothing; where they say nothing at all (an obstacle that
+    was never touched) it keeps steps and covariances finite.
+    """
+    with np.errstate(divide="ignore"):
+        return np.asarray(12.0 / (priors.upper - priors.lower) ** 2)
 
 
 def inverse(matrix: Array) -> Array:

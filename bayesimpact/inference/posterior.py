@@ -57,7 +57,7 @@ class Posterior:
     def thinned(self, count: int, rng: np.random.Generator) -> Array:
         """`count` draws (count, d), without replacement where there are enough."""
         size = self.draws.shape[0]
-        return self.draws[rng.choice(size, size=min(count, size), replace=False)]
+        return np.asarray(self.draws[rng.choice(size, size=min(count, size), replace=False)])
 
     def predictive(self, r: int, count: int, rng: np.random.Generator) -> Array:
         """Simulated recordings `r`, (count, n), m: posterior draws with fresh noise, as read."""
@@ -121,7 +121,10 @@ def _fingerprint(fit: Fit) -> str:
     target = fit.target
     parts = (
         target.oscillator.campaign.sha256,
+        hashlib.sha256(target.oscillator.samples.tobytes()).hexdigest(),
+        f"{target.oscillator.campaign.mass!r} {target.oscillator.intervals.tolist()!r}",
         ",".join(fit.names),
+        ",".join(effect.id for effect in target.oscillator.effects),
         repr(target.priors.parameters),
         repr(target.likelihood.noise),
         repr(target.oscillator.smoothing),

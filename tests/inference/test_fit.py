@@ -25,7 +25,7 @@ from bayesimpact.inference.priors import (
 )
 from bayesimpact.model.oscillator import build_oscillator
 from bayesimpact.model.parameters import Parameter
-from bayesimpact.trial.rig import Rig
+from bayesimpact.trial.rig import Release, Rig
 
 SAVGOL = Smoothing("savgol", window=11, polyorder=2)
 WIDE = {
@@ -248,6 +248,22 @@ def test_a_start_that_cannot_be_simulated_is_no_mode():
     start[1] = np.nan
     fit = find_mode(problem, start)
     assert not fit.converged and fit.log_posterior == -np.inf
+
+
+def test_what_the_recordings_do_not_tell_stays_where_it_was():
+    """An obstacle never touched: its stiffness keeps its start and its prior's deviation."""
+    releases = (small_rig.RELEASES[0], Release("c", "2", -0.9e-3))
+    campaign = small_rig.record(3, releases=releases, duration=0.8)
+    problem = target(campaign)
+    start = near_truth(problem, small_rig.true_values(releases=releases), 1e-6)
+    fit = find_mode(problem, start)
+    k2 = fit.names.index("k2[2]")
+    assert fit.converged
+    assert fit.mode[k2] == pytest.approx(start[k2], rel=1e-6)
+    assert fit.sd[k2] == pytest.approx(1e5 / np.sqrt(12), rel=1e-6)
+    correlation = fit.covariance / np.outer(fit.sd, fit.sd)
+    assert np.abs(correlation[k2]).sum() == pytest.approx(1.0, abs=1e-6)
+    np.linalg.cholesky(correlation)
 
 
 def test_iterations_are_limited():
