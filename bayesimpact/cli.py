@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 import click
 
 from bayesimpact.errors import BayesimpactError, InputError
+from bayesimpact.trial.command import trial
 
 BAD_INPUT = 2
 NOT_CONVERGED = 3
@@ -242,3 +243,20 @@ def demo(ctx: click.Context, out: Path, seed: int, quiet: bool) -> None:
         loaded, made_folder(out), seed=seed, command="bayesimpact demo", say=telling(quiet)
     )
     finish(ctx, outcome, out, quiet)
+
+
+@main.command()
+@common
+def effects(seed: int, quiet: bool) -> None:
+    """List the catalogue of effects: equations, parameters and units."""
+    from bayesimpact.model.effects import EFFECTS
+
+    for effect in EFFECTS:
+        click.echo(f"{effect.id}\n    {effect.title}: {effect.equation}   [{effect.family}]")
+        for parameter in effect.parameters:
+            null = "" if parameter.null is None else f", vanishes at {parameter.null:g}"
+            scope = "" if parameter.scope == "campaign" else f", one per {parameter.scope}"
+            click.echo(f"    {effect.id}.{parameter.name} ({parameter.unit}{null}{scope})")
+
+
+main.add_command(trial)

@@ -65,7 +65,9 @@ def sample_campaign(
     command: str = "",
     say: Say = print,
 ) -> Outcome:
-    """Posterior of the base model: posterior.nc, figures and report in `out`; the chain is kept in `out`/chain."""
+    """Posterior of the base model: posterior.nc, figures and report in `out`; the chain is kept in
+    `out`/chain.
+    """
     began = time.perf_counter()
     say("searching the mode")
     identification = identify(campaign, rng=np.random.default_rng(seed))

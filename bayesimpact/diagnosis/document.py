@@ -45,7 +45,14 @@ def document(
         "schema": "bayesimpact/diagnosis/1",
         "verdict": d.verdict,
         "summary": summary(
-            d.verdict, d.effects, statements, d.location, alternatives, shifts, _detectable(d)
+            d.verdict,
+            d.effects,
+            statements,
+            d.location,
+            alternatives,
+            shifts,
+            _detectable(d),
+            _remains(d),
         ),
         "location": _location(d),
         "effects": [
@@ -109,6 +116,16 @@ def _detectable(d: Diagnosis) -> str:
     return (
         f"What could still hide below its limit moves k2 by at most {worst[0]:.1f} of its standard "
         f"deviations ({worst[1]})."
+    )
+
+
+def _remains(d: Diagnosis) -> str:
+    if not d.remains:
+        return ""
+    ratio = d.after.reduced_chi2**0.5
+    return (
+        f" Something smaller remains: the residual is still {ratio:.1f} times the noise and not "
+        f"white, so the intervals are widened."
     )
 
 
@@ -223,7 +240,11 @@ def _parameters(
             low, median, high = np.percentile(draws[:, i], [5, 50, 95])
             entry.update(median=float(median), ci90=[float(low), float(high)])
         if diagnosis is not None and parameter.name in diagnosis.honest.names:
-            entry["ci90_honest"] = list(diagnosis.honest.interval(parameter.name))
+            honest = list(diagnosis.honest.interval(parameter.name))
+            entry["ci90_honest"] = honest
+            if diagnosis.remains:  # the narrow one would claim what the residual denies
+                entry["ci90_if_white"] = entry["ci90"]
+                entry["ci90"] = honest
         result[parameter.name] = entry
     _add_means(fit, result)
     return result

@@ -183,7 +183,9 @@ class _Evidence:
         )
 
     def maximum(self, scores: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Largest log evidence over the widths and which pair gives it, for scores (n, K): (n,) each."""
+        """Largest log evidence over the widths and which pair gives it, for scores (n, K): (n,)
+        each.
+        """
         scaled = (scores * self.unit).T
         gains = np.array(
             [0.5 * np.sum((f @ scaled) ** 2, axis=0) - penalty for f, penalty in self.factors]

@@ -13,7 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.diagnosis.directions import sigma_of
 from bayesimpact.diagnosis.name import State
+from bayesimpact.inference.fit import Fit
+
+LAGS_PER_ROOT = 3.0  # lags of the long-run covariance, times the root of the number of samples
 
 Array = NDArray[np.float64]
 
@@ -40,9 +44,29 @@ class Widened:
 
 
 def widened(state: State) -> Widened:
-    """Parameters of a model's fit, with the force that it leaves unexplained carried into them."""
+    """Parameters of a model's fit, with what it leaves unexplained carried into them."""
     fit, force = state.candidate.fit, state.force
     absorbed = force.projection.absorbed
     mean = fit.mode - absorbed @ force.mean
-    covariance = fit.covariance + absorbed @ force.covariance @ absorbed.T
+    statistical = fit.covariance if state.is_white else sandwich(fit)
+    covariance = statistical + absorbed @ force.covariance @ absorbed.T
     return Widened(fit.names, mean, covariance)
+
+
+def sandwich(fit: Fit) -> Array:
+    """Covariance (d, d) of the mode under residuals of any colour, Bartlett weights over one
+    period.
+    """
+    middle = np.zeros((fit.mode.size, fit.mode.size))
+    sigma = sigma_of(fit)
+    for part, level in zip(fit.linearisation, sigma, strict=True):
+        scores = part.jacobian * part.residual[:, None] / level**2
+        where = np.ix_(part.columns, part.columns)
+        middle[where] += scores.T @ scores
+        lags = int(LAGS_PER_ROOT * np.sqrt(scores.shape[0]))
+        for lag in range(1, min(lags, scores.shape[0] - 1)):
+            cross = scores[:-lag].T @ scores[lag:]
+            middle[where] += (1 - lag / lags) * (cross + cross.T)
+    found = fit.covariance @ middle @ fit.covariance
+    wider = np.sqrt(np.maximum(np.diag(found) / np.diag(fit.covariance), 1.0))
+    return np.asarray(fit.covariance * np.outer(wider, wider))

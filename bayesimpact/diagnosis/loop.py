@@ -72,6 +72,11 @@ class Diagnosis:
     scales: Scales
     filtered: Fingerprint | None = None
 
+    @property
+    def remains(self) -> bool:
+        """True when something small is left beside the effects that were named."""
+        return self.verdict in ("named", "ambiguous") and not self.naming.chosen.is_white
+
 
 def diagnose(
     campaign: Campaign,
@@ -157,9 +162,9 @@ def diagnose_fit(
 def judge(naming: Naming) -> Verdict:
     """The verdict that the evidence supports.
 
-    What remains beside the chosen effects must be white. One exception: where the base model misses by
-    far more than the noise, effects that explain nearly all of it are named although something small
-    remains (which the summary says).
+    What remains beside the chosen effects must be white. One exception: where the base model misses
+    by far more than the noise, effects that explain nearly all of it are named although something
+    small remains (which the summary says).
     """
     chosen = naming.chosen
     if not chosen.candidate.effects:
@@ -172,7 +177,9 @@ def judge(naming: Naming) -> Verdict:
 
 
 def explains_gross_misfit(naming: Naming) -> bool:
-    """True when the base residual dwarfs the noise and the chosen effects take nearly all of it away."""
+    """True when the base residual dwarfs the noise and the chosen effects take nearly all of it
+    away.
+    """
     base, chosen = naming.base.candidate.fit, naming.chosen.candidate.fit
     gross = base.reduced_chi2 > GROSS**2
     return gross and (base.reduced_chi2 - chosen.reduced_chi2) > NEARLY_ALL * base.reduced_chi2

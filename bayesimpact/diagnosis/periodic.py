@@ -1,8 +1,9 @@
 """Scans over frequency: a harmonic force on the mass, a hum in the probe's signal.
 
-Both have an amplitude and, in every recording, a phase; while the amplitude is zero the phases mean nothing, so each
-frequency is tested with a free sine and cosine per recording: 2 R numbers, chi-squared under the model once the
-fitted parameters are projected off. The smallest p-value pays for the number of independent frequencies.
+Both have an amplitude and, in every recording, a phase; while the amplitude is zero the phases mean
+nothing, so each frequency is tested with a free sine and cosine per recording: 2 R numbers, chi-
+squared under the model once the fitted parameters are projected off. The smallest p-value pays for
+the number of independent frequencies.
 """
 
 from __future__ import annotations
@@ -30,7 +31,9 @@ _FORCE, _OMEGA, _PHASE = (SLOTS.index(s) for s in ("A", "w", "phase"))
 
 @dataclass(frozen=True, eq=False)
 class _Blocks:
-    """One recording at F frequencies: sine and cosine columns against each other, J and the residual."""
+    """One recording at F frequencies: sine and cosine columns against each other, J and the
+    residual.
+    """
 
     own: Array  # (F, 2, 2)
     absorbed: Array  # (F, k, 2)

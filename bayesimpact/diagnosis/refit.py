@@ -57,7 +57,9 @@ def refit(fit: Fit, scores: Sequence[Score], scales: Scales) -> Candidate:
     start = transfer(fit, target.oscillator.layout, effects, scales, shapes)
     _shift(fit, target.oscillator.layout.names, start, scores)
     sizes = step_sizes(target.oscillator.layout.names, effects, scales, scores)
-    found = find_mode(target, start, steps=difference_steps(fit, target, sizes))
+    found = find_mode(
+        target, start, steps=difference_steps(fit, target, sizes), tolerance=0.02, max_iterations=20
+    )
     return Candidate(effects, found, log_evidence(found))
 
 
@@ -68,7 +70,8 @@ def without(candidate: Candidate, effect: Effect, scales: Scales) -> Candidate:
     layout = target.oscillator.layout
     start = transfer(candidate.fit, layout, effects, scales, {})
     sizes = step_sizes(layout.names, effects, scales, ())
-    found = find_mode(target, start, steps=difference_steps(candidate.fit, target, sizes))
+    steps = difference_steps(candidate.fit, target, sizes)
+    found = find_mode(target, start, steps=steps, tolerance=0.02, max_iterations=20)
     return Candidate(effects, found, log_evidence(found))
 
 

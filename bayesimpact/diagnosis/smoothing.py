@@ -1,4 +1,6 @@
-"""A filter that nobody declared: proved by the noise spectrum, then part of the model like any effect."""
+"""A filter that nobody declared: proved by the noise spectrum, then part of the model like any
+effect.
+"""
 
 from __future__ import annotations
 

@@ -62,8 +62,9 @@ def summary(
     alternatives: tuple[str, ...],
     shifts: Mapping[str, float],
     detectable: str,
+    remains: str = "",
 ) -> str:
-    """One paragraph."""
+    """One paragraph; `remains` says what is left beside the named effects."""
     if verdict == "adequate":
         found = "Nothing is missing: the base model describes the recordings down to the noise."
         return f"{found} {detectable}".strip()
@@ -89,4 +90,4 @@ def summary(
             f"Something is missing {place}; the likeliest is {titles}, but the recordings cannot "
             f"tell it from {others}.{cost}"
         )
-    return f"The base model leaves out {titles}, {place}. {' '.join(statements)}{cost}"
+    return f"The base model leaves out {titles}, {place}. {' '.join(statements)}{cost}{remains}"

@@ -77,11 +77,13 @@ CONCEALED_EFFECTS: Mapping[str, Mapping[str, float]] = {
     "contact_damping_speed": {"coefficient": 0.06},
     "gap_wear": {"step": 8e-8},
 }
-"""What `data/concealed` hides: damping that grows with the speed of indentation, a bolt that wears."""
+"""What `data/concealed` hides: damping that grows with the speed of indentation, a bolt that wears.
+"""
 
 
 def concealed_campaign() -> Campaign:
-    """The paper's campaign again, from a rig with two effects that the paper suspects of its own."""
+    """The paper's campaign again, from a rig with two effects that the paper suspects of its own.
+    """
     rng = np.random.default_rng(20231101)
     releases = paper_releases(rng)
     offsets = {release.name: float(10e-6 * rng.standard_normal()) for release in releases}
