@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from bayesimpact.model.effects import EFFECTS as EFFECTS
     from bayesimpact.model.effects import Effect as Effect
     from bayesimpact.model.simulate import simulate as simulate
-    from bayesimpact.report.figures.corner import posterior_corner as corner
+    from bayesimpact.report.notebook import corner as corner
     from bayesimpact.response.backbone import backbone as backbone
 
 _NAMES = {
@@ -35,7 +35,7 @@ _NAMES = {
     "backbone": ("bayesimpact.response.backbone", "backbone"),
     "fit": ("bayesimpact.inference.identify", "identify"),
     "sample": ("bayesimpact.inference.posterior", "sample"),
-    "corner": ("bayesimpact.report.figures.corner", "posterior_corner"),
+    "corner": ("bayesimpact.report.notebook", "corner"),
     "diagnose": ("bayesimpact.diagnosis.loop", "diagnose"),
     "EFFECTS": ("bayesimpact.model.effects", "EFFECTS"),
     "Effect": ("bayesimpact.model.effects", "Effect"),

@@ -95,7 +95,7 @@ def diagnose_campaign(
     command: str = "",
     say: Say = print,
 ) -> Outcome:
-    """The whole loop: diagnosis.json, posterior.nc (before and after), figures and report in `out`."""
+    """The whole loop: diagnosis.json, posterior.nc, figures and report in `out`."""
     began = time.perf_counter()
     diagnosis = diagnose(campaign, rng=np.random.default_rng(seed), search=not quick, progress=say)
     before = after = None

@@ -1,10 +1,10 @@
 """Smoothed recordings: which filter they passed, and what noise it left.
 
-A Savitzky-Golay filter leaves its signature in the noise: nulls at frequencies that depend on window
-and order only. Above the frequencies of the motion the periodogram is noise, so filters are compared
-by the Whittle likelihood of its ordinates (Whittle 1953), against AR(1) noise and a power law. The
-level is estimated where the information is, in the passband, from swings on the free side: a half
-swing is a sinusoid whatever the obstacle.
+A Savitzky-Golay filter leaves its signature in the noise: nulls at frequencies that depend on
+window and order only. Above the frequencies of the motion the periodogram is noise, so filters are
+compared by the Whittle likelihood of its ordinates (Whittle 1953), against AR(1) noise and a power
+law. The level is estimated where the information is, in the passband, from swings on the free side:
+a half swing is a sinusoid whatever the obstacle.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal, stats
+from scipy import optimize, signal, stats
 from scipy.linalg import null_space, toeplitz
-from scipy.optimize import minimize, minimize_scalar
 
 from bayesimpact.data.campaign import Smoothing
 from bayesimpact.data.recording import Recording
@@ -26,6 +26,9 @@ from bayesimpact.model.measurement import gain
 from bayesimpact.response.swings import rough_period
 
 Array = NDArray[np.float64]
+_minimize: Any = optimize.minimize  # stubs of SciPy differ between releases
+_minimize_scalar: Any = optimize.minimize_scalar
+_periodogram_of: Any = signal.periodogram
 
 WINDOWS = range(5, 62, 2)
 ORDERS = (2, 4)
@@ -97,8 +100,7 @@ def smoothed_noise(recordings: Sequence[Recording], smoothing: Smoothing) -> Noi
 
     Frequency and decay of the swings are those that leave the least.
     """
-    groups = [_half_swings(r) for r in recordings]
-    groups = [g for g in groups if g is not None]
+    groups = [g for g in (_half_swings(r) for r in recordings) if g is not None]
     if not groups:
         raise ValueError("too few half swings for a noise estimate")
 
@@ -109,7 +111,7 @@ def smoothed_noise(recordings: Sequence[Recording], smoothing: Smoothing) -> Noi
     first = 0.9 * np.pi / max(2 * times[-1] for _, _, times in groups)
     start = first * np.array([[1.0, 0.0], [0.9, 0.0], [1.0, 0.01]])
     options = {"initial_simplex": start, "xatol": 1e-5 * first, "fatol": 1e-3, "maxiter": 200}
-    best = minimize(energy, start[0], method="Nelder-Mead", options=options).x
+    best = _minimize(energy, start[0], method="Nelder-Mead", options=options).x
     parts = [_passed(rows, times, smoothing, r, best) for r, rows, times in groups]
     freedom = sum(f for _, f in parts)
     level = float(np.sqrt(sum(e for e, _ in parts) / freedom))
@@ -132,7 +134,8 @@ def _half_swings(recording: Recording) -> Swings | None:
     starts = _swings(recording.samples, length)
     if length < 8 or not starts:
         return None
-    times = (np.arange(length) - 0.5 * (length - 1)) * recording.interval
+    steps = np.arange(length, dtype=np.float64) - 0.5 * (length - 1)
+    times = np.asarray(steps * recording.interval, dtype=np.float64)
     return recording, np.array([recording.samples[s : s + length] for s in starts]), times
 
 
@@ -168,13 +171,13 @@ def _swings(samples: Array, length: int) -> list[int]:
         if deep[low + 1]:
             start = low + 1 + int(np.argmin(centred[low + 1 : high + 1])) - length // 2
             if start >= 0 and start + length <= samples.size:
-                starts.append(start)
+                starts.append(int(start))
     return starts
 
 
 def _covariance(smoothing: Smoothing, recording: Recording, length: int) -> Array:
     size = 8 * length
-    frequency = np.fft.rfftfreq(size, recording.interval)
+    frequency: Array = np.asarray(np.fft.rfftfreq(size, recording.interval), dtype=np.float64)
     power = gain(smoothing, recording.interval, frequency) ** 2
     return np.asarray(toeplitz(np.fft.irfft(power, size)[:length]))
 
@@ -182,7 +185,7 @@ def _covariance(smoothing: Smoothing, recording: Recording, length: int) -> Arra
 def _periodogram(recording: Recording) -> tuple[Array, Array, float]:
     """Frequencies above the motion, periodogram ordinates there, sampling interval."""
     interval = recording.interval
-    frequency, power = signal.periodogram(
+    frequency, power = _periodogram_of(
         recording.samples, 1 / interval, window="hann", detrend="linear"
     )
     lowest = ABOVE / (rough_period(recording.samples) * interval)
@@ -196,7 +199,9 @@ def _log_likelihood(power: Array, expected: Array) -> float:
 
 
 def _falling(spectra: Spectra) -> float:
-    """Best log likelihood of a power law on a white floor: what the motion itself may leave up here."""
+    """Best log likelihood of a power law on a white floor: what the motion itself may leave up
+    here.
+    """
     frequency = np.concatenate([f for f, _, _ in spectra])
     power = np.concatenate([p for _, p, _ in spectra])
     relative = np.log(frequency / frequency.min())
@@ -206,7 +211,7 @@ def _falling(spectra: Spectra) -> float:
 
     level = float(np.log(power.mean()))
     start = np.array([level, level - 1.0, 4.0])
-    return -float(minimize(negative, start, method="Nelder-Mead", options={"maxiter": 200}).fun)
+    return -float(_minimize(negative, start, method="Nelder-Mead", options={"maxiter": 200}).fun)
 
 
 def _ar1(spectra: Spectra) -> float:
@@ -215,7 +220,7 @@ def _ar1(spectra: Spectra) -> float:
         shape, power = np.concatenate(shapes), np.concatenate([p for _, p, _ in spectra])
         return -_log_likelihood(power, shape * np.mean(power / shape))
 
-    return -float(minimize_scalar(negative, bounds=(-0.9, 0.999), method="bounded").fun)
+    return -float(_minimize_scalar(negative, bounds=(-0.9, 0.999), method="bounded").fun)
 
 
 def _explains(spectra: Spectra, smoothing: Smoothing) -> bool:
@@ -243,5 +248,5 @@ def _levels(spectra: Spectra, smoothing: Smoothing) -> Array:
 
     level = float(np.mean(power) / np.mean(shape))
     start = np.log([level, max(1e-3 * level, float(np.quantile(power, 0.05)))])
-    found = minimize(negative, start, method="Nelder-Mead", options={"maxiter": 120})
+    found = _minimize(negative, start, method="Nelder-Mead", options={"maxiter": 120})
     return np.asarray(np.exp(found.x))

@@ -1,4 +1,4 @@
-"""The one way in which the package compiles: numba, cached on disk under a stamp of the sources it depends on.
+"""The one way in which the package compiles: numba, cached under a stamp of the sources below.
 
 numba's cache notices a change only in the file of the compiled function itself, not in the files of
 the functions it calls. Here the stamp of a function covers its own file and every file of the package

@@ -1,4 +1,4 @@
-"""Do 90 % intervals hold the truth nine times in ten? Campaigns of the paper's rig, base model, nothing concealed.
+"""Do 90 % intervals hold the truth nine times in ten? The paper's rig, nothing concealed.
 
     python tests/benchmarks/coverage.py --campaigns 100 --out tests/benchmarks/coverage.json
 
@@ -57,7 +57,7 @@ def one(seed: int, duration: float) -> dict[str, float]:
 
 
 def summary(errors: list[dict[str, float]]) -> dict[str, dict[str, float]]:
-    """Coverage and standard deviation of the standardised errors per parameter (nuisances by kind)."""
+    """Coverage and spread of the standardised errors per parameter (nuisances by kind)."""
     kinds: dict[str, list[float]] = {}
     for error in errors:
         for name, z in error.items():
@@ -85,9 +85,8 @@ def main() -> None:
     errors = [one(seed, chosen.duration) for seed in range(chosen.campaigns)]
     table = summary(errors)
     for name, row in table.items():
-        print(
-            f"{name:8s} {100 * row['coverage90']:5.1f} %  sd of z {row['sd_of_z']:.3f}  n {row['n']}"
-        )
+        share, spread = 100 * row["coverage90"], row["sd_of_z"]
+        print(f"{name:8s} {share:5.1f} %  sd of z {spread:.3f}  n {row['n']}")
     if chosen.out is not None:
         commit = subprocess.run(
             ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False
@@ -95,7 +94,7 @@ def main() -> None:
         content = {
             "question": "coverage of 90 % intervals, base model, paper's rig",
             "campaigns": chosen.campaigns, "duration_s": chosen.duration, "commit": commit,
-            "date": datetime.now(UTC).date().isoformat(), "machine": platform.processor() or platform.machine(),
+            "date": datetime.now(UTC).date().isoformat(), "machine": platform.machine(),
             "parameters": table,
         }  # fmt: skip
         chosen.out.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")

@@ -1,0 +1,20 @@
+"""Figures straight from a posterior, for a notebook."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from bayesimpact.inference.posterior import Posterior
+from bayesimpact.report.build import results_from_posterior
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def corner(posterior: Posterior, before: Posterior | None = None) -> Figure:
+    """Corner plot of the physical parameters and effects; `before` is drawn beside, where given."""
+    from bayesimpact.report.figures.corner import corner_figure
+
+    results = results_from_posterior(posterior, before=before)
+    assert results.draws is not None
+    return corner_figure(results.draws, before=results.before)
