@@ -50,7 +50,7 @@ class Direction:
 
 
 def directions(fit: Fit, effects: Iterable[Effect], scales: Scales) -> tuple[Direction, ...]:
-    """Directions of all effects that the fit's model lacks, one per point of their shape grids.
+    """Directions of all admissible effects that the fit lacks, one per point of their shape grids.
 
     Effects with a phase are left to `periodic`, which scans frequencies.
     """
@@ -58,8 +58,9 @@ def directions(fit: Fit, effects: Iterable[Effect], scales: Scales) -> tuple[Dir
     taken = {slot for e in fit.target.oscillator.effects for slot in e.binds}
     found = []
     for effect in effects:
-        possible = fit.target.oscillator.campaign.stop or not effect.needs_stop
-        if effect.id in have or not possible or is_periodic(effect) or taken & set(effect.binds):
+        if effect.id in have or is_periodic(effect) or taken & set(effect.binds):
+            continue
+        if not effect.admissible(scales):
             continue
         for shapes in _grid(effect, scales):
             direction = _direction(fit, effect, scales, shapes)

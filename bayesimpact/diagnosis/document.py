@@ -15,6 +15,7 @@ from bayesimpact.diagnosis.whiteness import whiteness_p
 from bayesimpact.diagnosis.words import parameter_shifts, sizes, statement, summary
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect
+from bayesimpact.model.parameters import bare_name, is_added
 
 Array = NDArray[np.float64]
 NORMAL_90 = 1.6448536269514722
@@ -254,9 +255,7 @@ def _add_means(fit: Fit, result: dict[str, dict[str, Any]]) -> None:
     """Report a base parameter that an effect split per obstacle or recording as their mean."""
     names = fit.target.oscillator.layout.names
     for base in ("c2", "g"):
-        members = [
-            i for i, n in enumerate(names) if n.split(".")[-1].startswith(base + "[") and "." in n
-        ]
+        members = [i for i, n in enumerate(names) if is_added(n) and bare_name(n) == base]
         if base not in result and members:
             weights = np.zeros(fit.mode.size)
             weights[members] = 1 / len(members)

@@ -13,7 +13,7 @@ from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.priors import Normal, Prior, Priors
 from bayesimpact.model.effects.effect import Effect, EffectParameter, Scales
 from bayesimpact.model.oscillator import Oscillator, build_oscillator
-from bayesimpact.model.parameters import Layout
+from bayesimpact.model.parameters import Layout, bare_name, is_added
 
 Array = NDArray[np.float64]
 
@@ -85,11 +85,11 @@ def extend(fit: Fit, effects: Sequence[Effect], scales: Scales) -> Target:
 
 
 def _prior(fit: Fit, effects: Sequence[Effect], name: str, scales: Scales) -> Prior:
-    if "." not in name:  # a base parameter comes back when the effect that had replaced it leaves
+    if not is_added(
+        name
+    ):  # a base parameter comes back when the effect that had replaced it leaves
         slot = name
-        values = [
-            v for n, v in zip(fit.names, fit.mode, strict=True) if n.split(".")[-1].startswith(slot)
-        ]
+        values = [v for n, v in zip(fit.names, fit.mode, strict=True) if bare_name(n) == slot]
         centre = float(np.mean(values))
         return Normal(centre, 10 * max(abs(centre), 1e-12))
     effect, parameter = owner(effects, name)
@@ -124,7 +124,7 @@ def transfer(
 def _start(
     fit: Fit, effects: Sequence[Effect], name: str, scales: Scales, shapes: Mapping[str, float]
 ) -> float:
-    if "." not in name:
+    if not is_added(name):
         return base_value(fit, name)
     bare = name.split("[")[0]
     if name in shapes or bare in shapes:

@@ -49,7 +49,7 @@ def periodic_scores(fit: Fit, effects: Sequence[Effect], scales: Scales) -> tupl
     have = {e.id for e in fit.target.oscillator.effects}
     found = []
     for effect in effects:
-        if effect.id in have or not is_periodic(effect):
+        if effect.id in have or not is_periodic(effect) or not effect.admissible(scales):
             continue
         score = _best_frequency(fit, effect, scales)
         if score is not None:

@@ -19,6 +19,7 @@ from bayesimpact.diagnosis.extend import (
 from bayesimpact.diagnosis.scan import Score
 from bayesimpact.inference.fit import Fit, find_mode
 from bayesimpact.model.effects.effect import Effect, Scales
+from bayesimpact.model.parameters import is_added
 
 Array = NDArray[np.float64]
 
@@ -81,7 +82,7 @@ def step_sizes(
     """Expected standard deviations of effect parameters, for difference steps."""
     sizes: dict[str, float] = {}
     for name in names:
-        if "." in name:
+        if is_added(name):
             sizes[name] = 1e-4 * owner(effects, name)[1].scale(scales)
         elif "[" not in name:
             sizes[name] = 1e-6
@@ -150,7 +151,7 @@ def _gradient(fit: Fit) -> Array:
 def effect_values(candidate: Candidate) -> Mapping[str, float]:
     """Modes of the added effects' parameters."""
     fit = candidate.fit
-    return {n: float(v) for n, v in zip(fit.names, fit.mode, strict=True) if "." in n}
+    return {n: float(v) for n, v in zip(fit.names, fit.mode, strict=True) if is_added(n)}
 
 
 __all__ = ["Candidate", "base_candidate", "log_evidence", "refit", "replaced_slot", "without"]

@@ -32,6 +32,7 @@ from bayesimpact.inference.priors import (
 )
 from bayesimpact.model.effects.effect import Effect, EffectParameter, Scales
 from bayesimpact.model.oscillator import Oscillator
+from bayesimpact.model.parameters import is_added
 from bayesimpact.response.estimates import Estimates
 
 SHAPE_WIDTH = 1.5  # of the log-normal prior of a depth, a time constant, a frequency
@@ -63,7 +64,7 @@ def _default(
     name: str, oscillator: Oscillator, estimates: Estimates, noise: Noise, scales: Scales | None
 ) -> Prior:
     campaign = oscillator.campaign
-    if "." in name:
+    if is_added(name):
         assert scales is not None
         effect, parameter = _owner(oscillator, name)
         return effect_prior(effect, parameter, scales)

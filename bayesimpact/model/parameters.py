@@ -134,6 +134,16 @@ def instance_name(effect: Effect, parameter: EffectParameter, key: str | None) -
     return f"{effect.id}.{parameter.name}" + ("" if key is None else f"[{key}]")
 
 
+def is_added(name: str) -> bool:
+    """True for `<effect>.<parameter>[...]`; cases and recordings may have dots in their names."""
+    return "." in name.split("[")[0]
+
+
+def bare_name(name: str) -> str:
+    """The parameter alone: `c2` of `contact_damping_per_case.c2[1]`, `k2` of `k2[1]`."""
+    return name.split("[")[0].split(".")[-1]
+
+
 def _unit(campaign: Campaign, unit: str) -> str:
     return angular(unit) if campaign.recordings[0].quantity == "angle" else unit
 
