@@ -19,7 +19,7 @@ from bayesimpact.diagnosis.directions import sigma_of, whitened
 from bayesimpact.diagnosis.learned import KNOTS, learned_force, spline_basis
 from bayesimpact.diagnosis.projection import Projection, project
 from bayesimpact.inference.fit import Fit
-from bayesimpact.model.effects.effect import Effect, Scales
+from bayesimpact.model.effects.effect import Effect, Scales, law_row
 from bayesimpact.model.measurement import smooth
 from bayesimpact.model.motions import general_motions
 from bayesimpact.model.oscillator import Oscillator
@@ -93,8 +93,9 @@ def missing_force(
     best, (width_a, width_b) = float(found[0]), evidence.pairs[which[0]]
     null, _ = evidence.maximum(evidence.null_draws(rng, NULL_DRAWS))
     mean, covariance = evidence.posterior(projection.score, width_a, width_b)
+    wide_a, wide_b = np.maximum((width_a, width_b), WIDTHS[1])  # a prior needs some width
     final = learned_force(
-        low, high, width_a * scales.force, width_b * scales.force / scales.speed, knots
+        low, high, wide_a * scales.force, wide_b * scales.force / scales.speed, knots
     )
     p_value = float((1 + np.sum(null >= best)) / (1 + NULL_DRAWS))
     spacing = (high - low) / (knots - 3)
@@ -138,11 +139,9 @@ def whitened_one(fit: Fit, r: int, values: Array, sigma: Array) -> Array:
 
 
 def _with_law(oscillator: Oscillator, effect: Effect) -> NDArray[np.int64]:
-    from bayesimpact.model.effects.effect import address
-
     assert effect.law is not None
     first = len(SLOTS) + sum(len(e.parameters) for e in oscillator.effects if e.law is not None)
-    row = np.array([[address(effect.law.force), 0, 0, 0, first]], dtype=np.int64)
+    row = np.array([law_row(effect.law, first)], dtype=np.int64)
     return np.concatenate([oscillator.laws, row])
 
 

@@ -7,11 +7,12 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import special, stats
 
 from bayesimpact.diagnosis.scan import Scan, Score
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Scales
+from bayesimpact.model.parameters import angular
 
 Array = NDArray[np.float64]
 
@@ -65,6 +66,7 @@ def _limit(fit: Fit, score: Score, scan: Scan, scales: Scales) -> Limit:
     upper = float(
         np.max([upper_limit(m, s, direction.one_sided) for m, s in zip(size, sd, strict=True)])
     )
+    quantity = fit.target.oscillator.campaign.recordings[0].quantity
     practical = PRACTICAL * parameter.scale(scales)
     power = float(stats.norm.sf(DETECTED - practical / sd[0]))
     column = scan.groups[scan.scores.index(score)][0]
@@ -75,7 +77,7 @@ def _limit(fit: Fit, score: Score, scan: Scan, scales: Scales) -> Limit:
     return Limit(
         score.effect.id,
         name,
-        parameter.unit,
+        angular(parameter.unit) if quantity == "angle" else parameter.unit,
         upper,
         score.limit,
         power,
@@ -88,15 +90,15 @@ def _limit(fit: Fit, score: Score, scan: Scan, scales: Scales) -> Limit:
 
 def upper_limit(mean: float, sd: float, one_sided: bool, probability: float = 0.95) -> float:
     """Quantile of the size's magnitude, normal about `mean`, cut at zero when one-sided."""
-    if one_sided:
-        below = stats.norm.cdf(-mean / sd)
-        return float(mean + sd * stats.norm.ppf(below + probability * (1 - below)))
-    return float(abs(mean) + sd * stats.norm.ppf(probability))
+    z = mean / sd
+    if one_sided:  # in logs: far below zero nothing else is left of the tail
+        return float(mean - sd * special.ndtri_exp(np.log1p(-probability) + special.log_ndtr(z)))
+    if abs(z) > 8:  # the other sign is out of reach
+        return float(abs(mean) + sd * stats.norm.ppf(probability))
+    return float(sd * stats.foldnorm.ppf(probability, abs(z)))
 
 
 def _answer(score: Score, upper: float, practical: float, power: float) -> Answer:
     if abs(score.z) > DETECTED:
         return "present" if abs(float(score.size[0])) >= practical else "negligible"
-    if upper < practical:
-        return "absent"
-    return "absent" if power >= 0.8 else "cannot tell"
+    return "absent" if upper < practical and power >= 0.8 else "cannot tell"
