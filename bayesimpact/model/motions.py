@@ -37,7 +37,7 @@ def motions(q: Array, mass: float, counts: Counts, intervals: Array) -> Array:
 def general_motions(
     q: Array, mass: float, counts: Counts, intervals: Array, laws: NDArray[np.int64]
 ) -> Array:
-    """The same for oscillators with added effects: slots (K, Q), table of laws (L, 5)."""
+    """The same for oscillators with added effects: slots (K, Q), table of laws (L, 6)."""
     out = np.empty((q.shape[0], int(counts.max())))
     integrate = integrate_many if q.shape[0] >= _THREADING_PAYS else integrate_few
     codes = integrate(q, mass, intervals, counts, laws, out)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign, Smoothing
 from bayesimpact.model import measurement
-from bayesimpact.model.effects.effect import Effect, address
+from bayesimpact.model.effects.effect import Effect, law_row
 from bayesimpact.model.motions import general_motions, motions
 from bayesimpact.model.parameters import BASE_SLOTS, SLOTS, Layout, build_layout, instance_name
 
@@ -61,15 +61,13 @@ class Oscillator:
 
     @cached_property
     def laws(self) -> NDArray[np.int64]:
-        """Table of force laws for the general simulator, (L, 5)."""
+        """Table of force laws for the general simulator, (L, 6)."""
         rows, first = [], len(SLOTS)
         for effect in self.effects:
-            law = effect.law
-            if law is not None:
-                addresses = [address(f) if f else 0 for f in (law.force, law.rate, law.surface)]
-                rows.append([*addresses, int(law.where == "contact"), first])
+            if effect.law is not None:
+                rows.append(law_row(effect.law, first))
                 first += len(effect.parameters)
-        return np.array(rows, dtype=np.int64).reshape(-1, 5)
+        return np.array(rows, dtype=np.int64).reshape(-1, 6)
 
     @cached_property
     def is_base(self) -> bool:

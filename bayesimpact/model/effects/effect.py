@@ -206,6 +206,14 @@ class Effect:
         raise KeyError(f"{self.id} has no parameter {name!r}")
 
 
+def law_row(law: Law, first: int) -> list[int]:
+    """A law's row in the general simulator's table; its parameters begin at slot `first`."""
+    functions = (law.force, law.rate, law.surface)
+    flags = (law.where == "contact") + 2 * law.kink_at_turn + 4 * law.rough_at_touch
+    pace = address(law.pace) if law.pace else 0
+    return [*(address(f) if f else 0 for f in functions), flags, first, pace]
+
+
 @cache
 def address(function: Callable[..., float]) -> int:
     """Pointer to a law's function, compiled on first use."""

@@ -1,0 +1,1 @@
+"""Parts of the simulator for oscillators with added effects; `general` is its door."""

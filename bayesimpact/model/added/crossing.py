@@ -1,0 +1,140 @@
+"""When the next event happens: Newton's method on the integrator's own steps, within a bracket."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from bayesimpact.model.added.method import quarters
+from bayesimpact.model.added.situation import GAP, HEADING, NONE, TURN, event_value, passed
+from bayesimpact.model.added.step import push, step
+from bayesimpact.model.added.world import AHEAD, NOW
+from bayesimpact.model.compiled import compiled
+
+TRIALS = 80
+ROUNDS = 8
+
+
+@compiled()
+def trial(y: Any, v: Any, t: Any, n0: Any, h: Any, flow: Any, w: Any) -> Any:
+    """A step of any length."""
+    return step(y, v, t, n0, quarters(h, flow.b, flow.K, flow.inverse), flow, w)
+
+
+@compiled()
+def value_and_slope(
+    event: Any,
+    y: Any,
+    v: Any,
+    t: Any,
+    column: Any,
+    short: Any,
+    flow: Any,
+    w: Any,
+) -> Any:
+    """An event's function and its slope along the trajectory, by a difference over `short`."""
+    value = event_value(event, y, v, t, column, w)
+    a = -2.0 * flow.b * v - flow.K * (y - flow.rest)
+    if not flow.plain:
+        a += flow.inverse * push(y, v, t, column, flow, w)
+    if event == TURN:
+        return value, a * w.s[HEADING]
+    later = event_value(event, y + v * short, v + a * short, t + short, column, w)
+    return value, (later - value) / short
+
+
+@compiled(forceinline=True)
+def guess(f0: Any, d0: Any, f1: Any, d1: Any) -> Any:
+    """Last root in (0, 1) of the cubic with values f0 >= 0 > f1 and slopes d0, d1 at 0 and 1."""
+    c2, c3 = 3.0 * (f1 - f0) - 2.0 * d0 - d1, 2.0 * (f0 - f1) + d0 + d1
+    x = f0 / (f0 - f1) if d0 <= 0.0 else 1.0
+    for _ in range(6):
+        slope = d0 + x * (2.0 * c2 + 3.0 * c3 * x)
+        if not slope < 0.0:
+            return 0.5
+        x -= (f0 + x * (d0 + x * (c2 + x * c3))) / slope
+    return x
+
+
+@compiled()
+def locate(
+    event: Any,
+    y: Any,
+    v: Any,
+    t: Any,
+    n0: Any,
+    h: Any,
+    y1: Any,
+    v1: Any,
+    flow: Any,
+    w: Any,
+) -> Any:
+    """Length of the step from (y, v) to the event inside (0, h], and the state there.
+
+    (y1, v1) is the state after h, where the event's function is negative.
+    """
+    column, short = AHEAD if flow.memory else NOW, 1e-6 * h
+    f0, d0 = value_and_slope(event, y, v, t, NOW, short, flow, w)
+    f1, d1 = value_and_slope(event, y1, v1, t + h, column, short, flow, w)
+    low, high, x = 0.0, h, h * guess(max(f0, 0.0), h * d0, f1, h * d1)
+    for _ in range(TRIALS):
+        if not low < x < high:
+            x = 0.5 * (low + high)
+        y1, v1 = trial(y, v, t, n0, x, flow, w)
+        value, slope = value_and_slope(event, y1, v1, t + x, column, short, flow, w)
+        if value > 0.0:
+            low = x
+        else:
+            high = x
+        change = -value / slope if slope < 0.0 else h
+        if abs(change) <= 1e-13 * h or high - low <= 1e-15 * h:
+            break
+        x += change
+    return x, y1, v1
+
+
+@compiled(forceinline=True)
+def turn_matters(y: Any, v: Any, y1: Any, v1: Any, h: Any, flow: Any, w: Any) -> Any:
+    """True when a step contains a turning point at which a force has a kink, or beyond the gap."""
+    heading = w.s[HEADING]
+    if not v1 * heading < 0.0:
+        return False
+    if flow.turns:
+        return True
+    reach = 0.25 * h * abs(v1 - v)
+    return min(y, y1) - reach < w.s[GAP] < max(y, y1) + reach
+
+
+@compiled(forceinline=True)
+def suspicious(y: Any, v: Any, y1: Any, v1: Any, t1: Any, h: Any, flow: Any, w: Any) -> Any:
+    """True when a step of length h from (y, v) to (y1, v1) at t1 contains an event."""
+    column = AHEAD if flow.memory else NOW
+    return (
+        turn_matters(y, v, y1, v1, h, flow, w) or passed(y1, v1, t1, column, NONE, flow, w) != NONE
+    )
+
+
+@compiled()
+def first_event(
+    y: Any,
+    v: Any,
+    t: Any,
+    n0: Any,
+    h: Any,
+    y1: Any,
+    v1: Any,
+    flow: Any,
+    w: Any,
+) -> Any:
+    """Earliest event of a step that ends at (y1, v1): (event, time to it, state there); or NONE."""
+    column = AHEAD if flow.memory else NOW
+    event, length = NONE, h
+    if turn_matters(y, v, y1, v1, h, flow, w):
+        event = TURN
+        length, y1, v1 = locate(TURN, y, v, t, n0, h, y1, v1, flow, w)
+    for _ in range(ROUNDS):
+        found = passed(y1, v1, t + length, column, event, flow, w)
+        if found == NONE:
+            break
+        event = found
+        length, y1, v1 = locate(event, y, v, t, n0, length, y1, v1, flow, w)
+    return event, length, y1, v1

@@ -1,0 +1,66 @@
+"""Samples inside a step of the oscillator with added effects.
+
+The exact linear flow, plus what the added forces contribute: a quintic that has the right value,
+slope and curvature at both ends of the step (Hermite). That contribution is small and smooth, so
+the samples are as accurate as the ends.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from bayesimpact.model.compiled import compiled
+from bayesimpact.model.flow import impulse_response
+
+LONGEST_STRIDE = 64  # samples that one step may span
+
+
+@compiled(forceinline=True)
+def fill_in(
+    first: Any, end: Any, t: Any, aligned: Any, at: Any, flow: Any, w: Any,
+    y: Any, v: Any, n0: Any, h: Any, y1: Any, v1: Any, n1: Any,
+) -> Any:  # fmt: skip
+    """Samples `first` to `end` - 1 inside a step of length h that began at time t.
+
+    `aligned` says that t is that of sample `first` - 1: the flow at the samples is then tabulated.
+    (y, v), (y1, v1) and n0, n1 are the states and the added forces at the two ends; `at` are the
+    `Quarters` of the step that was tried, which an event may have shortened to h.
+    """
+    u, b2, dx = y - flow.rest, 2.0 * flow.b, w.interval / h
+    m = v + b2 * u
+    table = tabulate(flow, w) if aligned else 0
+    x = 0.0 if aligned else (first * w.interval - t) / h - dx
+    e, e1, a0, a1 = 0.0, 0.0, 0.0, 0.0
+    if not flow.plain:
+        S1, D1 = at.S4, at.D4
+        if h != at.h:
+            S1, D1 = impulse_response(flow.b, flow.K, h)
+        e, e1 = y1 - (flow.rest + D1 * u + S1 * m), v1 - (D1 * v - S1 * flow.K * u)
+        a0 = h * h * flow.inverse * n0
+        a1 = h * h * (flow.inverse * n1 - b2 * e1 - flow.K * e)
+        e1 *= h
+    p3, p4 = 10.0 * e - 4.0 * e1 - 1.5 * a0 + 0.5 * a1, -15.0 * e + 7.0 * e1 + 1.5 * a0 - a1
+    p5 = 6.0 * e - 3.0 * e1 - 0.5 * a0 + 0.5 * a1
+    for i in range(end - first):
+        x += dx
+        if aligned:
+            S, D = w.tables[table + 2 * i], w.tables[table + 2 * i + 1]
+        else:
+            S, D = impulse_response(flow.b, flow.K, x * h)
+        added = x * x * (0.5 * a0 + x * (p3 + x * (p4 + x * p5)))
+        w.out[first + i] = flow.rest + D * u + S * m + added
+
+
+@compiled(forceinline=True)
+def tabulate(flow: Any, w: Any) -> Any:
+    """Where the table of S, D after 1, 2, ... samples begins; computed unless it still holds."""
+    side = int(flow.touching)
+    table = 2 * LONGEST_STRIDE * side
+    if w.keys[2 * side] != flow.b or w.keys[2 * side + 1] != flow.K:
+        S1, D1 = impulse_response(flow.b, flow.K, w.interval)
+        S, D = S1, D1
+        for i in range(LONGEST_STRIDE):
+            w.tables[table + 2 * i], w.tables[table + 2 * i + 1] = S, D
+            S, D = S * (D1 + 2.0 * flow.b * S1) + D * S1, D * D1 - flow.K * S1 * S
+        w.keys[2 * side], w.keys[2 * side + 1] = flow.b, flow.K
+    return table

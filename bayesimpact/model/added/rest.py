@@ -1,0 +1,55 @@
+"""Rest under dry friction."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from bayesimpact.model.added.flows import flow_from
+from bayesimpact.model.added.memory import keep_memory, relax_one
+from bayesimpact.model.added.situation import SLIDING, static_force
+from bayesimpact.model.added.world import AHEAD, FORCE, FRICTION
+from bayesimpact.model.compiled import compiled
+
+
+@compiled()
+def hold(y: Any, t: Any, j: Any, w: Any) -> Any:
+    """Rest under dry friction until the other forces exceed it: (t, next sample)."""
+    if w.size == 0 and w.q[FORCE] == 0.0:
+        for i in range(j, w.n):
+            w.out[i] = y
+        return t, w.n
+    flow, longest = flow_from(y, 0.0, t, w)
+    while j < w.n:
+        h = j * w.interval - t
+        cuts = max(int(np.ceil(h / longest)), 1)
+        h /= cuts
+        force = pull_at(y, t, h, flow, w)
+        if abs(force) > w.q[FRICTION]:
+            low, high = 0.0, h
+            for _ in range(60):
+                middle = 0.5 * (low + high)
+                force = pull_at(y, t, middle, flow, w)
+                if abs(force) > w.q[FRICTION]:
+                    high = middle
+                else:
+                    low = middle
+            w.s[SLIDING] = np.sign(pull_at(y, t, high, flow, w))
+            keep_memory(w)
+            return t + high, j
+        keep_memory(w)
+        t += h
+        if cuts == 1:
+            w.out[j] = y
+            t = j * w.interval
+            j += 1
+    return t, j
+
+
+@compiled()
+def pull_at(y: Any, t: Any, dt: Any, flow: Any, w: Any) -> Any:
+    """Force on the mass after a rest of dt, N, dry friction apart."""
+    for law in range(w.size):
+        relax_one(law, AHEAD, y, 0.0, t, dt, flow, w)
+    return static_force(y, t + dt, AHEAD, w)

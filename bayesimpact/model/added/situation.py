@@ -1,0 +1,206 @@
+"""What holds between two events of the oscillator with added effects, and how an event changes it.
+
+The mass is free, touches the obstacle, or is separated: beyond the gap though the obstacle, which
+cannot pull, has let go. A contact that cannot pull ends when its reaction, once positive, falls
+through zero, or at the gap if it never was positive. While separated, contact resumes as soon as
+the obstacle would push again (for a gap below zero; else the mass falls back below the gap first).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from bayesimpact.model.added.world import (
+    C1,
+    C2,
+    CONTACT_MASS,
+    CONTACT_ONLY,
+    FRICTION,
+    GAP_STEP,
+    K1,
+    K2,
+    LAW_COLUMNS,
+    LAW_FLAGS,
+    LAW_FORCE,
+    LAW_SURFACE,
+    NO_TENSION,
+    NOW,
+    V0,
+    WORK_COLUMNS,
+    Y0,
+    G,
+    forcing,
+    law_value,
+)
+from bayesimpact.model.compiled import compiled
+
+# what holds between events: gap, kind of motion, direction of sliding (0: held), direction of
+# motion, whether the obstacle has pushed in this contact, then the side of every law's surface
+GAP, MODE, SLIDING, HEADING, PUSHED, SIDES = range(6)
+FREE, TOUCHING, SEPARATED = 0.0, 1.0, 2.0
+NONE, TOUCH, LEAVE, TURN, SURFACE = range(-1, 4)  # SURFACE + i: surface of law i
+
+
+@compiled(forceinline=True)
+def one_sided(q: Any) -> Any:
+    """True when the obstacle cannot pull."""
+    return q[NO_TENSION] != 0.0 or q[CONTACT_MASS] > 0.0
+
+
+@compiled(forceinline=True)
+def laws_force(y: Any, v: Any, t: Any, column: Any, contact: Any, w: Any) -> Any:
+    """Sum of the forces that act in contact only, or of those that act everywhere, N."""
+    total, touching = 0.0, 1.0 if w.s[MODE] == TOUCHING or contact else 0.0
+    for law in range(w.size):
+        if (w.laws[LAW_COLUMNS * law + LAW_FLAGS] & CONTACT_ONLY != 0) == contact:
+            z = w.work[WORK_COLUMNS * law + column]
+            total += law_value(law, LAW_FORCE, y, v, t, z, w.s[GAP], touching, w)
+    return total
+
+
+@compiled()
+def reaction(y: Any, v: Any, t: Any, column: Any, w: Any) -> Any:
+    """Force with which the obstacle pushes the mass back, N (negative: it would have to pull)."""
+    q = w.q
+    obstacle = q[C2] * v + q[K2] * (y - w.s[GAP]) + laws_force(y, v, t, column, True, w)
+    if q[CONTACT_MASS] == 0.0:
+        return obstacle
+    other = q[C1] * v + q[K1] * y + q[FRICTION] * w.s[SLIDING] - forcing(t, q)
+    other += laws_force(y, v, t, column, False, w)
+    return (w.mass * obstacle - q[CONTACT_MASS] * other) / (w.mass + q[CONTACT_MASS])
+
+
+@compiled(forceinline=True)
+def event_value(event: Any, y: Any, v: Any, t: Any, column: Any, w: Any) -> Any:
+    """Smooth function that falls through zero when the event happens."""
+    s = w.s
+    if event == TOUCH:
+        return s[GAP] - y if s[MODE] == FREE else -reaction(y, v, t, column, w)
+    if event == LEAVE:
+        pushed = one_sided(w.q) and s[PUSHED] != 0.0
+        return reaction(y, v, t, column, w) if pushed else y - s[GAP]
+    if event == TURN:
+        return v * s[HEADING]
+    return s[SIDES + event - SURFACE] * surface_value(event - SURFACE, y, v, t, column, w)
+
+
+@compiled(forceinline=True)
+def surface_value(law: Any, y: Any, v: Any, t: Any, column: Any, w: Any) -> Any:
+    """Value of a law's surface function."""
+    touching = 1.0 if w.s[MODE] == TOUCHING else 0.0
+    return law_value(
+        law, LAW_SURFACE, y, v, t, w.work[WORK_COLUMNS * law + column], w.s[GAP], touching, w
+    )
+
+
+@compiled(forceinline=True)
+def passed(y: Any, v: Any, t: Any, column: Any, known: Any, flow: Any, w: Any) -> Any:
+    """An event other than `known` that lies behind this point of the trajectory, or NONE."""
+    if w.s[MODE] == TOUCHING:
+        if known != LEAVE and event_value(LEAVE, y, v, t, column, w) < 0.0:
+            unpushed = one_sided(w.q) and w.s[PUSHED] == 0.0
+            if not unpushed or reaction(y, v, t, column, w) <= 0.0:
+                return LEAVE
+    elif known != TOUCH and event_value(TOUCH, y, v, t, column, w) < 0.0:
+        return TOUCH
+    for k in range(flow.count):
+        law = w.acting[k]
+        if known == SURFACE + law or w.laws[LAW_COLUMNS * law + LAW_SURFACE] == 0:
+            continue
+        if event_value(SURFACE + law, y, v, t, column, w) < 0.0:
+            return SURFACE + law
+    return NONE
+
+
+@compiled()
+def begin(w: Any) -> Any:
+    """Motion and situation at t = 0 from the slots: (y, v)."""
+    q, s = w.q, w.s
+    y, v = q[Y0], q[V0]
+    s[GAP] = q[G]
+    s[SLIDING] = np.sign(v)
+    if y > s[GAP]:
+        s[MODE] = TOUCHING
+        push = reaction(y, v, 0.0, NOW, w)
+        s[PUSHED] = 1.0 if push > 0.0 else 0.0
+        if one_sided(q) and push <= 0.0:
+            s[MODE] = SEPARATED
+    set_sides(y, v, 0.0, w)
+    if v == 0.0:
+        set_sliding(y, 0.0, w)
+    if y == s[GAP] and (v > 0.0 or (v == 0.0 and static_force(y, 0.0, NOW, w) > 0.0)):
+        y, v = resolve(TOUCH, y, v, 0.0, w)
+    return y, v
+
+
+@compiled()
+def static_force(y: Any, t: Any, column: Any, w: Any) -> Any:
+    """What pulls at the mass at rest, dry friction apart, N; the laws' states stand in `column`."""
+    q, s = w.q, w.s
+    force = forcing(t, q) - q[K1] * y - laws_force(y, 0.0, t, column, False, w)
+    if s[MODE] == TOUCHING:
+        force -= q[K2] * (y - s[GAP]) + laws_force(y, 0.0, t, column, True, w)
+    return force
+
+
+@compiled()
+def set_sliding(y: Any, t: Any, w: Any) -> Any:
+    """Direction of sliding from a standstill: 0 where dry friction holds the mass."""
+    force = static_force(y, t, NOW, w)
+    w.s[SLIDING] = np.sign(force) if abs(force) > w.q[FRICTION] else 0.0
+
+
+@compiled()
+def set_sides(y: Any, v: Any, t: Any, w: Any) -> Any:
+    """Side of every law's surface that the motion is on."""
+    for law in range(w.size):
+        if w.laws[LAW_COLUMNS * law + LAW_SURFACE] != 0:
+            side = np.sign(surface_value(law, y, v, t, NOW, w))
+            w.s[SIDES + law] = side if side != 0.0 else 1.0
+
+
+@compiled()
+def resolve(event: Any, y: Any, v: Any, t: Any, w: Any) -> Any:
+    """Change what holds between events; returns displacement and velocity after the event."""
+    q, s = w.q, w.s
+    if event == TOUCH:
+        if s[MODE] == FREE:
+            y = s[GAP]
+            v *= w.mass / (w.mass + q[CONTACT_MASS])
+        s[MODE] = TOUCHING
+        s[PUSHED] = 1.0 if reaction(y, v, t, NOW, w) > 0.0 else 0.0
+        set_sides(y, v, t, w)
+    elif event == LEAVE:
+        if not (one_sided(q) and s[PUSHED] != 0.0):
+            y = s[GAP]
+        s[GAP] += q[GAP_STEP]
+        s[MODE] = SEPARATED if y > s[GAP] else FREE
+        set_sides(y, v, t, w)
+    elif event == TURN:
+        v = 0.0
+        if q[FRICTION] > 0.0:
+            set_sliding(y, t, w)
+    else:
+        s[SIDES + event - SURFACE] *= -1.0
+    return y, v
+
+
+@compiled(forceinline=True)
+def heading(v: Any, w: Any) -> Any:
+    """Direction of the motion at the start of a step, 0 where it is about to be chosen."""
+    if v != 0.0:
+        return 1.0 if v > 0.0 else -1.0
+    return w.s[SLIDING] if w.q[FRICTION] > 0.0 else 0.0
+
+
+@compiled(forceinline=True)
+def settle(y: Any, v: Any, t: Any, w: Any) -> Any:
+    """What changes without a change of force: the obstacle has pushed; the mass fell back."""
+    s = w.s
+    if s[MODE] == SEPARATED and y < s[GAP]:
+        s[MODE] = FREE
+    unpushed = s[MODE] == TOUCHING and s[PUSHED] == 0.0 and one_sided(w.q)
+    if unpushed and reaction(y, v, t, NOW, w) > 0.0:
+        s[PUSHED] = 1.0

@@ -1,0 +1,92 @@
+"""One step of the oscillator with added effects.
+
+Within a step the linear part (mass, damping, stiffness, obstacle, dry friction) is propagated
+exactly; only the added forces are integrated numerically, see `method`. The error is therefore
+proportional to the added force: an effect too small to see costs no accuracy.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from bayesimpact.model.added.memory import begin_memory, kick, remember
+from bayesimpact.model.added.method import stage
+from bayesimpact.model.added.world import (
+    AHEAD,
+    LAW_FORCE,
+    NOW,
+    STAGE,
+    WORK_COLUMNS,
+    forcing,
+    law_value,
+)
+from bayesimpact.model.compiled import compiled
+
+
+@compiled(forceinline=True)
+def push(y: Any, v: Any, t: Any, column: Any, flow: Any, w: Any) -> Any:
+    """Force that the linear flow leaves out, N; the laws' states stand in `column`."""
+    force = flow.level + flow.slope * y
+    if flow.count > 0:  # most often there is one: kept out of the loop's chain of dependences
+        law = w.acting[0]
+        z = w.work[WORK_COLUMNS * law + column]
+        force -= law_value(law, LAW_FORCE, y, v, t, z, flow.gap, flow.touching, w)
+        for k in range(1, flow.count):
+            law = w.acting[k]
+            z = w.work[WORK_COLUMNS * law + column]
+            force -= law_value(law, LAW_FORCE, y, v, t, z, flow.gap, flow.touching, w)
+    return force + forcing(t, w.q) if flow.forced else force
+
+
+@compiled(forceinline=True)
+def step(y: Any, v: Any, t: Any, n0: Any, at: Any, flow: Any, w: Any) -> Any:
+    """Displacement and velocity a time `at.h` on; the laws' states then stand in column AHEAD.
+
+    n0 is `push` at the start; `at` are the `Quarters` of the step.
+    """
+    u, rest, h = y - flow.rest, flow.rest, at.h
+    m, Ku = v + 2.0 * flow.b * u, flow.K * u
+    y_end, v_end = rest + at.D4 * u + at.S4 * m, at.D4 * v - at.S4 * Ku
+    if flow.plain:
+        return y_end, v_end
+    column, F1, F2, F3, F4 = STAGE if flow.memory else NOW, at.F1, at.F2, at.F3, at.F4
+    G0, G1, G2, G3, G4 = at.G0, at.G1, at.G2, at.G3, at.G4
+    ya, va = rest + at.D1 * u + at.S1 * m, at.D1 * v - at.S1 * Ku
+    yb, vb = rest + at.D2 * u + at.S2 * m, at.D2 * v - at.S2 * Ku
+    yc, vc = rest + at.D3 * u + at.S3 * m, at.D3 * v - at.S3 * Ku
+    if flow.memory:
+        begin_memory(y, v, t, n0, h, flow, w)
+
+    y1 = stage(1, ya, 0.0, F1, F2, F3, F4, n0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    v1 = stage(1, va, G0, G1, G2, G3, G4, n0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    n1 = stage_push(1, y, v, y1, v1, t + 0.25 * h, column, h, flow, w)
+    y2 = stage(2, ya, 0.0, F1, F2, F3, F4, n0, n1, 0.0, 0.0, 0.0, 0.0)
+    v2 = stage(2, va, G0, G1, G2, G3, G4, n0, n1, 0.0, 0.0, 0.0, 0.0)
+    n2 = stage_push(2, y, v, y2, v2, t + 0.25 * h, column, h, flow, w)
+    y3 = stage(3, yb, 0.0, F1, F2, F3, F4, n0, n1, n2, 0.0, 0.0, 0.0)
+    v3 = stage(3, vb, G0, G1, G2, G3, G4, n0, n1, n2, 0.0, 0.0, 0.0)
+    n3 = stage_push(3, y, v, y3, v3, t + 0.5 * h, column, h, flow, w)
+    y4 = stage(4, yc, 0.0, F1, F2, F3, F4, n0, n1, n2, n3, 0.0, 0.0)
+    v4 = stage(4, vc, G0, G1, G2, G3, G4, n0, n1, n2, n3, 0.0, 0.0)
+    n4 = stage_push(4, y, v, y4, v4, t + 0.75 * h, column, h, flow, w)
+    y5 = stage(5, y_end, 0.0, F1, F2, F3, F4, n0, n1, n2, n3, n4, 0.0)
+    v5 = stage(5, v_end, G0, G1, G2, G3, G4, n0, n1, n2, n3, n4, 0.0)
+    n5 = stage_push(5, y, v, y5, v5, t + h, column, h, flow, w)
+    y6 = stage(6, y_end, 0.0, F1, F2, F3, F4, n0, n1, n2, n3, n4, n5)
+    v6 = stage(6, v_end, G0, G1, G2, G3, G4, n0, n1, n2, n3, n4, n5)
+    if flow.memory:
+        remember(6, AHEAD, y, v, y6, v6, h, flow, w)
+    return y6, v6
+
+
+@compiled(forceinline=True)
+def stage_push(
+    number: Any, y: Any, v: Any, ys: Any, vs: Any, t: Any, column: Any, h: Any, flow: Any, w: Any
+) -> Any:
+    """`push` at a stage (ys, vs) of a step from (y, v), and the kicks of the laws' states there."""
+    if flow.memory:
+        remember(number, STAGE, y, v, ys, vs, h, flow, w)
+    n = push(ys, vs, t, column, flow, w)
+    if flow.memory:
+        kick(number, ys, vs, t, STAGE, n, flow, w)
+    return n

@@ -1,0 +1,81 @@
+"""What the parts of the general simulator share: arrays of a recording, and calls of its laws."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bayesimpact.model.callback import call_law
+from bayesimpact.model.compiled import compiled
+
+# slots of q: bayesimpact.model.parameters.SLOTS
+C1, K1, C2, G, K2, Y0, V0, FORCE, OMEGA, PHASE, OFFSET = range(11)
+FRICTION, CONTACT_MASS, NO_TENSION, GAP_STEP = range(11, 15)
+# columns of the table of laws, and its flags: bayesimpact.model.effects.effect.law_row
+LAW_FORCE, LAW_RATE, LAW_SURFACE, LAW_FLAGS, LAW_FIRST, LAW_PACE, LAW_COLUMNS = range(7)
+CONTACT_ONLY, KINK_AT_TURN, ROUGH_AT_TOUCH = 1, 2, 4
+# columns of the work array, one row per law: the law's state at the start of a step, at a stage and
+# at the end; the kicks of six stages; exp(-lambda h / 4), lambda, alpha, x_u, x_v
+NOW, STAGE, AHEAD, KICK = 0, 1, 2, 3
+FADE, LAMBDA, ALPHA, X_U, X_V, WORK_COLUMNS = range(9, 15)
+
+
+class World(NamedTuple):
+    """What stays the same throughout a recording; arrays as pointers, see `callback.floats_at`."""
+
+    mass: Any  # kg
+    interval: Any  # s
+    n: Any  # samples
+    out: Any  # (n,) displacements, m
+    tables: Any  # (2, LONGEST_STRIDE, 2) S and D of flight and of contact, see `dense`
+    keys: Any  # (2, 2) b and K for which they hold
+    size: Any  # number of laws L
+    q: Any  # (Q,) slots, then the laws' parameters
+    base: Any  # address of q
+    laws: Any  # (L, LAW_COLUMNS)
+    acting: Any  # (L,) the laws that act in the present kind of motion come first
+    work: Any  # (L, WORK_COLUMNS)
+    s: Any  # what holds between events, see `situation`
+
+
+class Flow(NamedTuple):
+    """A linear flow, y'' = -2 b y' - K (y - rest), and what is added to it."""
+
+    inverse: Any  # 1 / moving mass, 1/kg
+    b: Any  # 1/s
+    K: Any  # 1/s2
+    rest: Any  # m
+    slope: Any  # stiffness of laws that is counted into K, N/m
+    level: Any  # and their force at y = 0, counted into rest, N
+    gap: Any  # m
+    touching: Any  # 1.0 or 0.0
+    count: Any  # number of acting laws
+    memory: Any  # True when a law has a state
+    plain: Any  # True when nothing is added
+    forced: Any  # True when the slots' harmonic force acts
+    turns: Any  # True when a force has a kink or jump at v = 0
+    rough: Any  # True when a force is not smooth at the touch
+
+
+@compiled(forceinline=True)
+def law_value(
+    law: Any,
+    column: Any,
+    y: Any,
+    v: Any,
+    t: Any,
+    z: Any,
+    gap: Any,
+    touching: Any,
+    w: Any,
+) -> Any:
+    """Value of one of a law's functions."""
+    p = w.base + 8 * w.laws[LAW_COLUMNS * law + LAW_FIRST]
+    return call_law(w.laws[LAW_COLUMNS * law + column], y, v, y - gap, t, z, touching, p, w.base)
+
+
+@compiled(forceinline=True)
+def forcing(t: Any, q: Any) -> Any:
+    """The slots' harmonic force, N."""
+    return q[FORCE] * np.sin(q[OMEGA] * t + q[PHASE])
