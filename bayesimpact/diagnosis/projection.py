@@ -60,7 +60,8 @@ def project(fit: Fit, parts: Sequence[Array]) -> Projection:
         for lin, s, part in zip(fit.linearisation, sigma, parts, strict=True)
     ]
     curvature = -fit.target.priors.hessian(fit.mode)
-    curvature[fit.target.oscillator.layout.roles("noise")] = 0.0
+    noise = fit.target.oscillator.layout.roles("noise")
+    curvature[noise] = 0.0
     curvature = np.maximum(np.nan_to_num(curvature), weak_information(fit.target.priors))
     matrix = np.diag(curvature)
     for jacobian, _, where, _ in rows:
@@ -79,7 +80,9 @@ def project(fit: Fit, parts: Sequence[Array]) -> Projection:
             for (jacobian, _, where, _), part in zip(rows, left, strict=True)
         ]
     information = absorbed.T @ (curvature[:, None] * absorbed)
-    score, norm = np.zeros(columns), np.zeros(columns)
+    slope = np.nan_to_num(fit.target.priors.gradient(fit.mode))
+    slope[noise] = 0.0
+    score, norm = -absorbed.T @ slope, np.zeros(columns)  # at the mode J'r balances the priors
     for (_, residual, _, whole), part in zip(rows, left, strict=True):
         information += part.T @ part
         score += part.T @ residual
