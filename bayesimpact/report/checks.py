@@ -63,7 +63,8 @@ def amount(value: float, unit: str, digits: int = 3, like: float | None = None) 
 
 def headline(results: Results) -> str:
     """The verdict in words."""
-    model, like = model_name(results), results.noise.level
+    model = model_name(results)
+    like = results.rms if results.verdict == "inadequate" else results.noise.level
     model = model[0].upper() + model[1:]
     noise = amount(results.noise.level, results.unit, like=like)
     rms = amount(results.rms, results.unit, like=like)

@@ -68,6 +68,8 @@ def _hints(kind: type) -> dict[str, Any]:
 
 def _typed(hint: Any, value: Any, arrays: Mapping[str, NDArray[Any]], path: str) -> Any:
     origin, arguments = get_origin(hint), get_args(hint)
+    while hasattr(origin, "__value__"):  # NDArray is a `type` statement in NumPy 2.5
+        origin = get_origin(origin.__value__)
     if hint is Any:
         return _untyped(value, arrays)
     if origin in (Union, types.UnionType):

@@ -200,7 +200,7 @@ def _shift(
         "symbol": symbol(name),
         "before": _estimate(before),
         "after": _estimate(after),
-        "honest": _estimate(after | {"ci90": after["ci90_honest"]}, median=False)
+        "honest": _estimate({**after, "ci90": after["ci90_honest"]}, median=False)
         if after.get("ci90_honest")
         else "",
         "shift": signed(moved, 1) if abs(moved) < 1000 else f"{significant(moved, 2)}",

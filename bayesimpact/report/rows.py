@@ -45,8 +45,7 @@ def build_rows(
             low, median, high = (float(x) for x in np.percentile(draws[:, i], [5, 50, 95]))
             posterior_sd = float(np.std(draws[:, i]))
         ci90 = (low, high)
-        # A phase is no displacement, even where displacements are angles.
-        unit = "-" if parameter.name.partition("[")[0].endswith(".phase") else parameter.unit
+        unit = scaling_unit(parameter)
         ratio_unit = per_mass_unit(unit, angle=angle)
         nothing = (float("nan"),) * 3
         over = (median / campaign.mass, low / campaign.mass, high / campaign.mass)
@@ -73,6 +72,11 @@ def build_rows(
             )
         )
     return tuple(rows)
+
+
+def scaling_unit(parameter: Parameter) -> str:
+    """Unit that says how a parameter scales: a phase is no displacement, even in rad."""
+    return "-" if parameter.name.partition("[")[0].endswith(".phase") else parameter.unit
 
 
 def widened(

@@ -22,6 +22,7 @@ _BASE = {
     "1": (0.0, 0.0, 0.0),
     "-": (0.0, 0.0, 0.0),
 }
+_LEAST = {"N": 0.01, "rad": 0.1}  # smaller sizes get a prefix
 _SYMBOL = re.compile(r"([A-Za-z]+|1|-)(-?\d*)")
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _PREFIXES = {-9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
@@ -102,7 +103,7 @@ def display(unit: str, size: float) -> Display:
         return Display(1e6, "um" + tail) if 0 < size < 3e-5 else Display(1e3, "mm" + tail)
     if first == "kg" and 0 < size < 0.1:
         return Display(1e6, "mg" + tail) if size < 1e-4 else Display(1e3, "g" + tail)
-    if first in ("N", "rad") and size > 0 and not 0.01 <= size < 1e5:
+    if first in ("N", "rad") and size > 0 and not _LEAST[first] <= size < 1e5:
         power = max(-9, min(9, 3 * floor(log10(size) / 3)))
         return Display(10.0**-power, _PREFIXES[power] + unit)
     return Display(1.0, unit)

@@ -120,7 +120,12 @@ def test_interrupted_write_leaves_the_old_file(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [path]
     with atomic(path) as temporary:
         temporary.write_text("new")
-    assert path.read_text() == "new"
+        assert path.read_text() == "old"
+    with path.open() as reader:
+        with atomic(path) as temporary:
+            temporary.write_text("newer")
+        assert reader.read() == "new"  # whoever reads goes on reading the old file
+    assert path.read_text() == "newer"
     assert path.stat().st_mode & 0o777 == (tmp_path / "file.txt").stat().st_mode & 0o777
     other = tmp_path / "plain.txt"
     other.write_text("")

@@ -134,6 +134,12 @@ def test_whiteness_sees_colour(banded: bool) -> None:
     assert found == 20
 
 
+def test_flat_spectrum_is_uniform_on_few_powers() -> None:
+    rng = np.random.default_rng(5)
+    p = [flat_spectrum(rng.exponential(size=6)) for _ in range(3000)]
+    assert stats.kstest(p, "uniform").pvalue > 0.001
+
+
 def test_nothing_to_test() -> None:
     assert np.isnan(flat_spectrum(np.zeros(10)))
     assert np.isnan(flat_spectrum(np.ones(2)))

@@ -83,7 +83,7 @@ def test_fifty_recordings_show_the_worst_of_every_case() -> None:
 
 @pytest.mark.parametrize("count", [1, 9])
 def test_nothing_overlaps(count: int) -> None:
-    """Titles and labels of one page's panels keep clear of one another and of the edge."""
+    """Titles and labels keep clear of one another, of other panels and of the edge."""
     results = make_results(count, 3 if count > 1 else 1, n=300)
     for figure in all_figures(results).values():
         png(figure)
@@ -96,9 +96,10 @@ def test_nothing_overlaps(count: int) -> None:
                 texts += [text for place, text in ticks if low <= place <= high]
             boxes += [(t.get_text(), t.get_window_extent()) for t in texts if t.get_text().strip()]
         width, height = figure.bbox.size
+        panels = [("a panel", axis.get_window_extent()) for axis in figure.axes]
         for i, (text, box) in enumerate(boxes):
             assert box.x0 > -1 and box.y0 > -1 and box.x1 < width + 1 and box.y1 < height + 1, text
-            for other, second in boxes[i + 1 :]:
+            for other, second in boxes[i + 1 :] + panels:
                 apart = (
                     box.x1 <= second.x0 + 1 or second.x1 <= box.x0 + 1
                     or box.y1 <= second.y0 + 1 or second.y1 <= box.y0 + 1
@@ -193,8 +194,9 @@ def test_files(tmp_path: Path) -> None:
 
 
 def test_style_stays_inside(tmp_path: Path) -> None:
-    before = dict(matplotlib.rcParams)
     results: Results = make_results(1, 1, n=200)
-    figures = all_figures(results)
-    save_figures({"search": figures["search"]}, tmp_path)
-    assert dict(matplotlib.rcParams) == before
+    with matplotlib.rc_context({"font.size": 17.0, "axes.linewidth": 3.0}):
+        before = dict(matplotlib.rcParams)
+        figures = all_figures(results)
+        save_figures({"search": figures["search"]}, tmp_path)
+        assert dict(matplotlib.rcParams) == before

@@ -7,9 +7,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from bayesimpact.model.effects import EFFECTS
-from bayesimpact.model.parameters import angular
+from bayesimpact.model.parameters import Parameter, angular
 from bayesimpact.report.results import Chain
-from bayesimpact.report.rows import Z90, widened
+from bayesimpact.report.rows import Z90, scaling_unit, widened
 from bayesimpact.report.units import (
     Dimensions,
     decimals,
@@ -86,6 +86,12 @@ def test_every_unit_of_the_catalogue_is_known() -> None:
         # Phases are in rad whatever was recorded; `rows` tells them by their name.
         assert unit == "rad" or dimensions(angular(unit), angle=True) == dimensions(unit)
         display(unit, 1e-4)
+
+
+def test_a_phase_does_not_scale_with_the_gain() -> None:
+    phase = Parameter("sensor_hum.phase[run 1]", "rad", "effect")
+    assert dimensions(scaling_unit(phase), angle=True) == Dimensions(0, 0, 0)
+    assert scaling_unit(Parameter("y0[run 1]", "rad", "nuisance")) == "rad"
 
 
 def test_unknown_unit_is_refused() -> None:

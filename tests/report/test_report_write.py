@@ -64,8 +64,9 @@ def test_fit_in_numbers(identification: Identification) -> None:
     weights = [r.samples.size for r in results.recordings]
     mean = np.average([r.reduced_chi2 for r in results.recordings], weights=weights)
     assert mean == pytest.approx(fit.reduced_chi2, rel=1e-9)
-    # 2 (n - d) degrees of freedom: a few standard errors about 1
-    assert abs(results.chi2_z) < 4
+    freedom = sum(weights) - (fit.mode.size - 1)
+    error = np.hypot(np.sqrt(2 / freedom), 2 * identification.noise.level_error)
+    assert results.chi2_z == pytest.approx((fit.reduced_chi2 - 1) / error)
     assert results.provenance.seed == 5 and "numpy" in results.provenance.versions
     assert results.search is not None and results.search.agree
 

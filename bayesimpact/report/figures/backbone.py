@@ -59,9 +59,9 @@ def _backbone(results: Results, summary: BackboneSummary, cases: Sequence[str]) 
             low, _, high = curve.frequency_band.T
             order = np.argsort(amplitude)
             top.fill_betweenx(amplitude[order], low[order], high[order], color=colour, **_BAND)
-            top.plot(curve.frequency, amplitude, ".", color=colour, ms=3.5, mew=0)
+            top.plot(curve.frequency, amplitude, ".", color=colour, ms=4.0, mew=0)
             off = deviation(curve.frequency, curve.frequency_band)
-            bottom.plot(amplitude, off, ".", color=colour, ms=3.5, mew=0)
+            bottom.plot(amplitude, off, ".", color=colour, ms=4.0, mew=0)
         _title(top, summary, case)
         top.set_xlabel(label("frequency", "Hz"))
         bottom.set_xlabel(label("amplitude", shown.unit))
@@ -80,9 +80,9 @@ def _damping(results: Results, summary: BackboneSummary, cases: Sequence[str]) -
             colour, t = _COLOURS[curve.branch], curve.times
             low, _, high = 100 * curve.damping_band.T
             top.fill_between(t, low, high, color=colour, **_BAND)
-            top.plot(t, 100 * curve.damping_ratio, ".", color=colour, ms=3.5, mew=0)
+            top.plot(t, 100 * curve.damping_ratio, ".", color=colour, ms=4.0, mew=0)
             off = deviation(curve.damping_ratio, curve.damping_band)
-            bottom.plot(t, off, ".", color=colour, ms=3.5, mew=0)
+            bottom.plot(t, off, ".", color=colour, ms=4.0, mew=0)
         _title(top, summary, case)
         bottom.set_xlabel(label("time since the first sample", "s"))
     panels[0, 0].set_ylabel("damping ratio (%)")
