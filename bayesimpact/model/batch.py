@@ -49,11 +49,15 @@ def gather(q: Floats, theta: Floats, columns: Ints, constants: Floats) -> None:
 
 
 @compiled()
-def sums(
+def work(
     theta: Floats, columns: Ints, constants: Floats, mass: float, samples: Floats, starts: Ints,
-    counts: Ints, intervals: Floats, rows: Span, items: Span, sse: Floats, codes: Ints,
+    counts: Ints, intervals: Floats, rows: Span, items: Span, sse: Floats, values: Floats,
+    codes: Ints,
 ) -> None:  # fmt: skip
-    """Fill one share of `sse` and `codes` (B, R)."""
+    """Fill one share of `codes` (B, R), and of `sse` (B, R) or, without samples, `values` (B, N).
+
+    starts : where a recording begins in `samples` or `values`
+    """
     q = np.empty(11)
     nothing = np.empty(0)
     no_events = np.empty((0, 2))
@@ -61,63 +65,38 @@ def sums(
     for b in range(rows[0], rows[1]):
         for r in range(items[0], items[1]):
             gather(q, theta[b], columns[r], constants[r])
-            data = samples[starts[r] : starts[r] + counts[r]]
-            sink = Sink(data, nothing, nothing, no_events)
-            sse[b, r], _, codes[b, r] = run(q, mass, intervals[r], counts[r], sink, mine)
+            first, end = starts[r], starts[r] + counts[r]
+            if samples.size:
+                sink = Sink(samples[first:end], nothing, nothing, no_events)
+                sse[b, r], _, codes[b, r] = run(q, mass, intervals[r], counts[r], sink, mine)
+            else:
+                out = values[b, first:end]
+                sink = Sink(samples, out, nothing, no_events)
+                _, _, codes[b, r] = run(q, mass, intervals[r], counts[r], sink, mine)
+                if codes[b, r] != 0:
+                    out[:] = np.nan
 
 
 @compiled(parallel=True)
-def sums_in_parts(
+def work_in_parts(
     theta: Floats, columns: Ints, constants: Floats, mass: float, samples: Floats, starts: Ints,
-    counts: Ints, intervals: Floats, parts: int, sse: Floats, codes: Ints,
+    counts: Ints, intervals: Floats, parts: int, sse: Floats, values: Floats, codes: Ints,
 ) -> None:  # fmt: skip
-    """Fill `sse` and `codes` (B, R), shares in parallel."""
+    """As `work`, all shares, in parallel."""
     for part in numba.prange(parts):
-        rows, items = share(part, parts, sse.shape[0], sse.shape[1])
-        sums(
+        rows, items = share(part, parts, codes.shape[0], codes.shape[1])
+        work(
             theta, columns, constants, mass, samples, starts, counts, intervals, rows, items,
-            sse, codes,
+            sse, values, codes,
         )  # fmt: skip
 
 
 @compiled()
-def predict(
-    theta: Floats, columns: Ints, constants: Floats, mass: float, counts: Ints, intervals: Floats,
-    rows: Span, items: Span, values: Floats, codes: Ints,
-) -> None:  # fmt: skip
-    """Fill one share of `values` (B, N) and `codes` (B, R); failed recordings become nan."""
-    q = np.empty(11)
-    nothing = np.empty(0)
-    no_events = np.empty((0, 2))
-    mine = shelf()
-    for b in range(rows[0], rows[1]):
-        start = counts[: items[0]].sum()
-        for r in range(items[0], items[1]):
-            gather(q, theta[b], columns[r], constants[r])
-            out = values[b, start : start + counts[r]]
-            sink = Sink(nothing, out, nothing, no_events)
-            _, _, codes[b, r] = run(q, mass, intervals[r], counts[r], sink, mine)
-            if codes[b, r] != 0:
-                out[:] = np.nan
-            start += counts[r]
-
-
-@compiled(parallel=True)
-def predict_in_parts(
-    theta: Floats, columns: Ints, constants: Floats, mass: float, counts: Ints, intervals: Floats,
-    parts: int, values: Floats, codes: Ints,
-) -> None:  # fmt: skip
-    """Fill `values` (B, N) and `codes` (B, R), shares in parallel."""
-    for part in numba.prange(parts):
-        rows, items = share(part, parts, codes.shape[0], codes.shape[1])
-        predict(theta, columns, constants, mass, counts, intervals, rows, items, values, codes)
-
-
-@compiled()
 def single(
-    q: Floats, mass: float, interval: float, out: Floats, speeds: Floats, events: Floats
-) -> tuple[float, int, int]:
+    q: Floats, mass: float, interval: float, no_data: Floats, out: Floats, speeds: Floats,
+    events: Floats,
+) -> tuple[float, int, int]:  # fmt: skip
     """Simulate one recording into `out`, `speeds` and `events` (see `Sink`); as `kernel.run`."""
-    sink = Sink(np.empty(0), out, speeds, events)
+    sink = Sink(no_data, out, speeds, events)
     done: tuple[float, int, int] = run(q, mass, interval, out.size, sink, shelf())
     return done

@@ -15,13 +15,13 @@ from numpy.typing import ArrayLike
 
 from bayesimpact.errors import InputError
 from bayesimpact.model import batch as compiled_batch
-from bayesimpact.model.arguments import check_model, check_samples
+from bayesimpact.model.arguments import ModelArguments, check_model, check_samples, no_samples
 from bayesimpact.model.basis import FORCED, PLAIN
 from bayesimpact.model.batch import Floats, Ints, Span, gather, share
 from bayesimpact.model.blocks import Sink
 from bayesimpact.model.compiled import compiled
 from bayesimpact.model.kernel import run
-from bayesimpact.model.scaled import OK, OVERFLOW, begins_in_contact
+from bayesimpact.model.scaled import OK, OVERFLOW, A, begins_in_contact
 from bayesimpact.model.sweep import Lanes, desk, sweep
 from bayesimpact.model.tables import Shelf, shelf
 
@@ -45,94 +45,73 @@ def wanted(active: Lanes, columns: Ints, forced: bool) -> Lanes:
 
 @compiled()
 def find_events(
-    q: Floats, mass: float, interval: float, n: int, events: Floats, mine: Shelf
+    q: Floats, mass: float, interval: float, n: int, no_data: Floats, events: Floats, mine: Shelf
 ) -> tuple[Floats, int]:
     """Return (events, code): all events of one recording, in `events` if there is room."""
     nothing = np.empty(0)
-    _, count, code = run(q, mass, interval, n, Sink(nothing, nothing, nothing, events), mine)
+    _, count, code = run(q, mass, interval, n, Sink(no_data, nothing, nothing, events), mine)
     if count > events.shape[0] and code == OK:
         events = np.empty((count, 2))
-        run(q, mass, interval, n, Sink(nothing, nothing, nothing, events), mine)
+        run(q, mass, interval, n, Sink(no_data, nothing, nothing, events), mine)
     return events[:count], code
 
 
 @compiled()
-def gram_share(
+def work(
     theta: Floats, columns: Ints, constants: Floats, mass: float, samples: Floats, starts: Ints,
-    counts: Ints, intervals: Floats, size: int, rows: Span, items: Span, out: Floats, codes: Ints,
+    counts: Ints, intervals: Floats, size: int, rows: Span, items: Span, out: Floats,
+    values: Floats, jacobian: Floats, codes: Ints,
 ) -> None:  # fmt: skip
-    """Fill one share of `out` (B, R, 12, 12) and `codes` (B, R)."""
+    """Fill one share of `codes` (B, R), and of the Gram matrices `out` (B, R, 12, 12).
+
+    Without samples, and for one theta, fill `values` (N,) and `jacobian` (N, 11) instead. What
+    belongs to a failed simulation becomes nan.
+    """
     q = np.empty(11)
-    nothing, no_matrix = np.empty(0), np.empty((0, 0))
+    unused = np.empty((12, 12))
     active = np.empty(11, dtype=np.uint64)
     first_events = np.empty((EVENTS, 2))
-    mine = shelf()
-    room = desk(size, True)
+    mine, room = shelf(), desk(size, samples.size > 0)
     for b in range(rows[0], rows[1]):
         for r in range(items[0], items[1]):
             gather(q, theta[b], columns[r], constants[r])
             n = counts[r]
-            gram = out[b, r]
+            first, end = starts[r], starts[r] + n
+            if samples.size:
+                data, gram, own, slopes = samples[first:end], out[b, r], values, jacobian
+            else:
+                data, gram = samples, unused
+                own, slopes = values[first:end], jacobian[first:end]
             gram[:] = 0.0
-            events, code = find_events(q, mass, intervals[r], n, first_events, mine)
+            slopes[:] = 0.0
+            events, code = find_events(q, mass, intervals[r], n, samples[:0], first_events, mine)
             if code == OK:
                 sweep(
                     q, mass, intervals[r], n, events, begins_in_contact(q),
-                    wanted(active, columns[r], size > PLAIN), samples[starts[r] : starts[r] + n],
-                    nothing, no_matrix, gram, room,
+                    wanted(active, columns[r], size > PLAIN), data, own, slopes, gram, room,
                 )  # fmt: skip
-                if not math.isfinite(gram.sum()):
+                if not math.isfinite(gram.sum() + own.sum() + slopes.sum()):
                     code = OVERFLOW
-            codes[b, r] = code
             if code != OK:
                 gram[:] = np.nan
+                own[:] = np.nan
+                slopes[:] = np.nan
+            codes[b, r] = code
 
 
 @compiled(parallel=True)
-def gram_parts(
+def work_in_parts(
     theta: Floats, columns: Ints, constants: Floats, mass: float, samples: Floats, starts: Ints,
-    counts: Ints, intervals: Floats, size: int, parts: int, out: Floats, codes: Ints,
+    counts: Ints, intervals: Floats, size: int, parts: int, out: Floats, values: Floats,
+    jacobian: Floats, codes: Ints,
 ) -> None:  # fmt: skip
-    """Fill `out` (B, R, 12, 12) and `codes` (B, R), shares in parallel."""
+    """As `work`, all shares, in parallel."""
     for part in numba.prange(parts):
         rows, items = share(part, parts, codes.shape[0], codes.shape[1])
-        gram_share(
+        work(
             theta, columns, constants, mass, samples, starts, counts, intervals, size, rows, items,
-            out, codes,
+            out, values, jacobian, codes,
         )  # fmt: skip
-
-
-@compiled()
-def derivative_rows(
-    theta: Floats, columns: Ints, constants: Floats, mass: float, counts: Ints, intervals: Floats,
-    size: int, values: Floats, jacobian: Floats, codes: Ints,
-) -> None:  # fmt: skip
-    """Fill `values` (N,), `jacobian` (N, 11) and `codes` (R,) for one theta (d,)."""
-    q = np.empty(11)
-    nothing, no_matrix = np.empty(0), np.empty((0, 0))
-    active = np.empty(11, dtype=np.uint64)
-    first_events = np.empty((EVENTS, 2))
-    mine = shelf()
-    room = desk(size, False)
-    start = 0
-    for r in range(columns.shape[0]):
-        gather(q, theta, columns[r], constants[r])
-        n = counts[r]
-        own, rows = values[start : start + n], jacobian[start : start + n]
-        rows[:] = 0.0
-        events, code = find_events(q, mass, intervals[r], n, first_events, mine)
-        if code == OK:
-            sweep(
-                q, mass, intervals[r], n, events, begins_in_contact(q),
-                wanted(active, columns[r], size > PLAIN), nothing, own, rows, no_matrix, room,
-            )  # fmt: skip
-            if not (math.isfinite(own.sum()) and math.isfinite(rows.sum())):
-                code = OVERFLOW
-        codes[r] = code
-        if code != OK:
-            own[:] = np.nan
-            rows[:] = np.nan
-        start += n
 
 
 def trajectories_and_derivatives(
@@ -159,12 +138,8 @@ def trajectories_and_derivatives(
     if int(model.counts.sum()) != n_total:
         raise InputError("n_total", str(n_total), f"the sum of counts, {model.counts.sum()}")
     values, jacobian = np.empty(n_total), np.empty((n_total, 11))
-    codes = np.empty(len(model.columns), dtype=np.int64)
-    derivative_rows(
-        model.theta[0], model.columns, model.constants, float(mass), model.counts, model.intervals,
-        _basis_size(model.columns, model.constants), values, jacobian, codes,
-    )  # fmt: skip
-    return values, jacobian, codes
+    codes = _work(model, mass, *no_samples(model), np.empty((0, 0, 12, 12)), values, jacobian)
+    return values, jacobian, codes[0]
 
 
 def grams(
@@ -190,24 +165,28 @@ def grams(
     thetas = np.atleast_2d(np.asarray(theta, dtype=np.float64))
     model = check_model(thetas, columns, constants, intervals, counts)
     data, first = check_samples(samples, starts, model)
-    batch, recordings = len(model.theta), len(model.columns)
-    out = np.empty((batch, recordings, 12, 12))
-    codes = np.empty((batch, recordings), dtype=np.int64)
-    arguments = (
-        model.theta, model.columns, model.constants, float(mass), data, first, model.counts,
-        model.intervals, _basis_size(model.columns, model.constants),
-    )  # fmt: skip
-    parts = compiled_batch.parts(batch, int(model.counts.sum()))
-    if parts == 1:
-        gram_share(*arguments, (0, batch), (0, recordings), out, codes)
-    else:
-        gram_parts(*arguments, parts, out, codes)
+    out = np.empty((len(model.theta), len(model.columns), 12, 12))
+    codes = _work(model, mass, data, first, out, np.empty(0), np.empty((0, 11)))
     if np.ndim(theta) == 1:
         return out[0], codes[0]
     return out, codes
 
 
-def _basis_size(columns: Ints, constants: Floats) -> int:
-    """Derivatives with respect to the force are wanted also where it is 0."""
-    forced = np.any(columns[:, 7] >= 0) or np.any(constants[:, 7] != 0.0)
-    return FORCED if forced else PLAIN
+def _work(
+    model: ModelArguments, mass: float, data: Floats, first: Ints, out: Floats, values: Floats,
+    jacobian: Floats,
+) -> Ints:  # fmt: skip
+    batch, recordings = len(model.theta), len(model.columns)
+    codes = np.empty((batch, recordings), dtype=np.int64)
+    # derivatives with respect to the force are wanted also where it is 0
+    forced = np.any(model.columns[:, A] >= 0) or np.any(model.constants[:, A] != 0.0)
+    arguments = (
+        model.theta, model.columns, model.constants, float(mass), data, first, model.counts,
+        model.intervals, FORCED if forced else PLAIN,
+    )  # fmt: skip
+    parts = compiled_batch.parts(batch, int(model.counts.sum()))
+    if parts == 1:
+        work(*arguments, (0, batch), (0, recordings), out, values, jacobian, codes)
+    else:
+        work_in_parts(*arguments, parts, out, values, jacobian, codes)
+    return codes

@@ -20,7 +20,13 @@ from numpy.typing import ArrayLike
 from bayesimpact.errors import InputError, SimulationError
 from bayesimpact.model import batch as compiled_batch
 from bayesimpact.model import scaled
-from bayesimpact.model.arguments import check_model, check_samples
+from bayesimpact.model.arguments import (
+    ModelArguments,
+    check_model,
+    check_samples,
+    floats,
+    no_samples,
+)
 from bayesimpact.model.batch import Floats, Ints
 from bayesimpact.model.scaled import Q
 
@@ -72,18 +78,8 @@ def sums_of_squares(
     """
     model = check_model(theta, columns, constants, intervals, counts)
     data, first = check_samples(samples, starts, model)
-    batch, recordings = model.theta.shape[0], model.columns.shape[0]
-    sse = np.empty((batch, recordings))
-    codes = np.empty((batch, recordings), dtype=np.int64)
-    parts = compiled_batch.parts(batch, int(model.counts.sum()))
-    arguments = (
-        model.theta, model.columns, model.constants, float(mass), data, first, model.counts,
-        model.intervals,
-    )  # fmt: skip
-    if parts == 1:
-        compiled_batch.sums(*arguments, (0, batch), (0, recordings), sse, codes)
-    else:
-        compiled_batch.sums_in_parts(*arguments, parts, sse, codes)
+    sse = np.empty((len(model.theta), len(model.columns)))
+    codes = _work(model, mass, data, first, sse, np.empty((0, 0)))
     return sse, codes
 
 
@@ -102,19 +98,10 @@ def predictions(
     m, recordings one after the other, nan where a simulation failed, and (B, R) codes.
     """
     model = check_model(theta, columns, constants, intervals, counts)
-    batch, recordings = model.theta.shape[0], model.columns.shape[0]
     if int(model.counts.sum()) != n_total:
         raise InputError("n_total", str(n_total), f"the sum of counts, {model.counts.sum()}")
-    values = np.empty((batch, n_total))
-    codes = np.empty((batch, recordings), dtype=np.int64)
-    parts = compiled_batch.parts(batch, n_total)
-    arguments = (
-        model.theta, model.columns, model.constants, float(mass), model.counts, model.intervals
-    )  # fmt: skip
-    if parts == 1:
-        compiled_batch.predict(*arguments, (0, batch), (0, recordings), values, codes)
-    else:
-        compiled_batch.predict_in_parts(*arguments, parts, values, codes)
+    values = np.empty((len(model.theta), n_total))
+    codes = _work(model, mass, *no_samples(model), np.empty((0, 0)), values)
     return values, codes
 
 
@@ -129,8 +116,9 @@ def trajectory(q: ArrayLike, mass: float, interval: float, out: Floats) -> int:
         raise InputError("q", f"shape {values.shape}", "(11,)")
     values[10] = 0.0
     nothing, no_events = np.empty(0), np.empty((0, 2))
+    no_data = floats("data", (), 1)
     _, _, code = compiled_batch.single(
-        values, float(mass), float(interval), out, nothing, no_events
+        values, float(mass), float(interval), no_data, out, nothing, no_events
     )
     return int(code)
 
@@ -197,10 +185,14 @@ def simulate(
     if code != scaled.OK:
         raise InputError("simulate", CODES[code], "see the docstring of `simulate`")
     events = np.empty((1024, 2))
-    _, count, code = compiled_batch.single(q, mass, interval, displacement, velocity, events)
+    _, count, code = compiled_batch.single(
+        q, mass, interval, floats("data", (), 1), displacement, velocity, events
+    )
     if count > len(events) and code == scaled.OK:
         events = np.empty((count, 2))
-        _, count, code = compiled_batch.single(q, mass, interval, displacement, velocity, events)
+        _, count, code = compiled_batch.single(
+            q, mass, interval, floats("data", (), 1), displacement, velocity, events
+        )
     if code != scaled.OK:
         raise SimulationError(CODES[code])
     velocity /= interval
@@ -215,6 +207,23 @@ def simulate(
     for array in (times, displacement, velocity, impacts):
         array.flags.writeable = False
     return Trajectory(times, displacement, velocity, impacts)
+
+
+def _work(
+    model: ModelArguments, mass: float, data: Floats, first: Ints, sse: Floats, values: Floats
+) -> Ints:
+    batch, recordings = len(model.theta), len(model.columns)
+    codes = np.empty((batch, recordings), dtype=np.int64)
+    parts = compiled_batch.parts(batch, int(model.counts.sum()))
+    arguments = (
+        model.theta, model.columns, model.constants, float(mass), data, first, model.counts,
+        model.intervals,
+    )  # fmt: skip
+    if parts == 1:
+        compiled_batch.work(*arguments, (0, batch), (0, recordings), sse, values, codes)
+    else:
+        compiled_batch.work_in_parts(*arguments, parts, sse, values, codes)
+    return codes
 
 
 def _number(name: str, value: object) -> float:

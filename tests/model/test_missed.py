@@ -23,7 +23,9 @@ TOLERANCE = 1e-11
 def worst_excess(system: systems.System) -> tuple[float, int]:
     """Largest breach of a regime, relative to the amplitude; and the number of events."""
     q, mass = system.q, system.mass
-    events, code = find_events(q, mass, system.interval, system.n, np.empty((64, 2)), shelf())
+    events, code = find_events(
+        q, mass, system.interval, system.n, np.empty(0), np.empty((64, 2)), shelf()
+    )
     assert code == 0, system
     w1 = math.sqrt(q[1] / mass)
     end = (system.n - 1) * system.interval
