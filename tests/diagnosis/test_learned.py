@@ -1,0 +1,84 @@
+"""The free force's splines against SciPy's, compiled against Python, and in the simulator."""
+
+from __future__ import annotations
+
+import ctypes
+
+import numpy as np
+import pytest
+from effect_rigs import TestRig
+from scipy.interpolate import BSpline
+
+from bayesimpact.diagnosis.learned import force, learned_force, spline_basis
+from bayesimpact.model.effects.effect import address
+from bayesimpact.model.oscillator import build_oscillator
+
+LOW, HIGH, KNOTS = -6.5e-3, 3.5e-3, 12
+SPACING = (HIGH - LOW) / (KNOTS - 3)
+
+
+def scipy_basis(y: np.ndarray) -> np.ndarray:
+    knots = LOW + SPACING * np.arange(-3, KNOTS + 1)
+    return np.stack([BSpline(knots, row, 3)(y) for row in np.eye(KNOTS)], axis=1)
+
+
+def test_basis_is_that_of_cubic_splines():
+    y = np.linspace(LOW, HIGH, 301)
+    np.testing.assert_allclose(spline_basis(y, LOW, SPACING, KNOTS), scipy_basis(y), atol=1e-12)
+    np.testing.assert_allclose(spline_basis(y, LOW, SPACING, KNOTS).sum(axis=1), 1.0)
+
+
+def test_beyond_the_range_the_force_stays_what_it_was_at_the_end():
+    outside = spline_basis(np.array([LOW - 1.0, HIGH + 1.0]), LOW, SPACING, KNOTS)
+    np.testing.assert_array_equal(outside, spline_basis(np.array([LOW, HIGH]), LOW, SPACING, KNOTS))
+
+
+def parameters(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.concatenate([[KNOTS, LOW, SPACING], a, b])
+
+
+def test_compiled_force_is_the_python_one_and_the_splines():
+    rng = np.random.default_rng(0)
+    a, b = rng.standard_normal((2, KNOTS))
+    p = parameters(a, b)
+    pointer = ctypes.POINTER(ctypes.c_double)
+    compiled = ctypes.CFUNCTYPE(ctypes.c_double, *[ctypes.c_double] * 6, pointer, pointer)(
+        address(force)
+    )
+    data = p.ctypes.data_as(pointer)
+    for y in [LOW - 1e-3, LOW, 0.0, 0.3e-3, HIGH - 1e-9, HIGH, HIGH + 1e-3]:
+        v = float(rng.standard_normal())
+        row = spline_basis(np.array([y]), LOW, SPACING, KNOTS)[0]
+        expected = row @ a + row @ b * v
+        assert force(y, v, 0.0, 0.0, 0.0, 0.0, p, None) == pytest.approx(expected, rel=1e-12)
+        found = compiled(y, v, 0.0, 0.0, 0.0, 0.0, data, data)
+        assert found == pytest.approx(expected, rel=1e-12)
+
+
+def coefficients_of_a_line() -> np.ndarray:
+    """Coefficients whose spline is y itself: the Greville points."""
+    return LOW + SPACING * np.arange(-1, KNOTS - 1)
+
+
+def test_a_linear_force_is_a_change_of_stiffness_and_damping():
+    """a(y) = 8 y, b = 0.02 in the general simulator against the base one with k1 + 8, c1 + 0.02."""
+    rig = TestRig(duration=1.0)
+    effect = learned_force(LOW, HIGH, 1.0, 1.0, KNOTS)
+    values = {f"learned_force.a{i + 1}": 8 * c for i, c in enumerate(coefficients_of_a_line())}
+    values |= {f"learned_force.b{i + 1}": 0.02 for i in range(KNOTS)}
+    oscillator = build_oscillator(rig.campaign(), [effect])
+    found = oscillator.predict(rig.theta(oscillator, values))
+    base = build_oscillator(rig.campaign())
+    theta = rig.theta(base, {"k1": rig.k1 + 8, "c1": rig.c1 + 0.02})
+    for one, other in zip(found, base.predict(theta), strict=True):
+        assert np.abs(one).max() <= -LOW  # inside the splines' range
+        np.testing.assert_allclose(one, other, atol=1e-10)
+
+
+def test_its_priors_and_names():
+    effect = learned_force(LOW, HIGH, 2e-3, 5e-2, KNOTS)
+    free = [p for p in effect.parameters if p.fixed is None]
+    assert [p.name for p in free[:2]] == ["a1", "a2"] and free[-1].name == f"b{KNOTS}"
+    assert {p.scale(TestRig().scales()) for p in free[:KNOTS]} == {2e-3}
+    assert {p.scale(TestRig().scales()) for p in free[KNOTS:]} == {5e-2}
+    assert effect.family == "unknown"
