@@ -27,6 +27,10 @@ CHAIN_FOLDER = "chain"
 Say = Callable[[str], None]
 
 
+def silent(message: str) -> None:
+    """Say nothing."""
+
+
 @dataclass(frozen=True, eq=False)
 class Outcome:
     """What a command made.
@@ -44,7 +48,7 @@ class Outcome:
 
 
 def fit_campaign(
-    campaign: Campaign, out: Path, *, seed: int = 0, command: str = "", say: Say = print
+    campaign: Campaign, out: Path, *, seed: int = 0, command: str = "", say: Say = silent
 ) -> Outcome:
     """Mode of the base model: fit.json, figures and report in `out`."""
     began = time.perf_counter()
@@ -63,7 +67,7 @@ def sample_campaign(
     seed: int = 0,
     resume: bool = False,
     command: str = "",
-    say: Say = print,
+    say: Say = silent,
 ) -> Outcome:
     """Posterior of the base model: posterior.nc, figures and report in `out`; the chain is kept in
     `out`/chain.
@@ -93,7 +97,7 @@ def diagnose_campaign(
     seed: int = 0,
     quick: bool = False,
     command: str = "",
-    say: Say = print,
+    say: Say = silent,
 ) -> Outcome:
     """The whole loop: diagnosis.json, posterior.nc, figures and report in `out`."""
     began = time.perf_counter()

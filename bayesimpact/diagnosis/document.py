@@ -134,7 +134,8 @@ def _statement(d: Diagnosis, effect: Effect) -> str:
     if d.filtered is not None and effect.id == "smoothing":
         return effect.statement.format(size=filter_words(d.filtered))
     size, share = sizes(effect, d.before, d.after, d.scales)
-    return statement(effect, size, share, parameter_shifts(d.before, d.after))
+    alone = len(d.effects) == 1  # of several effects nobody can say which one moved a parameter
+    return statement(effect, size, share, parameter_shifts(d.before, d.after) if alone else {})
 
 
 def _location(d: Diagnosis) -> dict[str, Any] | None:

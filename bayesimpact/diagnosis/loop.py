@@ -16,9 +16,9 @@ from bayesimpact.diagnosis.heldout import HeldOut, held_out_cases, held_out_reco
 from bayesimpact.diagnosis.honest import Widened, widened
 from bayesimpact.diagnosis.limits import Limit, limits
 from bayesimpact.diagnosis.locate import Location, locate
-from bayesimpact.diagnosis.name import Naming, name
+from bayesimpact.diagnosis.name import Naming, is_gross, name
 from bayesimpact.diagnosis.refit import Candidate
-from bayesimpact.diagnosis.smoothing import proved_smoothing, with_smoothing
+from bayesimpact.diagnosis.smoothing import SMOOTHING, proved_smoothing, whole_campaign
 from bayesimpact.diagnosis.unknown import learn_force
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification, identify
@@ -27,7 +27,6 @@ from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.effects.effect import Effect, Scales
 
 Array = NDArray[np.float64]
-GROSS = 3.0  # base residual over noise from which on a misfit is no longer concealed
 NEARLY_ALL = 0.9  # of the squared residual
 
 Verdict = Literal["adequate", "named", "ambiguous", "unknown"]
@@ -113,6 +112,22 @@ def diagnose(
     return with_smoothing(found, identification, filtered)
 
 
+def with_smoothing(
+    found: Diagnosis, identification: Identification, filtered: Fingerprint
+) -> Diagnosis:
+    """The diagnosis made through the filter, told from the fit that knew nothing of it."""
+    location = found.location or whole_campaign(identification)
+    return replace(
+        found,
+        verdict="named" if found.verdict == "adequate" else found.verdict,
+        identification=replace(found.identification, search=identification.search),
+        before=identification.fit,
+        effects=(SMOOTHING, *found.effects),
+        location=location,
+        filtered=filtered,
+    )
+
+
 def diagnose_fit(
     identification: Identification,
     *,
@@ -181,8 +196,10 @@ def explains_gross_misfit(naming: Naming) -> bool:
     away.
     """
     base, chosen = naming.base.candidate.fit, naming.chosen.candidate.fit
-    gross = base.reduced_chi2 > GROSS**2
-    return gross and (base.reduced_chi2 - chosen.reduced_chi2) > NEARLY_ALL * base.reduced_chi2
+    return (
+        is_gross(base)
+        and (base.reduced_chi2 - chosen.reduced_chi2) > NEARLY_ALL * base.reduced_chi2
+    )
 
 
 def ordered(naming: Naming, effects: tuple[Effect, ...]) -> tuple[Effect, ...]:

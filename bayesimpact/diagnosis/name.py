@@ -16,7 +16,8 @@ import numpy as np
 from bayesimpact.diagnosis.force import MissingForce, missing_force
 from bayesimpact.diagnosis.pairs import promising_pairs
 from bayesimpact.diagnosis.refit import Candidate, base_candidate, refit, without
-from bayesimpact.diagnosis.scan import Scan, Score, scan
+from bayesimpact.diagnosis.scan import Scan, scan
+from bayesimpact.diagnosis.scores import Score
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
 
@@ -26,6 +27,8 @@ MOST_EFFECTS = 3
 WORTH_A_REFIT = 4.0  # expected gain in log likelihood, nats
 NEAR_BEST = 0.3  # of the best expected gain, less a margin: below that no refit makes a rival
 NEAR_MARGIN = 10.0  # nats
+GROSS = 3.0  # residual over noise from which on a misfit is no longer concealed
+LEAST_STEP = 0.8  # an effect that takes less than this off a gross residual is not worth a name
 BEAM = 3  # models that are extended further while the best one is not white
 PAIRS = 4  # refitted at the first step
 
@@ -86,6 +89,7 @@ class Naming:
             c
             for c in self.tried
             if self.log_odds(c) > floor
+            and len(c.effects) <= len(chosen.effects)
             and not set(chosen.ids) <= set(c.ids)
             and not _is_elaboration(c, chosen)
         )
@@ -125,6 +129,11 @@ def name(
         better = [c for s in beam for c in search.extended(s)]
         better = sorted({c.ids: c for c in better}.values(), key=search.worth, reverse=True)
         if not better or search.worth(better[0]) <= search.worth(state.candidate):
+            break
+        if (
+            is_gross(state.candidate.fit)
+            and better[0].fit.rms > LEAST_STEP * state.candidate.fit.rms
+        ):
             break
         state = search.examine(better[0])
         if not state.is_white:
@@ -220,10 +229,16 @@ class _Search:
 
     def naming(self, base: State, chosen: State) -> Naming:
         tried = tuple(sorted(self.tried.values(), key=self.worth, reverse=True))
-        best = tried[0]
-        if set(best.ids) != set(chosen.candidate.ids) and len(best.effects) <= MOST_EFFECTS:
+        size = len(chosen.candidate.effects)
+        best = next(c for c in tried if len(c.effects) <= size)
+        if set(best.ids) != set(chosen.candidate.ids):
             chosen = self.examine(best)
         return Naming(base, chosen, tried, self.cost)
+
+
+def is_gross(fit: Fit) -> bool:
+    """True when the residual dwarfs the noise: evidence then counts neighbours that say the same."""
+    return fit.reduced_chi2 > GROSS**2
 
 
 def worth_a_refit(scan: Scan) -> list[Score]:

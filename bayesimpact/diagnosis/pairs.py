@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bayesimpact.diagnosis.scan import Scan, Score
+from bayesimpact.diagnosis.scan import Scan
+from bayesimpact.diagnosis.scores import Score
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from scipy.signal import czt
 
 from bayesimpact.diagnosis.directions import is_periodic, sigma_of
 from bayesimpact.diagnosis.force import whitened_one
-from bayesimpact.diagnosis.scan import LIMIT_SD, Score
+from bayesimpact.diagnosis.scores import LIMIT_SD, Score
 from bayesimpact.inference.fit import Fit, inverse
 from bayesimpact.model.effects.effect import Effect, Scales
 from bayesimpact.model.parameters import SLOTS
@@ -26,6 +26,7 @@ from bayesimpact.model.parameters import SLOTS
 Array = NDArray[np.float64]
 
 RESPONSE_REACH = 2.0  # forcing is looked for up to so many times the natural frequency in contact
+HUM_ABOVE = 1.5  # times the natural frequency of free flight
 _FORCE, _OMEGA, _PHASE = (SLOTS.index(s) for s in ("A", "w", "phase"))
 
 
@@ -64,7 +65,9 @@ def frequencies(fit: Fit, effect: Effect, scales: Scales) -> Array:
     if effect.observe is None:
         stiffest = (scales.stiffness + scales.contact_stiffness) / scales.mass
         nyquist = min(0.9 * nyquist, RESPONSE_REACH * np.sqrt(stiffest) / (2 * np.pi))
-    return np.arange(2 * spacing, nyquist, spacing)
+        return np.arange(2 * spacing, nyquist, spacing)
+    lowest = HUM_ABOVE * scales.natural_frequency  # below, the motion itself would pass for a hum
+    return np.arange(max(2 * spacing, lowest), nyquist, spacing)
 
 
 def _best_frequency(fit: Fit, effect: Effect, scales: Scales) -> Score | None:

@@ -16,7 +16,7 @@ from bayesimpact.diagnosis.extend import (
     replaced_slot,
     transfer,
 )
-from bayesimpact.diagnosis.scan import Score
+from bayesimpact.diagnosis.scores import Score
 from bayesimpact.inference.fit import Fit, find_mode
 from bayesimpact.model.effects.effect import Effect, Scales
 from bayesimpact.model.parameters import is_added

@@ -8,7 +8,7 @@ that overlap are not counted twice (maxT of Westfall and Young 1993, with Gaussi
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,46 +16,16 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from bayesimpact.diagnosis.directions import Direction, directions
+from bayesimpact.diagnosis.periodic import periodic_scores
 from bayesimpact.diagnosis.projection import Projection, project
+from bayesimpact.diagnosis.scores import LIMIT_SD, Score
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
 
 Array = NDArray[np.float64]
 
 DRAWS = 4000  # of the joint law; resolves p down to 1/4000, beyond that Bonferroni bounds it
-LIMIT_SD = 5.0  # the detection limit is the size that stands out by so many standard errors
 RANK_TOLERANCE = 1e-7
-
-
-@dataclass(frozen=True, eq=False)
-class Score:
-    """What the recordings say of one effect at one point of its shape grid.
-
-    Attributes
-    ----------
-    effect, shapes : which
-    z : equivalent standard normal score (signed where the effect has one size)
-    p_value : of this score alone
-    size, size_sd : expected size of every size parameter and its standard error, (k,)
-    limit : detection limit of the first size, LIMIT_SD standard errors
-    bias : shift of the model's parameters that ignoring this size causes, (d,), in their standard
-        deviations
-    kept : fraction of the response that refitting the model cannot imitate
-    gain : expected gain in log likelihood
-    names : of the size parameters
-    """
-
-    effect: Effect
-    shapes: Mapping[str, float]
-    z: float
-    p_value: float
-    size: Array
-    size_sd: Array
-    limit: float
-    bias: Array
-    kept: float
-    gain: float
-    names: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,8 +57,6 @@ class Scan:
 
 def scan(fit: Fit, effects: Sequence[Effect], scales: Scales, *, rng: np.random.Generator) -> Scan:
     """Score every effect that the fit's model does not contain."""
-    from bayesimpact.diagnosis.periodic import periodic_scores
-
     single = score_directions(fit, directions(fit, effects, scales), rng=rng)
     periodic = periodic_scores(fit, effects, scales)
     families = [single.p_value, *(s.p_value for s in periodic)]

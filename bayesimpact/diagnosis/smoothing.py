@@ -5,17 +5,15 @@ effect.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.diagnosis.locate import Location
 from bayesimpact.inference.identify import Identification
 from bayesimpact.inference.spectrum import Fingerprint, find_smoothing
 from bayesimpact.model.effects.effect import Effect
-
-if TYPE_CHECKING:
-    from bayesimpact.diagnosis.loop import Diagnosis
 
 SMOOTHING = Effect(
     id="smoothing",
@@ -35,22 +33,6 @@ def proved_smoothing(campaign: Campaign) -> Fingerprint | None:
     return find_smoothing(campaign.recordings)
 
 
-def with_smoothing(
-    found: Diagnosis, identification: Identification, filtered: Fingerprint
-) -> Diagnosis:
-    """The diagnosis made through the filter, told from the fit that knew nothing of it."""
-    location = found.location or _everywhere(identification)
-    return replace(
-        found,
-        verdict="named" if found.verdict == "adequate" else found.verdict,
-        identification=replace(found.identification, search=identification.search),
-        before=identification.fit,
-        effects=(SMOOTHING, *found.effects),
-        location=location,
-        filtered=filtered,
-    )
-
-
 def filter_words(filtered: Fingerprint) -> str:
     """The filter in words."""
     s = filtered.smoothing
@@ -68,9 +50,8 @@ def filter_parameters(filtered: Fingerprint) -> Mapping[str, Mapping[str, Any]]:
     }
 
 
-def _everywhere(identification: Identification) -> Location:
-    import numpy as np
-
+def whole_campaign(identification: Identification) -> Location:
+    """The place of something in the measuring chain: all recordings, throughout."""
     fit = identification.fit
     campaign = fit.target.oscillator.campaign
     samples = np.concatenate([r.samples for r in campaign.recordings])

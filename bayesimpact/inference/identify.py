@@ -163,7 +163,7 @@ def global_search(
         lower,
         upper,
         rng=rng,
-        evaluations=evaluations or 600 * lower.size,
+        evaluations=evaluations or 1000 * lower.size,
         callback=callback,
     )
     return result, profile.complete(result.best[None])[0]

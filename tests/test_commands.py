@@ -1,0 +1,110 @@
+"""Commands on a small campaign: what they write and how they end."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from small_rig import RIG, record
+
+from bayesimpact.cli import main
+from bayesimpact.model.effects import EFFECTS
+from bayesimpact.trial.rig_files import write_campaign
+
+Run = Callable[..., tuple[int, str, str]]
+REAL = Path(
+    os.environ.get(
+        "BAYESIMPACT_RECORDINGS", Path(__file__).resolve().parents[2] / "shared" / "recordings"
+    )
+)
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Run:
+    def run(*arguments: object) -> tuple[int, str, str]:
+        with pytest.raises(SystemExit) as ended:
+            main([str(a) for a in arguments])
+        captured = capsys.readouterr()
+        return int(ended.value.code or 0), captured.out, captured.err
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("campaign")
+    write_campaign(folder, record(seed=3))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def sampled(campaign: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("sampled")
+    with pytest.raises(SystemExit) as ended:
+        main(["sample", str(campaign), "--out", str(out), "--quiet"])
+    assert ended.value.code in (0, None)
+    return out
+
+
+def test_fit_writes_the_mode_near_the_truth(run: Run, campaign: Path, tmp_path: Path) -> None:
+    code, out, _ = run("fit", campaign, "--out", tmp_path)
+    assert code == 0
+    assert (tmp_path / "report.html").exists() and "report.html" in out
+    rows = json.loads((tmp_path / "fit.json").read_text())["parameters"]
+    for name, true in {"k1": RIG.k1, "g": RIG.g, "k2[1]": RIG.k2["1"]}.items():
+        assert abs(rows[name]["mode"] - true) < 4.5 * rows[name]["sd"]
+
+
+def test_sample_leaves_what_the_contract_names(sampled: Path) -> None:
+    names = {p.name for p in sampled.iterdir()}
+    assert {"posterior.nc", "report.html", "figures", "fit.json"} <= names
+
+
+def test_resume_gives_the_same_posterior(run: Run, campaign: Path, sampled: Path) -> None:
+    before = (sampled / "fit.json").read_text()
+    code, _, _ = run("sample", campaign, "--out", sampled, "--resume", "--quiet")
+    assert code == 0
+
+    def medians(text: str) -> dict[str, float]:
+        return {name: row["median"] for name, row in json.loads(text)["parameters"].items()}
+
+    assert medians((sampled / "fit.json").read_text()) == medians(before)
+
+
+def test_report_is_written_again_from_the_files(run: Run, sampled: Path) -> None:
+    page = sampled / "report.html"
+    page.unlink()
+    code, _, _ = run("report", sampled)
+    assert code == 0 and page.stat().st_size > 10_000
+
+
+def test_report_of_an_empty_folder_is_refused(run: Run, tmp_path: Path) -> None:
+    code, out, err = run("report", tmp_path)
+    assert (code, out) == (2, "") and str(tmp_path) in err and list(tmp_path.iterdir()) == []
+
+
+def test_diagnose_finds_nothing_where_nothing_is(run: Run, campaign: Path, tmp_path: Path) -> None:
+    code, out, _ = run("diagnose", campaign, "--out", tmp_path, "--quick")
+    content = json.loads((tmp_path / "diagnosis.json").read_text())
+    assert code == 0 and content["schema"] == "bayesimpact/diagnosis/1"
+    assert content["verdict"] == "adequate" and content["effects"] == []
+    assert content["location"] is None and out.startswith("adequate")
+    assert {row["id"] for row in content["limits"]} >= {"coulomb_friction", "spring_cubic"}
+
+
+def test_effects_lists_the_whole_catalogue(run: Run) -> None:
+    code, out, _ = run("effects")
+    assert code == 0
+    assert all(f"\n{e.id}\n" in f"\n{out}" for e in EFFECTS)
+
+
+@pytest.mark.parametrize("name", ["pendulum", "ship_roll"])
+def test_a_linear_oscillator_is_told_not_to_fit(run: Run, name: str, tmp_path: Path) -> None:
+    if not (REAL / name).exists():
+        pytest.skip("the real recordings are not here")
+    code, out, _ = run("fit", REAL / name, "--out", tmp_path)
+    assert code in (0, 3)
+    assert "does not" in out and "times" in out
