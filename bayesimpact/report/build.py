@@ -32,7 +32,7 @@ from bayesimpact.report.results import (
     SamplerSummary,
     SearchSummary,
 )
-from bayesimpact.report.rows import build_rows
+from bayesimpact.report.rows import LEARNED, build_rows
 
 PACKAGES = ("bayesimpact", "numpy", "scipy", "numba", "emcee", "arviz")
 DRAWS_KEPT = 4000
@@ -88,10 +88,11 @@ def results_from_posterior(
     posterior : of `inference.posterior`, of the base model or with effects
     identification : how the mode was found; None leaves the search out
     backbone : simulate recordings for the posterior-predictive check of the backbone
-    before : posterior without the effects, shown beside this one
+    before : posterior without the effects, shown beside this one unless it is the same
     command, seconds, references, diagnosis, diagnosis_arrays : as in `results_from_fit`
     """
     fit = posterior.fit
+    before = None if before is posterior else before
     rng = np.random.default_rng([posterior.seed, 2])
     return _results(
         fit,
@@ -147,7 +148,9 @@ def _results(
         fit_converged=fit.converged,
         search=search,
         sampler=None if posterior is None else _sampler(posterior),
-        draws=None if posterior is None else _draws(posterior, "posterior"),
+        draws=None
+        if posterior is None
+        else _draws(posterior, "posterior" if before is None else "with added effects"),
         backbone=backbone,
         checks=(),
         provenance=provenance,
@@ -224,7 +227,9 @@ def _search(identification: Identification) -> SearchSummary | None:
 
 
 def _of_interest(fit: Fit) -> list[int]:
-    return [int(i) for i in fit.target.oscillator.layout.roles("physical", "effect")]
+    """Positions of the parameters that pictures show: no coefficients of a learned force."""
+    positions = fit.target.oscillator.layout.roles("physical", "effect")
+    return [int(i) for i in positions if not fit.names[i].startswith(LEARNED)]
 
 
 def _draws(posterior: Posterior, label: str) -> Draws:

@@ -193,7 +193,7 @@ def _sampler(results: Results) -> Check:
 
 
 def _gaussian(results: Results) -> Check:
-    ratio = np.array([row.posterior_sd / row.sd for row in results.rows])
+    ratio = np.array([row.posterior_sd / max(row.sd, 1e-300) for row in results.rows])
     worst = int(np.argmax(np.abs(np.log(np.maximum(ratio, 1e-300)))))
     furthest = results.rows[worst].name
     inside = bool(np.all((ratio > SD_RATIO[0]) & (ratio < SD_RATIO[1])))

@@ -156,12 +156,16 @@ def _fit(fit: Mapping[str, Any], unit: str) -> list[tuple[str, str, str]]:
     return [
         (words, _merit(before.get(key), kind, unit), _merit(after.get(key), kind, unit))
         for key, (words, kind) in _FIT_ROWS.items()
-        if before.get(key) is not None or after.get(key) is not None
+        if _known(before.get(key)) or _known(after.get(key))
     ]
 
 
+def _known(value: float | None) -> bool:
+    return value is not None and isfinite(value)
+
+
 def _merit(value: float | None, kind: str, unit: str) -> str:
-    if value is None:
+    if value is None or not isfinite(value):
         return "–"
     if kind == "m":
         return _amount(value, unit)
@@ -180,7 +184,7 @@ def _backbones(results: Results) -> list[tuple[str, str, str]]:
 def _held_out(fit: Mapping[str, Any]) -> str:
     gain = fit.get("held_out_gain") or {}
     value, error = gain.get("value"), gain.get("se")
-    if value is None or error is None:
+    if value is None or error is None or not isfinite(value) or gain.get("of") == 0:
         return ""
     words = (
         f"On recordings held out, the log score changes by {signed(value, 1)} ± {number(error, 1)} "

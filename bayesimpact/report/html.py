@@ -108,6 +108,8 @@ def _context(results: Results, pictures: Mapping[str, bytes]) -> dict[str, Any]:
 def _verdict_class(results: Results) -> str:
     if results.sampler is not None and not results.sampler.converged:
         return "bad"
+    if results.diagnosis is not None and results.diagnosis["verdict"] in ("ambiguous", "unknown"):
+        return ""
     return _VERDICT_CLASS[results.verdict]
 
 

@@ -15,6 +15,6 @@ def corner(posterior: Posterior, before: Posterior | None = None) -> Figure:
     """Corner plot of the physical parameters and effects; `before` is drawn beside, where given."""
     from bayesimpact.report.figures.corner import corner_figure
 
-    results = results_from_posterior(posterior, before=before)
+    results = results_from_posterior(posterior, backbone=False, before=before)
     assert results.draws is not None
     return corner_figure(results.draws, before=results.before)

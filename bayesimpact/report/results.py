@@ -71,7 +71,8 @@ class Row:
 
     Attributes
     ----------
-    name, unit, role : as in the contract; role is physical, effect, nuisance or noise
+    name, unit : as in the contract
+    role : physical, effect, learned (coefficients of a learned force), nuisance or noise
     meaning : in a few words
     mode, sd : where the posterior is highest, standard deviation there (Laplace)
     median, ci90 : of the posterior (of the Laplace approximation where there are no draws)

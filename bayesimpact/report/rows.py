@@ -15,6 +15,9 @@ from bayesimpact.report.units import dimensions, per_mass_unit, significant
 
 Z90 = 1.6448536269514722  # 95 % quantile of the standard normal distribution
 
+LEARNED = "learned_force."
+"""How the names of a learned force's coefficients begin: they mean nothing one by one."""
+
 _MEANINGS = {
     "c1": "damping of the suspension",
     "k1": "stiffness of the suspension",
@@ -53,7 +56,7 @@ def build_rows(
             Row(
                 name=parameter.name,
                 unit=parameter.unit,
-                role=parameter.role,
+                role="learned" if parameter.name.startswith(LEARNED) else parameter.role,
                 meaning=meaning(parameter, titles),
                 mode=mode,
                 sd=sd,

@@ -207,20 +207,21 @@ def sampler_views(results: Results) -> list[dict[str, str | Markup]]:
     ]
 
 
-def prior_views(results: Results) -> list[tuple[str | Markup, str]]:
-    """Parameter and prior; nuisances that share one prior on one row."""
+def prior_views(results: Results) -> list[tuple[Markup, str]]:
+    """Parameter and prior; nuisances and coefficients that share one prior on one row."""
     views: dict[tuple[str, str], list[Row]] = {}
     for row in results.rows:
-        shared = row.role in ("nuisance", "noise")
-        views.setdefault(
-            (row.name.partition("[")[0] if shared else row.name, row.prior), []
-        ).append(row)
-    return [
-        (
-            symbol(rows[0].name)
-            if len(rows) == 1
-            else symbol(key) + Markup(" of {} recordings").format(len(rows)),
-            prior,
-        )
-        for (key, prior), rows in views.items()
-    ]
+        views.setdefault((_family(row), row.prior), []).append(row)
+    words = []
+    for (family, prior), rows in views.items():
+        name = symbol(rows[0].name if len(rows) == 1 else family)
+        many = "coefficients" if rows[0].role == "learned" else "recordings"
+        words.append((name if len(rows) == 1 else name + escape(f" of {len(rows)} {many}"), prior))
+    return words
+
+
+def _family(row: Row) -> str:
+    """What rows have to share to stand together: all but the recording, or all but the number."""
+    if row.role in ("nuisance", "noise"):
+        return row.name.partition("[")[0]
+    return "learned_force" if row.role == "learned" else row.name

@@ -101,6 +101,8 @@ def write_posterior(
     archive_arviz.write_posterior(
         folder / POSTERIOR_FILE,
         inference_groups(posterior, results.provenance),
-        None if before is None else inference_groups(before, results.provenance),
+        None
+        if before is None or before is posterior
+        else inference_groups(before, results.provenance),
     )
     return write_results(results, folder)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from synthetic import NOISE, make_results, with_chain
+from synthetic import NOISE, make_results, row, with_chain
 
 from bayesimpact.report.checks import judged
 from bayesimpact.report.html import render
@@ -257,6 +257,23 @@ def test_improvement_needs_more_than_two_standard_errors() -> None:
     fit = dict(DIAGNOSIS["fit"]) | {"held_out_gain": {"value": 150.0, "se": 79.0}}  # type: ignore[call-overload]
     results = replace(make_results(), diagnosis=dict(DIAGNOSIS) | {"fit": fit})
     assert "no clear improvement" in page(results)[1].text
+
+
+def test_nothing_held_out_says_nothing_of_it() -> None:
+    nothing = {"value": 0.0, "se": 0.0, "of": 0}
+    side = {"rms_m": 5e-6, "held_out_log_score": float("nan")}
+    fit = {"before": side, "after": side, "held_out_gain": nothing}
+    bare = dict(DIAGNOSIS) | {"fit": fit}
+    text = page(replace(make_results(), diagnosis=bare))[1].text
+    assert "held out" not in text and "held-out" not in text and "residual rms 5.00 µm" in text
+
+
+def test_coefficients_of_a_learned_force_are_no_parameters() -> None:
+    results = make_results()
+    added = tuple(row(f"learned_force.a{i}", 1e-3, 1e-4, "N", "learned") for i in range(24))
+    text = page(replace(results, rows=(*results.rows, *added)))[1].text
+    assert "learned_force.a" not in text
+    assert "learned_force of 24 coefficients" in text
 
 
 @pytest.mark.parametrize("verdict", ["adequate", "unknown"])

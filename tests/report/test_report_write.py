@@ -106,11 +106,13 @@ def test_posterior_in_numbers(posterior: Posterior, identification: Identificati
 def test_folder_of_a_posterior(
     posterior: Posterior, identification: Identification, tmp_path: Path
 ) -> None:
-    results = write_posterior(posterior, identification, tmp_path, command="x", before=posterior)
+    base = replace(posterior, seed=4)
+    results = write_posterior(posterior, identification, tmp_path, command="x", before=base)
     names = {f.name for f in tmp_path.iterdir()}
     assert names == {"results.nc", "fit.json", POSTERIOR_FILE, REPORT_FILE, "figures"}
     assert load_results(tmp_path).headline == results.headline
-    assert read_posterior(tmp_path / POSTERIOR_FILE, "before").groups["posterior"]
+    assert read_posterior(tmp_path / POSTERIOR_FILE, "before").attrs["seed"] == 3
+    assert results.before is not None and results.before_backbone is not None
 
 
 def test_report_again_from_files_alone(tmp_path: Path) -> None:
