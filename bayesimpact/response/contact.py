@@ -150,7 +150,7 @@ def _unpack(x: Floats, free: Free, scale: float) -> tuple[float, float, Floats, 
     c1 = free.c1 + free.sd_c1 * x[2]
     k1 = free.k1 * float(np.exp(x[3] * free.sd_k1 / free.k1))
     k2 = k1 * np.exp(x[4:])
-    return scale * x[0], float(np.exp(x[1])), k2, max(c1, 0.0), k1
+    return float(scale * x[0]), float(np.exp(x[1])), k2, max(float(c1), 0.0), k1
 
 
 def _residuals(x: Floats, cycles: Cycles, free: Free, scale: float) -> Floats:

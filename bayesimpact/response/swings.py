@@ -116,7 +116,9 @@ def half_swings(samples: Floats, level: float, period: float, noise: float) -> H
     lengths = (last - first + 1).astype(np.float64)
     shorter = np.minimum(np.append(lengths, lengths[-1]), np.append(lengths[0], lengths))
     positions = local.crossings(signal, centre, 0.25 * shorter, noise)
-    count = _sound(np.diff(positions), side, amplitudes, max(6 * noise, 1.5 * threshold))
+    lost = amplitudes < max(6 * noise, 1.5 * threshold)
+    lost |= _merged(signal, turning_points(signal, period, noise), first, last, side, amplitudes)
+    count = int(np.argmax(lost)) if lost.any() else lost.size
     return HalfSwings(positions[: count + 1], side[:count], peaks[:count], amplitudes[:count])
 
 
@@ -132,17 +134,23 @@ def _middle_change(signal: Floats, before: int, after: int) -> int:
     return int(before + changes[changes.size // 2])
 
 
-def _sound(durations: Floats, side: NDArray[np.int_], amplitudes: Floats, floor: float) -> int:
-    """How many half swings come before the motion is lost: too small, or a swing overlooked."""
-    count = durations.size
-    small = np.flatnonzero(amplitudes < floor)
-    if small.size:
-        count = int(small[0])
-    for which in (-1, 1):
-        mine = np.flatnonzero(side[:count] == which)
-        for k in range(2, mine.size):
-            usual = float(np.median(durations[mine[max(0, k - 5) : k]]))
-            if durations[mine[k]] > 1.7 * usual:
-                count = min(count, int(mine[k]))
-                break
-    return count
+def _merged(
+    signal: Floats,
+    turns: tuple[Ints, NDArray[np.int_]],
+    first: Ints,
+    last: Ints,
+    side: NDArray[np.int_],
+    amplitudes: Floats,
+) -> NDArray[np.bool_]:
+    """Half swings that hold a further swing, to the other side, too short or small to be seen.
+
+    The signal then comes back more than half of its way to the level in between.
+    """
+    index, sign = turns
+    owner = np.searchsorted(first, index, side="right") - 1
+    inside = (owner >= 0) & (index <= last[owner])
+    index, sign, owner = index[inside], sign[inside], owner[inside]
+    back = (sign == -side[owner]) & (side[owner] * signal[index] < 0.5 * amplitudes[owner])
+    merged = np.zeros(side.size, dtype=bool)
+    merged[owner[back]] = True
+    return merged

@@ -115,6 +115,17 @@ def test_swings_stop_where_the_noise_takes_over() -> None:
     assert b.upper.frequency == pytest.approx(FREE, rel=0.05)
 
 
+def test_impacts_between_the_samples_end_the_backbone() -> None:
+    """Contacts of 2 ms at 200 Hz: where one is overlooked, two lower half swings look like one."""
+    motion = paper_motion(1200, 5e-3, g=0.0, k2=1e6, c2=0.0)
+    swings = half_swings(motion, 0.0, 31.0, 1e-7)
+    below = swings.durations[swings.side < 0]
+    free = 0.5 / FREE / 5e-3
+    assert below.max() < 1.5 * free
+    seen = np.flatnonzero(motion > 4e-7)
+    assert seen[-1] > swings.crossings[-1] + 10 * free
+
+
 def test_moving_average_reduces_the_scatter() -> None:
     """Eq. 2. Neighbouring half swings share no crossing on one side: scatter falls by sqrt(N)."""
     motion = paper_motion(20_000, c1=1e-3, k2=0.0, c2=0.0, g=1.0)
@@ -151,6 +162,12 @@ def test_rest_position_while_the_impacts_go_on() -> None:
     middle = 0.5 * (samples[-160:].max() + samples[-160:].min())
     assert abs(middle) > 4e-4  # what the last swings lie about
     assert rest_position(samples, rough_period(samples), 5e-6) == pytest.approx(3e-5, abs=1e-5)
+
+
+def test_rest_position_when_soft_impacts_hardly_decay() -> None:
+    """The last centres agree with each other, but between them the motion is no sine."""
+    samples = noisy(paper_motion(4000, k2=240.0, c1=0.01, c2=0.01) + 3e-5, 5e-6)
+    assert rest_position(samples, rough_period(samples), 5e-6) == pytest.approx(3e-5, abs=3e-5)
 
 
 def test_rest_position_of_a_preloaded_rig_is_where_it_settles() -> None:

@@ -1,0 +1,50 @@
+"""Where a recording starts, from its first samples."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from rigs import PAPER, paper_motion
+
+from bayesimpact.response.release import Oscillator, release
+
+RIG = Oscillator(**PAPER)
+NOISE = 5e-6
+
+
+def started(y0: float, v0: float, interval: float, seed: int) -> tuple[float, float, float, float]:
+    samples = paper_motion(round(0.4 / interval), interval, y0=y0, v0=v0)
+    noise = NOISE * np.random.default_rng(seed).standard_normal(samples.size)
+    return release(samples + noise, interval, RIG, NOISE)
+
+
+@pytest.mark.parametrize("interval", [1e-3, 5e-3])
+@pytest.mark.parametrize(
+    ("y0", "v0"),
+    [
+        (-6.5e-3, 0.0),  # as in the paper
+        (-2e-3, -0.15),  # on its way out
+        (0.9e-3, 0.2),  # about to touch
+        (1.08e-3, 0.05),
+        (2.5e-3, 0.0),  # on the stop
+        (1.2e-3, -0.2),  # about to leave it
+        (1.105e-3, 0.3),  # just touched
+    ],
+)
+def test_within_its_errors(y0: float, v0: float, interval: float) -> None:
+    found = np.array([started(y0, v0, interval, seed) for seed in range(6)])
+    assert np.abs((found[:, 0] - y0) / found[:, 2]).max() < 4.5
+    assert np.abs((found[:, 1] - v0) / found[:, 3]).max() < 4.5
+    # Better than one sample, and than what 1 % of the speed would be.
+    assert np.all(found[:, 2] < 1.05 * NOISE)
+    assert np.all(found[:, 3] < 3e-3)
+
+
+def test_without_a_stop() -> None:
+    free = Oscillator(PAPER["mass"], PAPER["c1"], PAPER["k1"], 0.0, np.inf, 0.0)
+    samples = paper_motion(400, k2=0.0, c2=0.0, g=1.0, y0=3e-3, v0=0.1)
+    y0, v0, sd_y0, sd_v0 = release(samples, 1e-3, free, NOISE)
+    assert y0 == pytest.approx(3e-3, abs=1e-9)
+    assert v0 == pytest.approx(0.1, abs=1e-7)
+    assert 0 < sd_y0 < NOISE
+    assert 0 < sd_v0 < 1e-3
