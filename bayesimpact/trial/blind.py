@@ -19,7 +19,11 @@ from typing import Any
 import numpy as np
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.read import load_campaign
+from bayesimpact.diagnosis.document import document
+from bayesimpact.diagnosis.loop import diagnose
 from bayesimpact.errors import InputError
+from bayesimpact.trial.rig_files import write_campaign
 
 LIBRARIES = ("bayesimpact", "numpy", "scipy", "numba")
 
@@ -49,8 +53,6 @@ def open_seal(text: str, promised: str) -> dict[str, Any]:
 
 def campaign_files(campaign: Campaign, rounding: float) -> dict[str, str]:
     """A campaign as the texts of its files, with digits two decades below its `rounding` in m."""
-    from bayesimpact.trial.rig_files import write_campaign
-
     decimals = 6 if rounding <= 0 else max(6, math.ceil(-math.log10(rounding * 1e3)) + 2)
     with tempfile.TemporaryDirectory() as folder:
         write_campaign(Path(folder), campaign, decimals=decimals)
@@ -62,10 +64,6 @@ def answer(files: Mapping[str, str], *, search: bool) -> dict[str, Any]:
 
     The diagnosis' own random numbers are seeded by the files, for the trial's seed is not shown.
     """
-    from bayesimpact.data.read import load_campaign
-    from bayesimpact.diagnosis.document import document
-    from bayesimpact.diagnosis.loop import diagnose
-
     with tempfile.TemporaryDirectory() as folder:
         for name, text in files.items():
             (Path(folder) / name).write_text(text, encoding="utf-8", newline="\n")

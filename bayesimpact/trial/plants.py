@@ -49,6 +49,7 @@ class Plant:
     form : draws its shape for a design
     obstacles, recordings : how many it needs at least
     slot : effects with the same slot exclude each other
+    by_noise : its trace in the noise shows it, however small its response
     """
 
     regimes: tuple[str, ...]
@@ -56,6 +57,7 @@ class Plant:
     obstacles: int = 0
     recordings: int = 1
     slot: str = ""
+    by_noise: bool = False
 
     def fits(self, cases: int, recordings: int) -> bool:
         """Whether a campaign with so many obstacles and recordings can show it."""
@@ -210,7 +212,7 @@ CATALOGUE_PLANTS: Mapping[str, Plant] = {
         ("measurement",), _one("gain", lambda d: 0.3 / d.amplitude**2, signed=True)
     ),
     "sensor_hum": Plant(("measurement",), _hum),
-    "smoothing": Plant(("measurement",), _smoothing, slot="smoothing"),
+    "smoothing": Plant(("measurement",), _smoothing, slot="smoothing", by_noise=True),
 }
 """Every effect of the catalogue that may be planted, by its id."""
 

@@ -87,6 +87,7 @@ class Ruler:
         self.fit = _fit(design, _noisy(design, self.clean, rng))
         self.basis = _basis(self.fit)
         self.others: tuple[Rival, ...] | None = None
+        self._seen: dict[str, Array] = {}
 
     def response(self, effects: Effects, reference: Effects | None = None) -> Array:
         """What refitting the base model leaves of an effect, (N,), in standard deviations.
@@ -97,9 +98,10 @@ class Ruler:
         return left - self._misfit(reference) if reference else left
 
     def _misfit(self, effects: Effects) -> Array:
-        fit = _fit(self.design, clean_readings(self.design, effects))
-        left = np.concatenate([part.residual for part in fit.linearisation])
-        return left / self.design.chain.noise
+        key = repr(effects)
+        if key not in self._seen:
+            self._seen[key] = misfit(self.design, clean_readings(self.design, effects))
+        return self._seen[key]
 
     def distinct(self, response: Array, besides: str = "") -> tuple[float, str]:
         """Norm of what the nearest single effect of the catalogue cannot imitate, and its id.
@@ -123,6 +125,13 @@ class Ruler:
         for _ in range(2):  # the second pass removes the rounding of the first
             x = x - self.basis @ (self.basis.T @ x)
         return x
+
+
+def misfit(design: Design, readings: Sequence[Array]) -> Array:
+    """What the base model, fitted to readings, leaves of them, (N,), in standard deviations."""
+    fit = _fit(design, readings)
+    left = np.concatenate([part.residual for part in fit.linearisation])
+    return np.asarray(left / design.chain.noise)
 
 
 def _noisy(design: Design, clean: Sequence[Array], rng: np.random.Generator) -> list[Array]:

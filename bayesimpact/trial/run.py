@@ -24,6 +24,9 @@ from pathlib import Path
 from typing import Any
 
 from bayesimpact.errors import InputError
+from bayesimpact.trial.blind import answer, campaign_files, open_seal, seal, sealed_text
+from bayesimpact.trial.draw import draw
+from bayesimpact.trial.score import score
 from bayesimpact.trial.settings import Settings, settings_from
 
 Job = tuple[Any, ...]
@@ -36,9 +39,6 @@ AHEAD = 3  # jobs per worker that wait in the cluster
 
 def draw_job(settings: Settings, seed: int) -> dict[str, Any]:
     """On a worker: the text of a trial's truth and its campaign's files, or what went wrong."""
-    from bayesimpact.trial.blind import campaign_files, sealed_text
-    from bayesimpact.trial.draw import draw
-
     try:
         drawn = draw(settings, seed)
         files = campaign_files(drawn.campaign, drawn.truth["rounding_m"])
@@ -49,8 +49,6 @@ def draw_job(settings: Settings, seed: int) -> dict[str, Any]:
 
 def answer_job(files: Mapping[str, str], search: bool) -> dict[str, Any]:
     """On a worker that sees only files: the diagnosis, or what went wrong."""
-    from bayesimpact.trial.blind import answer
-
     try:
         return {"answer": answer(files, search=search)}
     except Exception:
@@ -138,8 +136,6 @@ class Store:
 
     def publish(self, seeds: Sequence[int]) -> str:
         """Write seals.txt; its SHA-256 seals all truths at once."""
-        from bayesimpact.trial.blind import seal
-
         known = self.seals()
         for seed in seeds:
             if self._truth(seed).exists():
@@ -163,9 +159,6 @@ class Store:
 
     def finish(self, seed: int, answered: Mapping[str, Any], keep: bool) -> None:
         """Open the seal, score, store."""
-        from bayesimpact.trial.blind import open_seal
-        from bayesimpact.trial.score import score
-
         promised = self.seals()[seed]
         truth = open_seal(self._truth(seed).read_text(encoding="utf-8"), promised)
         result: dict[str, Any] = {"seal": promised, "truth": truth, **answered}

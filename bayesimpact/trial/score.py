@@ -100,8 +100,9 @@ def sizes(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> dict[str, bool
     values = {n: v for e in answer["effects"] for n, v in e["parameters"].items()}
     for planted in truth["planted"]:
         for name, true in flat(planted["id"], planted["parameters"]).items():
-            if name in values:
-                low, high = values[name]["ci90"]
+            interval = values.get(name, {}).get("ci90")
+            if interval is not None:
+                low, high = interval
                 if ".phase" in name:
                     true += 2 * np.pi * np.round((0.5 * (low + high) - true) / (2 * np.pi))
                 result[name] = bool(low <= true <= high)

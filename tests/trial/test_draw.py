@@ -13,13 +13,14 @@ from bayesimpact.errors import InputError
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.trial.benches import BENCHES, NOISES, depth, draw_bench
 from bayesimpact.trial.blind import campaign_files, sealed_text
-from bayesimpact.trial.draw import Unsuitable, _solve, draw, outside, pair, single
+from bayesimpact.trial.draw import draw
 from bayesimpact.trial.plants import CATALOGUE_PLANTS, OUTSIDE_PLANTS, Form
 from bayesimpact.trial.rig import Release, motion, record
 from bayesimpact.trial.rig_catalogue import CATALOGUE
 from bayesimpact.trial.rig_outside import OUTSIDE
 from bayesimpact.trial.ruler import Ruler, clean_readings, true_parameters
 from bayesimpact.trial.settings import Settings
+from bayesimpact.trial.sizing import Unsuitable, outside, pair, single, solve
 
 SMALL = Settings(benches=("small",), noises=("white",))
 
@@ -209,12 +210,12 @@ def test_the_wrong_sign_imitates_nothing(ruler: Ruler) -> None:
 def test_sizes_are_found_on_curves() -> None:
     form = Form(lambda size: {}, start=1e-3, largest=10.0)
     for power in (0.7, 1.0, 2.0):
-        size = _solve(lambda s, p=power: 50 * s**p, form, 10.0)
+        size = solve(lambda s, p=power: 50 * s**p, form, 10.0)
         assert 50 * size**power == pytest.approx(10.0, rel=0.05)
     with pytest.raises(Unsuitable, match="large"):
-        _solve(lambda s: 0.5 * s, form, 10.0)
+        solve(lambda s: 0.5 * s, form, 10.0)
     with pytest.raises(Unsuitable, match="seen"):
-        _solve(lambda s: 0.0, form, 10.0)
+        solve(lambda s: 0.0, form, 10.0)
 
 
 def test_no_rig_for_the_effect() -> None:

@@ -127,8 +127,8 @@ def test_jobs_catch_their_own_errors(monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*arguments: object, **named: object) -> None:
         raise ZeroDivisionError("on purpose")
 
-    monkeypatch.setattr("bayesimpact.trial.draw.draw", broken)
-    monkeypatch.setattr("bayesimpact.trial.blind.answer", broken)
+    monkeypatch.setattr(run, "draw", broken)
+    monkeypatch.setattr(run, "answer", broken)
     for found in (run.draw_job(CONTROLS, 1), run.answer_job({}, False)):
         assert "ZeroDivisionError: on purpose" in found["failed"] and "Traceback" in found["failed"]
 
