@@ -1,0 +1,194 @@
+"""Evidence against numerical integrals and importance sampling; refits recover what was planted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import small_rig
+from effect_rigs import BY_ID
+from scipy import integrate, stats
+from scipy.special import logsumexp
+
+from bayesimpact.diagnosis.directions import directions
+from bayesimpact.diagnosis.extend import campaign_scales
+from bayesimpact.diagnosis.refit import base_candidate, log_evidence, refit, without
+from bayesimpact.diagnosis.scan import score_directions
+from bayesimpact.inference.fit import Fit, Target, find_mode
+from bayesimpact.inference.identify import identify
+from bayesimpact.inference.likelihood import Linearisation
+from bayesimpact.inference.priors import HalfNormal, LogUniform, Normal, Priors
+from bayesimpact.model.parameters import Parameter
+
+
+@dataclass
+class Linear:
+    """y = X beta + noise of unknown level, in place of an oscillator."""
+
+    x: np.ndarray
+    y: np.ndarray
+    log_volume = np.array([0.0])
+
+    def __post_init__(self) -> None:
+        self.sizes = np.array([float(self.y.size)])
+        self.sigma_columns = np.array([self.x.shape[1]])
+        kinds = [Parameter(f"b{i}", "", "physical") for i in range(self.x.shape[1])]
+        self.parameters = (*kinds, Parameter("sigma", "", "noise", 0.0))
+
+    @property
+    def oscillator(self):
+        def roles(*wanted: str) -> np.ndarray:
+            return np.array([i for i, p in enumerate(self.parameters) if p.role in wanted])
+
+        layout = SimpleNamespace(parameters=self.parameters, roles=roles)
+        return SimpleNamespace(layout=layout)
+
+    def misfit(self, theta: np.ndarray) -> np.ndarray:
+        residual = self.y - np.atleast_2d(theta)[:, :-1] @ self.x.T
+        return np.sum(residual**2, axis=1)[:, None]
+
+    def linearise(self, theta: np.ndarray, steps: object = None) -> tuple[Linearisation, ...]:
+        return (Linearisation(self.y - self.x @ theta[:-1], self.x, np.arange(theta.size - 1)),)
+
+
+SIGMA = LogUniform(1e-3, 1e3)
+
+
+def linear_fit(n: int, d: int, priors: list, seed: int = 0, shift: float = 0.0) -> Fit:
+    """Shift moves the last coefficient's estimate by so many of its deviations."""
+    rng = np.random.default_rng(seed)
+    x = rng.standard_normal((n, d)) @ (np.eye(d) + 0.3 * rng.standard_normal((d, d)))
+    noise = rng.standard_normal(n)
+    projector = x @ np.linalg.pinv(x)
+    noise -= projector @ noise  # the estimate is the truth exactly
+    beta = np.zeros(d)
+    beta[-1] = shift * np.sqrt(np.linalg.inv(x.T @ x)[-1, -1]) * np.linalg.norm(noise) / np.sqrt(n)
+    target = Target(Linear(x, x @ beta + noise), Priors((*priors, SIGMA)))
+    return find_mode(target, np.append(np.zeros(d), 1.0), tolerance=1e-8)
+
+
+def exact_log_evidence(fit: Fit) -> float:
+    """Coefficients in closed form (one of them truncated at zero), the level by quadrature."""
+    problem, priors = fit.target.likelihood, fit.target.priors.parameters[:-1]
+    x, y = problem.x, problem.y
+    mean = np.array([p.mean if isinstance(p, Normal) else 0.0 for p in priors])
+    width = np.array([p.sd if isinstance(p, Normal) else p.scale for p in priors])
+    half = isinstance(priors[-1], HalfNormal)
+    q, r = np.linalg.qr(x)  # what the columns reach, and the rest: noise alone
+
+    def log_density(log_sigma: float) -> float:
+        sigma = np.exp(log_sigma)
+        covariance = sigma**2 * np.eye(width.size) + (r * width**2) @ r.T
+        value = stats.multivariate_normal(r @ mean, covariance).logpdf(q.T @ y)
+        value += stats.norm(0, sigma).logpdf(0) * (y.size - width.size)
+        value -= 0.5 * (y @ y - np.sum((q.T @ y) ** 2)) / sigma**2
+        if half:  # twice the whole normal's, times the posterior mass above zero
+            precision = x.T @ x / sigma**2 + np.diag(width**-2.0)
+            posterior = np.linalg.inv(precision)
+            centre = posterior @ (x.T @ y / sigma**2 + mean / width**2)
+            spread = np.sqrt(posterior[-1, -1])
+            value += np.log(2) + stats.norm.logcdf(centre[-1] / spread)
+        return float(value - np.log(SIGMA._log_width))
+
+    middle = np.log(fit.mode[-1])
+    grid = middle + np.linspace(-6, 6, 41) / np.sqrt(2 * y.size)
+    values = np.array([log_density(g) for g in grid])
+    top = values.max()
+    return float(top + np.log(integrate.simpson(np.exp(values - top), x=grid)))
+
+
+def test_evidence_of_a_linear_model():
+    fit = linear_fit(300, 4, [Normal(0.5, 2.0)] * 4)
+    # the level's own skewness is of order d^2 / n
+    assert log_evidence(fit) == pytest.approx(exact_log_evidence(fit), abs=0.03)
+
+
+@pytest.mark.parametrize("shift", [6.0, 2.0, 0.7, 0.0, -0.7, -2.0, -6.0, -20.0])
+def test_evidence_with_a_size_that_cannot_be_negative(shift):
+    """From well inside over the bound to far beyond it."""
+    fit = linear_fit(400, 3, [Normal(0.0, 3.0)] * 2 + [HalfNormal(1.5)], shift=shift)
+    assert (fit.mode[2] == 0.0) == (shift < 0.0) or shift == 0.0
+    assert log_evidence(fit) == pytest.approx(exact_log_evidence(fit), abs=0.05)
+
+
+def importance(fit: Fit, count: int, seed: int = 0, freedom: float = 12.0) -> tuple[float, float]:
+    """Log evidence and its standard error from a multivariate t about the mode."""
+    rng = np.random.default_rng(seed)
+    proposal = stats.multivariate_t(np.zeros(fit.mode.size), _unit(fit), df=freedom)
+    z = proposal.rvs(count, random_state=rng)
+    weights = fit.target(fit.mode + z * fit.sd) - proposal.logpdf(z) + np.log(fit.sd).sum()
+    value = logsumexp(weights) - np.log(count)
+    relative = np.exp(weights - value)
+    return float(value), float(relative.std() / np.sqrt(count))
+
+
+def _unit(fit: Fit) -> np.ndarray:
+    return fit.covariance / np.outer(fit.sd, fit.sd)
+
+
+def test_evidence_of_the_rig_by_importance_sampling(small):
+    value, error = importance(small.fit, 3000)
+    assert error < 0.05
+    assert log_evidence(small.fit) == pytest.approx(value, abs=0.03 + 4 * error)
+
+
+@pytest.fixture(scope="module")
+def planted():
+    """Friction of 0.4 mN, concealed: the base fit, its scores and its scales."""
+    campaign = small_rig.record(6, {"coulomb_friction": {"force": 4e-4}}, duration=1.5)
+    fit = identify(campaign, rng=np.random.default_rng(0), search=False).fit
+    return fit, campaign_scales(fit)
+
+
+def score_of(fit, scales, effect_id):
+    found = directions(fit, [BY_ID[effect_id]], scales)
+    return score_directions(fit, found, rng=np.random.default_rng(0)).best()[0]
+
+
+def test_a_refit_finds_what_was_planted(planted):
+    fit, scales = planted
+    score = score_of(fit, scales, "coulomb_friction")
+    found = refit(fit, [score], scales)
+    assert found.ids == ("coulomb_friction",) and found.fit.converged
+    size = found.fit.value("coulomb_friction.force")
+    sd = found.fit.sd[found.fit.names.index("coulomb_friction.force")]
+    assert abs(size - 4e-4) < 4 * sd
+    assert score.z > 6 and abs(score.size[0] - size) < 0.1 * size
+    truth = small_rig.true_values()
+    for name in ("c1", "k1", "c2", "g", "k2[1]", "k2[2]"):
+        i = found.fit.names.index(name)
+        assert abs(found.fit.mode[i] - truth[name]) < 4 * found.fit.sd[i]
+    # evidence: half of z^2 less Occam's share
+    base = base_candidate(fit)
+    scale = BY_ID["coulomb_friction"].parameters[0].scale(scales)
+    z = size / sd
+    occam = np.log(2 / np.sqrt(2 * np.pi) / scale) + np.log(np.sqrt(2 * np.pi) * sd)
+    expected = 0.5 * z**2 + occam
+    assert found.log_evidence - base.log_evidence == pytest.approx(expected, abs=0.05 * z**2 + 1)
+
+
+def test_evidence_of_an_added_effect_by_importance_sampling(planted):
+    fit, scales = planted
+    found = refit(fit, [score_of(fit, scales, "coulomb_friction")], scales)
+    value, error = importance(found.fit, 600)
+    assert error < 0.15
+    assert found.log_evidence == pytest.approx(value, abs=0.05 + 4 * error)
+
+
+def test_leaving_an_effect_out_returns_to_the_base_model(planted):
+    fit, scales = planted
+    found = refit(fit, [score_of(fit, scales, "coulomb_friction")], scales)
+    back = without(found, BY_ID["coulomb_friction"], scales)
+    assert back.ids == ()
+    assert back.log_evidence == pytest.approx(base_candidate(fit).log_evidence, abs=0.02)
+    np.testing.assert_array_less(np.abs(back.fit.mode - fit.mode) / fit.sd, 0.1)
+
+
+def test_what_was_not_fitted_has_no_evidence(small):
+    from dataclasses import replace
+
+    assert log_evidence(replace(small.fit, log_posterior=-np.inf)) == -np.inf
+    nan = np.full_like(small.fit.covariance, np.nan)
+    assert log_evidence(replace(small.fit, covariance=nan)) == -np.inf
