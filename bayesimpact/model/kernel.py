@@ -66,6 +66,7 @@ def run(
     t, y, v = 0.0, q[Y0], q[V0] * interval
     total = 0.0
     count = i = 0
+    shelf.history[:] = 0.0
     while True:
         if quick and count > 0:
             contact, t, v, i, count, passed = fast_lane(

@@ -88,7 +88,8 @@ def fast_lane(
 ) -> tuple[bool, float, float, int, int, float]:  # fmt: skip
     """Carry the motion from an event at (t, gap, v) to the last event that the fast lane settles.
 
-    i is the first sample at or after t, `count` the events so far, `limit` how many there may be.
+    i is the first sample at or after t, `count` the events so far, `limit` how many there may be;
+    shelf.history is 0 at the start of a recording.
     Returns (contact, t, v, i, count) there and the sum of squares of the samples passed.
     """
     tables, series, history = shelf.tables, shelf.series, shelf.history
@@ -100,7 +101,6 @@ def fast_lane(
         second_trough(b_flight, K_flight),
         second_trough(b_contact, K_contact),
     )
-    history[:] = 0.0
     total = 0.0
     fall = -v if contact else v  # z' = +-y' at the start of a stretch, below 0
     while count < limit:
