@@ -16,16 +16,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.campaign import Campaign, Smoothing
 from bayesimpact.diagnosis.extend import difference_steps
 from bayesimpact.diagnosis.refit import log_evidence
 from bayesimpact.inference.fit import Fit, Target, find_mode
 from bayesimpact.inference.likelihood import Likelihood
+from bayesimpact.model.measurement import edge
 from bayesimpact.model.oscillator import Oscillator
 
 Array = NDArray[np.float64]
 
 FIRST_PART = 0.1
+LEAST_SAMPLES = 20
 SMALL = 4.0  # nats; a smaller total gain is no evidence
 
 
@@ -98,18 +100,17 @@ def _held_out(
 def _without(fit: Fit, group: Sequence[int]) -> Fit:
     """The same model fitted with the recordings of `group` cut to their first part."""
     old = fit.target.oscillator
-    campaign = _cut(old.campaign, group)
+    campaign = _cut(old.campaign, group, old.smoothing)
     oscillator = Oscillator(campaign, old.effects, old.layout, old.smoothing)
     target = Target(Likelihood(oscillator, fit.target.likelihood.noise), fit.target.priors)
     steps = difference_steps(fit, target, {})
     return find_mode(target, fit.mode, steps=steps, max_iterations=8)
 
 
-def _cut(campaign: Campaign, group: Sequence[int]) -> Campaign:
-    kept = [
-        replace(r, samples=r.samples[: max(20, int(FIRST_PART * r.samples.size))])
-        if i in group
-        else r
-        for i, r in enumerate(campaign.recordings)
-    ]
+def _cut(campaign: Campaign, group: Sequence[int], smoothing: Smoothing | None) -> Campaign:
+    kept = list(campaign.recordings)
+    for i in group:
+        least = LEAST_SAMPLES + 2 * edge(smoothing, kept[i].interval)
+        first = max(least, int(FIRST_PART * kept[i].samples.size))
+        kept[i] = replace(kept[i], samples=kept[i].samples[:first])
     return replace(campaign, recordings=tuple(kept))
