@@ -37,6 +37,7 @@ FAMILIES = 3  # of tests that share the alarm probability: scores, forcing, hum
 NULL_DRAWS = 20_000
 NINETY = 0.9
 STRENGTHS = np.geomspace(0.2, 40.0, 400)
+SHOWN = slice(None, None, 8)  # of STRENGTHS, in power.json
 
 
 @dataclass(frozen=True)
@@ -158,22 +159,25 @@ def power_table(
     rows = {}
     for one in found:
         detected, named = one.detected(STRENGTHS, critical), one.named(STRENGTHS, critical)
-        at = {"detected": reaching(detected), "named": reaching(named)}
+        at_detected, at_named = reaching(detected), reaching(named)
         rows[one.effect] = {
             "size": one.size_name,
             "limit": one.limit,
             "exponent": one.exponent,
             "distinct": one.distinct,
             "nearest": one.nearest,
-            "detected_90": at["detected"],
-            "named_90": at["named"],
-            "detected_90_size": None if at["detected"] is None else one.size(at["detected"]),
-            "named_90_size": None if at["named"] is None else one.size(at["named"]),
+            "detected_90": at_detected,
+            "named_90": at_named,
+            "detected_90_size": None if at_detected is None else one.size(at_detected),
+            "named_90_size": None if at_named is None else one.size(at_named),
+            "detected": [round(float(p), 4) for p in detected[SHOWN]],
+            "named": [round(float(p), 4) for p in named[SHOWN]],
         }
     return {
         "schema": "bayesimpact/power/1",
         "critical_score": critical,
         "decisive": DECISIVE,
+        "strengths": [round(float(x), 4) for x in STRENGTHS[SHOWN]],
         "effects": rows,
         "limit_by_recordings": {
             effect: {str(n): v for n, v in row.items()}
@@ -204,3 +208,19 @@ def observed(results: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
             "wrong_name": rate(wrong, len(scores)),
         }
     return table
+
+
+def power_text(document: Mapping[str, Any]) -> str:
+    """The table of power.json: limits, and sizes found and named nine times in ten."""
+    heads = " ".join(f"{head:>10s}" for head in ("limit", "detected", "named"))
+    lines = [f"{'effect':30s} {'number':12s} {heads}  nearest rival"]
+    for effect, row in document["effects"].items():
+        cells = [row["limit"], row["detected_90_size"], row["named_90_size"]]
+        sizes = " ".join(f"{'-':>10s}" if c is None else f"{c:10.3g}" for c in cells)
+        share = f"{row['nearest']} ({100 * row['distinct']:.0f} % apart)"
+        lines.append(f"{effect:30s} {row['size']:12s} {sizes}  {share}")
+    lines += ["", "limit against that of nine recordings"]
+    for effect, row in document["limit_by_recordings"].items():
+        counts = "  ".join(f"{n}: {v:.2f}" for n, v in row.items())
+        lines.append(f"{effect:30s} {counts}")
+    return "\n".join(lines) + "\n"

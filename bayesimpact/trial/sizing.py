@@ -18,7 +18,7 @@ Rng = np.random.Generator
 
 LIMIT = 5.0  # standard errors that make the detection limit
 CLOSE = 0.05  # relative error of a score that is good enough
-LIKE = 0.99  # cosine beyond which two effects count as one
+LIKE = 0.97  # cosine beyond which two effects count as one
 TRIES = 10
 LARGEST_STEP = 1e3
 

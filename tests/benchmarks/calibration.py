@@ -1,0 +1,80 @@
+"""Is the posterior calibrated, and how often is nothing mistaken for something?
+
+python tests/benchmarks/calibration.py sbc --replicates 300 --workers 2 --out FILE.json
+python tests/benchmarks/calibration.py sbc --emcee --replicates 50 --models base --out FILE.json
+python tests/benchmarks/calibration.py alarms --controls 300 --workers 2 --out FILE.json
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+import numpy as np
+from tqdm import tqdm
+
+from bayesimpact.trial.alarms import alarm, false_alarms
+from bayesimpact.trial.run import executor
+from bayesimpact.trial.sbc import MODELS, replicate, verdicts
+from bayesimpact.trial.settings import Settings
+from bayesimpact.trial.stamp import origin
+
+
+def one_replicate(model: str, seed: int, emcee: bool):
+    """A job for a worker."""
+    return replicate(model, seed, emcee=emcee)
+
+
+def sbc(chosen: argparse.Namespace) -> dict:
+    """Ranks of all models."""
+    models = chosen.models.split(",") if chosen.models else list(MODELS)
+    seeds = range(chosen.seed, chosen.seed + chosen.replicates)
+    result: dict = {"draws": "emcee" if chosen.emcee else "normal approximation", "models": {}}
+    for model in models:
+        jobs = ((seed, (model, seed, chosen.emcee)) for seed in seeds)
+        with executor(chosen.workers, chosen.scheduler) as spread:
+            found = dict(tqdm(spread(one_replicate, jobs), total=len(seeds), desc=model))
+        rows = verdicts([found[seed] for seed in seeds], np.random.default_rng(0))
+        result["models"][model] = rows
+        print(f"{model:24s} outside the {100 * rows['level']:.0f} % band: {rows['outside']}")
+        for name, row in rows["parameters"].items():
+            print(
+                f"  {name:36s} tail {row['tail']:.3g}  90 % holds {100 * row['covered_90']:.1f} %"
+            )
+    return result
+
+
+def alarms(chosen: argparse.Namespace) -> dict:
+    """False alarms of controls on all rigs and noises."""
+    settings = Settings(kinds=("control",))
+    seeds = range(chosen.seed, chosen.seed + chosen.controls)
+    with executor(chosen.workers, chosen.scheduler) as spread:
+        jobs = ((seed, (settings, seed)) for seed in seeds)
+        found = dict(tqdm(spread(alarm, jobs), total=len(seeds), desc="controls"))
+    result = false_alarms([found[seed] for seed in seeds], np.random.default_rng(0))
+    print(json.dumps({k: v for k, v in result.items() if k != "rows"}, indent=1))
+    return {**result, "rows": [found[seed] for seed in seeds]}
+
+
+def main() -> None:
+    """Run one of the two and store it."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("what", choices=("sbc", "alarms"))
+    parser.add_argument("--replicates", type=int, default=300)
+    parser.add_argument("--controls", type=int, default=300)
+    parser.add_argument("--models", help="comma separated")
+    parser.add_argument("--emcee", action="store_true")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--scheduler")
+    parser.add_argument("--out", type=Path)
+    chosen = parser.parse_args()
+    result = {"sbc": sbc, "alarms": alarms}[chosen.what](chosen)
+    if chosen.out is not None:
+        document = {**origin(), "command": chosen.what, "seed": chosen.seed, **result}
+        chosen.out.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
