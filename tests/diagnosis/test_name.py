@@ -1,0 +1,138 @@
+"""The rules of the verdict on made-up evidence: rivals, elaborations, unknown physics."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from effect_rigs import BY_ID
+
+from bayesimpact.diagnosis.loop import judge, ordered
+from bayesimpact.diagnosis.name import ALPHA, DECISIVE, Naming, State, worth_a_refit
+from bayesimpact.diagnosis.refit import Candidate
+
+COST = 3.8
+
+
+def candidate(ids: str, evidence: float, chi2: float = 1.0) -> Candidate:
+    """Effects by name, separated by blanks; log evidence over the base model's."""
+    fit = SimpleNamespace(reduced_chi2=chi2)
+    return Candidate(tuple(BY_ID[i] for i in ids.split()), fit, 1000.0 + evidence)
+
+
+def state(
+    model: Candidate, p_catalogue: float = 0.5, p_force: float = 0.5, force_evidence: float = 0.0
+) -> State:
+    force = SimpleNamespace(p_value=p_force, log_evidence=force_evidence)
+    return State(model, SimpleNamespace(p_value=p_catalogue), force)
+
+
+def naming(
+    chosen: State, *others: Candidate, base_p: float = 1e-6, base_chi2: float = 1.0,
+    force_evidence: float = 0.0,
+) -> Naming:  # fmt: skip
+    base = state(candidate("", 0.0, base_chi2), base_p, base_p, force_evidence)
+    if not chosen.candidate.effects:
+        base = chosen
+    every = {c.ids: c for c in (base.candidate, chosen.candidate, *others)}
+    worth = lambda c: c.log_evidence - COST * len(c.effects)  # noqa: E731
+    return Naming(base, chosen, tuple(sorted(every.values(), key=worth, reverse=True)), COST)
+
+
+FRICTION, DRAG = "coulomb_friction", "quadratic_drag"
+
+
+def test_nothing_missing_is_adequate_and_an_alarm_without_a_name_is_unknown():
+    assert judge(naming(state(candidate("", 0.0)))) == "adequate"
+    assert judge(naming(state(candidate("", 0.0), p_force=ALPHA / 2))) == "unknown"
+    assert judge(naming(state(candidate("", 0.0), p_catalogue=ALPHA / 2))) == "unknown"
+
+
+def test_a_name_needs_decisive_odds_over_every_rival():
+    chosen = state(candidate(FRICTION, 100.0))
+    far = candidate(DRAG, 100.0 - DECISIVE - 0.1)
+    near = candidate(DRAG, 100.0 - DECISIVE + 0.1)
+    assert judge(naming(chosen, far)) == "named"
+    found = naming(chosen, near)
+    assert judge(found) == "ambiguous" and found.rivals() == (near,)
+
+
+def test_the_base_model_itself_is_a_rival():
+    weak = state(candidate(FRICTION, COST + DECISIVE - 0.1))
+    assert judge(naming(weak)) == "ambiguous"
+    assert judge(naming(state(candidate(FRICTION, COST + DECISIVE + 0.1)))) == "named"
+
+
+def test_supersets_and_elaborations_are_no_rivals():
+    chosen = state(candidate("contact_no_tension", 100.0))
+    superset = candidate("contact_no_tension spring_cubic", 104.0)
+    elaboration = candidate("obstacle_mass", 99.0)  # no tension is its null
+    assert judge(naming(chosen, superset, elaboration)) == "named"
+    # the other way round the simpler model is a rival
+    heavier = state(candidate("obstacle_mass", 100.0))
+    assert judge(naming(heavier, candidate("contact_no_tension", 98.0))) == "ambiguous"
+    assert judge(naming(heavier, candidate("contact_no_tension", 90.0))) == "named"
+
+
+def test_a_pair_is_compared_with_what_lacks_one_of_its_members():
+    chosen = state(candidate(f"{FRICTION} spring_cubic", 200.0))
+    alone = candidate(FRICTION, 200.0 - COST - DECISIVE + 0.1)
+    assert judge(naming(chosen, alone)) == "ambiguous"
+    swapped = candidate(f"{DRAG} spring_cubic", 196.0)
+    found = naming(chosen, swapped)
+    assert judge(found) == "ambiguous" and found.rivals() == (swapped,)
+    assert judge(naming(chosen, candidate(f"{DRAG} spring_cubic", 190.0))) == "named"
+
+
+@pytest.mark.parametrize("what", ["p_catalogue", "p_force"])
+def test_what_is_named_leaves_nothing(what):
+    chosen = state(candidate(FRICTION, 100.0), **{what: ALPHA / 2})
+    assert judge(naming(chosen)) == "unknown"
+    assert judge(naming(state(candidate(FRICTION, 100.0), **{what: ALPHA}))) == "named"
+
+
+def test_a_gross_misfit_nearly_explained_is_named_although_something_small_remains():
+    small_rest = state(candidate(FRICTION, 9000.0, chi2=1.5), p_force=1e-4)
+    large_rest = state(candidate(FRICTION, 9000.0, chi2=20.0), p_force=1e-4)
+    assert judge(naming(small_rest, base_chi2=100.0)) == "named"
+    assert judge(naming(large_rest, base_chi2=100.0)) == "unknown"
+    assert judge(naming(small_rest, base_chi2=4.0)) == "unknown"  # concealed: must be white
+
+
+def test_a_free_force_that_beats_a_combination_is_unknown_physics():
+    pair = state(candidate(f"{FRICTION} spring_cubic", 200.0))
+    odds = 200.0 - 2 * COST
+    assert judge(naming(pair, force_evidence=odds + DECISIVE + 0.1)) == "unknown"
+    assert judge(naming(pair, force_evidence=odds + DECISIVE - 0.1)) == "named"
+    single = state(candidate(FRICTION, 200.0))
+    assert judge(naming(single, force_evidence=300.0)) == "named"
+
+
+def test_probabilities_weigh_all_models():
+    chosen = state(candidate(FRICTION, 100.0))
+    rivals = (candidate(DRAG, 98.0), candidate(f"{FRICTION} {DRAG}", 101.0))
+    found = naming(chosen, *rivals)
+    weights = np.exp([0.0, 100 - COST, 98 - COST, 101 - 2 * COST])
+    assert found.probability(FRICTION) == pytest.approx((weights[1] + weights[3]) / weights.sum())
+    assert found.probability(DRAG) == pytest.approx((weights[2] + weights[3]) / weights.sum())
+    assert found.probability("gap_wear") == 0.0
+    assert found.log_odds(rivals[1]) == pytest.approx(101 - 2 * COST)
+
+
+def test_effects_are_ordered_by_what_the_model_loses_without_them():
+    chosen = state(candidate(f"{FRICTION} spring_cubic", 200.0))
+    found = naming(chosen, candidate(FRICTION, 50.0), candidate("spring_cubic", 150.0))
+    effects = chosen.candidate.effects
+    assert [e.id for e in ordered(found, effects)] == ["spring_cubic", FRICTION]
+    assert ordered(found, effects[:1]) == effects[:1]
+
+
+def test_what_is_worth_a_refit():
+    def scores(*gains: float):
+        rows = tuple(SimpleNamespace(gain=g) for g in gains)
+        return SimpleNamespace(best=lambda: rows)
+
+    assert [s.gain for s in worth_a_refit(scores(100.0, 21.0, 19.0, 3.0))] == [100.0, 21.0]
+    assert [s.gain for s in worth_a_refit(scores(6.0, 4.5, 3.9))] == [6.0, 4.5]
+    assert worth_a_refit(scores()) == []
