@@ -32,8 +32,8 @@ def noise_level(samples: Floats, period: float) -> float:
     -------
     The larger of two estimates, in the unit of the samples: from sixth differences (white noise
     only) and from the residuals of local quartic fits over an eighth of a period, which also see
-    noise that a smoothing filter has left with a correlation. Both are medians over the record, so
-    that the few samples around an impact do not count.
+    rounding and noise that a smoothing filter has left with a correlation. Both are medians over
+    the record, so that the few samples around an impact do not count.
     """
     n = samples.size
     level = 0.0
@@ -45,20 +45,7 @@ def noise_level(samples: Floats, period: float) -> float:
         centres = np.arange(half, n - half, half)
         _, rms = fit(samples, centres, half, 4)
         level = max(level, float(np.median(rms)))
-    return max(level, _rounding(samples) / math.sqrt(12))
-
-
-def _rounding(samples: Floats) -> float:
-    """Step of the grid that the samples are rounded to; 0 without one.
-
-    Rounding noise may leave most differences at zero, so that their median does not show it.
-    """
-    steps = np.abs(np.diff(samples))
-    steps = steps[steps > 0]
-    if steps.size == 0:
-        return 0.0
-    parts = steps / steps.min()
-    return float(steps.min()) if np.mean(np.abs(parts - np.rint(parts)) < 0.05) > 0.95 else 0.0
+    return level
 
 
 def fit(samples: Floats, centres: Ints, half: int, degree: int) -> tuple[Floats, Floats]:

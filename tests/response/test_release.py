@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rigs import PAPER, paper_motion
@@ -12,10 +14,12 @@ RIG = Oscillator(**PAPER)
 NOISE = 5e-6
 
 
-def started(y0: float, v0: float, interval: float, seed: int) -> tuple[float, float, float, float]:
-    samples = paper_motion(round(0.4 / interval), interval, y0=y0, v0=v0)
+def started(
+    y0: float, v0: float, interval: float, seed: int, k2: float = RIG.k2
+) -> tuple[float, float, float, float]:
+    samples = paper_motion(round(0.4 / interval), interval, y0=y0, v0=v0, k2=k2)
     noise = NOISE * np.random.default_rng(seed).standard_normal(samples.size)
-    return release(samples + noise, interval, RIG, NOISE)
+    return release(samples + noise, interval, replace(RIG, k2=k2), NOISE)
 
 
 @pytest.mark.parametrize("interval", [1e-3, 5e-3])
@@ -38,6 +42,14 @@ def test_within_its_errors(y0: float, v0: float, interval: float) -> None:
     # Better than one sample, and than what 1 % of the speed would be.
     assert np.all(found[:, 2] < 1.05 * NOISE)
     assert np.all(found[:, 3] < 3e-3)
+
+
+@pytest.mark.parametrize(("y0", "v0"), [(1.6e-3, 0.0), (1.0e-3, 0.2), (1.2e-3, 0.15)])
+def test_on_a_hard_stop_that_lets_go_between_two_samples(y0: float, v0: float) -> None:
+    """Contact takes 7 ms, a sample 5 ms: nothing can be read off the first ones alone."""
+    found = np.array([started(y0, v0, 5e-3, seed, k2=1e5) for seed in range(6)])
+    assert np.abs(found[:, 0] - y0).max() < 4.5 * NOISE
+    assert np.abs(found[:, 1] - v0).max() < 0.01
 
 
 def test_without_a_stop() -> None:
