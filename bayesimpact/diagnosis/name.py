@@ -9,13 +9,20 @@ physics and decide between near-opposites that scores cannot tell apart.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from bayesimpact.diagnosis.force import MissingForce, missing_force
 from bayesimpact.diagnosis.pairs import promising_pairs
-from bayesimpact.diagnosis.refit import Candidate, base_candidate, refit, without
+from bayesimpact.diagnosis.refit import (
+    Candidate,
+    base_candidate,
+    correlation_spread,
+    refit,
+    tempered_evidence,
+    without,
+)
 from bayesimpact.diagnosis.scan import Scan, scan
 from bayesimpact.diagnosis.scores import Score
 from bayesimpact.inference.fit import Fit
@@ -65,19 +72,20 @@ class Naming:
     base, chosen : first and last state
     tried : every model that was fitted, best first
     prior_cost : nats per added effect
+    spread : samples over which the best model's residual repeats itself, where the misfit is gross
     """
 
     base: State
     chosen: State
     tried: tuple[Candidate, ...]
     prior_cost: float
-    steps: tuple[str, ...] = field(default=())
+    spread: float = 1.0
 
     def log_odds(self, candidate: Candidate) -> float:
         """Log posterior odds of a model against the base model."""
         return (
-            candidate.log_evidence
-            - self.base.candidate.log_evidence
+            tempered_evidence(candidate, self.spread)
+            - tempered_evidence(self.base.candidate, self.spread)
             - self.prior_cost * len(candidate.effects)
         )
 
@@ -102,7 +110,7 @@ class Naming:
         chosen = self.chosen.candidate
         return (
             len(chosen.effects) > 1
-            and self.base.force.log_evidence > self.log_odds(chosen) + DECISIVE
+            and self.base.force.log_evidence / self.spread > self.log_odds(chosen) + DECISIVE
         )
 
     def probability(self, effect_id: str) -> float:
@@ -196,7 +204,15 @@ class _Search:
         return self.tried[key]
 
     def worth(self, candidate: Candidate) -> float:
-        return candidate.log_evidence - self.cost * len(candidate.effects)
+        return tempered_evidence(candidate, self.spread()) - self.cost * len(candidate.effects)
+
+    def spread(self) -> float:
+        """Samples over which the best residual repeats itself; 1 without a gross misfit."""
+        base = self.tried[frozenset()]
+        if not is_gross(base.fit):
+            return 1.0
+        best = min(self.tried.values(), key=lambda c: c.fit.reduced_chi2)
+        return correlation_spread(best.fit)
 
     def eliminated(self, state: State) -> State:
         """Leave out effects that are not worth their cost, the least useful first."""
@@ -233,11 +249,11 @@ class _Search:
         best = next(c for c in tried if len(c.effects) <= size)
         if set(best.ids) != set(chosen.candidate.ids):
             chosen = self.examine(best)
-        return Naming(base, chosen, tried, self.cost)
+        return Naming(base, chosen, tried, self.cost, self.spread())
 
 
 def is_gross(fit: Fit) -> bool:
-    """True when the residual dwarfs the noise: evidence then counts neighbours that say the same."""
+    """True when the residual dwarfs the noise."""
     return fit.reduced_chi2 > GROSS**2
 
 
