@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.model.compiled import compiled
-from bayesimpact.model.flow import advance_forced, forced_response, impulse_response
+from bayesimpact.model.flow import advance, advance_forced, forced_response, impulse_response
 from bayesimpact.model.scaled import Scaled
 from bayesimpact.model.tables import LENGTH
 
@@ -34,26 +34,42 @@ class Sink(NamedTuple):
     events: Floats
 
 
-@compiled()
+@compiled(forceinline=True, fastmath={"contract"})
 def write(
-    out: Floats, speeds: Floats, first: int, end: int, shift: float, tables: Floats, side: int,
-    b: float, K: float, w: float, u: float, v: float, fs: float, fc: float,
+    out: Floats, first: int, end: int, shift: float, tables: Floats, side: int, b: float, u: float,
+    v: float,
 ) -> None:  # fmt: skip
-    """Write positions (and velocities, if `speeds` has room) of samples first..end-1."""
-    S, D, E, F = tables[side, 0], tables[side, 1], tables[side, 2], tables[side, 3]
+    """Write positions of samples first..end-1 of one block, without forcing."""
     m = v + 2.0 * b * u
-    if fs == 0.0 and fc == 0.0:
+    # unsigned: numba then leaves out the check for negative indices, and the loop vectorises
+    i, j, count = np.uint64(first), np.uint64(0), np.uint64(end - first)
+    S, D, one = np.uint64(0), np.uint64(1), np.uint64(1)
+    while j < count:
+        out[i + j] = shift + (tables[side, D, j] * u + tables[side, S, j] * m)
+        j += one
+
+
+@compiled()
+def add_force(
+    out: Floats, first: int, end: int, tables: Floats, side: int, fs: float, fc: float
+) -> None:
+    """Add to positions of one block what the force does."""
+    for j in range(end - first):
+        out[first + j] += fs * tables[side, 2, j] + fc * tables[side, 3, j]
+
+
+@compiled()
+def write_speeds(
+    speeds: Floats, first: int, end: int, tables: Floats, side: int, b: float, K: float, w: float,
+    u: float, v: float, fs: float, fc: float,
+) -> None:  # fmt: skip
+    """Write velocities of one block, per interval."""
+    S, D, E, F = tables[side, 0], tables[side, 1], tables[side, 2], tables[side, 3]
+    for j in range(end - first):
+        speeds[first + j] = D[j] * v - S[j] * K * u
+    if fs != 0.0 or fc != 0.0:
         for j in range(end - first):
-            out[first + j] = shift + D[j] * u + S[j] * m
-    else:
-        for j in range(end - first):
-            out[first + j] = shift + D[j] * u + S[j] * m + fs * E[j] + fc * F[j]
-    if speeds.size:
-        for j in range(end - first):
-            speeds[first + j] = D[j] * v - S[j] * K * u
-        if fs != 0.0 or fc != 0.0:
-            for j in range(end - first):
-                speeds[first + j] += fs * (S[j] - w * F[j]) + fc * w * E[j]
+            speeds[first + j] += fs * (S[j] - w * F[j]) + fc * w * E[j]
 
 
 @compiled(forceinline=True, fastmath={"reassoc", "contract", "nsz"})
@@ -64,7 +80,6 @@ def squares(
     """Return the sum of squared residuals of one block, samples first..end-1, without forcing."""
     m = v + 2.0 * b * u
     total = 0.0
-    # unsigned: numba then leaves out the check for negative indices, and the loop vectorises
     i, j, count = np.uint64(first), np.uint64(0), np.uint64(end - first)
     S, D, one = np.uint64(0), np.uint64(1), np.uint64(1)
     while j < count:
@@ -89,39 +104,65 @@ def squares_forced(
     return total
 
 
+@compiled(forceinline=True, fastmath={"contract"})
+def pass_plain(
+    data: Floats, out: Floats, speeds: Floats, tables: Floats, side: int, b: float, K: float,
+    shift: float, u: float, v: float, i: int, end: int,
+) -> float:  # fmt: skip
+    """Write or compare samples i..end-1 of an unforced stretch with state (u, v) at sample i.
+
+    Returns their sum of squared residuals, if they were compared.
+    """
+    compared, written = data.size > 0, out.size > 0
+    total = 0.0
+    while i < end:
+        block = min(i + LENGTH, end)
+        if compared:
+            total += squares(data, i, block, shift, tables, side, b, u, v)
+        elif written:
+            write(out, i, block, shift, tables, side, b, u, v)
+            if speeds.size > 0:
+                write_speeds(speeds, i, block, tables, side, b, K, 0.0, u, v, 0.0, 0.0)
+        u, v = advance(b, K, u, v, tables[side, 0, LENGTH], tables[side, 1, LENGTH])
+        i = block
+    return total
+
+
 @compiled()
 def pass_samples(
     sink: Sink, tables: Floats, side: int, motion: Scaled, b: float, K: float, rest: float,
     t: float, u: float, v: float, i: int, end: int,
 ) -> float:  # fmt: skip
-    """Write or compare samples i..end-1 of a stretch that starts at (u, v) at time t <= i.
+    """Write or compare samples i..end-1 of any stretch with state (u, v) at time t <= i.
 
     Returns their sum of squared residuals, if they were compared.
     """
-    compared = sink.data.size > 0
-    if i >= end or not (compared or sink.out.size > 0):
+    data, out, speeds = sink.data, sink.out, sink.speeds
+    if i >= end or data.size + out.size == 0:
         return 0.0
-    w, force = motion.w, motion.force
+    w, phase, force = motion.w, motion.phase, motion.force
     shift = rest + motion.offset
-    total = E = F = fs = fc = 0.0
     S, D = impulse_response(b, K, i - t)
-    if force != 0.0:
-        fs, fc = force * math.sin(w * t + motion.phase), force * math.cos(w * t + motion.phase)
-        E, F = forced_response(b, K, w, i - t, S, D)
+    if force == 0.0:
+        u, v = advance(b, K, u, v, S, D)
+        total: float = pass_plain(data, out, speeds, tables, side, b, K, shift, u, v, i, end)
+        return total
+    fs, fc = force * math.sin(w * t + phase), force * math.cos(w * t + phase)
+    E, F = forced_response(b, K, w, i - t, S, D)
+    total = 0.0
     while True:
         u, v = advance_forced(b, K, w, u, v, fs, fc, S, D, E, F)
-        if force != 0.0:
-            fs, fc = force * math.sin(w * i + motion.phase), force * math.cos(w * i + motion.phase)
+        fs, fc = force * math.sin(w * i + phase), force * math.cos(w * i + phase)
         block = min(i + LENGTH, end)
-        if not compared:
-            write(sink.out, sink.speeds, i, block, shift, tables, side, b, K, w, u, v, fs, fc)
-        elif force != 0.0:
-            total += squares_forced(sink.data, i, block, shift, tables, side, b, u, v, fs, fc)
+        if data.size > 0:
+            total += squares_forced(data, i, block, shift, tables, side, b, u, v, fs, fc)
         else:
-            total += squares(sink.data, i, block, shift, tables, side, b, u, v)
+            write(out, i, block, shift, tables, side, b, u, v)
+            add_force(out, i, block, tables, side, fs, fc)
+            if speeds.size > 0:
+                write_speeds(speeds, i, block, tables, side, b, K, w, u, v, fs, fc)
         if block == end:
             return total
         i = block
         S, D = tables[side, 0, LENGTH], tables[side, 1, LENGTH]
-        if force != 0.0:
-            E, F = tables[side, 2, LENGTH], tables[side, 3, LENGTH]
+        E, F = tables[side, 2, LENGTH], tables[side, 3, LENGTH]

@@ -100,12 +100,9 @@ def run(
     return total, count, OK
 
 
-@compiled()
+@compiled(fastmath={"reassoc"})
 def finite(total: float, out: Floats) -> bool:
     """Say whether a recording's results are finite."""
-    if not math.isfinite(total):
-        return False
-    for value in out:  # noqa: SIM110
-        if not math.isfinite(value):
-            return False
-    return True
+    for i in range(out.size):  # 0 if finite, else nan; a test of each would not vectorise
+        total += out[i] * 0.0
+    return math.isfinite(total)

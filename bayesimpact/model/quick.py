@@ -16,7 +16,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.model.blocks import Sink, squares, write
+from bayesimpact.model.blocks import Sink, pass_plain
 from bayesimpact.model.compiled import compiled
 from bayesimpact.model.flow import advance
 from bayesimpact.model.scaled import Scaled
@@ -94,7 +94,6 @@ def fast_lane(
     """
     tables, series, history = shelf.tables, shelf.series, shelf.history
     data, out, speeds, events = sink.data, sink.out, sink.speeds, sink.events
-    compared, written = data.size > 0, out.size > 0
     b_flight, K_flight, b_contact, K_contact = motion[:4]
     gap, rest_contact, offset = motion.gap, motion.rest, motion.offset
     safe_flight, safe_contact = (
@@ -150,14 +149,8 @@ def fast_lane(
         end = math.ceil(t + wait)
         S, D = nearby(series, side, i - t)
         u, v = advance(b, K, u, v, S, D)
-        while i < end:
-            block = min(i + LENGTH, end)
-            if compared:
-                total += squares(data, i, block, rest + offset, tables, side, b, u, v)
-            elif written:
-                write(out, speeds, i, block, rest + offset, tables, side, b, K, 0.0, u, v, 0.0, 0.0)
-            u, v = advance(b, K, u, v, tables[side, 0, LENGTH], tables[side, 1, LENGTH])
-            i = block
+        total += pass_plain(data, out, speeds, tables, side, b, K, rest + offset, u, v, i, end)
+        i = end
         remember(history, side, wait)
         t += wait
         fall = -rise
