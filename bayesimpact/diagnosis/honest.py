@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.diagnosis.directions import sigma_of
-from bayesimpact.diagnosis.name import State
+from bayesimpact.diagnosis.name import State, is_gross
 from bayesimpact.inference.fit import Fit
 
 LAGS_PER_ROOT = 3.0  # lags of the long-run covariance, times the root of the number of samples
@@ -46,6 +46,8 @@ class Widened:
 def widened(state: State) -> Widened:
     """Parameters of a model's fit, with what it leaves unexplained carried into them."""
     fit, force = state.candidate.fit, state.force
+    if is_gross(fit):  # too far for the linearised problem: only the spread is believed
+        return Widened(fit.names, fit.mode, sandwich(fit))
     absorbed = force.projection.absorbed
     mean = fit.mode - absorbed @ force.mean
     statistical = fit.covariance if state.is_white else sandwich(fit)
