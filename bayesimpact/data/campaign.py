@@ -104,8 +104,7 @@ class Campaign:
         return replace(self, recordings=kept)
 
     def thinned(self, interval: float) -> Campaign:
-        """The same campaign with samples left out, so that they are about `interval` seconds apart.
-        """
+        """The same campaign, thinned to samples about `interval` seconds apart."""
         kept = []
         for r in self.recordings:
             step = max(1, int(interval / r.interval))
