@@ -13,7 +13,18 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "bayesimpact"
-LAYERS = ("errors", "data", "model", "response", "inference", "diagnosis", "report", "workflow", "trial", "cli")
+LAYERS = (
+    "errors",
+    "data",
+    "model",
+    "response",
+    "inference",
+    "diagnosis",
+    "report",
+    "workflow",
+    "trial",
+    "cli",
+)
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 

@@ -1,4 +1,4 @@
-"""The stamp of a compiled function changes with every file that it depends on, and with no other."""
+"""The stamp of a compiled function covers every file that it depends on, and no other."""
 
 from pathlib import Path
 
