@@ -48,6 +48,8 @@ def judge(reduced_chi2: float, z: float) -> str:
 def model_name(results: Results) -> str:
     """The model in words, with its article."""
     base = "the impact oscillator" if results.stop else "a linear oscillator"
+    if results.effects and not results.stop:
+        base = "an oscillator"
     if not results.effects:
         return base
     titles = [effect.title for effect in results.effects]
@@ -69,22 +71,24 @@ def headline(results: Results) -> str:
     noise = amount(results.noise.level, results.unit, like=like)
     rms = amount(results.rms, results.unit, like=like)
     excess = float(np.sqrt(results.reduced_chi2))
+    diagnosed = results.diagnosis is not None
     if results.verdict == "inadequate":
         text = (
             f"{model} does not fit these recordings. It leaves "
             f"{significant(100 * results.share, 2)} % of the signal unexplained: {rms} rms, about "
             f"{significant(excess, 2)} times what noise of {noise} would leave. The values below "
             "describe the closest such oscillator, and their intervals are too narrow to be "
-            "believed. What is missing is a question for bayesimpact diagnose."
+            "believed. "
+        ) + (
+            "Something else remains." if diagnosed else "bayesimpact diagnose asks what is missing."
         )
     elif results.verdict == "slight":
         text = (
             f"{model} fits these recordings to {significant(100 * (excess - 1), 2)} % above the "
             f"noise of {noise} (residual {rms} rms). That is little, but more than chance "
             f"({results.chi2_z:.1f} standard errors): something small is missing, and it may have "
-            "moved the parameters by more than their intervals. bayesimpact diagnose looks for "
-            "it."
-        )
+            "moved the parameters by more than their intervals."
+        ) + ("" if diagnosed else " bayesimpact diagnose looks for it.")
     elif results.verdict == "overestimated":
         text = (
             f"{model} fits these recordings more closely than noise of {noise} allows (residual "

@@ -81,6 +81,7 @@ def _context(results: Results, pictures: Mapping[str, bytes]) -> dict[str, Any]:
         "contents": _contents(results, groups),
         "parameters": parameters,
         "ratios": [v for v in parameters if v.ratio] if results.mass != 1.0 else [],
+        "centre": "median" if results.kind == "posterior" else "mode",
         "mass_symbol": "J" if results.quantity == "angle" else "m",
         "failed": [c for c in results.failed if c.title != MISFIT],
         "reference_labels": tables.reference_labels(interest),

@@ -14,7 +14,7 @@ from bayesimpact.report.units import number, significant, typeset
 def kind_words(results: Results) -> str:
     """What the report holds."""
     if results.diagnosis is not None:
-        return "diagnosis and posterior"
+        return "diagnosis" if results.draws is None else "diagnosis and posterior"
     return "posterior" if results.kind == "posterior" else "mode and curvature"
 
 

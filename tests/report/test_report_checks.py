@@ -52,11 +52,21 @@ def test_a_linear_oscillator_that_does_not_fit_is_said_so_first() -> None:
 
 
 def test_effects_are_named_in_the_verdict() -> None:
+    added = replace(make_results(1, stop=False), effects=(EffectSummary("a", "drag", ""),))
+    assert judged(added).headline.startswith("An oscillator with drag describes")
     effects = tuple(EffectSummary(i, t, "") for i, t in (("a", "dry friction"), ("b", "drag")))
     results = judged(replace(make_results(excess=3.0), effects=effects))
     assert results.headline.startswith(
         "The impact oscillator with dry friction and drag does not fit"
     )
+
+
+def test_after_a_diagnosis_nobody_is_sent_to_diagnose() -> None:
+    for results in (make_results(2, stop=False, excess=3.0), make_results(3, n=6000, excess=1.1)):
+        assert "bayesimpact diagnose" in results.headline
+        after = judged(replace(results, diagnosis={"verdict": "unknown", "summary": ""}))
+        assert "bayesimpact diagnose" not in after.headline
+        assert ("Something else remains." in after.headline) == (after.verdict == "inadequate")
 
 
 def test_slight_misfit_warns_about_the_intervals() -> None:

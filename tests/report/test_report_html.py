@@ -240,7 +240,7 @@ def test_diagnosis_tells_its_story_first() -> None:
         "free flight (93 % of what is unexplained)",
         "displacement \N{MINUS SIGN}6.0 to 3.0 mm",
         "force, rms 140 µN",
-        "Probability > 0.999; log evidence +812.3 over the base model",
+        "Probability > 0.999; it changes the log evidence by +812.3.",
         "160 (150 to 170) µN",
         "obstacle_mass 0.010 +770.0",
         "residual rms 5.40 µm 5.00 µm",
