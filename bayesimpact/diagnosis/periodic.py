@@ -19,7 +19,7 @@ from scipy.signal import czt
 from bayesimpact.diagnosis.directions import is_periodic, sigma_of
 from bayesimpact.diagnosis.force import whitened_one
 from bayesimpact.diagnosis.scores import LIMIT_SD, Score
-from bayesimpact.inference.fit import Fit, inverse
+from bayesimpact.inference.fit import Fit, inverse, prior_information
 from bayesimpact.model.effects.effect import Effect, Scales
 from bayesimpact.model.parameters import SLOTS
 
@@ -116,7 +116,7 @@ def _statistics(fit: Fit, blocks: Sequence[_Blocks]) -> tuple[Array, Array, Arra
     """Chi-squared (F,), sizes (F, 2 R) of sine and cosine, information (F, 2 R, 2 R)."""
     count, width = blocks[0].score.shape[0], 2 * len(blocks)
     sigma = sigma_of(fit)
-    matrix = np.diag(np.maximum(np.nan_to_num(-fit.target.priors.hessian(fit.mode)), 0.0))
+    matrix = np.diag(prior_information(fit.target.priors, fit.mode))
     noise = fit.target.oscillator.layout.roles("noise")
     matrix[noise, noise] = 0.0
     for part, s in zip(fit.linearisation, sigma, strict=True):

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.diagnosis.directions import sigma_of
-from bayesimpact.inference.fit import Fit, inverse, weak_information
+from bayesimpact.inference.fit import Fit, inverse, prior_information
 
 Array = NDArray[np.float64]
 
@@ -59,10 +59,9 @@ def project(fit: Fit, parts: Sequence[Array]) -> Projection:
         (lin.jacobian / s, lin.residual / s, lin.columns, part)
         for lin, s, part in zip(fit.linearisation, sigma, parts, strict=True)
     ]
-    curvature = -fit.target.priors.hessian(fit.mode)
+    curvature = prior_information(fit.target.priors, fit.mode)
     noise = fit.target.oscillator.layout.roles("noise")
     curvature[noise] = 0.0
-    curvature = np.maximum(np.nan_to_num(curvature), weak_information(fit.target.priors))
     matrix = np.diag(curvature)
     for jacobian, _, where, _ in rows:
         matrix[np.ix_(where, where)] += jacobian.T @ jacobian

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.inference.likelihood import Likelihood, Linearisation
-from bayesimpact.inference.priors import Priors
+from bayesimpact.inference.priors import LogNormal, Priors
 from bayesimpact.model.oscillator import Oscillator
 
 Array = NDArray[np.float64]
@@ -196,10 +196,9 @@ class _Climb:
         likelihood, priors = self.target.likelihood, self.target.priors
         parts = likelihood.linearise(theta, self.steps)
         matrix, vector = normal_equations(parts, theta[likelihood.sigma_columns], theta.size)
-        matrix -= np.diag(
-            np.where(np.isin(np.arange(theta.size), self.noise), 0, priors.hessian(theta))
-        )
-        matrix += np.diag(weak_information(priors))
+        information = prior_information(priors, theta)
+        information[self.noise] = 0.0
+        matrix += np.diag(information)
         vector += priors.gradient(theta)
         if self.steps is not None and np.isfinite(matrix).all():
             known = np.diag(matrix)[self.moving] > 0
@@ -272,14 +271,21 @@ def best_sigma(target: Target, sums: Array) -> Array:
     return np.array(result)
 
 
-def weak_information(priors: Priors) -> Array:
-    """Inverse variances (d,) of the flat priors, 0 for the others.
+def prior_information(priors: Priors, theta: Array) -> Array:
+    """What the priors add to the information at theta (d,): inverse variances (d,), never negative.
 
-    Next to what the recordings say it is nothing; where they say nothing at all (an obstacle that
-    was never touched) it keeps steps and covariances finite.
+    Minus the curvature of the log density, but for two kinds. A flat prior counts with its
+    variance: next to what the recordings say it is nothing, and where they say nothing (an obstacle
+    that was never touched) it keeps steps and covariances finite. A log-normal one, whose density
+    is convex in its tail, counts as what it is in log x, a normal.
     """
     with np.errstate(divide="ignore"):
-        return np.asarray(12.0 / (priors.upper - priors.lower) ** 2)
+        flat = 12.0 / (priors.upper - priors.lower) ** 2
+    information = np.maximum(np.nan_to_num(-priors.hessian(theta)), flat)
+    for i, prior in enumerate(priors.parameters):
+        if isinstance(prior, LogNormal):
+            information[i] = 1.0 / (prior.sigma * theta[i]) ** 2
+    return np.asarray(information)
 
 
 def inverse(matrix: Array) -> Array:

@@ -19,7 +19,7 @@ from bayesimpact.diagnosis.scan import score_directions
 from bayesimpact.inference.fit import Fit, Target, find_mode
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.likelihood import Linearisation
-from bayesimpact.inference.priors import HalfNormal, LogUniform, Normal, Priors
+from bayesimpact.inference.priors import HalfNormal, LogNormal, LogUniform, Normal, Priors
 from bayesimpact.model.parameters import Parameter
 
 
@@ -111,6 +111,29 @@ def test_evidence_with_a_size_that_cannot_be_negative(shift):
     fit = linear_fit(400, 3, [Normal(0.0, 3.0)] * 2 + [HalfNormal(1.5)], shift=shift)
     assert (fit.mode[2] == 0.0) == (shift < 0.0) or shift == 0.0
     assert log_evidence(fit) == pytest.approx(exact_log_evidence(fit), abs=0.05)
+
+
+@pytest.mark.parametrize("known", [0.05, 0.3, 1.0, 3.0, 100.0])
+def test_evidence_with_a_log_normal_prior(known):
+    """A shape parameter, from sharply known to not at all; its density is convex in the tail.
+
+    One coefficient of 2 with a standard error of `known`, its prior about 1 with 1.5 in the log.
+    """
+    n, rng, prior = 400, np.random.default_rng(3), LogNormal(1.0, 1.5)
+    x = rng.standard_normal((n, 1))
+    x /= np.linalg.norm(x) * known
+    noise = rng.standard_normal(n)
+    noise -= x[:, 0] * (x[:, 0] @ noise) / (x[:, 0] @ x[:, 0])
+    target = Target(Linear(x, 2.0 * x[:, 0] + noise), Priors((prior, SIGMA)))
+    fit = find_mode(target, np.array([1.0, 1.0]), tolerance=1e-8)
+    grid = np.exp(np.linspace(-12, 12, 4001))  # the coefficient; the level by its own quadrature
+    sums = target.likelihood.misfit(np.column_stack([grid, grid]))[:, 0]
+    level = np.exp(np.linspace(-0.3, 0.3, 121)) * fit.mode[1]
+    table = -n * np.log(level) - sums[:, None] / (2 * level**2) - 0.5 * n * np.log(2 * np.pi)
+    table += prior.log_density(grid)[:, None] + np.log(grid)[:, None] - np.log(SIGMA._log_width)
+    inner = integrate.simpson(np.exp(table - table.max()), x=np.log(level), axis=1)
+    expected = table.max() + np.log(integrate.simpson(inner, x=np.log(grid)))
+    assert log_evidence(fit) == pytest.approx(expected, abs=0.25)
 
 
 def importance(fit: Fit, count: int, seed: int = 0, freedom: float = 12.0) -> tuple[float, float]:
