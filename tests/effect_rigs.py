@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
+from naive_general import Naive
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.recording import Recording
-from bayesimpact.model.effects import EFFECTS, Effect, Scales
+from bayesimpact.model.effects import EFFECTS, Effect, EffectParameter, Scales
 from bayesimpact.model.oscillator import Oscillator, build_oscillator
+from bayesimpact.trial.rig import Release, Rig, motion
 
 BY_ID = {effect.id: effect for effect in EFFECTS}
+MOVING = tuple(effect for effect in EFFECTS if effect.observe is None)
 
 
 @dataclass(frozen=True)
@@ -30,7 +33,6 @@ class TestRig:
     v0: Sequence[float] = (0.0, 0.01)
     rate: float = 1000.0
     duration: float = 6.0
-    changes: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def count(self) -> int:
@@ -113,3 +115,66 @@ def values_at(effect: Effect, rig: TestRig, choose: object) -> dict[str, float]:
         else:
             values[name] = choose(parameter, i)
     return values
+
+
+def typical(effect: Effect, rig: TestRig, share: float = 1.0) -> dict[str, float]:
+    """All parameters of an effect, `share` of their scales away from the null."""
+    scales = rig.scales()
+
+    def choose(parameter: EffectParameter, _: int) -> float:
+        assert parameter.null is not None
+        return parameter.null + share * parameter.scale(scales)
+
+    values = values_at(effect, rig, choose)
+    for i, name in enumerate(values):
+        if effect.parameter(name.split(".")[1].split("[")[0]).replaces:
+            values[name] *= 1 + 0.1 * share * (i + 1)
+    return values
+
+
+def numbers_of(
+    effects: Sequence[Effect], values: Mapping[str, float], rig: TestRig, r: int
+) -> dict[str, dict[str, float]]:
+    """Effect -> parameter -> number for recording `r`, as the independent simulators take them."""
+    found: dict[str, dict[str, float]] = {}
+    for effect in effects:
+        found[effect.id] = {}
+        for parameter in effect.parameters:
+            key = {"campaign": "", "case": f"[{r}]", "recording": f"[{rig.names()[r]}]"}
+            found[effect.id][parameter.name] = values[
+                f"{effect.id}.{parameter.name}{key[parameter.scope]}"
+            ]
+    return found
+
+
+def moved(
+    effects: Sequence[Effect], values: Mapping[str, float], rig: TestRig, r: int = 0
+) -> np.ndarray:
+    """True displacement of recording `r`, (n,), m, by the package's own simulators."""
+    oscillator = build_oscillator(rig.campaign(), effects)
+    return oscillator.predict_recording(r, rig.theta(oscillator, values)[None])[0]
+
+
+def by_hand(
+    effects: Sequence[Effect], values: Mapping[str, float], rig: TestRig, r: int = 0
+) -> np.ndarray:
+    """The same by the naive twin."""
+    naive = Naive(
+        rig.mass, rig.c1, rig.k1, rig.c2 * rig.stop, rig.g if rig.stop else np.inf,
+        rig.k2[r] if rig.stop else 0.0, rig.y0[r], rig.v0[r],
+        numbers_of(effects, values, rig, r),
+    )  # fmt: skip
+    return naive.run(np.arange(rig.count) / rig.rate)
+
+
+def by_rig(
+    effects: Sequence[Effect], values: Mapping[str, float], rig: TestRig, r: int = 0
+) -> np.ndarray:
+    """The same by the independent rig that makes the blind trials' recordings."""
+    stop = {"c2": rig.c2, "g": rig.g, "k2": {str(i): k for i, k in enumerate(rig.k2)}}
+    oscillator = Rig(rig.mass, rig.c1, rig.k1, **(stop if rig.stop else {}))
+    release = Release(rig.names()[r], str(r) if rig.stop else "", rig.y0[r], rig.v0[r])
+    numbers = numbers_of(effects, values, rig, r)
+    return motion(
+        oscillator, release, numbers, rate=rig.rate, duration=rig.duration, rtol=1e-13, atol=1e-16
+    ).displacement

@@ -1,8 +1,8 @@
 """The one way in which the package compiles: numba, cached under a stamp of the sources below.
 
-numba's cache notices a change only in the file of the compiled function itself, not in the files of
-the functions it calls. Here the stamp of a function covers its own file and every file of the package
-that this one imports, directly or not, so a change anywhere below compiles it anew.
+numba's cache notices a change only in the file of the compiled function itself, not in the files
+of the functions it calls. Here the stamp of a function covers its own file and every file of the
+package that this one imports, directly or not, so a change anywhere below compiles it anew.
 """
 
 from __future__ import annotations
@@ -56,10 +56,14 @@ def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
 
 def compiled_callback(signature: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Decorate a function to be compiled at once as a C callback (`.address` is its pointer)."""
+    """Decorate a function to be compiled at once as a C callback (`.address` is its pointer).
+
+    A function typed into a session has no file beside which it could be cached.
+    """
 
     def decorate(function: Callable[..., Any]) -> Any:
-        return numba.cfunc(signature, cache=True)(function)
+        kept = Path(function.__code__.co_filename).exists()
+        return numba.cfunc(signature, cache=kept, error_model="numpy")(function)
 
     return decorate
 

@@ -134,10 +134,14 @@ class Law:
     force : N
     where : evaluated everywhere or in contact only
     rate : time derivative of the state z (a law with memory), or None
-    surface : a smooth function of y or d whose zero is a kink or jump of the force; steps end on it
+    surface : a smooth function of y or d whose zero is a kink of the force; steps end on it. (A
+        force may jump at the touch, being evaluated in contact only; other jumps cost accuracy.)
     pace : fastest rate at which the force depends on time explicitly, rad/s; steps resolve it
-    kink_at_turn : the force has a kink or jump at v = 0; steps end on turning points
+    kink_at_turn : the force has a kink at v = 0; steps end on turning points
     rough_at_touch : the force is continuous but not smooth at d = 0; steps begin small there
+
+    The state of a law that acts in contact only is not integrated in flight: its rate may there
+    depend on the state alone, linearly (it decays, or it stays).
     """
 
     force: Callable[..., float]

@@ -1,0 +1,188 @@
+"""The catalogue: complete, in the right words, consistent with the contract and with itself."""
+
+from __future__ import annotations
+
+import ast
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from effect_rigs import BY_ID, TestRig
+
+import bayesimpact.model.effects as package
+from bayesimpact.errors import InputError
+from bayesimpact.inference.defaults import effect_prior
+from bayesimpact.model.effects import EFFECTS, Scales
+from bayesimpact.model.effects.catalogue import HEADS, catalogue
+from bayesimpact.model.parameters import SLOTS, angular, build_layout
+
+CONTRACT = {
+    "contact_damping_indentation": ["coefficient"],
+    "contact_damping_speed": ["coefficient"],
+    "contact_damping_per_case": ["c2[case]"],
+    "contact_hardening": ["stiffness"],
+    "contact_power_law": ["exponent"],
+    "contact_second_stage": ["stiffness", "depth"],
+    "contact_no_tension": [],
+    "contact_relaxation": ["stiffness", "time"],
+    "obstacle_mass": ["mass"],
+    "gap_wear": ["step"],
+    "gap_per_recording": ["g[recording]"],
+    "coulomb_friction": ["force"],
+    "quadratic_drag": ["coefficient"],
+    "spring_quadratic": ["stiffness"],
+    "spring_cubic": ["stiffness"],
+    "stiffness_drift": ["rate"],
+    "harmonic_forcing": ["amplitude", "frequency", "phase[recording]"],
+    "opposite_stop": ["stiffness", "gap"],
+    "sensor_drift": ["rate"],
+    "sensor_quadratic": ["gain"],
+    "sensor_cubic": ["gain"],
+    "sensor_hum": ["amplitude", "frequency", "phase[recording]"],
+}
+DISSIPATIVE = {
+    "contact_damping_indentation.coefficient", "contact_damping_speed.coefficient",
+    "contact_relaxation.stiffness", "contact_second_stage.stiffness", "obstacle_mass.mass",
+    "gap_wear.step", "coulomb_friction.force", "quadratic_drag.coefficient",
+    "opposite_stop.stiffness",
+}  # fmt: skip
+SIGNED = {
+    "contact_hardening.stiffness", "spring_quadratic.stiffness", "spring_cubic.stiffness",
+    "stiffness_drift.rate", "sensor_drift.rate", "sensor_quadratic.gain", "sensor_cubic.gain",
+}  # fmt: skip
+
+
+def test_ids_and_parameters_are_those_of_the_contract():
+    found = {row.id: [p.name.split(".")[1] for p in row.parameters] for row in catalogue()}
+    assert found == CONTRACT
+
+
+def test_every_file_answers_every_question_in_order():
+    for path in Path(package.__file__).parent.glob("*.py"):
+        if path.stem in ("__init__", "effect", "catalogue"):
+            continue
+        words = ast.get_docstring(ast.parse(path.read_text())) or ""
+        places = [words.find(f"\n{head}") for head in HEADS]
+        assert -1 not in places, (path.name, places)
+        assert places == sorted(places), path.name
+        assert path.stem in BY_ID, f"{path.name} is not registered"
+    for row in catalogue():
+        assert len(row.summary) > 20 and row.summary[-1] in ".:"
+        assert all(getattr(row, attribute) for attribute in HEADS.values())
+
+
+def test_an_effect_without_a_file_is_listed_by_its_title():
+    (row,) = catalogue([replace(BY_ID["spring_cubic"], id="of_my_own")])
+    assert row.summary == row.title
+    assert row.source == ""
+    assert row.parameters[0].name == "of_my_own.stiffness"
+
+
+def test_bounds_are_physics():
+    parameters = {f"{e.id}.{p.name}": p for e in EFFECTS for p in e.parameters}
+    for name in DISSIPATIVE:
+        assert (parameters[name].lower, parameters[name].null) == (0.0, 0.0)
+    for name in SIGNED:
+        assert (parameters[name].lower, parameters[name].null) == (-np.inf, 0.0)
+    exponent = parameters["contact_power_law.exponent"]
+    assert (exponent.lower, exponent.null) == (0.5, 1.0)
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.id)
+def test_sentence_and_slots(effect):
+    text = effect.statement.format(size="1 N", share="2 %")
+    assert "1 N" in text and "2 %" in text and text.endswith(".")
+    assert set(effect.binds) | set(effect.sets) <= set(SLOTS)
+    for name in effect.binds.values():
+        assert effect.parameter(name)
+    assert effect.prefer is None or effect.prefer in BY_ID
+    assert sum(x is not None for x in (effect.law, effect.observe)) <= 1
+    acts = effect.law or effect.observe or effect.binds or effect.sets
+    assert acts
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda e: e.id)
+def test_priors_scale_with_the_rig(effect):
+    """The same rig in other units of length, mass and time gives the same priors in those units."""
+    length, mass, time = 1e3, 1e-2, 50.0
+    ours = TestRig().scales()
+    exponents = {
+        "mass": (0, 1, 0), "stiffness": (0, 1, -2), "damping": (0, 1, -1),
+        "contact_stiffness": (0, 1, -2), "contact_damping": (0, 1, -1), "amplitude": (1, 0, 0),
+        "speed": (1, 0, -1), "indentation": (1, 0, 0), "impact_speed": (1, 0, -1),
+        "duration": (0, 0, 1), "interval": (0, 0, 1), "gap": (1, 0, 0),
+    }  # fmt: skip
+    scaled = {
+        k: getattr(ours, k) * length**a * mass**b * time**c for k, (a, b, c) in exponents.items()
+    }
+    theirs = Scales(**scaled, impacts=ours.impacts, cases=ours.cases, recordings=ours.recordings)
+    units = {"N": (1, 1, -2), "s": (0, 0, 1), "s2": (0, 0, 2), "m": (1, 0, 0), "kg": (0, 1, 0),
+             "m2": (2, 0, 0), "m3": (3, 0, 0), "1": (0, 0, 0), "-": (0, 0, 0), "rad": (0, 0, 0),
+             "Hz": (0, 0, -1)}  # fmt: skip
+    for parameter in effect.parameters:
+        above, _, below = parameter.unit.partition("/")
+        power = np.zeros(3)
+        for part, sign in ((above, 1), (below, -1)):
+            for word in part.split():
+                power += sign * np.array(units[word])
+        expected = parameter.scale(ours) * np.prod(np.array([length, mass, time]) ** power)
+        if effect.id == "sensor_hum" and parameter.name == "frequency":
+            continue  # the mains do not scale
+        assert parameter.scale(theirs) == pytest.approx(expected, rel=1e-12)
+        assert parameter.scale(ours) > 0
+        prior = effect_prior(effect, parameter, ours)
+        assert np.isfinite(prior.log_density(np.array(prior.ppf(np.array(0.4)))))
+
+
+def test_shapes_have_grids_within_their_bounds():
+    scales = TestRig().scales()
+    for effect in EFFECTS:
+        for parameter in effect.parameters:
+            assert parameter.is_shape == (parameter.grid is not None)
+            if parameter.grid is not None:
+                values = parameter.grid(scales)
+                assert values.size >= 4
+                assert np.all((values >= parameter.lower) & (values <= parameter.upper))
+
+
+def test_admissible_only_where_it_could_show():
+    scales = TestRig().scales()
+    assert all(effect.admissible(scales) for effect in EFFECTS)
+    silent = replace(scales, impacts=0)
+    assert {e.id for e in EFFECTS if e.admissible(silent)} == {
+        e.id for e in EFFECTS if not e.needs_stop
+    }
+    assert not BY_ID["gap_wear"].admissible(replace(scales, impacts=1))
+    assert not BY_ID["contact_damping_per_case"].admissible(replace(scales, cases=1))
+    assert not BY_ID["gap_per_recording"].admissible(replace(scales, recordings=1))
+
+
+def test_families_hold_the_near_neighbours():
+    families: dict[str, set[str]] = {}
+    for effect in EFFECTS:
+        families.setdefault(effect.family, set()).add(effect.id)
+    for pair in (
+        ("contact_damping_speed", "contact_damping_indentation"),
+        ("contact_power_law", "contact_second_stage"),
+        ("contact_hardening", "contact_power_law"),
+        ("spring_cubic", "opposite_stop"),
+        ("obstacle_mass", "contact_relaxation"),
+        ("coulomb_friction", "quadratic_drag"),
+    ):
+        assert any(set(pair) <= family for family in families.values())
+
+
+def test_an_obstacle_effect_needs_an_obstacle():
+    campaign = TestRig(k2=()).campaign()
+    for effect in EFFECTS:
+        if effect.needs_stop:
+            with pytest.raises(InputError, match=effect.id):
+                build_layout(campaign, [effect])
+
+
+def test_units_of_angles():
+    found = {angular(p.unit) for e in EFFECTS for p in e.parameters}
+    assert not any(re.search(r"\bm\d?\b", unit.replace("N m", "").replace("kg m2", ""))
+                   for unit in found)  # fmt: skip

@@ -1,0 +1,174 @@
+"""A slow and obvious twin of the general simulator: SciPy's DOP853 from event to event.
+
+Every line of `force` is a line of the catalogue: d = y - g, v = y', forces on the left-hand side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+FREE, CONTACT, RELEASED = "free", "contact", "released"
+
+
+@dataclass
+class Naive:
+    """One recording of an oscillator with effects (id -> parameters); SI, frequencies in Hz."""
+
+    mass: float
+    c1: float
+    k1: float
+    c2: float = 0.0
+    g: float = np.inf
+    k2: float = 0.0
+    y0: float = 0.0
+    v0: float = 0.0
+    effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    tolerance: float = 1e-12
+
+    def __post_init__(self) -> None:
+        self.c2 = self.number("contact_damping_per_case", "c2", self.c2)
+        self.g = self.number("gap_per_recording", "g", self.g)
+        self.gap, self.m2 = self.g, self.number("obstacle_mass", "mass")
+        self.one_sided = bool({"contact_no_tension", "obstacle_mass"} & set(self.effects))
+        self.friction = self.number("coulomb_friction", "force")
+        self.t, self.state, self.slide = 0.0, [self.y0, self.v0, 0.0], np.sign(self.v0)
+        self.mode = FREE
+
+    def number(self, effect: str, name: str, default: float = 0.0) -> float:
+        return self.effects.get(effect, {}).get(name, default)
+
+    def in_contact(self, y: float, v: float, z: float) -> float:
+        """Everything that acts between obstacle and mass, N."""
+        d, p = y - self.gap, self.number
+        force = self.c2 * v + self.k2 * d
+        force += p("contact_damping_indentation", "coefficient") * d * v
+        force += p("contact_damping_speed", "coefficient") * abs(v) * v
+        force += p("contact_hardening", "stiffness") * d**3
+        n = p("contact_power_law", "exponent", 1.0)
+        force += self.k2 * d * ((abs(d) / 1e-3) ** (n - 1) - 1) if d != 0 else 0.0
+        if d > p("contact_second_stage", "depth", np.inf):
+            force += p("contact_second_stage", "stiffness") * (
+                d - p("contact_second_stage", "depth")
+            )
+        return force + z
+
+    def everywhere(self, t: float, y: float, v: float) -> float:
+        """Everything else but dry friction, N."""
+        p = self.number
+        force = self.c1 * v + self.k1 * (1 + p("stiffness_drift", "rate") * t) * y
+        force += p("quadratic_drag", "coefficient") * abs(v) * v
+        force += p("spring_quadratic", "stiffness") * y**2 + p("spring_cubic", "stiffness") * y**3
+        w = 2 * np.pi * p("harmonic_forcing", "frequency")
+        phase = p("harmonic_forcing", "phase")
+        force -= p("harmonic_forcing", "amplitude") * np.sin(w * t + phase)
+        if y < -p("opposite_stop", "gap", np.inf):
+            force += p("opposite_stop", "stiffness") * (y + p("opposite_stop", "gap"))
+        return force
+
+    def acceleration(self, t: float, y: float, v: float, z: float, mode: str) -> float:
+        force = self.everywhere(t, y, v) + self.friction * self.slide
+        if mode == CONTACT:
+            return -(force + self.in_contact(y, v, z)) / (self.mass + self.m2)
+        return -force / self.mass
+
+    def reaction(self, t: float, state: list[float]) -> float:
+        """Force of the obstacle on the mass, N: what moves the obstacle's own mass comes on top."""
+        y, v, z = state
+        return self.in_contact(y, v, z) + self.m2 * self.acceleration(t, y, v, z, CONTACT)
+
+    def right_hand_side(self, t: float, state: list[float]) -> list[float]:
+        y, v, z = state
+        touching = self.mode == CONTACT
+        stiffness, time = (self.number("contact_relaxation", n) for n in ("stiffness", "time"))
+        rate = stiffness * v * touching - z / time if time else 0.0
+        held = self.friction > 0 and self.slide == 0
+        return [0.0, 0.0, rate] if held else [v, self.acceleration(t, y, v, z, self.mode), rate]
+
+    def watches(self, sign: float) -> dict[str, tuple[object, float]]:
+        """Event -> (function of t and state, direction in which it crosses zero)."""
+        found = {"turn": (lambda t, s: s[1], -sign)}
+        if self.mode == FREE:
+            found["touch"] = (lambda t, s: s[0] - self.gap, 1.0)
+        elif self.mode == RELEASED or not self.one_sided:
+            found["gap"] = (lambda t, s: s[0] - self.gap, -1.0)
+        else:
+            found["release"] = (self.reaction, -1.0)
+        for effect, name, scale in (
+            ("opposite_stop", "gap", -1.0),
+            ("contact_second_stage", "depth", 1.0),
+        ):
+            if effect in self.effects:
+                base = 0.0 if scale < 0 else self.gap
+                level = base + scale * self.number(effect, name)
+                if sign * (level - self.state[0]) <= 1e-14:
+                    continue  # behind, or just crossed
+                found[effect] = (lambda t, s, level=level: s[0] - level, sign)
+        return found
+
+    def run(self, times: np.ndarray) -> np.ndarray:
+        """Displacement at `times`, (n,), m."""
+        out, filled = np.empty(times.size), 0
+        if self.y0 > self.gap:
+            self.mode = CONTACT
+            if self.one_sided and self.reaction(0.0, self.state) <= 0:
+                self.mode = RELEASED
+        while filled < times.size:
+            sign = self.start()
+            watches = self.watches(sign)
+            if sign == 0:
+                watches = {"slip": (self.slack, -1.0)}
+            events = []
+            for function, direction in watches.values():
+                event = lambda t, s, function=function: function(t, s)  # noqa: E731
+                event.terminal, event.direction = True, direction
+                events.append(event)
+            answer = solve_ivp(
+                self.right_hand_side, (self.t, times[-1] + 1e-9), self.state, "DOP853",
+                events=events, dense_output=True, rtol=self.tolerance, atol=1e-15,
+                max_step=0.1 * np.sqrt(self.mass / (self.k1 + self.k2)),
+            )  # fmt: skip
+            end = answer.t[-1]
+            upto = times.size if answer.status == 0 else int(np.searchsorted(times, end))
+            if upto > filled:
+                out[filled:upto] = answer.sol(times[filled:upto])[0]
+            filled = upto
+            self.t, self.state = end, list(answer.y[:, -1])
+            for name, hits in zip(watches, answer.t_events, strict=True):
+                if hits.size:
+                    self.happen(name)
+        return out
+
+    def start(self) -> float:
+        """Direction of the piece that begins now; 0 while dry friction holds."""
+        y, v, z = self.state
+        if v != 0:
+            self.slide = np.sign(v)
+            return self.slide
+        self.slide = 0.0
+        mass = self.mass + self.m2 * (self.mode == CONTACT)
+        pull = mass * self.acceleration(self.t, y, 0.0, z, self.mode)
+        if abs(pull) > self.friction:
+            self.slide = np.sign(pull)
+        return self.slide
+
+    def slack(self, t: float, state: list[float]) -> float:
+        mass = self.mass + self.m2 * (self.mode == CONTACT)
+        return self.friction - mass * abs(self.acceleration(t, state[0], 0.0, state[2], self.mode))
+
+    def happen(self, name: str) -> None:
+        if name == "turn":
+            self.state[1] = 0.0
+        elif name == "touch":
+            self.mode, self.state[0] = CONTACT, self.gap
+            self.state[1] *= self.mass / (self.mass + self.m2)
+        elif name == "gap" and self.mode == RELEASED:
+            self.mode = FREE
+        elif name in ("gap", "release"):
+            if name == "gap":
+                self.state[0] = self.gap
+            self.gap += self.number("gap_wear", "step")
+            self.mode = RELEASED if self.state[0] > self.gap else FREE
