@@ -21,7 +21,7 @@ from bayesimpact.model.batch import Floats, Ints, Span, gather, share
 from bayesimpact.model.blocks import Sink
 from bayesimpact.model.compiled import compiled
 from bayesimpact.model.kernel import run
-from bayesimpact.model.scaled import OK, OVERFLOW, A, begins_in_contact
+from bayesimpact.model.scaled import OK, OVERFLOW, A
 from bayesimpact.model.sweep import Lanes, desk, sweep
 from bayesimpact.model.tables import Shelf, shelf
 
@@ -87,7 +87,7 @@ def work(
             events, code = find_events(q, mass, intervals[r], n, samples[:0], first_events, mine)
             if code == OK:
                 sweep(
-                    q, mass, intervals[r], n, events, begins_in_contact(q),
+                    q, mass, intervals[r], n, events,
                     wanted(active, columns[r], size > PLAIN), data, own, slopes, gram, room,
                 )  # fmt: skip
                 if not math.isfinite(gram.sum() + own.sum() + slopes.sum()):

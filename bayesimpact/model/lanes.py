@@ -160,9 +160,15 @@ def dot(a: Floats, b: Floats) -> float:
 
 @compiled()
 def add_products(
-    gram: Floats, stack: Floats, products: Floats, moments: Floats, slots: int, active: Lanes
-) -> None:
-    """Add the slots' products of J with J and with the residual to `gram` (12, 12)."""
+    gram: Floats, stack: Floats, products: Floats, moments: Floats, slots: int, active: Lanes,
+    samples: int,
+) -> int:  # fmt: skip
+    """Add the slots' products of J with J and with the residual to `gram` (12, 12).
+
+    Only if there are samples. Returns how many slots are still filled: none.
+    """
+    if samples == 0:
+        return 0
     width = stack.shape[1] * stack.shape[2]
     count = slots * stack.shape[2]
     rows, weighted, residuals = stack.reshape(-1), products.reshape(-1), moments.reshape(-1)
@@ -179,3 +185,4 @@ def add_products(
         total = dot(mine, residuals[:count])
         gram[i, RESIDUAL] += total
         gram[RESIDUAL, i] += total
+    return 0

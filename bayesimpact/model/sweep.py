@@ -34,7 +34,7 @@ from bayesimpact.model.lanes import (
     multiply,
 )  # fmt: skip
 from bayesimpact.model.moments import forced_moments, plain_moments, prefix_grams, write_rows
-from bayesimpact.model.scaled import C1, C2, K1, K2, OFFSET, V0, Y0, G, W
+from bayesimpact.model.scaled import C2, OFFSET, V0, Y0, G, begins_in_contact, scale
 from bayesimpact.model.tables import LENGTH, SLOW, TERMS
 
 Floats = NDArray[np.float64]
@@ -47,15 +47,14 @@ BLOCKS = 64
 class Desk(NamedTuple):
     """Room for `sweep`, kept from recording to recording.
 
-    tables (2, basis, LENGTH), ends (2, 2, basis), series (2, 3, TERMS), prefixes (2, LENGTH + 1,
-    basis, basis), keys (2, 3) : of both regimes
+    tables (2, basis, LENGTH), series (2, 3, TERMS), prefixes (2, LENGTH + 1, basis, basis),
+    keys (2, 3) : of both regimes
     slopes (2, 3, 11) : derivatives of their 2 b, K and rest
     stack, products (11, BLOCKS, basis), moments (BLOCKS, basis) : of the blocks
     point (2, basis), dy (11,), dv (11,) : at one time
     """
 
     tables: Floats
-    ends: Floats
     series: Floats
     prefixes: Floats
     keys: Floats
@@ -74,7 +73,6 @@ def desk(size: int, with_grams: bool) -> Desk:
     lengths = LENGTH + 1 if with_grams else 0
     return Desk(
         np.empty((2, size, LENGTH)),
-        np.empty((2, 2, size)),
         np.empty((2, 3, TERMS)),
         np.empty((2, lengths, size, size)),
         np.full((2, 3), np.nan),
@@ -88,48 +86,51 @@ def desk(size: int, with_grams: bool) -> Desk:
     )
 
 
+@compiled()
+def refill(room: Desk, side: int, b: float, K: float, w: float) -> None:
+    """Fill tables, series and prefix sums of one regime."""
+    forced = room.tables.shape[1] > basis.PLAIN
+    fill_table(room.tables[side], room.point[0], room.point[1], b, K, w, forced)
+    fill_basis_series(room.series[side], b, K)
+    if room.prefixes.shape[1] > 0:
+        prefix_grams(room.prefixes, room.tables, side)
+    room.keys[side, 0], room.keys[side, 1], room.keys[side, 2] = b, K, w
+
+
 @compiled(fastmath={"contract"})
 def sweep(
-    q: Floats, mass: float, interval: float, n: int, events: Floats, contact: bool, active: Lanes,
+    q: Floats, mass: float, interval: float, n: int, events: Floats, active: Lanes,
     data: Floats, values: Floats, jacobian: Floats, gram: Floats, room: Desk,
 ) -> None:  # fmt: skip
     """Pass over one recording; add to `gram` (12, 12) if `data` has samples, else fill the others.
 
     events : (k, 2) times and velocities of all events, in sampling intervals
-    contact : whether the motion begins in contact
     active : the q whose derivatives are wanted
     values, jacobian : (n,), (n, 11)
     """
-    tables, ends, series, prefixes, keys, slopes, stack, products, moments, point, dy, dv = room
-    size = tables.shape[1]
-    forced = size > basis.PLAIN
-    w = q[W] * interval
+    tables, series, prefixes, keys, slopes, stack, products, moments, point, dy, dv = room
+    motion = scale(q, mass, interval)
+    contact = begins_in_contact(q)
+    forced = tables.shape[1] > basis.PLAIN
     fill_slopes(slopes, q, mass, interval)
     dy[:], dv[:] = 0.0, 0.0
     dy[Y0], dv[V0], dy[OFFSET] = 1.0, interval, 1.0
     t, y, v = 0.0, q[Y0], q[V0] * interval
-    fs = fc = 0.0
-    squares = 0.0
-    i = 0
-    slot = 0
+    squares = fs = fc = 0.0
+    i = slot = 0
     for e in range(events.shape[0] + 1):
-        side = 1 if contact else 0
-        stiffness = q[K1] + q[K2] if contact else q[K1]
-        beta = (q[C1] + q[C2] if contact else q[C1]) * interval / mass
-        K = stiffness * interval * interval / mass
-        rest = q[K2] * q[G] / stiffness if contact else 0.0
-        if keys[side, 0] != beta or keys[side, 1] != K or keys[side, 2] != w:
-            fill_table(tables[side], ends[side, 0], ends[side, 1], 0.5 * beta, K, w, forced)
-            fill_basis_series(series[side], 0.5 * beta, K)
-            if data.size:
-                prefix_grams(prefixes, tables, side)
-            keys[side, 0], keys[side, 1], keys[side, 2] = beta, K, w
+        if contact:
+            side, b, K, rest = 1, motion.b_contact, motion.K_contact, motion.rest
+        else:
+            side, b, K, rest = 0, motion.b_flight, motion.K_flight, 0.0
+        if keys[side, 0] != b or keys[side, 1] != K or keys[side, 2] != motion.w:
+            refill(room, side, b, K, motion.w)
+        beta = 2.0 * b
         slow = beta + math.sqrt(K) < SLOW
-
         last = e == events.shape[0]
         end = n if last else math.ceil(events[e, 0])
         while True:
-            # the motion from t on: samples of a block, if t is one, then to `target`
+            # the motion from t on: the samples of a block, if t is one, then to `target`
             u = y - rest
             m = v + beta * u
             fill_coefficients(stack, slot, active, slopes, side, beta, K, u, v, dy, dv)
@@ -140,7 +141,7 @@ def sweep(
             here = slot
             if t == i and i < end:
                 block = min(i + LENGTH, end)
-                shift = rest + q[OFFSET]
+                shift = rest + motion.offset
                 if data.size == 0:
                     write_rows(
                         stack, slot, active, tables, side, shift, u, m, fs, fc, values[i:block],
@@ -156,38 +157,36 @@ def sweep(
                             moments, slot, tables, side, data, i, block, shift, u, m
                         )
                     multiply(stack, products, slot, active, prefixes, side, block - i)
-                    slot += 1
+                slot += 1
                 i = block
             if last and i == end:
                 break
             to_event = i == end
             target = events[e, 0] if to_event else float(i)
             if forced:
-                fill_basis(point[0], point[1], 0.5 * beta, K, w, forced, target - t)
-                S, D, G_, H = point[0, 1], point[0, 2], point[0, 3], point[0, 4]
+                fill_basis(point[0], point[1], b, K, motion.w, forced, target - t)
+                S, D, second, third = point[0, 1], point[0, 2], point[0, 3], point[0, 4]
             else:
-                S, D, G_, H = plain_basis(tables, series, side, 0.5 * beta, K, slow, target - t)
-            carry(stack, here, active, beta, K, S, D, G_, H, dy, dv)
+                S, D, second, third = plain_basis(tables, series, side, b, K, slow, target - t)
+            carry(stack, here, active, beta, K, S, D, second, third, dy, dv)
             y, v = rest + D * u + S * m, D * v - S * (K * u)
             if forced:
                 carry_forced(stack, here, active, point[0], point[1], dy, dv)
                 y += fs * point[0, basis.E_] + fc * point[0, basis.F_]
                 v += fs * point[1, basis.E_] + fc * point[1, basis.F_]
             if slot == BLOCKS:
-                add_products(gram, stack, products, moments, slot, active)
-                slot = 0
+                slot = add_products(gram, stack, products, moments, slot, active, data.size)
             if to_event:
                 break
             t = target
         if last:
             break
-        t, y, v = events[e, 0], q[G], events[e, 1]
+        t, y, v = events[e, 0], motion.gap, events[e, 1]
         jump = (q[C2] if contact else -q[C2]) * interval / mass
         for p in active:
             dv[p] += jump * dy[p]
         dv[G] -= jump
         dv[OFFSET] -= jump
         contact = not contact
-    if data.size:
-        add_products(gram, stack, products, moments, slot, active)
-        gram[RESIDUAL, RESIDUAL] += squares
+    add_products(gram, stack, products, moments, slot, active, data.size)
+    gram[RESIDUAL, RESIDUAL] += squares
