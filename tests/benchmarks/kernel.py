@@ -86,7 +86,11 @@ def check(theta: np.ndarray, values: np.ndarray, rest: tuple) -> None:
     assert np.all(np.abs(found[0] - exact) < 1e-9 * scale)
 
 
-def rounds(subjects: dict[str, Callable[[], object]], count: int = ROUNDS) -> dict[str, np.ndarray]:
+def rounds(
+    subjects: dict[str, Callable[[], object]],
+    count: int = ROUNDS,
+    clock: Callable[[], float] = time.perf_counter,
+) -> dict[str, np.ndarray]:
     """Seconds of every subject in every round; they take turns, so all see the same machine."""
     taken = {name: np.full(count, np.inf) for name in subjects}
     for subject in subjects.values():
@@ -94,9 +98,9 @@ def rounds(subjects: dict[str, Callable[[], object]], count: int = ROUNDS) -> di
     for i in range(count):
         for name, subject in subjects.items():
             for _ in range(REPEATS):
-                start = time.perf_counter()
+                start = clock()
                 subject()
-                taken[name][i] = min(taken[name][i], time.perf_counter() - start)
+                taken[name][i] = min(taken[name][i], clock() - start)
     return taken
 
 
@@ -134,9 +138,13 @@ def measure() -> dict[str, float]:
 
 
 def efficiency(threads: int) -> dict[str, float]:
-    """Speed of a batch on all cores over that on one, per core (an idle machine needed)."""
+    """Speed of a batch on all cores over that on one, per core.
+
+    By the wall clock, which needs an idle machine; and by processor time, which shows what sharing
+    out the work costs however busy the machine is.
+    """
     theta, _, rest = campaign()
-    many = np.tile(theta, (256, 1))
+    many = np.tile(theta, (512, 1))
 
     def alone() -> None:
         numba.set_num_threads(1)
@@ -146,19 +154,27 @@ def efficiency(threads: int) -> dict[str, float]:
         numba.set_num_threads(threads)
         sums_of_squares(many, *rest)
 
-    taken = rounds({"alone": alone, "together": together}, 10)
-    least = float(taken["alone"].min() / taken["together"].min() / threads)
-    return {"threads": threads, "efficiency_of_threads": least}
+    wall = rounds({"alone": alone, "together": together}, 10)
+    cpu = rounds({"alone": alone, "together": together}, 10, time.process_time)
+    return {
+        "threads": threads,
+        "efficiency_of_threads": float(wall["alone"].min() / wall["together"].min() / threads),
+        "efficiency_by_processor_time": float(cpu["alone"].min() / cpu["together"].min()),
+    }
 
 
 def scaling(threads: int) -> dict[str, float]:
-    """Microseconds per 1,000 samples against samples and recordings: flat if linear."""
+    """Processor time in ns per sample against samples and recordings: flat if linear."""
     numba.set_num_threads(1)
     result = {}
     for count, n in ((9, 600), (9, 6000), (9, 60_000), (99, 6000), (999, 6000)):
-        theta, _, rest = campaign(count, n)
-        times = rounds({"x": lambda t=theta, r=rest: sums_of_squares(t[None], *r)}, 5)["x"]
-        result[f"us_per_1000_samples_{count}x{n}"] = float(times.min() * 1e9 / (count * n))
+        theta, values, rest = campaign(count, n)
+        subjects = {
+            "sse": lambda t=theta, r=rest: sums_of_squares(t[None], *r),
+            "floor": lambda v=values, r=rest: recurrence.floor(r[3], v),
+        }
+        for name, times in rounds(subjects, 5, time.process_time).items():
+            result[f"{name}_ns_per_sample_{count}x{n}"] = float(times.min() * 1e9 / (count * n))
     numba.set_num_threads(threads)
     return result
 
