@@ -17,9 +17,9 @@ from bayesimpact.diagnosis.loop import Diagnosis, diagnose
 from bayesimpact.inference.identify import Identification, identify
 from bayesimpact.inference.posterior import Posterior, sample
 from bayesimpact.report.archive import write_text
-from bayesimpact.report.build import results_from_fit, results_from_posterior, versions
+from bayesimpact.report.build import versions
 from bayesimpact.report.results import Results
-from bayesimpact.report.write import write_fit, write_posterior, write_results
+from bayesimpact.report.write import write_fit, write_posterior
 
 DIAGNOSIS_FILE = "diagnosis.json"
 CHAIN_FOLDER = "chain"
@@ -134,18 +134,19 @@ def _write_diagnosis(
 ) -> Results:
     out.mkdir(parents=True, exist_ok=True)
     write_text(out / DIAGNOSIS_FILE, json.dumps(_strict(content), indent=1))
-    seconds = float(content["seconds"])
+    seconds, plain = float(content["seconds"]), _strict(content)
     if after is None:
         final = replace(diagnosis.identification, fit=diagnosis.after, search=None)
-        results = results_from_fit(final, seed=seed, command=command, seconds=seconds)
-    else:
-        write_posterior(
-            after, diagnosis.identification, out, before=before, command=command, seconds=seconds
-        )
-        results = results_from_posterior(
-            after, diagnosis.identification, before=before, command=command, seconds=seconds
-        )
-    return write_results(replace(results, diagnosis=content), out)
+        return write_fit(final, out, seed=seed, command=command, seconds=seconds, diagnosis=plain)
+    return write_posterior(
+        after,
+        diagnosis.identification,
+        out,
+        before=before,
+        command=command,
+        seconds=seconds,
+        diagnosis=plain,
+    )
 
 
 def _strict(value: Any) -> Any:

@@ -242,7 +242,8 @@ def _parameters(
             low, median, high = np.percentile(draws[:, i], [5, 50, 95])
             entry.update(median=float(median), ci90=[float(low), float(high)])
         if diagnosis is not None and parameter.name in diagnosis.honest.names:
-            honest = list(diagnosis.honest.interval(parameter.name))
+            low, high = diagnosis.honest.interval(parameter.name)
+            honest = [max(low, parameter.lower), min(high, parameter.upper)]
             entry["ci90_honest"] = honest
             if diagnosis.remains:  # the narrow one would claim what the residual denies
                 entry["ci90_if_white"] = entry["ci90"]
