@@ -169,14 +169,19 @@ class _Evidence:
     def __init__(self, information: Array, unit: Array, knots: int) -> None:
         self.knots, self.unit = knots, unit
         self.scaled = information * np.outer(unit, unit)
+        self.modes: dict[float, tuple[Array, Array]] = {}
         grid = [(a, b) for a in WIDTHS for b in WIDTHS if a > 0 or b > 0]
         self.pairs = grid
         self.factors = [self._factor(a, b) for a, b in grid]
 
     def _factor(self, a: float, b: float) -> tuple[Array, float]:
-        width = np.repeat([a, b], self.knots)
-        values, vectors = np.linalg.eigh(self.scaled * np.outer(width, width))
-        values = np.maximum(values, 0.0)
+        width, largest = np.repeat([a, b], self.knots), max(a, b)
+        ratio = round(float(np.arctan2(a, b)), 12)
+        if ratio not in self.modes:  # widths of one ratio share their eigenvectors
+            relative = width / largest
+            self.modes[ratio] = np.linalg.eigh(self.scaled * np.outer(relative, relative))
+        values, vectors = self.modes[ratio]
+        values = np.maximum(values, 0.0) * largest**2
         return (vectors.T * width) / np.sqrt(1.0 + values)[:, None], 0.5 * float(
             np.log1p(values).sum()
         )
