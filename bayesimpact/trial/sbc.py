@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +34,11 @@ Table = Mapping[str, Mapping[str, Any]]
 RATE, DURATION, NOISE = 500.0, 1.6, 5e-6
 MASS = 0.503
 CASES = MappingProxyType({"a": "1", "b": "2"})  # recording -> obstacle
-DRAWS = 399
+DRAWS = 399  # of emcee and of the normal approximation
+PROPOSALS = 2000
+WIDER = 1.1  # standard deviations of the proposals over those of the normal approximation
+
+Method = Literal["normal", "weighted", "emcee"]
 LEVEL = 0.99
 
 
@@ -80,12 +84,13 @@ class Replicate:
     errors: Array
 
 
-def replicate(model: str, seed: int, *, emcee: bool = False) -> Replicate:
+def replicate(model: str, seed: int, method: Method = "weighted") -> Replicate:
     """Draw a truth of `model`, record it, rank it in its posterior.
 
     Parameters
     ----------
-    emcee : sample by emcee; else draw from the normal approximation at the mode
+    method : how the posterior is drawn from: `normal`, the approximation at the mode; `weighted`,
+        that approximation widened, each draw with its weight; `emcee`, the sampler
     """
     rng = np.random.default_rng([seed, list(MODELS).index(model)])
     table = {**BASE_PRIORS, **MODELS[model]}
@@ -96,13 +101,12 @@ def replicate(model: str, seed: int, *, emcee: bool = False) -> Replicate:
     start = np.array([_centre(table[name]) for name in names])
     steps = 0.05 * np.array([_width(table[name]) for name in names])
     fit = find_mode(target, start, steps=steps)
-    draws = _emcee(fit, seed, rng) if emcee else _normal_draws(fit, rng)
+    draws, weights = _posterior(fit, method, seed, rng)
     true = np.array([truth[name] for name in names])
     likelihood = target.likelihood
     values = np.column_stack([draws, likelihood(draws)])
     own = np.append(true, likelihood(true[None]))
-    below = np.sum(values < own, axis=0)
-    ranks = (below + rng.random(own.size)) / (draws.shape[0] + 1)
+    ranks = (weights @ (values < own) + rng.random(own.size)) / (weights.sum() + 1)
     return Replicate((*names, "log_likelihood"), ranks, (fit.mode - true) / fit.sd)
 
 
@@ -136,17 +140,25 @@ def _width(row: Mapping[str, Any]) -> float:
     return float(row["sd"] if "sd" in row else row["median"] * row["sigma"])
 
 
-def _normal_draws(fit: Fit, rng: np.random.Generator) -> Array:
-    """Draws of the normal approximation that the bounds admit, about DRAWS of them."""
-    scale = fit.sd
-    values, vectors = np.linalg.eigh(fit.covariance / np.outer(scale, scale))
-    root = vectors * np.sqrt(np.maximum(values, 0.0)) * scale[:, None]
-    draws = fit.mode + rng.standard_normal((DRAWS, scale.size)) @ root.T
-    return np.asarray(draws[np.isfinite(fit.target.priors.log_density(draws))])
-
-
-def _emcee(fit: Fit, seed: int, rng: np.random.Generator) -> Array:
-    return sample(fit, seed=seed).thinned(DRAWS, rng)
+def _posterior(
+    fit: Fit, method: Method, seed: int, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """Draws (S, d), and weights (S,) that sum up to what they are worth in independent draws."""
+    if method == "emcee":
+        draws = sample(fit, seed=seed).thinned(DRAWS, rng)
+        return draws, np.ones(draws.shape[0])
+    wide = 1.0 if method == "normal" else WIDER
+    count = DRAWS if method == "normal" else PROPOSALS
+    values, vectors = np.linalg.eigh(fit.covariance / np.outer(fit.sd, fit.sd))
+    root = wide * fit.sd[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    unit = rng.standard_normal((count, fit.mode.size))
+    draws = fit.mode + unit @ root.T
+    if method == "normal":
+        draws = draws[np.isfinite(fit.target.priors.log_density(draws))]
+        return draws, np.ones(draws.shape[0])
+    log_weight = fit.target(draws) + 0.5 * np.sum(unit**2, axis=1)
+    weight = np.exp(log_weight - log_weight.max())
+    return draws, weight * weight.sum() / np.sum(weight**2)
 
 
 def verdicts(

@@ -1,7 +1,7 @@
 """Is the posterior calibrated, and how often is nothing mistaken for something?
 
 python tests/benchmarks/calibration.py sbc --replicates 300 --workers 2 --out FILE.json
-python tests/benchmarks/calibration.py sbc --emcee --replicates 50 --models base --out FILE.json
+python tests/benchmarks/calibration.py sbc --method emcee --replicates 50 --out FILE.json
 python tests/benchmarks/calibration.py alarms --controls 300 --workers 2 --out FILE.json
 """
 
@@ -21,20 +21,15 @@ from bayesimpact.trial.settings import Settings
 from bayesimpact.trial.stamp import origin
 
 
-def one_replicate(model: str, seed: int, emcee: bool):
-    """A job for a worker."""
-    return replicate(model, seed, emcee=emcee)
-
-
 def sbc(chosen: argparse.Namespace) -> dict:
     """Ranks of all models."""
     models = chosen.models.split(",") if chosen.models else list(MODELS)
     seeds = range(chosen.seed, chosen.seed + chosen.replicates)
-    result: dict = {"draws": "emcee" if chosen.emcee else "normal approximation", "models": {}}
+    result: dict = {"method": chosen.method, "models": {}}
     for model in models:
-        jobs = ((seed, (model, seed, chosen.emcee)) for seed in seeds)
+        jobs = ((seed, (model, seed, chosen.method)) for seed in seeds)
         with executor(chosen.workers, chosen.scheduler) as spread:
-            found = dict(tqdm(spread(one_replicate, jobs), total=len(seeds), desc=model))
+            found = dict(tqdm(spread(replicate, jobs), total=len(seeds), desc=model))
         rows = verdicts([found[seed] for seed in seeds], np.random.default_rng(0))
         result["models"][model] = rows
         print(f"{model:24s} outside the {100 * rows['level']:.0f} % band: {rows['outside']}")
@@ -64,7 +59,7 @@ def main() -> None:
     parser.add_argument("--replicates", type=int, default=300)
     parser.add_argument("--controls", type=int, default=300)
     parser.add_argument("--models", help="comma separated")
-    parser.add_argument("--emcee", action="store_true")
+    parser.add_argument("--method", default="weighted", choices=("normal", "weighted", "emcee"))
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--scheduler")

@@ -84,6 +84,14 @@ def test_ranks_of_a_model(model: str) -> None:
     assert 0.4 < np.mean(errors**2) < 1.9
 
 
+def test_methods_agree() -> None:
+    """Weighted draws are the posterior, emcee's too; the normal approximation nearly so."""
+    ranks = {m: replicate("base", 5, m).ranks[:-1] for m in ("normal", "weighted", "emcee")}
+    # 400 draws at least: a share of them is known within 0.025
+    assert np.max(np.abs(ranks["weighted"] - ranks["emcee"])) < 0.11
+    assert np.max(np.abs(ranks["weighted"] - ranks["normal"])) < 0.3
+
+
 def test_a_wrong_model_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     """Friction that the posterior does not know of: truths lie far outside."""
     monkeypatch.setitem(sbc.MODELS, "wrong", MODELS["coulomb_friction"])
