@@ -170,30 +170,34 @@ class _Evidence:
         self.knots, self.unit = knots, unit
         self.scaled = information * np.outer(unit, unit)
         self.modes: dict[float, tuple[Array, Array]] = {}
-        grid = [(a, b) for a in WIDTHS for b in WIDTHS if a > 0 or b > 0]
-        self.pairs = grid
-        self.factors = [self._factor(a, b) for a, b in grid]
+        self.pairs = [(a, b) for a in WIDTHS for b in WIDTHS if a > 0 or b > 0]
+
+    def _ratio(self, a: float, b: float) -> float:
+        """Key of the eigenvectors and eigenvalues that widths of one ratio share."""
+        ratio = round(float(np.arctan2(a, b)), 12)
+        if ratio not in self.modes:
+            width = np.repeat([a, b], self.knots) / max(a, b)
+            values, vectors = np.linalg.eigh(self.scaled * np.outer(width, width))
+            self.modes[ratio] = np.maximum(values, 0.0), vectors.T * width
+        return ratio
 
     def _factor(self, a: float, b: float) -> tuple[Array, float]:
-        width, largest = np.repeat([a, b], self.knots), max(a, b)
-        ratio = round(float(np.arctan2(a, b)), 12)
-        if ratio not in self.modes:  # widths of one ratio share their eigenvectors
-            relative = width / largest
-            self.modes[ratio] = np.linalg.eigh(self.scaled * np.outer(relative, relative))
-        values, vectors = self.modes[ratio]
-        values = np.maximum(values, 0.0) * largest**2
-        return (vectors.T * width) / np.sqrt(1.0 + values)[:, None], 0.5 * float(
-            np.log1p(values).sum()
-        )
+        """Root of the posterior covariance (K, K), in units, and the evidence's penalty."""
+        values, root = self.modes[self._ratio(a, b)]
+        scale = max(a, b)
+        root = root * scale / np.sqrt(1.0 + values * scale**2)[:, None]
+        return root, 0.5 * float(np.log1p(values * scale**2).sum())
 
     def maximum(self, scores: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Largest log evidence over the widths and which pair gives it, for scores (n, K): (n,)
-        each.
-        """
+        """Largest log evidence over the widths, and which pair gives it, for scores (n, K)."""
         scaled = (scores * self.unit).T
-        gains = np.array(
-            [0.5 * np.sum((f @ scaled) ** 2, axis=0) - penalty for f, penalty in self.factors]
-        )
+        ratios = [self._ratio(a, b) for a, b in self.pairs]
+        energies = {r: (self.modes[r][1] @ scaled) ** 2 for r in set(ratios)}
+        gains = np.empty((len(self.pairs), scores.shape[0]))
+        for i, (ratio, pair) in enumerate(zip(ratios, self.pairs, strict=True)):
+            values, squared = self.modes[ratio][0], max(pair) ** 2
+            weights = 0.5 * squared / (1.0 + values * squared)
+            gains[i] = weights @ energies[ratio] - 0.5 * np.log1p(values * squared).sum()
         return gains.max(axis=0), gains.argmax(axis=0)
 
     def posterior(self, score: Array, a: float, b: float) -> tuple[Array, Array]:
