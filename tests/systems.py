@@ -67,3 +67,19 @@ def draw(rng: np.random.Generator, n: int = 60) -> System:
         phase = rng.uniform(0, 2 * math.pi)
     interval = 2 * math.pi / w1 / 10 ** rng.uniform(0.5, 2.3)
     return System(np.array([c1, k1, c2, g, k2, y0, v0, A, w, phase, 0.0]), mass, interval, n)
+
+
+def draw_fine(rng: np.random.Generator) -> System:
+    """Draw an unforced system, sampled finely (the fast lane's domain), for up to 12 periods."""
+    coarse = draw(rng)
+    q, mass = coarse.q, coarse.mass
+    q[7:10] = 0.0
+    K_flight, K_contact = q[1] / mass, (q[1] + q[4]) / mass
+    fastest = max(math.sqrt(K_flight) + q[0] / mass, math.sqrt(K_contact) + (q[0] + q[2]) / mass)
+    interval = rng.uniform(0.02, 0.24) / fastest
+    periods = 12 * 2 * math.pi / math.sqrt(K_flight) / interval
+    return System(q, mass, interval, 1 + EVERY * min(max(1, int(periods / EVERY)), 100))
+
+
+#: The recordings of `draw_fine` have a multiple of this many intervals.
+EVERY = 30
