@@ -77,8 +77,7 @@ CONCEALED_EFFECTS: Mapping[str, Mapping[str, float]] = {
     "contact_damping_speed": {"coefficient": 0.06},
     "gap_wear": {"step": 8e-8},
 }
-"""What `data/concealed` hides: damping that grows with the speed of indentation, a bolt that wears.
-"""
+"""What `data/concealed` hides: damping that grows with indentation speed, a bolt that wears."""
 
 
 def concealed_campaign() -> Campaign:
