@@ -81,7 +81,7 @@ CONCEALED_EFFECTS: Mapping[str, Mapping[str, float]] = {
 
 
 def concealed_campaign() -> Campaign:
-    """The paper's campaign again, from a rig with two effects that the paper suspects of its own."""
+    """The campaign again, from a rig with two effects that the paper suspects of its own."""
     rng = np.random.default_rng(20231101)
     releases = paper_releases(rng)
     offsets = {release.name: float(10e-6 * rng.standard_normal()) for release in releases}
