@@ -182,12 +182,14 @@ def test_drifting_spring_is_airys_equation():
     np.testing.assert_allclose(y, expected, rtol=0, atol=3e-10)
 
 
-def test_forcing_against_the_closed_form():
-    rig = TestRig(k2=(5350.0,), y0=(-2e-3,), v0=(0.1,), duration=4.0)
-    y = one("harmonic_forcing", rig, amplitude=1.5, frequency=7.3, phase=0.4)
+@pytest.mark.parametrize(("frequency", "rate"), [(7.3, 1000.0), (230.0, 1000.0), (480.0, 200.0)])
+def test_forcing_against_the_closed_form(frequency, rate):
+    """Also far above the oscillator's own frequency, and above what the samples resolve."""
+    rig = TestRig(k2=(5350.0,), y0=(-5e-3,), v0=(0.1,), duration=4.0, rate=rate)
+    y = one("harmonic_forcing", rig, amplitude=1.5, frequency=frequency, phase=0.4)
     exact = simulate(
         mass=rig.mass, c1=rig.c1, k1=rig.k1, c2=rig.c2, g=rig.g, k2=rig.k2[0], y0=rig.y0[0],
-        v0=rig.v0[0], A=1.5, w=2 * np.pi * 7.3, phase=0.4, interval=1 / rig.rate, n=rig.count,
+        v0=rig.v0[0], A=1.5, w=2 * np.pi * frequency, phase=0.4, interval=1 / rig.rate, n=rig.count,
     )  # fmt: skip
     assert exact.impacts.shape[0] > 10
     np.testing.assert_allclose(y, exact.displacement, rtol=0, atol=1e-11)
