@@ -54,6 +54,7 @@ def document(
             shifts,
             _detectable(d),
             _remains(d),
+            angle=d.before.target.oscillator.campaign.recordings[0].quantity == "angle",
         ),
         "location": _location(d),
         "effects": [

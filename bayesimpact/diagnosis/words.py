@@ -102,6 +102,8 @@ def summary(
     shifts: Mapping[str, float],
     detectable: str,
     remains: str = "",
+    *,
+    angle: bool = False,
 ) -> str:
     """One paragraph; `remains` says what is left beside the named effects."""
     if verdict == "adequate":
@@ -117,10 +119,12 @@ def summary(
         else ""
     )
     if verdict == "unknown":
-        low, high = (1e3 * x for x in location.displacement)
+        scale, length, force = (1.0, "rad", "N m") if angle else (1e3, "mm", "N")
+        low, high = (scale * x for x in location.displacement)
         return (
             f"Something is missing that the catalogue does not hold. It acts {place}, mostly "
-            f"between {low:.2f} and {high:.2f} mm, with {location.force_rms:.2g} N rms.{cost}"
+            f"between {low:.2f} and {high:.2f} {length}, with {location.force_rms:.2g} {force} "
+            f"rms.{cost}"
         )
     titles = " and ".join(e.title for e in effects)
     if verdict == "ambiguous":

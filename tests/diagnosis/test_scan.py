@@ -19,6 +19,7 @@ from bayesimpact.diagnosis.projection import Projection
 from bayesimpact.diagnosis.scan import DRAWS, Scan, _corrected, _Test, scan, score_directions
 from bayesimpact.diagnosis.scores import Score
 from bayesimpact.inference.fit import Target, find_mode
+from bayesimpact.inference.identify import identify
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.noise import Noise
 from bayesimpact.model.effects import EFFECTS
@@ -217,3 +218,29 @@ def test_pairs_respect_signs_slots_and_need_each_other():
 def test_scores_are_records():
     found = scan_of(np.eye(1), np.array([2.0]), [record("spring_cubic", 1)]).scores[0]
     assert isinstance(found, Score) and found.p_value == pytest.approx(2 * stats.norm.sf(2.0))
+
+
+ONE = replace(small_rig.RIG, k2={"1": small_rig.RIG.k2["1"]})
+NOT_TOUCHED = (replace(small_rig.RELEASES[0], y0=-0.8e-3, v0=0.0),)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"rig": ONE, "releases": small_rig.RELEASES[:1]},
+        {"rig": ONE, "releases": NOT_TOUCHED},
+        {"rig": small_rig.PLAIN, "releases": small_rig.PLAIN_RELEASES},
+    ],
+    ids=["one recording", "stop never touched", "no stop"],
+)
+def test_the_whole_catalogue_on_campaigns_that_cannot_show_all_of_it(settings):
+    campaign = small_rig.record(7, duration=1.0, **settings)
+    fit = identify(campaign, rng=np.random.default_rng(0), search=False).fit
+    scales = campaign_scales(fit)
+    found = scan(fit, EFFECTS, scales, rng=np.random.default_rng(0))
+    assert 1e-3 < found.p_value <= 1.0
+    scored = {s.effect.id for s in found.scores}
+    assert "coulomb_friction" in scored
+    assert not scored & {"contact_damping_per_case", "gap_per_recording"}
+    stop = fit.target.oscillator.campaign.stop
+    assert stop or not any(BY_ID[i].needs_stop for i in scored)

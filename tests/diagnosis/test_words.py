@@ -1,0 +1,114 @@
+"""Sizes, shifts and sentences of a diagnosis."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import small_rig
+from effect_rigs import BY_ID
+
+from bayesimpact.diagnosis.extend import campaign_scales, extend, transfer
+from bayesimpact.diagnosis.force import trajectory_points
+from bayesimpact.diagnosis.words import parameter_shifts, peak_force, sizes, statement, summary
+from bayesimpact.inference.fit import Fit
+
+
+def with_effect(small, effect_id: str, **values: float) -> Fit:
+    """The small rig's fit with an effect of given size put beside it."""
+    scales, effects = campaign_scales(small.fit), (BY_ID[effect_id],)
+    target = extend(small.fit, effects, scales)
+    mode = transfer(small.fit, target.oscillator.layout, effects, scales, {})
+    for name, value in values.items():
+        mode[target.oscillator.layout.index(f"{effect_id}.{name}")] = value
+    return replace(small.fit, target=target, mode=mode)
+
+
+def test_peak_force_along_the_motion(small):
+    fit = with_effect(small, "spring_cubic", stiffness=2e4)
+    largest = max(np.abs(y).max() for y, _ in trajectory_points(fit))
+    assert peak_force(BY_ID["spring_cubic"], fit) == pytest.approx(2e4 * largest**3, rel=0.01)
+    drag = with_effect(small, "quadratic_drag", coefficient=0.3)
+    fastest = max(np.abs(v).max() for _, v in trajectory_points(drag))
+    found = peak_force(BY_ID["quadratic_drag"], drag)
+    assert found == pytest.approx(0.3 * fastest**2, rel=0.02)
+    hard = with_effect(small, "contact_hardening", stiffness=1e7)
+    gap = small.fit.value("g")
+    deepest = max((y - gap).max() for y, _ in trajectory_points(hard))
+    found = peak_force(BY_ID["contact_hardening"], hard)
+    assert found == pytest.approx(1e7 * deepest**3, rel=0.05)
+
+
+def test_a_size_is_a_force_and_its_share(small):
+    scales = campaign_scales(small.fit)
+    fit = with_effect(small, "spring_cubic", stiffness=2e4)
+    text, share = sizes(BY_ID["spring_cubic"], small.fit, fit, scales)
+    peak = peak_force(BY_ID["spring_cubic"], fit)
+    assert text == f"{peak:.2g} N" and share == pytest.approx(peak / scales.force)
+    hard = with_effect(small, "contact_hardening", stiffness=1e7)
+    _, share = sizes(BY_ID["contact_hardening"], small.fit, hard, scales)
+    peak = peak_force(BY_ID["contact_hardening"], hard)
+    assert share == pytest.approx(peak / scales.contact_force)
+    friction = with_effect(small, "coulomb_friction", force=2e-3)
+    text, share = sizes(BY_ID["coulomb_friction"], small.fit, friction, scales)
+    assert text == "0.002 N" and share == pytest.approx(2e-3 / scales.force)
+
+
+def test_a_size_without_a_force_is_told_by_its_parameters_or_its_trace(small):
+    scales = campaign_scales(small.fit)
+    bent = with_effect(small, "sensor_quadratic", gain=0.5)
+    text, share = sizes(BY_ID["sensor_quadratic"], small.fit, bent, scales)
+    assert "0.5" in text and "1/m" in text
+    change = np.concatenate(
+        [a - b for a, b in zip(bent.predicted, small.fit.predicted, strict=True)]
+    )
+    assert share == pytest.approx(np.abs(change).max() / scales.amplitude)
+    text, _ = sizes(
+        BY_ID["contact_no_tension"], small.fit, with_effect(small, "contact_no_tension"), scales
+    )
+    assert text.endswith("um of trajectory")
+
+
+def test_shifts_are_what_ignoring_did(small):
+    moved = replace(small.fit, mode=small.fit.mode - 3 * small.fit.sd)
+    shifts = parameter_shifts(small.fit, moved)
+    assert set(shifts) == {"c1", "k1", "c2", "g", "k2[1]", "k2[2]"}
+    np.testing.assert_allclose(list(shifts.values()), 3.0)
+    split = with_effect(small, "gap_per_recording")
+    assert "g" not in parameter_shifts(small.fit, split)
+
+
+@pytest.mark.parametrize("effect_id", BY_ID)
+def test_every_effect_has_its_sentence(effect_id):
+    text = statement(BY_ID[effect_id], "3 N", 0.012, {"k1": -1.0, "k2[1]": 7.25})
+    assert "{" not in text and "3 N" in text
+    assert text.endswith("Ignoring it moved k2[1] by +7.2 of its standard deviations.")
+    assert "Ignoring" not in statement(BY_ID[effect_id], "3 N", 0.012, {})
+
+
+def place(regime: str):
+    return SimpleNamespace(regime=regime, displacement=(-2e-3, 1.5e-3), force_rms=0.012)
+
+
+def test_the_paragraph():
+    friction = (BY_ID["coulomb_friction"],)
+    shifts = {"k1": 1.0, "k2[1]": -8.2, "k2[2]": 3.0}
+    said = summary("adequate", (), (), None, (), {}, "Limits.")
+    assert said.startswith("Nothing is missing") and said.endswith("Limits.")
+    said = summary("named", friction, ("It rubs.",), place("free"), (), shifts, "")
+    assert "dry friction" in said and "It rubs." in said and "suspension" in said
+    assert "k2[1] by 8.2" in said
+    said = summary("ambiguous", friction, ("",), place("contact"), ("gap_wear",), shifts, "")
+    assert "gap_wear" in said and "cannot tell" in said and "obstacle" in said
+    said = summary("unknown", (), (), place("contact"), (), {"k1": -4.0}, "")
+    assert "-2.00 and 1.50 mm" in said and "0.012 N rms" in said and "k1 by 4.0" in said
+    wide = SimpleNamespace(regime="free", displacement=(-0.3, 0.31), force_rms=0.012)
+    said = summary("unknown", (), (), wide, (), {}, "", angle=True)
+    assert "-0.30 and 0.31 rad" in said and "0.012 N m rms" in said
+
+
+def test_recordings_keep_their_truth(small):
+    """The helpers above leave the shared fit as it was."""
+    assert small.fit.value("k1") == pytest.approx(small_rig.RIG.k1, rel=1e-3)
