@@ -13,7 +13,7 @@ stage (least squares, likelihood, scores) sees white noise. Three kinds:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 class Noise:
     """Shape of the noise; its level is the unknown `sigma` (or this estimate of it).
 
+    Equal means the same whitening; how well the level is known has no say in it.
+
     Attributes
     ----------
     correlation : between neighbouring raw samples (AR(1)), 0 for white noise
@@ -40,9 +42,9 @@ class Noise:
 
     correlation: float = 0.0
     smoothing: Smoothing | None = None
-    level: float = float("nan")
-    level_error: float = float("nan")
-    correlation_error: float = float("nan")
+    level: float = field(default=float("nan"), compare=False)
+    level_error: float = field(default=float("nan"), compare=False)
+    correlation_error: float = field(default=float("nan"), compare=False)
     source: str = "assumed"
 
     @property

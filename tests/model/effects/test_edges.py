@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from effect_rigs import BY_ID, MOVING, TestRig, by_hand, moved, typical
+from effect_rigs import BY_ID, MOVING, TestRig, by_hand, by_rig, moved, typical
 
 from bayesimpact.inference.defaults import effect_prior
 from bayesimpact.model.general import BAD_PARAMETERS, OK, integrate_many
@@ -176,3 +176,12 @@ def test_finite_over_the_whole_prior_box(effect):
         for y in oscillator.predict(np.array(thetas)):
             assert np.all(np.isfinite(y))
             assert np.abs(y).max() < 10 * max(map(abs, rig.y0))
+
+
+@pytest.mark.parametrize("speed", [0.002, 0.01, 0.02, 0.04])
+def test_touches_too_slow_for_the_obstacle_to_push(speed):
+    """A heavy obstacle holds the mass back at first: contact ends once it has pushed, or at g."""
+    rig = TestRig(k2=(5350.0,), y0=(1.0e-3,), v0=(speed,), duration=0.4)
+    effects, values = [BY_ID["obstacle_mass"]], {"obstacle_mass.mass": 0.08}
+    difference = moved(effects, values, rig) - by_rig(effects, values, rig)
+    assert np.abs(difference).max() < 1e-12
