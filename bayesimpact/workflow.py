@@ -18,6 +18,7 @@ from bayesimpact.inference.identify import Identification, identify
 from bayesimpact.inference.posterior import Posterior, sample
 from bayesimpact.report.archive import write_text
 from bayesimpact.report.build import versions
+from bayesimpact.report.diagnosis_arrays import diagnosis_arrays
 from bayesimpact.report.results import Results
 from bayesimpact.report.write import write_fit, write_posterior
 
@@ -133,20 +134,18 @@ def _write_diagnosis(
     command: str,
 ) -> Results:
     out.mkdir(parents=True, exist_ok=True)
-    write_text(out / DIAGNOSIS_FILE, json.dumps(_strict(content), indent=1))
-    seconds, plain = float(content["seconds"]), _strict(content)
+    plain = _strict(content)
+    write_text(out / DIAGNOSIS_FILE, json.dumps(plain, indent=1))
+    told: dict[str, Any] = {
+        "command": command,
+        "seconds": float(content["seconds"]),
+        "diagnosis": plain,
+        "diagnosis_arrays": diagnosis_arrays(diagnosis),
+    }
     if after is None:
         final = replace(diagnosis.identification, fit=diagnosis.after, search=None)
-        return write_fit(final, out, seed=seed, command=command, seconds=seconds, diagnosis=plain)
-    return write_posterior(
-        after,
-        diagnosis.identification,
-        out,
-        before=before,
-        command=command,
-        seconds=seconds,
-        diagnosis=plain,
-    )
+        return write_fit(final, out, seed=seed, **told)
+    return write_posterior(after, diagnosis.identification, out, before=before, **told)
 
 
 def _strict(value: Any) -> Any:

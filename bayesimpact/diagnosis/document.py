@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.diagnosis.limits import PRACTICAL, Limit
 from bayesimpact.diagnosis.loop import Diagnosis
+from bayesimpact.diagnosis.name import DECISIVE
 from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.smoothing import filter_parameters, filter_words
 from bayesimpact.diagnosis.whiteness import whiteness_p
@@ -73,6 +75,7 @@ def document(
                 "unit": x.unit,
                 "upper95": x.upper95,
                 "detection_limit": x.detection,
+                "practical_size": _practical(d, x),
                 "power_at_practical_size": x.power,
                 "answer": x.answer,
                 "hidden_bias": {"parameter": x.biased, "sd": x.bias, "k2_sd": x.k2_bias},
@@ -101,6 +104,7 @@ def _evidence(d: Diagnosis) -> dict[str, Any]:
         "p_catalogue_after": chosen.scan.p_value,
         "p_unknown_force_after": chosen.force.p_value,
         "log_odds": d.naming.log_odds(chosen.candidate),
+        "decisive": DECISIVE,
         "models": [
             {"effects": list(c.ids), "log_odds": d.naming.log_odds(c)} for c in d.naming.tried[:20]
         ],
@@ -108,6 +112,13 @@ def _evidence(d: Diagnosis) -> dict[str, Any]:
             {"id": s.effect.id, "z": s.z, "p": s.p_value, "kept": s.kept} for s in base.scan.best()
         ],
     }
+
+
+def _practical(d: Diagnosis, limit: Limit) -> float:
+    """Size of an effect that would matter in practice, in the limit's unit."""
+    scores = d.naming.chosen.scan.scores
+    effect = next(s.effect for s in scores if s.effect.id == limit.effect_id)
+    return PRACTICAL * effect.parameter(limit.parameter).scale(d.scales)
 
 
 def _detectable(d: Diagnosis) -> str:
@@ -161,6 +172,7 @@ def _effect(d: Diagnosis, effect: Effect, text: str, draws: Array | None) -> dic
     if d.filtered is not None and effect.id == "smoothing":
         return {
             "id": effect.id,
+            "title": effect.title,
             "family": effect.family,
             "statement": text,
             "probability": 1.0,
@@ -174,6 +186,7 @@ def _effect(d: Diagnosis, effect: Effect, text: str, draws: Array | None) -> dic
     own = {n: v for n, v in values.items() if n.startswith(effect.id + ".")}
     return {
         "id": effect.id,
+        "title": effect.title,
         "family": effect.family,
         "statement": text,
         "probability": d.naming.probability(effect.id),

@@ -9,12 +9,13 @@ physics and decide between near-opposites that scores cannot tell apart.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bayesimpact.diagnosis.force import MissingForce, missing_force
 from bayesimpact.diagnosis.pairs import promising_pairs
+from bayesimpact.diagnosis.periodic import shakes_in_own_band
 from bayesimpact.diagnosis.refit import (
     Candidate,
     base_candidate,
@@ -168,6 +169,8 @@ class _Search:
 
     def keep(self, candidate: Candidate) -> Candidate:
         key = frozenset(candidate.ids)
+        if is_gross(candidate.fit) and shakes_in_own_band(candidate.fit):
+            candidate = replace(candidate, log_evidence=-np.inf)
         held = self.tried.get(key)
         if held is None or candidate.log_evidence > held.log_evidence:
             self.tried[key] = candidate

@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 
 RESPONSE_REACH = 2.0  # forcing is looked for up to so many times the natural frequency in contact
 HUM_ABOVE = 1.5  # times the natural frequency of free flight
+OWN_BAND = 0.1  # of the spectrum's peak
 _FORCE, _OMEGA, _PHASE = (SLOTS.index(s) for s in ("A", "w", "phase"))
 
 
@@ -68,6 +69,32 @@ def frequencies(fit: Fit, effect: Effect, scales: Scales) -> Array:
         return np.arange(2 * spacing, nyquist, spacing)
     lowest = HUM_ABOVE * scales.natural_frequency  # below, the motion itself would pass for a hum
     return np.arange(max(2 * spacing, lowest), nyquist, spacing)
+
+
+def shakes_in_own_band(fit: Fit) -> bool:
+    """True when the model has a harmonic force at a frequency at which the motion swings anyway.
+
+    There a decaying motion and a forced one differ only by phase, and the force passes for any slow
+    change of frequency or damping.
+    """
+    names = [f"{e.id}.frequency" for e in fit.target.oscillator.effects if _is_force(e)]
+    found = [float(fit.mode[fit.names.index(name)]) for name in names]
+    return any(_swings(fit, frequency) for frequency in found)
+
+
+def _is_force(effect: Effect) -> bool:
+    return is_periodic(effect) and effect.observe is None
+
+
+def _swings(fit: Fit, frequency: float) -> bool:
+    """Whether any recording has a good part of its spectrum's peak at a frequency, Hz."""
+    for recording in fit.target.oscillator.campaign.recordings:
+        spectrum = np.abs(np.fft.rfft(recording.samples - recording.samples.mean()))
+        at = frequency * recording.samples.size * recording.interval
+        near = spectrum[max(1, int(at) - 1) : int(at) + 3]
+        if near.size and near.max() > OWN_BAND * spectrum[1:].max():
+            return True
+    return False
 
 
 def _best_frequency(fit: Fit, effect: Effect, scales: Scales) -> Score | None:

@@ -1,4 +1,4 @@
-"""From live fits and posteriors to `Results`: the one place where the report touches the model."""
+"""From live fits and posteriors to `Results` (from diagnoses: `diagnosis_arrays`)."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ def _results(
         mass=campaign.mass,
         stop=campaign.stop,
         quantity=campaign.recordings[0].quantity,
-        recordings=_recordings(fit),
+        recordings=recording_results(fit),
         rows=build_rows(fit, draws, chain, beside),
         effects=tuple(
             EffectSummary(e.id, e.title, e.equation, e.statement) for e in oscillator.effects
@@ -162,7 +162,8 @@ def _results(
     return checks.judged(summary)
 
 
-def _recordings(fit: Fit) -> tuple[RecordingResult, ...]:
+def recording_results(fit: Fit) -> tuple[RecordingResult, ...]:
+    """Every recording and what a fit makes of it."""
     likelihood = fit.target.likelihood
     recordings = fit.target.oscillator.campaign.recordings
     shared = (fit.mode.size - 1) / len(recordings)  # parameters per recording

@@ -6,9 +6,11 @@ from collections.abc import Callable, Mapping
 
 from matplotlib.figure import Figure
 
+from bayesimpact.report.figures.force_map import force_figures
+from bayesimpact.report.figures.gain import gain_figures
 from bayesimpact.report.results import Results
 
-DRAWERS: tuple[Callable[[Results], Mapping[str, Figure]], ...] = ()
+DRAWERS: tuple[Callable[[Results], Mapping[str, Figure]], ...] = (force_figures, gain_figures)
 """Functions from results to figures by name; each returns {} when its arrays are not there."""
 
 

@@ -1,0 +1,77 @@
+"""When, at which impact and in which recordings the missing physics shows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from bayesimpact.report.figures.style import AFTER, Array, new_figure, styled
+from bayesimpact.report.results import Results
+
+_ROW, _LEAST, _MOST = 0.22, 2.6, 8.0  # in
+
+
+def gain_figures(results: Results) -> Mapping[str, Figure]:
+    """Gain in log likelihood by recording, time and impact, where there is one."""
+    if "gain" not in results.diagnosis_arrays:
+        return {}
+    return {"gain": _figure(results, results.diagnosis_arrays)}
+
+
+@styled
+def _figure(results: Results, arrays: Mapping[str, Array]) -> Figure:
+    rows = len(results.recordings)
+    impacts = arrays.get("impact_gain")
+    figure = new_figure(min(_MOST, max(_LEAST, _ROW * rows + 1.2)))
+    ratios = [1.5, 0.8] if impacts is None else [1.5, 0.8, 1.2]
+    panels = figure.subplots(1, len(ratios), width_ratios=ratios, squeeze=False)[0]
+    _by_time(figure, panels[0], results, arrays["gain"])
+    _by_recording(panels[1], arrays["gain"].sum(axis=1))
+    if impacts is not None:
+        _by_impact(panels[2], impacts)
+    return figure
+
+
+def _by_time(figure: Figure, axis: Axes, results: Results, gain: Array) -> None:
+    limit = float(np.abs(gain).max()) or 1.0
+    for i, (row, recording) in enumerate(zip(gain, results.recordings, strict=True)):
+        edges = np.linspace(0.0, recording.times[-1], gain.shape[1] + 1)
+        mesh = axis.pcolormesh(
+            edges, [i - 0.45, i + 0.45], row[None], cmap="PuOr_r", vmin=-limit, vmax=limit
+        )
+    _rows(axis, len(results.recordings))
+    axis.set_yticks(range(len(results.recordings)), [r.name for r in results.recordings])
+    axis.set_xlabel("time since the first sample (s)")
+    axis.set_title("by recording and time", loc="left")
+    bar = figure.colorbar(mesh, ax=axis, pad=0.01, aspect=30)
+    bar.set_label("gain in log likelihood (nats)")
+    bar.outline.set_visible(False)  # type: ignore[operator]
+
+
+def _by_recording(axis: Axes, total: Array) -> None:
+    axis.barh(range(total.size), total, color=AFTER, height=0.6)
+    axis.axvline(0.0, color="#444444", lw=0.7)
+    _rows(axis, total.size)
+    axis.set_yticks(range(total.size), [""] * total.size)
+    axis.set_xlabel("gain (nats)")
+    axis.set_title("by recording", loc="left")
+    axis.grid(axis="x")
+
+
+def _rows(axis: Axes, count: int) -> None:
+    """First recording on top, half a row of margin."""
+    axis.set_ylim(count - 0.4, -0.6)
+
+
+def _by_impact(axis: Axes, gain: Array) -> None:
+    """Mean over the recordings that have so many impacts."""
+    number = np.arange(1, gain.shape[1] + 1)
+    axis.bar(number, np.nanmean(gain, axis=0), color=AFTER, width=0.8)
+    axis.axhline(0.0, color="#444444", lw=0.7)
+    axis.set_xlabel("impact number")
+    axis.set_ylabel("gain until the next impact,\nmean of recordings (nats)")
+    axis.set_title("by impact", loc="left")
+    axis.grid(axis="y")
