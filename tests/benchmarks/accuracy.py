@@ -13,7 +13,6 @@ it are as good as exact.
 
 from __future__ import annotations
 
-import json
 import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -92,9 +91,7 @@ def summary(found: list[Accuracy]) -> dict[str, float]:
 
 
 if __name__ == "__main__":
-    from benchmarks.kernel import provenance
+    from benchmarks.record import keep
 
     result = survey(int(sys.argv[1]) if len(sys.argv) > 1 else 1000)
-    kept = {**provenance(), **summary(result), "worst": asdict(max(result, key=lambda r: r.time))}
-    Path(__file__).with_suffix(".json").write_text(json.dumps(kept, indent=2) + "\n")
-    print(json.dumps(kept, indent=2))
+    keep(__file__, {**summary(result), "worst": asdict(max(result, key=lambda r: r.time))})

@@ -1,6 +1,6 @@
 """The plain way to simulate a recording with numba: sample by sample, each from the one before.
 
-Kept as the peer of `benchmarks/kernel.py`. Exact in the free motion (a 2 x 2 step matrix per
+Kept as the peer of `kernel.py` and `peers.py`. Exact in the free motion (a 2 x 2 step matrix per
 regime); an event is noticed by a change of sign between two samples and located by bisection and
 Newton.
 """
@@ -44,11 +44,15 @@ def crossing(b, K, u, v, level, t):
 
 
 @numba.njit
-def sum_of_squares(q, mass, interval, data):
-    """Sum of squared residuals of one recording, started away from the stop, under-damped."""
+def sum_of_squares(q, mass, interval, data, out):
+    """Sum of squared residuals of one recording, started away from the stop, under-damped.
+
+    data : (n,) samples, m; out : (n,) receives the displacement, m, without the offset
+    """
     c1, k1, c2, g, k2, y, v = q[0], q[1], q[2], q[3], q[4], q[5], q[6]
     contact = y > g
     t = 0.0
+    out[0] = y
     total = (data[0] - q[10] - y) ** 2
     flight = step_matrix(0.5 * c1 / mass, k1 / mass, interval)
     touch = step_matrix(0.5 * (c1 + c2) / mass, (k1 + k2) / mass, interval)
@@ -73,6 +77,7 @@ def sum_of_squares(q, mass, interval, data):
             contact = not contact
             whole = False
         y, v = y_next, v_next
+        out[i] = y
         total += (data[i] - q[10] - y) ** 2
     return total
 
@@ -82,11 +87,12 @@ def sums_of_squares(theta, columns, constants, mass, samples, starts, counts, in
     """As `bayesimpact.model.simulate.sums_of_squares` for one vector theta (d,)."""
     sse = np.empty(columns.shape[0])
     q = np.empty(11)
+    out = np.empty(counts.max())
     for r in range(columns.shape[0]):
         for i in range(11):
             q[i] = theta[columns[r, i]] if columns[r, i] >= 0 else constants[r, i]
         data = samples[starts[r] : starts[r] + counts[r]]
-        sse[r] = sum_of_squares(q, mass, intervals[r], data)
+        sse[r] = sum_of_squares(q, mass, intervals[r], data, out[: counts[r]])
     return sse
 
 
