@@ -7,18 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special, stats
 
+from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.extend import (
     difference_steps,
     extend,
     owner,
-    replaced_slot,
     transfer,
 )
 from bayesimpact.diagnosis.scores import Score
 from bayesimpact.inference.fit import Fit, find_mode
-from bayesimpact.inference.priors import LogNormal
 from bayesimpact.model.effects.effect import Effect, Scales
 from bayesimpact.model.parameters import is_added
 
@@ -48,7 +46,7 @@ class Candidate:
 
 def base_candidate(fit: Fit) -> Candidate:
     """The base model as a candidate."""
-    return Candidate(fit.target.oscillator.effects, fit, log_evidence(fit))
+    return Candidate(fit.target.oscillator.effects, fit, model_evidence(fit))
 
 
 def refit(fit: Fit, scores: Sequence[Score], scales: Scales) -> Candidate:
@@ -62,7 +60,7 @@ def refit(fit: Fit, scores: Sequence[Score], scales: Scales) -> Candidate:
     found = find_mode(
         target, start, steps=difference_steps(fit, target, sizes), tolerance=0.02, max_iterations=20
     )
-    return Candidate(effects, found, log_evidence(found))
+    return Candidate(effects, found, model_evidence(found))
 
 
 def without(candidate: Candidate, effect: Effect, scales: Scales) -> Candidate:
@@ -74,7 +72,7 @@ def without(candidate: Candidate, effect: Effect, scales: Scales) -> Candidate:
     sizes = step_sizes(layout.names, effects, scales, ())
     steps = difference_steps(candidate.fit, target, sizes)
     found = find_mode(target, start, steps=steps, tolerance=0.02, max_iterations=20)
-    return Candidate(effects, found, log_evidence(found))
+    return Candidate(effects, found, model_evidence(found))
 
 
 def step_sizes(
@@ -134,67 +132,7 @@ def correlation_spread(fit: Fit) -> float:
     return max(1.0, float(np.mean(values)))
 
 
-def log_evidence(fit: Fit) -> float:
-    """Log marginal likelihood by Laplace's method.
-
-    A parameter with a bound near its mode gets the normal mass that is left inside: Phi of the
-    distance, or, where the mode sits on the bound with a slope, the exact one-dimensional integral
-    of the exponential of a quadratic. A parameter with a log-normal prior is near normal in its
-    logarithm; there the mode lies a little higher, by a slope of one. Accurate for the
-    near-Gaussian posteriors of this problem (Tierney and Kadane 1986).
-    """
-    if not np.isfinite(fit.log_posterior) or not np.isfinite(fit.sd).all():
-        return -np.inf
-    lower = np.maximum(
-        fit.target.priors.lower, [p.lower for p in fit.target.oscillator.layout.parameters]
-    )
-    sign, log_det = np.linalg.slogdet(_unit(fit.covariance))
-    scale = np.log(fit.sd).sum()
-    if sign <= 0:
-        return -np.inf
-    value = fit.log_posterior + 0.5 * fit.mode.size * np.log(2 * np.pi) + 0.5 * log_det + scale
-    logs = _log_normal(fit)
-    value += 0.5 * float(
-        np.sum(fit.covariance[np.ix_(logs, logs)] / np.outer(*[fit.mode[logs]] * 2))
-    )
-    inside = (fit.mode - lower) / fit.sd
-    inside[logs] = np.inf
-    for i in np.flatnonzero(inside < 8).tolist():
-        value += _boundary(float(inside[i]), i, fit)
-    return float(value)
-
-
-def _log_normal(fit: Fit) -> NDArray[np.int64]:
-    """Positions of parameters, the noise level apart, with log-normal priors."""
-    priors = fit.target.priors.parameters
-    moving = fit.target.oscillator.layout.roles("physical", "effect", "nuisance")
-    return np.array([i for i in moving if isinstance(priors[i], LogNormal)], dtype=np.int64)
-
-
-def _unit(covariance: Array) -> Array:
-    sd = np.sqrt(np.diag(covariance))
-    return np.asarray(covariance / np.outer(sd, sd))
-
-
-def _boundary(distance: float, index: int, fit: Fit) -> float:
-    if distance > 1e-6:
-        return float(stats.norm.logcdf(distance))
-    slope = -_gradient(fit)[index] * fit.sd[index]  # of the negative log posterior, per sd, >= 0
-    return float(np.log(special.erfcx(max(slope, 0.0) / np.sqrt(2)) / 2))
-
-
-def _gradient(fit: Fit) -> Array:
-    sigma = fit.mode[fit.target.likelihood.sigma_columns]
-    vector = np.array(fit.target.priors.gradient(fit.mode))
-    for lin, s in zip(fit.linearisation, sigma, strict=True):
-        vector[lin.columns] += lin.jacobian.T @ lin.residual / s**2
-    return vector
-
-
 def effect_values(candidate: Candidate) -> Mapping[str, float]:
     """Modes of the added effects' parameters."""
     fit = candidate.fit
     return {n: float(v) for n, v in zip(fit.names, fit.mode, strict=True) if is_added(n)}
-
-
-__all__ = ["Candidate", "base_candidate", "log_evidence", "refit", "replaced_slot", "without"]

@@ -127,16 +127,18 @@ def find_mode(
     start: Array,
     *,
     steps: Array | None = None,
+    slopes: tuple[Linearisation, ...] | None = None,
     tolerance: float = 1e-3,
     max_iterations: int = 60,
 ) -> Fit:
     """Climb from `start` (d,) to the nearest mode.
 
     `steps` (d,) are difference steps for models without exact derivatives; they are refreshed to a
-    twentieth of the standard deviations as these become known. The noise levels in `start` are
-    ignored. Stops when a step is below `tolerance` standard deviations.
+    twentieth of the standard deviations as these become known. `slopes` are derivatives that hold
+    near enough all the way (the chord method), where they are known and new ones would be dear. The
+    noise levels in `start` are ignored. Stops when a step is below `tolerance` standard deviations.
     """
-    climb = _Climb(target, steps)
+    climb = _Climb(target, steps, slopes)
     theta, value, sums = climb.evaluate(start)
     damping, converged, iterations = 1e-3, False, 0
     while iterations < max_iterations and not converged:
@@ -165,10 +167,12 @@ def find_mode(
 class _Climb:
     """One ascent: everything that stays fixed while theta moves."""
 
-    def __init__(self, target: Target, steps: Array | None) -> None:
+    def __init__(
+        self, target: Target, steps: Array | None, slopes: tuple[Linearisation, ...] | None
+    ) -> None:
         layout = target.oscillator.layout
         self.target = target
-        self.steps = steps
+        self.steps, self.slopes = steps, slopes
         self.noise = layout.roles("noise")
         self.moving = layout.roles("physical", "effect", "nuisance")
         physical = np.array([(p.lower, p.upper) for p in layout.parameters])
@@ -194,7 +198,7 @@ class _Climb:
 
     def linear(self, theta: Array) -> tuple[tuple[Linearisation, ...], Array, Array]:
         likelihood, priors = self.target.likelihood, self.target.priors
-        parts = likelihood.linearise(theta, self.steps)
+        parts = self.parts(theta)
         matrix, vector = normal_equations(parts, theta[likelihood.sigma_columns], theta.size)
         information = prior_information(priors, theta)
         information[self.noise] = 0.0
@@ -207,6 +211,15 @@ class _Climb:
             better = known & np.isfinite(spread) & (spread > 0)
             self.steps[self.moving[better]] = 0.05 * spread[better]
         return parts, matrix, vector
+
+    def parts(self, theta: Array) -> tuple[Linearisation, ...]:
+        likelihood = self.target.likelihood
+        if self.slopes is None:
+            return likelihood.linearise(theta, self.steps)
+        return tuple(
+            replace(part, residual=likelihood.residual(r, theta[None])[0])
+            for r, part in enumerate(self.slopes)
+        )
 
     def step(self, theta: Array, matrix: Array, vector: Array, damping: float) -> Array:
         """Damped Gauss-Newton step; a parameter pushed against its bound stays there."""

@@ -7,6 +7,7 @@ with S_r the sum of squares of the whitened residual of recording r and n_r its 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -98,10 +99,14 @@ class Likelihood:
                 sums[part, r] = self._recording_misfit(r, theta[part])
         return sums
 
-    def _recording_misfit(self, r: int, theta: Array) -> Array:
+    def residual(self, r: int, theta: Array) -> Array:
+        """Whitened residual of one recording, (B, m), m."""
         recording = self.oscillator.campaign.recordings[r]
-        residual = recording.samples - self.oscillator.predict_recording(r, theta)
-        white = self.noise.whiten(residual, recording.interval)
+        left = recording.samples - self.oscillator.predict_recording(r, theta)
+        return self.noise.whiten(left, recording.interval)
+
+    def _recording_misfit(self, r: int, theta: Array) -> Array:
+        white = self.residual(r, theta)
         sums = np.einsum("bn,bn->b", white, white)
         return np.where(np.isfinite(sums), sums, np.inf)
 
@@ -121,19 +126,22 @@ class Likelihood:
         """Log likelihood, (B,)."""
         return np.asarray(self.per_recording(theta).sum(axis=1))
 
-    def linearise(self, theta: Array, steps: Array | None = None) -> tuple[Linearisation, ...]:
-        """Whitened residual and Jacobian of every recording at `theta` (d,).
+    def linearise(
+        self, theta: Array, steps: Array | None = None, recordings: Sequence[int] | None = None
+    ) -> tuple[Linearisation, ...]:
+        """Whitened residual and Jacobian of the `recordings` (all by default) at `theta` (d,).
 
         Derivatives are exact (through the events) for the base oscillator and central differences
         with `steps` (d,) otherwise; `steps` should be a small fraction of the posterior's standard
         deviations.
         """
+        wanted = range(self.oscillator.counts.size) if recordings is None else recordings
         if self.oscillator.is_base and not self.oscillator.sensors:
-            return self._exact(theta)
+            parts = self._exact(theta)
+            return tuple(parts[r] for r in wanted)
         if steps is None:
             raise ValueError("an oscillator with added effects needs difference steps")
-        recordings = range(self.oscillator.counts.size)
-        return tuple(self._differences(r, theta, steps) for r in recordings)
+        return tuple(self._differences(r, theta, steps) for r in wanted)
 
     def _whitened(self, r: int, predicted: Array, jacobian: Array, columns: Index) -> Linearisation:
         """Linearisation from a prediction (n,) and derivatives (k, n)."""

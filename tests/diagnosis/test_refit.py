@@ -13,8 +13,9 @@ from scipy import integrate, stats
 from scipy.special import logsumexp
 
 from bayesimpact.diagnosis.directions import directions
+from bayesimpact.diagnosis.evidence import SPREADS, common_spread, log_evidence
 from bayesimpact.diagnosis.extend import campaign_scales
-from bayesimpact.diagnosis.refit import base_candidate, log_evidence, refit, without
+from bayesimpact.diagnosis.refit import base_candidate, refit, without
 from bayesimpact.diagnosis.scan import score_directions
 from bayesimpact.inference.fit import Fit, Target, find_mode
 from bayesimpact.inference.identify import identify
@@ -215,3 +216,32 @@ def test_what_was_not_fitted_has_no_evidence(small):
     assert log_evidence(replace(small.fit, log_posterior=-np.inf)) == -np.inf
     nan = np.full_like(small.fit.covariance, np.nan)
     assert log_evidence(replace(small.fit, covariance=nan)) == -np.inf
+
+
+@pytest.mark.parametrize("spread", [0.0, 0.02, 1.0])
+def test_values_that_share_a_spread(spread):
+    """Three gaps, measured to one thousandth of the prior's width: two grids over all three."""
+    width, error, mean = 2.0, 0.002, 5.0
+    truth = mean + 0.3 + spread * np.array([1.0, -0.4, -0.7])
+    precision = np.full((3, 3), -0.3) / error**2 + np.eye(3) * 1.3 / error**2
+    posterior = np.linalg.inv(precision + np.eye(3) / width**2)
+    mode = posterior @ (precision @ truth + mean / width**2)
+    measured = np.linalg.inv(precision)
+
+    def exact(prior: np.ndarray) -> float:  # density of what was measured under a prior
+        centre = np.full(3, mean)
+        return float(stats.multivariate_normal(centre, prior + measured).logpdf(truth))
+
+    shared = [exact(tau**2 * np.eye(3) + width**2) for tau in SPREADS * width]
+    expected = logsumexp(shared) - np.log(SPREADS.size) - exact(width**2 * np.eye(3))
+    found = common_spread(mode, posterior, mean, width)
+    assert found == pytest.approx(expected, abs=1e-6)
+    assert (found > 5) == (spread < 0.1)  # small differences are no longer punished
+
+
+def test_a_value_that_nothing_was_measured_of_changes_nothing():
+    """An obstacle that was never touched: its value is its prior."""
+    posterior = np.diag([1e-6, 1e-6, 4.0])
+    with_it = common_spread(np.array([5.0, 5.001, 5.0]), posterior, 5.0, 2.0)
+    without_it = common_spread(np.array([5.0, 5.001]), posterior[:2, :2], 5.0, 2.0)
+    assert with_it == pytest.approx(without_it, abs=1e-3)
