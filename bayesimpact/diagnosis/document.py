@@ -12,9 +12,10 @@ from bayesimpact.diagnosis.limits import PRACTICAL, Limit
 from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.diagnosis.name import DECISIVE
 from bayesimpact.diagnosis.refit import Candidate
+from bayesimpact.diagnosis.size import size_in_words
 from bayesimpact.diagnosis.smoothing import filter_parameters, filter_words
 from bayesimpact.diagnosis.whiteness import whiteness_p
-from bayesimpact.diagnosis.words import parameter_shifts, sizes, statement, summary
+from bayesimpact.diagnosis.words import parameter_shifts, statement, summary
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect
 from bayesimpact.model.parameters import bare_name, is_added
@@ -145,7 +146,7 @@ def _remains(d: Diagnosis) -> str:
 def _statement(d: Diagnosis, effect: Effect) -> str:
     if d.filtered is not None and effect.id == "smoothing":
         return effect.statement.format(size=filter_words(d.filtered))
-    size, share = sizes(effect, d.before, d.after, d.scales)
+    size, share = size_in_words(effect, d.before, d.after, d.scales)
     alone = len(d.effects) == 1  # of several effects nobody can say which one moved a parameter
     return statement(effect, size, share, parameter_shifts(d.before, d.after) if alone else {})
 

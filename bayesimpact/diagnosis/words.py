@@ -4,15 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-
-from bayesimpact.diagnosis.force import trajectory_points
 from bayesimpact.diagnosis.locate import Location
 from bayesimpact.inference.fit import Fit
-from bayesimpact.model.effects.effect import Effect, Scales
-from bayesimpact.model.parameters import instance_name
+from bayesimpact.model.effects.effect import Effect
 
-IN_CONTACT = ("contact", "entry", "exit")
 _REGIMES = {
     "free": "in the suspension, wherever the mass moves",
     "contact": "in contact with the obstacle",
@@ -30,56 +25,6 @@ def statement(effect: Effect, size: str, share: float, shift: Mapping[str, float
         return text
     worst = max(shift, key=lambda name: abs(shift[name]))
     return f"{text} Ignoring it moved {worst} by {shift[worst]:+.1f} of its standard deviations."
-
-
-def sizes(effect: Effect, before: Fit, after: Fit, scales: Scales) -> tuple[str, float]:
-    """Size of an effect as text (a force, where it has one) and relative to its yardstick."""
-    parameters = after.target.oscillator.layout.parameters
-    values = {
-        n.split(".", 1)[1]: (float(v), p.unit)
-        for n, v, p in zip(after.names, after.mode, parameters, strict=True)
-        if n.startswith(effect.id + ".")
-    }
-    yardstick = scales.contact_force if effect.regime in IN_CONTACT else scales.force
-    if effect.law is not None and effect.law.rate is None:
-        peak = peak_force(effect, after)
-        return f"{peak:.2g} {_force_unit(after)}", peak / yardstick
-    if "force" in values:
-        return f"{values['force'][0]:.2g} {values['force'][1]}", values["force"][0] / yardstick
-    change = np.concatenate([a - b for a, b in zip(after.predicted, before.predicted, strict=True)])
-    reach = float(np.max(np.abs(change)))
-    text = ", ".join(f"{name} {v:.3g} {unit}" for name, (v, unit) in list(values.items())[:4])
-    return text or f"{1e6 * reach:.2g} um of trajectory", reach / scales.amplitude
-
-
-def peak_force(effect: Effect, fit: Fit, points: int = 2000) -> float:
-    """Largest force of an effect's law along the fitted motion, N."""
-    assert effect.law is not None
-    layout = fit.target.oscillator.layout
-    known = dict(zip(fit.names, fit.mode, strict=True))
-    largest = 0.0
-    for r, ((y, v), recording) in enumerate(
-        zip(trajectory_points(fit), fit.target.oscillator.campaign.recordings, strict=True)
-    ):
-        q = layout.slots(fit.mode)[r]
-        keys = {"campaign": None, "case": recording.case, "recording": recording.name}
-        p = [
-            x.fixed if x.fixed is not None else known[instance_name(effect, x, keys[x.scope])]
-            for x in effect.parameters
-        ]
-        step = max(1, y.size * len(layout.columns) // points)
-        for i in range(0, y.size, step):
-            d = y[i] - q[3]
-            if effect.law.where == "everywhere" or d > 0:
-                t, touching = i * recording.interval, float(d > 0)
-                force = effect.law.force(y[i], v[i], d, t, 0.0, touching, p, q)
-                largest = max(largest, abs(float(force)))
-    return largest
-
-
-def _force_unit(fit: Fit) -> str:
-    angle = fit.target.oscillator.campaign.recordings[0].quantity == "angle"
-    return "N m" if angle else "N"
 
 
 def parameter_shifts(before: Fit, after: Fit) -> dict[str, float]:

@@ -11,8 +11,7 @@ import small_rig
 from effect_rigs import BY_ID
 
 from bayesimpact.diagnosis.extend import campaign_scales, extend, transfer
-from bayesimpact.diagnosis.force import trajectory_points
-from bayesimpact.diagnosis.words import parameter_shifts, peak_force, sizes, statement, summary
+from bayesimpact.diagnosis.words import parameter_shifts, statement, summary
 from bayesimpact.inference.fit import Fit
 
 
@@ -24,51 +23,6 @@ def with_effect(small, effect_id: str, **values: float) -> Fit:
     for name, value in values.items():
         mode[target.oscillator.layout.index(f"{effect_id}.{name}")] = value
     return replace(small.fit, target=target, mode=mode)
-
-
-def test_peak_force_along_the_motion(small):
-    fit = with_effect(small, "spring_cubic", stiffness=2e4)
-    largest = max(np.abs(y).max() for y, _ in trajectory_points(fit))
-    assert peak_force(BY_ID["spring_cubic"], fit) == pytest.approx(2e4 * largest**3, rel=0.01)
-    drag = with_effect(small, "quadratic_drag", coefficient=0.3)
-    fastest = max(np.abs(v).max() for _, v in trajectory_points(drag))
-    found = peak_force(BY_ID["quadratic_drag"], drag)
-    assert found == pytest.approx(0.3 * fastest**2, rel=0.02)
-    hard = with_effect(small, "contact_hardening", stiffness=1e7)
-    gap = small.fit.value("g")
-    deepest = max((y - gap).max() for y, _ in trajectory_points(hard))
-    found = peak_force(BY_ID["contact_hardening"], hard)
-    assert found == pytest.approx(1e7 * deepest**3, rel=0.05)
-
-
-def test_a_size_is_a_force_and_its_share(small):
-    scales = campaign_scales(small.fit)
-    fit = with_effect(small, "spring_cubic", stiffness=2e4)
-    text, share = sizes(BY_ID["spring_cubic"], small.fit, fit, scales)
-    peak = peak_force(BY_ID["spring_cubic"], fit)
-    assert text == f"{peak:.2g} N" and share == pytest.approx(peak / scales.force)
-    hard = with_effect(small, "contact_hardening", stiffness=1e7)
-    _, share = sizes(BY_ID["contact_hardening"], small.fit, hard, scales)
-    peak = peak_force(BY_ID["contact_hardening"], hard)
-    assert share == pytest.approx(peak / scales.contact_force)
-    friction = with_effect(small, "coulomb_friction", force=2e-3)
-    text, share = sizes(BY_ID["coulomb_friction"], small.fit, friction, scales)
-    assert text == "0.002 N" and share == pytest.approx(2e-3 / scales.force)
-
-
-def test_a_size_without_a_force_is_told_by_its_parameters_or_its_trace(small):
-    scales = campaign_scales(small.fit)
-    bent = with_effect(small, "sensor_quadratic", gain=0.5)
-    text, share = sizes(BY_ID["sensor_quadratic"], small.fit, bent, scales)
-    assert "0.5" in text and "1/m" in text
-    change = np.concatenate(
-        [a - b for a, b in zip(bent.predicted, small.fit.predicted, strict=True)]
-    )
-    assert share == pytest.approx(np.abs(change).max() / scales.amplitude)
-    text, _ = sizes(
-        BY_ID["contact_no_tension"], small.fit, with_effect(small, "contact_no_tension"), scales
-    )
-    assert text.endswith("um of trajectory")
 
 
 def test_shifts_are_what_ignoring_did(small):

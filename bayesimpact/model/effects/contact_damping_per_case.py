@@ -40,4 +40,5 @@ EFFECT = Effect(
     binds=MappingProxyType({"c2": "c2"}),
     needs_stop=True,
     condition=lambda s: s.cases > 1,
+    size=lambda p, s: (max(p) - min(p), "N s/m", (max(p) - min(p)) / s.contact_damping),
 )

@@ -33,4 +33,9 @@ EFFECT = Effect(
     ),
     sets=MappingProxyType({"no_tension": 1.0}),
     needs_stop=True,
+    size=lambda p, s: (
+        s.contact_damping * s.impact_speed,
+        "N",
+        s.contact_damping * s.impact_speed / s.contact_force,
+    ),
 )

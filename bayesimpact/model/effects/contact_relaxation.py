@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayesimpact.model.effects.effect import Effect, EffectParameter, Law, Numbers
+from bayesimpact.model.effects.effect import Effect, EffectParameter, Law, Numbers, Scales, Size
 
 
 def force(
@@ -33,6 +33,12 @@ def rate(
 ) -> float:
     """Growth of the branch's force, N/s."""
     return touching * p[0] * v - z / p[1]
+
+
+def size(p: Numbers, s: Scales) -> Size:
+    """Peak force of the branch: of a spring when it is slow, of a dashpot when it is fast."""
+    peak = p[0] * min(s.indentation, p[1] * s.impact_speed)
+    return peak, "N", peak / s.contact_force
 
 
 EFFECT = Effect(
@@ -58,4 +64,5 @@ EFFECT = Effect(
     ),
     law=Law(force, where="contact", rate=rate),
     needs_stop=True,
+    size=size,
 )

@@ -28,4 +28,5 @@ EFFECT = Effect(
     statement="Dry friction of {size} ({share} of the peak elastic force) acts against the motion.",
     parameters=(EffectParameter("force", "N", scale=lambda s: 0.5 * s.damping_force, lower=0.0),),
     binds=MappingProxyType({"friction": "force"}),
+    size=lambda p, s: (p[0], "N", p[0] / s.force),
 )

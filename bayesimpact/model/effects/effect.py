@@ -154,6 +154,8 @@ class Law:
 
 
 Numbers = Sequence[float]
+Size = tuple[float, str, float]
+"""How large an effect is: value, unit for displacements, share of its yardstick."""
 Observe = Callable[
     [NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]
 ]
@@ -178,6 +180,8 @@ class Effect:
     needs_stop : True when it makes no sense without an obstacle
     prefer : id of the simpler effect that this one reduces to at its null
     condition : what else a campaign must offer (two obstacles, two impacts, ...); None for nothing
+    size : how large it is for given parameters, where the peak of its force along the motion or of
+        its change of the readings does not say so
     """
 
     id: str
@@ -195,6 +199,7 @@ class Effect:
     needs_stop: bool = False
     prefer: str | None = None
     condition: Callable[[Scales], bool] | None = None
+    size: Callable[[Numbers, Scales], Size] | None = None
 
     def admissible(self, scales: Scales) -> bool:
         """True when a campaign of these scales could show the effect at all."""

@@ -40,4 +40,5 @@ EFFECT = Effect(
     binds=MappingProxyType({"g": "g"}),
     needs_stop=True,
     condition=lambda s: s.recordings > 1,
+    size=lambda p, s: (max(p) - min(p), "m", (max(p) - min(p)) / s.indentation),
 )

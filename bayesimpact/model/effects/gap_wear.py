@@ -36,4 +36,5 @@ EFFECT = Effect(
     binds=MappingProxyType({"gap_step": "step"}),
     needs_stop=True,
     condition=lambda s: s.impacts > 1,
+    size=lambda p, s: (p[0] * s.impacts, "m", p[0] * s.impacts / s.indentation),
 )

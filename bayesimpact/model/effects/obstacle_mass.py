@@ -35,4 +35,5 @@ EFFECT = Effect(
     sets=MappingProxyType({"no_tension": 1.0}),
     needs_stop=True,
     prefer="contact_no_tension",
+    size=lambda p, s: (p[0], "kg", p[0] / s.mass),
 )

@@ -1,0 +1,103 @@
+"""How large an effect is, in a unit that a lab person can hold against something."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.diagnosis.force import trajectory_points
+from bayesimpact.inference.fit import Fit
+from bayesimpact.model.effects.effect import Effect, Scales, Size
+from bayesimpact.model.parameters import angular, instance_name
+
+Array = NDArray[np.float64]
+IN_CONTACT = ("contact", "entry", "exit")
+_SMALLER = (("mm", 1e-3), ("µm", 1e-6), ("nm", 1e-9))
+
+
+def size_in_words(effect: Effect, before: Fit, after: Fit, scales: Scales) -> tuple[str, float]:
+    """Size of an effect as text, and relative to what it should be held against."""
+    value, unit, share = size(effect, before, after, scales)
+    quantity = after.target.oscillator.campaign.recordings[0].quantity
+    return amount(value, angular(unit) if quantity == "angle" else unit), share
+
+
+def amount(value: float, unit: str) -> str:
+    """Two digits, and a length in a unit that suits it."""
+    if unit == "m":
+        for name, factor in _SMALLER:
+            if value >= factor:
+                return f"{_two_digits(value / factor)} {name}"
+    return f"{_two_digits(value)} {unit}"
+
+
+def _two_digits(value: float) -> str:
+    return f"{float(f'{value:.2g}'):g}"  # 430, not 4.3e+02
+
+
+def size(effect: Effect, before: Fit, after: Fit, scales: Scales) -> Size:
+    """Size, its unit for displacements, and share.
+
+    As the effect itself defines it; else the peak of its force along the motion, over the peak
+    elastic force of spring or obstacle; else the largest change of the readings, over the
+    amplitude: its own, or where it has none that of the fit.
+    """
+    if effect.size is not None:
+        own = [float(v) for n, v in _values(after).items() if n.startswith(f"{effect.id}.")]
+        return effect.size(own, scales)
+    if effect.law is not None:
+        peak = peak_force(effect, after)
+        yardstick = scales.contact_force if effect.regime in IN_CONTACT else scales.force
+        return peak, "N", peak / yardstick
+    if effect.observe is not None:
+        change = largest_change(effect, after)
+    else:
+        pairs = zip(after.predicted, before.predicted, strict=True)
+        change = max(float(np.abs(a - b).max()) for a, b in pairs)
+    return change, "m", change / scales.amplitude
+
+
+def _values(fit: Fit) -> Mapping[str, float]:
+    return dict(zip(fit.names, fit.mode, strict=True))
+
+
+def _numbers(effect: Effect, fit: Fit, r: int) -> list[float]:
+    """The effect's parameters in its own order, as recording r has them."""
+    known, recording = _values(fit), fit.target.oscillator.campaign.recordings[r]
+    keys = {"campaign": None, "case": recording.case, "recording": recording.name}
+    return [
+        x.fixed if x.fixed is not None else known[instance_name(effect, x, keys[x.scope])]
+        for x in effect.parameters
+    ]
+
+
+def largest_change(effect: Effect, fit: Fit) -> float:
+    """How far an effect of the measuring chain changes any reading, m."""
+    assert effect.observe is not None
+    largest = 0.0
+    for r, (y, _) in enumerate(trajectory_points(fit)):
+        t = (
+            np.arange(y.size, dtype=np.float64)
+            * fit.target.oscillator.campaign.recordings[r].interval
+        )
+        p = np.array([_numbers(effect, fit, r)])
+        largest = max(largest, float(np.abs(effect.observe(y[None], t, p) - y).max()))
+    return largest
+
+
+def peak_force(effect: Effect, fit: Fit, points: int = 2000) -> float:
+    """Largest force of an effect's law along the fitted motion, N."""
+    assert effect.law is not None
+    slots = fit.target.oscillator.layout.slots(fit.mode)
+    largest = 0.0
+    for r, (y, v) in enumerate(trajectory_points(fit)):
+        interval = fit.target.oscillator.campaign.recordings[r].interval
+        q, p = slots[r], _numbers(effect, fit, r)
+        for i in range(0, y.size, max(1, y.size * len(slots) // points)):
+            d = y[i] - q[3]
+            if effect.law.where == "everywhere" or d > 0:
+                force = effect.law.force(y[i], v[i], d, i * interval, 0.0, float(d > 0), p, q)
+                largest = max(largest, abs(float(force)))
+    return largest
