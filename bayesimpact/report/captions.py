@@ -4,12 +4,57 @@ from __future__ import annotations
 
 from bayesimpact.report.figures.corner import MOST as MOST_CORNER
 from bayesimpact.report.figures.traces import MOST as MOST_TRACES
+from bayesimpact.report.force_arrays import QUIET_WIDTH
 from bayesimpact.report.results import Results
+
+DIAGNOSIS = {
+    "force": (
+        "The force that the base model leaves unexplained, on the left-hand side of the equation "
+        "of motion (positive resists motion towards the stop). Left: its posterior mean wherever "
+        "the mass has been; black lines enclose what exceeds its own 90 % band; the dashed line is "
+        "the stop. Right: the same split into a conservative part and a dissipative part, with 90 "
+        "% bands. What changes of the base parameters could imitate is taken out."
+    ),
+    "gain": (
+        "Where the extended model explains more: gain in log likelihood over the base model. A "
+        "gain of 1 nat makes a stretch e times likelier; negative ones are chance. Impacts are "
+        "shown as far as half of the recordings have them."
+    ),
+    "ranking": (
+        "Models that were fitted, by their log odds (evidence and the price of each added effect) "
+        "behind the best one; linear up to 10 nats, logarithmic beyond. A name needs all rivals to "
+        "lie beyond the dashed line. Right: probability among the models tried."
+    ),
+    "limits": (
+        "What the recordings rule out. Dots: 95 % upper limit of each effect's size; bars: a size "
+        "that would stand out by five standard errors. Both over the size that would matter in "
+        "practice, which is a tenth of the effect's prior scale (dashed): left of it an effect is "
+        "absent or negligible; orange dots mark effects of which the recordings cannot tell."
+    ),
+    "improvement": (
+        "Before and after. Left: power of the whitened residual over that of the noise, estimated "
+        "without any model, all recordings together; the grey band holds nine tenths of white "
+        "noise. Middle: reduced χ² of each recording, the grey stripe likewise. Right: gain in the "
+        "log score with which each recording is predicted from the others."
+    ),
+    "bands": (
+        "Backbone and damping before and after: recorded minus median of simulated swings, in "
+        "half-widths of the 90 % band (grey). Left: frequency against amplitude. Right: damping "
+        "ratio against time."
+    ),
+    "shifts": (
+        "How far the added physics moves the parameters, in standard deviations of the base model: "
+        "medians and 90 % intervals. The honest interval carries what stays unexplained."
+    ),
+}
+"""Captions of a diagnosis' figures."""
 
 
 def caption(name: str, results: Results) -> str:
     """What a figure shows."""
     stem = name.split("_")[0]
+    if stem in DIAGNOSIS:
+        return DIAGNOSIS[stem] + (_nothing_missing(results) if stem == "force" else "")
     writer = {
         "fit": _fit,
         "corner": _corner,
@@ -19,6 +64,15 @@ def caption(name: str, results: Results) -> str:
         "traces": _traces,
     }.get(stem)
     return writer(results) if writer else name.replace("_", " ")
+
+
+def _nothing_missing(results: Results) -> str:
+    if results.diagnosis is None or results.diagnosis["verdict"] != "adequate":
+        return ""
+    return (
+        f" Nothing is missing here: drawn is what the recordings allow of a force of about "
+        f"{100 * QUIET_WIDTH:.0f} % of the peak elastic force (its prior)."
+    )
 
 
 def _fit(results: Results) -> str:
@@ -31,7 +85,8 @@ def _fit(results: Results) -> str:
 
 
 def _corner(results: Results) -> str:
-    assert results.draws is not None
+    if results.draws is None:
+        return _gaussian()
     count = len(results.draws.names)
     some = f" The first {MOST_CORNER} of {count} parameters." if count > MOST_CORNER else ""
     before = (
@@ -41,6 +96,14 @@ def _corner(results: Results) -> str:
         "Posterior of the parameters of interest: marginals on the diagonal with median ± half "
         "of the 90 % interval, pairs below with the contours of one and two standard deviations "
         f"(39 % and 86 %). Axes count from a value near the median.{some}{before}"
+    )
+
+
+def _gaussian() -> str:
+    return (
+        "Gaussian approximations at the modes (nothing was sampled): marginals on the diagonal "
+        "with median ± half of the 90 % interval, pairs below with the contours of one and two "
+        "standard deviations. Orange: the base model; blue: with what was added."
     )
 
 

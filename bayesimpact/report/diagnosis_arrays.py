@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from scipy import stats
 
 from bayesimpact.diagnosis.directions import sigma_of
-from bayesimpact.diagnosis.force import MissingForce, trajectory_points
-from bayesimpact.diagnosis.learned import spline_basis
+from bayesimpact.diagnosis.force import trajectory_points
 from bayesimpact.diagnosis.loop import Diagnosis
-from bayesimpact.diagnosis.unknown import shape
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.parameters import SLOTS
 from bayesimpact.report.build import recording_results
+from bayesimpact.report.force_arrays import force_arrays
 from bayesimpact.report.results import Array
 
-POINTS = 240  # displacements at which forces are kept
-_BINS = 60  # of displacement, to find which velocities were visited
 _BANDS = 36  # of frequency
 _LEAST = 8  # Fourier coefficients in a band
 _GAP = SLOTS.index("g")
@@ -25,19 +24,20 @@ _GAP = SLOTS.index("g")
 def diagnosis_arrays(d: Diagnosis) -> dict[str, Array]:
     """Arrays by name; recordings and cases in the campaign's order.
 
-    force_* : (POINTS,) displacement y, m; a, N, and b, N s/m, of the unexplained force, their
-        standard deviations and covariance; slowest and fastest velocity met there, m/s; left_* the
-        same of what the chosen model leaves, learned_* of the force learned with the parameters
-    gap : (1,) of the base model, m; absent without a stop
+    force_*, left_*, learned_*, gap : see `force_arrays`
     gain : (R, bins) log likelihood gained per recording and stretch of time, nats
-    impact_gain : (R, K) the same from each touch to the next, NaN where there was none
+    impact_gain : (R, K) the same from each touch to the next, NaN after the last
     before_chi2 : (R,) reduced chi2 of the base model
     spectrum : (k, 5) frequency, Hz; power of the whitened residual over that of the noise before
         and after; ends of the 90 % band for white noise
     held_out_recordings, held_out_cases : (L, 2) log score before and after, nats
     before_mode, before_covariance : (d,), (d, d) of the base model, SI
     """
-    arrays = {**_force(d), "before_mode": d.before.mode, "before_covariance": d.before.covariance}
+    arrays = {
+        **force_arrays(d),
+        "before_mode": d.before.mode,
+        "before_covariance": d.before.covariance,
+    }
     if d.verdict == "adequate":
         return arrays
     if d.location is not None and d.location.gain.shape[1] > 1:
@@ -49,45 +49,6 @@ def diagnosis_arrays(d: Diagnosis) -> dict[str, Array]:
         if held is not None:
             arrays[f"held_out_{name}"] = np.stack([held.before, held.after], axis=1)
     return arrays
-
-
-def _force(d: Diagnosis) -> dict[str, Array]:
-    force, fit = d.force, d.naming.base.candidate.fit
-    y = np.linspace(force.low, force.low + force.spacing * (force.knots - 3), POINTS)
-    slow, fast = _velocities(fit, y)
-    arrays = {"force_y": y, "force_v_low": slow, "force_v_high": fast} | _parts("force", force, y)
-    if d.naming.chosen is not d.naming.base:
-        arrays |= _parts("left", d.naming.chosen.force, y)
-    if d.verdict == "unknown":
-        learned = shape(d.after, d.naming.base, POINTS)
-        arrays |= {"learned_a": learned.conservative, "learned_b": learned.dissipative}
-    oscillator = fit.target.oscillator
-    if oscillator.campaign.stop:
-        arrays["gap"] = np.array([np.mean(oscillator.layout.slots(fit.mode)[:, _GAP])])
-    return arrays
-
-
-def _parts(name: str, force: MissingForce, y: Array) -> dict[str, Array]:
-    """Both parts of a force at displacements (n,), with their spread."""
-    a, b = force.parts(y)
-    a_sd, b_sd = force.spread(y)
-    basis, n = spline_basis(y, force.low, force.spacing, force.knots), force.knots
-    ab = np.einsum("ni,ij,nj->n", basis, force.covariance[:n, n:], basis)
-    found = {"a": a, "b": b, "a_sd": a_sd, "b_sd": b_sd, "ab": ab}
-    return {f"{name}_{key}": values for key, values in found.items()}
-
-
-def _velocities(fit: Fit, y: Array) -> tuple[Array, Array]:
-    """Lowest and highest velocity that the fitted motion has near displacements (n,), m/s."""
-    points = trajectory_points(fit)
-    where, velocity = (np.concatenate([p[k] for p in points]) for k in (0, 1))
-    edges = np.linspace(y[0], y[-1], _BINS + 1)
-    cell = np.clip(np.searchsorted(edges, where) - 1, 0, _BINS - 1)
-    met = np.flatnonzero(np.bincount(cell, minlength=_BINS))
-    middle = 0.5 * (edges[1:] + edges[:-1])[met]
-    low = [velocity[cell == i].min() for i in met]
-    high = [velocity[cell == i].max() for i in met]
-    return np.interp(y, middle, low), np.interp(y, middle, high)
 
 
 def _impacts(d: Diagnosis) -> dict[str, Array]:
@@ -103,7 +64,7 @@ def _impacts(d: Diagnosis) -> dict[str, Array]:
         old, new = (f.linearisation[r].residual / sigma_of(base)[r] for f in (base, better))
         total = np.concatenate([[0.0], np.cumsum(0.5 * (old**2 - new**2))])
         touches = np.flatnonzero((y[1:] >= gaps[r]) & (y[:-1] < gaps[r]))
-        rows.append(np.diff(total[np.append(touches, y.size)]))
+        rows.append(np.diff(total[touches]))
     if not max(row.size for row in rows):
         return {}
     table = np.full((len(rows), max(row.size for row in rows)), np.nan)
@@ -118,12 +79,12 @@ def spectrum(before: Fit, after: Fit) -> Array:
     other, new = _power(after)
     edges = np.geomspace(max(frequency.min(), other.min()), frequency.max(), _BANDS + 1)
     rows = []
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in pairwise(edges):
         inside, inside_new = ((f >= low) & (f <= high) for f in (frequency, other))
         count = int(inside.sum())
         if count < _LEAST or inside_new.sum() < _LEAST:
             continue
-        ends = stats.chi2.ppf([0.05, 0.95], 2 * count) / (2 * count)
+        ends = [stats.chi2.ppf(q, 2 * count) / (2 * count) for q in (0.05, 0.95)]
         rows.append([np.sqrt(low * high), old[inside].mean(), new[inside_new].mean(), *ends])
     return np.array(rows).reshape(-1, 5)
 

@@ -29,7 +29,7 @@ VERDICTS = {
     "ambiguous": "Several effects fit alike",
     "unknown": "The missing physics is outside the catalogue",
 }
-_REGIMES = {
+REGIMES = {
     "free": "free flight",
     "contact": "contact with the stop",
     "entry": "the beginning of contact",
@@ -37,12 +37,12 @@ _REGIMES = {
     "everywhere": "everywhere",
     "measurement": "the measuring chain",
 }
-_NUISANCES = ("y0", "v0", "offset", "sigma")
+NUISANCES = ("y0", "v0", "offset", "sigma")
 _FIT_ROWS = {
     "rms_m": ("residual rms", "m"),
     "reduced_chi2": ("reduced χ²", ""),
     "whiteness_p": ("whiteness p", "p"),
-    "held_out_log_score": ("held-out log score", ""),
+    "held_out_log_score": ("held-out log score", "nats"),
 }
 
 
@@ -54,12 +54,13 @@ def diagnosis_view(results: Results) -> dict[str, Any] | None:
     before, after = (diagnosis.get("parameters", {}).get(k, {}) for k in ("before", "after"))
     return {
         "verdict": VERDICTS.get(diagnosis["verdict"], diagnosis["verdict"]),
+        "changed": diagnosis["verdict"] != "adequate",
         "location": _location(diagnosis.get("location"), unit),
         "effects": [_effect(effect) for effect in diagnosis.get("effects", [])],
         "alternatives": [
             {
                 "id": other["id"],
-                "probability": _probability(other["probability"]),
+                "probability": probability(other["probability"]),
                 "evidence": _plain(other["delta_log_evidence"], 1),
             }
             for other in diagnosis.get("alternatives", [])
@@ -69,7 +70,7 @@ def diagnosis_view(results: Results) -> dict[str, Any] | None:
         "parameters": [
             _shift(name, before[name], after[name])
             for name in before
-            if name in after and name.partition("[")[0] not in _NUISANCES
+            if name in after and name.partition("[")[0] not in NUISANCES
         ],
         "limits": [_limit(limit) for limit in diagnosis.get("limits", [])],
     }
@@ -82,7 +83,7 @@ def _location(location: Mapping[str, Any] | None, unit: str) -> list[tuple[str, 
     regime = str(location["regime"])
     share = location.get("share")
     part = "" if share is None else f" ({significant(100 * share, 2)} % of what is unexplained)"
-    rows = [("regime", _REGIMES.get(regime, regime) + part)]
+    rows = [("regime", REGIMES.get(regime, regime) + part)]
     ranges = (
         ("displacement_m", "displacement", unit),
         ("velocity_m_s", "velocity", f"{unit}/s"),
@@ -90,27 +91,29 @@ def _location(location: Mapping[str, Any] | None, unit: str) -> list[tuple[str, 
     )
     for key, words, si in ranges:
         if location.get(key):
-            rows.append((words, _range(location[key], si)))
+            rows.append((words, span_of(location[key], si)))
     for key in ("cases", "recordings"):
         if location.get(key):
             rows.append((key, ", ".join(str(x) for x in location[key])))
     if location.get("force_rms_n") is not None:
         rows.append(
-            ("force, rms", _amount(location["force_rms_n"], "N m" if unit == "rad" else "N"))
+            ("force, rms", amount(location["force_rms_n"], "N m" if unit == "rad" else "N"))
         )
     return rows
 
 
-def _range(ends: Sequence[float], unit: str) -> str:
+def span_of(ends: Sequence[float], unit: str) -> str:
+    """A range with its unit."""
     low, high = ends
     shown = readable(unit, max(abs(low), abs(high)))
     places = decimals((high - low) * shown.scale)
     return f"{span(low, high, shown.scale, places)} {typeset(shown.unit)}"
 
 
-def _amount(value: float, unit: str) -> str:
+def amount(value: float, unit: str, digits: int = 3) -> str:
+    """A size with its unit."""
     shown = readable(unit, abs(value))
-    return f"{significant(value * shown.scale, 3)} {typeset(shown.unit)}"
+    return f"{significant(value * shown.scale, digits)} {typeset(shown.unit)}"
 
 
 def _effect(effect: Mapping[str, Any]) -> dict[str, Any]:
@@ -118,16 +121,16 @@ def _effect(effect: Mapping[str, Any]) -> dict[str, Any]:
         "id": effect["id"],
         "family": effect.get("family", ""),
         "statement": effect.get("statement", ""),
-        "probability": _probability(effect.get("probability")),
+        "probability": probability(effect.get("probability")),
         "evidence": _plain(effect.get("delta_log_evidence"), 1),
         "parameters": [
-            (symbol(name), _estimate(content))
+            (symbol(name), estimate(content))
             for name, content in effect.get("parameters", {}).items()
         ],
     }
 
 
-def _estimate(content: Mapping[str, Any], *, median: bool = True) -> str:
+def estimate(content: Mapping[str, Any], *, median: bool = True) -> str:
     """Median with its 90 % interval and unit, or the interval alone."""
     low, high = content["ci90"]
     half = 0.5 * (high - low)
@@ -140,7 +143,8 @@ def _estimate(content: Mapping[str, Any], *, median: bool = True) -> str:
     return f"{value} ({ends}) {typeset(shown.unit)}".rstrip()
 
 
-def _probability(p: float | None) -> str:
+def probability(p: float | None) -> str:
+    """A probability for a table."""
     if p is None or not isfinite(p):
         return "–"
     return "> 0.999" if p > 0.999 else p_value(p)
@@ -168,7 +172,9 @@ def _merit(value: float | None, kind: str, unit: str) -> str:
     if value is None or not isfinite(value):
         return "–"
     if kind == "m":
-        return _amount(value, unit)
+        return amount(value, unit)
+    if kind == "nats":
+        return number(value, 0)
     return p_value(value) if kind == "p" else significant(value, 4)
 
 
@@ -201,10 +207,11 @@ def _shift(
     sd = (before["ci90"][1] - before["ci90"][0]) / (2 * Z90)
     moved = (after["median"] - before["median"]) / sd if sd > 0 else float("nan")
     return {
+        "name": name,
         "symbol": symbol(name),
-        "before": _estimate(before),
-        "after": _estimate(after),
-        "honest": _estimate({**after, "ci90": after["ci90_honest"]}, median=False)
+        "before": estimate(before),
+        "after": estimate(after),
+        "honest": estimate({**after, "ci90": after["ci90_honest"]}, median=False)
         if after.get("ci90_honest")
         else "",
         "shift": signed(moved, 1) if abs(moved) < 1000 else f"{significant(moved, 2)}",
@@ -219,8 +226,8 @@ def _limit(limit: Mapping[str, Any]) -> dict[str, str]:
     return {
         "id": str(limit["id"]),
         "parameter": str(limit.get("parameter", "")).replace("_", " "),
-        "upper": "–" if upper is None else _amount(float(upper), unit),
-        "detection": "" if detection is None else _amount(float(detection), unit),
+        "upper": "–" if upper is None else amount(float(upper), unit),
+        "detection": "" if detection is None else amount(float(detection), unit),
         "answer": str(limit.get("answer", "")),
         "bias": "" if bias is None else f"{significant(abs(bias), 2)} sd of {hidden['parameter']}",
     }

@@ -18,10 +18,14 @@ from bayesimpact.report.checks import MISFIT
 from bayesimpact.report.diagnosis_view import diagnosis_view
 from bayesimpact.report.figures.save import DPI
 from bayesimpact.report.results import Results
+from bayesimpact.report.story import corrected, story_rows
 
 TEMPLATES = Path(__file__).parent / "template"
 _VERDICT_CLASS = {"adequate": "good", "inadequate": "bad", "slight": "", "overestimated": ""}
-_GROUPS = ("fit", "corner", "backbone", "search", "traces")
+_GROUPS = (
+    *("fit", "corner", "backbone", "search", "traces"),
+    *("force", "gain", "ranking", "limits", "improvement", "bands", "shifts"),
+)
 _PIXELS_PER_INCH = 96
 
 
@@ -69,10 +73,14 @@ def _context(results: Results, pictures: Mapping[str, bytes]) -> dict[str, Any]:
     interest = results.select("physical", "effect")
     groups = _grouped(results, pictures)
     parameters = tables.parameter_views(results, interest)
+    told = diagnosis_view(results)
+    first = [] if told is None else corrected(results.diagnosis or {})
     return {
         "r": results,
         "css": Markup((TEMPLATES / "style.css").read_text(encoding="utf-8")),
-        "d": diagnosis_view(results),
+        "d": told,
+        "story": story_rows(results),
+        "corrected": [p for p in told["parameters"] if p["name"] in first] if told else [],
         "angle": results.quantity == "angle",
         "kind_words": words.kind_words(results),
         "byline": words.byline(results),

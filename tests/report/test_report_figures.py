@@ -8,11 +8,13 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pytest
+from diagnosed import diagnosed
 from matplotlib.figure import Figure
 from synthetic import make_results
 
 from bayesimpact.report.figures.backbone import deviation
 from bayesimpact.report.figures.corner import corner_figure
+from bayesimpact.report.figures.diagnosis import diagnosis_figures
 from bayesimpact.report.figures.recordings import MOST, recording_figures, shown_recordings
 from bayesimpact.report.figures.save import all_figures, file_name, png, save_figures
 from bayesimpact.report.figures.style import polyline, scaled, symbol
@@ -85,7 +87,8 @@ def test_fifty_recordings_show_the_worst_of_every_case() -> None:
 def test_nothing_overlaps(count: int) -> None:
     """Titles and labels keep clear of one another, of other panels and of the edge."""
     results = make_results(count, 3 if count > 1 else 1, n=300)
-    for figure in all_figures(results).values():
+    told = diagnosis_figures(diagnosed(count, 3 if count > 1 else 1))
+    for figure in (all_figures(results) | told).values():
         png(figure)
         boxes = []
         for axis in figure.axes:

@@ -7,10 +7,10 @@ import re
 from dataclasses import replace
 from functools import cache
 from html.parser import HTMLParser
-from typing import Any
 
 import numpy as np
 import pytest
+from diagnosed import DIAGNOSIS
 from synthetic import NOISE, make_results, row, with_chain
 
 from bayesimpact.report.checks import judged
@@ -194,40 +194,6 @@ def test_effects_and_model() -> None:
     text = page(results)[1].text
     assert "dry friction ( coulomb_friction ): F sign(v), sticking" in text
     assert "with dry friction describes" in text
-
-
-def estimate(median: float, half: float, unit: str) -> dict[str, Any]:
-    return {"unit": unit, "median": median, "ci90": [median - half, median + half]}
-
-
-DIAGNOSIS = {
-    "verdict": "named",
-    "summary": "Dry friction is missing <here>.",
-    "location": {
-        "regime": "free", "share": 0.93, "displacement_m": [-0.006, 0.003],
-        "velocity_m_s": [-0.25, 0.25], "time_s": [0.0, 6.0], "recordings": ["run_0"],
-        "cases": ["1", "2"], "force_rms_n": 1.4e-4,
-    },
-    "effects": [
-        {
-            "id": "coulomb_friction", "family": "free damping", "statement": "It rubs.",
-            "probability": 0.9998, "delta_log_evidence": 812.34,
-            "parameters": {"coulomb_friction.force": estimate(1.6e-4, 1e-5, "N")},
-        }
-    ],
-    "alternatives": [{"id": "obstacle_mass", "probability": 0.01, "delta_log_evidence": 770.0}],
-    "fit": {
-        "before": {"rms_m": 5.4e-6, "reduced_chi2": 1.17, "whiteness_p": 1e-9,
-                   "held_out_log_score": 1000.0},
-        "after": {"rms_m": 5e-6, "reduced_chi2": 1.002, "whiteness_p": 0.4,
-                  "held_out_log_score": 1320.0},
-        "held_out_gain": {"value": 320.0, "se": 79.0},
-    },
-    "parameters": {"before": {"k1": estimate(808.6, 0.005, "N/m")},
-                   "after": {"k1": estimate(808.556, 0.006, "N/m")}},
-    "limits": [{"id": "quadratic_drag", "parameter": "coefficient", "unit": "N s2/m2",
-                "upper95": 1e-4}],
-}  # fmt: skip
 
 
 def test_diagnosis_tells_its_story_first() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -27,8 +27,8 @@ from bayesimpact.report.units import p_words
 PER_PAGE = 3
 MOST = 12
 """Cases shown."""
-_COLOURS = {"upper": RED, "lower": BLUE}
-_BRANCHES = {"upper": "above rest", "lower": "below rest"}
+BRANCH_COLOURS = {"upper": RED, "lower": BLUE}
+BRANCH_WORDS = {"upper": "above rest", "lower": "below rest"}
 _BAND: dict[str, Any] = {"alpha": 0.3, "lw": 0}
 
 
@@ -55,7 +55,7 @@ def _backbone(results: Results, summary: BackboneSummary, cases: Sequence[str]) 
     for column, case in enumerate(cases):
         top, bottom = panels[:, column]
         for curve in _curves(summary, case):
-            colour, amplitude = _COLOURS[curve.branch], curve.amplitude * shown.scale
+            colour, amplitude = BRANCH_COLOURS[curve.branch], curve.amplitude * shown.scale
             low, _, high = curve.frequency_band.T
             order = np.argsort(amplitude)
             top.fill_betweenx(amplitude[order], low[order], high[order], color=colour, **_BAND)
@@ -77,7 +77,7 @@ def _damping(results: Results, summary: BackboneSummary, cases: Sequence[str]) -
     for column, case in enumerate(cases):
         top, bottom = panels[:, column]
         for curve in _curves(summary, case):
-            colour, t = _COLOURS[curve.branch], curve.times
+            colour, t = BRANCH_COLOURS[curve.branch], curve.times
             low, _, high = 100 * curve.damping_band.T
             top.fill_between(t, low, high, color=colour, **_BAND)
             top.plot(t, 100 * curve.damping_ratio, ".", color=colour, ms=4.0, mew=0)
@@ -124,14 +124,17 @@ def _finish(figure: Figure, panels: np.ndarray, summary: BackboneSummary) -> Non
         axis.grid()
     for axis in panels[1]:
         axis.axhspan(-1.0, 1.0, color="#E4E4E4", lw=0, zorder=0)
-    points = [
-        np.asarray(line.get_ydata(), dtype=float) for axis in panels[1] for line in axis.lines
-    ]
-    sizes = np.abs(np.concatenate(points)) if points else np.zeros(0)
-    limit = max(2.5, 1.1 * float(np.nanmax(sizes, initial=0.0)))
+    limit = deviation_limit(panels[1])
     panels[1, 0].set_ylim(-limit, limit)
     panels[1, 0].set_ylabel("recorded \N{MINUS SIGN} simulated\n(half-widths of the band)")
     _legend(figure, summary)
+
+
+def deviation_limit(axes: Iterable[Axes]) -> float:
+    """Where an axis of deviations ends so that all points and some of the outside are seen."""
+    points = [np.asarray(line.get_ydata(), dtype=float) for axis in axes for line in axis.lines]
+    sizes = np.abs(np.concatenate(points)) if points else np.zeros(0)
+    return max(2.5, 1.1 * float(np.nanmax(sizes, initial=0.0)))
 
 
 def _title(axis: Axes, summary: BackboneSummary, case: str) -> None:
@@ -144,8 +147,8 @@ def _title(axis: Axes, summary: BackboneSummary, case: str) -> None:
 
 def _legend(figure: Figure, summary: BackboneSummary) -> None:
     points = [
-        Line2D([], [], ls="", marker=".", color=_COLOURS[b], label=f"recorded, {words}")
-        for b, words in _BRANCHES.items()
+        Line2D([], [], ls="", marker=".", color=BRANCH_COLOURS[b], label=f"recorded, {words}")
+        for b, words in BRANCH_WORDS.items()
     ]
     band = Patch(
         color=GREY, alpha=0.4, lw=0, label=f"{100 * summary.probability:.0f} % of simulated"

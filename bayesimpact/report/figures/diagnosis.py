@@ -6,11 +6,22 @@ from collections.abc import Callable, Mapping
 
 from matplotlib.figure import Figure
 
+from bayesimpact.report.figures.bands import band_figures
 from bayesimpact.report.figures.force_map import force_figures
 from bayesimpact.report.figures.gain import gain_figures
+from bayesimpact.report.figures.gaussian import gaussian_figures
+from bayesimpact.report.figures.improvement import improvement_figures
+from bayesimpact.report.figures.ranking import ranking_figures
 from bayesimpact.report.results import Results
 
-DRAWERS: tuple[Callable[[Results], Mapping[str, Figure]], ...] = (force_figures, gain_figures)
+DRAWERS: tuple[Callable[[Results], Mapping[str, Figure]], ...] = (
+    force_figures,
+    gain_figures,
+    ranking_figures,
+    improvement_figures,
+    band_figures,
+    gaussian_figures,
+)
 """Functions from results to figures by name; each returns {} when its arrays are not there."""
 
 

@@ -7,8 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
-from bayesimpact.report.figures.style import AFTER, Array, new_figure, styled
+from bayesimpact.report.figures.style import AFTER, Array, new_figure, rows_axis, styled
 from bayesimpact.report.results import Results
 
 _ROW, _LEAST, _MOST = 0.22, 2.6, 8.0  # in
@@ -42,8 +43,8 @@ def _by_time(figure: Figure, axis: Axes, results: Results, gain: Array) -> None:
         mesh = axis.pcolormesh(
             edges, [i - 0.45, i + 0.45], row[None], cmap="PuOr_r", vmin=-limit, vmax=limit
         )
-    _rows(axis, len(results.recordings))
-    axis.set_yticks(range(len(results.recordings)), [r.name for r in results.recordings])
+    rows_axis(axis, [r.name for r in results.recordings])
+    axis.grid(visible=False)
     axis.set_xlabel("time since the first sample (s)")
     axis.set_title("by recording and time", loc="left")
     bar = figure.colorbar(mesh, ax=axis, pad=0.01, aspect=30)
@@ -54,24 +55,20 @@ def _by_time(figure: Figure, axis: Axes, results: Results, gain: Array) -> None:
 def _by_recording(axis: Axes, total: Array) -> None:
     axis.barh(range(total.size), total, color=AFTER, height=0.6)
     axis.axvline(0.0, color="#444444", lw=0.7)
-    _rows(axis, total.size)
-    axis.set_yticks(range(total.size), [""] * total.size)
+    rows_axis(axis, [""] * total.size)
     axis.set_xlabel("gain (nats)")
     axis.set_title("by recording", loc="left")
-    axis.grid(axis="x")
-
-
-def _rows(axis: Axes, count: int) -> None:
-    """First recording on top, half a row of margin."""
-    axis.set_ylim(count - 0.4, -0.6)
 
 
 def _by_impact(axis: Axes, gain: Array) -> None:
-    """Mean over the recordings that have so many impacts."""
+    """Mean over recordings, up to the impact that half of them reach."""
+    gain = gain[:, np.isfinite(gain).sum(axis=0) >= 0.5 * gain.shape[0]]
     number = np.arange(1, gain.shape[1] + 1)
     axis.bar(number, np.nanmean(gain, axis=0), color=AFTER, width=0.8)
     axis.axhline(0.0, color="#444444", lw=0.7)
     axis.set_xlabel("impact number")
     axis.set_ylabel("gain until the next impact,\nmean of recordings (nats)")
     axis.set_title("by impact", loc="left")
+    axis.xaxis.set_major_locator(MaxNLocator(integer=True))
     axis.grid(axis="y")
+    axis.set_axisbelow(True)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import wraps
 from typing import Any, ParamSpec, TypeVar
 
 import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -88,6 +89,14 @@ def label(words: str, unit: str) -> str:
     """Axis label with its unit: "time (s)"."""
     shown = typeset(unit)
     return f"{words} ({shown})" if shown else words
+
+
+def rows_axis(axis: Axes, names: Sequence[str], *, above: float = 0.6) -> None:
+    """One row per name from the top down, `above` rows of margin over the first; grid behind."""
+    axis.set_yticks(range(len(names)), names)
+    axis.set_ylim(len(names) - 0.4, -above)
+    axis.grid(axis="x")
+    axis.set_axisbelow(True)
 
 
 def polyline(x: Array, y: Array, columns: int = _POINTS) -> tuple[Array, Array]:

@@ -1,0 +1,62 @@
+"""Backbone and damping before and after: how far recorded swings lie from simulated ones."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from bayesimpact.report.figures.backbone import (
+    BRANCH_COLOURS,
+    BRANCH_WORDS,
+    deviation,
+    deviation_limit,
+)
+from bayesimpact.report.figures.style import label, new_figure, response, styled
+from bayesimpact.report.results import BackboneSummary, Results
+from bayesimpact.report.units import p_words
+
+
+def band_figures(results: Results) -> Mapping[str, Figure]:
+    """Deviations in half-widths of the bands of both models, where both were sampled."""
+    before, after = results.before_backbone, results.backbone
+    if before is None or after is None:
+        return {}
+    return {"bands": _figure(results, before, after)}
+
+
+@styled
+def _figure(results: Results, before: BackboneSummary, after: BackboneSummary) -> Figure:
+    figure = new_figure(5.0)
+    panels = figure.subplots(2, 2, sharex="col", sharey=True)
+    sides = (("base model", before), ("with what was added", after))
+    for row, (words, summary) in zip(panels, sides, strict=True):
+        _swings(row, summary, response(results).scale)
+        inside = 100 * summary.inside[-1]
+        row[0].set_title(
+            f"{words}: {inside:.0f} % inside, {p_words(summary.p_values[-1])}", loc="left"
+        )
+    limit = deviation_limit(panels.flat)
+    panels[0, 0].set_ylim(-limit, limit)
+    panels[1, 0].set_xlabel(label("amplitude", response(results).unit))
+    panels[1, 1].set_xlabel(label("time since the first sample", "s"))
+    panels[0, 1].set_title("damping ratio", loc="left")
+    figure.supylabel("recorded \N{MINUS SIGN} simulated (half-widths of the band)", fontsize=9)
+    handles, labels = panels[0, 0].get_legend_handles_labels()
+    unique = dict(zip(labels, handles, strict=True))
+    figure.legend(unique.values(), unique.keys(), loc="outside upper right", ncols=2)
+    return figure
+
+
+def _swings(row: np.ndarray, summary: BackboneSummary, scale: float) -> None:
+    for axis in row:
+        axis.axhspan(-1.0, 1.0, color="#E4E4E4", lw=0, zorder=0)
+        axis.grid()
+    for curve in summary.curves:
+        for axis, x, recorded, band in (
+            (row[0], curve.amplitude * scale, curve.frequency, curve.frequency_band),
+            (row[1], curve.times, curve.damping_ratio, curve.damping_band),
+        ):
+            axis.plot(x, deviation(recorded, band), ".", color=BRANCH_COLOURS[curve.branch],
+                      ms=4.0, mew=0, label=BRANCH_WORDS[curve.branch])  # fmt: skip

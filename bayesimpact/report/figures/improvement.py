@@ -1,0 +1,171 @@
+"""Before and after: spectrum of the residual, misfit, held-out scores, shifts of the parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator, NullFormatter
+
+from bayesimpact.report.figures.style import (
+    AFTER,
+    BEFORE,
+    BLACK,
+    GREY,
+    Array,
+    new_figure,
+    rows_axis,
+    styled,
+    symbol,
+)
+from bayesimpact.report.results import Results
+from bayesimpact.report.rows import Z90
+from bayesimpact.report.units import number
+
+NUISANCES = ("y0", "v0", "offset", "sigma")
+MOST = 16
+"""Parameters shown; those that moved most."""
+_ROW = 0.24  # in
+
+
+def improvement_figures(results: Results) -> Mapping[str, Figure]:
+    """Misfit before and after, and how the parameters moved; nothing when nothing was missing."""
+    arrays, diagnosis = results.diagnosis_arrays, results.diagnosis or {}
+    if "before_chi2" not in arrays:
+        return {}
+    figures = {"improvement": _improvement(results, arrays, diagnosis.get("fit") or {})}
+    moved = shifts(diagnosis.get("parameters") or {})
+    if moved:
+        figures["shifts"] = _shifts(moved)
+    return figures
+
+
+@styled
+def _improvement(results: Results, arrays: Mapping[str, Array], fit: Mapping[str, Any]) -> Figure:
+    rows = len(results.recordings)
+    held = arrays.get("held_out_recordings")
+    figure = new_figure(max(3.3, min(9.0, _ROW * rows + 1.4)))
+    ratios = [1.3, 1.0] if held is None else [1.3, 1.0, 0.8]
+    panels = figure.subplots(1, len(ratios), width_ratios=ratios, squeeze=False)[0]
+    _spectrum(panels[0], arrays["spectrum"])
+    _chi2(panels[1], results, arrays["before_chi2"])
+    if held is not None:
+        _held_out(panels[2], held[:, 1] - held[:, 0], fit.get("held_out_gain") or {})
+    handles = [
+        Line2D([], [], color=BEFORE, marker="o", ms=4, label="base model"),
+        Line2D([], [], color=AFTER, marker="o", ms=4, label="with what was added"),
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=2)
+    return figure
+
+
+def _spectrum(axis: Axes, spectrum: Array) -> None:
+    frequency, before, after, low, high = spectrum.T
+    axis.fill_between(
+        frequency, low, high, color=GREY, alpha=0.3, lw=0, label="90 % of white noise"
+    )
+    axis.plot(frequency, before, "o-", color=BEFORE, ms=3)
+    axis.plot(frequency, after, "o-", color=AFTER, ms=3)
+    axis.set_xscale("log")
+    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+    axis.xaxis.set_major_formatter("{x:g}")
+    axis.xaxis.set_minor_formatter(NullFormatter())
+    if spectrum[:, 1:3].max() > 5:
+        axis.set_yscale("log")
+    axis.set_xlabel("frequency (Hz)")
+    axis.set_ylabel("power over that of the noise")
+    axis.set_title("whitened residual", loc="left")
+    axis.grid()
+    axis.legend(loc="upper right")
+
+
+def _chi2(axis: Axes, results: Results, before: Array) -> None:
+    after = np.array([r.reduced_chi2 for r in results.recordings])
+    rows = np.arange(after.size)
+    level = np.nan_to_num(results.noise.level_error)
+    counts = np.array([r.samples.size for r in results.recordings])
+    spread = Z90 * np.sqrt(2 / counts + 4 * level**2)
+    axis.barh(rows, 2 * spread, left=1 - spread, height=0.9, color=GREY, alpha=0.3, lw=0)
+    axis.hlines(rows, before, after, color="#777777", lw=0.9)
+    axis.plot(before, rows, "o", color=BEFORE, ms=5)
+    axis.plot(after, rows, "o", color=AFTER, ms=5)
+    if before.max() > 5:
+        axis.set_xscale("log")
+    rows_axis(axis, [r.name for r in results.recordings])
+    axis.set_xlabel("reduced $\\chi^2$")
+    axis.set_title("misfit by recording", loc="left")
+
+
+def _held_out(axis: Axes, gain: Array, total: Mapping[str, Any]) -> None:
+    axis.barh(range(gain.size), gain, color=AFTER, height=0.6)
+    axis.axvline(0.0, color=BLACK, lw=0.7)
+    rows_axis(axis, [""] * gain.size)
+    axis.set_xlabel("gain in log score (nats)")
+    axis.set_title("held out: " + _total(total), loc="left")
+
+
+def _total(gain: Mapping[str, Any]) -> str:
+    value, error = gain.get("value"), gain.get("se")
+    if value is None:
+        return "by recording"
+    spread = "" if error is None else f" ± {number(error, 0)}"
+    return f"{number(value, 0)}{spread} in all"
+
+
+def shifts(parameters: Mapping[str, Any]) -> list[tuple[str, Array, Array, Array | None]]:
+    """Parameters that both models have: name, and (low, median, high) before, after and honest.
+
+    In standard deviations of the base model, from its median; most moved ones in the table's order.
+    """
+    before, after = parameters.get("before", {}), parameters.get("after", {})
+    found = []
+    for name, old in before.items():
+        sd = (old["ci90"][1] - old["ci90"][0]) / (2 * Z90)
+        if name not in after or name.partition("[")[0] in NUISANCES or not sd > 0:
+            continue
+        new = after[name]
+        ends = [_scaled(x, old["median"], sd) for x in (old, new)]
+        honest = new.get("ci90_honest")
+        wide = None if honest is None else _scaled({**new, "ci90": honest}, old["median"], sd)
+        found.append((name, ends[0], ends[1], wide))
+    kept = sorted(found, key=lambda row: -abs(row[2][1]))[:MOST]
+    return [row for row in found if row in kept] if len(found) > MOST else found
+
+
+def _scaled(estimate: Mapping[str, Any], centre: float, sd: float) -> Array:
+    low, high = estimate["ci90"]
+    return (np.array([low, estimate["median"], high]) - centre) / sd
+
+
+@styled
+def _shifts(moved: list[tuple[str, Array, Array, Array | None]]) -> Figure:
+    figure = new_figure(0.42 * len(moved) + 1.2)
+    axis = figure.subplots()
+    for i, (_, before, after, honest) in enumerate(moved):
+        for values, colour, offset, width in (
+            (before, BEFORE, -0.2, 3.0),
+            (after, AFTER, 0.05, 3.0),
+            (honest, BLACK, 0.27, 1.2),
+        ):
+            if values is not None:
+                axis.plot(values[[0, 2]], [i + offset] * 2, color=colour, lw=width)
+        axis.plot(before[1], i - 0.2, "o", color=BEFORE, ms=5)
+        axis.plot(after[1], i + 0.05, "o", color=AFTER, ms=5)
+    axis.axvline(0.0, color=GREY, lw=0.7)
+    rows_axis(axis, [symbol(name) for name, *_ in moved])
+    axis.set_xlabel("shift from the base model (its standard deviations)")
+    axis.set_title("parameters and 90 % intervals", loc="left")
+    handles = [
+        Line2D([], [], color=colour, lw=width, label=words)
+        for colour, width, words in (
+            (BEFORE, 3.0, "base model"),
+            (AFTER, 3.0, "with what was added"),
+            (BLACK, 1.2, "honest: with what stays unexplained"),
+        )
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    return figure

@@ -1,0 +1,156 @@
+"""A diagnosis on one page: verdict, place, physics, size, improvement, corrected stiffness."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from markupsafe import Markup
+
+from bayesimpact.report.diagnosis_view import (
+    NUISANCES,
+    REGIMES,
+    VERDICTS,
+    amount,
+    estimate,
+    probability,
+    span_of,
+)
+from bayesimpact.report.results import Results
+from bayesimpact.report.tables import signed, symbol
+from bayesimpact.report.units import number, significant
+
+MOST_NAMES = 4
+"""Recordings called by name; more are counted."""
+
+
+def story_rows(results: Results) -> list[tuple[str, list[str | Markup]]]:
+    """Question and answer, an answer being one line or several; [] without a diagnosis."""
+    diagnosis = results.diagnosis
+    if diagnosis is None:
+        return []
+    rows = [
+        ("verdict", [VERDICTS.get(diagnosis["verdict"], diagnosis["verdict"])]),
+        ("place", _place(results, diagnosis.get("location"))),
+        ("physics", _physics(diagnosis)),
+        ("size", _size(results, diagnosis)),
+        ("improvement", _improvement(results, diagnosis)),
+        ("could still hide", _hidden(diagnosis)),
+    ]
+    return [(question, answer) for question, answer in rows if answer]
+
+
+def corrected(diagnosis: Mapping[str, Any]) -> list[str]:
+    """Parameters whose correction is told first: the stops' stiffnesses, else what moved."""
+    parameters = diagnosis.get("parameters") or {}
+    both = [n for n in parameters.get("before", {}) if n in parameters.get("after", {})]
+    stiffness = [n for n in both if n.partition("[")[0] == "k2"]
+    return stiffness or [n for n in both if n.partition("[")[0] not in NUISANCES]
+
+
+def _place(results: Results, location: Mapping[str, Any] | None) -> list[str | Markup]:
+    if not location:
+        return []
+    regime = str(location["regime"])
+    lines: list[str | Markup] = [REGIMES.get(regime, regime)]
+    if regime != "measurement":
+        unit = results.unit
+        lines[0] += (
+            f", at {span_of(location['displacement_m'], unit)} and "
+            f"{span_of(location['velocity_m_s'], unit + '/s')}"
+        )
+    lines.append(_shown_in(results, location.get("recordings") or (), location.get("cases") or ()))
+    return [line for line in lines if line]
+
+
+def _shown_in(results: Results, recordings: Sequence[str], cases: Sequence[str]) -> str:
+    """Where it shows most."""
+    total = len(results.recordings)
+    if not recordings:
+        return ""
+    if len(recordings) == total:
+        words = "shows in all recordings" if total > 1 else ""
+    elif len(recordings) <= MOST_NAMES:
+        words = "shows in " + ", ".join(recordings)
+    else:
+        words = f"shows in {len(recordings)} of {total} recordings, most in {recordings[0]}"
+    if cases and len(cases) < len(results.cases):
+        words += f"; case {', '.join(cases)}"
+    return words
+
+
+def _physics(diagnosis: Mapping[str, Any]) -> list[str | Markup]:
+    if diagnosis["verdict"] == "unknown":
+        return ["a force that no effect of the catalogue explains; it was learned instead"]
+    lines: list[str | Markup] = [
+        Markup("{}, probability {} <code>{}</code>").format(
+            effect.get("title") or effect["id"].replace("_", " "),
+            probability(effect.get("probability")),
+            effect["id"],
+        )
+        for effect in diagnosis.get("effects", ())
+    ]
+    others = diagnosis.get("alternatives", ()) if diagnosis["verdict"] == "ambiguous" else ()
+    return lines + [
+        Markup("or <code>{}</code>, probability {}").format(
+            other["id"], probability(other.get("probability"))
+        )
+        for other in others
+    ]
+
+
+def _size(results: Results, diagnosis: Mapping[str, Any]) -> list[str | Markup]:
+    lines: list[str | Markup] = [
+        Markup("{} = {}").format(symbol(name), estimate(content))
+        for effect in diagnosis.get("effects", ())
+        for name, content in effect.get("parameters", {}).items()
+    ]
+    force = (diagnosis.get("location") or {}).get("force_rms_n")
+    if force:
+        unit = "N m" if results.quantity == "angle" else "N"
+        lines.append(f"unexplained force there: {amount(force, unit, 2)} rms")
+    return lines
+
+
+def _improvement(results: Results, diagnosis: Mapping[str, Any]) -> list[str | Markup]:
+    if diagnosis["verdict"] == "adequate":
+        return []
+    fit = diagnosis.get("fit") or {}
+    before, after, gain = (fit.get(k) or {} for k in ("before", "after", "held_out_gain"))
+    lines: list[str | Markup] = []
+    changes = [
+        f"{words} {write(before[key])} → {write(after[key])}"
+        for key, words, write in (
+            ("rms_m", "residual rms", lambda x: amount(x, results.unit)),
+            ("reduced_chi2", "reduced χ²", lambda x: significant(x, 4)),
+        )
+        if before.get(key) is not None and after.get(key) is not None
+    ]
+    if changes:
+        lines.append(", ".join(changes))
+    if gain.get("value") is not None and gain.get("of") != 0:
+        spread = "" if gain.get("se") is None else f" ± {number(gain['se'], 0)}"
+        better = f", {gain['wins']} of {gain['of']} better" if gain.get("of") else ""
+        lines.append(f"held-out recordings: log score {signed(gain['value'], 0)}{spread}{better}")
+    return lines
+
+
+def _hidden(diagnosis: Mapping[str, Any]) -> list[str | Markup]:
+    """The worst that an effect below its limit could still do, where nothing was found."""
+    if diagnosis["verdict"] != "adequate":
+        return []
+    known = [x for x in diagnosis.get("limits", ()) if x.get("answer") != "cannot tell"]
+    biases = [(x["hidden_bias"], x["id"]) for x in known if x.get("hidden_bias")]
+    biases = [(bias, name) for bias, name in biases if bias.get("sd") is not None]
+    unsure = [x["id"] for x in diagnosis.get("limits", ()) if x.get("answer") == "cannot tell"]
+    lines: list[str | Markup] = []
+    if biases:
+        bias, name = max(biases, key=lambda b: abs(b[0]["sd"]))
+        lines.append(
+            Markup("{} by at most {} of its standard deviations (<code>{}</code>)").format(
+                symbol(bias["parameter"]), significant(abs(bias["sd"]), 2), name
+            )
+        )
+    if unsure:
+        lines.append(f"these recordings cannot tell: {', '.join(unsure)}")
+    return lines

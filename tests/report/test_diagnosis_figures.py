@@ -1,0 +1,110 @@
+"""Figures of a diagnosis: which there are, what they say, and that files hold all they need."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from diagnosed import MODELS, diagnosed, made_up_arrays
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from bayesimpact.report.archive import load_results, save_results
+from bayesimpact.report.captions import caption
+from bayesimpact.report.figures.diagnosis import diagnosis_figures
+from bayesimpact.report.figures.improvement import shifts
+from bayesimpact.report.figures.ranking import MOST, ranked
+from bayesimpact.report.figures.save import all_figures, png
+from bayesimpact.report.write import rewrite_report
+
+NAMES = {"force_map", "gain", "ranking", "limits", "improvement", "shifts", "bands"}
+
+
+def words(figure: Figure) -> str:
+    """All text of a figure, laid out."""
+    png(figure)
+    found = [text.get_text() for text in figure.findobj(Text)]
+    return " | ".join(found)
+
+
+def test_every_figure_of_a_sampled_diagnosis() -> None:
+    figures = diagnosis_figures(diagnosed())
+    assert set(figures) == NAMES
+    assert all(caption(name, diagnosed()) != name.replace("_", " ") for name in figures)
+
+
+def test_without_draws_the_corner_shows_gaussians() -> None:
+    results = diagnosed(sampled=False)
+    results = replace(results, before_backbone=None)
+    figures = all_figures(results)
+    assert set(figures) >= NAMES - {"bands"} | {"corner"}
+    assert {"base model", "with what was added"} <= set(words(figures["corner"]).split(" | "))
+    assert caption("corner", results).startswith("Gaussian")
+
+
+def test_nothing_is_drawn_from_nothing() -> None:
+    results = replace(diagnosed(), diagnosis_arrays={}, before_backbone=None)
+    bare = {"verdict": "adequate", "limits": [], "evidence": {}}
+    assert diagnosis_figures(replace(results, diagnosis=bare)) == {}
+    assert diagnosis_figures(replace(results, diagnosis=None)) == {}
+
+
+def test_force_map_is_in_millinewtons_and_marks_contact() -> None:
+    text = words(diagnosis_figures(diagnosed())["force_map"])
+    for expected in ("force (mN)", "velocity (mm/s)", "displacement (mm)", "contact",
+                     "conservative part", "dissipative part", "still unexplained"):  # fmt: skip
+        assert expected in text, expected
+
+
+def test_force_map_colours_only_where_the_mass_has_been() -> None:
+    figure = diagnosis_figures(diagnosed())["force_map"]
+    mesh = figure.axes[0].collections[0]
+    seen = np.ma.filled(mesh.get_array().astype(float), np.nan).reshape(-1, 240)
+    assert np.isnan(seen[0, 0]) and np.isfinite(seen[seen.shape[0] // 2]).all()
+    assert np.nanmax(np.abs(seen)) == pytest.approx(2.0 + 0.26, rel=0.06)  # a + b v in mN
+
+
+def test_ranking_keeps_the_base_model_in_sight() -> None:
+    models = ranked({"models": MODELS})
+    assert len(models) == MOST and models[0] == (("coulomb_friction",), 0.0)
+    assert models[-1] == ((), 800.0)
+    assert [m[1] for m in models] == sorted(m[1] for m in models)
+    text = words(diagnosis_figures(diagnosed())["ranking"])
+    assert "base model" in text and "decisive" in text
+    assert "0.953" in text and "0.047" in text  # 3 nats apart
+
+
+def test_limits_are_told_in_their_units() -> None:
+    text = words(diagnosis_figures(diagnosed())["limits"])
+    assert "100 µN" in text and "95 N/m" in text and "detection limit" in text
+
+
+def test_shifts_are_in_deviations_of_the_base_model() -> None:
+    sd = 2.0
+    old = {"unit": "N/m", "median": 100.0, "ci90": [100 - 1.6448536 * sd, 100 + 1.6448536 * sd]}
+    new = {"unit": "N/m", "median": 90.0, "ci90": [88.0, 92.0], "ci90_honest": [86.0, 94.0]}
+    tables = {"before": {"k1": old, "c1": old, "sigma": old}, "after": {"k1": new, "sigma": new}}
+    ((name, before, after, honest),) = shifts(tables)
+    assert name == "k1" and before == pytest.approx([-1.6448536, 0, 1.6448536])
+    assert after == pytest.approx([-6, -5, -4]) and honest == pytest.approx([-7, -5, -3])
+
+
+@pytest.mark.parametrize(("count", "cases"), [(1, 1), (2, 1), (50, 5)])
+def test_any_number_of_recordings(count: int, cases: int) -> None:
+    for figure in diagnosis_figures(diagnosed(count, cases)).values():
+        assert png(figure).startswith(b"\x89PNG")
+
+
+def test_report_is_drawn_again_from_stored_results(tmp_path: Path) -> None:
+    results = diagnosed(2, 1)
+    save_results(results, tmp_path)
+    loaded = load_results(tmp_path)
+    for name, array in made_up_arrays(2, 1).items():
+        assert np.array_equal(loaded.diagnosis_arrays[name], array, equal_nan=True), name
+    rewrite_report(tmp_path)
+    assert {f.stem for f in (tmp_path / "figures").glob("*.png")} >= NAMES
+    first = {f.name: f.read_bytes() for f in (tmp_path / "figures").glob("*.png")}
+    rewrite_report(tmp_path)
+    assert first == {f.name: f.read_bytes() for f in (tmp_path / "figures").glob("*.png")}

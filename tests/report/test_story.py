@@ -1,0 +1,82 @@
+"""The story on one page: every answer, in the order of the questions, from the document alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from diagnosed import DIAGNOSIS, LIMITS, diagnosed, estimate
+from markupsafe import Markup
+from test_report_html import page
+
+from bayesimpact.report.results import Results
+from bayesimpact.report.story import corrected, story_rows
+
+
+def told(results: Results) -> dict[str, str]:
+    """Question -> answer as text without tags."""
+    rows = {q: " / ".join(map(str, lines)) for q, lines in story_rows(results)}
+    plain = {q: Markup(text).striptags() for q, text in rows.items()}
+    return {q: text.replace("\N{NO-BREAK SPACE}", " ") for q, text in plain.items()}
+
+
+STIFF = {
+    "before": {"k1": estimate(808.6, 0.005, "N/m"), "k2[1]": estimate(5358.17, 0.5, "N/m")},
+    "after": {"k1": estimate(808.56, 0.006, "N/m"), "k2[1]": estimate(5349.0, 0.8, "N/m")},
+}
+
+
+def test_every_question_of_a_named_effect() -> None:
+    story = told(diagnosed())
+    assert list(story) == ["verdict", "place", "physics", "size", "improvement"]
+    assert story["verdict"] == "What is missing is named"
+    assert "free flight" in story["place"] and "shows in run_0; case 1" not in story["place"]
+    assert "coulomb friction, probability > 0.999" in story["physics"]
+    assert "force = 160 (150 to 170) µN" in story["size"]
+    assert "5.40 µm → 5.00 µm" in story["improvement"] and "+320 ± 79" in story["improvement"]
+
+
+def test_the_story_comes_before_everything_else() -> None:
+    source, parsed = page(diagnosed(parameters=STIFF))
+    text = parsed.text
+    marks = ("What is missing is named", "corrected", "5358.17", "5349.00", "recordings 3",
+             "Diagnosis: what is missing", "Parameters Medians")  # fmt: skip
+    places = [text.index(mark) for mark in marks]
+    assert places == sorted(places) and source.count('class="story"') == 1
+
+
+def test_corrected_stiffness_comes_first() -> None:
+    assert corrected({"parameters": STIFF}) == ["k2[1]"]
+    free = {side: {"k1": values["k1"], "sigma": values["k1"]} for side, values in STIFF.items()}
+    assert corrected({"parameters": free}) == ["k1"]
+
+
+def test_unknown_physics_is_not_given_a_name() -> None:
+    story = told(diagnosed(verdict="unknown", effects=[]))
+    assert "no effect of the catalogue" in story["physics"]
+    assert "140 µN rms" in story["size"]
+
+
+def test_alternatives_are_told_when_several_fit_alike() -> None:
+    story = told(diagnosed(verdict="ambiguous"))
+    assert "or obstacle_mass, probability 0.010" in story["physics"]
+    assert "obstacle_mass" not in told(diagnosed())["physics"]
+
+
+def test_nothing_missing_says_what_could_hide() -> None:
+    story = told(diagnosed(verdict="adequate", location=None, effects=[], limits=LIMITS))
+    assert list(story) == ["verdict", "could still hide"]
+    assert "c1 by at most 3.2" in story["could still hide"]
+    assert "cannot tell: contact_relaxation" in story["could still hide"]
+    source, _ = page(diagnosed(verdict="adequate", location=None, effects=[]))
+    assert "corrected" not in source and "Before and after" not in source
+
+
+def test_no_diagnosis_no_story() -> None:
+    results = replace(diagnosed(), diagnosis=None)
+    assert story_rows(results) == [] and 'class="story"' not in page(results)[0]
+
+
+def test_a_document_with_nulls_is_told() -> None:
+    hollow = {"before": {"rms_m": None}, "after": {}, "held_out_gain": {"value": None, "se": None}}
+    story = told(diagnosed(fit=hollow, location={**DIAGNOSIS["location"], "share": None}))
+    assert "improvement" not in story and "place" in story
