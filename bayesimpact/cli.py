@@ -134,15 +134,20 @@ def telling(quiet: bool) -> Callable[[str], None]:
     return say
 
 
-def finish(ctx: click.Context, outcome: Any, out: Path, quiet: bool) -> None:
-    """Say how it ended; exit code 3 when something did not converge."""
-    if not quiet:
-        if outcome.diagnosis is not None:
-            click.echo(f"{outcome.diagnosis['verdict']}: {outcome.diagnosis['summary']}")
-        else:
-            click.echo(outcome.results.headline or outcome.results.verdict)
-        click.echo(f"report: {out / 'report.html'}")
-    if not outcome.converged:
+def announce(outcome: Any, out: Path, quiet: bool) -> None:
+    """Say what was found, and where the report is."""
+    if quiet:
+        return
+    if outcome.diagnosis is not None:
+        click.echo(f"{outcome.diagnosis['verdict']}: {outcome.diagnosis['summary']}")
+    else:
+        click.echo(outcome.results.headline or outcome.results.verdict)
+    click.echo(f"report: {out / 'report.html'}")
+
+
+def finish(ctx: click.Context, *outcomes: Any) -> None:
+    """Exit code 3 when something did not converge."""
+    if not all(outcome.converged for outcome in outcomes):
         click.echo("bayesimpact: not converged; the report says what did not", err=True)
         ctx.exit(NOT_CONVERGED)
 
@@ -161,7 +166,8 @@ def fit(ctx: click.Context, campaign: Path, out: Path, seed: int, quiet: bool) -
 
     command = f"bayesimpact fit {campaign} --out {out} --seed {seed}"
     outcome = fit_campaign(loaded, made_folder(out), seed=seed, command=command, say=telling(quiet))
-    finish(ctx, outcome, out, quiet)
+    announce(outcome, out, quiet)
+    finish(ctx, outcome)
 
 
 @main.command()
@@ -183,7 +189,8 @@ def sample(
     outcome = sample_campaign(
         loaded, made_folder(out), seed=seed, resume=resume, command=command, say=telling(quiet)
     )
-    finish(ctx, outcome, out, quiet)
+    announce(outcome, out, quiet)
+    finish(ctx, outcome)
 
 
 @main.command()
@@ -205,7 +212,8 @@ def diagnose(
     outcome = diagnose_campaign(
         loaded, made_folder(out), seed=seed, quick=quick, command=command, say=telling(quiet)
     )
-    finish(ctx, outcome, out, quiet)
+    announce(outcome, out, quiet)
+    finish(ctx, outcome)
 
 
 @main.command()
@@ -232,17 +240,34 @@ def report(folder: Path, seed: int, quiet: bool) -> None:
 @common
 @click.pass_context
 def demo(ctx: click.Context, out: Path, seed: int, quiet: bool) -> None:
-    """The main job on the bundled campaign, from raw recordings to posterior and report."""
+    """The whole story on bundled recordings, in two parts.
+
+    First the main job, from raw recordings to posterior and report (in DIR). Then a campaign that
+    hides something: its base fit looks right; the diagnosis says what is missing and corrects the
+    stiffness (in DIR/concealed). What was hidden is opened at the very end, beside the answer.
+    """
     from bayesimpact.data.bundled import bundled_campaign
     from bayesimpact.data.read import load_campaign
 
-    loaded = load_campaign(bundled_campaign("paper"))
-    from bayesimpact.workflow import sample_campaign
+    hiding = bundled_campaign("concealed")
+    open_book, concealed = load_campaign(bundled_campaign("paper")), load_campaign(hiding)
+    from bayesimpact.workflow import diagnose_campaign, sample_campaign
 
-    outcome = sample_campaign(
-        loaded, made_folder(out), seed=seed, command="bayesimpact demo", say=telling(quiet)
-    )
-    finish(ctx, outcome, out, quiet)
+    say = telling(quiet)
+    told: dict[str, Any] = {"seed": seed, "command": "bayesimpact demo", "say": say}
+    say("part 1: recordings that hide nothing")
+    first = sample_campaign(open_book, made_folder(out), **told)
+    announce(first, out, quiet)
+    say("part 2: recordings that hide something")
+    second = diagnose_campaign(concealed, made_folder(out / "concealed"), **told)
+    announce(second, out / "concealed", quiet)
+    if not quiet:
+        from bayesimpact.trial.truth import compared, open_truth
+
+        click.echo("\nWhat was hidden, opened now:")
+        for line in compared(second.diagnosis or {}, open_truth(hiding)):
+            click.echo(line)
+    finish(ctx, first, second)
 
 
 @main.command()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from markupsafe import Markup
@@ -118,12 +119,13 @@ def _improvement(results: Results, diagnosis: Mapping[str, Any]) -> list[str | M
     fit = diagnosis.get("fit") or {}
     before, after, gain = (fit.get(k) or {} for k in ("before", "after", "held_out_gain"))
     lines: list[str | Markup] = []
+    pairs = (
+        ("rms_m", "residual rms", partial(amount, unit=results.unit)),
+        ("reduced_chi2", "reduced χ²", partial(significant, digits=4)),
+    )
     changes = [
         f"{words} {write(before[key])} → {write(after[key])}"
-        for key, words, write in (
-            ("rms_m", "residual rms", lambda x: amount(x, results.unit)),
-            ("reduced_chi2", "reduced χ²", lambda x: significant(x, 4)),
-        )
+        for key, words, write in pairs
         if before.get(key) is not None and after.get(key) is not None
     ]
     if changes:

@@ -13,6 +13,7 @@ from bayesimpact.data.campaign import Beam, Campaign
 from bayesimpact.trial.rig import Release, Rig, make_campaign
 from bayesimpact.trial.rig_chain import Chain
 from bayesimpact.trial.rig_files import write_campaign
+from bayesimpact.trial.truth import TRUTH_FILE
 
 PAPER_RIG = Rig(
     mass=0.503,
@@ -99,7 +100,7 @@ def concealed_campaign() -> Campaign:
 
 
 def concealed_truth() -> dict[str, object]:
-    """The content of truth.json."""
+    """What `concealed_campaign` hides, and the values it was made from."""
     rig = PAPER_RIG
     parameters = {"c1": rig.c1, "k1": rig.k1, "c2": rig.c2, "g": rig.g}
     parameters |= {f"k2[{case}]": value for case, value in rig.k2.items()}
@@ -128,7 +129,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     write_campaign(folder, CAMPAIGNS[chosen.campaign](), decimals=DECIMALS, comment=comment)
     if chosen.campaign == "concealed":
         truth = json.dumps(concealed_truth(), indent=1)
-        (folder / "truth.json").write_text(truth + "\n", encoding="utf-8")
+        (folder / TRUTH_FILE).write_text(truth + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
