@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bayesimpact.diagnosis.name import GROSS
 from bayesimpact.report.figures.corner import MOST as MOST_CORNER
 from bayesimpact.report.figures.traces import MOST as MOST_TRACES
 from bayesimpact.report.force_arrays import QUIET_WIDTH
@@ -11,19 +12,19 @@ DIAGNOSIS = {
     "force": (
         "The force that the base model leaves unexplained, on the left-hand side of the equation "
         "of motion (positive resists motion towards the stop). Left: its posterior mean wherever "
-        "the mass has been; black lines enclose what exceeds its own 90 % band; the dashed line is "
-        "the stop. Right: the same split into a conservative part and a dissipative part, with 90 "
-        "% bands. What changes of the base parameters could imitate is taken out."
+        "the mass has been; black lines enclose what exceeds its own 90 % band. Right: the same "
+        "split into a conservative part and a dissipative part, with 90 % bands. What "
+        "changes of the base parameters could imitate is taken out."
     ),
     "gain": (
         "Where the extended model explains more: gain in log likelihood over the base model. A "
-        "gain of 1 nat makes a stretch e times likelier; negative ones are chance. Impacts are "
-        "shown as far as half of the recordings have them."
+        "gain of 1 nat makes a stretch e times likelier; small negative ones are chance."
     ),
     "ranking": (
         "Models that were fitted, by their log odds (evidence and the price of each added effect) "
         "behind the best one; linear up to 10 nats, logarithmic beyond. A name needs all rivals to "
-        "lie beyond the dashed line. Right: probability among the models tried."
+        "lie beyond the dashed line. Right: probability among the models tried. Blue: the model "
+        "that was chosen."
     ),
     "limits": (
         "What the recordings rule out. Dots: 95 % upper limit of each effect's size; bars: a size "
@@ -34,8 +35,7 @@ DIAGNOSIS = {
     "improvement": (
         "Before and after. Left: power of the whitened residual over that of the noise, estimated "
         "without any model, all recordings together; the grey band holds nine tenths of white "
-        "noise. Middle: reduced χ² of each recording, the grey stripe likewise. Right: gain in the "
-        "log score with which each recording is predicted from the others."
+        "noise. Middle: reduced χ² of each recording, the grey stripe likewise."
     ),
     "bands": (
         "Backbone and damping before and after: recorded minus median of simulated swings, in "
@@ -54,7 +54,7 @@ def caption(name: str, results: Results) -> str:
     """What a figure shows."""
     stem = name.split("_")[0]
     if stem in DIAGNOSIS:
-        return DIAGNOSIS[stem] + (_nothing_missing(results) if stem == "force" else "")
+        return DIAGNOSIS[stem] + _more(stem, results)
     writer = {
         "fit": _fit,
         "corner": _corner,
@@ -66,13 +66,29 @@ def caption(name: str, results: Results) -> str:
     return writer(results) if writer else name.replace("_", " ")
 
 
-def _nothing_missing(results: Results) -> str:
-    if results.diagnosis is None or results.diagnosis["verdict"] != "adequate":
+def _more(stem: str, results: Results) -> str:
+    """What holds for some diagnoses only."""
+    arrays, diagnosis = results.diagnosis_arrays, results.diagnosis or {}
+    if stem == "gain" and "impact_gain" in arrays:
+        return " Impacts are shown as far as half of the recordings have them."
+    if stem == "improvement" and "held_out_recordings" in arrays:
+        words = " Right: gain in the log score with which each recording is predicted from the"
+        return f"{words} others."
+    if stem != "force":
         return ""
-    return (
-        f" Nothing is missing here: drawn is what the recordings allow of a force of about "
-        f"{100 * QUIET_WIDTH:.0f} % of the peak elastic force (its prior)."
-    )
+    words = " The dashed line is the stop." if "gap" in arrays else ""
+    misfit = ((diagnosis.get("fit") or {}).get("before") or {}).get("reduced_chi2")
+    if diagnosis.get("verdict") == "adequate":
+        words += (
+            f" Nothing is missing here: drawn is what the recordings allow of a force of about "
+            f"{100 * QUIET_WIDTH:.0f} % of the peak elastic force (its prior)."
+        )
+    elif misfit is not None and misfit > GROSS**2:
+        words += (
+            " The base model misses by far more than the noise, and the force follows from a "
+            "linearised problem: here it is a rough guide only."
+        )
+    return words
 
 
 def _fit(results: Results) -> str:

@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from diagnosed import MODELS, diagnosed, made_up_arrays
+from matplotlib.collections import PathCollection
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
@@ -17,6 +19,7 @@ from bayesimpact.report.figures.diagnosis import diagnosis_figures
 from bayesimpact.report.figures.improvement import shifts
 from bayesimpact.report.figures.ranking import MOST, ranked
 from bayesimpact.report.figures.save import all_figures, png
+from bayesimpact.report.figures.style import AFTER, BLACK
 from bayesimpact.report.write import rewrite_report
 
 NAMES = {"force_map", "gain", "ranking", "limits", "improvement", "shifts", "bands"}
@@ -74,6 +77,29 @@ def test_ranking_keeps_the_base_model_in_sight() -> None:
     text = words(diagnosis_figures(diagnosed())["ranking"])
     assert "base model" in text and "decisive" in text
     assert "0.953" in text and "0.047" in text  # 3 nats apart
+
+
+def test_ranking_marks_the_chosen_model_even_where_it_is_not_the_best() -> None:
+    effects = [{"id": "obstacle_mass"}, {"id": "smoothing"}]
+    figure = diagnosis_figures(diagnosed(effects=effects))["ranking"]
+    (dots,) = [c for c in figure.axes[0].collections if isinstance(c, PathCollection)]
+    colours = [to_hex(c).upper() for c in dots.get_facecolors()]
+    assert colours.index(AFTER) == 1 and colours.count(AFTER) == 1
+    assert colours[-1] == BLACK  # the base model
+
+
+def test_captions_say_what_holds_for_this_diagnosis_only() -> None:
+    results = diagnosed()
+    assert "dashed line is the stop" in caption("force_map", results)
+    assert "predicted from the others" in caption("improvement", results)
+    free = replace(results, diagnosis_arrays={})
+    assert "stop" not in caption("force_map", free).replace("towards the stop", "")
+    assert "predicted" not in caption("improvement", free)
+    assert "Impacts" in caption("gain", results) and "Impacts" not in caption("gain", free)
+    assert "Nothing is missing" in caption("force_map", diagnosed(verdict="adequate"))
+    gross = diagnosed(fit={"before": {"reduced_chi2": 8510.0}})
+    assert "rough guide" in caption("force_map", gross)
+    assert "rough guide" not in caption("force_map", results)
 
 
 def test_limits_are_told_in_their_units() -> None:

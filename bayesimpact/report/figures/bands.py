@@ -33,15 +33,13 @@ def _figure(results: Results, before: BackboneSummary, after: BackboneSummary) -
     sides = (("base model", before), ("with what was added", after))
     for row, (words, summary) in zip(panels, sides, strict=True):
         _swings(row, summary, response(results).scale)
-        inside = 100 * summary.inside[-1]
-        row[0].set_title(
-            f"{words}: {inside:.0f} % inside, {p_words(summary.p_values[-1])}", loc="left"
-        )
+        inside = f"{100 * summary.inside[-1]:.0f} % inside, {p_words(summary.p_values[-1])}"
+        row[0].set_title(f"frequency, {words}: {inside}", loc="left")
+        row[1].set_title(f"damping ratio, {words}", loc="left")
     limit = deviation_limit(panels.flat)
     panels[0, 0].set_ylim(-limit, limit)
     panels[1, 0].set_xlabel(label("amplitude", response(results).unit))
     panels[1, 1].set_xlabel(label("time since the first sample", "s"))
-    panels[0, 1].set_title("damping ratio", loc="left")
     figure.supylabel("recorded \N{MINUS SIGN} simulated (half-widths of the band)", fontsize=9)
     handles, labels = panels[0, 0].get_legend_handles_labels()
     unique = dict(zip(labels, handles, strict=True))

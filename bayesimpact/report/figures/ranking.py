@@ -26,7 +26,9 @@ def ranking_figures(results: Results) -> Mapping[str, Figure]:
     figures = {}
     models = ranked(diagnosis.get("evidence") or {})
     if len(models) > 1:
-        figures["ranking"] = _ranking(models, diagnosis["evidence"].get("decisive"))
+        figures["ranking"] = _ranking(
+            models, chosen(diagnosis), diagnosis["evidence"].get("decisive")
+        )
     limits = [x for x in diagnosis.get("limits", ()) if _known(x)]
     if limits:
         figures["limits"] = _limits(limits)
@@ -51,15 +53,23 @@ def ranked(evidence: Mapping[str, Any]) -> list[tuple[tuple[str, ...], float]]:
     return [(effects, best - odds) for effects, odds in kept]
 
 
+def chosen(diagnosis: Mapping[str, Any]) -> frozenset[str]:
+    """Effects of the model that the verdict stands for; a proved filter is in all of them."""
+    return frozenset(e["id"] for e in diagnosis.get("effects", ()) if e["id"] != "smoothing")
+
+
 @styled
-def _ranking(models: Sequence[tuple[tuple[str, ...], float]], decisive: float | None) -> Figure:
+def _ranking(
+    models: Sequence[tuple[tuple[str, ...], float]], picked: frozenset[str], decisive: float | None
+) -> Figure:
     figure = new_figure(_ROW * len(models) + _FRAME)
     axis = figure.subplots()
     behind = np.array([b for _, b in models])
     weight = np.exp(-behind) / np.exp(-behind).sum()
     rows = np.arange(len(models))
-    colours = [BLACK if not effects else AFTER if b == 0 else GREY
-               for effects, b in models]  # fmt: skip
+    colours = [
+        BLACK if not effects else AFTER if picked == set(effects) else GREY for effects, _ in models
+    ]
     axis.hlines(rows, 0.0, behind, color=colours, lw=1.2)
     axis.scatter(behind, rows, c=colours, s=28, zorder=3)
     if decisive is not None:
