@@ -8,6 +8,7 @@ Dopri8, on which the samples between its long steps depend, stays at 1e-4 m here
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
 import diffrax
 import jax
@@ -50,26 +51,35 @@ def section(method, control, ts, regime, t, state):
     return values, jnp.sum(jnp.isfinite(values)), found.ts[1][0], end, met
 
 
+@cache
+def compiled(method: str, n: int, interval: float) -> Callable:
+    """The whole simulation: (start (2,), regimes (2, 5), rtol, atol (2,)) -> (n,) displacement."""
+    kind = getattr(diffrax, method)()
+
+    @jax.jit
+    def simulate(start, regimes, rtol, atol):
+        control = diffrax.PIDController(rtol=rtol, atol=atol)
+        gap = regimes[0, 4]
+
+        def advance(carry):
+            t, state, contact, done, out = carry
+            ts = (done + jnp.arange(WINDOW)) * interval
+            regime = regimes[contact.astype(int)]
+            values, count, t, state, met = section(kind, control, ts, regime, t, state)
+            out = jax.lax.dynamic_update_slice(out, values, (done,))
+            state = jnp.where(met, state.at[0].set(gap), state)
+            return t, state, contact ^ met, done + count, out
+
+        carry = (jnp.zeros(()), start, start[0] > gap, jnp.array(0), jnp.zeros(n + WINDOW))
+        return jax.lax.while_loop(lambda carry: carry[3] < n, advance, carry)[4][:n]
+
+    return simulate
+
+
 def solver(problem: Problem, method: str, tolerance: float) -> Callable[[], Array]:
     """A simulation of the problem: () -> (n,) displacement, m; `tolerance` is relative."""
     sides = ((False, -1.0), (True, 1.0))
     regimes = jnp.array([(*problem.regime(c), side, problem.gap) for c, side in sides])
-    control = diffrax.PIDController(rtol=tolerance, atol=tolerance * jnp.array(problem.scale))
-    kind, begin = getattr(diffrax, method)(), jnp.array(problem.start)
-
-    def advance(carry):
-        t, state, contact, done, out = carry
-        ts = (done + jnp.arange(WINDOW)) * problem.interval
-        regime = regimes[contact.astype(int)]
-        values, count, t, state, met = section(kind, control, ts, regime, t, state)
-        out = jax.lax.dynamic_update_slice(out, values, (done,))
-        state = jnp.where(met, state.at[0].set(problem.gap), state)
-        return t, state, contact ^ met, done + count, out
-
-    @jax.jit
-    def simulate(state):
-        out = jnp.zeros(problem.n + WINDOW)
-        carry = (jnp.zeros(()), state, state[0] > problem.gap, jnp.array(0), out)
-        return jax.lax.while_loop(lambda c: c[3] < problem.n, advance, carry)[4][: problem.n]
-
-    return lambda: np.asarray(simulate(begin))
+    start, atol = jnp.array(problem.start), jnp.array(tolerance * problem.scale)
+    simulate = compiled(method, problem.n, problem.interval)
+    return lambda: np.asarray(simulate(start, regimes, tolerance, atol))
