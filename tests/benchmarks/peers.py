@@ -105,7 +105,7 @@ def compare(given: Problem, names: list[str]) -> dict[str, Any]:
             subjects[name] = solver(given, method, point["tolerance"])
     errors = {name: error(simulation, reference) for name, simulation in subjects.items()}
     assert max(errors.values()) <= ACCURACY, errors
-    taken = rounds(subjects, 9, 2)
+    taken = rounds(subjects, 5, 4)
     rows = {
         name: {
             "error_m": errors[name] if name != "ours" else None,

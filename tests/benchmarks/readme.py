@@ -4,15 +4,40 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterable
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 README = HERE.parents[1] / "README.md"
+BUSY = 0.25  # cores busy with something else, from which on times are not to be trusted
 
 
 def stored(name: str) -> dict:
     """Content of a stored result."""
     return json.loads((HERE / f"{name}.json").read_text(encoding="utf-8"))
+
+
+def grid(head: Iterable[str], rows: Iterable[Iterable[str]], foot: str) -> str:
+    """A table, and a line below it."""
+    cells = [tuple(head), *map(tuple, rows)]
+    lines = [f"| {' | '.join(row)} |" for row in cells]
+    lines.insert(1, "|---" * len(cells[0]) + "|")
+    return "\n".join([*lines, "", foot])
+
+
+def measured(result: dict, *more: str) -> str:
+    """Where and when, what was not installed, and whether something else ran."""
+    parts = [result["machine"], *more, f"commit {result['commit']}", result["date"]]
+    if (result.get("others") or 0.0) > BUSY:
+        parts.append(f"{result['others']:.1f} of the cores busy with other work: to be repeated")
+    if result.get("absent"):
+        parts.append(f"not installed: {', '.join(result['absent'])}")
+    return f"{', '.join(parts)}."
+
+
+def duration(us: float) -> str:
+    """Microseconds in a unit that fits."""
+    return f"{us:.0f} us" if us < 1e3 else f"{us / 1e3:.1f} ms" if us < 1e5 else f"{us / 1e6:.2f} s"
 
 
 def kernel_table() -> str:
@@ -25,26 +50,103 @@ def kernel_table() -> str:
         ("with all derivatives (Gram matrices)", k["with_derivatives_us"]),
         ("plain recurrence, for comparison", k["recurrence_us"]),
     ]
-    lines = ["| nine recordings of 6,000 samples | median, us |", "|---|---|"]
-    lines += [f"| {label} | {value:.0f} |" for label, value in rows]
-    lines.append(f"\n{k['machine']}, one core, commit {k['commit']}, {k['date']}.")
-    return "\n".join(lines)
+    return grid(
+        ("nine recordings of 6,000 samples", "median, us"),
+        ((label, f"{value:.0f}") for label, value in rows),
+        measured(k, "one core"),
+    )
+
+
+def peers_table() -> str:
+    """One simulation by other people's integrators."""
+    p = stored("peers")
+    head = (f"{p['samples']:,} samples, {p['contacts']} contacts", "largest error, m", "median")
+    rows = [
+        (
+            name,
+            "" if row["error_m"] is None else f"{row['error_m']:.0e}",
+            duration(row["us"]),
+            f"{row['over_ours']:,.0f}",
+        )
+        for name, row in sorted(p["peers"].items(), key=lambda item: item[1]["us"])
+    ]
+    return grid((*head, "over ours"), rows, measured(p, "one core"))
+
+
+def samplers_table() -> str:
+    """Effective draws per second."""
+    s = stored("samplers")
+    rows = []
+    for name, row in s["samplers"].items():
+        rate, ratio = "none: disagrees with ours", ""
+        if row["agrees"]:
+            rate, ratio = f"{row['ess_per_s']:,.0f}", f"{row['ours_over_this']:,.1f}"
+        if row["long_enough"] is False:
+            rate += f" (only {row['autocorrelation_times']:.0f} autocorrelation times)"
+        per_draw = f"{row['evaluations_per_effective_draw']:,.1f}"
+        rows.append((name, str(row["threads"]), rate, ratio, per_draw))
+    head = ("sampler", "threads", "effective draws per s", "ours over it", "evaluations per draw")
+    return grid(head, rows, measured(s, f"worst of {s['parameters']} parameters"))
+
+
+def scaling_table() -> str:
+    """How the cost of a likelihood grows."""
+    s = stored("scaling")
+    rows = []
+    for label, series, grown in (
+        ("samples of nine recordings (longer, as the motion dies away)", "samples", "samples"),
+        ("recordings of 6,000 samples", "recordings", "recordings"),
+        ("impacts in 6,000 samples (cost of the stop)", "impacts", "impacts"),
+        ("parameter vectors in one call", "batch", "vectors"),
+    ):
+        values, slope = s[series][grown], s[series]["slope"]
+        rows.append((label, f"{values[0]:,}", f"{values[-1]:,}", f"{slope:.2f}"))
+    t = s["threads"]
+    foot = (
+        f"A batch on {t['threads']} threads is {100 * t['efficiency']:.0f} % efficient by the "
+        f"clock and {100 * t['efficiency_by_processor_time']:.0f} % by processor time; an impact "
+        f"takes {s['impacts']['ns_per_impact']:.0f} ns. {measured(s)}"
+    )
+    return grid(("one likelihood against", "from", "to", "slope of log time"), rows, foot)
+
+
+def startup_table() -> str:
+    """Fresh processes."""
+    s = stored("startup")
+    rows = [
+        (label, f"{s[f'{key}_s']:.1f}", f"{s[f'{key}_processor_s']:.1f}")
+        for label, key in (
+            ("`bayesimpact --help`", "help"),
+            ("first likelihood, compiled before", "first_likelihood"),
+            ("first likelihood, nothing compiled", "cold_first_likelihood"),
+            ("everything compiled anew", "cold"),
+        )
+    ]
+    return grid(("a fresh process", "s", "processor time, s"), rows, measured(s))
 
 
 def coverage_table() -> str:
     """Coverage of the intervals."""
     c = stored("coverage")
-    lines = ["| parameter | 90 % intervals that hold the truth | of |", "|---|---|---|"]
-    for name, row in c["parameters"].items():
-        lines.append(f"| {name} | {100 * row['coverage90']:.0f} % | {row['n']} |")
-    lines.append(
-        f"\n{c['campaigns']} campaigns of nine recordings of {c['duration_s']:.0f} s from the "
+    rows = [
+        (name, f"{100 * row['coverage90']:.0f} %", str(row["n"]))
+        for name, row in c["parameters"].items()
+    ]
+    foot = (
+        f"{c['campaigns']} campaigns of nine recordings of {c['duration_s']:.0f} s from the "
         f"independent generator, commit {c['commit']}, {c['date']}."
     )
-    return "\n".join(lines)
+    return grid(("parameter", "90 % intervals that hold the truth", "of"), rows, foot)
 
 
-TABLES = {"kernel": kernel_table, "coverage": coverage_table}
+TABLES = {
+    "kernel": kernel_table,
+    "peers": peers_table,
+    "samplers": samplers_table,
+    "scaling": scaling_table,
+    "startup": startup_table,
+    "coverage": coverage_table,
+}
 
 
 def rendered(text: str) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import datetime
 import importlib.util
 import json
+import os
 import platform
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -26,7 +27,7 @@ FIELDS = ("date", "commit", "machine", "python", "numba", "numpy")
 
 
 def provenance(peers: Sequence[str] = ()) -> dict[str, Any]:
-    """Date, commit (with a + when the package differs from it), machine, versions.
+    """Date, commit (with a + when the package differs from it), machine, versions, `others`.
 
     peers : further libraries, whose versions go under "versions" (None: not installed)
     """
@@ -41,12 +42,29 @@ def provenance(peers: Sequence[str] = ()) -> dict[str, Any]:
         "python": platform.python_version(),
         "numba": numba.__version__,
         "numpy": np.__version__,
+        "others": others(),
     }
     if peers:
         result["versions"] = {
             name: metadata.version(name) if present(name) else None for name in peers
         }
     return result
+
+
+def others(seconds: float = 0.5) -> float | None:
+    """Cores that other processes keep busy while this one sleeps; None where /proc/stat is not."""
+    file = Path("/proc/stat")
+    if not file.exists():
+        return None
+
+    def ticks() -> np.ndarray:  # user, nice, system, idle, waiting for a disk, ...
+        return np.array(file.read_text().split("\n", 1)[0].split()[1:9], dtype=float)
+
+    before = ticks()
+    time.sleep(seconds)
+    spent = ticks() - before
+    idle = spent[3:5].sum() / max(spent.sum(), 1.0)
+    return round((os.cpu_count() or 1) * (1.0 - float(idle)), 2)
 
 
 def present(library: str) -> bool:

@@ -1,0 +1,138 @@
+"""What the benchmarks rest on: peers that solve the same problem, records, slopes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from benchmarks import bundled, figures, peers, readme, record, samplers, sampling, scaling
+from benchmarks.kernel import campaign, check
+from benchmarks.sampling import Sampled
+
+BENCHMARKS = Path(record.__file__).parent
+MEASURED = ("kernel", "peers", "samplers", "scaling", "startup")
+
+
+@pytest.fixture(scope="module")
+def problem() -> bundled.Problem:
+    return bundled.problem()
+
+
+def test_the_kernels_subjects_agree() -> None:
+    check(*campaign(3, 500))
+
+
+@pytest.mark.parametrize("recording", range(9))
+def test_the_plain_recurrence_is_exact(recording: int) -> None:
+    given = bundled.problem(recording)
+    assert peers.error(peers.plain(given), given.exact()) < 1e-13
+
+
+@pytest.mark.parametrize("name", peers.PEERS)
+def test_a_peer_solves_the_same_problem(name: str, problem: bundled.Problem) -> None:
+    """Looser tolerances are worse, and some tolerance is good enough."""
+    module, library, method = peers.PEERS[name]
+    pytest.importorskip(library)
+    solver = __import__(f"benchmarks.{module}", fromlist=["solver"]).solver
+    reference = problem.exact()
+    loose, tight = (peers.error(solver(problem, method, t), reference) for t in (1e-7, 1e-12))
+    assert tight <= peers.ACCURACY < loose
+
+
+def test_the_fastest_of_the_accurate_is_chosen() -> None:
+    def point(error: float, seconds: float) -> dict[str, float]:
+        return {"error_m": error, "seconds": seconds}
+
+    points = [point(1e-8, 1.0), point(9e-10, 3.0), point(1e-12, 2.0)]
+    assert peers.fastest(points) == points[2]
+    assert peers.fastest(points[:1]) is None
+
+
+def test_the_gradient_for_nuts() -> None:
+    """Value as the package has it; derivatives as differences have them."""
+    fit = bundled.fit()
+    both = sampling.with_gradient(fit)
+    theta = fit.mode + 0.3 * fit.sd
+    value, gradient = both(theta)
+    assert value == pytest.approx(float(fit.target(theta)[0]), abs=1e-6)
+    steps = np.diag(1e-3 * fit.sd)
+    slopes = (fit.target(theta + steps) - fit.target(theta - steps)) / 2e-3
+    np.testing.assert_allclose(gradient * fit.sd, slopes, atol=1e-4 * np.abs(slopes).max())
+
+
+def sampled(shift: float = 0.0, stretch: float = 1.0) -> Sampled:
+    rng = np.random.default_rng(0)
+    draws = shift + stretch * rng.standard_normal((2, 50, 20, 3))
+    return Sampled(*sampling.moments(draws), 2.0, 1, 4000, 60.0)
+
+
+def test_moments_of_independent_draws() -> None:
+    found = sampled()
+    np.testing.assert_allclose(found.ess, 2000, rtol=0.25)
+    np.testing.assert_allclose(found.mean_error, 1 / np.sqrt(2000), rtol=0.2)
+    np.testing.assert_allclose(found.sd_error, 1 / np.sqrt(4000), rtol=0.2)
+
+
+@pytest.mark.parametrize("wrong", [{"shift": 0.2}, {"stretch": 0.85}])
+def test_a_sampler_that_disagrees_has_no_rate(wrong: dict[str, float]) -> None:
+    good, bad = sampled(), sampled(**wrong)
+    row = samplers.row(good, good, good)
+    assert row["agrees"] and row["long_enough"]
+    assert row["ess_per_s"] == pytest.approx(good.ess.min() / 2)
+    row = samplers.row(bad, good, good)
+    assert not row["agrees"] and row["ess_per_s"] is None and row["ours_over_this"] is None
+
+
+def test_undamped_impacts() -> None:
+    """Twice the time, twice the impacts; the plain recurrence finds the same motion."""
+    (_, _, few), (q, rest, many) = (scaling.undamped(dt, True) for dt in (0.25e-3, 0.5e-3))
+    assert abs(many - 2 * few) <= 1
+    scaling.agrees(q, rest)
+    assert scaling.undamped(0.5e-3, False)[2] == 0
+
+
+def test_a_busy_machine_is_noticed() -> None:
+    found = record.others(0.05)
+    assert found is None or found >= 0.0
+    result = {"machine": "M", "commit": "c", "date": "d"}
+    assert "busy" not in readme.measured(result | {"others": 0.1}) + readme.measured(result)
+    assert "1.3 of the cores busy" in readme.measured(result | {"others": 1.3})
+
+
+def test_slope_and_rounds() -> None:
+    assert record.slope([1, 10, 100], [3, 300, 30000]) == pytest.approx(2)
+    calls = []
+    taken = record.rounds({"a": lambda: calls.append("a"), "b": lambda: calls.append("b")}, 3, 2)
+    assert "".join(calls) == "ab" + 3 * "aabb"
+    assert all(t.shape == (3,) and np.isfinite(t).all() for t in taken.values())
+
+
+def test_a_record_says_where_it_comes_from(tmp_path: Path) -> None:
+    record.keep(str(tmp_path / "some.py"), {"answer": 1.5}, ("numpy", "no_such_library"))
+    content = json.loads((tmp_path / "some.json").read_text())
+    assert tuple(content)[: len(record.FIELDS)] == record.FIELDS and content["answer"] == 1.5
+    assert content["versions"] == {"numpy": np.__version__, "no_such_library": None}
+
+
+@pytest.mark.parametrize("name", MEASURED)
+def test_stored_results_say_where_they_come_from(name: str) -> None:
+    content = readme.stored(name)
+    assert all(content[field] for field in record.FIELDS)
+
+
+def test_stored_peers_are_as_accurate_as_claimed() -> None:
+    content = readme.stored("peers")
+    errors = [row["error_m"] for name, row in content["peers"].items() if name != "ours"]
+    assert max(errors) <= content["accuracy_m"] == 1e-9
+
+
+@pytest.mark.parametrize("name", figures.FIGURES)
+def test_figures_show_every_row(name: str) -> None:
+    content = readme.stored(name)
+    figure = figures.FIGURES[name](content)
+    texts = [t.get_text() for a in figure.axes for t in a.get_yticklabels()]
+    texts += [t.get_text() for legend in figure.legends for t in legend.get_texts()]
+    rows = {n: r for n, r in content[name].items() if r.get("agrees", True)}
+    assert all(any(text.startswith(row) for text in texts) for row in rows)
