@@ -59,6 +59,12 @@ class MissingForce:
     p_value: float
     projection: Projection
 
+    @property
+    def gain(self) -> float:
+        """What the mean force gains in log likelihood, nats, in the linearised problem."""
+        bend = self.projection.information @ self.mean
+        return float(self.mean @ (self.projection.score - 0.5 * bend))
+
     def parts(self, y: Array) -> tuple[Array, Array]:
         """Conservative a(y) N and dissipative b(y) N s/m at displacements (n,)."""
         basis = spline_basis(y, self.low, self.spacing, self.knots)

@@ -33,11 +33,12 @@ ALPHA = 0.005  # of each of the two tests that ask whether anything is missing
 DECISIVE = 5.5  # nats of log odds that a name needs over every rival (2 ln odds of 11)
 MOST_EFFECTS = 3
 WORTH_A_REFIT = 4.0  # expected gain in log likelihood, nats
-NEAR_BEST = 0.3  # of the best expected gain, less a margin: below that no refit makes a rival
+NEAR_BEST = 0.5  # of the best expected gain, less a margin: below that no refit makes a rival
 NEAR_MARGIN = 10.0  # nats
+RASH = 1.5  # by how much a score may underrate what a refit gains
 GROSS = 3.0  # residual over noise from which on a misfit is no longer concealed
 LEAST_STEP = 0.8  # an effect that takes less than this off a gross residual is not worth a name
-BEAM = 3  # models that are extended further while the best one is not white
+BEAM = (3, 1)  # singles, pairs that are extended further while the best one is not white
 PAIRS = 4  # refitted at the first step
 
 Progress = Callable[[str], None]
@@ -91,28 +92,30 @@ class Naming:
         )
 
     def rivals(self) -> tuple[Candidate, ...]:
-        """Models that lack one of the chosen effects and come within the decisive odds."""
+        """Models, of any size, that lack a chosen effect and come within the decisive odds."""
         chosen = self.chosen.candidate
         floor = self.log_odds(chosen) - DECISIVE
         return tuple(
             c
             for c in self.tried
             if self.log_odds(c) > floor
-            and len(c.effects) <= len(chosen.effects)
             and not set(chosen.ids) <= set(c.ids)
             and not _is_elaboration(c, chosen)
         )
 
     def prefers_learned_force(self) -> bool:
-        """True when one free force beats the chosen combination decisively.
+        """True when one free force a(y) + b(y) v beats the chosen effects decisively.
 
-        A combination of many terms that imitates one local force loses to that force.
+        An effect that imitates a force outside the catalogue loses to that force. Where the chosen
+        effects leave nothing, no force can gain more than they do, whatever the linearised problem
+        promises.
         """
-        chosen = self.chosen.candidate
-        return (
-            len(chosen.effects) > 1
-            and self.base.force.log_evidence / self.spread > self.log_odds(chosen) + DECISIVE
-        )
+        force, chosen = self.base.force, self.chosen.candidate
+        evidence = force.log_evidence
+        if self.chosen.is_white:
+            reached = chosen.fit.log_likelihood - self.base.candidate.fit.log_likelihood
+            evidence -= max(0.0, force.gain - reached - DECISIVE)
+        return evidence / self.spread > self.log_odds(chosen) + DECISIVE
 
     def probability(self, effect_id: str) -> float:
         """Probability that an effect is part of the model, over all models tried."""
@@ -135,6 +138,8 @@ def name(
     state = base = search.examine(base_candidate(fit))
     beam = [base]
     while not state.is_white and len(state.candidate.effects) < MOST_EFFECTS:
+        if all(search.is_hopeless(s) for s in beam):
+            break
         better = [c for s in beam for c in search.extended(s)]
         better = sorted({c.ids: c for c in better}.values(), key=search.worth, reverse=True)
         if not better or search.worth(better[0]) <= search.worth(state.candidate):
@@ -146,9 +151,11 @@ def name(
             break
         state = search.examine(better[0])
         if not state.is_white:
-            beam = [state, *(search.examine(c) for c in better[1:BEAM])]
-    state = search.eliminated(state)
-    search.compare_rivals(state)
+            width = BEAM[min(len(state.candidate.effects), len(BEAM)) - 1]
+            beam = [state, *(search.examine(c) for c in better[1:width])]
+    if state.is_white or is_gross(base.candidate.fit):  # else no name can be given
+        state = search.eliminated(state)
+        search.compare_rivals(state)
     return search.naming(base, state)
 
 
@@ -205,6 +212,15 @@ class _Search:
             self.progress("fitting " + " + ".join((*candidate.ids, *(s.effect.id for s in scores))))
             self.keep(refit(candidate.fit, scores, self.scales))
         return self.tried[key]
+
+    def is_hopeless(self, state: State) -> bool:
+        """Whether a free force will beat all models with one more effect, as far as scores tell."""
+        if not state.candidate.effects or is_gross(state.candidate.fit):
+            return False
+        base = self.states[frozenset()]
+        most = max((s.gain for s in state.scan.best()), default=0.0)
+        within_reach = self.worth(state.candidate) + RASH * most
+        return base.force.log_evidence > within_reach - self.worth(base.candidate) + NEAR_MARGIN
 
     def worth(self, candidate: Candidate) -> float:
         return tempered_evidence(candidate, self.spread()) - self.cost * len(candidate.effects)

@@ -32,14 +32,14 @@ _FORCE, _OMEGA, _PHASE = (SLOTS.index(s) for s in ("A", "w", "phase"))
 
 
 @dataclass(frozen=True, eq=False)
-class _Blocks:
-    """One recording at F frequencies: sine and cosine columns against each other, J and the
-    residual.
+class Blocks:
+    """One recording at F frequencies: m columns (sine and cosine, or several of them) against each
+    other, J and the residual.
     """
 
-    own: Array  # (F, 2, 2)
-    absorbed: Array  # (F, k, 2)
-    score: Array  # (F, 2)
+    own: Array  # (F, m, m)
+    absorbed: Array  # (F, k, m)
+    score: Array  # (F, m)
     columns: NDArray[np.int64]  # (k,)
 
 
@@ -139,9 +139,20 @@ def _shapes(fit: Fit, effect: Effect, frequency: float, sizes: Array) -> dict[st
     return shapes
 
 
-def _statistics(fit: Fit, blocks: Sequence[_Blocks]) -> tuple[Array, Array, Array]:
+def _statistics(fit: Fit, blocks: Sequence[Blocks]) -> tuple[Array, Array, Array]:
     """Chi-squared (F,), sizes (F, 2 R) of sine and cosine, information (F, 2 R, 2 R)."""
-    count, width = blocks[0].score.shape[0], 2 * len(blocks)
+    information, score = projected(fit, blocks)
+    scale = np.sqrt(np.maximum(np.einsum("fii->fi", information), 1e-300))
+    scaled = information / (scale[:, :, None] * scale[:, None, :])
+    ridge = 1e-9 * np.eye(scale.shape[1])
+    sizes = np.linalg.solve(scaled + ridge, (score / scale)[..., None])[..., 0] / scale
+    return np.einsum("fi,fi->f", sizes, score), sizes, information
+
+
+def projected(fit: Fit, blocks: Sequence[Blocks]) -> tuple[Array, Array]:
+    """Information (F, m R, m R) and score (F, m R) with what the parameters absorb taken off."""
+    count, own = blocks[0].score.shape
+    width = own * len(blocks)
     sigma = sigma_of(fit)
     matrix = np.diag(prior_information(fit.target.priors, fit.mode))
     noise = fit.target.oscillator.layout.roles("noise")
@@ -152,21 +163,15 @@ def _statistics(fit: Fit, blocks: Sequence[_Blocks]) -> tuple[Array, Array, Arra
     information = np.zeros((count, width, width))
     score = np.zeros((count, width))
     for r, block in enumerate(blocks):
-        at = slice(2 * r, 2 * r + 2)
+        at = slice(own * r, own * (r + 1))
         shared[:, block.columns, at] = block.absorbed
         information[:, at, at] = block.own
         score[:, at] = block.score
     information -= np.einsum("fdi,de,fej->fij", shared, inverse(matrix), shared, optimize=True)
-    information = 0.5 * (information + information.transpose(0, 2, 1))
-    scale = np.sqrt(np.maximum(np.einsum("fii->fi", information), 1e-300))
-    scaled = information / (scale[:, :, None] * scale[:, None, :])
-    sizes = (
-        np.linalg.solve(scaled + 1e-9 * np.eye(width), (score / scale)[..., None])[..., 0] / scale
-    )
-    return np.einsum("fi,fi->f", sizes, score), sizes, information
+    return 0.5 * (information + information.transpose(0, 2, 1)), score
 
 
-def _line_blocks(fit: Fit, r: int, grid: Array) -> _Blocks:
+def _line_blocks(fit: Fit, r: int, grid: Array) -> Blocks:
     """A hum of one metre: Fourier sums of the whitened residual and derivatives."""
     part, sigma = fit.linearisation[r], sigma_of(fit)[r]
     interval = float(fit.target.oscillator.intervals[r])
@@ -178,7 +183,7 @@ def _line_blocks(fit: Fit, r: int, grid: Array) -> _Blocks:
     pairs = np.stack([-sums.imag, sums.real], axis=-1) * gain[:, None]  # (1 + k, F, 2)
     n = part.residual.size
     own = np.repeat((0.5 * n * gain**2)[:, None, None] * np.eye(2), 1, axis=0)
-    return _Blocks(own, pairs[1:].transpose(1, 0, 2), pairs[0], part.columns)
+    return Blocks(own, pairs[1:].transpose(1, 0, 2), pairs[0], part.columns)
 
 
 def _whitening_gain(fit: Fit, grid: Array, interval: float) -> Array:
@@ -187,10 +192,23 @@ def _whitening_gain(fit: Fit, grid: Array, interval: float) -> Array:
     return np.sqrt((1 - 2 * rho * np.cos(angle) + rho**2) / (1 - rho**2))
 
 
-def _response_blocks(fit: Fit, r: int, grid: Array, scales: Scales) -> _Blocks:
+def _response_blocks(fit: Fit, r: int, grid: Array, scales: Scales) -> Blocks:
     """A force of one newton: simulated responses to its sine and cosine."""
+    pairs = force_responses(fit, r, grid, scales).reshape(grid.size, 2, -1)
+    return blocks_of(fit, r, pairs)
+
+
+def blocks_of(fit: Fit, r: int, columns: Array) -> Blocks:
+    """Products of whitened columns (F, m, n) of recording r."""
+    part, sigma = fit.linearisation[r], float(sigma_of(fit)[r])
+    own = np.einsum("fin,fjn->fij", columns, columns, optimize=True)
+    absorbed = np.einsum("nk,fin->fki", part.jacobian / sigma, columns, optimize=True)
+    return Blocks(own, absorbed, columns @ (part.residual / sigma), part.columns)
+
+
+def force_responses(fit: Fit, r: int, grid: Array, scales: Scales) -> Array:
+    """Whitened responses (2 F, n) to sine and cosine of one newton at frequencies (F,), Hz."""
     oscillator, sigma = fit.target.oscillator, sigma_of(fit)
-    part = fit.linearisation[r]
     slots = oscillator.layout.slots(fit.mode)[r]
     size = 1e-3 * float(sigma[r]) * scales.stiffness
     q = np.tile(slots, (2 * grid.size + 1, 1))
@@ -198,9 +216,4 @@ def _response_blocks(fit: Fit, r: int, grid: Array, scales: Scales) -> _Blocks:
     q[1:, _OMEGA] = np.repeat(2 * np.pi * grid, 2)
     q[1:, _PHASE] = np.tile([0.0, 0.5 * np.pi], grid.size)
     motion = oscillator.motions_of(np.full(q.shape[0], r), q)
-    change = whitened_one(fit, r, motion[1:] - motion[0], sigma) / size
-    pairs = change.reshape(grid.size, 2, -1)
-    own = np.einsum("fin,fjn->fij", pairs, pairs)
-    absorbed = np.einsum("nk,fin->fki", part.jacobian / sigma[r], pairs, optimize=True)
-    score = pairs @ (part.residual / sigma[r])
-    return _Blocks(own, absorbed, score, part.columns)
+    return whitened_one(fit, r, motion[1:] - motion[0], sigma) / size

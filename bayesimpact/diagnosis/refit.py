@@ -58,7 +58,7 @@ def refit(fit: Fit, scores: Sequence[Score], scales: Scales) -> Candidate:
     _shift(fit, target.oscillator.layout.names, start, scores)
     sizes = step_sizes(target.oscillator.layout.names, effects, scales, scores)
     found = find_mode(
-        target, start, steps=difference_steps(fit, target, sizes), tolerance=0.02, max_iterations=20
+        target, start, steps=difference_steps(fit, target, sizes), tolerance=0.02, max_iterations=40
     )
     return Candidate(effects, found, model_evidence(found))
 
@@ -71,7 +71,7 @@ def without(candidate: Candidate, effect: Effect, scales: Scales) -> Candidate:
     start = transfer(candidate.fit, layout, effects, scales, {})
     sizes = step_sizes(layout.names, effects, scales, ())
     steps = difference_steps(candidate.fit, target, sizes)
-    found = find_mode(target, start, steps=steps, tolerance=0.02, max_iterations=20)
+    found = find_mode(target, start, steps=steps, tolerance=0.02, max_iterations=40)
     return Candidate(effects, found, model_evidence(found))
 
 
@@ -113,8 +113,7 @@ def tempered_evidence(candidate: Candidate, spread: float) -> float:
     fit = candidate.fit
     if spread <= 1.0 or not np.isfinite(candidate.log_evidence):
         return candidate.log_evidence
-    prior = float(fit.target.priors.log_density(fit.mode[None])[0])
-    lost = (1.0 - 1.0 / spread) * (fit.log_posterior - prior)
+    lost = (1.0 - 1.0 / spread) * fit.log_likelihood
     return candidate.log_evidence - lost + 0.5 * fit.mode.size * float(np.log(spread))
 
 

@@ -19,6 +19,7 @@ from bayesimpact.diagnosis.directions import Direction, directions
 from bayesimpact.diagnosis.periodic import periodic_scores
 from bayesimpact.diagnosis.projection import Projection, project
 from bayesimpact.diagnosis.scores import LIMIT_SD, Score
+from bayesimpact.diagnosis.steady import steadiness
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
 
@@ -59,7 +60,7 @@ def scan(fit: Fit, effects: Sequence[Effect], scales: Scales, *, rng: np.random.
     """Score every effect that the fit's model does not contain."""
     single = score_directions(fit, directions(fit, effects, scales), rng=rng)
     periodic = periodic_scores(fit, effects, scales)
-    families = [single.p_value, *(s.p_value for s in periodic)]
+    families = [single.p_value, *(s.p_value for s in periodic), *steadiness(fit, scales)]
     p_value = min(1.0, len(families) * min(families))
     return replace(single, scores=(*single.scores, *periodic), p_value=p_value)
 

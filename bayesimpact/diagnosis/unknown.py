@@ -50,7 +50,7 @@ def learn_force(state: State, scales: Scales) -> Fit:
         start[names.index(name)] -= shift
     floor = 1e-9 * np.repeat([scales.force, scales.force / scales.speed], force.knots)
     sizes = dict(zip(coefficients, np.maximum(sd, floor), strict=True))
-    return find_mode(target, start, steps=difference_steps(fit, target, sizes), max_iterations=15)
+    return find_mode(target, start, steps=difference_steps(fit, target, sizes), max_iterations=30)
 
 
 def coefficient_names(knots: int) -> tuple[str, ...]:

@@ -23,6 +23,9 @@ from bayesimpact.model.oscillator import Oscillator
 
 Array = NDArray[np.float64]
 
+SLOW = 0.5  # of the last step's size: above that, old derivatives are renewed
+ROUGH = np.log(4.0)  # steps that were off by more give derivatives for one step only
+
 
 @dataclass(frozen=True, eq=False)
 class Target:
@@ -58,7 +61,7 @@ class Fit:
     log_posterior : at the mode
     sums : (R,) whitened sums of squares, m2
     converged : the last step was below 1e-3 standard deviations
-    iterations : Jacobians spent
+    iterations : steps taken
     linearisation : of every recording at the mode
     """
 
@@ -84,6 +87,11 @@ class Fit:
     def value(self, name: str) -> float:
         """The mode of one parameter."""
         return float(self.mode[self.target.oscillator.layout.index(name)])
+
+    @property
+    def log_likelihood(self) -> float:
+        """Of the mode, nats."""
+        return self.log_posterior - float(self.target.priors.log_density(self.mode[None])[0])
 
     @property
     def reduced_chi2(self) -> float:
@@ -140,14 +148,17 @@ def find_mode(
     """
     climb = _Climb(target, steps, slopes)
     theta, value, sums = climb.evaluate(start)
-    damping, converged, iterations = 1e-3, False, 0
-    while iterations < max_iterations and not converged:
-        iterations += 1
+    damping, converged, last = 1e-3, False, np.inf
+    while climb.iterations < max_iterations and not converged:
         _, matrix, vector = climb.linear(theta)
         if not (np.isfinite(matrix).all() and np.isfinite(vector).all()):
             break
         whole = climb.step(theta, matrix, vector, 0.0)
         size = float(np.sqrt(np.maximum(whole @ matrix @ whole, 0.0)))  # damping must not hide it
+        if climb.stale and (size < tolerance or size > SLOW * last):
+            climb.renew()  # old derivatives neither decide nor creep
+            continue
+        last = size
         for _ in range(12):
             step = climb.step(theta, matrix, vector, damping)
             trial, trial_value, trial_sums = climb.evaluate(theta + step)
@@ -155,13 +166,15 @@ def find_mode(
                 theta, value, sums = trial, trial_value, trial_sums
                 damping = max(damping * 0.1, 1e-12)
                 break
-            if size < tolerance:
+            if size < tolerance or climb.stale:
                 break
             damping = max(damping * 8, 1e-9)
         converged = size < tolerance
         if trial_value > value and not converged:
-            break
-    return climb.fit(theta, value, sums, converged, iterations)
+            if not climb.stale:
+                break
+            climb.renew()
+    return climb.fit(theta, value, sums, converged)
 
 
 class _Climb:
@@ -173,6 +186,9 @@ class _Climb:
         layout = target.oscillator.layout
         self.target = target
         self.steps, self.slopes = steps, slopes
+        self.frozen = slopes is not None
+        self.stale = False  # the derivatives are those of an earlier theta
+        self.iterations = 0
         self.noise = layout.roles("noise")
         self.moving = layout.roles("physical", "effect", "nuisance")
         physical = np.array([(p.lower, p.upper) for p in layout.parameters])
@@ -197,6 +213,8 @@ class _Climb:
         return float(constant - spread)
 
     def linear(self, theta: Array) -> tuple[tuple[Linearisation, ...], Array, Array]:
+        """Matrix and vector of the next step; derivatives by differences serve several steps."""
+        self.iterations += 1
         likelihood, priors = self.target.likelihood, self.target.priors
         parts = self.parts(theta)
         matrix, vector = normal_equations(parts, theta[likelihood.sigma_columns], theta.size)
@@ -204,22 +222,31 @@ class _Climb:
         information[self.noise] = 0.0
         matrix += np.diag(information)
         vector += priors.gradient(theta)
-        if self.steps is not None and np.isfinite(matrix).all():
+        if self.steps is not None and not self.stale and np.isfinite(matrix).all():
             known = np.diag(matrix)[self.moving] > 0
             spread = marginal_sd(matrix[np.ix_(self.moving, self.moving)])
-            self.steps = self.steps.copy()
+            steps = self.steps.copy()
             better = known & np.isfinite(spread) & (spread > 0)
-            self.steps[self.moving[better]] = 0.05 * spread[better]
+            steps[self.moving[better]] = 0.05 * spread[better]
+            if np.max(np.abs(np.log(steps / self.steps))) > ROUGH:
+                self.renew()
+            self.steps = steps
         return parts, matrix, vector
 
     def parts(self, theta: Array) -> tuple[Linearisation, ...]:
         likelihood = self.target.likelihood
-        if self.slopes is None:
-            return likelihood.linearise(theta, self.steps)
+        if self.slopes is None or (self.steps is None and not self.frozen):
+            self.slopes, self.stale = likelihood.linearise(theta, self.steps), False
+            return self.slopes
+        self.stale = not self.frozen
         return tuple(
             replace(part, residual=likelihood.residual(r, theta[None])[0])
             for r, part in enumerate(self.slopes)
         )
+
+    def renew(self) -> None:
+        """New derivatives at the next step."""
+        self.slopes = None
 
     def step(self, theta: Array, matrix: Array, vector: Array, damping: float) -> Array:
         """Damped Gauss-Newton step; a parameter pushed against its bound stays there."""
@@ -244,7 +271,10 @@ class _Climb:
             free = free[~outside]
         return step
 
-    def fit(self, theta: Array, value: float, sums: Array, converged: bool, iterations: int) -> Fit:
+    def fit(self, theta: Array, value: float, sums: Array, converged: bool) -> Fit:
+        iterations = self.iterations
+        if self.stale:
+            self.renew()
         parts, matrix, _ = self.linear(theta)
         if not np.isfinite(matrix).all():  # not a mode of anything: the caller sees its value
             unknown = np.full(matrix.shape, np.nan)

@@ -15,16 +15,22 @@ from bayesimpact.diagnosis.refit import Candidate
 COST = 3.8
 
 
+OCCAM = 10.0  # nats between likelihood and evidence of a model with effects
+
+
 def candidate(ids: str, evidence: float, chi2: float = 1.0) -> Candidate:
     """Effects by name, separated by blanks; log evidence over the base model's."""
-    fit = SimpleNamespace(reduced_chi2=chi2)
+    likelihood = 2000.0 + evidence + (OCCAM if ids else 0.0)
+    fit = SimpleNamespace(reduced_chi2=chi2, log_likelihood=likelihood)
     return Candidate(tuple(BY_ID[i] for i in ids.split()), fit, 1000.0 + evidence)
 
 
 def state(
     model: Candidate, p_catalogue: float = 0.5, p_force: float = 0.5, force_evidence: float = 0.0
 ) -> State:
-    force = SimpleNamespace(p_value=p_force, log_evidence=force_evidence)
+    force = SimpleNamespace(
+        p_value=p_force, log_evidence=force_evidence, gain=force_evidence + 2 * OCCAM
+    )
     return State(model, SimpleNamespace(p_value=p_catalogue), force)
 
 
@@ -82,6 +88,9 @@ def test_a_pair_is_compared_with_what_lacks_one_of_its_members():
     swapped = candidate(f"{DRAG} spring_cubic", 196.0)
     found = naming(chosen, swapped)
     assert judge(found) == "ambiguous" and found.rivals() == (swapped,)
+    single = state(candidate("harmonic_forcing", 200.0))
+    pair = candidate("gap_wear gap_per_recording", 199.0 + COST)
+    assert naming(single, pair).rivals() == (pair,)  # a rival may be larger
     assert judge(naming(chosen, candidate(f"{DRAG} spring_cubic", 190.0))) == "named"
 
 
@@ -100,13 +109,20 @@ def test_a_gross_misfit_nearly_explained_is_named_although_something_small_remai
     assert judge(naming(small_rest, base_chi2=4.0)) == "unknown"  # concealed: must be white
 
 
-def test_a_free_force_that_beats_a_combination_is_unknown_physics():
-    pair = state(candidate(f"{FRICTION} spring_cubic", 200.0))
-    odds = 200.0 - 2 * COST
-    assert judge(naming(pair, force_evidence=odds + DECISIVE + 0.1)) == "unknown"
-    assert judge(naming(pair, force_evidence=odds + DECISIVE - 0.1)) == "named"
-    single = state(candidate(FRICTION, 200.0))
-    assert judge(naming(single, force_evidence=300.0)) == "named"
+@pytest.mark.parametrize("ids", [FRICTION, f"{FRICTION} spring_cubic"])
+def test_a_free_force_that_beats_the_chosen_effects_is_unknown_physics(ids):
+    imitation = state(candidate(ids, 200.0))
+    object.__setattr__(imitation.candidate.fit, "log_likelihood", 2300.0)  # a heavy prior volume
+    odds = 200.0 - COST * len(ids.split())
+    assert judge(naming(imitation, force_evidence=odds + DECISIVE + 0.1)) == "unknown"
+    assert judge(naming(imitation, force_evidence=odds + DECISIVE - 0.1)) == "named"
+
+
+def test_no_force_can_gain_more_than_a_model_that_leaves_nothing():
+    """The linearised problem promises too much where effects are large."""
+    assert judge(naming(state(candidate(FRICTION, 200.0)), force_evidence=300.0)) == "named"
+    left = state(candidate(FRICTION, 200.0), p_force=ALPHA / 2)
+    assert judge(naming(left, force_evidence=300.0)) == "unknown"
 
 
 def test_probabilities_weigh_all_models():
@@ -133,6 +149,6 @@ def test_what_is_worth_a_refit():
         rows = tuple(SimpleNamespace(gain=g) for g in gains)
         return SimpleNamespace(best=lambda: rows)
 
-    assert [s.gain for s in worth_a_refit(scores(100.0, 21.0, 19.0, 3.0))] == [100.0, 21.0]
+    assert [s.gain for s in worth_a_refit(scores(100.0, 41.0, 39.0, 3.0))] == [100.0, 41.0]
     assert [s.gain for s in worth_a_refit(scores(6.0, 4.5, 3.9))] == [6.0, 4.5]
     assert worth_a_refit(scores()) == []

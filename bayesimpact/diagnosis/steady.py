@@ -1,0 +1,61 @@
+"""Is a force or a hum that a model calls harmonic really steady?
+
+It has one amplitude in all recordings and keeps it. A resonance that rings down, or a damping that
+drifts, can be imitated by one, but not without remains close to its line: amplitudes that differ
+between recordings, and modulation within them. Both show as lines at its frequency and one
+reciprocal duration to either side, with an amplitude and a phase of their own in every recording.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from bayesimpact.diagnosis.directions import is_periodic, sigma_of
+from bayesimpact.diagnosis.force import whitened_one
+from bayesimpact.diagnosis.periodic import Blocks, blocks_of, force_responses, projected
+from bayesimpact.inference.fit import Fit
+from bayesimpact.model.effects.effect import Effect, Scales
+
+Array = NDArray[np.float64]
+
+SIDEBANDS = np.array([-1.0, 0.0, 1.0])  # reciprocals of the longest recording
+RANK = 1e-6
+
+
+def steadiness(fit: Fit, scales: Scales) -> tuple[float, ...]:
+    """p-values that what a model calls periodic is steady, one per periodic effect in it."""
+    found = []
+    for effect in fit.target.oscillator.effects:
+        if is_periodic(effect):
+            lines = fit.value(f"{effect.id}.frequency") + SIDEBANDS / scales.duration
+            recordings = range(len(fit.linearisation))
+            found.append(
+                _p_value(fit, [_blocks(fit, r, effect, lines, scales) for r in recordings])
+            )
+    return tuple(found)
+
+
+def _blocks(fit: Fit, r: int, effect: Effect, lines: Array, scales: Scales) -> Blocks:
+    columns = (
+        force_responses(fit, r, lines, scales) if effect.observe is None else _hums(fit, r, lines)
+    )
+    return blocks_of(fit, r, columns[None])
+
+
+def _hums(fit: Fit, r: int, lines: Array) -> Array:
+    """Whitened sines and cosines (2 F, n) of one metre."""
+    recording = fit.target.oscillator.campaign.recordings[r]
+    angle = 2 * np.pi * lines[:, None] * recording.times
+    waves = np.concatenate([np.sin(angle), np.cos(angle)])
+    return whitened_one(fit, r, waves, sigma_of(fit))
+
+
+def _p_value(fit: Fit, blocks: list[Blocks]) -> float:
+    information, score = (x[0] for x in projected(fit, blocks))
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    kept = values > RANK * values[-1]
+    numbers = (score / scale) @ vectors[:, kept] / np.sqrt(values[kept])
+    return float(stats.chi2.sf(numbers @ numbers, int(kept.sum())))
