@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal
 
 from bayesimpact.data.campaign import Smoothing
 
@@ -20,6 +19,8 @@ def smooth(samples: Array, smoothing: Smoothing | None, interval: float) -> Arra
     """
     if smoothing is None:
         return samples
+    from scipy import signal  # slow to import, and most recordings are not smoothed
+
     if smoothing.kind == "savgol":
         return _savgol(samples, smoothing.window, smoothing.polyorder)
     decay = np.exp(-interval / smoothing.time_constant)
@@ -29,6 +30,8 @@ def smooth(samples: Array, smoothing: Smoothing | None, interval: float) -> Arra
 
 
 def _savgol(samples: Array, window: int, order: int) -> Array:
+    from scipy import signal
+
     # SciPy fits the end windows with LAPACK, which refuses NaN, and whose last bit depends on the
     # number of rows; a resumed sampler needs the same bits
     filtered = signal.savgol_filter(samples, window, order, axis=-1, mode="constant")
@@ -45,6 +48,8 @@ def gain(smoothing: Smoothing | None, interval: float, frequency: Array) -> Arra
     """Amplitude response of the filter at `frequency` in Hz."""
     if smoothing is None:
         return np.ones_like(frequency)
+    from scipy import signal
+
     angle = 2 * np.pi * frequency * interval
     if smoothing.kind == "savgol":
         taps = signal.savgol_coeffs(smoothing.window, smoothing.polyorder)

@@ -1,0 +1,60 @@
+"""A hum that is steady passes for one; what rings down or differs between recordings does not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import small_rig
+from effect_rigs import BY_ID
+
+from bayesimpact.diagnosis.extend import campaign_scales
+from bayesimpact.diagnosis.periodic import periodic_scores
+from bayesimpact.diagnosis.refit import refit
+from bayesimpact.diagnosis.steady import steadiness
+from bayesimpact.inference.identify import identify
+
+FREQUENCY, AMPLITUDE = 61.3, 2e-6
+Envelope = Callable[[int, np.ndarray], np.ndarray]
+
+
+def p_value(seed: int, envelope: Envelope) -> float:
+    """Of a hum with the envelope (recording, times), fitted as a steady one."""
+    campaign = small_rig.record(seed)
+    recordings = [
+        replace(
+            x,
+            samples=x.samples + envelope(r, x.times) * np.sin(2 * np.pi * FREQUENCY * x.times + r),
+        )
+        for r, x in enumerate(campaign.recordings)
+    ]
+    campaign = replace(campaign, recordings=tuple(recordings))
+    fit = identify(campaign, rng=np.random.default_rng(0), search=False).fit
+    scales = campaign_scales(fit)
+    (score,) = periodic_scores(fit, [BY_ID["sensor_hum"]], scales)
+    found = refit(fit, [score], scales).fit
+    assert found.value("sensor_hum.frequency") == pytest.approx(FREQUENCY, abs=0.3)
+    (p,) = steadiness(found, scales)
+    return p
+
+
+def test_a_steady_hum_passes():
+    assert min(p_value(seed, lambda r, t: AMPLITUDE + 0 * t) for seed in (1, 2, 3)) > 1e-3
+
+
+@pytest.mark.parametrize(
+    "envelope",
+    [
+        lambda r, t: (0.3 + 0.7 * r) * AMPLITUDE + 0 * t,
+        lambda r, t: 2 * AMPLITUDE * np.exp(-2 * t),
+    ],
+    ids=["differs between recordings", "rings down"],
+)
+def test_what_is_not_steady_does_not(envelope):
+    assert p_value(4, envelope) < 1e-4
+
+
+def test_a_model_without_a_line_has_nothing_to_be_steady(small):
+    assert steadiness(small.fit, campaign_scales(small.fit)) == ()
