@@ -61,11 +61,12 @@ class Fingerprint:
 def find_smoothing(recordings: Sequence[Recording]) -> Fingerprint | None:
     """The Savitzky-Golay filter that the recordings passed, or None when the spectrum proves none.
 
-    Each filter is judged from just below its first null on: no motion can pass for a passband.
+    Each filter is judged from just below its first null on: no motion can pass for a passband. The
+    likeliest one for white noise must then stand, for white or AR(1) noise, against no filter.
     """
     spectra = [_periodogram(r) for r in recordings]
     shortest = min(r.samples.size for r in recordings)
-    best: Fingerprint | None = None
+    best, most = None, -np.inf
     for window in WINDOWS:
         for order in ORDERS:
             if order >= window - 1 or window > 0.2 * shortest:
@@ -75,12 +76,21 @@ def find_smoothing(recordings: Sequence[Recording]) -> Fingerprint | None:
             stopband = _above(spectra, 0.8 * found[0]) if found else []
             if sum(p.size for _, p, _ in stopband) < LEAST_ORDINATES:
                 continue
-            ratio = _filtered(stopband, smoothing) - max(_ar1(stopband), _falling(stopband))
-            if ratio > (best.log_ratio if best else DECISIVE):
-                best = Fingerprint(smoothing, ratio, found)
-    if best is None or not _explains(_above(spectra, 0.8 * best.nulls[0]), best.smoothing):
-        return None
-    return best
+            unfiltered = max(_ar1(stopband), _falling(stopband))
+            ratio = _filtered(stopband, smoothing) - unfiltered
+            if ratio > most:
+                best, most = (smoothing, found, stopband, unfiltered), ratio
+    return None if best is None else _proved(*best)
+
+
+def _proved(
+    smoothing: Smoothing, found: tuple[float, ...], stopband: Spectra, unfiltered: float
+) -> Fingerprint | None:
+    """The fingerprint of a filter when the spectrum above its first null is what it leaves."""
+    shape = _coloured_shape(stopband, smoothing)
+    ratio = _log_likelihood(_power(stopband), shape) - unfiltered
+    scatters = stats.kstest(_power(stopband) / shape, "expon").pvalue > LEAST_FIT
+    return Fingerprint(smoothing, ratio, found) if ratio > DECISIVE and scatters else None
 
 
 def _above(spectra: Spectra, frequency: float) -> Spectra:
@@ -223,19 +233,35 @@ def _ar1(spectra: Spectra) -> float:
     return -float(_minimize_scalar(negative, bounds=(-0.9, 0.999), method="bounded").fun)
 
 
-def _explains(spectra: Spectra, smoothing: Smoothing) -> bool:
-    """True when the ordinates scatter about the filter's spectrum as they must (exponentially)."""
-    level, floor = _levels(spectra, smoothing)
-    shape = np.concatenate([gain(smoothing, dt, f) ** 2 for f, _, dt in spectra])
-    power = np.concatenate([p for _, p, _ in spectra])
-    return bool(stats.kstest(power / (level * shape + floor), "expon").pvalue > LEAST_FIT)
+def _power(spectra: Spectra) -> Array:
+    return np.concatenate([p for _, p, _ in spectra])
+
+
+def _coloured_shape(spectra: Spectra, smoothing: Smoothing) -> Array:
+    """Expected ordinates of filtered AR(1) noise on a white floor, at their most likely."""
+    power, angle = _power(spectra), np.concatenate([2 * np.pi * f * dt for f, _, dt in spectra])
+    filtered = np.concatenate([gain(smoothing, dt, f) ** 2 for f, _, dt in spectra])
+
+    def expected(x: Array) -> Array:
+        rho = np.tanh(x[2])
+        shape = filtered * (1 - rho) ** 2 / (1 - 2 * rho * np.cos(angle) + rho**2)
+        return np.asarray(np.exp(x[0]) * shape + np.exp(x[1]))
+
+    start = np.append(np.log(_levels(spectra, smoothing)), 0.1)
+    found = _minimize(
+        lambda x: -_log_likelihood(power, expected(x)),
+        start,
+        method="Nelder-Mead",
+        options={"maxiter": 400},
+    )
+    return expected(found.x)
 
 
 def _filtered(spectra: Spectra, smoothing: Smoothing) -> float:
     """Best log likelihood of filtered white noise on a white floor (rounding)."""
     level, floor = _levels(spectra, smoothing)
     shape = np.concatenate([gain(smoothing, dt, f) ** 2 for f, _, dt in spectra])
-    return _log_likelihood(np.concatenate([p for _, p, _ in spectra]), level * shape + floor)
+    return _log_likelihood(_power(spectra), level * shape + floor)
 
 
 def _levels(spectra: Spectra, smoothing: Smoothing) -> Array:
