@@ -144,17 +144,23 @@ def _response(
     scales: Scales,
 ) -> tuple[Array, ...] | None:
     """Whitened change per unit of parameter `index`; None when it changes nothing."""
-    step = FIRST_STEP * parameter.scale(scales)
-    for _ in range(3):
+    step, seen = FIRST_STEP * parameter.scale(scales), None
+    for _ in range(4):
         moved = theta.copy()
         moved[index] += step
         values = whitened(target, target.oscillator.predict(moved), sigma)
         change = [b - a for a, b in zip(base, values, strict=True)]
         with np.errstate(over="ignore", invalid="ignore"):
             norm = float(np.sqrt(sum(float(c.ravel() @ c.ravel()) for c in change)))
-        if norm < INVISIBLE or not np.isfinite(norm):
+        if not np.isfinite(norm):
             return None
+        if norm < INVISIBLE:  # such as a lag far below the sampling interval
+            if seen is not None or step == parameter.scale(scales):
+                break
+            step = parameter.scale(scales)
+            continue
+        seen = tuple(c / step for c in change)
         if 0.1 * CHANGE < norm < 10 * CHANGE:
             break
         step = min(step * CHANGE / norm, parameter.scale(scales))
-    return tuple(c / step for c in change)
+    return seen

@@ -18,7 +18,7 @@ from bayesimpact.diagnosis.limits import Limit, limits
 from bayesimpact.diagnosis.locate import Location, locate
 from bayesimpact.diagnosis.name import Naming, is_gross, name
 from bayesimpact.diagnosis.refit import Candidate
-from bayesimpact.diagnosis.smoothing import SMOOTHING, proved_smoothing, whole_campaign
+from bayesimpact.diagnosis.smoothing import SAVITZKY_GOLAY, proved_smoothing, whole_campaign
 from bayesimpact.diagnosis.unknown import learn_force
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification, identify
@@ -122,7 +122,7 @@ def with_smoothing(
         verdict="named" if found.verdict == "adequate" else found.verdict,
         identification=replace(found.identification, search=identification.search),
         before=identification.fit,
-        effects=(SMOOTHING, *found.effects),
+        effects=(SAVITZKY_GOLAY, *found.effects),
         location=location,
         filtered=filtered,
     )
@@ -138,6 +138,8 @@ def diagnose_fit(
     """The loop from a base fit on."""
     say = progress or (lambda message: None)
     base = identification.fit
+    if base.target.oscillator.smoothing is not None:  # a chain has one filter
+        effects = [e for e in effects if e.id != SAVITZKY_GOLAY.id]
     scales = campaign_scales(base)
     naming = name(base, effects, scales, rng=rng, progress=say)
     verdict = judge(naming)

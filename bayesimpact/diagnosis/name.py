@@ -234,11 +234,15 @@ class _Search:
         return correlation_spread(best.fit)
 
     def eliminated(self, state: State) -> State:
-        """Leave out effects that are not worth their cost, the least useful first."""
+        """Leave out effects, the least useful first, that the recordings do not demand.
+
+        An effect stays when the model without it is decisively worse, or leaves something.
+        """
         while len(state.candidate.effects) > 1:
             smaller = [self.drop(state.candidate, e) for e in state.candidate.effects]
             best = max(smaller, key=self.worth)
-            if self.worth(best) < self.worth(state.candidate):
+            lost = self.worth(state.candidate) - self.worth(best)
+            if lost >= DECISIVE or (lost > 0 and not self.examine(best).is_white):
                 return state
             state = self.examine(best)
         return state

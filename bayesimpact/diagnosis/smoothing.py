@@ -5,6 +5,7 @@ effect.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,16 +14,15 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.diagnosis.locate import Location
 from bayesimpact.inference.identify import Identification
 from bayesimpact.inference.spectrum import Fingerprint, find_smoothing
-from bayesimpact.model.effects.effect import Effect
+from bayesimpact.model.effects import smoothing
 
-SMOOTHING = Effect(
-    id="smoothing",
-    family="sensor",
-    title="smoothing by the measuring chain",
+SAVITZKY_GOLAY = replace(
+    smoothing.EFFECT,
     equation="the simulated signal passes the same filter",
-    regime="measurement",
-    energy="none",
     statement="The chain smoothed the recordings: {size}.",
+    parameters=(),
+    observe=None,
+    size=None,
 )
 
 

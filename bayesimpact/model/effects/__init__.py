@@ -20,6 +20,7 @@ from bayesimpact.model.effects import (
     sensor_drift,
     sensor_hum,
     sensor_quadratic,
+    smoothing,
     spring_cubic,
     spring_quadratic,
     stiffness_drift,
@@ -49,6 +50,7 @@ EFFECTS: tuple[Effect, ...] = (
     sensor_quadratic.EFFECT,
     sensor_cubic.EFFECT,
     sensor_hum.EFFECT,
+    smoothing.EFFECT,
 )
 
 __all__ = ["EFFECTS", "Effect", "EffectParameter", "Law", "Scales", "address"]

@@ -41,6 +41,7 @@ CONTRACT = {
     "sensor_quadratic": ["gain"],
     "sensor_cubic": ["gain"],
     "sensor_hum": ["amplitude", "frequency", "phase[recording]"],
+    "smoothing": ["time_constant"],
 }
 DISSIPATIVE = {
     "contact_damping_indentation.coefficient", "contact_damping_speed.coefficient",
