@@ -58,6 +58,7 @@ def document(
             _detectable(d),
             _remains(d),
             angle=d.before.target.oscillator.campaign.recordings[0].quantity == "angle",
+            drifts=d.naming.base.unknown.reach > 0,
         ),
         "location": _location(d),
         "effects": [
@@ -102,8 +103,10 @@ def _evidence(d: Diagnosis) -> dict[str, Any]:
     return {
         "p_catalogue_before": base.scan.p_value,
         "p_unknown_force_before": base.force.p_value,
+        "p_unknown_drift_before": base.drift.p_value,
         "p_catalogue_after": chosen.scan.p_value,
         "p_unknown_force_after": chosen.force.p_value,
+        "p_unknown_drift_after": chosen.drift.p_value,
         "log_odds": d.naming.log_odds(chosen.candidate),
         "decisive": DECISIVE,
         "models": [

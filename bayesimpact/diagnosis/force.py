@@ -3,20 +3,22 @@
 The unexplained force is a(y) + b(y) v with B-spline coefficients of independent normal priors. Each
 coefficient's response is simulated, whitened and projected off everything the model fits, so what
 remains of the misfit is explained by force, not by displacement errors that an earlier force left
-behind. In the linearised problem the coefficients' posterior and the evidence are closed forms; the
+behind. A second form, a(t) y + b(t) v, catches stiffness and damping that change with time. In the
+linearised problem the coefficients' posterior and the evidence are closed forms; the
 prior widths maximise the evidence.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.diagnosis.directions import sigma_of, whitened
-from bayesimpact.diagnosis.learned import KNOTS, learned_force, spline_basis
+from bayesimpact.diagnosis.learned import KNOTS, TIMES, learned_drift, learned_force, spline_basis
 from bayesimpact.diagnosis.projection import Projection, project
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales, law_row
@@ -47,6 +49,7 @@ class MissingForce:
     log_evidence : of the force over no force
     p_value : of the largest log evidence, against its simulated law under the model
     projection : scores of the coefficients
+    reach : 0 for a(y) + b(y) v; else a(t) y / reach + b(t) v, and `low`, `spacing` are times in s
     """
 
     effect: Effect
@@ -58,6 +61,7 @@ class MissingForce:
     log_evidence: float
     p_value: float
     projection: Projection
+    reach: float = 0.0
 
     @property
     def gain(self) -> float:
@@ -66,7 +70,7 @@ class MissingForce:
         return float(self.mean @ (self.projection.score - 0.5 * bend))
 
     def parts(self, y: Array) -> tuple[Array, Array]:
-        """Conservative a(y) N and dissipative b(y) N s/m at displacements (n,)."""
+        """Conservative a N and dissipative b N s/m at displacements (or times) (n,)."""
         basis = spline_basis(y, self.low, self.spacing, self.knots)
         return basis @ self.mean[: self.knots], basis @ self.mean[self.knots :]
 
@@ -77,18 +81,47 @@ class MissingForce:
         b = np.einsum("ni,ij,nj->n", basis, self.covariance[n:, n:], basis)
         return np.sqrt(np.maximum(a, 0)), np.sqrt(np.maximum(b, 0))
 
-    def force(self, y: Array, v: Array) -> Array:
-        """Mean force at points of the trajectory (n,), N."""
+    def force(self, y: Array, v: Array, t: Array) -> Array:
+        """Mean force at points of the trajectory (n,), N; times in s."""
+        if self.reach:
+            a, b = self.parts(t)
+            return a * y / self.reach + b * v
         a, b = self.parts(y)
         return a + b * v
+
+
+Learned = Callable[[float, float], Effect]
+"""An unknown force with given prior widths of its conservative and dissipative part."""
 
 
 def missing_force(
     fit: Fit, scales: Scales, *, rng: np.random.Generator, knots: int = KNOTS
 ) -> MissingForce:
-    """Posterior of the force that the fit's model leaves out."""
+    """Posterior of the force of displacement and velocity that the fit's model leaves out."""
     low, high = motion_range(fit)
-    effect = learned_force(low, high, scales.force, scales.force / scales.speed, knots)
+    spacing = (high - low) / (knots - 3)
+    return _missing(fit, scales, rng, partial(learned_force, low, high, knots=knots), low, spacing)
+
+
+def missing_drift(
+    fit: Fit, scales: Scales, *, rng: np.random.Generator, knots: int = TIMES
+) -> MissingForce:
+    """Posterior of a change of stiffness and damping with time that the model leaves out."""
+    learned = partial(learned_drift, scales.duration, scales.amplitude, knots=knots)
+    found = _missing(fit, scales, rng, learned, 0.0, scales.duration / (knots - 3))
+    return replace(found, reach=scales.amplitude)
+
+
+def _missing(
+    fit: Fit,
+    scales: Scales,
+    rng: np.random.Generator,
+    learned: Learned,
+    low: float,
+    spacing: float,
+) -> MissingForce:
+    effect = learned(scales.force, scales.force / scales.speed)
+    knots = int(effect.parameter("knots").fixed or 0)
     responses = basis_responses(fit, effect, knots, scales)
     projection = project(fit, responses)
     unit = np.concatenate(
@@ -100,11 +133,8 @@ def missing_force(
     null, _ = evidence.maximum(evidence.null_draws(rng, NULL_DRAWS))
     mean, covariance = evidence.posterior(projection.score, width_a, width_b)
     wide_a, wide_b = np.maximum((width_a, width_b), WIDTHS[1])  # a prior needs some width
-    final = learned_force(
-        low, high, wide_a * scales.force, wide_b * scales.force / scales.speed, knots
-    )
+    final = learned(wide_a * scales.force, wide_b * scales.force / scales.speed)
     p_value = float((1 + np.sum(null >= best)) / (1 + NULL_DRAWS))
-    spacing = (high - low) / (knots - 3)
     return MissingForce(final, knots, low, spacing, mean, covariance, best, p_value, projection)
 
 

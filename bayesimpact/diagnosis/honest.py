@@ -45,7 +45,7 @@ class Widened:
 
 def widened(state: State) -> Widened:
     """Parameters of a model's fit, with what it leaves unexplained carried into them."""
-    fit, force = state.candidate.fit, state.force
+    fit, force = state.candidate.fit, state.unknown
     if is_gross(fit):  # too far for the linearised problem: only the spread is believed
         return Widened(fit.names, fit.mode, sandwich(fit))
     absorbed = force.projection.absorbed

@@ -1,4 +1,4 @@
-"""An unknown force a(y) + b(y) v, cubic B-splines over the displacement, as an effect like any.
+"""Unknown forces as effects like any: a(y) + b(y) v, and a(t) y + b(t) v; cubic B-splines.
 
 The conservative part a and the dissipative part b have one coefficient per knot each. With
 independent normal priors of equal width this is a Gaussian process of correlation length about one
@@ -15,13 +15,17 @@ from bayesimpact.model.effects.effect import Effect, EffectParameter, Law
 Array = NDArray[np.float64]
 
 KNOTS = 24
-_HEAD = 3  # number of coefficients, lowest displacement, spacing
+TIMES = 8  # knots over time: what changes does so slowly
 
 
 def force(y, v, d, t, z, touching, p, q):  # type: ignore[no-untyped-def]
-    """Force a(y) + b(y) v, N; p = (n, lowest, spacing, a_1..a_n, b_1..b_n)."""
+    """Force a(y) + b(y) v or, where `reach` is not 0, a(t) y / reach + b(t) v, N.
+
+    p = (n, lowest, spacing, reach, a_1..a_n, b_1..b_n).
+    """
     n = int(p[0])
-    x = (y - p[1]) / p[2]
+    along = y if p[3] == 0.0 else t
+    x = (along - p[1]) / p[2]
     if x < 0.0:
         x = 0.0
     if x > n - 3.0:
@@ -35,8 +39,10 @@ def force(y, v, d, t, z, touching, p, q):  # type: ignore[no-untyped-def]
     w1 = (3.0 * u * u * u - 6.0 * u * u + 4.0) / 6.0
     w2 = (3.0 * w * w * w - 6.0 * w * w + 4.0) / 6.0
     w3 = u * u * u / 6.0
-    a = w0 * p[3 + i] + w1 * p[4 + i] + w2 * p[5 + i] + w3 * p[6 + i]
-    b = w0 * p[3 + n + i] + w1 * p[4 + n + i] + w2 * p[5 + n + i] + w3 * p[6 + n + i]
+    a = w0 * p[4 + i] + w1 * p[5 + i] + w2 * p[6 + i] + w3 * p[7 + i]
+    b = w0 * p[4 + n + i] + w1 * p[5 + n + i] + w2 * p[6 + n + i] + w3 * p[7 + n + i]
+    if p[3] > 0.0:
+        a *= y / p[3]
     return a + b * v
 
 
@@ -57,16 +63,28 @@ def spline_basis(y: Array, low: float, spacing: float, count: int) -> Array:
 def learned_force(
     low: float, high: float, conservative: float, dissipative: float, knots: int = KNOTS
 ) -> Effect:
-    """The effect for displacements `low` to `high` m; prior widths of a in N, of b in N s/m."""
-    spacing = (high - low) / (knots - 3)
+    """a(y) + b(y) v for displacements `low` to `high` m; prior widths of a in N, of b in N s/m."""
+    return _learned(low, high, 0.0, conservative, dissipative, knots)
 
+
+def learned_drift(
+    duration: float, reach: float, conservative: float, dissipative: float, knots: int = TIMES
+) -> Effect:
+    """a(t) y / `reach` + b(t) v for times up to `duration` s: stiffness and damping that change."""
+    return _learned(0.0, duration, reach, conservative, dissipative, knots)
+
+
+def _learned(
+    low: float, high: float, reach: float, conservative: float, dissipative: float, knots: int
+) -> Effect:
     def fixed(name: str, unit: str, value: float) -> EffectParameter:
         return EffectParameter(name, unit, scale=lambda s: 1.0, fixed=value)
 
     head = (
         fixed("knots", "1", float(knots)),
         fixed("lowest", "m", low),
-        fixed("spacing", "m", spacing),
+        fixed("spacing", "m", (high - low) / (knots - 3)),
+        fixed("reach", "m", reach),
     )
     a = tuple(EffectParameter(f"a{i + 1}", "N", scale=lambda s: conservative) for i in range(knots))
     b = tuple(
@@ -76,7 +94,7 @@ def learned_force(
         id="learned_force",
         family="unknown",
         title="learned force",
-        equation="a(y) + b(y) v, cubic B-splines",
+        equation="a(t) y / reach + b(t) v" if reach else "a(y) + b(y) v",
         regime="everywhere",
         energy="either",
         statement=(

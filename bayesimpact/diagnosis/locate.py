@@ -60,7 +60,8 @@ class Location:
 def locate(base: Fit, better: Fit, force: MissingForce, effects: tuple[Effect, ...]) -> Location:
     """Place of what `better` has and `base` lacks; `force` is what is missing from `base`."""
     points = trajectory_points(base)
-    weights = [force.force(y, v) ** 2 for y, v in points]
+    times = [r.times for r in base.target.oscillator.campaign.recordings]
+    weights = [force.force(y, v, t) ** 2 for (y, v), t in zip(points, times, strict=True)]
     total = max(sum(float(w.sum()) for w in weights), 1e-300)
     gaps = base.target.oscillator.layout.slots(base.mode)[:, _GAP]
     beyond = [w[y >= g].sum() for w, (y, _), g in zip(weights, points, gaps, strict=True)]

@@ -152,7 +152,7 @@ def diagnose_fit(
     location = held = cases = None
     if verdict != "adequate":
         say("locating")
-        location = locate(base, after, naming.base.force, added)
+        location = locate(base, after, naming.base.unknown, added)
         if len(identification.fit.target.oscillator.campaign.recordings) > 1:
             say("predicting held-out recordings")
             held = held_out_recordings(base, after)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bayesimpact.diagnosis.force import MissingForce, missing_force
+from bayesimpact.diagnosis.force import MissingForce, missing_drift, missing_force
 from bayesimpact.diagnosis.pairs import promising_pairs
 from bayesimpact.diagnosis.periodic import shakes_in_own_band
 from bayesimpact.diagnosis.refit import (
@@ -29,7 +29,7 @@ from bayesimpact.diagnosis.scores import Score
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
 
-ALPHA = 0.005  # of each of the two tests that ask whether anything is missing
+ALPHA = 0.004  # of each of the three tests that ask whether anything is missing
 DECISIVE = 5.5  # nats of log odds that a name needs over every rival (2 ln odds of 11)
 MOST_EFFECTS = 3
 WORTH_A_REFIT = 4.0  # expected gain in log likelihood, nats
@@ -52,17 +52,24 @@ class State:
     ----------
     candidate : the model
     scan : scores of everything it lacks
-    force : the force that it leaves unexplained
+    force : the force of displacement and velocity that it leaves unexplained
+    drift : the change of stiffness and damping with time that it leaves unexplained
     """
 
     candidate: Candidate
     scan: Scan
     force: MissingForce
+    drift: MissingForce
 
     @property
     def is_white(self) -> bool:
         """True when neither the catalogue nor an unknown force explains anything more."""
-        return self.scan.p_value >= ALPHA and self.force.p_value >= ALPHA
+        return min(self.scan.p_value, self.force.p_value, self.drift.p_value) >= ALPHA
+
+    @property
+    def unknown(self) -> MissingForce:
+        """The likelier one of both free forces."""
+        return max(self.force, self.drift, key=lambda f: f.log_evidence)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,13 +111,13 @@ class Naming:
         )
 
     def prefers_learned_force(self) -> bool:
-        """True when one free force a(y) + b(y) v beats the chosen effects decisively.
+        """True when one free force beats the chosen effects decisively.
 
         An effect that imitates a force outside the catalogue loses to that force. Where the chosen
         effects leave nothing, no force can gain more than they do, whatever the linearised problem
         promises.
         """
-        force, chosen = self.base.force, self.chosen.candidate
+        force, chosen = self.base.unknown, self.chosen.candidate
         evidence = force.log_evidence
         if self.chosen.is_white:
             reached = chosen.fit.log_likelihood - self.base.candidate.fit.log_likelihood
@@ -190,7 +197,8 @@ class _Search:
             return self.states[frozenset(candidate.ids)]
         found = scan(candidate.fit, self.effects, self.scales, rng=self.rng)
         force = missing_force(candidate.fit, self.scales, rng=self.rng)
-        state = State(candidate, found, force)
+        drift = missing_drift(candidate.fit, self.scales, rng=self.rng)
+        state = State(candidate, found, force, drift)
         self.states[frozenset(candidate.ids)] = state
         return state
 
@@ -220,7 +228,7 @@ class _Search:
         base = self.states[frozenset()]
         most = max((s.gain for s in state.scan.best()), default=0.0)
         within_reach = self.worth(state.candidate) + RASH * most
-        return base.force.log_evidence > within_reach - self.worth(base.candidate) + NEAR_MARGIN
+        return base.unknown.log_evidence > within_reach - self.worth(base.candidate) + NEAR_MARGIN
 
     def worth(self, candidate: Candidate) -> float:
         return tempered_evidence(candidate, self.spread()) - self.cost * len(candidate.effects)

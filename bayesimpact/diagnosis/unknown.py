@@ -36,8 +36,8 @@ class ForceShape:
 
 
 def learn_force(state: State, scales: Scales) -> Fit:
-    """Fit the parameters and the coefficients of a free force a(y) + b(y) v together."""
-    fit, force = state.candidate.fit, state.force
+    """Fit the parameters and the coefficients of the likelier free force together."""
+    fit, force = state.candidate.fit, state.unknown
     effects = (*fit.target.oscillator.effects, force.effect)
     target = extend(fit, effects, scales)
     names = target.oscillator.layout.names

@@ -49,8 +49,12 @@ def summary(
     remains: str = "",
     *,
     angle: bool = False,
+    drifts: bool = False,
 ) -> str:
-    """One paragraph; `remains` says what is left beside the named effects."""
+    """One paragraph; `remains` says what is left beside the named effects.
+
+    `drifts`: the likelier unknown force changes with time.
+    """
     if verdict == "adequate":
         found = "Nothing is missing: the base model describes the recordings down to the noise."
         return f"{found} {detectable}".strip()
@@ -69,7 +73,7 @@ def summary(
         return (
             f"Something is missing that the catalogue does not hold. It acts {place}, mostly "
             f"between {low:.2f} and {high:.2f} {length}, with {location.force_rms:.2g} {force} "
-            f"rms.{cost}"
+            f"rms.{' It is a stiffness or damping that changes with time.' if drifts else ''}{cost}"
         )
     titles = " and ".join(e.title for e in effects)
     if verdict == "ambiguous":

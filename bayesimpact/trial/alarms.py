@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from bayesimpact.diagnosis.extend import campaign_scales
-from bayesimpact.diagnosis.force import missing_force
+from bayesimpact.diagnosis.force import missing_drift, missing_force
 from bayesimpact.diagnosis.name import ALPHA
 from bayesimpact.diagnosis.scan import scan
 from bayesimpact.diagnosis.smoothing import proved_smoothing
@@ -36,6 +36,7 @@ def alarm(settings: Settings, seed: int) -> dict[str, Any]:
     scales = campaign_scales(fit)
     scanned = scan(fit, EFFECTS, scales, rng=rng)
     force = missing_force(fit, scales, rng=rng).p_value
+    drift = missing_drift(fit, scales, rng=rng).p_value
     filtered = proved_smoothing(drawn.campaign) is not None
     return {
         "seed": seed,
@@ -43,9 +44,10 @@ def alarm(settings: Settings, seed: int) -> dict[str, Any]:
         "noise": drawn.truth["noise_kind"],
         "scan_p": scanned.p_value,
         "force_p": force,
+        "drift_p": drift,
         "filter": filtered,
         "best": scanned.best()[0].effect.id if scanned.scores else None,
-        "alarm": bool(min(scanned.p_value, force) < ALPHA or filtered),
+        "alarm": bool(min(scanned.p_value, force, drift) < ALPHA or filtered),
     }
 
 
@@ -56,7 +58,7 @@ def false_alarms(rows: Sequence[Mapping[str, Any]], rng: np.random.Generator) ->
     for key in ("noise", "bench"):
         kinds = sorted({row[key] for row in rows})
         result[f"by_{key}"] = {k: _rate([r for r in rows if r[key] == k]) for k in kinds}
-    for key in ("scan_p", "force_p"):
+    for key in ("scan_p", "force_p", "drift_p"):
         values = np.array([row[key] for row in rows])
         result[key] = {
             "uniform": bool(smallest_tail(values) >= critical),

@@ -17,6 +17,7 @@ from bayesimpact.diagnosis.force import (
     MissingForce,
     _Evidence,
     basis_responses,
+    missing_drift,
     missing_force,
     motion_range,
     trajectory_points,
@@ -27,6 +28,7 @@ from bayesimpact.diagnosis.refit import base_candidate
 from bayesimpact.diagnosis.scan import scan
 from bayesimpact.diagnosis.unknown import coefficient_names, learn_force, shape
 from bayesimpact.inference.fit import Fit, Target, find_mode
+from bayesimpact.inference.identify import identify
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.model.oscillator import Oscillator
 
@@ -199,7 +201,7 @@ def test_force_and_spread_are_those_of_the_coefficients(detent):
     v = np.array([0.1, -0.2, 0.05])
     basis = spline_basis(y, found.low, found.spacing, found.knots)
     whole = np.concatenate([basis, basis * v[:, None]], axis=1)
-    np.testing.assert_allclose(found.force(y, v), whole @ found.mean, rtol=1e-12)
+    np.testing.assert_allclose(found.force(y, v, np.zeros_like(y)), whole @ found.mean, rtol=1e-12)
     draws = np.random.default_rng(0).multivariate_normal(found.mean, found.covariance, 20_000)
     spread = np.concatenate([(draws[:, : found.knots] @ basis.T).std(axis=0),
                              (draws[:, found.knots :] @ basis.T).std(axis=0)])  # fmt: skip
@@ -210,7 +212,11 @@ def test_the_learned_force_goes_back_into_the_simulator(detent):
     """Fitted with the parameters: the residual is noise, the parameters are right again."""
     fit, found = detent
     scales = campaign_scales(fit)
-    state = State(base_candidate(fit), scan(fit, [], scales, rng=np.random.default_rng(0)), found)
+    rng = np.random.default_rng(0)
+    drift = missing_drift(fit, scales, rng=rng)
+    assert drift.log_evidence < found.log_evidence - 20  # a detent is no drift
+    state = State(base_candidate(fit), scan(fit, [], scales, rng=rng), found, drift)
+    assert state.unknown is found
     learned = learn_force(state, scales)
     assert fit.reduced_chi2 > learned.reduced_chi2
     chi2 = learned.sums.sum() / small_rig.NOISE**2
@@ -243,3 +249,24 @@ def test_points_of_the_trajectory(small):
     low, high = motion_range(fit)
     assert low == min(p[0].min() for p in trajectory_points(fit))
     assert high == max(p[0].max() for p in trajectory_points(fit))
+
+
+def test_damping_that_drifts_is_a_force_of_time():
+    campaign = small_rig.record(5, {"damping_drift": {"rate": 0.15}})
+    fit = identify(campaign, rng=np.random.default_rng(0), search=False).fit
+    scales, rng = campaign_scales(fit), np.random.default_rng(0)
+    drift, force = missing_drift(fit, scales, rng=rng), missing_force(fit, scales, rng=rng)
+    assert drift.p_value == pytest.approx(1 / 1001)
+    assert drift.log_evidence > force.log_evidence + 10
+    times = np.linspace(0.1, 0.9, 9) * scales.duration
+    _, damping = drift.parts(times)
+    slope = np.polyfit(times, damping, 1)[0]
+    assert 0.3 < slope / (0.15 * small_rig.RIG.c1) < 2.0  # c1 (1 + rate t)
+    state = State(base_candidate(fit), scan(fit, [], scales, rng=rng), force, drift)
+    learned = learn_force(state, scales)
+    assert learned.sums.sum() / small_rig.NOISE**2 < stats.chi2.ppf(1 - 1e-3, 6000)
+
+
+def test_nothing_drifts_in_a_control(small):
+    scales = campaign_scales(small.fit)
+    assert missing_drift(small.fit, scales, rng=np.random.default_rng(0)).p_value > 0.01

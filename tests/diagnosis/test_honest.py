@@ -26,7 +26,7 @@ def test_widened_is_the_marginal_of_the_joint_problem(small):
     scaled = force.projection.information * np.outer(widths, widths)
     covariance = np.linalg.inv(scaled + np.eye(16)) * np.outer(widths, widths)
     force = replace(force, covariance=covariance, mean=covariance @ force.projection.score)
-    state = SimpleNamespace(candidate=SimpleNamespace(fit=fit), force=force, is_white=True)
+    state = SimpleNamespace(candidate=SimpleNamespace(fit=fit), unknown=force, is_white=True)
     found = widened(state)
     d = fit.mode.size
     responses = basis_responses(fit, force.effect, 8, scales)

@@ -34,7 +34,7 @@ def test_beyond_the_range_the_force_stays_what_it_was_at_the_end():
 
 
 def parameters(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.concatenate([[KNOTS, LOW, SPACING], a, b])
+    return np.concatenate([[KNOTS, LOW, SPACING, 0.0], a, b])
 
 
 def test_compiled_force_is_the_python_one_and_the_splines():

@@ -31,7 +31,8 @@ def state(
     force = SimpleNamespace(
         p_value=p_force, log_evidence=force_evidence, gain=force_evidence + 2 * OCCAM
     )
-    return State(model, SimpleNamespace(p_value=p_catalogue), force)
+    drift = SimpleNamespace(p_value=0.5, log_evidence=-1.0, gain=0.0)
+    return State(model, SimpleNamespace(p_value=p_catalogue), force, drift)
 
 
 def naming(
