@@ -35,6 +35,8 @@ MOST_EFFECTS = 3
 WORTH_A_REFIT = 4.0  # expected gain in log likelihood, nats
 NEAR_BEST = 0.5  # of the best expected gain, less a margin: below that no refit makes a rival
 NEAR_MARGIN = 10.0  # nats
+FAR = 50.0  # nats; beyond four times that, the floor grows with the root of the best gain only
+LEAP = 30.0  # expected gain from which on effects that are on or off are always fitted, nats
 RASH = 1.5  # by how much a score may underrate what a refit gains
 GROSS = 3.0  # residual over noise from which on a misfit is no longer concealed
 LEAST_STEP = 0.8  # an effect that takes less than this off a gross residual is not worth a name
@@ -289,11 +291,20 @@ def is_gross(fit: Fit) -> bool:
 
 
 def worth_a_refit(scan: Scan) -> list[Score]:
-    """Effects whose score promises something, and not far less than the best one."""
+    """Effects whose score promises something, and not far less than the best one.
+
+    The larger the misfit, the less a score tells. Where something can be gained at all, effects
+    that do not begin at the base model (a contact without tension) are always fitted.
+    """
     scores = scan.best()
     most = max((s.gain for s in scores), default=0.0)
-    floor = max(WORTH_A_REFIT, NEAR_BEST * most - NEAR_MARGIN)
-    return [s for s in scores if s.gain > floor]
+    floor = max(WORTH_A_REFIT, min(NEAR_BEST * most, np.sqrt(FAR * most)) - NEAR_MARGIN)
+    leaps = most > LEAP
+    return [s for s in scores if s.gain > floor or (leaps and _is_a_leap(s.effect))]
+
+
+def _is_a_leap(effect: Effect) -> bool:
+    return not effect.parameters or effect.prefer is not None
 
 
 def _is_elaboration(candidate: Candidate, chosen: Candidate) -> bool:

@@ -145,11 +145,22 @@ def test_effects_are_ordered_by_what_the_model_loses_without_them():
     assert ordered(found, effects[:1]) == effects[:1]
 
 
-def test_what_is_worth_a_refit():
-    def scores(*gains: float):
-        rows = tuple(SimpleNamespace(gain=g) for g in gains)
-        return SimpleNamespace(best=lambda: rows)
+def scores(*gains: float, effect: str = FRICTION):
+    rows = tuple(SimpleNamespace(gain=g, effect=BY_ID[effect]) for g in gains)
+    return SimpleNamespace(best=lambda: rows)
 
-    assert [s.gain for s in worth_a_refit(scores(100.0, 41.0, 39.0, 3.0))] == [100.0, 41.0]
-    assert [s.gain for s in worth_a_refit(scores(6.0, 4.5, 3.9))] == [6.0, 4.5]
-    assert worth_a_refit(scores()) == []
+
+def test_what_is_worth_a_refit():
+    def kept(*gains: float) -> list[float]:
+        return [s.gain for s in worth_a_refit(scores(*gains))]
+
+    assert kept(100.0, 41.0, 39.0, 3.0) == [100.0, 41.0]
+    assert kept(6.0, 4.5, 3.9) == [6.0, 4.5]
+    assert kept(5000.0, 500.0, 480.0) == [5000.0, 500.0]
+    assert kept() == []
+
+
+def test_what_is_on_or_off_is_fitted_wherever_something_is_to_be_gained():
+    for effect in ("contact_no_tension", "obstacle_mass"):
+        assert [s.gain for s in worth_a_refit(scores(40.0, 0.1, effect=effect))] == [40.0, 0.1]
+        assert [s.gain for s in worth_a_refit(scores(20.0, 0.1, effect=effect))] == [20.0]
