@@ -98,7 +98,7 @@ class _Test:
         kept = values > RANK_TOLERANCE * max(values[-1], 1e-300)
         root = basis @ (vectors[:, kept] / np.sqrt(values[kept]) / scale[:, None])
         self.group, self.rank = group, int(kept.sum())
-        self.one_sided = direction.one_sided and group.size == 1
+        self.one_sided = direction.one_sided and group.size == 1 == self.rank
         self.weights, self.size_map = root, root @ root.T
 
     def whitened(self, score: Array) -> Array:
@@ -108,6 +108,8 @@ class _Test:
     def p_values(self, score: Array) -> Array:
         """p-value of this direction alone for scores (..., K)."""
         w = self.whitened(score)
+        if self.rank == 0:  # the fitted parameters absorb all of it
+            return np.ones(w.shape[:-1])
         if self.rank == 1:
             z = w[..., 0]
             return np.asarray(stats.norm.sf(z) if self.one_sided else 2 * stats.norm.sf(np.abs(z)))
@@ -129,7 +131,8 @@ def _score(
     gain = 0.5 * float(w @ w)
     if test.one_sided:
         gain *= float(w[0] > 0)
-    z = float(w[0]) if group.size == 1 else float(stats.norm.isf(max(p_value, 1e-300) / 2))
+    two_sided = float(stats.norm.isf(max(p_value, 1e-300) / 2))
+    z = float(w[0]) if test.rank == 1 == group.size else two_sided
     bias = projection.absorbed[:, group] @ size / fit.sd
     return Score(
         direction.effect,

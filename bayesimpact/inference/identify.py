@@ -21,6 +21,7 @@ from bayesimpact.inference.fit import Fit, Target, find_mode
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.noise_estimate import estimate_noise
+from bayesimpact.inference.noise_refined import refined_noise
 from bayesimpact.inference.priors import Priors
 from bayesimpact.inference.search import Generation, SearchResult, metropolis_differential_evolution
 from bayesimpact.model.derivatives import grams
@@ -82,7 +83,7 @@ def identify(
     Raises `InputError` when a recording shows no oscillation.
     """
     estimates = estimate(campaign)
-    noise = estimate_noise(campaign) if noise is None else noise
+    given, noise = noise is not None, noise or estimate_noise(campaign)
     oscillator = build_oscillator(campaign, sigma_per_recording=sigma_per_recording)
     priors = default_priors(oscillator, estimates, noise)
     guess = initial_theta(oscillator, estimates, noise)
@@ -95,6 +96,10 @@ def identify(
         from_search = climb(oscillator, priors, noise, start)
     ends = [fit for fit in (from_guess, from_search) if fit is not None]
     best = max(ends, key=lambda fit: fit.log_posterior)
+    refined = noise if given else refined_noise(best)
+    if refined != noise:
+        noise = refined
+        best = find_mode(Target(Likelihood(oscillator, noise), priors), best.mode)
     return Identification(best, estimates, noise, result, from_guess, from_search)
 
 

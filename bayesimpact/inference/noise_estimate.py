@@ -73,13 +73,19 @@ def raw_noise(recordings: Sequence[Recording]) -> Noise:
         if remainder is None:
             continue
         found = _restricted_ml(remainder)
-        if chosen is not None and found.level > chosen.level * (1.02 + 3 * found.level_error):
+        if chosen is not None and _rises(chosen, found):
             break  # the oscillation itself begins to show
         chosen = found
     if chosen is None:
         total = sum(r.samples.size for r in recordings)
         raise InputError("noise estimate", f"{total} samples in all", f"at least {5 * SMALLEST}")
     return chosen
+
+
+def _rises(before: Noise, after: Noise) -> bool:
+    """Whether longer windows leave more than the errors of both levels explain."""
+    error = 3 * np.hypot(before.level_error, after.level_error)
+    return bool(after.level > before.level * (1.02 + error))
 
 
 def _remainder(recordings: Sequence[Recording], per_period: float) -> _Remainder | None:
