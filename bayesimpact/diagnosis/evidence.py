@@ -43,8 +43,16 @@ def structure(fit: Fit) -> float:
                 if isinstance(prior, Normal):
                     gain += common_spread(
                         fit.mode[at], fit.covariance[np.ix_(at, at)], prior.mean, prior.sd
-                    )
+                    ) + common_mean(fit, parameter.replaces, float(fit.mode[at].mean()), prior)
     return gain
+
+
+def common_mean(fit: Fit, slot: str, value: float, prior: Normal) -> float:
+    """Log density of a common mean under the prior of what it replaces, over that of `prior`."""
+    before = fit.target.replaced.get(slot)
+    if before is None:
+        return 0.0
+    return float(before.log_density(np.array(value)) - prior.log_density(np.array(prior.mean)))
 
 
 def common_spread(mode: Array, covariance: Array, mean: float, sd: float) -> float:

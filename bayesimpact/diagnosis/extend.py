@@ -13,7 +13,7 @@ from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.priors import Normal, Prior, Priors
 from bayesimpact.model.effects.effect import Effect, EffectParameter, Scales
 from bayesimpact.model.oscillator import Oscillator, build_oscillator
-from bayesimpact.model.parameters import Layout, bare_name, is_added
+from bayesimpact.model.parameters import Layout, is_added
 
 Array = NDArray[np.float64]
 
@@ -79,19 +79,14 @@ def extend(fit: Fit, effects: Sequence[Effect], scales: Scales) -> Target:
         smoothing=old.oscillator.smoothing,
         sigma_per_recording=per_recording,
     )
-    known = dict(zip(old.oscillator.layout.names, old.priors.parameters, strict=True))
+    known = {**old.replaced, **dict(zip(fit.names, old.priors.parameters, strict=True))}
     priors = [known.get(n) or _prior(fit, effects, n, scales) for n in oscillator.layout.names]
-    return Target(Likelihood(oscillator, old.likelihood.noise), Priors(tuple(priors)))
+    names = set(oscillator.layout.names)
+    replaced = {n: p for n, p in known.items() if n not in names and not is_added(n)}
+    return Target(Likelihood(oscillator, old.likelihood.noise), Priors(tuple(priors)), replaced)
 
 
 def _prior(fit: Fit, effects: Sequence[Effect], name: str, scales: Scales) -> Prior:
-    if not is_added(
-        name
-    ):  # a base parameter comes back when the effect that had replaced it leaves
-        slot = name
-        values = [v for n, v in zip(fit.names, fit.mode, strict=True) if bare_name(n) == slot]
-        centre = float(np.mean(values))
-        return Normal(centre, 10 * max(abs(centre), 1e-12))
     effect, parameter = owner(effects, name)
     slot_name = replaced_slot(effect, parameter)
     if slot_name is not None:

@@ -11,14 +11,15 @@ whose Gauss-Newton matrix is J'J / sigma^2 plus the priors' curvature (Levenberg
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.inference.likelihood import Likelihood, Linearisation
-from bayesimpact.inference.priors import LogNormal, Priors
+from bayesimpact.inference.priors import LogNormal, Prior, Priors
 from bayesimpact.model.oscillator import Oscillator
 
 Array = NDArray[np.float64]
@@ -29,10 +30,16 @@ ROUGH = np.log(4.0)  # steps that were off by more give derivatives for one step
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """A posterior density: likelihood times priors."""
+    """A posterior density: likelihood times priors.
+
+    Attributes
+    ----------
+    replaced : priors of base parameters in whose place an effect has put others
+    """
 
     likelihood: Likelihood
     priors: Priors
+    replaced: Mapping[str, Prior] = field(default_factory=dict)
 
     @property
     def oscillator(self) -> Oscillator:

@@ -245,3 +245,17 @@ def test_a_value_that_nothing_was_measured_of_changes_nothing():
     with_it = common_spread(np.array([5.0, 5.001, 5.0]), posterior, 5.0, 2.0)
     without_it = common_spread(np.array([5.0, 5.001]), posterior[:2, :2], 5.0, 2.0)
     assert with_it == pytest.approx(without_it, abs=1e-3)
+
+
+@pytest.mark.parametrize("effect_id", ["gap_per_recording", "contact_damping_per_case"])
+def test_values_of_their_own_gain_nothing_on_a_control(small, effect_id):
+    """Nor does the common mean: it keeps the prior of the parameter that it replaces."""
+    scales, base = campaign_scales(small.fit), base_candidate(small.fit)
+    found = directions(small.fit, [BY_ID[effect_id]], scales)
+    score = score_directions(small.fit, found, rng=np.random.default_rng(0)).best()[0]
+    candidate = refit(small.fit, [score], scales)
+    assert -4 < candidate.log_evidence - base.log_evidence < 1
+    slot = {"gap_per_recording": "g", "contact_damping_per_case": "c2"}[effect_id]
+    assert set(candidate.fit.target.replaced) == {slot}
+    back = without(candidate, BY_ID[effect_id], scales)
+    assert back.log_evidence == pytest.approx(base.log_evidence, abs=1e-3)
