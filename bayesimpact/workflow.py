@@ -24,6 +24,8 @@ from bayesimpact.report.write import write_fit, write_posterior
 
 DIAGNOSIS_FILE = "diagnosis.json"
 CHAIN_FOLDER = "chain"
+MAX_STEPS = 20_000
+LEARNED_STEPS = 300  # of a model with a learned force, whose many coefficients may mix slowly
 
 Say = Callable[[str], None]
 
@@ -106,10 +108,10 @@ def diagnose_campaign(
     before = after = None
     if not quick:
         say("sampling both models")
-        before = sample(diagnosis.before, seed=seed)
-        after = (
-            before if diagnosis.after is diagnosis.before else sample(diagnosis.after, seed=seed)
-        )
+        before = after = sample(diagnosis.before, seed=seed)
+        if diagnosis.after is not diagnosis.before:
+            allowed = LEARNED_STEPS if diagnosis.verdict == "unknown" else MAX_STEPS
+            after = sample(diagnosis.after, seed=seed, max_steps=allowed)
     content = document(
         diagnosis,
         seed=seed,

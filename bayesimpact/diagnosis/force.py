@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from bayesimpact.diagnosis.directions import sigma_of, whitened
 from bayesimpact.diagnosis.learned import KNOTS, TIMES, learned_drift, learned_force, spline_basis
 from bayesimpact.diagnosis.projection import Projection, project
-from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.fit import Fit, inverse
 from bayesimpact.model.effects.effect import Effect, Scales, law_row
 from bayesimpact.model.measurement import smooth
 from bayesimpact.model.motions import general_motions
@@ -68,6 +68,21 @@ class MissingForce:
         """What the mean force gains in log likelihood, nats, in the linearised problem."""
         bend = self.projection.information @ self.mean
         return float(self.mean @ (self.projection.score - 0.5 * bend))
+
+    def share_within(self, low: float, high: float) -> float:
+        """Share of its energy 1/2 s'Cs that a force between two displacements, m, has alone.
+
+        What the fitted parameters imitate counts nowhere, so a force in contact is found there even
+        where the mean force, which is arbitrary by such imitations, is not.
+        """
+        score = self.projection.score
+        whole = float(score @ self.covariance @ score)
+        centres = self.low + self.spacing * np.arange(-1, self.knots - 1)
+        inside = (centres > low - self.spacing) & (centres < high + self.spacing)
+        kept = np.flatnonzero(np.tile(inside, 2))
+        precision = inverse(self.covariance)[np.ix_(kept, kept)]
+        alone = float(score[kept] @ inverse(precision) @ score[kept])
+        return alone / max(whole, 1e-300)
 
     def parts(self, y: Array) -> tuple[Array, Array]:
         """Conservative a N and dissipative b N s/m at displacements (or times) (n,)."""

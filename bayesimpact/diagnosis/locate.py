@@ -35,7 +35,7 @@ class Location:
     Attributes
     ----------
     regime : free, contact, entry, exit, everywhere or measurement
-    share : of the squared unexplained force (of the gain, for a measurement) inside the ranges
+    share : of the unexplained force (of the gain, for a measurement) inside the ranges
     displacement, velocity, time : ranges, m, m/s, s
     recordings, cases : where it shows, most first
     force_rms : over the place, N
@@ -74,7 +74,7 @@ def locate(base: Fit, better: Fit, force: MissingForce, effects: tuple[Effect, .
     inside = np.concatenate(chosen)
     place = _ranges(y, v, np.where(inside, w, 0.0))
     held = inside & _between(y, place[0]) & _between(v, place[1])
-    share = float(w[held].sum() / total)
+    share = float(w[held].sum() / total) if force.reach else force.share_within(*place[0])
     rms = float(np.sqrt(np.mean(w[held]))) if held.any() else 0.0
     if regime == "measurement":
         share, rms = _positive_share(gain), 0.0

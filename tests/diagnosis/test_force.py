@@ -270,3 +270,14 @@ def test_damping_that_drifts_is_a_force_of_time():
 def test_nothing_drifts_in_a_control(small):
     scales = campaign_scales(small.fit)
     assert missing_drift(small.fit, scales, rng=np.random.default_rng(0)).p_value > 0.01
+
+
+def test_a_force_in_contact_is_found_in_contact():
+    """Wherever the mean force lies, for the stiffness and the gap imitate parts of it."""
+    campaign = small_rig.record(5, {"contact_hardening": {"stiffness": 4e6}})
+    fit = identify(campaign, rng=np.random.default_rng(0), search=False).fit
+    found = missing_force(fit, campaign_scales(fit), rng=np.random.default_rng(0))
+    gap = fit.value("g")
+    assert found.log_evidence > 20
+    assert found.share_within(gap, 1.0) > 0.9 > 0.8 > found.share_within(-1.0, -1e-3)
+    assert found.share_within(-1.0, 1.0) == pytest.approx(1.0)
