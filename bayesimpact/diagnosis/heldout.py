@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 from bayesimpact.data.campaign import Campaign, Smoothing
 from bayesimpact.diagnosis.evidence import log_evidence
 from bayesimpact.diagnosis.extend import difference_steps
-from bayesimpact.inference.fit import Fit, Target, find_mode
+from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.likelihood import Likelihood
+from bayesimpact.inference.mode import find_mode
 from bayesimpact.model.measurement import edge
 from bayesimpact.model.oscillator import Oscillator
 

@@ -16,7 +16,8 @@ from bayesimpact.diagnosis.extend import (
     transfer,
 )
 from bayesimpact.diagnosis.scores import Score
-from bayesimpact.inference.fit import Fit, find_mode
+from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.mode import find_mode
 from bayesimpact.model.effects.effect import Effect, Scales
 from bayesimpact.model.parameters import is_added
 

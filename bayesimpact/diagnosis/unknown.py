@@ -11,7 +11,8 @@ from bayesimpact.diagnosis.extend import difference_steps, extend, transfer
 from bayesimpact.diagnosis.force import trajectory_points
 from bayesimpact.diagnosis.learned import spline_basis
 from bayesimpact.diagnosis.name import State
-from bayesimpact.inference.fit import Fit, find_mode
+from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.mode import find_mode
 from bayesimpact.model.effects.effect import Scales
 
 Array = NDArray[np.float64]

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.inference.defaults import default_priors
-from bayesimpact.inference.fit import Fit, Target, find_mode
+from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.likelihood import Likelihood
+from bayesimpact.inference.mode import find_mode
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.noise_estimate import estimate_noise
 from bayesimpact.inference.noise_refined import refined_noise

@@ -20,8 +20,9 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.directions import directions
 from bayesimpact.diagnosis.extend import campaign_scales
-from bayesimpact.inference.fit import Fit, Target, find_mode
+from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.likelihood import Likelihood
+from bayesimpact.inference.mode import find_mode
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.priors import LogUniform, Normal, Prior, Priors
 from bayesimpact.model.effects import EFFECTS

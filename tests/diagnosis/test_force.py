@@ -27,9 +27,10 @@ from bayesimpact.diagnosis.name import State
 from bayesimpact.diagnosis.refit import base_candidate
 from bayesimpact.diagnosis.scan import scan
 from bayesimpact.diagnosis.unknown import coefficient_names, learn_force, shape
-from bayesimpact.inference.fit import Fit, Target, find_mode
+from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.likelihood import Likelihood
+from bayesimpact.inference.mode import find_mode
 from bayesimpact.model.oscillator import Oscillator
 
 KNOTS = 10

@@ -14,8 +14,9 @@ from bayesimpact.diagnosis.directions import directions, sigma_of
 from bayesimpact.diagnosis.extend import campaign_scales, extend, transfer
 from bayesimpact.diagnosis.projection import project
 from bayesimpact.diagnosis.scan import score_directions
-from bayesimpact.inference.fit import Fit, Target, find_mode
+from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.likelihood import Likelihood
+from bayesimpact.inference.mode import find_mode
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.priors import Normal, Priors
 from bayesimpact.model.measurement import smooth

@@ -17,9 +17,10 @@ from bayesimpact.diagnosis.evidence import SPREADS, common_spread, log_evidence
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.refit import base_candidate, refit, without
 from bayesimpact.diagnosis.scan import score_directions
-from bayesimpact.inference.fit import Fit, Target, find_mode
+from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.likelihood import Linearisation
+from bayesimpact.inference.mode import find_mode
 from bayesimpact.inference.priors import HalfNormal, LogNormal, LogUniform, Normal, Priors
 from bayesimpact.model.parameters import Parameter
 

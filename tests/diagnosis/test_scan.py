@@ -18,9 +18,10 @@ from bayesimpact.diagnosis.periodic import periodic_scores
 from bayesimpact.diagnosis.projection import Projection
 from bayesimpact.diagnosis.scan import DRAWS, Scan, _corrected, _Test, scan, score_directions
 from bayesimpact.diagnosis.scores import Score
-from bayesimpact.inference.fit import Target, find_mode
+from bayesimpact.inference.fit import Target
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.likelihood import Likelihood
+from bayesimpact.inference.mode import find_mode
 from bayesimpact.inference.noise import Noise
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.oscillator import Oscillator

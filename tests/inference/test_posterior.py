@@ -15,8 +15,9 @@ from scipy.linalg import toeplitz
 from bayesimpact.data.campaign import Campaign, Smoothing
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
-from bayesimpact.inference.fit import Fit, Target, find_mode
+from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.likelihood import Likelihood
+from bayesimpact.inference.mode import find_mode
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.posterior import Posterior, sample
 from bayesimpact.inference.priors import LogUniform, Priors, Uniform

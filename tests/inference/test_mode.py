@@ -12,8 +12,9 @@ from effect_rigs import BY_ID
 from scipy.optimize import least_squares, minimize_scalar
 
 from bayesimpact.data.campaign import Smoothing
-from bayesimpact.inference.fit import Fit, Target, best_sigma, find_mode, inverse
+from bayesimpact.inference.fit import Fit, Target, inverse
 from bayesimpact.inference.likelihood import Likelihood, Linearisation
+from bayesimpact.inference.mode import best_sigma, find_mode
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.priors import (
     HalfNormal,
