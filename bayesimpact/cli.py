@@ -197,10 +197,17 @@ def sample(
 @campaign_argument
 @out_option(required=True)
 @click.option("--quick", is_flag=True, help="No sampling: intervals from the mode's curvature.")
+@click.option(
+    "--certify",
+    type=click.IntRange(min=0),
+    default=0,
+    metavar="N",
+    help="Repeat the loop on N simulated controls, and on N campaigns with what was named.",
+)
 @common
 @click.pass_context
 def diagnose(
-    ctx: click.Context, campaign: Path, out: Path, quick: bool, seed: int, quiet: bool
+    ctx: click.Context, campaign: Path, out: Path, quick: bool, certify: int, seed: int, quiet: bool
 ) -> None:
     """Locate, name, model and show what the base model leaves out of CAMPAIGN."""
     from bayesimpact.data.read import load_campaign
@@ -210,7 +217,13 @@ def diagnose(
 
     command = f"bayesimpact diagnose {campaign} --out {out} --seed {seed}"
     outcome = diagnose_campaign(
-        loaded, made_folder(out), seed=seed, quick=quick, command=command, say=telling(quiet)
+        loaded,
+        made_folder(out),
+        seed=seed,
+        quick=quick,
+        certify=certify,
+        command=command,
+        say=telling(quiet),
     )
     announce(outcome, out, quiet)
     finish(ctx, outcome)

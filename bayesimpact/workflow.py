@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.diagnosis.certificate import certificate
 from bayesimpact.diagnosis.document import document
 from bayesimpact.diagnosis.loop import Diagnosis, diagnose
 from bayesimpact.inference.identify import Identification, identify
@@ -99,10 +100,14 @@ def diagnose_campaign(
     *,
     seed: int = 0,
     quick: bool = False,
+    certify: int = 0,
     command: str = "",
     say: Say = silent,
 ) -> Outcome:
-    """The whole loop: diagnosis.json, posterior.nc, figures and report in `out`."""
+    """The whole loop: diagnosis.json, posterior.nc, figures and report in `out`.
+
+    `certify`: how often the loop is repeated on simulated campaigns of this design.
+    """
     began = time.perf_counter()
     diagnosis = diagnose(campaign, rng=np.random.default_rng(seed), search=not quick, progress=say)
     before = after = None
@@ -112,6 +117,11 @@ def diagnose_campaign(
         if diagnosis.after is not diagnosis.before:
             allowed = LEARNED_STEPS if diagnosis.verdict == "unknown" else MAX_STEPS
             after = sample(diagnosis.after, seed=seed, max_steps=allowed)
+    certified = None
+    if certify:
+        certified = certificate(
+            diagnosis, certify, rng=np.random.default_rng([seed, 1]), progress=say
+        )
     content = document(
         diagnosis,
         seed=seed,
@@ -119,6 +129,7 @@ def diagnose_campaign(
         versions=versions(),
         draws_before=None if before is None else before.draws,
         draws_after=None if after is None else after.draws,
+        certified=certified,
     )
     say("writing the report")
     results = _write_diagnosis(diagnosis, content, before, after, out, seed, command)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.diagnosis.certificate import Certificate
 from bayesimpact.diagnosis.limits import PRACTICAL, Limit
 from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.diagnosis.name import DECISIVE
@@ -32,6 +34,7 @@ def document(
     versions: Mapping[str, str],
     draws_before: Array | None = None,
     draws_after: Array | None = None,
+    certified: Certificate | None = None,
 ) -> dict[str, Any]:
     """The content of diagnosis.json.
 
@@ -39,6 +42,7 @@ def document(
     ----------
     draws_before, draws_after : posterior draws (S, d) of both models; None takes the normal
         approximation
+    certified : how often the loop errs on campaigns of this design, where that was asked for
     """
     d = diagnosis
     noise = d.identification.noise
@@ -85,6 +89,7 @@ def document(
             for x in d.limits
         ],
         "evidence": _evidence(d),
+        "certificate": None if certified is None else asdict(certified),
         "noise": {
             "sigma_m": noise.level,
             "correlation": "white" if noise.correlation == 0 else "ar1",

@@ -1,0 +1,41 @@
+"""The loop repeated on campaigns of the same design."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import small_rig
+from effect_rigs import BY_ID
+
+from bayesimpact.diagnosis.certificate import Certificate, certificate, simulated
+from bayesimpact.diagnosis.loop import diagnose_fit
+from bayesimpact.inference.identify import identify
+
+FEW = [BY_ID[i] for i in ("coulomb_friction", "quadratic_drag", "gap_wear")]
+
+
+def test_a_simulated_campaign_has_the_design_and_the_noise(small):
+    campaign = small.fit.target.oscillator.campaign
+    again = simulated(small.fit, np.random.default_rng(1))
+    assert [r.name for r in again.recordings] == [r.name for r in campaign.recordings]
+    left = np.concatenate(
+        [r.samples - m for r, m in zip(again.recordings, small.fit.predicted, strict=True)]
+    )
+    error = small.fit.target.likelihood.noise.level / np.sqrt(2 * left.size)
+    assert np.std(left) == pytest.approx(small.fit.target.likelihood.noise.level, abs=5 * error)
+
+
+def test_a_certificate_of_what_stands_out():
+    campaign = small_rig.record(6, {"coulomb_friction": {"force": 6e-4}})
+    base = identify(campaign, rng=np.random.default_rng(0), search=False)
+    found = diagnose_fit(base, rng=np.random.default_rng(0), effects=FEW)
+    assert found.verdict == "named"
+    said = certificate(found, 3, rng=np.random.default_rng(0), effects=FEW)
+    assert said == Certificate(3, 0, 3, 3, 0)
+
+
+def test_of_an_adequate_model_only_controls_are_repeated(small):
+    found = diagnose_fit(small, rng=np.random.default_rng(0), effects=FEW)
+    assert found.verdict == "adequate"
+    said = certificate(found, 1, rng=np.random.default_rng(0), effects=FEW)
+    assert (said.controls, said.planted, said.named) == (1, 0, 0)
