@@ -37,6 +37,7 @@ def story_rows(results: Results) -> list[tuple[str, list[str | Markup]]]:
         ("size", _size(results, diagnosis)),
         ("improvement", _improvement(results, diagnosis)),
         ("could still hide", _hidden(diagnosis)),
+        ("certificate", _certificate(diagnosis.get("certificate"))),
     ]
     return [(question, answer) for question, answer in rows if answer]
 
@@ -134,6 +135,22 @@ def _improvement(results: Results, diagnosis: Mapping[str, Any]) -> list[str | M
         spread = "" if gain.get("se") is None else f" ± {number(gain['se'], 0)}"
         better = f", {gain['wins']} of {gain['of']} better" if gain.get("of") else ""
         lines.append(f"held-out recordings: log score {signed(gain['value'], 0)}{spread}{better}")
+    return lines
+
+
+def _certificate(certificate: Mapping[str, Any] | None) -> list[str | Markup]:
+    """How the loop did on simulated campaigns of the same design."""
+    if not certificate:
+        return []
+    lines: list[str | Markup] = [
+        f"of {certificate['controls']} simulated campaigns with nothing missing, "
+        f"{certificate['false_alarms']} raised an alarm"
+    ]
+    if certificate["planted"]:
+        lines.append(
+            f"of {certificate['planted']} with what was named here, {certificate['named']} were "
+            f"named the same, {certificate['misnamed']} got another name"
+        )
     return lines
 
 

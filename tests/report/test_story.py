@@ -80,3 +80,11 @@ def test_a_document_with_nulls_is_told() -> None:
     hollow = {"before": {"rms_m": None}, "after": {}, "held_out_gain": {"value": None, "se": None}}
     story = told(diagnosed(fit=hollow, location={**DIAGNOSIS["location"], "share": None}))
     assert "improvement" not in story and "place" in story
+
+
+def test_a_certificate_is_told_where_there_is_one() -> None:
+    found = {"controls": 20, "false_alarms": 1, "planted": 20, "named": 18, "misnamed": 0}
+    story = told(diagnosed(certificate=found))
+    assert "of 20" in story["certificate"] and "1 raised an alarm" in story["certificate"]
+    assert "18 were named the same" in story["certificate"]
+    assert "certificate" not in told(diagnosed(certificate=None))
