@@ -148,7 +148,7 @@ def diagnose_fit(
     if verdict == "unknown":
         say("learning the force")
         after = learn_force(naming.base, scales)
-    added = chosen.candidate.effects if verdict in ("named", "ambiguous") else ()
+    added = ordered(naming, chosen.candidate.effects) if verdict in ("named", "ambiguous") else ()
     location = held = cases = None
     if verdict != "adequate":
         say("locating")
@@ -164,7 +164,7 @@ def diagnose_fit(
         naming,
         base,
         after,
-        ordered(naming, added),
+        added,
         naming.rivals() if verdict == "ambiguous" else (),
         location,
         naming.base.force,

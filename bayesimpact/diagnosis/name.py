@@ -40,8 +40,9 @@ LEAP = 30.0  # expected gain from which on effects that are on or off are always
 RASH = 1.5  # by how much a score may underrate what a refit gains
 GROSS = 3.0  # residual over noise from which on a misfit is no longer concealed
 LEAST_STEP = 0.8  # an effect that takes less than this off a gross residual is not worth a name
-BEAM = (3, 1)  # singles, pairs that are extended further while the best one is not white
+BEAM = 3  # models that are extended while the best one is not white: it, and single effects
 PAIRS = 4  # refitted at the first step
+EXCHANGES = 3  # rounds of leaving out and exchanging effects
 
 Progress = Callable[[str], None]
 
@@ -101,13 +102,17 @@ class Naming:
         )
 
     def rivals(self) -> tuple[Candidate, ...]:
-        """Models, of any size, that lack a chosen effect and come within the decisive odds."""
+        """Models that lack a chosen effect and come within the decisive odds.
+
+        One with more effects must be the likelier one: two effects imitate a third more often than
+        the price of an effect allows for.
+        """
         chosen = self.chosen.candidate
-        floor = self.log_odds(chosen) - DECISIVE
+        reached = self.log_odds(chosen)
         return tuple(
             c
             for c in self.tried
-            if self.log_odds(c) > floor
+            if self.log_odds(c) > reached - DECISIVE * (len(c.effects) <= len(chosen.effects))
             and not set(chosen.ids) <= set(c.ids)
             and not _is_elaboration(c, chosen)
         )
@@ -160,11 +165,10 @@ def name(
             break
         state = search.examine(better[0])
         if not state.is_white:
-            width = BEAM[min(len(state.candidate.effects), len(BEAM)) - 1]
-            beam = [state, *(search.examine(c) for c in better[1:width])]
+            singles = [c for c in better[1:] if len(c.effects) == 1]
+            beam = [state, *(search.examine(c) for c in singles[: BEAM - 1])]
     if state.is_white or is_gross(base.candidate.fit):  # else no name can be given
-        state = search.eliminated(state)
-        search.compare_rivals(state)
+        state = search.settled(state)
     return search.naming(base, state)
 
 
@@ -264,6 +268,21 @@ class _Search:
             self.keep(without(candidate, effect, self.scales))
         return self.tried[key]
 
+    def settled(self, state: State) -> State:
+        """The model that neither leaving out nor exchanging an effect improves."""
+        for _ in range(EXCHANGES):
+            state = self.eliminated(state)
+            self.compare_rivals(state)
+            best = self.best(len(state.candidate.effects))
+            if set(best.ids) == set(state.candidate.ids):
+                break
+            state = self.examine(best)
+        return state
+
+    def best(self, size: int) -> Candidate:
+        """The likeliest model tried with at most so many effects."""
+        return max((c for c in self.tried.values() if len(c.effects) <= size), key=self.worth)
+
     def compare_rivals(self, state: State) -> None:
         """Put every other effect in the place of each chosen one (for pairs and triples)."""
         chosen = state.candidate
@@ -278,8 +297,7 @@ class _Search:
 
     def naming(self, base: State, chosen: State) -> Naming:
         tried = tuple(sorted(self.tried.values(), key=self.worth, reverse=True))
-        size = len(chosen.candidate.effects)
-        best = next(c for c in tried if len(c.effects) <= size)
+        best = self.best(len(chosen.candidate.effects))
         if set(best.ids) != set(chosen.candidate.ids):
             chosen = self.examine(best)
         return Naming(base, chosen, tried, self.cost, self.spread())
