@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bayesimpact.diagnosis.certificate import Certificate
 from bayesimpact.diagnosis.limits import PRACTICAL, Limit
 from bayesimpact.diagnosis.loop import Diagnosis
-from bayesimpact.diagnosis.name import DECISIVE
+from bayesimpact.diagnosis.naming import DECISIVE
 from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.size import size_in_words
 from bayesimpact.diagnosis.smoothing import filter_parameters, filter_words

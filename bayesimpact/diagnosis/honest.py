@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.diagnosis.directions import sigma_of
-from bayesimpact.diagnosis.name import State, is_gross
+from bayesimpact.diagnosis.naming import State, is_gross
 from bayesimpact.inference.fit import Fit
 
 LAGS_PER_ROOT = 3.0  # lags of the long-run covariance, times the root of the number of samples

@@ -16,7 +16,8 @@ from bayesimpact.diagnosis.heldout import HeldOut, held_out_cases, held_out_reco
 from bayesimpact.diagnosis.honest import Widened, widened
 from bayesimpact.diagnosis.limits import Limit, limits
 from bayesimpact.diagnosis.locate import Location, locate
-from bayesimpact.diagnosis.name import Naming, is_gross, name
+from bayesimpact.diagnosis.name import name
+from bayesimpact.diagnosis.naming import Naming, is_gross
 from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.smoothing import SAVITZKY_GOLAY, proved_smoothing, whole_campaign
 from bayesimpact.diagnosis.unknown import learn_force

@@ -9,11 +9,12 @@ physics and decide between near-opposites that scores cannot tell apart.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from bayesimpact.diagnosis.force import MissingForce, missing_drift, missing_force
+from bayesimpact.diagnosis.force import missing_drift, missing_force
+from bayesimpact.diagnosis.naming import DECISIVE, Naming, State, is_gross
 from bayesimpact.diagnosis.pairs import promising_pairs
 from bayesimpact.diagnosis.periodic import shakes_in_own_band
 from bayesimpact.diagnosis.refit import (
@@ -29,8 +30,6 @@ from bayesimpact.diagnosis.scores import Score
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
 
-ALPHA = 0.004  # of each of the three tests that ask whether anything is missing
-DECISIVE = 5.5  # nats of log odds that a name needs over every rival (2 ln odds of 11)
 MOST_EFFECTS = 3
 WORTH_A_REFIT = 4.0  # expected gain in log likelihood, nats
 NEAR_BEST = 0.5  # of the best expected gain, less a margin: below that no refit makes a rival
@@ -38,105 +37,13 @@ NEAR_MARGIN = 10.0  # nats
 FAR = 50.0  # nats; beyond four times that, the floor grows with the root of the best gain only
 LEAP = 30.0  # expected gain from which on effects that are on or off are always fitted, nats
 RASH = 1.5  # by how much a score may underrate what a refit gains
-GROSS = 3.0  # residual over noise from which on a misfit is no longer concealed
 LEAST_STEP = 0.8  # an effect that takes less than this off a gross residual is not worth a name
 BEAM = 3  # models that are extended while the best one is not white: it, and single effects
 PAIRS = 4  # refitted at the first step
+STARTS = 2  # points of an effect's shape grid from which it is fitted
 EXCHANGES = 3  # rounds of leaving out and exchanging effects
 
 Progress = Callable[[str], None]
-
-
-@dataclass(frozen=True, eq=False)
-class State:
-    """One model on the way, and whether anything is missing from it.
-
-    Attributes
-    ----------
-    candidate : the model
-    scan : scores of everything it lacks
-    force : the force of displacement and velocity that it leaves unexplained
-    drift : the change of stiffness and damping with time that it leaves unexplained
-    """
-
-    candidate: Candidate
-    scan: Scan
-    force: MissingForce
-    drift: MissingForce
-
-    @property
-    def is_white(self) -> bool:
-        """True when neither the catalogue nor an unknown force explains anything more."""
-        return min(self.scan.p_value, self.force.p_value, self.drift.p_value) >= ALPHA
-
-    @property
-    def unknown(self) -> MissingForce:
-        """The likelier one of both free forces."""
-        return max(self.force, self.drift, key=lambda f: f.log_evidence)
-
-
-@dataclass(frozen=True, eq=False)
-class Naming:
-    """The outcome of the search for names.
-
-    Attributes
-    ----------
-    base, chosen : first and last state
-    tried : every model that was fitted, best first
-    prior_cost : nats per added effect
-    spread : samples over which the best model's residual repeats itself, where the misfit is gross
-    """
-
-    base: State
-    chosen: State
-    tried: tuple[Candidate, ...]
-    prior_cost: float
-    spread: float = 1.0
-
-    def log_odds(self, candidate: Candidate) -> float:
-        """Log posterior odds of a model against the base model."""
-        return (
-            tempered_evidence(candidate, self.spread)
-            - tempered_evidence(self.base.candidate, self.spread)
-            - self.prior_cost * len(candidate.effects)
-        )
-
-    def rivals(self) -> tuple[Candidate, ...]:
-        """Models that lack a chosen effect and come within the decisive odds.
-
-        One with more effects must be the likelier one: two effects imitate a third more often than
-        the price of an effect allows for.
-        """
-        chosen = self.chosen.candidate
-        reached = self.log_odds(chosen)
-        return tuple(
-            c
-            for c in self.tried
-            if self.log_odds(c) > reached - DECISIVE * (len(c.effects) <= len(chosen.effects))
-            and not set(chosen.ids) <= set(c.ids)
-            and not _is_elaboration(c, chosen)
-        )
-
-    def prefers_learned_force(self) -> bool:
-        """True when one free force beats the chosen effects decisively.
-
-        An effect that imitates a force outside the catalogue loses to that force. Where the chosen
-        effects leave nothing, no force can gain more than they do, whatever the linearised problem
-        promises.
-        """
-        force, chosen = self.base.unknown, self.chosen.candidate
-        evidence = force.log_evidence
-        if self.chosen.is_white:
-            reached = chosen.fit.log_likelihood - self.base.candidate.fit.log_likelihood
-            evidence -= max(0.0, force.gain - reached - DECISIVE)
-        return evidence / self.spread > self.log_odds(chosen) + DECISIVE
-
-    def probability(self, effect_id: str) -> float:
-        """Probability that an effect is part of the model, over all models tried."""
-        odds = np.array([self.log_odds(c) for c in self.tried])
-        weight = np.exp(odds - odds.max())
-        have = np.array([effect_id in c.ids for c in self.tried])
-        return float(weight[have].sum() / weight.sum())
 
 
 def name(
@@ -186,6 +93,7 @@ class _Search:
         self.cost = float(np.log(2 * len(effects)))
         self.tried: dict[frozenset[str], Candidate] = {}
         self.states: dict[frozenset[str], State] = {}
+        self.dropped: set[tuple[frozenset[str], str]] = set()
 
     def keep(self, candidate: Candidate) -> Candidate:
         key = frozenset(candidate.ids)
@@ -197,10 +105,11 @@ class _Search:
         return self.tried[key]
 
     def examine(self, candidate: Candidate) -> State:
-        self.progress("scoring what " + (" + ".join(candidate.ids) or "the base model") + " lacks")
         candidate = self.keep(candidate)
-        if frozenset(candidate.ids) in self.states:
-            return self.states[frozenset(candidate.ids)]
+        held = self.states.get(frozenset(candidate.ids))
+        if held is not None and held.candidate is candidate:
+            return held
+        self.progress("scoring what " + (" + ".join(candidate.ids) or "the base model") + " lacks")
         found = scan(candidate.fit, self.effects, self.scales, rng=self.rng)
         force = missing_force(candidate.fit, self.scales, rng=self.rng)
         drift = missing_drift(candidate.fit, self.scales, rng=self.rng)
@@ -211,7 +120,7 @@ class _Search:
     def extended(self, state: State) -> list[Candidate]:
         """Models with one more effect; from the base model on also the most promising pairs."""
         scores = worth_a_refit(state.scan)
-        found = [self.fit_more(state.candidate, [score]) for score in scores]
+        found = [self.fit_one(state.candidate, state.scan, score) for score in scores]
         if not state.candidate.effects:
             best_single = max((c.log_evidence for c in found), default=-np.inf)
             for pair in promising_pairs(state.scan, count=PAIRS):
@@ -219,6 +128,15 @@ class _Search:
                 if expected > best_single + self.cost:
                     found.append(self.fit_more(state.candidate, pair.scores))
         return found
+
+    def fit_one(self, candidate: Candidate, found: Scan, score: Score) -> Candidate:
+        """One more effect, from the best points of its shape grid."""
+        key = frozenset((*candidate.ids, score.effect.id))
+        if key not in self.tried:
+            self.fit_more(candidate, [score])
+            for other in found.starts(score, STARTS)[1:]:
+                self.keep(refit(candidate.fit, [other], self.scales))
+        return self.tried[key]
 
     def fit_more(self, candidate: Candidate, scores: Sequence[Score]) -> Candidate:
         key = frozenset((*candidate.ids, *(s.effect.id for s in scores)))
@@ -262,11 +180,13 @@ class _Search:
         return state
 
     def drop(self, candidate: Candidate, effect: Effect) -> Candidate:
-        key = frozenset(i for i in candidate.ids if i != effect.id)
-        if key not in self.tried:
+        """The model without one effect, fitted from here even where it was fitted before."""
+        step = (frozenset(candidate.ids), effect.id)
+        if step not in self.dropped:
+            self.dropped.add(step)
             self.progress("without " + effect.id)
             self.keep(without(candidate, effect, self.scales))
-        return self.tried[key]
+        return self.tried[frozenset(i for i in candidate.ids if i != effect.id)]
 
     def settled(self, state: State) -> State:
         """The model that neither leaving out nor exchanging an effect improves."""
@@ -290,10 +210,10 @@ class _Search:
             return
         for effect in chosen.effects:
             rest = self.drop(chosen, effect)
-            scores = worth_a_refit(scan(rest.fit, self.effects, self.scales, rng=self.rng))
-            for score in scores:
+            found = scan(rest.fit, self.effects, self.scales, rng=self.rng)
+            for score in worth_a_refit(found):
                 if score.effect.id != effect.id:
-                    self.fit_more(rest, [score])
+                    self.fit_one(rest, found, score)
 
     def naming(self, base: State, chosen: State) -> Naming:
         tried = tuple(sorted(self.tried.values(), key=self.worth, reverse=True))
@@ -301,11 +221,6 @@ class _Search:
         if set(best.ids) != set(chosen.candidate.ids):
             chosen = self.examine(best)
         return Naming(base, chosen, tried, self.cost, self.spread())
-
-
-def is_gross(fit: Fit) -> bool:
-    """True when the residual dwarfs the noise."""
-    return fit.reduced_chi2 > GROSS**2
 
 
 def worth_a_refit(scan: Scan) -> list[Score]:
@@ -323,9 +238,3 @@ def worth_a_refit(scan: Scan) -> list[Score]:
 
 def _is_a_leap(effect: Effect) -> bool:
     return not effect.parameters or effect.prefer is not None
-
-
-def _is_elaboration(candidate: Candidate, chosen: Candidate) -> bool:
-    """True when the candidate only refines the chosen model (`Effect.prefer`)."""
-    extra = [e for e in candidate.effects if e.id not in chosen.ids]
-    return bool(extra) and all(e.prefer in chosen.ids for e in extra)

@@ -55,6 +55,15 @@ class Scan:
                 by_id[score.effect.id] = score
         return tuple(sorted(by_id.values(), key=lambda s: -s.gain))
 
+    def starts(self, score: Score, count: int) -> tuple[Score, ...]:
+        """A score and the next best ones of its effect with other shapes, `count` at most.
+
+        Those that promise less than half as much are left out.
+        """
+        own = [s for s in self.scores if s.effect.id == score.effect.id and s is not score]
+        others = sorted((s for s in own if s.gain > 0.5 * score.gain), key=lambda s: -s.gain)
+        return (score, *others[: count - 1])
+
 
 def scan(fit: Fit, effects: Sequence[Effect], scales: Scales, *, rng: np.random.Generator) -> Scan:
     """Score every effect that the fit's model does not contain."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from bayesimpact.diagnosis.extend import difference_steps, extend, transfer
 from bayesimpact.diagnosis.force import trajectory_points
 from bayesimpact.diagnosis.learned import spline_basis
-from bayesimpact.diagnosis.name import State
+from bayesimpact.diagnosis.naming import State
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.model.effects.effect import Scales

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bayesimpact.diagnosis.name import GROSS
+from bayesimpact.diagnosis.naming import GROSS
 from bayesimpact.report.figures.corner import MOST as MOST_CORNER
 from bayesimpact.report.figures.traces import MOST as MOST_TRACES
 from bayesimpact.report.force_arrays import QUIET_WIDTH

@@ -14,7 +14,7 @@ import numpy as np
 
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.force import missing_drift, missing_force
-from bayesimpact.diagnosis.name import ALPHA
+from bayesimpact.diagnosis.naming import ALPHA
 from bayesimpact.diagnosis.scan import scan
 from bayesimpact.diagnosis.smoothing import proved_smoothing
 from bayesimpact.inference.identify import identify

@@ -19,7 +19,7 @@ from scipy import stats
 
 from bayesimpact.data.campaign import Measurement
 from bayesimpact.diagnosis.extend import campaign_scales
-from bayesimpact.diagnosis.name import ALPHA, DECISIVE
+from bayesimpact.diagnosis.naming import ALPHA, DECISIVE
 from bayesimpact.diagnosis.scan import scan
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.trial.benches import Design

@@ -23,7 +23,7 @@ from bayesimpact.diagnosis.force import (
     trajectory_points,
 )
 from bayesimpact.diagnosis.learned import learned_force, spline_basis
-from bayesimpact.diagnosis.name import State
+from bayesimpact.diagnosis.naming import State
 from bayesimpact.diagnosis.refit import base_candidate
 from bayesimpact.diagnosis.scan import scan
 from bayesimpact.diagnosis.unknown import coefficient_names, learn_force, shape

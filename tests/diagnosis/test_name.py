@@ -9,7 +9,8 @@ import pytest
 from effect_rigs import BY_ID
 
 from bayesimpact.diagnosis.loop import judge, ordered
-from bayesimpact.diagnosis.name import ALPHA, DECISIVE, Naming, State, worth_a_refit
+from bayesimpact.diagnosis.name import worth_a_refit
+from bayesimpact.diagnosis.naming import ALPHA, DECISIVE, Naming, State
 from bayesimpact.diagnosis.refit import Candidate
 
 COST = 3.8

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bayesimpact.diagnosis.name import DECISIVE
+from bayesimpact.diagnosis.naming import DECISIVE
 from bayesimpact.report.figures.power import limits_figure, power_figure
 from bayesimpact.trial.benches import draw_bench
 from bayesimpact.trial.power import (

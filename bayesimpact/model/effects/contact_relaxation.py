@@ -59,7 +59,7 @@ EFFECT = Effect(
             scale=lambda s: 0.3 / s.contact_rate,
             lower=0.0,
             null=None,
-            grid=lambda s: np.geomspace(0.03, 3.0, 5) / s.contact_rate,
+            grid=lambda s: np.geomspace(0.03, 3.0, 9) / s.contact_rate,
         ),
     ),
     law=Law(force, where="contact", rate=rate),

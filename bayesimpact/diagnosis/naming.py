@@ -1,0 +1,122 @@
+"""What a search for names found: models, their odds, rivals, and whether anything is left.
+
+A name needs decisive odds over every rival; what remains beside it must be white.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayesimpact.diagnosis.force import MissingForce
+from bayesimpact.diagnosis.refit import Candidate, tempered_evidence
+from bayesimpact.diagnosis.scan import Scan
+from bayesimpact.inference.fit import Fit
+
+ALPHA = 0.004  # of each of the three tests that ask whether anything is missing
+DECISIVE = 5.5  # nats of log odds that a name needs over every rival (2 ln odds of 11)
+GROSS = 3.0  # residual over noise from which on a misfit is no longer concealed
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """One model on the way, and whether anything is missing from it.
+
+    Attributes
+    ----------
+    candidate : the model
+    scan : scores of everything it lacks
+    force : the force of displacement and velocity that it leaves unexplained
+    drift : the change of stiffness and damping with time that it leaves unexplained
+    """
+
+    candidate: Candidate
+    scan: Scan
+    force: MissingForce
+    drift: MissingForce
+
+    @property
+    def is_white(self) -> bool:
+        """True when neither the catalogue nor an unknown force explains anything more."""
+        return min(self.scan.p_value, self.force.p_value, self.drift.p_value) >= ALPHA
+
+    @property
+    def unknown(self) -> MissingForce:
+        """The likelier one of both free forces."""
+        return max(self.force, self.drift, key=lambda f: f.log_evidence)
+
+
+@dataclass(frozen=True, eq=False)
+class Naming:
+    """The outcome of the search for names.
+
+    Attributes
+    ----------
+    base, chosen : first and last state
+    tried : every model that was fitted, best first
+    prior_cost : nats per added effect
+    spread : samples over which the best model's residual repeats itself, where the misfit is gross
+    """
+
+    base: State
+    chosen: State
+    tried: tuple[Candidate, ...]
+    prior_cost: float
+    spread: float = 1.0
+
+    def log_odds(self, candidate: Candidate) -> float:
+        """Log posterior odds of a model against the base model."""
+        return (
+            tempered_evidence(candidate, self.spread)
+            - tempered_evidence(self.base.candidate, self.spread)
+            - self.prior_cost * len(candidate.effects)
+        )
+
+    def rivals(self) -> tuple[Candidate, ...]:
+        """Models that lack a chosen effect and come within the decisive odds.
+
+        One with more effects must be the likelier one: two effects imitate a third more often than
+        the price of an effect allows for.
+        """
+        chosen = self.chosen.candidate
+        reached = self.log_odds(chosen)
+        return tuple(
+            c
+            for c in self.tried
+            if self.log_odds(c) > reached - DECISIVE * (len(c.effects) <= len(chosen.effects))
+            and not set(chosen.ids) <= set(c.ids)
+            and not _is_elaboration(c, chosen)
+        )
+
+    def prefers_learned_force(self) -> bool:
+        """True when one free force beats the chosen effects decisively.
+
+        An effect that imitates a force outside the catalogue loses to that force. Where the chosen
+        effects leave nothing, no force can gain more than they do, whatever the linearised problem
+        promises.
+        """
+        force, chosen = self.base.unknown, self.chosen.candidate
+        evidence = force.log_evidence
+        if self.chosen.is_white:
+            reached = chosen.fit.log_likelihood - self.base.candidate.fit.log_likelihood
+            evidence -= max(0.0, force.gain - reached - DECISIVE)
+        return evidence / self.spread > self.log_odds(chosen) + DECISIVE
+
+    def probability(self, effect_id: str) -> float:
+        """Probability that an effect is part of the model, over all models tried."""
+        odds = np.array([self.log_odds(c) for c in self.tried])
+        weight = np.exp(odds - odds.max())
+        have = np.array([effect_id in c.ids for c in self.tried])
+        return float(weight[have].sum() / weight.sum())
+
+
+def is_gross(fit: Fit) -> bool:
+    """True when the residual dwarfs the noise."""
+    return fit.reduced_chi2 > GROSS**2
+
+
+def _is_elaboration(candidate: Candidate, chosen: Candidate) -> bool:
+    """True when the candidate only refines the chosen model (`Effect.prefer`)."""
+    extra = [e for e in candidate.effects if e.id not in chosen.ids]
+    return bool(extra) and all(e.prefer in chosen.ids for e in extra)
