@@ -12,8 +12,7 @@ import numpy as np
 from bayesimpact.data.campaign import Beam, Campaign
 from bayesimpact.trial.rig import Release, Rig, make_campaign
 from bayesimpact.trial.rig_chain import Chain
-from bayesimpact.trial.rig_files import write_campaign
-from bayesimpact.trial.truth import TRUTH_FILE
+from bayesimpact.trial.rig_files import TRUTH_FILE, write_campaign
 
 PAPER_RIG = Rig(
     mass=0.503,

@@ -10,6 +10,9 @@ from typing import Any
 from bayesimpact.data.campaign import Beam, Campaign, Measurement, Smoothing
 from bayesimpact.data.recording import Recording
 
+TRUTH_FILE = "truth.json"
+"""What a bundled campaign conceals, beside its recordings."""
+
 
 def write_campaign(
     folder: Path, campaign: Campaign, *, decimals: int = 6, comment: str = ""

@@ -12,8 +12,8 @@ from bayesimpact.errors import InputError
 from bayesimpact.report.rows import Z90
 from bayesimpact.report.tables import signed
 from bayesimpact.report.units import decimals, display, number, significant, typeset
+from bayesimpact.trial.rig_files import TRUTH_FILE
 
-TRUTH_FILE = "truth.json"
 NAMES = ("c1", "k1", "c2", "g", "k2")
 """Parameters that are compared, beside those of the hidden effects."""
 

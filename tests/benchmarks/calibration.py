@@ -25,7 +25,7 @@ def sbc(chosen: argparse.Namespace) -> dict:
     """Ranks of all models."""
     models = chosen.models.split(",") if chosen.models else list(MODELS)
     seeds = range(chosen.seed, chosen.seed + chosen.replicates)
-    result: dict = {"method": chosen.method, "models": {}}
+    result: dict = {"method": chosen.method, "replicates": len(seeds), "models": {}}
     for model in models:
         jobs = ((seed, (model, seed, chosen.method)) for seed in seeds)
         with executor(chosen.workers, chosen.scheduler) as spread:

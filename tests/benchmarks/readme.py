@@ -139,52 +139,32 @@ def coverage_table() -> str:
     return grid(("parameter", "90 % intervals that hold the truth", "of"), rows, foot)
 
 
-def share(row: dict) -> str:
-    """A rate with its interval."""
-    low, high = row["interval"]
-    return f"{row['hits']} of {row['of']} ({100 * low:.0f} to {100 * high:.0f} %)"
-
-
-def trials_table() -> str:
-    """Blind trials: what the diagnosis said of what was concealed."""
-    t = stored("trials")
-    five, two = stored("five_limits"), stored("two_limits")
-    low, high = t["settings"]["strength"]
+def sbc_table() -> str:
+    """Simulation-based calibration."""
+    s = stored("sbc")
     rows = [
-        ("nothing concealed: called adequate", share(t["right"]["control"])),
-        ("one effect: named", share(t["right"]["single"])),
-        ("two effects: both named", share(t["right"]["pair"])),
-        ("a force outside the catalogue: called unknown", share(t["right"]["outside"])),
-        ("a wrong name given with confidence, all of these", share(t["confident_wrong_names"])),
-        ("right place", share(t["place"])),
-        ("sizes inside their 90 % interval, where named", share(t["sizes_inside"])),
-        ("one effect at five limits: named", share(five["right"]["single"])),
-        ("one effect at two limits: named", share(two["right"]["single"])),
-        ("one effect at two limits: wrong name", share(two["confident_wrong_names"])),
+        (
+            model,
+            f"{len(found['parameters'])}",
+            ", ".join(found["outside"]) or "none",
+            f"{100 * min(p['covered_90'] for p in found['parameters'].values()):.0f} to "
+            f"{100 * max(p['covered_90'] for p in found['parameters'].values()):.0f} %",
+        )
+        for model, found in s["models"].items()
     ]
-    foot = (
-        f"Sizes of {low:g} to {high:g} detection limits (a limit is five standard errors) in the "
-        f"first seven rows; {len(t['by_bench'])} rigs, {len(t['by_noise'])} kinds of noise; median "
-        f"{t['seconds']['median']:.0f} s a diagnosis. In brackets: 95 % interval. Commit "
-        f"{t['commit'][:7]}, {t['date']}."
+    head = (
+        "model",
+        "quantities ranked",
+        "outside the 99 % band",
+        "90 % intervals hold the truth in",
     )
-    return grid(("concealed", "answers"), rows, foot)
-
-
-def trial_coverage_table() -> str:
-    """Intervals before and after naming."""
-    t = stored("trials")["coverage"]
-    rows = [
-        (name, share(t["concealed"][name]["before"]), share(t["named"][name]["after"]))
-        for name in ("c1", "k1", "c2", "g", "k2")
-    ]
-    head = ("90 % intervals that hold the truth", "base model, something concealed", "after naming")
-    return grid(head, rows, "From the first seven rows' trials.")
+    return grid(
+        head, rows, f"{s['replicates']} replicates each. Commit {s['commit'][:7]}, {s['date']}."
+    )
 
 
 TABLES = {
-    "trials": trials_table,
-    "trial coverage": trial_coverage_table,
+    "sbc": sbc_table,
     "kernel": kernel_table,
     "peers": peers_table,
     "samplers": samplers_table,

@@ -1,4 +1,4 @@
-"""The proof in small: twenty blind trials of every kind, end to end, with the real diagnosis."""
+"""The proof in small: blind trials of every kind, end to end, with the real diagnosis."""
 
 from __future__ import annotations
 
@@ -12,19 +12,17 @@ from bayesimpact.trial.settings import Settings
 from bayesimpact.trial.summary import summarise
 from bayesimpact.trial.table import summary_text
 
-# Seed s draws kinds[s % 4]; sizes are far above the limits, for this rig is short and tells less
-# than the paper's.
+# One of each kind that costs little. Seed s draws kinds[s % 4]; sizes are far above the limits, for
+# this rig is short and tells less than the paper's.
 SETTINGS = Settings(
-    effects=(
-        "sensor_quadratic", "stiffness_drift", "coulomb_friction", "spring_cubic", "gap_wear",
-    ),
-    outside=("detent", "damping_bump"),
+    effects=("sensor_quadratic", "stiffness_drift"),
+    outside=("detent",),
     strength=(6.0, 8.0),
     benches=("small",),
     noises=("white",),
     search=False,
-)  # fmt: skip
-SEEDS = range(20)
+)
+SEEDS = range(4)
 
 
 def timeless(result: dict) -> dict:
