@@ -257,7 +257,8 @@ def demo(ctx: click.Context, out: Path, seed: int, quiet: bool) -> None:
 
     First the main job, from raw recordings to posterior and report (in DIR). Then a campaign that
     hides something: its base fit looks right; the diagnosis says what is missing and corrects the
-    stiffness (in DIR/concealed). What was hidden is opened at the very end, beside the answer.
+    stiffness (in DIR/concealed; as `diagnose --quick`). What was hidden is opened at the very end,
+    beside the answer.
     """
     from bayesimpact.data.bundled import bundled_campaign
     from bayesimpact.data.read import load_campaign
@@ -272,7 +273,7 @@ def demo(ctx: click.Context, out: Path, seed: int, quiet: bool) -> None:
     first = sample_campaign(open_book, made_folder(out), **told)
     announce(first, out, quiet)
     say("part 2: recordings that hide something")
-    second = diagnose_campaign(concealed, made_folder(out / "concealed"), **told)
+    second = diagnose_campaign(concealed, made_folder(out / "concealed"), quick=True, **told)
     announce(second, out / "concealed", quiet)
     if not quiet:
         from bayesimpact.trial.truth import compared, open_truth
