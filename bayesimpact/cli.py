@@ -288,14 +288,14 @@ def demo(ctx: click.Context, out: Path, seed: int, quiet: bool) -> None:
 @common
 def effects(seed: int, quiet: bool) -> None:
     """List the catalogue of effects: equations, parameters and units."""
-    from bayesimpact.model.effects import EFFECTS
+    from bayesimpact.model.effects.catalogue import catalogue
 
-    for effect in EFFECTS:
-        click.echo(f"{effect.id}\n    {effect.title}: {effect.equation}   [{effect.family}]")
-        for parameter in effect.parameters:
-            null = "" if parameter.null is None else f", vanishes at {parameter.null:g}"
+    for row in catalogue():
+        click.echo(f"{row.id}\n    {row.title}: {row.equation}   [{row.family}]")
+        for parameter in row.parameters:
+            null = "" if parameter.null == "-" else f", vanishes at {parameter.null}"
             scope = "" if parameter.scope == "campaign" else f", one per {parameter.scope}"
-            click.echo(f"    {effect.id}.{parameter.name} ({parameter.unit}{null}{scope})")
+            click.echo(f"    {parameter.name} ({parameter.unit}{null}{scope})")
 
 
 main.add_command(trial)

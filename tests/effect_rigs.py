@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -10,6 +11,9 @@ from naive_general import Naive
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.recording import Recording
+from bayesimpact.diagnosis.extend import campaign_scales, extend, transfer
+from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.identify import Identification
 from bayesimpact.model.effects import EFFECTS, Effect, EffectParameter, Scales
 from bayesimpact.model.oscillator import Oscillator, build_oscillator
 from bayesimpact.trial.rig import Release, Rig, motion
@@ -178,3 +182,13 @@ def by_rig(
     return motion(
         oscillator, release, numbers, rate=rig.rate, duration=rig.duration, rtol=1e-13, atol=1e-16
     ).displacement
+
+
+def with_effect(small: Identification, effect_id: str, **values: float) -> Fit:
+    """The small rig's fit with an effect of given size put beside it."""
+    scales, effects = campaign_scales(small.fit), (BY_ID[effect_id],)
+    target = extend(small.fit, effects, scales)
+    mode = transfer(small.fit, target.oscillator.layout, effects, scales, {})
+    for name, value in values.items():
+        mode[target.oscillator.layout.index(f"{effect_id}.{name}")] = value
+    return dataclasses.replace(small.fit, target=target, mode=mode)

@@ -12,7 +12,7 @@ from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.priors import Normal, Prior, Priors
 from bayesimpact.model.effects.effect import Effect, EffectParameter, Scales
-from bayesimpact.model.oscillator import Oscillator, build_oscillator
+from bayesimpact.model.oscillator import build_oscillator
 from bayesimpact.model.parameters import Layout, is_added
 
 Array = NDArray[np.float64]
@@ -139,9 +139,3 @@ def difference_steps(fit: Fit, target: Target, sizes: Mapping[str, float]) -> Ar
     sd = {n: s if s > 0 else 1e-6 * max(m, 1e-6) for n, s, m in known}
     names = target.oscillator.layout.names
     return np.array([0.05 * sd[n] if n in sd else 0.05 * sizes[n] for n in names])
-
-
-def swap(oscillator: Oscillator, effects: Sequence[Effect]) -> tuple[Effect, ...]:
-    """Effects of the oscillator followed by those that it has not yet."""
-    have = {e.id for e in oscillator.effects}
-    return (*oscillator.effects, *(e for e in effects if e.id not in have))

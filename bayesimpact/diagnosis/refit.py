@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -130,9 +130,3 @@ def correlation_spread(fit: Fit) -> float:
         last = int(below[0]) if below.size else x.size
         values.append(1.0 + 2.0 * float(np.sum(rho[1:last])))
     return max(1.0, float(np.mean(values)))
-
-
-def effect_values(candidate: Candidate) -> Mapping[str, float]:
-    """Modes of the added effects' parameters."""
-    fit = candidate.fit
-    return {n: float(v) for n, v in zip(fit.names, fit.mode, strict=True) if is_added(n)}

@@ -2,38 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.diagnosis.extend import difference_steps, extend, transfer
-from bayesimpact.diagnosis.force import trajectory_points
-from bayesimpact.diagnosis.learned import spline_basis
 from bayesimpact.diagnosis.naming import State
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.model.effects.effect import Scales
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class ForceShape:
-    """A learned force along the displacement.
-
-    Attributes
-    ----------
-    displacement : (n,), m
-    conservative, dissipative : a(y) N and b(y) N s/m, (n,)
-    conservative_rms, dissipative_rms : of a and of b v along the motion, N
-    """
-
-    displacement: Array
-    conservative: Array
-    dissipative: Array
-    conservative_rms: float
-    dissipative_rms: float
 
 
 def learn_force(state: State, scales: Scales) -> Fit:
@@ -57,26 +35,3 @@ def learn_force(state: State, scales: Scales) -> Fit:
 def coefficient_names(knots: int) -> tuple[str, ...]:
     """Names of the coefficients in theta, conservative ones first."""
     return tuple(f"learned_force.{part}{i + 1}" for part in "ab" for i in range(knots))
-
-
-def shape(fit: Fit, state: State, points: int = 200) -> ForceShape:
-    """The learned force of a fit along the displacement."""
-    force = state.force
-    values = dict(zip(fit.names, fit.mode, strict=True))
-    coefficients = np.array([values[n] for n in coefficient_names(force.knots)])
-    a, b = coefficients[: force.knots], coefficients[force.knots :]
-    y = np.linspace(force.low, force.low + force.spacing * (force.knots - 3), points)
-    basis = spline_basis(y, force.low, force.spacing, force.knots)
-    along = [
-        (spline_basis(x, force.low, force.spacing, force.knots), v)
-        for x, v in trajectory_points(fit)
-    ]
-    conservative = np.concatenate([m @ a for m, _ in along])
-    dissipative = np.concatenate([(m @ b) * v for m, v in along])
-    return ForceShape(
-        y,
-        basis @ a,
-        basis @ b,
-        float(np.std(conservative)),
-        float(np.sqrt(np.mean(dissipative**2))),
-    )

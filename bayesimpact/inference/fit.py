@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -152,8 +152,3 @@ def inverse(matrix: Array) -> Array:
 def marginal_sd(matrix: Array) -> Array:
     """Standard deviations that go with an information matrix."""
     return np.asarray(np.sqrt(np.maximum(np.diag(inverse(matrix)), 0.0)))
-
-
-def refit(fit: Fit, **changes: object) -> Fit:
-    """The same fit with some fields replaced."""
-    return replace(fit, **changes)  # type: ignore[arg-type]

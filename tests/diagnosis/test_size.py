@@ -2,26 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from effect_rigs import BY_ID
+from effect_rigs import BY_ID, with_effect
 
-from bayesimpact.diagnosis.extend import campaign_scales, extend, transfer
+from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.force import trajectory_points
 from bayesimpact.diagnosis.size import amount, peak_force, size, size_in_words
-from bayesimpact.inference.fit import Fit
-
-
-def with_effect(small, effect_id: str, **values: float) -> Fit:
-    """The small rig's fit with an effect of given size put beside it."""
-    scales, effects = campaign_scales(small.fit), (BY_ID[effect_id],)
-    target = extend(small.fit, effects, scales)
-    mode = transfer(small.fit, target.oscillator.layout, effects, scales, {})
-    for name, value in values.items():
-        mode[target.oscillator.layout.index(f"{effect_id}.{name}")] = value
-    return replace(small.fit, target=target, mode=mode)
 
 
 def test_peak_force_along_the_motion(small):

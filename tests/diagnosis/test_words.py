@@ -8,21 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import small_rig
-from effect_rigs import BY_ID
+from effect_rigs import BY_ID, with_effect
 
-from bayesimpact.diagnosis.extend import campaign_scales, extend, transfer
 from bayesimpact.diagnosis.words import parameter_shifts, statement, summary
-from bayesimpact.inference.fit import Fit
-
-
-def with_effect(small, effect_id: str, **values: float) -> Fit:
-    """The small rig's fit with an effect of given size put beside it."""
-    scales, effects = campaign_scales(small.fit), (BY_ID[effect_id],)
-    target = extend(small.fit, effects, scales)
-    mode = transfer(small.fit, target.oscillator.layout, effects, scales, {})
-    for name, value in values.items():
-        mode[target.oscillator.layout.index(f"{effect_id}.{name}")] = value
-    return replace(small.fit, target=target, mode=mode)
 
 
 def test_shifts_are_what_ignoring_did(small):
