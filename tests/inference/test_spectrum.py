@@ -1,0 +1,68 @@
+"""Undeclared filters: proved by the noise spectrum, and never where there is none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import small_rig
+from scipy.signal import savgol_filter
+
+from bayesimpact.data.campaign import Smoothing
+from bayesimpact.data.recording import Recording
+from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.spectrum import find_smoothing, nulls
+from bayesimpact.trial.rig_chain import Chain
+
+FILTERS = [(7, 2), (11, 2), (15, 4), (21, 2), (31, 4)]
+
+
+@pytest.fixture(scope="module")
+def silent():
+    return small_rig.record(chain=Chain())
+
+
+def noisy(silent, seed: int, rho: float = 0.0, sigma: float = small_rig.NOISE) -> list[Recording]:
+    rng, noise = np.random.default_rng(seed), Noise(rho)
+    return [
+        replace(r, samples=r.samples + noise.coloured(rng, r.samples.size, r.interval, sigma))
+        for r in silent.recordings
+    ]
+
+
+def filtered(recordings: list[Recording], window: int, order: int) -> list[Recording]:
+    """SciPy's own filter, as a lab would have used it."""
+    return [replace(r, samples=savgol_filter(r.samples, window, order)) for r in recordings]
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.6])
+@pytest.mark.parametrize(("window", "order"), FILTERS)
+def test_a_filter_is_found_behind_white_and_coloured_noise(silent, window, order, rho):
+    found = find_smoothing(filtered(noisy(silent, window, rho), window, order))
+    assert found is not None
+    assert found.smoothing == Smoothing("savgol", window, order)
+    assert found.log_ratio > 20
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.5, 0.9])
+def test_no_filter_is_found_where_there_is_none(silent, rho):
+    for seed in range(5):
+        assert find_smoothing(noisy(silent, seed, rho)) is None
+
+
+def test_rounding_and_a_lag_are_no_such_filter(silent):
+    digit = 5e-6
+    rounded = [replace(r, samples=np.round(r.samples / digit) * digit) for r in noisy(silent, 1)]
+    assert find_smoothing(rounded) is None
+    lag = Smoothing("lag", time_constant=2e-3)
+    chain = Chain(noise=small_rig.NOISE, smoothing=lag, offsets=small_rig.OFFSETS)
+    assert find_smoothing(small_rig.record(chain=chain).recordings) is None
+
+
+@pytest.mark.parametrize(("window", "order"), FILTERS)
+def test_nulls_are_where_a_sine_vanishes(window, order):
+    t = np.arange(4000) * 1e-3
+    for frequency in nulls(Smoothing("savgol", window, order), 1e-3, count=2):
+        wave = savgol_filter(np.sin(2 * np.pi * frequency * t), window, order)[window:-window]
+        assert np.abs(wave).max() < 5e-3
