@@ -1,0 +1,63 @@
+"""Filters that nobody declared: a lag is an effect, a Savitzky-Golay filter shows in the noise."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import small_rig
+from effect_rigs import BY_ID
+
+from bayesimpact.data.campaign import Measurement, Smoothing
+from bayesimpact.diagnosis.document import document
+from bayesimpact.diagnosis.loop import Diagnosis, diagnose
+from bayesimpact.diagnosis.smoothing import proved_smoothing
+from bayesimpact.trial.rig_chain import Chain
+
+CATALOGUE = tuple(
+    BY_ID[i] for i in ("smoothing", "coulomb_friction", "contact_hardening", "sensor_cubic")
+)
+
+
+def recorded(seed: int, smoothing: Smoothing, measurement: Measurement | None = None):
+    chain = Chain(noise=small_rig.NOISE, offsets=small_rig.OFFSETS, smoothing=smoothing)
+    return small_rig.record(seed, chain=chain, duration=1.5, measurement=measurement)
+
+
+def run(campaign) -> Diagnosis:
+    return diagnose(campaign, rng=np.random.default_rng(0), effects=CATALOGUE, search=False)
+
+
+def test_a_lag_is_named_with_its_time_constant():
+    truth = 1e-3
+    diagnosis = run(recorded(5, Smoothing("lag", time_constant=truth)))
+    assert diagnosis.verdict == "named"
+    assert [e.id for e in diagnosis.effects] == ["smoothing"]
+    found = diagnosis.after
+    sd = found.sd[found.names.index("smoothing.time_constant")]
+    assert abs(found.value("smoothing.time_constant") - truth) < 4 * sd < 0.2 * truth
+    assert diagnosis.location.regime == "measurement"
+
+
+@pytest.fixture(scope="module")
+def undeclared() -> Diagnosis:
+    return run(recorded(6, Smoothing("savgol", window=15, polyorder=2)))
+
+
+def test_a_filter_is_named_with_window_and_order(undeclared):
+    assert undeclared.verdict == "named"
+    content = document(undeclared, seed=0, seconds=1.0, versions={})
+    (effect,) = content["effects"]
+    assert effect["id"] == "smoothing"
+    assert effect["parameters"]["smoothing.window"]["median"] == 15
+    assert effect["parameters"]["smoothing.order"]["median"] == 2
+    truth = small_rig.true_values()
+    after = undeclared.after
+    for name in ("k2[1]", "k2[2]", "g", "k1"):
+        assert abs(after.value(name) - truth[name]) < 4 * after.sd[after.names.index(name)]
+
+
+def test_a_declared_filter_is_not_looked_for():
+    smoothing = Smoothing("savgol", window=15, polyorder=2)
+    assert proved_smoothing(recorded(6, smoothing)).smoothing == smoothing
+    declared = Measurement(smoothing=smoothing)
+    assert proved_smoothing(recorded(6, smoothing, declared)) is None
