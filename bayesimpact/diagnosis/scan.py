@@ -101,10 +101,12 @@ class _Test:
         self, projection: Projection, group: NDArray[np.int64], direction: Direction
     ) -> None:
         basis = _contrasts(group.size) if direction.contrast else np.eye(group.size)
-        block = basis.T @ projection.information[np.ix_(group, group)] @ basis
-        scale = np.sqrt(np.maximum(np.diag(block), 1e-300))
+        information = projection.information[np.ix_(group, group)]
+        block = basis.T @ information @ basis
+        alone = np.diag(information) @ basis**2  # were the sizes of a group not alike
+        scale = np.sqrt(np.maximum(alone, 1e-300))
         values, vectors = np.linalg.eigh(block / np.outer(scale, scale))
-        kept = values > RANK_TOLERANCE * max(values[-1], 1e-300)
+        kept = values > RANK_TOLERANCE * max(values[-1], 1.0)
         root = basis @ (vectors[:, kept] / np.sqrt(values[kept]) / scale[:, None])
         self.group, self.rank = group, int(kept.sum())
         self.one_sided = direction.one_sided and group.size == 1 == self.rank

@@ -182,6 +182,25 @@ def test_the_best_score_of_every_effect():
     assert [(s.effect.id, s.z) for s in found] == [("spring_cubic", -4.0), ("gap_wear", 2.0)]
 
 
+def test_equal_values_per_case_are_no_contrast():
+    """A damping per case whose cases cannot be told apart says nothing, not even noise."""
+    kind = replace(record("contact_damping_per_case", 2), contrast=True)
+    p = projection(np.ones((2, 2)), np.array([3.0, 3.0]))
+    test = _Test(p, np.arange(2), kind)
+    assert test.rank == 0
+    np.testing.assert_array_equal(test.p_values(np.array([[3.0, 3.0], [9.0, 9.0]])), 1.0)
+
+
+def test_an_effect_starts_from_its_best_shapes():
+    """Other effects and shapes that promise less than half as much are no starting points."""
+    kinds = [record(e, 1) for e in ("spring_cubic", "spring_cubic", "gap_wear", "spring_cubic")]
+    found = scan_of(np.eye(4), np.array([3.5, -4.0, 5.0, 2.5]), kinds)
+    best = next(s for s in found.best() if s.effect.id == "spring_cubic")
+    assert [s.z for s in found.starts(best, 1)] == [-4.0]
+    assert [s.z for s in found.starts(best, 2)] == [-4.0, 3.5]
+    assert [s.z for s in found.starts(best, 4)] == [-4.0, 3.5]
+
+
 def test_pairs_are_ranked_by_their_joint_gain():
     rng = np.random.default_rng(5)
     names = ("spring_cubic", "spring_quadratic", "stiffness_drift", "sensor_drift")

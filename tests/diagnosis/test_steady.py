@@ -10,8 +10,8 @@ import pytest
 import small_rig
 from effect_rigs import BY_ID
 
-from bayesimpact.diagnosis.extend import campaign_scales
-from bayesimpact.diagnosis.periodic import periodic_scores
+from bayesimpact.diagnosis.extend import campaign_scales, extend, transfer
+from bayesimpact.diagnosis.periodic import periodic_scores, shakes_in_own_band
 from bayesimpact.diagnosis.refit import refit
 from bayesimpact.diagnosis.steady import steadiness
 from bayesimpact.inference.identify import identify
@@ -58,3 +58,19 @@ def test_what_is_not_steady_does_not(envelope):
 
 def test_a_model_without_a_line_has_nothing_to_be_steady(small):
     assert steadiness(small.fit, campaign_scales(small.fit)) == ()
+
+
+@pytest.mark.parametrize(("factor", "own"), [(1.0, True), (1.7, False)])
+def test_a_force_in_the_band_of_the_motion_is_told_apart(factor, own):
+    """A plain oscillator swings at one frequency only; a force elsewhere may be one."""
+    rig, releases = small_rig.PLAIN, small_rig.PLAIN_RELEASES
+    fit = identify(
+        small_rig.record(rig=rig, releases=releases), rng=np.random.default_rng(0), search=False
+    ).fit
+    assert not shakes_in_own_band(fit)
+    scales, effects = campaign_scales(fit), (BY_ID["harmonic_forcing"],)
+    target = extend(fit, effects, scales)
+    frequency = factor * np.sqrt(rig.k1 / rig.mass) / (2 * np.pi)
+    shapes = {"harmonic_forcing.frequency": frequency}
+    mode = transfer(fit, target.oscillator.layout, effects, scales, shapes)
+    assert shakes_in_own_band(replace(fit, target=target, mode=mode)) is own

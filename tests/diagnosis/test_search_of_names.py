@@ -1,0 +1,138 @@
+"""The path through the models, on a table of made-up evidences: no model is ever fitted."""
+
+from __future__ import annotations
+
+import importlib
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from effect_rigs import BY_ID
+
+from bayesimpact.diagnosis.refit import Candidate
+from bayesimpact.diagnosis.scan import Scan
+from bayesimpact.diagnosis.scores import Score
+
+search = importlib.import_module("bayesimpact.diagnosis.name")
+
+A, B, C, D = "coulomb_friction", "quadratic_drag", "spring_cubic", "gap_wear"
+EFFECTS = tuple(BY_ID[i] for i in (A, B, C, D))
+ENOUGH = 500.0  # a gain at which nothing is left
+
+
+class Table:
+    """Stands for the fits: a gain in log evidence over the base model for every set of effects.
+
+    `forward` has what a fit reaches from a smaller model, where that ends in a worse place than
+    one from a larger model.
+    """
+
+    def __init__(
+        self, gains: dict[str, float], force: float = 0.0, forward: dict[str, float] | None = None
+    ) -> None:
+        self.gains = {frozenset(): 0.0} | {frozenset(k.split()): v for k, v in gains.items()}
+        self.forward = {frozenset(k.split()): v for k, v in (forward or {}).items()}
+        self.force = force
+        self.fitted: list[frozenset[str]] = []
+
+    def gain(self, ids) -> float:
+        """Sets that the table does not have are no better than their best part."""
+        parts = [v for k, v in self.gains.items() if k <= frozenset(ids)]
+        return max(parts)
+
+    def candidate(self, ids, gain: float) -> Candidate:
+        fit = SimpleNamespace(
+            reduced_chi2=1.0, log_likelihood=gain + 10, rms=1.0, ids=tuple(ids), gain=gain
+        )
+        return Candidate(tuple(BY_ID[i] for i in ids), fit, gain)
+
+    def refit(self, fit, scores, scales) -> Candidate:
+        ids = (*fit.ids, *(s.effect.id for s in scores))
+        self.fitted.append(key := frozenset(ids))
+        return self.candidate(ids, self.forward.get(key, self.gain(ids)))
+
+    def without(self, candidate, effect, scales) -> Candidate:
+        ids = [i for i in candidate.ids if i != effect.id]
+        return self.candidate(ids, self.gain(ids))
+
+    def scan(self, fit, effects, scales, *, rng) -> Scan:
+        scores = tuple(
+            self.score(e, self.gain((*fit.ids, e.id)) - fit.gain)
+            for e in effects
+            if e.id not in fit.ids
+        )
+        p = 0.5 if fit.gain >= ENOUGH else 1e-6
+        return Scan(scores, p, None, (), ())
+
+    @staticmethod
+    def score(effect, gain: float) -> Score:
+        none = np.zeros(0)
+        return Score(effect, {}, 0.0, 1.0, none, none, 0.0, none, 1.0, gain, ())
+
+    def missing(self, fit, scales, *, rng):
+        left = self.force - fit.gain
+        return SimpleNamespace(p_value=0.5, log_evidence=left, gain=left + 20)
+
+
+@pytest.fixture
+def run(monkeypatch):
+    def go(table: Table):
+        monkeypatch.setattr(search, "refit", table.refit)
+        monkeypatch.setattr(search, "without", table.without)
+        monkeypatch.setattr(search, "scan", table.scan)
+        monkeypatch.setattr(search, "promising_pairs", lambda scan, count: ())
+        for force in ("missing_force", "missing_drift"):
+            monkeypatch.setattr(search, force, table.missing)
+        monkeypatch.setattr(
+            search, "base_candidate", lambda fit: table.candidate((), table.gain(()))
+        )
+        fit = SimpleNamespace()
+        return search.name(fit, EFFECTS, None, rng=np.random.default_rng(0))
+
+    return go
+
+
+def chosen(naming) -> set[str]:
+    return set(naming.chosen.candidate.ids)
+
+
+def test_nothing_is_fitted_where_nothing_is_missing(run):
+    table = Table({"": ENOUGH})
+    assert chosen(run(table)) == set() and table.fitted == []
+
+
+def test_the_best_single_effect_ends_the_search(run):
+    table = Table({A: ENOUGH, B: 400.0})
+    assert chosen(run(table)) == {A}
+    assert all(len(ids) == 1 for ids in table.fitted)
+
+
+def test_a_pair_is_reached_though_its_best_part_is_not_the_best_single(run):
+    """Greedy selection from D alone would need three effects."""
+    table = Table({D: 300.0, A: 280.0, B: 200.0, f"{A} {B}": 600.0, f"{D} {A} {B}": 601.0})
+    assert chosen(run(table)) == {A, B}
+
+
+def test_an_effect_that_is_hardly_needed_is_left_out(run):
+    """Friction alone leaves nothing once it has been fitted from the pair."""
+    table = Table({A: 505.0, B: 250.0, f"{A} {B}": 510.0}, forward={A: 300.0})
+    assert chosen(run(table)) == {A}
+    needed = Table({A: 497.0, B: 250.0, f"{A} {B}": 510.0}, forward={A: 300.0})
+    assert chosen(run(needed)) == {A, B}
+
+
+def test_an_exchange_replaces_an_imitation(run):
+    """The path to the three leads over the pair {A, C}; from {A, B} one with D is better."""
+    pairs = {f"{A} {C}": 450.0, f"{A} {B}": 440.0, f"{B} {C}": 430.0}
+    triples = {f"{A} {B} {C}": 520.0, f"{A} {B} {D}": 560.0}
+    table = Table({A: 400.0, C: 380.0, B: 300.0, D: 100.0} | pairs | triples)
+    assert chosen(run(table)) == {A, B, D}
+
+
+def test_the_search_ends_when_a_free_force_will_beat_all_names(run):
+    steps = {A: 100.0, f"{A} {B}": 120.0, f"{A} {B} {C}": 140.0}
+    hopeless, hopeful = Table(steps, force=2000.0), Table(steps, force=130.0)
+    run(hopeless)
+    run(hopeful)
+    assert max(map(len, hopeless.fitted)) == 1
+    assert max(map(len, hopeful.fitted)) == 3
