@@ -169,7 +169,7 @@ def fill_table(
     table[ONE] = 1.0
     table[D_, 0] = 1.0
     S, D, G, H = table[S_], table[D_], table[G_], table[H_]
-    a = 1
+    a = np.int64(1)  # typed: a literal would be compiled for separately
     while a <= LENGTH:
         fill_basis(value, rate, b, K, w, forced, float(a))
         v = value

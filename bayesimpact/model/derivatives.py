@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -17,7 +16,7 @@ from bayesimpact.errors import InputError
 from bayesimpact.model import batch as compiled_batch
 from bayesimpact.model.arguments import ModelArguments, check_model, check_samples, no_samples
 from bayesimpact.model.basis import FORCED, PLAIN
-from bayesimpact.model.batch import Floats, Ints, Span, gather, share
+from bayesimpact.model.batch import Floats, Ints, Span, gather
 from bayesimpact.model.blocks import Sink
 from bayesimpact.model.compiled import compiled
 from bayesimpact.model.kernel import run
@@ -56,7 +55,7 @@ def find_events(
     return events[:count], code
 
 
-@compiled()
+@compiled(nogil=True)
 def work(
     theta: Floats, columns: Ints, constants: Floats, mass: float, samples: Floats, starts: Ints,
     counts: Ints, intervals: Floats, size: int, rows: Span, items: Span, out: Floats,
@@ -97,21 +96,6 @@ def work(
                 own[:] = np.nan
                 slopes[:] = np.nan
             codes[b, r] = code
-
-
-@compiled(parallel=True)
-def work_in_parts(
-    theta: Floats, columns: Ints, constants: Floats, mass: float, samples: Floats, starts: Ints,
-    counts: Ints, intervals: Floats, size: int, parts: int, out: Floats, values: Floats,
-    jacobian: Floats, codes: Ints,
-) -> None:  # fmt: skip
-    """As `work`, all shares, in parallel."""
-    for part in numba.prange(parts):
-        rows, items = share(part, parts, codes.shape[0], codes.shape[1])
-        work(
-            theta, columns, constants, mass, samples, starts, counts, intervals, size, rows, items,
-            out, values, jacobian, codes,
-        )  # fmt: skip
 
 
 def trajectories_and_derivatives(
@@ -180,13 +164,12 @@ def _work(
     codes = np.empty((batch, recordings), dtype=np.int64)
     # derivatives with respect to the force are wanted also where it is 0
     forced = np.any(model.columns[:, A] >= 0) or np.any(model.constants[:, A] != 0.0)
-    arguments = (
+    before = (
         model.theta, model.columns, model.constants, float(mass), data, first, model.counts,
         model.intervals, FORCED if forced else PLAIN,
     )  # fmt: skip
-    parts = compiled_batch.parts(batch, int(model.counts.sum()))
-    if parts == 1:
-        work(*arguments, (0, batch), (0, recordings), out, values, jacobian, codes)
-    else:
-        work_in_parts(*arguments, parts, out, values, jacobian, codes)
+    compiled_batch.share_out(
+        lambda rows, items: work(*before, rows, items, out, values, jacobian, codes),
+        batch, recordings, int(model.counts.sum()),
+    )  # fmt: skip
     return codes

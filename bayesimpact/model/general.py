@@ -12,7 +12,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from bayesimpact.model.added.crossing import first_event, suspicious
@@ -48,8 +47,10 @@ from bayesimpact.model.added.world import (
 )
 from bayesimpact.model.callback import floats_at, integers_at
 from bayesimpact.model.compiled import compiled
+from bayesimpact.model.threads import in_shares
 
 OK, BAD_PARAMETERS, TOO_MANY_EVENTS, NOT_FINITE = 0, 1, 2, 3
+THREADING_PAYS = 4  # trajectories from which on
 EVENTS_AT_LEAST, EVENTS_PER_SAMPLE = 1000, 50
 
 
@@ -147,7 +148,7 @@ def walk(w: Any) -> Any:
     """Displacements at the samples, without the sensor's offset; returns a failure code."""
     y, v = begin(w)
     w.out[0] = y
-    t, j = 0.0, 1
+    t, j = 0.0, np.int64(1)  # typed: a literal would be compiled for separately, all the way
     events = EVENTS_AT_LEAST + EVENTS_PER_SAMPLE * w.n
     while j < w.n:
         events -= 1
@@ -181,20 +182,12 @@ def integrate(q: Any, mass: Any, interval: Any, laws: Any, out: Any) -> Any:
     return code
 
 
-@compiled(parallel=True)
-def _on_threads(q: Any, mass: Any, intervals: Any, counts: Any, laws: Any, out: Any) -> Any:
-    codes = np.zeros(q.shape[0], dtype=np.int64)
-    for k in prange(q.shape[0]):
-        codes[k] = integrate(q[k], mass, intervals[k], laws, out[k, : counts[k]])
-    return codes
-
-
-@compiled()
-def _in_turn(q: Any, mass: Any, intervals: Any, counts: Any, laws: Any, out: Any) -> Any:
-    codes = np.zeros(q.shape[0], dtype=np.int64)
+@compiled(nogil=True)
+def _in_turn(
+    q: Any, mass: Any, intervals: Any, counts: Any, laws: Any, out: Any, codes: Any
+) -> Any:
     for k in range(q.shape[0]):
         codes[k] = integrate(q[k], mass, intervals[k], laws, out[k, : counts[k]])
-    return codes
 
 
 def integrate_many(
@@ -205,7 +198,7 @@ def integrate_many(
     laws: NDArray[np.int64],
     out: NDArray[np.float64],
     *,
-    threads: bool = True,
+    threads: bool | None = None,
 ) -> NDArray[np.int64]:
     """Trajectories of many slot vectors, each a recording of its own.
 
@@ -216,7 +209,7 @@ def integrate_many(
     intervals, counts : (K,) sampling intervals, s, and numbers of samples
     laws : (L, 5 or 6) table of laws, see `bayesimpact.model.effects.effect.law_row`
     out : (K, n) receives displacements, m, without the sensor's offset
-    threads : share the work among threads; the numbers do not depend on it
+    threads : share the work among threads; the numbers do not depend on it. None: where it pays
 
     Returns
     -------
@@ -224,17 +217,15 @@ def integrate_many(
     """
     table = np.zeros((laws.shape[0], LAW_COLUMNS), dtype=np.int64)
     table[:, : laws.shape[1]] = laws
-    run = _on_threads if threads else _in_turn
-    return np.asarray(run(np.ascontiguousarray(q), mass, intervals, counts, table, out))
+    codes = np.zeros(q.shape[0], dtype=np.int64)
+    q = np.ascontiguousarray(q)
 
+    def run(first: int, end: int) -> None:
+        some = slice(first, end)
+        _in_turn(q[some], mass, intervals[some], counts[some], table, out[some], codes[some])
 
-def integrate_few(
-    q: NDArray[np.float64],
-    mass: float,
-    intervals: NDArray[np.float64],
-    counts: NDArray[np.int64],
-    laws: NDArray[np.int64],
-    out: NDArray[np.float64],
-) -> NDArray[np.int64]:
-    """The same on one thread, sooner done for a few."""
-    return integrate_many(q, mass, intervals, counts, laws, out, threads=False)
+    if threads or (threads is None and q.shape[0] >= THREADING_PAYS):
+        in_shares(run, q.shape[0])
+    else:
+        run(0, q.shape[0])
+    return codes

@@ -65,7 +65,7 @@ def run(
     limit = EVENTS_AT_LEAST + EVENTS_PER_SAMPLE * n
     t, y, v = 0.0, q[Y0], q[V0] * interval
     total = 0.0
-    count = i = 0
+    count = i = np.int64(0)  # typed: a literal would be compiled for separately
     shelf.history[:] = 0.0
     while True:
         if quick and count > 0:

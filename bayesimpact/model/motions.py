@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.model.general import integrate_few, integrate_many
+from bayesimpact.model.general import integrate_many
 from bayesimpact.model.parameters import BASE_SLOTS
 from bayesimpact.model.simulate import predictions
 
@@ -13,7 +13,6 @@ Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
 _OFFSET = BASE_SLOTS.index("offset")
-_THREADING_PAYS = 4  # trajectories; fewer are done sooner than threads wake up
 
 
 def motions(q: Array, mass: float, counts: Counts, intervals: Array) -> Array:
@@ -39,8 +38,7 @@ def general_motions(
 ) -> Array:
     """The same for oscillators with added effects: slots (K, Q), table of laws (L, 6)."""
     out = np.empty((q.shape[0], int(counts.max())))
-    integrate = integrate_many if q.shape[0] >= _THREADING_PAYS else integrate_few
-    codes = integrate(q, mass, intervals, counts, laws, out)
+    codes = integrate_many(q, mass, intervals, counts, laws, out)
     out[np.arange(out.shape[1]) >= counts[:, None]] = np.nan
     out[codes != 0] = np.nan
     return out
