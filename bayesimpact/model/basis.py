@@ -23,7 +23,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.model.compiled import compiled
+from bayesimpact.model.compiled import compiled, typed
 from bayesimpact.model.flow import forced_response, impulse_response, second_response
 from bayesimpact.model.tables import LENGTH, TERMS, fill_series, nearby, polynomial
 
@@ -169,7 +169,7 @@ def fill_table(
     table[ONE] = 1.0
     table[D_, 0] = 1.0
     S, D, G, H = table[S_], table[D_], table[G_], table[H_]
-    a = np.int64(1)  # typed: a literal would be compiled for separately
+    a = typed(1)
     while a <= LENGTH:
         fill_basis(value, rate, b, K, w, forced, float(a))
         v = value

@@ -7,8 +7,7 @@ that results do not depend on how the work is shared out.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,7 +15,7 @@ from bayesimpact.model.blocks import Sink
 from bayesimpact.model.compiled import compiled
 from bayesimpact.model.kernel import run
 from bayesimpact.model.tables import shelf
-from bayesimpact.model.threads import SHARES_PER_THREAD, available, in_shares
+from bayesimpact.model.threads import SHARES_PER_THREAD, available
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -26,18 +25,20 @@ Span = tuple[int, int]
 SAMPLES_WORTH_THREADS = 100_000
 
 
-def share_out(work: Callable[[Span, Span], None], batch: int, recordings: int, n: int) -> None:
-    """Call work(rows, items) until all of `batch` x `recordings` is done; n samples in all.
+def parts(batch: int, samples: int) -> int:
+    """Return into how many shares a job of `batch` x `samples` samples is cut."""
+    threads = available()
+    if threads == 1 or batch * samples < SAMPLES_WORTH_THREADS:
+        return 1
+    return min(SHARES_PER_THREAD * threads, max(batch, threads))
 
-    A large batch is shared out by its rows, a small one by recordings.
-    """
-    everything = (0, batch), (0, recordings)
-    if available() == 1 or batch * n < SAMPLES_WORTH_THREADS:
-        work(*everything)
-    elif batch >= SHARES_PER_THREAD * available():
-        in_shares(lambda first, end: work((first, end), everything[1]), batch)
-    else:
-        in_shares(lambda first, end: work(everything[0], (first, end)), recordings)
+
+@compiled()
+def share(part: int, parts: int, batch: int, recordings: int) -> tuple[Span, Span]:
+    """Return the rows and the recordings of one of `parts` equal shares of the work."""
+    if batch >= parts:
+        return (part * batch // parts, (part + 1) * batch // parts), (0, recordings)
+    return (0, batch), (part * recordings // parts, (part + 1) * recordings // parts)
 
 
 @compiled()
@@ -48,7 +49,7 @@ def gather(q: Floats, theta: Floats, columns: Ints, constants: Floats) -> None:
         q[i] = theta[column] if column >= 0 else constants[i]
 
 
-@compiled(nogil=True)
+@compiled()
 def work(
     theta: Floats, columns: Ints, constants: Floats, mass: float, samples: Floats, starts: Ints,
     counts: Ints, intervals: Floats, rows: Span, items: Span, sse: Floats, values: Floats,
@@ -75,6 +76,20 @@ def work(
                 _, _, codes[b, r] = run(q, mass, intervals[r], counts[r], sink, mine)
                 if codes[b, r] != 0:
                     out[:] = np.nan
+
+
+@compiled(parallel=True)
+def work_in_parts(
+    theta: Floats, columns: Ints, constants: Floats, mass: float, samples: Floats, starts: Ints,
+    counts: Ints, intervals: Floats, parts: int, sse: Floats, values: Floats, codes: Ints,
+) -> None:  # fmt: skip
+    """As `work`, all shares, in parallel; numba's threads wake up sooner than Python's."""
+    for part in numba.prange(parts):
+        rows, items = share(part, parts, codes.shape[0], codes.shape[1])
+        work(
+            theta, columns, constants, mass, samples, starts, counts, intervals, rows, items,
+            sse, values, codes,
+        )  # fmt: skip
 
 
 @compiled()

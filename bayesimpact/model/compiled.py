@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
+import numpy as np
 
 _ROOT = Path(__file__).parents[2]
 _IMPORT = re.compile(r"^\s*from (bayesimpact[\w.]*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
@@ -74,3 +75,9 @@ def _stamped(dispatcher: Any) -> Any:
         path = Path(dispatcher.py_func.__code__.co_filename)
         cache_file._source_stamp = source_stamp(path)
     return dispatcher
+
+
+@compiled()
+def typed(number: int) -> int:
+    """The same number as one of its type: numba compiles every callee once more for a literal."""
+    return int(np.int64(number))

@@ -23,6 +23,7 @@ from bayesimpact.model.kernel import run
 from bayesimpact.model.scaled import OK, OVERFLOW, A
 from bayesimpact.model.sweep import Lanes, desk, sweep
 from bayesimpact.model.tables import Shelf, shelf
+from bayesimpact.model.threads import in_shares
 
 #: Events for which there is room at first; a recording with more is run once more.
 EVENTS = 256
@@ -168,8 +169,12 @@ def _work(
         model.theta, model.columns, model.constants, float(mass), data, first, model.counts,
         model.intervals, FORCED if forced else PLAIN,
     )  # fmt: skip
-    compiled_batch.share_out(
-        lambda rows, items: work(*before, rows, items, out, values, jacobian, codes),
-        batch, recordings, int(model.counts.sum()),
-    )  # fmt: skip
+
+    def run(start: int, stop: int) -> None:
+        work(*before, (start, stop), (0, recordings), out, values, jacobian, codes)
+
+    if compiled_batch.parts(batch, int(model.counts.sum())) == 1:
+        run(0, batch)
+    else:
+        in_shares(run, batch)
     return codes

@@ -46,7 +46,7 @@ from bayesimpact.model.added.world import (
     World,
 )
 from bayesimpact.model.callback import floats_at, integers_at
-from bayesimpact.model.compiled import compiled
+from bayesimpact.model.compiled import compiled, typed
 from bayesimpact.model.threads import in_shares
 
 OK, BAD_PARAMETERS, TOO_MANY_EVENTS, NOT_FINITE = 0, 1, 2, 3
@@ -148,7 +148,7 @@ def walk(w: Any) -> Any:
     """Displacements at the samples, without the sensor's offset; returns a failure code."""
     y, v = begin(w)
     w.out[0] = y
-    t, j = 0.0, np.int64(1)  # typed: a literal would be compiled for separately, all the way
+    t, j = 0.0, typed(1)
     events = EVENTS_AT_LEAST + EVENTS_PER_SAMPLE * w.n
     while j < w.n:
         events -= 1

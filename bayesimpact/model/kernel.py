@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.model.blocks import Sink, pass_samples
-from bayesimpact.model.compiled import compiled
+from bayesimpact.model.compiled import compiled, typed
 from bayesimpact.model.events import next_event
 from bayesimpact.model.quick import fast_lane
 from bayesimpact.model.scaled import (
@@ -65,7 +65,7 @@ def run(
     limit = EVENTS_AT_LEAST + EVENTS_PER_SAMPLE * n
     t, y, v = 0.0, q[Y0], q[V0] * interval
     total = 0.0
-    count = i = np.int64(0)  # typed: a literal would be compiled for separately
+    count = i = typed(0)
     shelf.history[:] = 0.0
     while True:
         if quick and count > 0:

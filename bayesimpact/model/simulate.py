@@ -214,14 +214,15 @@ def _work(
 ) -> Ints:
     batch, recordings = len(model.theta), len(model.columns)
     codes = np.empty((batch, recordings), dtype=np.int64)
-    before = (
+    arguments = (
         model.theta, model.columns, model.constants, float(mass), data, first, model.counts,
         model.intervals,
     )  # fmt: skip
-    compiled_batch.share_out(
-        lambda rows, items: compiled_batch.work(*before, rows, items, sse, values, codes),
-        batch, recordings, int(model.counts.sum()),
-    )  # fmt: skip
+    parts = compiled_batch.parts(batch, int(model.counts.sum()))
+    if parts == 1:
+        compiled_batch.work(*arguments, (0, batch), (0, recordings), sse, values, codes)
+    else:
+        compiled_batch.work_in_parts(*arguments, parts, sse, values, codes)
     return codes
 
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.model import basis
 from bayesimpact.model.basis import fill_basis, fill_basis_series, fill_table, plain_basis
-from bayesimpact.model.compiled import compiled
+from bayesimpact.model.compiled import compiled, typed
 from bayesimpact.model.lanes import (
     RESIDUAL,
     add_products,
@@ -117,7 +117,7 @@ def sweep(
     dy[Y0], dv[V0], dy[OFFSET] = 1.0, interval, 1.0
     t, y, v = 0.0, q[Y0], q[V0] * interval
     squares = fs = fc = 0.0
-    i = slot = np.int64(0)  # typed: a literal would be compiled for separately
+    i = slot = typed(0)
     for e in range(events.shape[0] + 1):
         if contact:
             side, b, K, rest = 1, motion.b_contact, motion.K_contact, motion.rest

@@ -1,7 +1,7 @@
 """One job in shares on several threads: compiled work lets go of Python's lock while it runs.
 
-Threads of Python, not numba's: nothing is compiled twice, and calls from several threads at once
-are safe with every threading layer.
+Threads of Python, not numba's: nothing is compiled twice. Waking one up takes about 0.1 ms, so this
+is for jobs of milliseconds; the likelihood's batches (`batch`) have numba's.
 """
 
 from __future__ import annotations

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from bayesimpact.model.added.method import quarters
 from bayesimpact.model.added.situation import GAP, HEADING, NONE, TURN, event_value, passed
 from bayesimpact.model.added.step import push, step
 from bayesimpact.model.added.world import AHEAD, NOW
-from bayesimpact.model.compiled import compiled
+from bayesimpact.model.compiled import compiled, typed
 
 TRIALS = 80
 ROUNDS = 8
@@ -74,7 +72,7 @@ def locate(
 
     (y1, v1) is the state after h, where the event's function is negative.
     """
-    now, column, short = np.int64(NOW), AHEAD if flow.memory else NOW, 1e-6 * h
+    now, column, short = typed(NOW), AHEAD if flow.memory else NOW, 1e-6 * h
     f0, d0 = value_and_slope(event, y, v, t, now, short, flow, w)
     f1, d1 = value_and_slope(event, y1, v1, t + h, column, short, flow, w)
     low, high, x = 0.0, h, h * guess(max(f0, 0.0), h * d0, f1, h * d1)
@@ -131,7 +129,7 @@ def first_event(
     column = AHEAD if flow.memory else NOW
     event, length = NONE, h
     if turn_matters(y, v, y1, v1, h, flow, w):
-        event = np.int64(TURN)  # typed: a literal would be compiled for separately
+        event = typed(TURN)
         length, y1, v1 = locate(event, y, v, t, n0, h, y1, v1, flow, w)
     for _ in range(ROUNDS):
         found = passed(y1, v1, t + length, column, event, flow, w)
