@@ -1,6 +1,7 @@
-"""Draws the README's two plots from the stored results: `python tests/benchmarks/figures.py`.
+"""Draws the README's plots from the stored results: `python tests/benchmarks/figures.py`.
 
 peers.svg: time of one simulation against its error. samplers.svg: effective draws per second.
+trials.svg: what the diagnosis said of every concealed effect, against its size.
 """
 
 from __future__ import annotations
@@ -58,7 +59,47 @@ def samplers_figure(content: dict[str, Any]) -> Figure:
     return figure
 
 
-FIGURES = {"peers": peers_figure, "samplers": samplers_figure}
+ANSWERS = {  # outcome -> label, marker, colour
+    "named": ("named", "o", "#0072B2"),
+    "ambiguous": ("ambiguous", "D", "#E69F00"),
+    "called unknown": ("called unknown", "s", "#8A8A8A"),
+    "wrong name": ("wrong name", "X", "#D55E00"),
+    "missed": ("missed", "X", "#000000"),
+}
+
+
+def trials_figure(content: dict[str, Any]) -> Figure:
+    """One mark per concealed effect of the catalogue: row, size, outcome; open marks in pairs."""
+    rows = [a for a in content["answers"] if a["kind"] in ("single", "pair")]
+    effects = content["settings"]["effects"]
+    figure = Figure(figsize=(7.0, 0.9 + 0.24 * len(effects)), layout="constrained")
+    axis = figure.add_subplot()
+    for outcome, (label, marker, colour) in ANSWERS.items():
+        for alone in (True, False):
+            points = [
+                (strength, effects.index(effect) + (-0.13 if alone else 0.13))
+                for a in rows
+                if a["outcome"] == outcome and (a["kind"] == "single") == alone
+                for effect, strength in zip(a["planted"], a["strengths"], strict=True)
+            ]
+            if points:
+                x, y = zip(*points, strict=True)
+                face = colour if alone else "none"
+                words = f"{label}, {'alone' if alone else 'one of two'}"
+                axis.scatter(
+                    x, y, 22, marker=marker, edgecolors=colour, facecolors=face, label=words
+                )
+    axis.set_yticks(range(len(effects)), [e.replace("_", " ") for e in effects])
+    axis.set_ylim(len(effects) - 0.4, -0.6)
+    axis.set_xlabel("size, detection limits")
+    axis.grid(axis="y", color="0.9", lw=0.5)
+    axis.set_axisbelow(True)
+    axis.spines[["top", "right"]].set_visible(False)
+    figure.legend(loc="outside upper right", frameon=False, fontsize="small", ncols=3)
+    return figure
+
+
+FIGURES = {"peers": peers_figure, "samplers": samplers_figure, "trials": trials_figure}
 
 
 def draw(folder: Path = HERE) -> None:

@@ -163,7 +163,49 @@ def sbc_table() -> str:
     )
 
 
+def share(row: dict) -> str:
+    """A rate with its interval."""
+    low, high = row["interval"]
+    return f"{row['hits']} of {row['of']} ({100 * low:.0f} to {100 * high:.0f} %)"
+
+
+def trials_table() -> str:
+    """Blind trials: what the diagnosis said of what was concealed."""
+    t = stored("trials")
+    low, high = t["settings"]["strength"]
+    rows = [
+        ("nothing concealed: called adequate", share(t["right"]["control"])),
+        ("one effect: named", share(t["right"]["single"])),
+        ("two effects: both named", share(t["right"]["pair"])),
+        ("a force outside the catalogue: called unknown", share(t["right"]["outside"])),
+        ("a wrong name given with confidence, all of these", share(t["confident_wrong_names"])),
+        ("right place", share(t["place"])),
+        ("sizes inside their 90 % interval, where named", share(t["sizes_inside"])),
+    ]
+    first, last = t["seeds"]
+    foot = (
+        f"{t['trials']} trials, seeds {first} to {last}; sizes of {low:g} to {high:g} detection "
+        f"limits (a limit is five standard errors); {len(t['by_bench'])} rigs, "
+        f"{len(t['by_noise'])} kinds of noise; median {t['seconds']['median']:.0f} s a diagnosis. "
+        f"In brackets: 95 % interval. Commit {t['commit'][:7]}, {t['date']}."
+    )
+    return grid(("concealed", "answers"), rows, foot)
+
+
+def trial_coverage_table() -> str:
+    """Intervals before and after naming."""
+    t = stored("trials")["coverage"]
+    rows = [
+        (name, share(t["concealed"][name]["before"]), share(t["named"][name]["after"]))
+        for name in ("c1", "k1", "c2", "g", "k2")
+    ]
+    head = ("90 % intervals that hold the truth", "base model, something concealed", "after naming")
+    return grid(head, rows, "From the same trials.")
+
+
 TABLES = {
+    "trials": trials_table,
+    "trial_coverage": trial_coverage_table,
     "sbc": sbc_table,
     "kernel": kernel_table,
     "peers": peers_table,
