@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy import special, stats
 
 from bayesimpact.inference.fit import Fit, inverse
-from bayesimpact.inference.priors import LogNormal, Normal, Uniform
+from bayesimpact.inference.prior import LogNormal, Normal, Uniform
 
 Array = NDArray[np.float64]
 

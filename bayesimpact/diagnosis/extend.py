@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from bayesimpact.inference.defaults import effect_prior
 from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.likelihood import Likelihood
-from bayesimpact.inference.priors import Normal, Prior, Priors
+from bayesimpact.inference.prior import Normal, Prior
+from bayesimpact.inference.priors import Priors
 from bayesimpact.model.effects.effect import Effect, EffectParameter, Scales
 from bayesimpact.model.oscillator import build_oscillator
 from bayesimpact.model.parameters import Layout, is_added

@@ -20,16 +20,8 @@ import numpy as np
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.inference.noise import Noise
-from bayesimpact.inference.priors import (
-    HalfNormal,
-    LogNormal,
-    LogUniform,
-    Normal,
-    Prior,
-    Priors,
-    Uniform,
-    prior_from_table,
-)
+from bayesimpact.inference.prior import HalfNormal, LogNormal, LogUniform, Normal, Prior, Uniform
+from bayesimpact.inference.priors import Priors, prior_from_table
 from bayesimpact.model.effects.effect import Effect, EffectParameter, Scales
 from bayesimpact.model.oscillator import Oscillator
 from bayesimpact.model.parameters import is_added

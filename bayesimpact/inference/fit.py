@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.inference.likelihood import Likelihood, Linearisation
-from bayesimpact.inference.priors import LogNormal, Prior, Priors
+from bayesimpact.inference.prior import LogNormal, Prior
+from bayesimpact.inference.priors import Priors
 from bayesimpact.model.oscillator import Oscillator
 
 Array = NDArray[np.float64]

@@ -1,274 +1,26 @@
-"""Prior densities of the parameters: five kinds, closed forms, one frozen record per parameter.
-
-Every record knows its log density with two derivatives (for the Laplace approximation), its
-quantile function and its support, all vectorised over x and in the parameter's SI unit. The forms
-are the usual ones (Johnson, Kotz & Balakrishnan 1994, Continuous Univariate Distributions, 1).
-
-Outside its support a density is zero: the log density is -inf there, also for NaN, and the
-derivatives are NaN, for they do not exist.
-"""
+"""Independent priors of all parameters, and how campaign.toml writes one."""
 
 from __future__ import annotations
 
-import math
-import sys
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import erfinv, ndtri
 
 from bayesimpact.errors import InputError
+from bayesimpact.inference.prior import (
+    HalfNormal,
+    LogNormal,
+    LogUniform,
+    Normal,
+    Prior,
+    Uniform,
+    require,
+)
 
 Array = npt.NDArray[np.float64]
-
-_LOG_SQRT_2PI = 0.5 * math.log(2 * math.pi)
-_LARGEST = sys.float_info.max
-
-
-def _require(condition: bool, where: str, found: str, accepted: str) -> None:
-    """Raise InputError unless `condition`."""
-    if not condition:
-        raise InputError(where, found, accepted)
-
-
-@dataclass(frozen=True)
-class Prior(ABC):
-    """The prior density of one parameter; the kinds below say which."""
-
-    kind: ClassVar[str]
-    _open_at_zero: ClassVar[bool] = False
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            usable = isinstance(value, int | float | np.floating | np.integer)
-            usable = usable and not isinstance(value, bool) and abs(value) <= _LARGEST
-            _require(usable, f"{self.kind} prior, {field.name}", repr(value), "a finite number")
-            object.__setattr__(self, field.name, float(value))  # integers of TOML included
-        self._check()
-
-    def log_density(self, x: npt.ArrayLike) -> Array:
-        """Log of the normalised density at x, elementwise; -inf outside the support and at NaN."""
-        return self._inside(x, self._log_density, -np.inf)
-
-    def gradient(self, x: npt.ArrayLike) -> Array:
-        """First derivative of the log density at x, elementwise; NaN outside the support."""
-        return self._inside(x, self._gradient, np.nan)
-
-    def curvature(self, x: npt.ArrayLike) -> Array:
-        """Second derivative of the log density at x, elementwise; NaN outside the support."""
-        return self._inside(x, self._curvature, np.nan)
-
-    def ppf(self, q: npt.ArrayLike) -> Array:
-        """Quantile at probability q, elementwise; NaN where q is not in [0, 1]."""
-        q = np.asarray(q, dtype=np.float64)
-        return np.asarray(self._ppf(np.where((q >= 0) & (q <= 1), q, np.nan)))
-
-    def sample(self, rng: np.random.Generator, size: int | tuple[int, ...] = ()) -> Array:
-        """Independent draws of the given shape, by inversion."""
-        # From the smallest normal number, for a q of exactly 0 is at minus infinity for a normal.
-        return self.ppf(rng.uniform(np.finfo(np.float64).tiny, 1.0, size))
-
-    @property
-    @abstractmethod
-    def support(self) -> tuple[float, float]:
-        """Smallest and largest value of non-zero density; both may be infinite."""
-
-    @abstractmethod
-    def _check(self) -> None: ...
-
-    @abstractmethod
-    def _log_density(self, x: Array) -> Array: ...
-
-    @abstractmethod
-    def _gradient(self, x: Array) -> Array: ...
-
-    @abstractmethod
-    def _curvature(self, x: Array) -> Array: ...
-
-    @abstractmethod
-    def _ppf(self, q: Array) -> Array: ...
-
-    def _inside(
-        self, x: npt.ArrayLike, function: Callable[[Array], Array], outside: float
-    ) -> Array:
-        """`function` where x lies in the support, `outside` elsewhere."""
-        x = np.asarray(x, dtype=np.float64)
-        lower, upper = self.support
-        inside = (x >= lower) & (x <= upper) & np.isfinite(x)
-        if self._open_at_zero:
-            inside &= x > 0
-        if inside.all():
-            return np.asarray(function(x))
-        result = np.full(x.shape, outside)
-        result[inside] = function(x[inside])
-        return result
-
-
-@dataclass(frozen=True)
-class Uniform(Prior):
-    """Constant on [lower, upper]."""
-
-    lower: float
-    upper: float
-    kind: ClassVar[str] = "uniform"
-
-    @property
-    def support(self) -> tuple[float, float]:
-        """[lower, upper]."""
-        return self.lower, self.upper
-
-    def _check(self) -> None:
-        found = f"lower = {self.lower!r}, upper = {self.upper!r}"
-        _require(self.lower < self.upper, "uniform prior", found, "lower < upper")
-        _require(math.isfinite(self.upper - self.lower), "uniform prior", found, "a finite width")
-
-    def _log_density(self, x: Array) -> Array:
-        return np.full(x.shape, -math.log(self.upper - self.lower))
-
-    def _gradient(self, x: Array) -> Array:
-        return np.zeros(x.shape)
-
-    def _curvature(self, x: Array) -> Array:
-        return np.zeros(x.shape)
-
-    def _ppf(self, q: Array) -> Array:
-        # The minimum, for rounding may carry the last quantile beyond the support.
-        return np.minimum(self.lower + q * (self.upper - self.lower), self.upper)
-
-
-@dataclass(frozen=True)
-class Normal(Prior):
-    """Gaussian with mean and standard deviation."""
-
-    mean: float
-    sd: float
-    kind: ClassVar[str] = "normal"
-
-    @property
-    def support(self) -> tuple[float, float]:
-        """The whole line."""
-        return -math.inf, math.inf
-
-    def _check(self) -> None:
-        _require(self.sd > 0, "normal prior, sd", repr(self.sd), "a number above 0")
-
-    def _log_density(self, x: Array) -> Array:
-        return -0.5 * ((x - self.mean) / self.sd) ** 2 - math.log(self.sd) - _LOG_SQRT_2PI
-
-    def _gradient(self, x: Array) -> Array:
-        return (self.mean - x) / self.sd**2
-
-    def _curvature(self, x: Array) -> Array:
-        return np.full(x.shape, -1 / self.sd**2)
-
-    def _ppf(self, q: Array) -> Array:
-        return np.asarray(self.mean + self.sd * ndtri(q))
-
-
-@dataclass(frozen=True)
-class HalfNormal(Prior):
-    """The positive half of a Gaussian around 0; `scale` is the whole Gaussian's deviation."""
-
-    scale: float
-    kind: ClassVar[str] = "halfnormal"
-
-    @property
-    def support(self) -> tuple[float, float]:
-        """[0, inf)."""
-        return 0.0, math.inf
-
-    def _check(self) -> None:
-        _require(self.scale > 0, "halfnormal prior, scale", repr(self.scale), "a number above 0")
-
-    def _log_density(self, x: Array) -> Array:
-        constant = math.log(2) - math.log(self.scale) - _LOG_SQRT_2PI
-        return -0.5 * (x / self.scale) ** 2 + constant
-
-    def _gradient(self, x: Array) -> Array:
-        return -x / self.scale**2
-
-    def _curvature(self, x: Array) -> Array:
-        return np.full(x.shape, -1 / self.scale**2)
-
-    def _ppf(self, q: Array) -> Array:
-        # erfinv and not ndtri((1 + q) / 2), which loses the digits of a small q.
-        return np.asarray(self.scale * math.sqrt(2) * erfinv(q))
-
-
-@dataclass(frozen=True)
-class LogNormal(Prior):
-    """log x is Gaussian around log(median) with deviation `sigma` (no unit)."""
-
-    median: float
-    sigma: float
-    kind: ClassVar[str] = "lognormal"
-    _open_at_zero: ClassVar[bool] = True
-
-    @property
-    def support(self) -> tuple[float, float]:
-        """(0, inf)."""
-        return 0.0, math.inf
-
-    def _check(self) -> None:
-        _require(self.median > 0, "lognormal prior, median", repr(self.median), "a number above 0")
-        _require(self.sigma > 0, "lognormal prior, sigma", repr(self.sigma), "a number above 0")
-
-    def _standardised(self, x: Array) -> Array:
-        return np.asarray((np.log(x) - math.log(self.median)) / self.sigma)
-
-    def _log_density(self, x: Array) -> Array:
-        z = self._standardised(x)
-        return np.asarray(-0.5 * z**2 - np.log(x) - math.log(self.sigma) - _LOG_SQRT_2PI)
-
-    def _gradient(self, x: Array) -> Array:
-        return -(1 + self._standardised(x) / self.sigma) / x
-
-    def _curvature(self, x: Array) -> Array:
-        return (1 + self._standardised(x) / self.sigma - 1 / self.sigma**2) / x**2
-
-    def _ppf(self, q: Array) -> Array:
-        return np.asarray(self.median * np.exp(self.sigma * ndtri(q)))
-
-
-@dataclass(frozen=True)
-class LogUniform(Prior):
-    """log x is constant on [log(lower), log(upper)]: the density falls as 1/x."""
-
-    lower: float
-    upper: float
-    kind: ClassVar[str] = "loguniform"
-
-    @property
-    def support(self) -> tuple[float, float]:
-        """[lower, upper]."""
-        return self.lower, self.upper
-
-    def _check(self) -> None:
-        found = f"lower = {self.lower!r}, upper = {self.upper!r}"
-        _require(0 < self.lower < self.upper, "loguniform prior", found, "0 < lower < upper")
-
-    @property
-    def _log_width(self) -> float:
-        return math.log(self.upper) - math.log(self.lower)
-
-    def _log_density(self, x: Array) -> Array:
-        return np.asarray(-np.log(x) - math.log(self._log_width))
-
-    def _gradient(self, x: Array) -> Array:
-        return -1 / x
-
-    def _curvature(self, x: Array) -> Array:
-        return 1 / x**2
-
-    def _ppf(self, q: Array) -> Array:
-        x = np.exp(math.log(self.lower) + q * self._log_width)
-        return np.asarray(np.clip(x, self.lower, self.upper))
-
 
 KINDS: Mapping[str, type[Prior]] = {
     prior.kind: prior for prior in (Uniform, Normal, HalfNormal, LogNormal, LogUniform)
@@ -289,11 +41,11 @@ def prior_from_table(name: str, table: Mapping[str, Any]) -> Prior:
     where = f"[priors] {name}"
     kind = table.get("distribution")
     known = isinstance(kind, str) and kind in KINDS
-    _require(known, f"{where}, distribution", repr(kind), " | ".join(KINDS))
+    require(known, f"{where}, distribution", repr(kind), " | ".join(KINDS))
     prior = KINDS[str(kind)]
     wanted = [field.name for field in fields(prior)]
     given = [key for key in table if key != "distribution"]
-    _require(
+    require(
         sorted(given) == sorted(wanted),
         f"{where} ({kind})",
         "the keys " + (", ".join(map(str, given)) or "(none)"),
@@ -317,7 +69,7 @@ class Priors:
     parameters: tuple[Prior, ...]
 
     def __post_init__(self) -> None:
-        _require(len(self.parameters) > 0, "priors", "none", "one prior per parameter")
+        require(len(self.parameters) > 0, "priors", "none", "one prior per parameter")
 
     def __len__(self) -> int:
         return len(self.parameters)
@@ -363,7 +115,7 @@ class Priors:
 
     def _checked(self, theta: npt.ArrayLike) -> Array:
         theta = np.asarray(theta, dtype=np.float64)
-        _require(
+        require(
             theta.ndim > 0 and theta.shape[-1] == len(self),
             "parameter vector",
             f"shape {theta.shape}",

@@ -8,7 +8,7 @@ from dataclasses import fields
 import numpy as np
 
 from bayesimpact.inference.fit import Fit
-from bayesimpact.inference.priors import Prior
+from bayesimpact.inference.prior import Prior
 from bayesimpact.model.parameters import Parameter
 from bayesimpact.report.results import Array, Chain, Row
 from bayesimpact.report.units import dimensions, per_mass_unit, significant

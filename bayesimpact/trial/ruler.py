@@ -24,7 +24,8 @@ from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.inference.noise import Noise
-from bayesimpact.inference.priors import LogUniform, Normal, Prior, Priors
+from bayesimpact.inference.prior import LogUniform, Normal, Prior
+from bayesimpact.inference.priors import Priors
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.oscillator import build_oscillator
 from bayesimpact.trial.benches import Design

@@ -24,7 +24,7 @@ from bayesimpact.inference.convergence import (
 from bayesimpact.inference.ensemble import Target, random_streams, start
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.posterior import sample
-from bayesimpact.inference.priors import LogUniform, Uniform
+from bayesimpact.inference.prior import LogUniform, Uniform
 from bayesimpact.inference.whiten import cholesky
 from bayesimpact.model.derivatives import grams
 from bayesimpact.model.parameters import BASE_SLOTS

@@ -19,7 +19,7 @@ from bayesimpact.diagnosis.extend import (
     transfer,
 )
 from bayesimpact.inference.fit import Fit
-from bayesimpact.inference.priors import HalfNormal, Normal, Uniform
+from bayesimpact.inference.prior import HalfNormal, Normal, Uniform
 
 
 def effects(*ids: str):

@@ -18,7 +18,8 @@ from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.inference.noise import Noise
-from bayesimpact.inference.priors import Normal, Priors
+from bayesimpact.inference.prior import Normal
+from bayesimpact.inference.priors import Priors
 from bayesimpact.model.measurement import smooth
 from bayesimpact.model.oscillator import Oscillator
 

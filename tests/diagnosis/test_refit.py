@@ -21,7 +21,8 @@ from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.likelihood import Linearisation
 from bayesimpact.inference.mode import find_mode
-from bayesimpact.inference.priors import HalfNormal, LogNormal, LogUniform, Normal, Priors
+from bayesimpact.inference.prior import HalfNormal, LogNormal, LogUniform, Normal
+from bayesimpact.inference.priors import Priors
 from bayesimpact.model.parameters import Parameter
 
 

@@ -12,14 +12,7 @@ from effect_rigs import BY_ID, TestRig
 from bayesimpact.data.campaign import Measurement
 from bayesimpact.inference.defaults import default_priors, effect_prior
 from bayesimpact.inference.noise import Noise
-from bayesimpact.inference.priors import (
-    HalfNormal,
-    LogNormal,
-    LogUniform,
-    Normal,
-    Prior,
-    Uniform,
-)
+from bayesimpact.inference.prior import HalfNormal, LogNormal, LogUniform, Normal, Prior, Uniform
 from bayesimpact.model.oscillator import build_oscillator
 from bayesimpact.response.estimates import Estimates, estimate
 

@@ -16,14 +16,8 @@ from bayesimpact.inference.fit import Fit, Target, inverse
 from bayesimpact.inference.likelihood import Likelihood, Linearisation
 from bayesimpact.inference.mode import best_sigma, find_mode
 from bayesimpact.inference.noise import Noise
-from bayesimpact.inference.priors import (
-    HalfNormal,
-    LogNormal,
-    LogUniform,
-    Normal,
-    Priors,
-    Uniform,
-)
+from bayesimpact.inference.prior import HalfNormal, LogNormal, LogUniform, Normal, Uniform
+from bayesimpact.inference.priors import Priors
 from bayesimpact.model.oscillator import build_oscillator
 from bayesimpact.model.parameters import Parameter
 from bayesimpact.trial.rig import Release, Rig

@@ -20,7 +20,8 @@ from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.posterior import Posterior, sample
-from bayesimpact.inference.priors import LogUniform, Priors, Uniform
+from bayesimpact.inference.prior import LogUniform, Uniform
+from bayesimpact.inference.priors import Priors
 from bayesimpact.model.measurement import smooth
 from bayesimpact.model.oscillator import Oscillator, build_oscillator
 

@@ -9,16 +9,8 @@ import pytest
 from scipy import stats
 
 from bayesimpact.errors import InputError
-from bayesimpact.inference.priors import (
-    HalfNormal,
-    LogNormal,
-    LogUniform,
-    Normal,
-    Prior,
-    Priors,
-    Uniform,
-    prior_from_table,
-)
+from bayesimpact.inference.prior import HalfNormal, LogNormal, LogUniform, Normal, Prior, Uniform
+from bayesimpact.inference.priors import Priors, prior_from_table
 
 # (ours, the same in scipy.stats); scales as in a campaign, some far from 1.
 TWINS = [
