@@ -201,7 +201,7 @@ CATALOGUE_PLANTS: Mapping[str, Plant] = {
         ("free",), _one("rate", lambda d: 0.3 / d.duration, signed=True), slot="k1"
     ),
     "harmonic_forcing": Plant(("everywhere", "free"), _forcing),
-    "opposite_stop": Plant(("free",), _opposite_stop),
+    "opposite_stop": Plant(("free",), _opposite_stop, obstacles=1),
     "sensor_drift": Plant(
         ("measurement",), _one("rate", lambda d: 0.3 * d.amplitude / d.duration, signed=True)
     ),

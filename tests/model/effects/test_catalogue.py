@@ -155,6 +155,7 @@ def test_admissible_only_where_it_could_show():
     assert {e.id for e in EFFECTS if e.admissible(silent)} == {
         e.id for e in EFFECTS if not e.needs_stop
     }
+    assert not BY_ID["opposite_stop"].admissible(replace(scales, cases=0))
     assert not BY_ID["gap_wear"].admissible(replace(scales, impacts=1))
     assert not BY_ID["contact_damping_per_case"].admissible(replace(scales, cases=1))
     assert not BY_ID["gap_per_recording"].admissible(replace(scales, recordings=1))

@@ -1,0 +1,107 @@
+"""What does an added effect cost, and how exact is it? Work against precision, effect by effect.
+
+    python tests/benchmarks/added.py
+
+Nine recordings of 6,000 samples at the paper's values, one effect at a time at its plausible size
+(the width of its prior), on one thread. Numba takes the step sizes as constants when it compiles,
+so each scale of the steps is a process of its own, compiled anew: 1 is what the package uses. The
+error is the largest difference to steps a quarter as long; `halving` that of 1 against 1/2. Writes
+added.json beside this file.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+if __name__ == "__main__":  # imports go by the tests' folder, not by this one
+    sys.path[0] = str(Path(__file__).resolve().parents[1])
+
+import numpy as np
+from benchmarks.record import keep, rounds
+from effect_rigs import MOVING, TestRig, typical
+
+from bayesimpact.model.added import flows
+from bayesimpact.model.oscillator import Oscillator, build_oscillator
+
+SCALES = (2.0, 1.0, 0.5, 0.25)  # of all step sizes
+STEPS = ("MAX_ANGLE", "MAX_ANGLE_PACE", "RAMP", "ROUGH", "FIRST", "SINCE", "UNTIL")
+ROUNDS, REPEATS = 7, 3
+RIG = TestRig(
+    k2=np.repeat([5350.156, 4776.275, 2959.249], 3),
+    y0=np.tile([-6.5e-3, -5e-3, -4e-3], 3),
+    v0=np.zeros(9),
+)
+
+
+def resolved() -> list[tuple[str, Oscillator, np.ndarray]]:
+    """Effects that need steps, with their oscillators and parameter vectors (d,)."""
+    found = []
+    for effect in MOVING:
+        oscillator = build_oscillator(RIG.campaign(), [effect])
+        if not oscillator.is_base:
+            found.append((effect.id, oscillator, RIG.theta(oscillator, typical(effect, RIG))))
+    return found
+
+
+def child(scale: float, file: str) -> None:
+    """Simulate and time every effect with scaled steps; motions and seconds into a file."""
+    import numba
+
+    numba.set_num_threads(1)
+    for name in STEPS:
+        setattr(flows, name, scale * getattr(flows, name))
+    result = {}
+    for effect, oscillator, theta in resolved():
+        slots, recordings = oscillator.layout.slots(theta[None])[0], np.arange(9)
+
+        def run(o: Oscillator = oscillator, s: np.ndarray = slots) -> np.ndarray:
+            return o.motions_of(recordings, s)  # noqa: B023
+
+        result[f"{effect}.y"] = run()
+        taken = rounds({"it": run}, ROUNDS, REPEATS)["it"]
+        result[f"{effect}.s"] = np.median(taken)
+    np.savez(file, **result)
+
+
+def measure() -> dict[str, Any]:
+    """Nanoseconds per sample and errors, m, of every effect and scale."""
+    runs = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for scale in SCALES:
+            file = str(Path(folder) / f"{scale}.npz")
+            cache = {"NUMBA_CACHE_DIR": str(Path(folder) / f"cache{scale}")}
+            command = [sys.executable, str(Path(__file__)), str(scale), file]
+            subprocess.run(command, check=True, env={**os.environ, **cache})
+            with np.load(file) as stored:
+                runs[scale] = {name: stored[name] for name in stored.files}
+    samples = 9 * RIG.count
+    finest = runs[min(SCALES)]
+
+    def apart(one: dict[str, Any], other: dict[str, Any], effect: str) -> float:
+        return float(np.abs(one[f"{effect}.y"] - other[f"{effect}.y"]).max())
+
+    effects = {}
+    for effect in (name[:-2] for name in finest if name.endswith(".y")):
+        effects[effect] = {
+            "ns_per_sample": [float(runs[s][f"{effect}.s"]) / samples * 1e9 for s in SCALES],
+            "error_m": [apart(runs[s], finest, effect) for s in SCALES[:-1]],
+            "halving_m": apart(runs[1.0], runs[0.5], effect),
+        }
+    return {"samples": samples, "scales": list(SCALES), "effects": effects}
+
+
+def main() -> None:
+    """One scale when called with it, else all."""
+    if len(sys.argv) == 3:
+        child(float(sys.argv[1]), sys.argv[2])
+    else:
+        keep(__file__, measure())
+
+
+if __name__ == "__main__":
+    main()
