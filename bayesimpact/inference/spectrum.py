@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize, signal, stats
+from scipy import ndimage, optimize, signal, stats
 from scipy.linalg import null_space, toeplitz
 
 from bayesimpact.data.campaign import Smoothing
@@ -35,6 +35,8 @@ ORDERS = (2, 4)
 ABOVE = 10.0  # times the lowest frequency of the motion: noise only
 DECISIVE = 20.0  # nats that a filter needs over white and AR(1) noise
 LEAST_ORDINATES = 40
+LINE_REACH = 17  # ordinates over which the noise has one level
+LINE = 7.0  # nats beyond the largest of as many ordinates of noise
 LEAST_FIT = 1e-4  # p-value of the scatter about the filter's spectrum
 STRONG = 0.3  # of the largest variance: combinations of a half swing that the filter let pass
 
@@ -64,7 +66,7 @@ def find_smoothing(recordings: Sequence[Recording]) -> Fingerprint | None:
     Each filter is judged from just below its first null on: no motion can pass for a passband. The
     likeliest one for white noise must then stand, for white or AR(1) noise, against no filter.
     """
-    spectra = [_periodogram(r) for r in recordings]
+    spectra = [_without_lines(*_periodogram(r)) for r in recordings]
     shortest = min(r.samples.size for r in recordings)
     best, most = None, -np.inf
     for window in WINDOWS:
@@ -91,6 +93,13 @@ def _proved(
     ratio = _log_likelihood(_power(stopband), shape) - unfiltered
     scatters = stats.kstest(_power(stopband) / shape, "expon").pvalue > LEAST_FIT
     return Fingerprint(smoothing, ratio, found) if ratio > DECISIVE and scatters else None
+
+
+def _without_lines(frequency: Array, power: Array, interval: float) -> tuple[Array, Array, float]:
+    """A periodogram without the ordinates of a hum: far above all that noise would give there."""
+    level = ndimage.median_filter(power, LINE_REACH, mode="nearest") / np.log(2.0)
+    noise = power < (np.log(power.size) + LINE) * level
+    return frequency[noise], power[noise], interval
 
 
 def _above(spectra: Spectra, frequency: float) -> Spectra:

@@ -13,6 +13,7 @@ from bayesimpact.data.campaign import Smoothing
 from bayesimpact.data.recording import Recording
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.spectrum import find_smoothing, nulls
+from bayesimpact.trial.rig import Release
 from bayesimpact.trial.rig_chain import Chain
 
 FILTERS = [(7, 2), (11, 2), (15, 4), (21, 2), (31, 4)]
@@ -58,6 +59,33 @@ def test_rounding_and_a_lag_are_no_such_filter(silent):
     lag = Smoothing("lag", time_constant=2e-3)
     chain = Chain(noise=small_rig.NOISE, smoothing=lag, offsets=small_rig.OFFSETS)
     assert find_smoothing(small_rig.record(chain=chain).recordings) is None
+
+
+@pytest.mark.parametrize(("frequency", "seed"), [(70.0, 0), (75.0, 1), (80.0, 0)])
+def test_a_hum_is_no_filter(frequency, seed):
+    """A line between the nulls of some filter looks like what that filter lets pass."""
+    heights = zip("abcd", (-6.5e-3, -5e-3, 4e-3, 3e-3), strict=True)
+    plain = small_rig.record(
+        rig=small_rig.PLAIN, releases=[Release(name, "", y) for name, y in heights],
+        chain=Chain(), rate=500.0, duration=7.5,
+    )  # fmt: skip
+    rng = np.random.default_rng(seed)
+    hummed = []
+    for r in plain.recordings:
+        noise = small_rig.NOISE * rng.standard_normal(r.samples.size)
+        hum = 0.4 * small_rig.NOISE * np.sin(2 * np.pi * frequency * r.times + seed)
+        hummed.append(replace(r, samples=r.samples + noise + hum))
+    assert find_smoothing(hummed) is None
+
+
+def test_a_filter_is_found_beside_a_hum(silent):
+    for window, order in FILTERS[:3]:
+        hummed = [
+            replace(r, samples=r.samples + 1e-5 * np.sin(2 * np.pi * 50.0 * r.times))
+            for r in noisy(silent, 3)
+        ]
+        found = find_smoothing(filtered(hummed, window, order))
+        assert found is not None and found.smoothing == Smoothing("savgol", window, order)
 
 
 @pytest.mark.parametrize(("window", "order"), FILTERS)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import copy
+from collections import Counter
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from bayesimpact.trial.run import run_trials
@@ -12,17 +14,23 @@ from bayesimpact.trial.settings import Settings
 from bayesimpact.trial.summary import summarise
 from bayesimpact.trial.table import summary_text
 
-# One of each kind that costs little. Seed s draws kinds[s % 4]; sizes are far above the limits, for
-# this rig is short and tells less than the paper's.
+# Five of each kind, of those that cost little. Seed s draws kinds[s % 4]; sizes are far above the
+# limits, for this rig is short and tells less than the paper's.
 SETTINGS = Settings(
-    effects=("sensor_quadratic", "stiffness_drift"),
-    outside=("detent",),
-    strength=(6.0, 8.0),
+    effects=(
+        "sensor_quadratic",
+        "stiffness_drift",
+        "coulomb_friction",
+        "spring_cubic",
+        "contact_hardening",
+    ),
+    outside=("detent", "damping_bump", "friction_pad"),
+    strength=(6.0, 10.0),
     benches=("small",),
     noises=("white",),
     search=False,
 )
-SEEDS = range(4)
+SEEDS = range(20)
 
 
 def timeless(result: dict) -> dict:
@@ -39,15 +47,18 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> list[dict]:
 
 
 def test_every_kind_is_answered_right(results: list[dict]) -> None:
+    """Nothing is ever called wrong; a short rig may leave one or two of twenty undecided."""
     assert not [r["failed"] for r in results if "failed" in r]
-    outcomes = {r["truth"]["kind"]: r["score"]["outcome"] for r in results}
-    assert outcomes == {
-        "control": "quiet",
-        "single": "named",
-        "pair": "named",
-        "outside": "unknown outside",
+    outcomes = {
+        kind: Counter(r["score"]["outcome"] for r in results if r["truth"]["kind"] == kind)
+        for kind in SETTINGS.kinds
     }
-    assert all(r["score"]["place"] for r in results[1:])
+    assert outcomes["control"] == {"quiet": 5}
+    assert outcomes["outside"] == {"unknown outside": 5}
+    for kind in ("single", "pair"):
+        assert set(outcomes[kind]) <= {"named", "ambiguous"} and outcomes[kind]["named"] >= 4
+    places = [r["score"]["place"] for r in results if r["truth"]["planted"]]
+    assert np.mean(places) >= 0.9
 
 
 def test_what_ignoring_an_effect_costs(results: list[dict]) -> None:
@@ -67,6 +78,6 @@ def test_one_trial_again_bit_for_bit(results: list[dict], tmp_path: Path) -> Non
 
 def test_the_summary(results: list[dict]) -> None:
     summary = summarise(results)
-    assert summary["trials"] == 4 and not summary["failed"] and not summary["misses"]
+    assert summary["trials"] == 20 and not summary["failed"] and len(summary["misses"]) <= 2
     assert summary["confident_wrong_names"]["hits"] == 0
-    assert "single effects named             100.0 %" in summary_text(summary)
+    assert "controls called adequate         100.0 %" in summary_text(summary)

@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 from bayesimpact.report.figures.style import BLUE, GREY, ORANGE, new_figure, styled
 
-COLUMNS = 4
-ROW_HEIGHT = 1.5  # in
+COLUMNS = 3
+ROW_HEIGHT = 1.1  # in
+LIMITS = (0.5, 0.7, 1.0, 1.4, 2.0)
 
 
 @styled
@@ -34,8 +36,11 @@ def power_figure(document: Mapping[str, Any]) -> Figure:
         axis.set_title(effect.replace("_", " "), loc="left")
         axis.set_xscale("log")
         axis.set_ylim(-0.03, 1.03)
+        axis.xaxis.set_major_formatter("{x:g}")
     for axis in axes.flat[len(effects) :]:
         axis.set_axis_off()
+    for axis in axes.flat[: len(effects)][-COLUMNS:]:  # the lowest of every column
+        axis.tick_params(labelbottom=True)
     axes.flat[0].legend(loc="lower right")
     figure.supxlabel("size in detection limits (five standard errors)", fontsize=9)
     figure.supylabel("probability", fontsize=9)
@@ -68,6 +73,9 @@ def limits_figure(document: Mapping[str, Any]) -> Figure:
     axis.set_xscale("log")
     axis.set_yscale("log")
     axis.set_xticks(counts, [str(n) for n in counts])
+    axis.set_yticks(LIMITS, [f"{limit:g}" for limit in LIMITS])
+    for one in (axis.xaxis, axis.yaxis):
+        one.set_minor_formatter(NullFormatter())
     axis.set_xlabel("recordings")
     axis.set_ylabel("detection limit / that of nine recordings")
     axis.grid()
