@@ -38,8 +38,15 @@ class State:
 
     @property
     def is_white(self) -> bool:
-        """True when neither the catalogue nor an unknown force explains anything more."""
-        return min(self.scan.p_value, self.force.p_value, self.drift.p_value) >= ALPHA
+        """True when neither the catalogue nor an unknown force explains anything more.
+
+        Beside effects, an unknown force needs decisive odds as they do: each model on the way is
+        tested anew, and one in a hundred has a small p-value by chance.
+        """
+        forces = (self.force, self.drift)
+        if self.candidate.effects:
+            forces = tuple(f for f in forces if f.log_evidence >= DECISIVE)
+        return min([self.scan.p_value, *(f.p_value for f in forces)]) >= ALPHA
 
     @property
     def unknown(self) -> MissingForce:

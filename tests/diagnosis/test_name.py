@@ -98,14 +98,24 @@ def test_a_pair_is_compared_with_what_lacks_one_of_its_members():
 
 @pytest.mark.parametrize("what", ["p_catalogue", "p_force"])
 def test_what_is_named_leaves_nothing(what):
-    chosen = state(candidate(FRICTION, 100.0), **{what: ALPHA / 2})
+    left = {"force_evidence": DECISIVE}
+    chosen = state(candidate(FRICTION, 100.0), **{what: ALPHA / 2}, **left)
     assert judge(naming(chosen)) == "unknown"
-    assert judge(naming(state(candidate(FRICTION, 100.0), **{what: ALPHA}))) == "named"
+    assert judge(naming(state(candidate(FRICTION, 100.0), **{what: ALPHA}, **left))) == "named"
+
+
+def test_beside_a_name_an_unknown_force_needs_decisive_odds():
+    """The base model's alarm stays one of p-values alone, whose rate is known."""
+    for evidence, verdict in ((DECISIVE - 0.1, "named"), (DECISIVE + 0.1, "unknown")):
+        chosen = state(candidate(FRICTION, 100.0), p_force=ALPHA / 2, force_evidence=evidence)
+        assert judge(naming(chosen)) == verdict
+    base = state(candidate("", 0.0), p_force=ALPHA / 2, force_evidence=DECISIVE - 0.1)
+    assert judge(naming(base)) == "unknown"
 
 
 def test_a_gross_misfit_nearly_explained_is_named_although_something_small_remains():
-    small_rest = state(candidate(FRICTION, 9000.0, chi2=1.5), p_force=1e-4)
-    large_rest = state(candidate(FRICTION, 9000.0, chi2=20.0), p_force=1e-4)
+    small_rest = state(candidate(FRICTION, 9000.0, chi2=1.5), p_force=1e-4, force_evidence=9.0)
+    large_rest = state(candidate(FRICTION, 9000.0, chi2=20.0), p_force=1e-4, force_evidence=9.0)
     assert judge(naming(small_rest, base_chi2=100.0)) == "named"
     assert judge(naming(large_rest, base_chi2=100.0)) == "unknown"
     assert judge(naming(small_rest, base_chi2=4.0)) == "unknown"  # concealed: must be white
@@ -123,7 +133,7 @@ def test_a_free_force_that_beats_the_chosen_effects_is_unknown_physics(ids):
 def test_no_force_can_gain_more_than_a_model_that_leaves_nothing():
     """The linearised problem promises too much where effects are large."""
     assert judge(naming(state(candidate(FRICTION, 200.0)), force_evidence=300.0)) == "named"
-    left = state(candidate(FRICTION, 200.0), p_force=ALPHA / 2)
+    left = state(candidate(FRICTION, 200.0), p_force=ALPHA / 2, force_evidence=9.0)
     assert judge(naming(left, force_evidence=300.0)) == "unknown"
 
 
