@@ -12,7 +12,7 @@ from benchmarks.kernel import campaign, check
 from benchmarks.sampling import Sampled
 
 BENCHMARKS = Path(record.__file__).parent
-MEASURED = ("kernel", "peers", "samplers", "scaling", "startup")
+MEASURED = ("added", "kernel", "peers", "samplers", "scaling", "startup")
 
 
 @pytest.fixture(scope="module")
@@ -128,11 +128,44 @@ def test_stored_peers_are_as_accurate_as_claimed() -> None:
     assert max(errors) <= content["accuracy_m"] == 1e-9
 
 
+def test_added_effects_are_as_accurate_as_claimed() -> None:
+    content = readme.stored("added")
+    assert max(row["halving_m"] for row in content["effects"].values()) < 1e-9
+
+
+def test_stored_trials_are_counted_right() -> None:
+    content = readme.stored("trials")
+    rows = content["answers"]
+    assert len(rows) == content["trials"] - len(content["failed"])
+    right = {"control": "quiet", "single": "named", "pair": "named", "outside": "unknown outside"}
+    for kind, outcome in right.items():
+        of = [row for row in rows if row["kind"] == kind]
+        hits = sum(row["outcome"] == outcome for row in of)
+        assert (content["right"][kind]["hits"], content["right"][kind]["of"]) == (hits, len(of))
+    wrong = sum(row["outcome"] == "wrong name" for row in rows)
+    assert content["confident_wrong_names"]["hits"] == wrong
+    for row in rows:
+        if row["outcome"] == "named":
+            assert set(row["named"].split(" + ")) == set(row["planted"])
+
+
+ROWS = {
+    "peers": lambda content: content["peers"],
+    "added": lambda content: [e.replace("_", " ") for e in content["effects"]],
+    "samplers": lambda content: [n for n, row in content["samplers"].items() if row["agrees"]],
+    "trials": lambda content: [e.replace("_", " ") for e in content["settings"]["effects"]],
+    "power": lambda content: [e.replace("_", " ") for e in content["effects"]],
+    "limits": lambda content: ["one over square root"],
+}
+
+
 @pytest.mark.parametrize("name", figures.FIGURES)
 def test_figures_show_every_row(name: str) -> None:
-    content = readme.stored(name)
+    content = readme.stored(figures.STORES.get(name, name))
     figure = figures.FIGURES[name](content)
+    legends = [*figure.legends, *(a.get_legend() for a in figure.axes if a.get_legend())]
     texts = [t.get_text() for a in figure.axes for t in a.get_yticklabels()]
-    texts += [t.get_text() for legend in figure.legends for t in legend.get_texts()]
-    rows = {n: r for n, r in content[name].items() if r.get("agrees", True)}
+    texts += [t.get_text() for legend in legends for t in legend.get_texts()]
+    texts += [a.get_title(loc="left") for a in figure.axes]
+    rows = ROWS[name](content)
     assert all(any(text.startswith(row) for text in texts) for row in rows)

@@ -1,7 +1,9 @@
 """Draws the README's plots from the stored results: `python tests/benchmarks/figures.py`.
 
 peers.svg: time of one simulation against its error. samplers.svg: effective draws per second.
-trials.svg: what the diagnosis said of every concealed effect, against its size.
+added.svg: the same for the steps of added effects. trials.svg: what the diagnosis said of every
+concealed effect, against its size. power.svg, limits.svg: how large an effect must be to
+be found and named, and how that falls with the number of recordings.
 """
 
 from __future__ import annotations
@@ -16,6 +18,8 @@ if __name__ == "__main__":  # imports go by the tests' folder, not by this one
 import matplotlib as mpl
 from benchmarks.readme import stored
 from matplotlib.figure import Figure
+
+from bayesimpact.report.figures.power import limits_figure, power_figure
 
 HERE = Path(__file__).resolve().parent
 INK, ACCENT = "0.35", "tab:red"
@@ -99,14 +103,46 @@ def trials_figure(content: dict[str, Any]) -> Figure:
     return figure
 
 
-FIGURES = {"peers": peers_figure, "samplers": samplers_figure, "trials": trials_figure}
+def added_figure(content: dict[str, Any]) -> Figure:
+    """Work against precision of the steps: one line per effect, the package's steps filled."""
+    figure = Figure(figsize=(7.0, 4.0), layout="constrained")
+    axis = figure.add_subplot()
+    here = content["scales"].index(1.0)
+    for i, (effect, row) in enumerate(content["effects"].items()):
+        errors, costs = [max(e, 1e-16) for e in row["error_m"]], row["ns_per_sample"]
+        colour, style = f"C{i % 10}", ("-", "--")[i // 10 % 2]
+        axis.loglog(errors, costs[: len(errors)], style, color=colour, lw=1, marker="o", ms=3,
+                    mfc="none", label=effect.replace("_", " "))  # fmt: skip
+        axis.plot(errors[here], costs[here], "o", color=colour, ms=5)
+    axis.axvline(1e-9, color=INK, lw=0.5)
+    axis.axhline(40, color=INK, lw=0.5)
+    axis.invert_xaxis()
+    axis.set_xlabel("largest error, m (more accurate to the right)")
+    axis.set_ylabel("ns per sample")
+    figure.legend(loc="outside right upper", frameon=False, fontsize="small")
+    return figure
+
+
+FIGURES = {
+    "peers": peers_figure,
+    "added": added_figure,
+    "samplers": samplers_figure,
+    "trials": trials_figure,
+    "power": power_figure,
+    "limits": limits_figure,
+}
+
+
+STORES = {"limits": "power"}  # figure -> result, where the names differ
 
 
 def draw(folder: Path = HERE) -> None:
     """Write both plots; the same result gives the same file."""
     with mpl.rc_context({"svg.hashsalt": "bayesimpact", "svg.fonttype": "none"}):
         for name, figure in FIGURES.items():
-            figure(stored(name)).savefig(folder / f"{name}.svg", metadata={"Date": None})
+            figure(stored(STORES.get(name, name))).savefig(
+                folder / f"{name}.svg", metadata={"Date": None}
+            )
 
 
 if __name__ == "__main__":

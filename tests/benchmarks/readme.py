@@ -7,6 +7,9 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
+from bayesimpact.model import effects
+
+EFFECTS = {effect.id: effect for effect in effects.EFFECTS}
 HERE = Path(__file__).resolve().parent
 README = HERE.parents[1] / "README.md"
 BUSY = 0.25  # cores busy with something else, from which on times are not to be trusted
@@ -73,6 +76,25 @@ def peers_table() -> str:
     return grid((*head, "over ours"), rows, measured(p, "one core"))
 
 
+def added_table() -> str:
+    """Cost and error of the steps that an added effect needs."""
+    a = stored("added")
+    here, half = a["scales"].index(1.0), a["scales"].index(0.5)
+    rows = [
+        (
+            effect.replace("_", " "),
+            f"{row['ns_per_sample'][here]:.0f}",
+            f"{row['halving_m']:.0e}",
+            f"{row['ns_per_sample'][half] / row['ns_per_sample'][here]:.1f}",
+        )
+        for effect, row in sorted(
+            a["effects"].items(), key=lambda item: item[1]["ns_per_sample"][here]
+        )
+    ]
+    head = ("added effect", "ns per sample", "change with half the steps, m", "at what cost")
+    return grid(head, rows, measured(a, f"{a['samples']:,} samples, one thread"))
+
+
 def samplers_table() -> str:
     """Effective draws per second."""
     s = stored("samplers")
@@ -137,6 +159,21 @@ def coverage_table() -> str:
         f"independent generator, commit {c['commit']}, {c['date']}."
     )
     return grid(("parameter", "90 % intervals that hold the truth", "of"), rows, foot)
+
+
+def power_table() -> str:
+    """How large an effect must be."""
+    p = stored("power")
+    rows = []
+    for effect, row in p["effects"].items():
+        parameter = EFFECTS[effect].parameter(row["size"])
+        sizes = (row["limit"], row["detected_90_size"], row["named_90_size"])
+        shown = ("beyond" if size is None else f"{size:.2g}" for size in sizes)
+        rival = f"{row['nearest'].replace('_', ' ')} ({100 * row['distinct']:.0f} % apart)"
+        name = f"{effect.replace('_', ' ')}, {row['size'].replace('_', ' ')}"
+        rows.append((name, parameter.unit, *shown, rival))
+    head = ("effect, size", "unit", "limit", "found", "named", "nearest rival")
+    return grid(head, rows, f"Commit {p['commit'][:7]}, {p['date']}.")
 
 
 def sbc_table() -> str:
@@ -206,9 +243,11 @@ def trial_coverage_table() -> str:
 TABLES = {
     "trials": trials_table,
     "trial_coverage": trial_coverage_table,
+    "power": power_table,
     "sbc": sbc_table,
     "kernel": kernel_table,
     "peers": peers_table,
+    "added": added_table,
     "samplers": samplers_table,
     "scaling": scaling_table,
     "startup": startup_table,
