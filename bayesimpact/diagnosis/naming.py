@@ -43,9 +43,9 @@ class State:
         Beside effects, an unknown force needs decisive odds as they do: each model on the way is
         tested anew, and one in a hundred has a small p-value by chance.
         """
-        forces = (self.force, self.drift)
+        forces = [self.force, self.drift]
         if self.candidate.effects:
-            forces = tuple(f for f in forces if f.log_evidence >= DECISIVE)
+            forces = [f for f in forces if f.log_evidence >= DECISIVE]
         return min([self.scan.p_value, *(f.p_value for f in forces)]) >= ALPHA
 
     @property
