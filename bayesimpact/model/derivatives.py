@@ -170,11 +170,17 @@ def _work(
         model.intervals, FORCED if forced else PLAIN,
     )  # fmt: skip
 
-    def run(start: int, stop: int) -> None:
-        work(*before, (start, stop), (0, recordings), out, values, jacobian, codes)
+    by_rows = batch >= recordings
 
+    def run(start: int, stop: int) -> None:
+        rows, items = (start, stop), (0, recordings)
+        if not by_rows:
+            rows, items = (0, batch), (start, stop)
+        work(*before, rows, items, out, values, jacobian, codes)
+
+    size = batch if by_rows else recordings
     if compiled_batch.parts(batch, int(model.counts.sum())) == 1:
-        run(0, batch)
+        run(0, size)
     else:
-        in_shares(run, batch)
+        in_shares(run, size)
     return codes

@@ -6,12 +6,14 @@ import math
 
 import mpmath as mp
 import naive
+import numba
 import numpy as np
 import pytest
 import systems
 from test_simulate import campaign
 
 from bayesimpact.errors import InputError
+from bayesimpact.model import derivatives
 from bayesimpact.model.derivatives import grams, trajectories_and_derivatives
 from bayesimpact.model.simulate import predictions, sums_of_squares
 
@@ -148,3 +150,28 @@ def test_failures_are_codes():
         trajectories_and_derivatives(
             np.tile(theta, (2, 1)), columns, constants, mass, counts, intervals, counts.sum()
         )
+
+
+@pytest.mark.parametrize(("vectors", "recordings", "n"), [(1, 5, 30_000), (67, 3, 600)])
+def test_shares_by_vectors_or_by_recordings_change_nothing(vectors, recordings, n, monkeypatch):
+    """One vector of a large campaign is shared out as well, by its recordings."""
+    theta, *rest = campaign(count=recordings, n=n)
+    rest[0][:, 7:10] = -1
+    batch = theta * (1 + 1e-3 * np.random.default_rng(3).standard_normal((vectors, theta.size)))
+    threads, sizes, shares = numba.get_num_threads(), [], derivatives.in_shares
+
+    def counted(work, size):
+        sizes.append(size)
+        shares(work, size)
+
+    monkeypatch.setattr(derivatives, "in_shares", counted)
+    try:
+        numba.set_num_threads(1)
+        alone, _ = grams(batch, *rest)
+    finally:
+        numba.set_num_threads(threads)
+    assert sizes == []
+    together, _ = grams(batch, *rest)
+    np.testing.assert_array_equal(together, alone)
+    if threads > 1:
+        assert sizes == [max(vectors, recordings)]
