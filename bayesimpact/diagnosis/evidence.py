@@ -127,11 +127,12 @@ def _unit(covariance: Array) -> Array:
 def _boundary(distance: float, index: int, fit: Fit) -> float:
     if distance > 1e-6:
         return float(stats.norm.logcdf(distance))
-    slope = -_gradient(fit)[index] * fit.sd[index]  # of the negative log posterior, per sd, >= 0
+    slope = -gradient(fit)[index] * fit.sd[index]  # of the negative log posterior, per sd, >= 0
     return float(np.log(special.erfcx(max(slope, 0.0) / np.sqrt(2)) / 2))
 
 
-def _gradient(fit: Fit) -> Array:
+def gradient(fit: Fit) -> Array:
+    """Gradient of the log posterior at a fit, (d,)."""
     sigma = fit.mode[fit.target.likelihood.sigma_columns]
     vector = np.array(fit.target.priors.gradient(fit.mode))
     for lin, s in zip(fit.linearisation, sigma, strict=True):

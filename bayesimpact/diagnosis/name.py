@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.force import missing_drift, missing_force
 from bayesimpact.diagnosis.naming import DECISIVE, Naming, State, is_gross
 from bayesimpact.diagnosis.pairs import promising_pairs
@@ -27,6 +28,7 @@ from bayesimpact.diagnosis.refit import (
 )
 from bayesimpact.diagnosis.scan import Scan, scan
 from bayesimpact.diagnosis.scores import Score
+from bayesimpact.diagnosis.valley import followed
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
 
@@ -41,6 +43,7 @@ LEAST_STEP = 0.8  # an effect that takes less than this off a gross residual is 
 BEAM = 3  # models that are extended while the best one is not white: it, and single effects
 PAIRS = 4  # refitted at the first step
 STARTS = 2  # points of an effect's shape grid from which it is fitted
+SHORT = 60.0  # by how much a climb that gave up may have fallen short, nats
 EXCHANGES = 3  # rounds of leaving out and exchanging effects
 
 Progress = Callable[[str], None]
@@ -61,8 +64,7 @@ def name(
     while not state.is_white and len(state.candidate.effects) < MOST_EFFECTS:
         if all(search.is_hopeless(s) for s in beam):
             break
-        better = [c for s in beam for c in search.extended(s)]
-        better = sorted({c.ids: c for c in better}.values(), key=search.worth, reverse=True)
+        better = search.ranked([c for s in beam for c in search.extended(s)])
         if not better or search.worth(better[0]) <= search.worth(state.candidate):
             break
         if (
@@ -94,6 +96,7 @@ class _Search:
         self.tried: dict[frozenset[str], Candidate] = {}
         self.states: dict[frozenset[str], State] = {}
         self.dropped: set[tuple[frozenset[str], str]] = set()
+        self.followed: set[frozenset[str]] = set()
 
     def keep(self, candidate: Candidate) -> Candidate:
         key = frozenset(candidate.ids)
@@ -132,7 +135,7 @@ class _Search:
     def fit_one(self, candidate: Candidate, found: Scan, score: Score) -> Candidate:
         """One more effect, from the best points of its shape grid."""
         key = frozenset((*candidate.ids, score.effect.id))
-        if key not in self.tried:
+        if not self.is_known(key):
             self.fit_more(candidate, [score])
             for other in found.starts(score, STARTS)[1:]:
                 self.keep(refit(candidate.fit, [other], self.scales))
@@ -140,22 +143,29 @@ class _Search:
 
     def fit_more(self, candidate: Candidate, scores: Sequence[Score]) -> Candidate:
         key = frozenset((*candidate.ids, *(s.effect.id for s in scores)))
-        if key not in self.tried:
+        if not self.is_known(key):
             self.progress("fitting " + " + ".join((*candidate.ids, *(s.effect.id for s in scores))))
             self.keep(refit(candidate.fit, scores, self.scales))
         return self.tried[key]
+
+    def is_known(self, key: frozenset[str]) -> bool:
+        """Whether a model has its mode; a climb that gave up may do better from elsewhere."""
+        return key in self.tried and self.tried[key].fit.converged
 
     def is_hopeless(self, state: State) -> bool:
         """Whether a free force will beat all models with one more effect, as far as scores tell."""
         if not state.candidate.effects or is_gross(state.candidate.fit):
             return False
-        base = self.states[frozenset()]
         most = max((s.gain for s in state.scan.best()), default=0.0)
-        within_reach = self.worth(state.candidate) + RASH * most
-        return base.unknown.log_evidence > within_reach - self.worth(base.candidate) + NEAR_MARGIN
+        return self.force_worth() > self.worth(state.candidate) + RASH * most + NEAR_MARGIN
 
     def worth(self, candidate: Candidate) -> float:
         return tempered_evidence(candidate, self.spread()) - self.cost * len(candidate.effects)
+
+    def force_worth(self) -> float:
+        """What a free force in place of all effects would be worth, as far as scores tell."""
+        base = self.states[frozenset()]
+        return self.worth(base.candidate) + base.unknown.log_evidence
 
     def spread(self) -> float:
         """Samples over which the best residual repeats itself; 1 without a gross misfit."""
@@ -201,7 +211,28 @@ class _Search:
 
     def best(self, size: int) -> Candidate:
         """The likeliest model tried with at most so many effects."""
-        return max((c for c in self.tried.values() if len(c.effects) <= size), key=self.worth)
+        return self.ranked([c for c in self.tried.values() if len(c.effects) <= size])[0]
+
+    def ranked(self, candidates: Sequence[Candidate]) -> list[Candidate]:
+        """Models, likeliest first. A climb that gave up decides nothing near the best one."""
+        best = max((self.worth(c) for c in candidates), default=0.0)
+        models = {frozenset(c.ids): c for c in candidates}
+        if self.force_worth() > best + SHORT:
+            best = np.inf  # a free force wins anyhow
+        for key, candidate in models.items():
+            if self.worth(candidate) > best - SHORT and not candidate.fit.converged:
+                models[key] = self.finished(candidate)
+        return sorted(models.values(), key=self.worth, reverse=True)
+
+    def finished(self, candidate: Candidate) -> Candidate:
+        """A model whose climb gave up, at the lowest point of its valley."""
+        key = frozenset(candidate.ids)
+        if key not in self.followed:
+            self.followed.add(key)
+            self.progress("following the valley of " + " + ".join(candidate.ids))
+            fit = followed(candidate.fit)
+            self.keep(Candidate(candidate.effects, fit, model_evidence(fit)))
+        return self.tried[key]
 
     def compare_rivals(self, state: State) -> None:
         """Put every other effect in the place of each chosen one (for pairs and triples)."""

@@ -48,9 +48,11 @@ class Linear:
         layout = SimpleNamespace(parameters=self.parameters, roles=roles)
         return SimpleNamespace(layout=layout)
 
+    def residual(self, r: int, theta: np.ndarray) -> np.ndarray:
+        return self.y - theta[:, :-1] @ self.x.T
+
     def misfit(self, theta: np.ndarray) -> np.ndarray:
-        residual = self.y - np.atleast_2d(theta)[:, :-1] @ self.x.T
-        return np.sum(residual**2, axis=1)[:, None]
+        return np.sum(self.residual(0, np.atleast_2d(theta)) ** 2, axis=1)[:, None]
 
     def linearise(self, theta: np.ndarray, steps: object = None) -> tuple[Linearisation, ...]:
         return (Linearisation(self.y - self.x @ theta[:-1], self.x, np.arange(theta.size - 1)),)

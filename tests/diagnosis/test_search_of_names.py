@@ -24,16 +24,22 @@ class Table:
     """Stands for the fits: a gain in log evidence over the base model for every set of effects.
 
     `forward` has what a fit reaches from a smaller model, where that ends in a worse place than
-    one from a larger model.
+    one from a larger model. `unfinished` has what is gained beyond where a climb gave up.
     """
 
     def __init__(
-        self, gains: dict[str, float], force: float = 0.0, forward: dict[str, float] | None = None
+        self,
+        gains: dict[str, float],
+        force: float = 0.0,
+        forward: dict[str, float] | None = None,
+        unfinished: dict[str, float] | None = None,
     ) -> None:
         self.gains = {frozenset(): 0.0} | {frozenset(k.split()): v for k, v in gains.items()}
         self.forward = {frozenset(k.split()): v for k, v in (forward or {}).items()}
+        self.unfinished = {frozenset(k.split()): v for k, v in (unfinished or {}).items()}
         self.force = force
         self.fitted: list[frozenset[str]] = []
+        self.finished: list[frozenset[str]] = []
 
     def gain(self, ids) -> float:
         """Sets that the table does not have are no better than their best part."""
@@ -42,8 +48,9 @@ class Table:
 
     def candidate(self, ids, gain: float) -> Candidate:
         fit = SimpleNamespace(
-            reduced_chi2=1.0, log_likelihood=gain + 10, rms=1.0, ids=tuple(ids), gain=gain
-        )
+            reduced_chi2=1.0, log_likelihood=gain + 10, rms=1.0, ids=tuple(ids), gain=gain,
+            converged=frozenset(ids) not in self.unfinished,
+        )  # fmt: skip
         return Candidate(tuple(BY_ID[i] for i in ids), fit, gain)
 
     def refit(self, fit, scores, scales) -> Candidate:
@@ -54,6 +61,13 @@ class Table:
     def without(self, candidate, effect, scales) -> Candidate:
         ids = [i for i in candidate.ids if i != effect.id]
         return self.candidate(ids, self.gain(ids))
+
+    def followed(self, fit):
+        self.finished.append(frozenset(fit.ids))
+        return SimpleNamespace(
+            **vars(fit)
+            | {"converged": True, "gain": fit.gain + self.unfinished[frozenset(fit.ids)]}
+        )
 
     def scan(self, fit, effects, scales, *, rng) -> Scan:
         scores = tuple(
@@ -80,6 +94,8 @@ def run(monkeypatch):
         monkeypatch.setattr(search, "refit", table.refit)
         monkeypatch.setattr(search, "without", table.without)
         monkeypatch.setattr(search, "scan", table.scan)
+        monkeypatch.setattr(search, "followed", table.followed)
+        monkeypatch.setattr(search, "model_evidence", lambda fit: fit.gain)
         monkeypatch.setattr(search, "promising_pairs", lambda scan, count: ())
         for force in ("missing_force", "missing_drift"):
             monkeypatch.setattr(search, force, table.missing)
@@ -136,3 +152,15 @@ def test_the_search_ends_when_a_free_force_will_beat_all_names(run):
     run(hopeful)
     assert max(map(len, hopeless.fitted)) == 1
     assert max(map(len, hopeful.fitted)) == 3
+
+
+def test_a_climb_that_gave_up_near_the_best_is_finished_before_it_loses(run):
+    table = Table({A: 480.0, B: 520.0, C: 300.0}, unfinished={A: 60.0, C: 400.0})
+    assert chosen(run(table)) == {A}
+    assert table.finished == [frozenset({A})]  # once, and none that is far behind
+
+
+def test_no_valley_is_followed_where_a_free_force_wins_anyhow(run):
+    table = Table({A: 100.0, B: 120.0}, force=900.0, unfinished={A: 60.0})
+    assert chosen(run(table)) != {A}
+    assert table.finished == []

@@ -1,0 +1,229 @@
+"""The steps of a climb to a mode: damped, inside the bounds, bent where a valley bends."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.inference.fit import (
+    Fit,
+    Target,
+    inverse,
+    marginal_sd,
+    normal_equations,
+    prior_information,
+)
+from bayesimpact.inference.likelihood import Linearisation
+
+Array = NDArray[np.float64]
+
+TRIES = 12  # dampings, each eight times the last one
+BENT_AT = 0.1  # of a step: where its second derivative is taken
+ROUGH = np.log(4.0)  # steps that were off by more give derivatives for one step only
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Theta (d,) with the best noise levels; minus the log posterior there; sums of squares."""
+
+    theta: Array
+    value: float
+    sums: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Slope:
+    """Derivatives at a point, matrix (d, d) and vector (d,) of the normal equations."""
+
+    parts: tuple[Linearisation, ...]
+    matrix: Array
+    vector: Array
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether a step can be taken."""
+        return bool(np.isfinite(self.matrix).all() and np.isfinite(self.vector).all())
+
+
+class Climb:
+    """One ascent: what stays fixed while theta moves, and the derivatives that still serve."""
+
+    def __init__(
+        self,
+        target: Target,
+        steps: Array | None,
+        slopes: tuple[Linearisation, ...] | None,
+        held: Sequence[int],
+    ) -> None:
+        layout = target.oscillator.layout
+        self.target = target
+        self.steps, self.slopes = steps, slopes
+        self.frozen = slopes is not None
+        self.stale = False  # the derivatives are those of an earlier theta
+        self.iterations = 0
+        self.noise = layout.roles("noise")
+        free = layout.roles("physical", "effect", "nuisance")
+        self.moving = np.setdiff1d(free, np.array(held, dtype=np.int64))
+        physical = np.array([(p.lower, p.upper) for p in layout.parameters])
+        self.lower = np.maximum(target.priors.lower, physical[:, 0])
+        self.upper = np.minimum(target.priors.upper, physical[:, 1])
+
+    def evaluate(self, theta: Array) -> Point:
+        """The point at theta, moved inside its bounds."""
+        theta = np.clip(theta, self.lower, self.upper)
+        sums = self.target.likelihood.misfit(theta)[0]
+        if not np.isfinite(sums).all():
+            return Point(theta, np.inf, sums)
+        theta[self.noise] = best_sigma(self.target, sums)
+        prior = float(self.target.priors.log_density(theta[None])[0])
+        return Point(theta, -float(self._log_likelihood(theta, sums)) - prior, sums)
+
+    def _log_likelihood(self, theta: Array, sums: Array) -> float:
+        likelihood = self.target.likelihood
+        sigma = theta[likelihood.sigma_columns]
+        constant = np.sum(likelihood.log_volume - 0.5 * likelihood.sizes * np.log(2 * np.pi))
+        spread = np.sum(likelihood.sizes * np.log(sigma) + sums / (2 * sigma**2))
+        return float(constant - spread)
+
+    def linear(self, theta: Array) -> Slope:
+        """Normal equations of the next step; derivatives by differences serve several steps."""
+        likelihood, priors = self.target.likelihood, self.target.priors
+        parts = self._parts(theta)
+        matrix, vector = normal_equations(parts, theta[likelihood.sigma_columns], theta.size)
+        information = prior_information(priors, theta)
+        information[self.noise] = 0.0
+        matrix += np.diag(information)
+        vector += priors.gradient(theta)
+        if self.steps is not None and not self.stale and np.isfinite(matrix).all():
+            known = np.diag(matrix)[self.moving] > 0
+            spread = marginal_sd(matrix[np.ix_(self.moving, self.moving)])
+            steps = self.steps.copy()
+            better = known & np.isfinite(spread) & (spread > 0)
+            steps[self.moving[better]] = 0.05 * spread[better]
+            if np.max(np.abs(np.log(steps / self.steps))) > ROUGH:
+                self.renew()
+            self.steps = steps
+        return Slope(parts, matrix, vector)
+
+    def _parts(self, theta: Array) -> tuple[Linearisation, ...]:
+        likelihood = self.target.likelihood
+        if self.slopes is None or (self.steps is None and not self.frozen):
+            self.slopes, self.stale = likelihood.linearise(theta, self.steps), False
+            return self.slopes
+        self.stale = not self.frozen
+        return tuple(
+            replace(part, residual=likelihood.residual(r, theta[None])[0])
+            for r, part in enumerate(self.slopes)
+        )
+
+    def renew(self) -> None:
+        """New derivatives at the next step."""
+        self.slopes = None
+
+    def descend(
+        self, here: Point, slope: Slope, damping: float, *, once: bool
+    ) -> tuple[Point, float]:
+        """The next point, `here` itself where none is better, and the damping it took.
+
+        `once`: neither more damping nor a bent step is tried.
+        """
+        for _ in range(1 if once else TRIES):
+            step = self.step(here.theta, slope, damping)
+            there = self.evaluate(here.theta + step)
+            if there.value > here.value and not once:
+                bend = self.bend(here.theta, slope, step, damping)
+                there = self.evaluate(here.theta + step + bend)
+            if there.value <= here.value:
+                return there, damping
+            damping = max(damping * 8, 1e-9)
+        return here, damping
+
+    def step(self, theta: Array, slope: Slope, damping: float) -> Array:
+        """Damped Gauss-Newton step; a parameter pushed against its bound stays there."""
+        matrix, vector = slope.matrix, slope.vector
+        step = np.zeros(theta.size)
+        free = self.moving
+        at_lower = (theta[free] <= self.lower[free]) & (vector[free] < 0)
+        at_upper = (theta[free] >= self.upper[free]) & (vector[free] > 0)
+        free = free[~(at_lower | at_upper)]
+        for _ in range(free.size):
+            block = matrix[np.ix_(free, free)]
+            scale = np.sqrt(np.maximum(np.diag(block), 1e-300))
+            scaled = block / np.outer(scale, scale)
+            move = np.linalg.lstsq(
+                scaled + damping * np.eye(free.size), vector[free] / scale, rcond=1e-15
+            )[0]
+            move = move / scale
+            outside = (theta[free] + move < self.lower[free]) & (theta[free] <= self.lower[free])
+            outside |= (theta[free] + move > self.upper[free]) & (theta[free] >= self.upper[free])
+            if not outside.any():
+                step[free] = move
+                return step
+            free = free[~outside]
+        return step
+
+    def bend(self, theta: Array, slope: Slope, step: Array, damping: float) -> Array:
+        """What a step must be corrected by to follow a valley that bends, to second order.
+
+        The geodesic acceleration of Transtrum and Sethna 2012, from one more simulation.
+        """
+        likelihood, part_way = self.target.likelihood, theta + BENT_AT * step
+        ahead = []
+        for r, part in enumerate(slope.parts):
+            straight = part.residual - BENT_AT * part.jacobian @ step[part.columns]
+            left = likelihood.residual(r, part_way[None])[0] - straight
+            ahead.append(replace(part, residual=left * 2.0 / BENT_AT**2))
+        sigma = theta[likelihood.sigma_columns]
+        _, vector = normal_equations(tuple(ahead), sigma, theta.size)
+        if not np.isfinite(vector).all():
+            return np.zeros(theta.size)
+        return 0.5 * self.step(theta, replace(slope, vector=vector), damping)
+
+    def fit(self, here: Point, converged: bool) -> Fit:
+        """The record of a climb that ends here."""
+        theta, sums, iterations = here.theta, here.sums, self.iterations
+        if self.stale:
+            self.renew()
+        slope = self.linear(theta)
+        parts, matrix = slope.parts, slope.matrix
+        if not np.isfinite(matrix).all():  # not a mode of anything: the caller sees its value
+            unknown = np.full(matrix.shape, np.nan)
+            return Fit(self.target, theta, unknown, -np.inf, sums, False, iterations, parts)
+        sizes, sigma = self.target.likelihood.sizes, theta[self.target.likelihood.sigma_columns]
+        for column in np.unique(self.target.likelihood.sigma_columns):
+            mine = self.target.likelihood.sigma_columns == column
+            level = sigma[mine][0]
+            information = 3 * sums[mine].sum() / level**4 - sizes[mine].sum() / level**2
+            prior = self.target.priors.hessian(theta)[column]
+            matrix[column, column] = max(information - prior, sizes[mine].sum() / level**2)
+        return Fit(
+            self.target, theta, inverse(matrix), -here.value, sums, converged, iterations, parts
+        )
+
+
+def best_sigma(target: Target, sums: Array) -> Array:
+    """Noise levels, one per noise parameter, m, that maximise the posterior for `sums` (R,)."""
+    likelihood, layout = target.likelihood, target.oscillator.layout
+    result = []
+    for column in layout.roles("noise"):
+        mine = likelihood.sigma_columns == column
+        n, s = likelihood.sizes[mine].sum(), max(float(sums[mine].sum()), 1e-300)
+        prior = target.priors.parameters[column]
+        log_sigma = 0.5 * np.log(s / n)
+        for _ in range(60):  # Newton in log sigma
+            sigma = np.exp(log_sigma)
+            slope = -n + s / sigma**2
+            bend = -2 * s / sigma**2
+            if prior.support[0] < sigma < prior.support[1]:
+                pull = float(prior.gradient(sigma)) * sigma
+                slope += pull
+                bend = min(bend + pull + float(prior.curvature(sigma)) * sigma**2, 0.1 * bend)
+            change = -slope / bend
+            log_sigma += float(np.clip(change, -1, 1))
+            if abs(change) < 1e-12:
+                break
+        result.append(np.clip(np.exp(log_sigma), *prior.support))
+    return np.array(result)

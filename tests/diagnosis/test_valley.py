@@ -1,0 +1,103 @@
+"""A search along a narrow, bent valley against a likelihood whose profile is known."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from effect_rigs import BY_ID
+
+from bayesimpact.diagnosis.valley import CLOSE, followed, valley
+from bayesimpact.inference.fit import Fit, Target
+from bayesimpact.inference.likelihood import Linearisation
+from bayesimpact.inference.mode import find_mode
+from bayesimpact.inference.prior import HalfNormal, LogNormal, LogUniform, Uniform
+from bayesimpact.inference.priors import Priors
+from bayesimpact.model.parameters import Parameter
+
+NAMES = ("c2", "contact_relaxation.stiffness", "contact_relaxation.time", "sigma")
+STIFFNESS, TIME = 20.0, 0.02  # at the mode
+
+
+class Branch:
+    """A Maxwell branch that is nearly a dashpot: c2 + K tau counts, K tau^2 hardly."""
+
+    sizes = np.array([40.0])
+    log_volume = np.array([0.0])
+    sigma_columns = np.array([3])
+    steps_of = np.array([1.0, 1.0, 1e-3])
+
+    def __init__(self) -> None:
+        roles = ("physical", "effect", "effect", "noise")
+        parameters = tuple(
+            Parameter(n, "", r, 0.0 if i else -np.inf)
+            for i, (n, r) in enumerate(zip(NAMES, roles, strict=True))
+        )
+
+        def positions(*wanted: str) -> np.ndarray:
+            return np.array([i for i, p in enumerate(parameters) if p.role in wanted])
+
+        layout = SimpleNamespace(parameters=parameters, roles=positions, names=NAMES, size=4)
+        effects = (BY_ID["contact_relaxation"],)
+        self.oscillator = SimpleNamespace(layout=layout, effects=effects)
+
+    def residual(self, r: int, theta: np.ndarray) -> np.ndarray:
+        c, k, t = theta[:, 0], theta[:, 1], theta[:, 2]
+        dashpot = c + k * t - (1.0 + STIFFNESS * TIME)
+        inertia = k * t**2 - STIFFNESS * TIME**2
+        slow = k * t**3 - STIFFNESS * TIME**3
+        rest = np.tile(1e-3 * np.sin(np.arange(37.0)), (c.size, 1))
+        return np.column_stack([3e2 * dashpot, 1e1 * inertia, 3e2 * slow, rest])
+
+    def misfit(self, theta: np.ndarray) -> np.ndarray:
+        return np.sum(self.residual(0, np.atleast_2d(theta)) ** 2, axis=1)[:, None]
+
+    def linearise(self, theta: np.ndarray, steps: object = None) -> tuple[Linearisation, ...]:
+        at = np.repeat(theta[None], 6, axis=0)
+        h = 1e-6 * np.abs(theta[:3])
+        at[np.arange(3), np.arange(3)] += h
+        at[np.arange(3, 6), np.arange(3)] -= h
+        r = self.residual(0, at)
+        jacobian = -((r[:3] - r[3:]) / (2 * h)[:, None]).T
+        return (Linearisation(self.residual(0, theta[None])[0], jacobian, np.arange(3)),)
+
+
+def problem() -> Target:
+    priors = Priors(
+        (Uniform(-1e3, 1e3), HalfNormal(1e4), LogNormal(0.02, 3.0), LogUniform(1e-9, 1e3))
+    )
+    return Target(Branch(), priors)
+
+
+def unfinished() -> Fit:
+    """A climb that gave up where the branch is ten times too fast."""
+    t = 0.002
+    start = np.array([1.0 + STIFFNESS * TIME - 2000.0 * t, 2000.0, t, 1e-3])
+    return find_mode(problem(), start, max_iterations=2)
+
+
+def test_the_valley_is_that_of_the_time_constant():
+    assert NAMES[valley(unfinished())] == "contact_relaxation.time"
+
+
+def test_the_lowest_point_of_a_bent_valley_is_found():
+    begun = unfinished()
+    assert not begun.converged and begun.mode[2] < 0.5 * TIME
+    found = followed(begun)
+    assert found.converged and found.log_posterior > begun.log_posterior
+    best = find_mode(problem(), np.array([1.0, STIFFNESS, TIME, 1e-3]), max_iterations=500)
+    assert best.converged
+    away = np.log(found.mode[2] / best.mode[2])
+    assert abs(away) < CLOSE
+    bend = (best.mode[2] / best.sd[2]) ** 2  # of the profile, over the logarithm
+    lost = best.log_posterior - found.log_posterior
+    assert lost == pytest.approx(0.5 * bend * away**2, rel=0.3)
+
+
+def test_a_model_without_shapes_has_no_valley():
+    fit = unfinished()
+    fit.target.likelihood.oscillator.effects = ()
+    names = ("c2", "k1", "c1", "sigma")
+    fit.target.likelihood.oscillator.layout.names = names
+    assert followed(fit) is fit
