@@ -62,7 +62,7 @@ def document(
             _detectable(d),
             _remains(d),
             angle=d.before.target.oscillator.campaign.recordings[0].quantity == "angle",
-            drifts=d.naming.base.unknown.reach > 0,
+            drifts=d.naming.unknown.reach > 0,
         ),
         "location": _location(d),
         "effects": [

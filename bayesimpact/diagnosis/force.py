@@ -3,9 +3,10 @@
 The unexplained force is a(y) + b(y) v with B-spline coefficients of independent normal priors. Each
 coefficient's response is simulated, whitened and projected off everything the model fits, so what
 remains of the misfit is explained by force, not by displacement errors that an earlier force left
-behind. A second form, a(t) y + b(t) v, catches stiffness and damping that change with time. In the
-linearised problem the coefficients' posterior and the evidence are closed forms; the
-prior widths maximise the evidence.
+behind. A second form, a(t) y + b(t) v, catches stiffness and damping that change with time; a third
+one, a(d) + b(d) v in contact alone, what begins with a jump at the touch. In the linearised problem
+the coefficients' posterior and the evidence are closed forms; the prior widths maximise the
+evidence.
 """
 
 from __future__ import annotations
@@ -18,7 +19,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.diagnosis.directions import sigma_of, whitened
-from bayesimpact.diagnosis.learned import KNOTS, TIMES, learned_drift, learned_force, spline_basis
+from bayesimpact.diagnosis.force_evidence import WIDTHS, ForceEvidence
+from bayesimpact.diagnosis.learned import (
+    DEPTHS,
+    KNOTS,
+    TIMES,
+    learned_contact,
+    learned_drift,
+    learned_force,
+    spline_basis,
+)
 from bayesimpact.diagnosis.projection import Projection, project
 from bayesimpact.inference.fit import Fit, inverse
 from bayesimpact.model.effects.effect import Effect, Scales, law_row
@@ -29,9 +39,6 @@ from bayesimpact.model.parameters import SLOTS
 
 Array = NDArray[np.float64]
 
-WIDTHS = np.concatenate(
-    [[0.0], np.geomspace(1e-6, 1.0, 13)]
-)  # of a and b, relative to the elastic force
 NULL_DRAWS = 1000
 _OFFSET = SLOTS.index("offset")
 
@@ -50,6 +57,7 @@ class MissingForce:
     p_value : of the largest log evidence, against its simulated law under the model
     projection : scores of the coefficients
     reach : 0 for a(y) + b(y) v; else a(t) y / reach + b(t) v, and `low`, `spacing` are times in s
+    touching : acts beyond `low` only, which is the gap
     """
 
     effect: Effect
@@ -62,6 +70,7 @@ class MissingForce:
     p_value: float
     projection: Projection
     reach: float = 0.0
+    touching: bool = False
 
     @property
     def gain(self) -> float:
@@ -86,15 +95,19 @@ class MissingForce:
 
     def parts(self, y: Array) -> tuple[Array, Array]:
         """Conservative a N and dissipative b N s/m at displacements (or times) (n,)."""
-        basis = spline_basis(y, self.low, self.spacing, self.knots)
+        basis = self._basis(y)
         return basis @ self.mean[: self.knots], basis @ self.mean[self.knots :]
 
     def spread(self, y: Array) -> tuple[Array, Array]:
         """Posterior standard deviations of a(y) and b(y) at displacements (n,)."""
-        basis, n = spline_basis(y, self.low, self.spacing, self.knots), self.knots
+        basis, n = self._basis(y), self.knots
         a = np.einsum("ni,ij,nj->n", basis, self.covariance[:n, :n], basis)
         b = np.einsum("ni,ij,nj->n", basis, self.covariance[n:, n:], basis)
         return np.sqrt(np.maximum(a, 0)), np.sqrt(np.maximum(b, 0))
+
+    def _basis(self, along: Array) -> Array:
+        basis = spline_basis(along, self.low, self.spacing, self.knots)
+        return basis * (along >= self.low)[:, None] if self.touching else basis
 
     def force(self, y: Array, v: Array, t: Array) -> Array:
         """Mean force at points of the trajectory (n,), N; times in s."""
@@ -127,6 +140,17 @@ def missing_drift(
     return replace(found, reach=scales.amplitude)
 
 
+def missing_contact(
+    fit: Fit, scales: Scales, *, rng: np.random.Generator, knots: int = DEPTHS
+) -> MissingForce | None:
+    """Posterior of a force in contact that the model leaves out; None where nothing is touched."""
+    if scales.indentation <= 0.0:
+        return None
+    learned = partial(learned_contact, scales.indentation, knots=knots)
+    found = _missing(fit, scales, rng, learned, scales.gap, scales.indentation / (knots - 3))
+    return replace(found, touching=True)
+
+
 def _missing(
     fit: Fit,
     scales: Scales,
@@ -142,7 +166,7 @@ def _missing(
     unit = np.concatenate(
         [np.full(knots, scales.force), np.full(knots, scales.force / scales.speed)]
     )
-    evidence = _Evidence(projection.information, unit, knots)
+    evidence = ForceEvidence(projection.information, unit, knots)
     found, which = evidence.maximum(projection.score[None])
     best, (width_a, width_b) = float(found[0]), evidence.pairs[which[0]]
     null, _ = evidence.maximum(evidence.null_draws(rng, NULL_DRAWS))
@@ -212,57 +236,6 @@ def _change(
     counts = np.full(points.shape[0], n, dtype=np.int64)
     out = general_motions(points, oscillator.campaign.mass, counts, intervals, laws)
     return np.asarray(out[1:] - out[0])
-
-
-class _Evidence:
-    """Closed-form evidence of normal coefficients with information S about them."""
-
-    def __init__(self, information: Array, unit: Array, knots: int) -> None:
-        self.knots, self.unit = knots, unit
-        self.scaled = information * np.outer(unit, unit)
-        self.modes: dict[float, tuple[Array, Array]] = {}
-        self.pairs = [(a, b) for a in WIDTHS for b in WIDTHS if a > 0 or b > 0]
-
-    def _ratio(self, a: float, b: float) -> float:
-        """Key of the eigenvectors and eigenvalues that widths of one ratio share."""
-        ratio = round(float(np.arctan2(a, b)), 12)
-        if ratio not in self.modes:
-            width = np.repeat([a, b], self.knots) / max(a, b)
-            values, vectors = np.linalg.eigh(self.scaled * np.outer(width, width))
-            self.modes[ratio] = np.maximum(values, 0.0), vectors.T * width
-        return ratio
-
-    def _factor(self, a: float, b: float) -> tuple[Array, float]:
-        """Root of the posterior covariance (K, K), in units, and the evidence's penalty."""
-        values, root = self.modes[self._ratio(a, b)]
-        scale = max(a, b)
-        root = root * scale / np.sqrt(1.0 + values * scale**2)[:, None]
-        return root, 0.5 * float(np.log1p(values * scale**2).sum())
-
-    def maximum(self, scores: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Largest log evidence over the widths, and which pair gives it, for scores (n, K)."""
-        scaled = (scores * self.unit).T
-        ratios = [self._ratio(a, b) for a, b in self.pairs]
-        energies = {r: (self.modes[r][1] @ scaled) ** 2 for r in set(ratios)}
-        gains = np.empty((len(self.pairs), scores.shape[0]))
-        for i, (ratio, pair) in enumerate(zip(ratios, self.pairs, strict=True)):
-            values, squared = self.modes[ratio][0], max(pair) ** 2
-            weights = 0.5 * squared / (1.0 + values * squared)
-            gains[i] = weights @ energies[ratio] - 0.5 * np.log1p(values * squared).sum()
-        return gains.max(axis=0), gains.argmax(axis=0)
-
-    def posterior(self, score: Array, a: float, b: float) -> tuple[Array, Array]:
-        """Mean and covariance of the coefficients."""
-        factor, _ = self._factor(a, b)
-        root = factor.T * self.unit[:, None]
-        covariance = root @ root.T
-        return covariance @ score, covariance
-
-    def null_draws(self, rng: np.random.Generator, count: int) -> Array:
-        """Scores under the model, (count, K)."""
-        values, vectors = np.linalg.eigh(self.scaled)
-        root = vectors * np.sqrt(np.maximum(values, 0.0)) / self.unit[:, None]
-        return np.asarray(rng.standard_normal((count, values.size)) @ root.T)
 
 
 def trajectory_points(fit: Fit) -> Sequence[tuple[Array, Array]]:

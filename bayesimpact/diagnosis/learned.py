@@ -1,11 +1,13 @@
-"""Unknown forces as effects like any: a(y) + b(y) v, and a(t) y + b(t) v; cubic B-splines.
+"""Unknown forces as effects like any: a(y) + b(y) v, a(t) y + b(t) v, a(d) + b(d) v in contact.
 
-The conservative part a and the dissipative part b have one coefficient per knot each. With
-independent normal priors of equal width this is a Gaussian process of correlation length about one
-knot spacing.
+The conservative part a and the dissipative part b are cubic B-splines with one coefficient per knot
+each. With independent normal priors of equal width this is a Gaussian process of correlation length
+about one knot spacing.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,17 +16,21 @@ from bayesimpact.model.effects.effect import Effect, EffectParameter, Law
 
 Array = NDArray[np.float64]
 
+EQUATIONS = {0: "a(y) + b(y) v", 1: "a(t) y / reach + b(t) v", -1: "a(d) + b(d) v in contact"}
 KNOTS = 24
 TIMES = 8  # knots over time: what changes does so slowly
+DEPTHS = 6  # knots over the indentation
 
 
 def force(y, v, d, t, z, touching, p, q):  # type: ignore[no-untyped-def]
-    """Force a(y) + b(y) v or, where `reach` is not 0, a(t) y / reach + b(t) v, N.
+    """Force a + b v of the displacement, of time (`reach` above 0; a y / reach) or in contact, N.
 
-    p = (n, lowest, spacing, reach, a_1..a_n, b_1..b_n).
+    p = (n, lowest, spacing, reach, a_1..a_n, b_1..b_n); a negative reach stands for contact.
     """
     n = int(p[0])
     along = y if p[3] == 0.0 else t
+    if p[3] < 0.0:
+        along = d
     x = (along - p[1]) / p[2]
     if x < 0.0:
         x = 0.0
@@ -74,6 +80,14 @@ def learned_drift(
     return _learned(0.0, duration, reach, conservative, dissipative, knots)
 
 
+def learned_contact(
+    depth: float, conservative: float, dissipative: float, knots: int = DEPTHS
+) -> Effect:
+    """a(d) + b(d) v for indentations up to `depth` m, in contact alone."""
+    found = _learned(0.0, depth, -1.0, conservative, dissipative, knots)
+    return replace(found, regime="contact", law=Law(force, where="contact"), needs_stop=True)
+
+
 def _learned(
     low: float, high: float, reach: float, conservative: float, dissipative: float, knots: int
 ) -> Effect:
@@ -94,7 +108,7 @@ def _learned(
         id="learned_force",
         family="unknown",
         title="learned force",
-        equation="a(t) y / reach + b(t) v" if reach else "a(y) + b(y) v",
+        equation=EQUATIONS[int(np.sign(reach))],
         regime="everywhere",
         energy="either",
         statement=(

@@ -148,12 +148,12 @@ def diagnose_fit(
     after = chosen.candidate.fit
     if verdict == "unknown":
         say("learning the force")
-        after = learn_force(naming.base, scales)
+        after = learn_force(base, naming.unknown, scales)
     added = ordered(naming, chosen.candidate.effects) if verdict in ("named", "ambiguous") else ()
     location = held = cases = None
     if verdict != "adequate":
         say("locating")
-        location = locate(base, after, naming.base.unknown, added)
+        location = locate(base, after, naming.unknown, added)
         if len(identification.fit.target.oscillator.campaign.recordings) > 1:
             say("predicting held-out recordings")
             held = held_out_recordings(base, after)

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from bayesimpact.diagnosis.evidence import model_evidence
-from bayesimpact.diagnosis.force import missing_drift, missing_force
+from bayesimpact.diagnosis.force import missing_contact, missing_drift, missing_force
 from bayesimpact.diagnosis.naming import DECISIVE, Naming, State, is_gross
 from bayesimpact.diagnosis.pairs import promising_pairs
 from bayesimpact.diagnosis.periodic import shakes_in_own_band
@@ -28,11 +28,13 @@ from bayesimpact.diagnosis.refit import (
 )
 from bayesimpact.diagnosis.scan import Scan, scan
 from bayesimpact.diagnosis.scores import Score
+from bayesimpact.diagnosis.unknown import learn_force
 from bayesimpact.diagnosis.valley import followed
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
 
 MOST_EFFECTS = 3
+MANY = 3  # effects from which on they may imitate a single force
 WORTH_A_REFIT = 4.0  # expected gain in log likelihood, nats
 NEAR_BEST = 0.5  # of the best expected gain, less a margin: below that no refit makes a rival
 NEAR_MARGIN = 10.0  # nats
@@ -251,7 +253,13 @@ class _Search:
         best = self.best(len(chosen.candidate.effects))
         if set(best.ids) != set(chosen.candidate.ids):
             chosen = self.examine(best)
-        return Naming(base, chosen, tried, self.cost, self.spread())
+        contact = missing_contact(base.candidate.fit, self.scales, rng=self.rng)
+        odds = -np.inf
+        if contact is not None and len(chosen.candidate.effects) >= MANY and self.spread() == 1.0:
+            self.progress("fitting a force in contact in place of " + " + ".join(best.ids))
+            fit = learn_force(base.candidate.fit, contact, self.scales)
+            odds = model_evidence(fit) - base.candidate.log_evidence
+        return Naming(base, chosen, tried, self.cost, self.spread(), contact, odds)
 
 
 def worth_a_refit(scan: Scan) -> list[Score]:

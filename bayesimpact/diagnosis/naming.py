@@ -64,6 +64,9 @@ class Naming:
     tried : every model that was fitted, best first
     prior_cost : nats per added effect
     spread : samples over which the best model's residual repeats itself, where the misfit is gross
+    contact : force in contact alone that the base model leaves unexplained, or None
+    contact_odds : its log evidence over the base model when it is fitted with the parameters, where
+        many chosen effects may imitate it
     """
 
     base: State
@@ -71,6 +74,14 @@ class Naming:
     tried: tuple[Candidate, ...]
     prior_cost: float
     spread: float = 1.0
+    contact: MissingForce | None = None
+    contact_odds: float = -np.inf
+
+    @property
+    def unknown(self) -> MissingForce:
+        """The likeliest free force."""
+        forces = [self.base.unknown, *([self.contact] if self.contact else [])]
+        return max(forces, key=lambda f: f.log_evidence)
 
     def log_odds(self, candidate: Candidate) -> float:
         """Log posterior odds of a model against the base model."""
@@ -101,14 +112,14 @@ class Naming:
 
         An effect that imitates a force outside the catalogue loses to that force. Where the chosen
         effects leave nothing, no force can gain more than they do, whatever the linearised problem
-        promises.
+        promises. Many effects that imitate one force in contact lose to that force when fitted.
         """
         force, chosen = self.base.unknown, self.chosen.candidate
         evidence = force.log_evidence
         if self.chosen.is_white:
             reached = chosen.fit.log_likelihood - self.base.candidate.fit.log_likelihood
             evidence -= max(0.0, force.gain - reached - DECISIVE)
-        return evidence / self.spread > self.log_odds(chosen) + DECISIVE
+        return max(evidence / self.spread, self.contact_odds) > self.log_odds(chosen) + DECISIVE
 
     def probability(self, effect_id: str) -> float:
         """Probability that an effect is part of the model, over all models tried."""

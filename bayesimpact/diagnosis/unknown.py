@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.diagnosis.extend import difference_steps, extend, transfer
-from bayesimpact.diagnosis.naming import State
+from bayesimpact.diagnosis.force import MissingForce
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.model.effects.effect import Scales
@@ -14,9 +14,8 @@ from bayesimpact.model.effects.effect import Scales
 Array = NDArray[np.float64]
 
 
-def learn_force(state: State, scales: Scales) -> Fit:
-    """Fit the parameters and the coefficients of the likelier free force together."""
-    fit, force = state.candidate.fit, state.unknown
+def learn_force(fit: Fit, force: MissingForce, scales: Scales) -> Fit:
+    """Fit the parameters and the coefficients of a free force together."""
     effects = (*fit.target.oscillator.effects, force.effect)
     target = extend(fit, effects, scales)
     names = target.oscillator.layout.names

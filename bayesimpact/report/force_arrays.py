@@ -52,7 +52,7 @@ def force_arrays(d: Diagnosis) -> dict[str, Array]:
             [force.effect.parameter(n).scale(d.scales) for n in ("a1", "b1")], force.knots
         )
         arrays |= rest.parts("left", *_posterior(d.naming.chosen.force, width))
-    if d.verdict == "unknown" and d.naming.base.unknown is force:
+    if d.verdict == "unknown" and d.naming.unknown is force:
         values = dict(zip(d.after.names, d.after.mode, strict=True))
         learned = np.array([values[n] for n in coefficient_names(force.knots)])
         arrays |= {f"learned_{part}": rest.maps[part] @ learned for part in "ab"}

@@ -13,15 +13,15 @@ from scipy import stats
 from bayesimpact.diagnosis.directions import sigma_of
 from bayesimpact.diagnosis.extend import campaign_scales, extend, transfer
 from bayesimpact.diagnosis.force import (
-    WIDTHS,
     MissingForce,
-    _Evidence,
     basis_responses,
+    missing_contact,
     missing_drift,
     missing_force,
     motion_range,
     trajectory_points,
 )
+from bayesimpact.diagnosis.force_evidence import WIDTHS, ForceEvidence
 from bayesimpact.diagnosis.learned import learned_force, spline_basis
 from bayesimpact.diagnosis.naming import State
 from bayesimpact.diagnosis.refit import base_candidate
@@ -57,7 +57,7 @@ def problem():
 
 def test_evidence_and_posterior_are_the_dense_ones(problem):
     d, residual, unit = problem
-    evidence = _Evidence(d.T @ d, unit, 3)
+    evidence = ForceEvidence(d.T @ d, unit, 3)
     score = d.T @ residual
     for a, b in [(1e-3, 1e-2), (1e-4, 0.0), (0.0, 1e-2)]:
         width = np.repeat([a, b], 3) * unit
@@ -74,7 +74,7 @@ def test_evidence_and_posterior_are_the_dense_ones(problem):
 
 def test_the_widths_maximise_the_evidence(problem):
     d, residual, unit = problem
-    evidence = _Evidence(d.T @ d, unit, 3)
+    evidence = ForceEvidence(d.T @ d, unit, 3)
     found, which = evidence.maximum((d.T @ residual)[None])
     values = {
         (a, b): dense_log_evidence(d, residual, np.repeat([a, b], 3) * unit)
@@ -90,7 +90,7 @@ def test_the_widths_maximise_the_evidence(problem):
 def test_scores_under_the_model_have_the_information_as_covariance(problem):
     d, _, unit = problem
     information = d.T @ d
-    draws = _Evidence(information, unit, 3).null_draws(np.random.default_rng(1), 20_000)
+    draws = ForceEvidence(information, unit, 3).null_draws(np.random.default_rng(1), 20_000)
     scale = np.sqrt(np.diag(information))
     found = draws.T @ draws / 20_000 / np.outer(scale, scale)
     np.testing.assert_allclose(found, information / np.outer(scale, scale), atol=0.04)
@@ -218,7 +218,7 @@ def test_the_learned_force_goes_back_into_the_simulator(detent):
     assert drift.log_evidence < found.log_evidence - 20  # a detent is no drift
     state = State(base_candidate(fit), scan(fit, [], scales, rng=rng), found, drift)
     assert state.unknown is found
-    learned = learn_force(state, scales)
+    learned = learn_force(state.candidate.fit, state.unknown, scales)
     assert fit.reduced_chi2 > learned.reduced_chi2
     chi2 = learned.sums.sum() / small_rig.NOISE**2
     assert chi2 < stats.chi2.ppf(1 - 1e-4, 6000)
@@ -265,7 +265,7 @@ def test_damping_that_drifts_is_a_force_of_time():
     slope = np.polyfit(times, damping, 1)[0]
     assert 0.3 < slope / (0.15 * small_rig.RIG.c1) < 2.0  # c1 (1 + rate t)
     state = State(base_candidate(fit), scan(fit, [], scales, rng=rng), force, drift)
-    learned = learn_force(state, scales)
+    learned = learn_force(state.candidate.fit, state.unknown, scales)
     assert learned.sums.sum() / small_rig.NOISE**2 < stats.chi2.ppf(1 - 1e-3, 6000)
 
 
@@ -283,3 +283,26 @@ def test_a_force_in_contact_is_found_in_contact():
     assert found.log_evidence > 20
     assert found.share_within(gap, 1.0) > 0.9 > 0.8 > found.share_within(-1.0, -1e-3)
     assert found.share_within(-1.0, 1.0) == pytest.approx(1.0)
+
+
+def test_a_preload_is_a_force_in_contact_that_jumps_at_the_touch():
+    """The free force of displacement is too smooth for it; the one in contact learns it."""
+    force = 0.05
+    campaign = small_rig.record(5, {"contact_preload": {"force": force}})
+    fit = identify(campaign, rng=np.random.default_rng(0), search=False).fit
+    scales, rng = campaign_scales(fit), np.random.default_rng(0)
+    contact, smooth = missing_contact(fit, scales, rng=rng), missing_force(fit, scales, rng=rng)
+    assert contact is not None and contact.log_evidence > smooth.log_evidence + 10
+    y, v = np.array([-1e-3, scales.gap + 1e-5]), np.zeros(2)
+    assert contact.force(y, v, v)[0] == 0.0
+    learned = learn_force(fit, contact, scales)
+    assert learned.converged
+    assert learned.sums.sum() / small_rig.NOISE**2 < stats.chi2.ppf(1 - 1e-3, 6000)
+    for name in ("k2[1]", "k2[2]", "c2"):
+        i = learned.names.index(name)
+        assert abs(learned.mode[i] - small_rig.true_values()[name]) < 4 * learned.sd[i]
+
+
+def test_without_an_obstacle_there_is_no_force_in_contact(small):
+    scales = replace(campaign_scales(small.fit), indentation=0.0)
+    assert missing_contact(small.fit, scales, rng=np.random.default_rng(0)) is None

@@ -9,9 +9,16 @@ import pytest
 from effect_rigs import TestRig
 from scipy.interpolate import BSpline
 
-from bayesimpact.diagnosis.learned import force, learned_force, spline_basis
+from bayesimpact.diagnosis.learned import (
+    DEPTHS,
+    force,
+    learned_contact,
+    learned_force,
+    spline_basis,
+)
 from bayesimpact.model.effects.effect import address
 from bayesimpact.model.oscillator import build_oscillator
+from bayesimpact.trial.rig import Release, Rig, motion
 
 LOW, HIGH, KNOTS = -6.5e-3, 3.5e-3, 12
 SPACING = (HIGH - LOW) / (KNOTS - 3)
@@ -82,3 +89,36 @@ def test_its_priors_and_names():
     assert {p.scale(TestRig().scales()) for p in free[:KNOTS]} == {2e-3}
     assert {p.scale(TestRig().scales()) for p in free[KNOTS:]} == {5e-2}
     assert effect.family == "unknown"
+
+
+def contact_values(a: np.ndarray, b: float) -> dict[str, float]:
+    values = {f"learned_force.a{i + 1}": float(x) for i, x in enumerate(a)}
+    return values | {f"learned_force.b{i + 1}": b for i in range(DEPTHS)}
+
+
+def test_a_linear_force_in_contact_is_a_stiffer_obstacle():
+    """a(d) = 40 d, b = 0.5 against the base model with k2 + 40, c2 + 0.5."""
+    rig, depth = TestRig(duration=1.0), 4e-3
+    line = 40 * depth / (DEPTHS - 3) * np.arange(-1, DEPTHS - 1)
+    oscillator = build_oscillator(rig.campaign(), [learned_contact(depth, 1.0, 1.0)])
+    found = oscillator.predict(rig.theta(oscillator, contact_values(line, 0.5)))
+    base = build_oscillator(rig.campaign())
+    stiffer = {f"k2[{i}]": k + 40 for i, k in enumerate(rig.k2)}
+    theta = rig.theta(base, stiffer | {"c2": rig.c2 + 0.5})
+    for one, other in zip(found, base.predict(theta), strict=True):
+        assert rig.g < one.max() < rig.g + depth  # inside the splines' range
+        np.testing.assert_allclose(one, other, atol=1e-10)
+
+
+def test_a_constant_force_in_contact_is_the_independent_rigs_preload():
+    rig, force = TestRig(duration=1.0), 0.05
+    oscillator = build_oscillator(rig.campaign(), [learned_contact(3e-3, 1.0, 1.0)])
+    values = contact_values(np.full(DEPTHS, force), 0.0)
+    found = oscillator.predict(rig.theta(oscillator, values))[0]
+    other = Rig(rig.mass, rig.c1, rig.k1, c2=rig.c2, g=rig.g, k2={"0": rig.k2[0]})
+    release = Release("r0", "0", rig.y0[0], rig.v0[0])
+    preload = {"contact_preload": {"force": force}}
+    expected = motion(
+        other, release, preload, rate=rig.rate, duration=rig.duration, rtol=1e-12, atol=1e-15
+    ).displacement
+    np.testing.assert_allclose(found, expected, atol=1e-9)

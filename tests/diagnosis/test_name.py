@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -175,3 +176,20 @@ def test_what_is_on_or_off_is_fitted_wherever_something_is_to_be_gained():
     for effect in ("contact_no_tension", "obstacle_mass"):
         assert [s.gain for s in worth_a_refit(scores(40.0, 0.1, effect=effect))] == [40.0, 0.1]
         assert [s.gain for s in worth_a_refit(scores(20.0, 0.1, effect=effect))] == [20.0]
+
+
+def test_many_effects_that_imitate_one_force_in_contact_are_unknown():
+    """Three effects against the force fitted with the parameters; a decisive lead is needed."""
+    three = "contact_damping_per_case contact_no_tension gap_wear"
+    found = naming(state(candidate(three, 500.0)))
+    assert judge(found) == "named"
+    lead = found.log_odds(found.chosen.candidate)
+    assert judge(replace(found, contact_odds=lead + DECISIVE - 0.1)) == "named"
+    assert judge(replace(found, contact_odds=lead + DECISIVE + 0.1)) == "unknown"
+
+
+def test_the_unknown_force_is_the_likeliest_of_its_forms():
+    found = naming(state(candidate("", 0.0), force_evidence=20.0))
+    assert found.unknown is found.base.force
+    contact = SimpleNamespace(log_evidence=30.0)
+    assert replace(found, contact=contact).unknown is contact

@@ -33,7 +33,9 @@ class Table:
         force: float = 0.0,
         forward: dict[str, float] | None = None,
         unfinished: dict[str, float] | None = None,
+        in_contact: float = 0.0,
     ) -> None:
+        self.in_contact = in_contact
         self.gains = {frozenset(): 0.0} | {frozenset(k.split()): v for k, v in gains.items()}
         self.forward = {frozenset(k.split()): v for k, v in (forward or {}).items()}
         self.unfinished = {frozenset(k.split()): v for k, v in (unfinished or {}).items()}
@@ -83,6 +85,10 @@ class Table:
         none = np.zeros(0)
         return Score(effect, {}, 0.0, 1.0, none, none, 0.0, none, 1.0, gain, ())
 
+    def contact(self, fit, scales, *, rng):
+        fit = SimpleNamespace(gain=self.in_contact)
+        return SimpleNamespace(log_evidence=self.in_contact, fit=fit)
+
     def missing(self, fit, scales, *, rng):
         left = self.force - fit.gain
         return SimpleNamespace(p_value=0.5, log_evidence=left, gain=left + 20)
@@ -96,6 +102,8 @@ def run(monkeypatch):
         monkeypatch.setattr(search, "scan", table.scan)
         monkeypatch.setattr(search, "followed", table.followed)
         monkeypatch.setattr(search, "model_evidence", lambda fit: fit.gain)
+        monkeypatch.setattr(search, "missing_contact", table.contact)
+        monkeypatch.setattr(search, "learn_force", lambda fit, force, scales: force.fit)
         monkeypatch.setattr(search, "promising_pairs", lambda scan, count: ())
         for force in ("missing_force", "missing_drift"):
             monkeypatch.setattr(search, force, table.missing)
@@ -164,3 +172,12 @@ def test_no_valley_is_followed_where_a_free_force_wins_anyhow(run):
     table = Table({A: 100.0, B: 120.0}, force=900.0, unfinished={A: 60.0})
     assert chosen(run(table)) != {A}
     assert table.finished == []
+
+
+def test_a_force_in_contact_is_fitted_in_place_of_three_effects_only(run):
+    gains = {A: 200.0, B: 190.0, f"{A} {B}": 400.0, f"{A} {B} {C}": 600.0}
+    three = run(Table(gains, in_contact=650.0))
+    assert chosen(three) == {A, B, C} and three.contact_odds == 650.0
+    assert three.prefers_learned_force()
+    two = run(Table(gains | {f"{A} {B}": 550.0}, in_contact=650.0))
+    assert chosen(two) == {A, B} and two.contact_odds == -np.inf
