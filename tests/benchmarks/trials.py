@@ -1,6 +1,6 @@
 """Did the diagnosis find what was concealed? Stores a finished run of blind trials.
 
-    bayesimpact trial --number 200 --seed 1000 --strength 5 12 --workers 2 --out proof
+    bayesimpact trial --number 200 --seed 2000 --strength 5 12 --workers 2 --out proof
     python tests/benchmarks/trials.py proof
 
 Writes trials.json beside this file: the run's summary, with settings, seeds, versions, commit and
