@@ -76,6 +76,8 @@ def name(
             break
         state = search.examine(better[0])
         if not state.is_white:
+            state = search.restarted(state)
+        if not state.is_white:
             singles = [c for c in better[1:] if len(c.effects) == 1]
             beam = [state, *(search.examine(c) for c in singles[: BEAM - 1])]
     if state.is_white or is_gross(base.candidate.fit):  # else no name can be given
@@ -176,6 +178,24 @@ class _Search:
             return 1.0
         best = min(self.tried.values(), key=lambda c: c.fit.reduced_chi2)
         return correlation_spread(best.fit)
+
+    def restarted(self, state: State) -> State:
+        """The same model with the shapes of its effects sought anew beside all others.
+
+        A frequency or a depth that was found while something else was missing may be a side
+        minimum that no climb leaves.
+        """
+        chosen = state.candidate
+        if len(chosen.effects) < 2 or self.force_worth() > self.worth(chosen) + SHORT:
+            return state
+        for effect in chosen.effects:
+            if any(p.is_shape and not p.circular for p in effect.parameters):
+                rest = self.drop(chosen, effect)
+                found = scan(rest.fit, [effect], self.scales, rng=self.rng)
+                for score in found.best():
+                    for start in found.starts(score, STARTS):
+                        self.keep(refit(rest.fit, [start], self.scales))
+        return self.examine(self.ranked([self.tried[frozenset(chosen.ids)]])[0])
 
     def eliminated(self, state: State) -> State:
         """Leave out effects, the least useful first, that the recordings do not demand.

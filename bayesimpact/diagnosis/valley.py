@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 
 FIRST = 0.2  # first move along the logarithm of the shape
 CLOSE = 0.02  # in that logarithm: how near the mode is found
+FARTHEST = 5.0  # that the shape is followed, in its logarithm
 MOST = 12  # moves, and as many more of Brent's method
 ITERATIONS = 10  # of a climb beside the valley
 TOLERANCE = 0.02  # standard deviations
@@ -88,12 +89,12 @@ class _Profile:
 
     def search(self, x: float) -> None:
         """Downhill in growing steps until the profile rises again, then Brent's method."""
-        step = FIRST
+        step, begun = FIRST, x
         if self(x + step) > self(x):
             step = -step
         low, middle, high = x, x, x + step
         for _ in range(MOST):
-            if self(high) > self(middle):
+            if self(high) > self(middle) or abs(high - begun) > FARTHEST:
                 break
             low, middle, step = middle, high, 1.6 * step
             high = middle + step

@@ -16,7 +16,8 @@ from bayesimpact.diagnosis.scores import Score
 search = importlib.import_module("bayesimpact.diagnosis.name")
 
 A, B, C, D = "coulomb_friction", "quadratic_drag", "spring_cubic", "gap_wear"
-EFFECTS = tuple(BY_ID[i] for i in (A, B, C, D))
+S = "contact_second_stage"  # has a depth
+EFFECTS = tuple(BY_ID[i] for i in (A, B, C, D, S))
 ENOUGH = 500.0  # a gain at which nothing is left
 
 
@@ -24,7 +25,8 @@ class Table:
     """Stands for the fits: a gain in log evidence over the base model for every set of effects.
 
     `forward` has what a fit reaches from a smaller model, where that ends in a worse place than
-    one from a larger model. `unfinished` has what is gained beyond where a climb gave up.
+    one from a larger model. `unfinished` has what is gained beyond where a climb gave up,
+    `once` where a model's first fit ends.
     """
 
     def __init__(
@@ -34,7 +36,9 @@ class Table:
         forward: dict[str, float] | None = None,
         unfinished: dict[str, float] | None = None,
         in_contact: float = 0.0,
+        once: dict[str, float] | None = None,
     ) -> None:
+        self.once = {frozenset(k.split()): v for k, v in (once or {}).items()}
         self.in_contact = in_contact
         self.gains = {frozenset(): 0.0} | {frozenset(k.split()): v for k, v in gains.items()}
         self.forward = {frozenset(k.split()): v for k, v in (forward or {}).items()}
@@ -58,7 +62,8 @@ class Table:
     def refit(self, fit, scores, scales) -> Candidate:
         ids = (*fit.ids, *(s.effect.id for s in scores))
         self.fitted.append(key := frozenset(ids))
-        return self.candidate(ids, self.forward.get(key, self.gain(ids)))
+        reached = self.forward.get(key, self.gain(ids))
+        return self.candidate(ids, self.once.pop(key, reached))
 
     def without(self, candidate, effect, scales) -> Candidate:
         ids = [i for i in candidate.ids if i != effect.id]
@@ -181,3 +186,13 @@ def test_a_force_in_contact_is_fitted_in_place_of_three_effects_only(run):
     assert three.prefers_learned_force()
     two = run(Table(gains | {f"{A} {B}": 550.0}, in_contact=650.0))
     assert chosen(two) == {A, B} and two.contact_odds == -np.inf
+
+
+def test_shapes_are_sought_anew_before_a_model_is_given_up(run):
+    """The depth was found while friction was missing: a side minimum."""
+    pair = f"{A} {S}"
+    stuck = {f"{pair} {other}": 450.0 for other in (B, C, D)}
+    table = Table({A: 300.0, S: 200.0, pair: 600.0}, forward=stuck, once={pair: 450.0})
+    found = run(table)
+    assert chosen(found) == {A, S} and found.chosen.is_white
+    assert found.chosen.candidate.log_evidence == 600.0
