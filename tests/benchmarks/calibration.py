@@ -1,6 +1,6 @@
 """Is the posterior calibrated, and how often is nothing mistaken for something?
 
-python tests/benchmarks/calibration.py sbc --replicates 300 --workers 2 --out FILE.json
+python tests/benchmarks/calibration.py sbc --seed 300 --replicates 300 --workers 2 --out FILE.json
 python tests/benchmarks/calibration.py sbc --method emcee --replicates 50 --out FILE.json
 python tests/benchmarks/calibration.py alarms --controls 300 --workers 2 --out FILE.json
 """

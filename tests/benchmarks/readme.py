@@ -177,27 +177,29 @@ def power_table() -> str:
 
 
 def sbc_table() -> str:
-    """Simulation-based calibration."""
-    s = stored("sbc")
-    rows = [
-        (
-            model,
-            f"{len(found['parameters'])}",
-            ", ".join(found["outside"]) or "none",
-            f"{100 * min(p['covered_90'] for p in found['parameters'].values()):.0f} to "
-            f"{100 * max(p['covered_90'] for p in found['parameters'].values()):.0f} %",
-        )
-        for model, found in s["models"].items()
-    ]
+    """Simulation-based calibration, one column of verdicts per run."""
+    runs = stored("sbc")
+    rows = []
+    for model, first in runs[0]["models"].items():
+        outside = [", ".join(run["models"][model]["outside"]) or "none" for run in runs]
+        held = [p["covered_90"] for r in runs for p in r["models"][model]["parameters"].values()]
+        ranked = f"{len(first['parameters'])}"
+        held_text = f"{100 * min(held):.0f} to {100 * max(held):.0f} %"
+        rows.append((model, ranked, *outside, held_text))
+    seeds = [f"{run['seed']} to {run['seed'] + run['replicates'] - 1}" for run in runs]
     head = (
         "model",
         "quantities ranked",
-        "outside the 99 % band",
+        *(f"outside the 99 % band, seeds {s}" for s in seeds),
         "90 % intervals hold the truth in",
     )
-    return grid(
-        head, rows, f"{s['replicates']} replicates each. Commit {s['commit'][:7]}, {s['date']}."
+    every = [row for run in runs for row in run["models"].values()]
+    count, out = sum(len(r["parameters"]) for r in every), sum(len(r["outside"]) for r in every)
+    commits = " and ".join(run["commit"][:7] for run in runs)
+    foot = (
+        f"{out} of {count} outside, {0.01 * count:.1f} expected by chance; 300 replicates per run."
     )
+    return grid(head, rows, f"{foot} Commits {commits}, {runs[-1]['date']}.")
 
 
 def share(row: dict) -> str:
