@@ -10,7 +10,7 @@ searched in one dimension (Brent 1973).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,14 +51,19 @@ def valley(fit: Fit) -> int | None:
 
 
 def followed(fit: Fit) -> Fit:
-    """The fit that a search along its valley reaches; never a worse one."""
+    """The fit that a search along its valley reaches; never a worse one.
+
+    Converged only where the valley rises again on both sides.
+    """
     column = valley(fit)
     if column is None or not np.isfinite(fit.log_posterior):
         return fit
     profile = _Profile(column, fit)
-    profile.search(float(np.log(fit.mode[column])))
+    enclosed = profile.search(float(np.log(fit.mode[column])))
     best = max(profile.fits.values(), key=lambda f: f.log_posterior)
-    return best if best.log_posterior >= fit.log_posterior else fit
+    if best.log_posterior < fit.log_posterior:
+        return fit
+    return replace(best, converged=best.converged and enclosed)
 
 
 @dataclass
@@ -87,8 +92,11 @@ class _Profile:
             )
         return -self.fits[x].log_posterior
 
-    def search(self, x: float) -> None:
-        """Downhill in growing steps until the profile rises again, then Brent's method."""
+    def search(self, x: float) -> bool:
+        """Downhill in growing steps until the profile rises again, then Brent's method.
+
+        False when it never rises.
+        """
         step, begun = FIRST, x
         if self(x + step) > self(x):
             step = -step
@@ -101,10 +109,11 @@ class _Profile:
         if low == middle:  # the first point is the best so far: look behind it
             low = x - step
         if not (self(low) > self(middle) < self(high)):
-            return
+            return False
         optimize.minimize_scalar(
             self,
             bracket=(low, middle, high),
             method="brent",
             options={"xtol": CLOSE / max(1.0, abs(middle)), "maxiter": MOST},
         )
+        return True

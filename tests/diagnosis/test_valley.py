@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from effect_rigs import BY_ID
 
-from bayesimpact.diagnosis.valley import CLOSE, followed, valley
+from bayesimpact.diagnosis.valley import CLOSE, _Profile, followed, valley
 from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.likelihood import Linearisation
 from bayesimpact.inference.mode import find_mode
@@ -101,3 +102,21 @@ def test_a_model_without_shapes_has_no_valley():
     names = ("c2", "k1", "c1", "sigma")
     fit.target.likelihood.oscillator.layout.names = names
     assert followed(fit) is fit
+
+
+def test_a_valley_that_never_rises_has_no_lowest_point(monkeypatch):
+    begun = unfinished()
+
+    def forever_down(self, x: float) -> float:
+        fit = replace(begun, log_posterior=begun.log_posterior - x, converged=True)
+        return -self.fits.setdefault(x, fit).log_posterior
+
+    def bowl(self, x: float) -> float:
+        lost = (x - np.log(TIME)) ** 2
+        fit = replace(begun, log_posterior=begun.log_posterior + 9.0 - lost, converged=True)
+        return -self.fits.setdefault(x, fit).log_posterior
+
+    monkeypatch.setattr(_Profile, "__call__", forever_down)
+    assert not followed(begun).converged
+    monkeypatch.setattr(_Profile, "__call__", bowl)
+    assert followed(begun).converged
