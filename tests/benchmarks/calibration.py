@@ -15,6 +15,7 @@ import numpy as np
 from tqdm import tqdm
 
 from bayesimpact.trial.alarms import alarm, false_alarms
+from bayesimpact.trial.command import one_thread_each
 from bayesimpact.trial.run import executor
 from bayesimpact.trial.sbc import MODELS, replicate, verdicts
 from bayesimpact.trial.settings import Settings
@@ -47,6 +48,11 @@ def alarms(chosen: argparse.Namespace) -> dict:
     with executor(chosen.workers, chosen.scheduler) as spread:
         jobs = ((seed, (settings, seed)) for seed in seeds)
         found = dict(tqdm(spread(alarm, jobs), total=len(seeds), desc="controls"))
+    lost = {seed: row["failed"] for seed, row in found.items() if "failed" in row}
+    if lost:
+        raise SystemExit(
+            f"{len(lost)} of {len(found)} controls failed, the first: {lost.popitem()}"
+        )
     result = false_alarms([found[seed] for seed in seeds], np.random.default_rng(0))
     print(json.dumps({k: v for k, v in result.items() if k != "rows"}, indent=1))
     return {**result, "rows": [found[seed] for seed in seeds]}
@@ -65,6 +71,8 @@ def main() -> None:
     parser.add_argument("--scheduler")
     parser.add_argument("--out", type=Path)
     chosen = parser.parse_args()
+    if chosen.workers > 1:
+        one_thread_each()  # before a worker's numba reads the environment
     result = {"sbc": sbc, "alarms": alarms}[chosen.what](chosen)
     if chosen.out is not None:
         document = {**origin(), "command": chosen.what, "seed": chosen.seed, **result}
