@@ -202,17 +202,6 @@ def sbc_table() -> str:
     return grid(head, rows, f"{foot} Commits {commits}, {runs[-1]['date']}.")
 
 
-def alarms_table() -> str:
-    """False alarms of campaigns with nothing missing, by noise and by rig."""
-    a = stored("alarms")
-    rows = [("all", share(a["alarms"]))]
-    rows += [(f"noise: {kind}", share(row)) for kind, row in a["by_noise"].items()]
-    rows += [(f"rig: {kind}", share(row)) for kind, row in a["by_bench"].items()]
-    first, last = a["seed"], a["seed"] + a["controls"] - 1
-    foot = f"Seeds {first} to {last}, search left out. Commit {a['commit'][:7]}, {a['date']}."
-    return grid(("nothing missing", "something was reported"), rows, foot)
-
-
 def share(row: dict) -> str:
     """A rate with its interval."""
     low, high = row["interval"]
@@ -258,7 +247,6 @@ TABLES = {
     "trial_coverage": trial_coverage_table,
     "power": power_table,
     "sbc": sbc_table,
-    "alarms": alarms_table,
     "kernel": kernel_table,
     "peers": peers_table,
     "added": added_table,
