@@ -275,7 +275,8 @@ class _Search:
             chosen = self.examine(best)
         contact = missing_contact(base.candidate.fit, self.scales, rng=self.rng)
         odds = -np.inf
-        if contact is not None and len(chosen.candidate.effects) >= MANY and self.spread() == 1.0:
+        many = len(chosen.candidate.effects) >= MANY and not is_gross(base.candidate.fit)
+        if contact is not None and many:
             self.progress("fitting a force in contact in place of " + " + ".join(best.ids))
             fit = learn_force(base.candidate.fit, contact, self.scales)
             odds = model_evidence(fit) - base.candidate.log_evidence

@@ -23,6 +23,9 @@ from bayesimpact.model.parameters import is_added
 
 Array = NDArray[np.float64]
 
+TOLERANCE = 0.02  # last step of a refit, standard deviations
+ITERATIONS = 40
+
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
@@ -59,7 +62,11 @@ def refit(fit: Fit, scores: Sequence[Score], scales: Scales) -> Candidate:
     _shift(fit, target.oscillator.layout.names, start, scores)
     sizes = step_sizes(target.oscillator.layout.names, effects, scales, scores)
     found = find_mode(
-        target, start, steps=difference_steps(fit, target, sizes), tolerance=0.02, max_iterations=40
+        target,
+        start,
+        steps=difference_steps(fit, target, sizes),
+        tolerance=TOLERANCE,
+        max_iterations=ITERATIONS,
     )
     return Candidate(effects, found, model_evidence(found))
 
@@ -72,7 +79,7 @@ def without(candidate: Candidate, effect: Effect, scales: Scales) -> Candidate:
     start = transfer(candidate.fit, layout, effects, scales, {})
     sizes = step_sizes(layout.names, effects, scales, ())
     steps = difference_steps(candidate.fit, target, sizes)
-    found = find_mode(target, start, steps=steps, tolerance=0.02, max_iterations=40)
+    found = find_mode(target, start, steps=steps, tolerance=TOLERANCE, max_iterations=ITERATIONS)
     return Candidate(effects, found, model_evidence(found))
 
 

@@ -18,6 +18,7 @@ from scipy import optimize
 
 from bayesimpact.diagnosis.evidence import gradient
 from bayesimpact.diagnosis.extend import difference_steps, owner
+from bayesimpact.diagnosis.refit import TOLERANCE
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.model.effects.effect import Effect
@@ -30,7 +31,6 @@ CLOSE = 0.02  # in that logarithm: how near the mode is found
 FARTHEST = 5.0  # that the shape is followed, in its logarithm
 MOST = 12  # moves, and as many more of Brent's method
 ITERATIONS = 10  # of a climb beside the valley
-TOLERANCE = 0.02  # standard deviations
 
 
 def valley(fit: Fit) -> int | None:

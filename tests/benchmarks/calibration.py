@@ -1,8 +1,10 @@
 """Is the posterior calibrated, and how often is nothing mistaken for something?
 
-python tests/benchmarks/calibration.py sbc --seed 300 --replicates 300 --workers 2 --out FILE.json
+python tests/benchmarks/calibration.py sbc --seed 300 --replicates 300 --workers 2 --add
 python tests/benchmarks/calibration.py sbc --method emcee --replicates 50 --out FILE.json
 python tests/benchmarks/calibration.py alarms --controls 300 --workers 2 --out FILE.json
+
+`--add` adds a run of all models, without its single ranks, to sbc.json beside this file.
 """
 
 from __future__ import annotations
@@ -15,11 +17,12 @@ import numpy as np
 from tqdm import tqdm
 
 from bayesimpact.trial.alarms import alarm, false_alarms
-from bayesimpact.trial.command import one_thread_each
 from bayesimpact.trial.run import executor
 from bayesimpact.trial.sbc import MODELS, replicate, verdicts
 from bayesimpact.trial.settings import Settings
 from bayesimpact.trial.stamp import origin
+
+STORE = Path(__file__).parent / "sbc.json"
 
 
 def sbc(chosen: argparse.Namespace) -> dict:
@@ -39,6 +42,16 @@ def sbc(chosen: argparse.Namespace) -> dict:
                 f"  {name:36s} tail {row['tail']:.3g}  90 % holds {100 * row['covered_90']:.1f} %"
             )
     return result
+
+
+def without_ranks(document: dict) -> dict:
+    """An SBC run as it is stored: verdicts and coverage, not every rank."""
+    models = {}
+    for model, found in document["models"].items():
+        rows = found["parameters"].items()
+        kept = {name: {k: v for k, v in row.items() if k != "ranks"} for name, row in rows}
+        models[model] = {**found, "parameters": kept}
+    return {**document, "models": models}
 
 
 def alarms(chosen: argparse.Namespace) -> dict:
@@ -70,12 +83,14 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--scheduler")
     parser.add_argument("--out", type=Path)
+    parser.add_argument("--add", action="store_true", help="add an SBC run to sbc.json")
     chosen = parser.parse_args()
-    if chosen.workers > 1:
-        one_thread_each()  # before a worker's numba reads the environment
     result = {"sbc": sbc, "alarms": alarms}[chosen.what](chosen)
+    document = {**origin(), "command": chosen.what, "seed": chosen.seed, **result}
+    if chosen.add and chosen.what == "sbc":
+        runs = [*json.loads(STORE.read_text(encoding="utf-8")), without_ranks(document)]
+        STORE.write_text(json.dumps(runs, indent=1) + "\n", encoding="utf-8")
     if chosen.out is not None:
-        document = {**origin(), "command": chosen.what, "seed": chosen.seed, **result}
         chosen.out.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
 
 

@@ -195,7 +195,7 @@ def sbc_table() -> str:
     )
     every = [row for run in runs for row in run["models"].values()]
     count, out = sum(len(r["parameters"]) for r in every), sum(len(r["outside"]) for r in every)
-    commits = " and ".join(run["commit"][:7] for run in runs)
+    commits = " and ".join(run["commit"][:7] + run["commit"][40:] for run in runs)
     foot = (
         f"{out} of {count} outside, {0.01 * count:.1f} expected by chance; 300 replicates per run."
     )

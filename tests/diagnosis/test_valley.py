@@ -27,7 +27,6 @@ class Branch:
     sizes = np.array([40.0])
     log_volume = np.array([0.0])
     sigma_columns = np.array([3])
-    steps_of = np.array([1.0, 1.0, 1e-3])
 
     def __init__(self) -> None:
         roles = ("physical", "effect", "effect", "noise")
