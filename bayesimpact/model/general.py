@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.model.added.crossing import first_event, suspicious
 from bayesimpact.model.added.dense import LONGEST_STRIDE, fill_in
-from bayesimpact.model.added.flows import first_step, flow_from, next_step
+from bayesimpact.model.added.flows import RENEWED, first_step, flow_from, next_step
 from bayesimpact.model.added.memory import keep_memory, relax
 from bayesimpact.model.added.method import quarters
 from bayesimpact.model.added.rest import hold
@@ -67,12 +67,12 @@ def admissible(q: Any, mass: Any) -> Any:
 
 
 @compiled()
-def cruise(y: Any, v: Any, n0: Any, j: Any, stride: Any, flow: Any, w: Any) -> Any:
-    """Strides from sample j - 1 on, as many as come without an event: (y, v, push, next sample)."""
+def cruise(y: Any, v: Any, n0: Any, j: Any, stride: Any, end: Any, flow: Any, w: Any) -> Any:
+    """Strides from sample j - 1 to before `end` without an event: (y, v, push, next sample)."""
     h, column = stride * w.interval, AHEAD if flow.memory else NOW
     at = quarters(h, flow.b, flow.K, flow.inverse)
     n1 = 0.0
-    while j + stride <= w.n:
+    while j + stride <= end:
         t = (j - 1) * w.interval
         w.s[HEADING] = heading(v, w)
         y1, v1 = step(y, v, t, n0, at, flow, w)
@@ -92,21 +92,23 @@ def cruise(y: Any, v: Any, n0: Any, j: Any, stride: Any, flow: Any, w: Any) -> A
 
 @compiled()
 def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
-    """Motion to the next event, or to the last sample: (y, v, t, next sample)."""
+    """Motion to the next event, or to where its flow is renewed: (y, v, t, next sample)."""
     flow, longest = flow_from(y, v, t, w)
-    start = t
+    start, event = t, typed(NONE)
     ramp = first_step(y, v, t, longest, flow, w)
     column = AHEAD if flow.memory else NOW
     n0 = n1 = 0.0
     if not flow.plain:
         n0 = push(y, v, t, NOW, flow, w)
     stride = min(int(longest / w.interval), LONGEST_STRIDE)
-    while j < w.n:
+    at = quarters(longest, flow.b, flow.K, flow.inverse)
+    end = min(w.n, j + max(1, int(min(RENEWED * longest / w.interval, 1.0 * w.n))))
+    while j < end:
         aligned = t == (j - 1) * w.interval
         if aligned and stride > 0 and ramp >= longest and not flow.rough:
-            y, v, n0, j = cruise(y, v, n0, j, stride, flow, w)
+            y, v, n0, j = cruise(y, v, n0, j, stride, end, flow, w)
             t = (j - 1) * w.interval
-            if j == w.n:
+            if j == end:
                 break
         h, lands = next_step(y, v, t, j, aligned, min(longest, ramp), flow, w)
         if not h > 0.0:  # an event on the sample itself
@@ -115,9 +117,10 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
             j += 1
             continue
         w.s[HEADING] = heading(v, w)
-        at = quarters(h, flow.b, flow.K, flow.inverse)
+        if h != at.h:
+            at = quarters(h, flow.b, flow.K, flow.inverse)
         y1, v1 = step(y, v, t, n0, at, flow, w)
-        event, length = NONE, h
+        length = h
         if suspicious(y, v, y1, v1, t + h, h, flow, w):
             event, length, y1, v1 = first_event(y, v, t, n0, h, y1, v1, flow, w)
         if not flow.plain:
@@ -136,10 +139,11 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
             keep_memory(w)
         settle(y, v, t, w)
         if event != NONE:
-            if flow.touching == 0.0 and not flow.memory:
-                relax(y, v, start, t - start, flow, w)
-            y, v = resolve(event, y, v, t, w)
             break
+    if flow.touching == 0.0 and not flow.memory:
+        relax(y, v, start, t - start, flow, w)
+    if event != NONE:
+        y, v = resolve(event, y, v, t, w)
     return y, v, t, j
 
 

@@ -12,6 +12,7 @@ from bayesimpact.model.compiled import compiled, typed
 
 TRIALS = 80
 ROUNDS = 8
+NEAR = 1e-7  # change over the step from which on the state follows by its own derivatives
 
 
 @compiled()
@@ -31,15 +32,15 @@ def value_and_slope(
     flow: Any,
     w: Any,
 ) -> Any:
-    """An event's function and its slope along the trajectory, by a difference over `short`."""
+    """An event's function, its slope along the trajectory by a difference over `short`, and y''."""
     value = event_value(event, y, v, t, column, w)
     a = -2.0 * flow.b * v - flow.K * (y - flow.rest)
     if not flow.plain:
         a += flow.inverse * push(y, v, t, column, flow, w)
     if event == TURN:
-        return value, a * w.s[HEADING]
+        return value, a * w.s[HEADING], a
     later = event_value(event, y + v * short, v + a * short, t + short, column, w)
-    return value, (later - value) / short
+    return value, (later - value) / short, a
 
 
 @compiled(forceinline=True)
@@ -73,14 +74,14 @@ def locate(
     (y1, v1) is the state after h, where the event's function is negative.
     """
     now, column, short = typed(NOW), AHEAD if flow.memory else NOW, 1e-6 * h
-    f0, d0 = value_and_slope(event, y, v, t, now, short, flow, w)
-    f1, d1 = value_and_slope(event, y1, v1, t + h, column, short, flow, w)
+    f0, d0, _ = value_and_slope(event, y, v, t, now, short, flow, w)
+    f1, d1, _ = value_and_slope(event, y1, v1, t + h, column, short, flow, w)
     low, high, x = 0.0, h, h * guess(max(f0, 0.0), h * d0, f1, h * d1)
     for _ in range(TRIALS):
         if not low < x < high:
             x = 0.5 * (low + high)
         y1, v1 = trial(y, v, t, n0, x, flow, w)
-        value, slope = value_and_slope(event, y1, v1, t + x, column, short, flow, w)
+        value, slope, a = value_and_slope(event, y1, v1, t + x, column, short, flow, w)
         if value > 0.0:
             low = x
         else:
@@ -89,6 +90,8 @@ def locate(
         if abs(change) <= 1e-13 * h or high - low <= 1e-15 * h:
             break
         x += change
+        if abs(change) <= NEAR * h and low < x < high and not flow.memory:
+            return x, y1 + change * (v1 + 0.5 * change * a), v1 + change * a
     return x, y1, v1
 
 

@@ -27,8 +27,11 @@ from bayesimpact.model.added.world import (
     LAW_SURFACE,
     NOW,
     OMEGA,
+    POLYNOMIAL,
     ROUGH_AT_TOUCH,
+    V0,
     WORK_COLUMNS,
+    Y0,
     Flow,
     law_value,
 )
@@ -37,12 +40,20 @@ from bayesimpact.model.compiled import compiled
 MAX_ANGLE = 0.125  # longest step times natural frequency, rad
 MAX_ANGLE_PLAIN = 0.6  # the same where nothing is added: exact, but one turning point at most
 MAX_ANGLE_PACE = 0.35  # the same for an explicit dependence on time
+RENEWED = 64  # longest steps after which a flow is chosen anew: the swing may have grown
 MOST_CUTS = 4096  # steps per sample at most
 FOLDED = 0.1  # a law's stiffness above this share of the linear one is counted into the flow
+LEAST = 0.25  # of the linear stiffness, which the flow keeps
+REACH = np.sqrt(0.75)  # where a cubic spring's secant has its mean stiffness, over the swing
 RAMP = 0.3  # first step of a contact over the time constant of a law's state
-# where a force is not smooth at the touch: longest step over the usual one, first step over the
-# longest, step over the time since the touch, step over the time to the release
-ROUGH, FIRST, SINCE, UNTIL = 0.6, 1.0 / 256.0, 0.5, 0.33
+# where a force is not smooth at the touch: shortest step over the longest; then, for times in units
+# of the longest step, step over the 3/4th power of the time since the touch, or to the release
+FIRST, SINCE, UNTIL = 1.0 / 320.0, 0.36, 0.26
+# a force without features admits longer steps the weaker it is: share of the linear force at which
+# they are the usual ones, and by how much they are shortened and lengthened at most
+SLIGHT, LEAST_GAIN, MOST_GAIN = 0.05, 0.4, 2.5
+OUTSIDE = 0.05  # of a force that does not depend on the motion: nothing feeds its errors back
+OFF_TURN, OFF_PASSAGE = np.cos(np.pi / 8), np.sin(np.pi / 8)  # of the swing's four points
 
 
 @compiled()
@@ -50,7 +61,7 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
     """Linear flow of the present kind of motion, and the longest step that resolves the rest."""
     q, s, laws = w.q, w.s, w.laws
     touching = s[MODE] == TOUCHING
-    count, memory, turns, rough = 0, False, q[FRICTION] > 0.0, False
+    count, memory, turns, rough, tame = 0, False, q[FRICTION] > 0.0, False, True
     for law in range(w.size):
         flags = laws[LAW_COLUMNS * law + LAW_FLAGS]
         if touching or flags & CONTACT_ONLY == 0:
@@ -59,6 +70,7 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
             count += 1
             turns = turns or flags & KINK_AT_TURN != 0 or laws[LAW_COLUMNS * law + LAW_SURFACE] != 0
             rough = rough or (touching and flags & ROUGH_AT_TOUCH != 0)
+            tame = tame and flags & POLYNOMIAL != 0
     mass, damping, stiffness, force = w.mass, q[C1], q[K1], -q[FRICTION] * s[SLIDING]
     if touching:
         mass += q[CONTACT_MASS]
@@ -85,7 +97,56 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
         1.0 / mass, b, K, (force - level) / stiffness, slope, level, s[GAP],
         1.0 if touching else 0.0, count, memory, plain, forced, turns, rough,
     )  # fmt: skip
+    if tame and not plain:
+        longest *= gain(y, v, t, pace, longest, flow, w)
     return flow, longest
+
+
+@compiled()
+def gain(y: Any, v: Any, t: Any, pace: Any, longest: Any, flow: Any, w: Any) -> Any:
+    """Length of the steps over the usual one: longer where what is added to the flow is weak.
+
+    Its size is the largest at four points of a swing, a quarter of it apart, each at another time
+    (phase, where there is a pace), over the linear force of the swing or, if that is larger, of the
+    release: the error of a step grows with it, and with the step's sixth power.
+    """
+    q, w0, largest = w.q, np.sqrt(flow.K), 0.0
+    speed = np.sqrt(flow.K * (y - flow.rest) ** 2 + v * v)
+    y0, v0, wait = speed / w0 * OFF_TURN, speed * OFF_PASSAGE, RENEWED * longest / 3.0
+    if pace > 0.0:
+        wait = 0.5 * np.pi / pace
+    for point in range(4):
+        ys, vs, ts = y0, v0, t + point * wait
+        if point % 2 == 1:
+            ys, vs = -v0 / w0, y0 * w0
+        if point >= 2:
+            ys, vs = -ys, -vs
+        if flow.touching == 1.0:
+            ys = max(ys, flow.gap - flow.rest)
+        outside = left_out(flow.rest, 0.0, ts, flow, w)
+        inside = left_out(flow.rest + ys, vs, ts, flow, w) - outside
+        largest = max(largest, abs(inside) + OUTSIDE * abs(outside))
+    largest += OUTSIDE * abs(q[FORCE])
+    speed = max(speed, np.sqrt(q[K1] / w.mass * q[Y0] * q[Y0] + q[V0] * q[V0]))
+    weight = SLIGHT * w0 * speed / (flow.inverse * largest)
+    return min(max(np.sqrt(np.cbrt(weight)), LEAST_GAIN), MOST_GAIN)
+
+
+@compiled()
+def left_out(y: Any, v: Any, t: Any, flow: Any, w: Any) -> Any:
+    """Force that the linear flow leaves out at a point other than the present one, N.
+
+    A law beyond a surface of its own does not count: the motion does not get there within a step.
+    """
+    total = flow.level + flow.slope * y
+    for k in range(flow.count):
+        law = w.acting[k]
+        bounded = w.laws[LAW_COLUMNS * law + LAW_SURFACE] != 0
+        if bounded and w.s[SIDES + law] * surface_value(law, y, v, t, NOW, w) < 0.0:
+            continue
+        z = w.work[WORK_COLUMNS * law + NOW]
+        total -= law_value(law, LAW_FORCE, y, v, t, z, flow.gap, flow.touching, w)
+    return total
 
 
 @compiled()
@@ -100,7 +161,11 @@ def fold(
     count: Any,
     w: Any,
 ) -> Any:
-    """Stiffness and force at y = 0 of stiff laws, looking ahead: exact for springs with gaps."""
+    """Stiffness and force at y = 0 of the laws: what of them is counted into the linear flow.
+
+    The secant over the swing of a law that has no features; of others what lies just ahead, if it
+    is stiff: exact for springs with gaps.
+    """
     touching = 1.0 if w.s[MODE] == TOUCHING else 0.0
     total, gap = force - damping * v - stiffness * y, w.s[GAP]
     for k in range(count):
@@ -110,21 +175,30 @@ def fold(
         )
     ahead = 0.5 * MAX_ANGLE / np.sqrt(stiffness / mass)
     shift = ahead * (v + 0.5 * ahead * total / mass)
-    slope, level = 0.0, 0.0
-    if shift == 0.0:
-        return slope, level
+    rest, slope, level = force / stiffness, 0.0, 0.0
+    swing = REACH * np.sqrt((y - rest) * (y - rest) + v * v * mass / stiffness)
+    low, high = rest - swing, rest + swing
+    if touching == 1.0:
+        low = max(low, gap)
     for k in range(count):
         law = w.acting[k]
         z = w.work[WORK_COLUMNS * law + NOW]
         bounded = w.laws[LAW_COLUMNS * law + LAW_SURFACE] != 0
-        if bounded and w.s[SIDES + law] * surface_value(law, y + shift, v, t, NOW, w) < 0.0:
+        wide = w.laws[LAW_COLUMNS * law + LAW_FLAGS] & (POLYNOMIAL | ROUGH_AT_TOUCH) != 0
+        wide = wide and not bounded
+        start, end, speed = (low, high, 0.0) if wide else (y, y + shift, v)
+        if bounded and w.s[SIDES + law] * surface_value(law, end, v, t, NOW, w) < 0.0:
             continue
-        here = law_value(law, LAW_FORCE, y, v, t, z, gap, touching, w)
-        there = law_value(law, LAW_FORCE, y + shift, v, t, z, gap, touching, w)
-        stiff = (there - here) / shift
-        if stiff > FOLDED * stiffness:
+        if start == end:
+            continue
+        here = law_value(law, LAW_FORCE, start, speed, t, z, gap, touching, w)
+        there = law_value(law, LAW_FORCE, end, speed, t, z, gap, touching, w)
+        stiff = (there - here) / (end - start)
+        if wide or stiff > FOLDED * stiffness:
             slope += stiff
-            level += here - stiff * y
+            level += here - stiff * start
+    if stiffness + slope < LEAST * stiffness:
+        return 0.0, 0.0
     return slope, level
 
 
@@ -146,11 +220,12 @@ def next_step(y: Any, v: Any, t: Any, j: Any, aligned: Any, longest: Any, flow: 
     """
     least = w.interval / MOST_CUTS
     if flow.rough:
-        limit = ROUGH * longest
         if v != 0.0:
             away = (y - flow.gap) / v  # time since the touch, or minus the time to the release
-            limit = min(limit, max(FIRST * limit, SINCE * away, -UNTIL * away))
-        return max(limit, least), False
+            root = np.sqrt(abs(away) / longest)
+            share = SINCE if away >= 0.0 else UNTIL
+            longest *= min(1.0, max(FIRST, share * root * np.sqrt(root)))
+        return max(longest, least), False
     longest = max(longest, least)
     if aligned and longest >= w.interval:
         return min(int(longest / w.interval), LONGEST_STRIDE, w.n - j) * w.interval, True

@@ -44,6 +44,6 @@ EFFECT = Effect(
             lower=0.0,
         ),
     ),
-    law=Law(force, where="contact"),
+    law=Law(force, where="contact", polynomial=True),
     needs_stop=True,
 )

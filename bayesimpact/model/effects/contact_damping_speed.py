@@ -42,6 +42,6 @@ EFFECT = Effect(
             lower=0.0,
         ),
     ),
-    law=Law(force, where="contact", kink_at_turn=True),
+    law=Law(force, where="contact", kink_at_turn=True, polynomial=True),
     needs_stop=True,
 )

@@ -139,6 +139,9 @@ class Law:
     pace : fastest rate at which the force depends on time explicitly, rad/s; steps resolve it
     kink_at_turn : the force has a kink at v = 0; steps end on turning points
     rough_at_touch : the force is continuous but not smooth at d = 0; steps begin small there
+    polynomial : between its kinks the force is a polynomial of low degree of y and v, and of sines
+        of time no faster than `pace`: it has no features that a look at four points of a swing
+        misses, so steps may be longer where it is weak
 
     The state of a law that acts in contact only is not integrated in flight: its rate may there
     depend on the state alone, linearly (it decays, or it stays).
@@ -151,6 +154,7 @@ class Law:
     pace: Callable[..., float] | None = None
     kink_at_turn: bool = False
     rough_at_touch: bool = False
+    polynomial: bool = False
 
 
 Numbers = Sequence[float]
@@ -219,6 +223,7 @@ def law_row(law: Law, first: int) -> list[int]:
     """A law's row in the general simulator's table; its parameters begin at slot `first`."""
     functions = (law.force, law.rate, law.surface)
     flags = (law.where == "contact") + 2 * law.kink_at_turn + 4 * law.rough_at_touch
+    flags += 8 * law.polynomial
     pace = address(law.pace) if law.pace else 0
     return [*(address(f) if f else 0 for f in functions), flags, first, pace]
 

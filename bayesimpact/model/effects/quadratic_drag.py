@@ -41,5 +41,5 @@ EFFECT = Effect(
             "coefficient", "N s2/m2", scale=lambda s: 0.5 * s.damping_force / s.speed**2, lower=0.0
         ),
     ),
-    law=Law(force, kink_at_turn=True),
+    law=Law(force, kink_at_turn=True, polynomial=True),
 )

@@ -127,7 +127,23 @@ def test_a_short_recording_is_the_start_of_a_long_one():
     for effect in effects:
         values |= typical(effect, long)
     whole, part = moved(effects, values, long), moved(effects, values, short)
-    np.testing.assert_allclose(part, whole[: part.size], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(part, whole[: part.size], rtol=0, atol=1e-12)  # a shorter last step
+
+
+def test_a_swing_that_grows():
+    """Forced from rest near resonance: the cubic spring is nothing at first, in the end as strong as k1.
+
+    Steps chosen once, at rest, would be too long at the end.
+    """
+    effects = [BY_ID["spring_cubic"], BY_ID["harmonic_forcing"]]
+    rig = TestRig(k2=(), y0=(0.0,), v0=(0.0,), rate=200.0, duration=4.0)
+    values = {
+        "spring_cubic.stiffness": 9e5, "harmonic_forcing.amplitude": 2.0,
+        "harmonic_forcing.frequency": 7.2, "harmonic_forcing.phase[r0]": 0.0,
+    }  # fmt: skip
+    y = moved(effects, values, rig)
+    assert np.abs(y).max() > 0.025
+    assert np.abs(y - by_rig(effects, values, rig)).max() < 5e-8
 
 
 @pytest.mark.parametrize("name", ["contact_no_tension", "obstacle_mass"])

@@ -142,7 +142,7 @@ def test_a_law_typed_into_a_session():
     """No source file, no cache, the same numbers."""
     space: dict = {}
     exec("def force(y, v, d, t, z, touching, p, q):\n    return p[0] * y * y * y\n", space)
-    own, values = effect(Law(space["force"]), 2e6)
+    own, values = effect(Law(space["force"], polynomial=True), 2e6)
     known = moved([BY_ID["spring_cubic"]], {"spring_cubic.stiffness": 2e6}, RIG)
     np.testing.assert_array_equal(moved([own], values, RIG), known)
 
