@@ -163,8 +163,8 @@ def fold(
 ) -> Any:
     """Stiffness and force at y = 0 of the laws: what of them is counted into the linear flow.
 
-    The secant over the swing of a law that has no features; of others what lies just ahead, if it
-    is stiff: exact for springs with gaps.
+    The secant over the swing of a law that has no features; of others what lies just ahead (on this
+    side of the law's surface), if it is stiff: exact for springs with gaps.
     """
     touching = 1.0 if w.s[MODE] == TOUCHING else 0.0
     total, gap = force - damping * v - stiffness * y, w.s[GAP]
@@ -188,7 +188,7 @@ def fold(
         wide = wide and not bounded
         start, end, speed = (low, high, 0.0) if wide else (y, y + shift, v)
         if bounded and w.s[SIDES + law] * surface_value(law, end, v, t, NOW, w) < 0.0:
-            continue
+            end = y - shift  # about to leave: what lies behind tells the stiffness
         if start == end:
             continue
         here = law_value(law, LAW_FORCE, start, speed, t, z, gap, touching, w)
