@@ -125,8 +125,12 @@ class _Search:
         return state
 
     def extended(self, state: State) -> list[Candidate]:
-        """Models with one more effect; from the base model on also the most promising pairs."""
-        scores = worth_a_refit(state.scan)
+        """Models with one more effect; from the base model on also the most promising pairs.
+
+        Only those that may overtake the best model so far, as far as scores tell.
+        """
+        behind = max(map(self.worth, self.tried.values())) - self.worth(state.candidate)
+        scores = worth_a_refit(state.scan, behind / RASH)
         found = [self.fit_one(state.candidate, state.scan, score) for score in scores]
         if not state.candidate.effects:
             best_single = max((c.log_evidence for c in found), default=-np.inf)
@@ -157,11 +161,16 @@ class _Search:
         return key in self.tried and self.tried[key].fit.converged
 
     def is_hopeless(self, state: State) -> bool:
-        """Whether a free force will beat all models with one more effect, as far as scores tell."""
+        """Whether a free force will explain what the effects still to come cannot, say the scores.
+
+        Either one beside the model's effects, or one in the place of all of them.
+        """
         if not state.candidate.effects or is_gross(state.candidate.fit):
             return False
-        most = max((s.gain for s in state.scan.best()), default=0.0)
-        return self.force_worth() > self.worth(state.candidate) + RASH * most + NEAR_MARGIN
+        most = RASH * max((s.gain for s in state.scan.best()), default=0.0) + NEAR_MARGIN
+        more = MOST_EFFECTS - len(state.candidate.effects)
+        instead = self.force_worth() - self.worth(state.candidate)
+        return state.unknown.log_evidence > more * most or instead > most
 
     def worth(self, candidate: Candidate) -> float:
         return tempered_evidence(candidate, self.spread()) - self.cost * len(candidate.effects)
@@ -283,15 +292,15 @@ class _Search:
         return Naming(base, chosen, tried, self.cost, self.spread(), contact, odds)
 
 
-def worth_a_refit(scan: Scan) -> list[Score]:
-    """Effects whose score promises something, and not far less than the best one.
+def worth_a_refit(scan: Scan, least: float = 0.0) -> list[Score]:
+    """Effects whose score promises something (`least`, nats), and not far less than the best one.
 
     The larger the misfit, the less a score tells. Where something can be gained at all, effects
     that do not begin at the base model (a contact without tension) are always fitted.
     """
     scores = scan.best()
     most = max((s.gain for s in scores), default=0.0)
-    floor = max(WORTH_A_REFIT, min(NEAR_BEST * most, np.sqrt(FAR * most)) - NEAR_MARGIN)
+    floor = max(least, WORTH_A_REFIT, min(NEAR_BEST * most, np.sqrt(FAR * most)) - NEAR_MARGIN)
     leaps = most > LEAP
     return [s for s in scores if s.gain > floor or (leaps and _is_a_leap(s.effect))]
 

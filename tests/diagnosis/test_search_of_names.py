@@ -26,7 +26,8 @@ class Table:
 
     `forward` has what a fit reaches from a smaller model, where that ends in a worse place than
     one from a larger model. `unfinished` has what is gained beyond where a climb gave up,
-    `once` where a model's first fit ends.
+    `once` where a model's first fit ends. `force` is the evidence of a free force in place of all
+    effects, to which `beside` adds where there are effects that it may stand beside.
     """
 
     def __init__(
@@ -37,7 +38,9 @@ class Table:
         unfinished: dict[str, float] | None = None,
         in_contact: float = 0.0,
         once: dict[str, float] | None = None,
+        beside: float = 0.0,
     ) -> None:
+        self.beside = beside
         self.once = {frozenset(k.split()): v for k, v in (once or {}).items()}
         self.in_contact = in_contact
         self.gains = {frozenset(): 0.0} | {frozenset(k.split()): v for k, v in gains.items()}
@@ -95,7 +98,7 @@ class Table:
         return SimpleNamespace(log_evidence=self.in_contact, fit=fit)
 
     def missing(self, fit, scales, *, rng):
-        left = self.force - fit.gain
+        left = self.force - fit.gain + (self.beside if fit.ids else 0.0)
         return SimpleNamespace(p_value=0.5, log_evidence=left, gain=left + 20)
 
 
@@ -165,6 +168,21 @@ def test_the_search_ends_when_a_free_force_will_beat_all_names(run):
     run(hopeful)
     assert max(map(len, hopeless.fitted)) == 1
     assert max(map(len, hopeful.fitted)) == 3
+
+
+def test_the_search_ends_when_a_free_force_explains_what_is_left(run):
+    """Beside A it gains 100 nats, two effects promise 20 each."""
+    steps = {A: 100.0, f"{A} {B}": 120.0, f"{A} {B} {C}": 140.0}
+    for beside, reached in ((200.0, 1), (170.0, 2), (150.0, 3)):
+        run(table := Table(steps, beside=beside))
+        assert max(map(len, table.fitted)) == reached
+
+
+def test_what_cannot_overtake_the_best_is_not_fitted(run):
+    """B has 250 nats less than A: C promises 150 more, D 250; scores underrate by half at most."""
+    table = Table({A: 400.0, B: 150.0, f"{B} {C}": 300.0, f"{B} {D}": 400.0})
+    run(table)
+    assert frozenset({B, C}) not in table.fitted and frozenset({B, D}) in table.fitted
 
 
 def test_a_climb_that_gave_up_near_the_best_is_finished_before_it_loses(run):
