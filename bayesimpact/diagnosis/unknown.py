@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.diagnosis.extend import difference_steps, extend, transfer
 from bayesimpact.diagnosis.force import MissingForce
+from bayesimpact.diagnosis.refit import ITERATIONS, TOLERANCE
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.model.effects.effect import Scales
@@ -28,7 +29,8 @@ def learn_force(fit: Fit, force: MissingForce, scales: Scales) -> Fit:
         start[names.index(name)] -= shift
     floor = 1e-9 * np.repeat([scales.force, scales.force / scales.speed], force.knots)
     sizes = dict(zip(coefficients, np.maximum(sd, floor), strict=True))
-    return find_mode(target, start, steps=difference_steps(fit, target, sizes), max_iterations=30)
+    steps = difference_steps(fit, target, sizes)
+    return find_mode(target, start, steps=steps, tolerance=TOLERANCE, max_iterations=ITERATIONS)
 
 
 def coefficient_names(knots: int) -> tuple[str, ...]:

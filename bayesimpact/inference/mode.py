@@ -23,8 +23,8 @@ from bayesimpact.inference.likelihood import Linearisation
 Array = NDArray[np.float64]
 
 SLOW = 0.5  # of the last step's size: above that, old derivatives are renewed
-STALLED = 1e-5  # gain, nats, for which the damping had to be raised
-STALLS = 2  # such steps in a row: the derivatives tell no more
+STALLED = 4.0  # tolerances: a gain that such a step would have brought, or less
+STALLS = 2  # such steps in a row, with new derivatives: these tell no more
 DOUBTFUL = 1.0  # last step, in standard deviations, that rough derivatives may still promise then
 
 
@@ -44,7 +44,8 @@ def find_mode(
     twentieth of the standard deviations as these become known. `slopes` are derivatives that hold
     near enough all the way (the chord method), where they are known and new ones would be dear.
     Parameters `held` stay where they start. The noise levels in `start` are ignored. Stops when a
-    step is below `tolerance` standard deviations.
+    step is below `tolerance` standard deviations, or when new derivatives twice gain no more than a
+    few such steps would.
     """
     climb = Climb(target, steps, slopes, held)
     here = climb.evaluate(start)
@@ -61,12 +62,12 @@ def find_mode(
         climb.iterations += 1
         last, converged = size, size < tolerance
         there, used = climb.descend(here, slope, damping, once=converged or climb.stale)
-        gain, raised, moved = here.value - there.value, used > damping, there is not here
+        gain, moved = here.value - there.value, there is not here
         here, damping = there, max(used * 0.1, 1e-12) if moved else damping
         if climb.stale and not moved:
             climb.renew()
         elif not (climb.stale or converged):
-            stalls = stalls + 1 if raised and gain < STALLED else 0
+            stalls = stalls + 1 if gain < 0.5 * (STALLED * tolerance) ** 2 else 0
             if stalls == STALLS or not moved:
                 converged = moved and size < DOUBTFUL
                 break

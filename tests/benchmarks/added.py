@@ -29,7 +29,8 @@ from bayesimpact.model.added import flows
 from bayesimpact.model.oscillator import Oscillator, build_oscillator
 
 SCALES = (2.0, 1.0, 0.5, 0.25)  # of all step sizes
-STEPS = ("MAX_ANGLE", "MAX_ANGLE_PACE", "RAMP", "ROUGH", "FIRST", "SINCE", "UNTIL")
+STEPS = ("MAX_ANGLE", "MAX_ANGLE_PACE", "RAMP")
+GRADED = ("SINCE", "UNTIL")  # over the 3/4th power of a time in longest steps
 ROUNDS, REPEATS = 7, 3
 RIG = TestRig(
     k2=np.repeat([5350.156, 4776.275, 2959.249], 3),
@@ -55,6 +56,8 @@ def child(scale: float, file: str) -> None:
     numba.set_num_threads(1)
     for name in STEPS:
         setattr(flows, name, scale * getattr(flows, name))
+    for name in GRADED:
+        setattr(flows, name, scale**0.75 * getattr(flows, name))
     result = {}
     for effect, oscillator, theta in resolved():
         slots, recordings = oscillator.layout.slots(theta[None])[0], np.arange(9)

@@ -163,7 +163,7 @@ def fold(
 ) -> Any:
     """Stiffness and force at y = 0 of the laws: what of them is counted into the linear flow.
 
-    The secant over the swing of a law that has no features; of others what lies just ahead (on this
+    The secant over the swing of a steady law that has no features; of others what lies just ahead (on this
     side of the law's surface), if it is stiff: exact for springs with gaps.
     """
     touching = 1.0 if w.s[MODE] == TOUCHING else 0.0
@@ -185,7 +185,7 @@ def fold(
         z = w.work[WORK_COLUMNS * law + NOW]
         bounded = w.laws[LAW_COLUMNS * law + LAW_SURFACE] != 0
         wide = w.laws[LAW_COLUMNS * law + LAW_FLAGS] & (POLYNOMIAL | ROUGH_AT_TOUCH) != 0
-        wide = wide and not bounded
+        wide = wide and not bounded and w.laws[LAW_COLUMNS * law + LAW_PACE] == 0
         start, end, speed = (low, high, 0.0) if wide else (y, y + shift, v)
         if bounded and w.s[SIDES + law] * surface_value(law, end, v, t, NOW, w) < 0.0:
             end = y - shift  # about to leave: what lies behind tells the stiffness
