@@ -163,8 +163,8 @@ def fold(
 ) -> Any:
     """Stiffness and force at y = 0 of the laws: what of them is counted into the linear flow.
 
-    The secant over the swing of a steady law that has no features; of others what lies just ahead (on this
-    side of the law's surface), if it is stiff: exact for springs with gaps.
+    The secant over the swing of a steady law that has no features; of others what lies just ahead
+    (on this side of the law's surface), if it is stiff: exact for springs with gaps.
     """
     touching = 1.0 if w.s[MODE] == TOUCHING else 0.0
     total, gap = force - damping * v - stiffness * y, w.s[GAP]

@@ -131,7 +131,7 @@ def test_a_short_recording_is_the_start_of_a_long_one():
 
 
 def test_a_swing_that_grows():
-    """Forced from rest near resonance: the cubic spring is nothing at first, in the end as strong as k1.
+    """Forced from rest near resonance: the cubic spring is nothing at first, then as strong as k1.
 
     Steps chosen once, at rest, would be too long at the end.
     """
