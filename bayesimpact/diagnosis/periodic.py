@@ -62,7 +62,9 @@ def periodic_scores(fit: Fit, effects: Sequence[Effect], scales: Scales) -> tupl
 def frequencies(fit: Fit, effect: Effect, scales: Scales) -> Array:
     """Frequencies to scan, Hz: finer than the resolution of the longest recording."""
     spacing = (0.5 if effect.observe is not None else 0.75) / scales.duration
-    nyquist = 0.5 / float(fit.target.oscillator.intervals.max())
+    oscillator, noise = fit.target.oscillator, fit.target.likelihood.noise
+    pairs = zip(oscillator.counts, oscillator.intervals, strict=True)
+    nyquist = min(noise.highest(int(n), float(dt)) for n, dt in pairs)
     if effect.observe is None:
         stiffest = (scales.stiffness + scales.contact_stiffness) / scales.mass
         nyquist = min(0.9 * nyquist, RESPONSE_REACH * np.sqrt(stiffest) / (2 * np.pi))
@@ -99,11 +101,11 @@ def _swings(fit: Fit, frequency: float) -> bool:
 
 def _best_frequency(fit: Fit, effect: Effect, scales: Scales) -> Score | None:
     grid = frequencies(fit, effect, scales)
+    if grid.size < 2:
+        return None
     recordings = range(len(fit.linearisation))
     if effect.observe is not None:
-        if fit.target.likelihood.noise.smoothing is not None:
-            return None  # the filter's band holds too few coefficients for a search of lines
-        blocks = [_line_blocks(fit, r, grid) for r in recordings]
+        blocks = [line_blocks(fit, r, grid) for r in recordings]
     else:
         blocks = [_response_blocks(fit, r, grid, scales) for r in recordings]
     statistic, sizes, information = _statistics(fit, blocks)
@@ -171,17 +173,20 @@ def projected(fit: Fit, blocks: Sequence[Blocks]) -> tuple[Array, Array]:
     return 0.5 * (information + information.transpose(0, 2, 1)), score
 
 
-def _line_blocks(fit: Fit, r: int, grid: Array) -> Blocks:
+def line_blocks(fit: Fit, r: int, grid: Array) -> Blocks:
     """A hum of one metre: Fourier sums of the whitened residual and derivatives."""
-    part, sigma = fit.linearisation[r], sigma_of(fit)[r]
-    interval = float(fit.target.oscillator.intervals[r])
-    stacked = np.vstack([part.residual, part.jacobian.T]) / sigma
+    part, sigma, noise = fit.linearisation[r], sigma_of(fit)[r], fit.target.likelihood.noise
+    oscillator = fit.target.oscillator
+    interval, count = float(oscillator.intervals[r]), int(oscillator.counts[r])
+    white = np.vstack([part.residual, part.jacobian.T]) / sigma
+    stacked, start = noise.in_time(white, count, interval)
     step = 2 * np.pi * interval * (grid[1] - grid[0])
     first = 2 * np.pi * interval * grid[0]
     sums = czt(stacked, grid.size, np.exp(-1j * step), np.exp(1j * first), axis=-1)
     gain = _whitening_gain(fit, grid, interval) / sigma
+    sums = sums * np.exp(-2j * np.pi * grid * start)
     pairs = np.stack([-sums.imag, sums.real], axis=-1) * gain[:, None]  # (1 + k, F, 2)
-    n = part.residual.size
+    n = stacked.shape[-1]
     own = np.repeat((0.5 * n * gain**2)[:, None, None] * np.eye(2), 1, axis=0)
     return Blocks(own, pairs[1:].transpose(1, 0, 2), pairs[0], part.columns)
 

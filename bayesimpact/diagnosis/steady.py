@@ -39,12 +39,12 @@ def steadiness(fit: Fit, scales: Scales) -> tuple[float, ...]:
 
 def _blocks(fit: Fit, r: int, effect: Effect, lines: Array, scales: Scales) -> Blocks:
     columns = (
-        force_responses(fit, r, lines, scales) if effect.observe is None else _hums(fit, r, lines)
+        force_responses(fit, r, lines, scales) if effect.observe is None else hums(fit, r, lines)
     )
     return blocks_of(fit, r, columns[None])
 
 
-def _hums(fit: Fit, r: int, lines: Array) -> Array:
+def hums(fit: Fit, r: int, lines: Array) -> Array:
     """Whitened sines and cosines (2 F, n) of one metre."""
     recording = fit.target.oscillator.campaign.recordings[r]
     angle = 2 * np.pi * lines[:, None] * recording.times

@@ -76,6 +76,30 @@ class Noise:
             return n
         return 2 * (self._band_size(n, interval) - 1) + 1
 
+    def in_time(self, white: Array, n: int, interval: float) -> tuple[Array, float]:
+        """Whitened numbers (..., size(n)) as signals in time with the same products: (them, start).
+
+        `start` is the time of their first sample after the recording's, s.
+        """
+        if self.smoothing is None:
+            return white, 0.0
+        from scipy.fft import irfft
+
+        inner = self._interior(n, interval)
+        count, m = inner.stop - inner.start, self._band_size(n, interval)
+        coefficients = np.zeros((*white.shape[:-1], count // 2 + 1), dtype=complex)
+        coefficients[..., 0] = np.sqrt(2.0) * white[..., 0]
+        coefficients[..., 1:m] = white[..., 1:m] + 1j * white[..., m:]
+        signal = irfft(coefficients * np.sqrt(0.5 * count), count, axis=-1)
+        return np.asarray(signal), inner.start * interval
+
+    def highest(self, n: int, interval: float) -> float:
+        """Highest frequency that the whitened numbers of n samples know, Hz."""
+        if self.smoothing is None:
+            return 0.5 / interval
+        inner = self._interior(n, interval)
+        return (self._band_size(n, interval) - 1) / ((inner.stop - inner.start) * interval)
+
     def log_volume(self, n: int, interval: float) -> float:
         """Log determinant of the whitening operator (0 for the band: there it is a constant)."""
         if self.smoothing is not None:

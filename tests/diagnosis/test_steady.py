@@ -10,11 +10,19 @@ import pytest
 import small_rig
 from effect_rigs import BY_ID
 
+from bayesimpact.data.campaign import Measurement, Smoothing
 from bayesimpact.diagnosis.extend import campaign_scales, extend, transfer
-from bayesimpact.diagnosis.periodic import periodic_scores, shakes_in_own_band
+from bayesimpact.diagnosis.periodic import (
+    blocks_of,
+    line_blocks,
+    periodic_scores,
+    shakes_in_own_band,
+)
 from bayesimpact.diagnosis.refit import refit
-from bayesimpact.diagnosis.steady import steadiness
+from bayesimpact.diagnosis.steady import hums, steadiness
 from bayesimpact.inference.identify import identify
+from bayesimpact.model.measurement import smooth
+from bayesimpact.trial.rig_chain import Chain
 
 FREQUENCY, AMPLITUDE = 61.3, 2e-6
 Envelope = Callable[[int, np.ndarray], np.ndarray]
@@ -54,6 +62,39 @@ def test_a_steady_hum_passes():
 )
 def test_what_is_not_steady_does_not(envelope):
     assert p_value(4, envelope) < 1e-4
+
+
+def test_a_hum_behind_a_declared_filter_is_found():
+    """The search's Fourier sums say what simulated readings of a hum, filtered and whitened, say."""
+    filtered = Smoothing("savgol", window=9, polyorder=2)
+    campaign = small_rig.record(
+        5,
+        chain=Chain(noise=small_rig.NOISE, offsets=small_rig.OFFSETS, smoothing=filtered),
+        duration=1.5,
+        measurement=Measurement(smoothing=filtered),
+    )
+    hum = [
+        AMPLITUDE * np.sin(2 * np.pi * FREQUENCY * x.times + r)
+        for r, x in enumerate(campaign.recordings)
+    ]
+    recordings = [
+        replace(x, samples=x.samples + smooth(h, filtered, x.interval))
+        for x, h in zip(campaign.recordings, hum, strict=True)
+    ]
+    campaign = replace(campaign, recordings=tuple(recordings))
+    fit = identify(campaign, rng=np.random.default_rng(0), search=False).fit
+    (score,) = periodic_scores(fit, [BY_ID["sensor_hum"]], campaign_scales(fit))
+    assert score.p_value < 1e-9
+    assert score.shapes["sensor_hum.frequency"] == pytest.approx(FREQUENCY, abs=0.3)
+    assert score.size[0] == pytest.approx(AMPLITUDE, abs=4 * score.size_sd[0])
+    phases = [score.shapes[f"sensor_hum.phase[{x.name}]"] for x in campaign.recordings]
+    for r, phase in enumerate(phases):
+        assert np.cos(phase - r) > 0.9
+    lines = np.array([FREQUENCY - 1, FREQUENCY, FREQUENCY + 1])
+    waves = hums(fit, 0, lines).reshape(2, lines.size, -1).transpose(1, 0, 2)
+    direct, sums = blocks_of(fit, 0, waves), line_blocks(fit, 0, lines)
+    np.testing.assert_allclose(sums.score, direct.score, rtol=0.05, atol=0.01 * sums.score.max())
+    np.testing.assert_allclose(sums.own[:, 0, 0], direct.own[:, 0, 0], rtol=0.05)
 
 
 def test_a_model_without_a_line_has_nothing_to_be_steady(small):

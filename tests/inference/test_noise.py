@@ -128,3 +128,17 @@ def test_what_it_says_of_itself():
     assert Noise().kind == "white"
     assert Noise(0.25, SAVGOL).kind == "AR(1), correlation 0.25, smoothed (savgol)"
     assert Noise(0.25).with_smoothing(LAG) == Noise(0.25, LAG)
+
+
+@pytest.mark.parametrize("smoothing", [None, SAVGOL, LAG])
+@pytest.mark.parametrize("n", [400, 401])
+def test_whitened_numbers_as_signals_keep_their_products(smoothing, n):
+    """And their place in time: one late blip stays late, a wave in the band keeps its frequency."""
+    noise, rng = Noise(0.3, smoothing), np.random.default_rng(3)
+    white = noise.whiten(rng.standard_normal((3, n)), INTERVAL)
+    signals, start = noise.in_time(white, n, INTERVAL)
+    np.testing.assert_allclose(signals @ signals.T, white @ white.T, rtol=1e-12, atol=1e-12)
+    blip = np.exp(-0.5 * ((np.arange(n) - 0.8 * n) / 12) ** 2)
+    (signal,), start = noise.in_time(noise.whiten(blip[None], INTERVAL), n, INTERVAL)
+    assert abs(start / INTERVAL + np.argmax(np.abs(signal)) - 0.8 * n) < 15
+    assert noise.highest(n, INTERVAL) <= 0.5 / INTERVAL
