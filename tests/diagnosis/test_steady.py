@@ -65,7 +65,7 @@ def test_what_is_not_steady_does_not(envelope):
 
 
 def test_a_hum_behind_a_declared_filter_is_found():
-    """The search's Fourier sums say what simulated readings of a hum, filtered and whitened, say."""
+    """The search's Fourier sums say what simulated readings, filtered and whitened, say."""
     filtered = Smoothing("savgol", window=9, polyorder=2)
     campaign = small_rig.record(
         5,
