@@ -25,7 +25,8 @@ from bayesimpact.model.parameters import SLOTS
 
 Array = NDArray[np.float64]
 
-RESPONSE_REACH = 2.0  # forcing is looked for up to so many times the natural frequency in contact
+RESPONSE_REACH = 2.0  # forcing is looked for up to so many times the natural frequency in contact,
+FLIGHT_REACH = 4.0  # or in free flight
 HUM_ABOVE = 1.5  # times the natural frequency of free flight
 OWN_BAND = 0.1  # of the spectrum's peak
 _FORCE, _OMEGA, _PHASE = (SLOTS.index(s) for s in ("A", "w", "phase"))
@@ -67,7 +68,8 @@ def frequencies(fit: Fit, effect: Effect, scales: Scales) -> Array:
     nyquist = min(noise.highest(int(n), float(dt)) for n, dt in pairs)
     if effect.observe is None:
         stiffest = (scales.stiffness + scales.contact_stiffness) / scales.mass
-        nyquist = min(0.9 * nyquist, RESPONSE_REACH * np.sqrt(stiffest) / (2 * np.pi))
+        contact = RESPONSE_REACH * np.sqrt(stiffest) / (2 * np.pi)
+        nyquist = min(0.9 * nyquist, max(contact, FLIGHT_REACH * scales.natural_frequency))
         return np.arange(2 * spacing, nyquist, spacing)
     lowest = HUM_ABOVE * scales.natural_frequency  # below, the motion itself would pass for a hum
     return np.arange(max(2 * spacing, lowest), nyquist, spacing)

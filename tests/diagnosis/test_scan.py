@@ -155,6 +155,28 @@ def test_scan_pays_for_the_frequencies_as_well(small):
     assert [s.effect.id for s in found.scores] == ["coulomb_friction", "sensor_hum"]
 
 
+def test_a_plain_rig_cannot_tell_a_hum_from_a_force():
+    """Where all is linear, steady forcing and a hum of the same frequency read alike: both count.
+
+    Initial conditions absorb how the forced motion began.
+    """
+    rig, releases = small_rig.PLAIN, small_rig.PLAIN_RELEASES
+    campaign = small_rig.record(rig=rig, releases=releases)
+    frequency = 2.4 * np.sqrt(rig.k1 / rig.mass) / (2 * np.pi)
+    hummed = tuple(
+        replace(x, samples=x.samples + 3e-6 * np.sin(2 * np.pi * frequency * x.times))
+        for x in campaign.recordings
+    )
+    campaign = replace(campaign, recordings=hummed)
+    fit = identify(campaign, rng=np.random.default_rng(0), search=False).fit
+    effects = [BY_ID["harmonic_forcing"], BY_ID["sensor_hum"]]
+    force, hum = periodic_scores(fit, effects, campaign_scales(fit))
+    for score in (force, hum):
+        found = score.shapes[f"{score.effect.id}.frequency"]
+        assert found == pytest.approx(frequency, abs=0.5 / campaign_scales(fit).duration)
+    assert hum.gain > 100 and force.gain > 0.8 * hum.gain
+
+
 def test_an_empty_catalogue_finds_nothing(small):
     scales = campaign_scales(small.fit)
     found = scan(small.fit, [], scales, rng=np.random.default_rng(0))
