@@ -98,7 +98,7 @@ class Noise:
         if self.smoothing is None:
             return 0.5 / interval
         inner = self._interior(n, interval)
-        return (self._band_size(n, interval) - 1) / ((inner.stop - inner.start) * interval)
+        return float((self._band_size(n, interval) - 1) / ((inner.stop - inner.start) * interval))
 
     def log_volume(self, n: int, interval: float) -> float:
         """Log determinant of the whitening operator (0 for the band: there it is a constant)."""

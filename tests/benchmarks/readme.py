@@ -231,6 +231,33 @@ def trials_table() -> str:
     return grid(("concealed", "answers"), rows, foot)
 
 
+def single_table() -> str:
+    """Blind trials of one effect of fixed size each."""
+    rows, feet = [], []
+    for name in ("singles_5", "singles_2"):
+        t = stored(name)
+        said = [answer["outcome"] for answer in t["answers"]]
+        wrong = t["confident_wrong_names"]
+        undecided = len(said) - said.count("named") - wrong["hits"]
+        missed = said.count("missed")
+        rows.append(
+            (
+                f"{t['settings']['strength'][0]:g} limits",
+                share(t["right"]["single"]),
+                f"{undecided - missed}",
+                f"{missed}",
+                share(wrong),
+                share(t["place"]),
+                share(t["sizes_inside"]),
+            )
+        )
+        feet.append(
+            f"seeds {t['seeds'][0]} to {t['seeds'][1]}, commit {t['commit'][:7]}, {t['date']}"
+        )
+    head = ("size", "named", "undecided", "missed", "wrong name", "right place", "sizes inside")
+    return grid(head, rows, f"In brackets: 95 % interval. Runs: {'; '.join(feet)}.")
+
+
 def trial_coverage_table() -> str:
     """Intervals before and after naming."""
     t = stored("trials")["coverage"]
@@ -245,6 +272,7 @@ def trial_coverage_table() -> str:
 TABLES = {
     "trials": trials_table,
     "trial_coverage": trial_coverage_table,
+    "singles": single_table,
     "power": power_table,
     "sbc": sbc_table,
     "kernel": kernel_table,

@@ -52,7 +52,7 @@ FIRST, SINCE, UNTIL = 1.0 / 320.0, 0.36, 0.26
 # a force without features admits longer steps the weaker it is: share of the linear force at which
 # they are the usual ones, and by how much they are shortened and lengthened at most
 SLIGHT, LEAST_GAIN, MOST_GAIN = 0.05, 0.4, 2.5
-OUTSIDE = 0.05  # of a force that does not depend on the motion: nothing feeds its errors back
+OUTSIDE = 0.02  # of a force that does not depend on the motion: nothing feeds its errors back
 OFF_TURN, OFF_PASSAGE = np.cos(np.pi / 8), np.sin(np.pi / 8)  # of the swing's four points
 
 
