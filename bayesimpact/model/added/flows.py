@@ -127,6 +127,8 @@ def gain(y: Any, v: Any, t: Any, pace: Any, longest: Any, flow: Any, w: Any) -> 
         inside = left_out(flow.rest + ys, vs, ts, flow, w) - outside
         largest = max(largest, abs(inside) + OUTSIDE * abs(outside))
     largest += OUTSIDE * abs(q[FORCE])
+    if largest == 0.0:
+        return MOST_GAIN
     speed = max(speed, np.sqrt(q[K1] / w.mass * q[Y0] * q[Y0] + q[V0] * q[V0]))
     weight = SLIGHT * w0 * speed / (flow.inverse * largest)
     return min(max(np.sqrt(np.cbrt(weight)), LEAST_GAIN), MOST_GAIN)
