@@ -65,14 +65,14 @@ def frequencies(fit: Fit, effect: Effect, scales: Scales) -> Array:
     spacing = (0.5 if effect.observe is not None else 0.75) / scales.duration
     oscillator, noise = fit.target.oscillator, fit.target.likelihood.noise
     pairs = zip(oscillator.counts, oscillator.intervals, strict=True)
-    nyquist = min(noise.highest(int(n), float(dt)) for n, dt in pairs)
+    highest = min(noise.highest(int(n), float(dt)) for n, dt in pairs)
     if effect.observe is None:
         stiffest = (scales.stiffness + scales.contact_stiffness) / scales.mass
         contact = RESPONSE_REACH * np.sqrt(stiffest) / (2 * np.pi)
-        nyquist = min(0.9 * nyquist, max(contact, FLIGHT_REACH * scales.natural_frequency))
-        return np.arange(2 * spacing, nyquist, spacing)
+        highest = min(0.9 * highest, max(contact, FLIGHT_REACH * scales.natural_frequency))
+        return np.arange(2 * spacing, highest, spacing)
     lowest = HUM_ABOVE * scales.natural_frequency  # below, the motion itself would pass for a hum
-    return np.arange(max(2 * spacing, lowest), nyquist, spacing)
+    return np.arange(max(2 * spacing, lowest), highest, spacing)
 
 
 def shakes_in_own_band(fit: Fit) -> bool:

@@ -8,7 +8,7 @@ from scipy.linalg import toeplitz
 
 from bayesimpact.data.campaign import Smoothing
 from bayesimpact.inference.noise import Noise
-from bayesimpact.model.measurement import smooth
+from bayesimpact.model.measurement import gain, smooth
 
 INTERVAL = 1e-3
 SAVGOL = Smoothing("savgol", window=21, polyorder=2)
@@ -133,7 +133,7 @@ def test_what_it_says_of_itself():
 @pytest.mark.parametrize("smoothing", [None, SAVGOL, LAG])
 @pytest.mark.parametrize("n", [400, 401])
 def test_whitened_numbers_as_signals_keep_their_products(smoothing, n):
-    """And their place in time: one late blip stays late, a wave in the band keeps its frequency."""
+    """And their place in time: a late blip stays late."""
     noise, rng = Noise(0.3, smoothing), np.random.default_rng(3)
     white = noise.whiten(rng.standard_normal((3, n)), INTERVAL)
     signals, start = noise.in_time(white, n, INTERVAL)
@@ -141,4 +141,13 @@ def test_whitened_numbers_as_signals_keep_their_products(smoothing, n):
     blip = np.exp(-0.5 * ((np.arange(n) - 0.8 * n) / 12) ** 2)
     (signal,), start = noise.in_time(noise.whiten(blip[None], INTERVAL), n, INTERVAL)
     assert abs(start / INTERVAL + np.argmax(np.abs(signal)) - 0.8 * n) < 15
-    assert noise.highest(n, INTERVAL) <= 0.5 / INTERVAL
+
+
+@pytest.mark.parametrize("smoothing", [SAVGOL, LAG])
+def test_the_highest_frequency_known_is_the_filters_half_power_one(smoothing):
+    n = 4000
+    highest = Noise(0.3, smoothing).highest(n, INTERVAL)
+    near = highest + np.array([0.0, 2.0]) / (n * INTERVAL)
+    kept, lost = gain(smoothing, INTERVAL, near) ** 2
+    assert kept >= 0.5 > lost
+    assert Noise(0.3).highest(n, INTERVAL) == 0.5 / INTERVAL

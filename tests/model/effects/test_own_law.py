@@ -166,3 +166,4 @@ def test_rows_say_what_the_law_says(where):
     assert row[1] == row[5] == 0
     assert row[3] == 2 + (where == "contact")
     assert row[4] == 17
+    assert law_row(Law(layer_edge_force, rough_at_touch=True, polynomial=True), 0)[3] == 4 + 8
