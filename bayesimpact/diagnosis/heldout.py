@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from bayesimpact.data.campaign import Campaign, Smoothing
 from bayesimpact.diagnosis.evidence import log_evidence
 from bayesimpact.diagnosis.extend import difference_steps
+from bayesimpact.diagnosis.refit import TOLERANCE
 from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
@@ -111,7 +112,7 @@ def _without(fit: Fit, group: Sequence[int]) -> Fit:
     slopes = list(fit.linearisation)
     for r, part in zip(group, cut, strict=True):
         slopes[r] = part
-    return find_mode(target, fit.mode, slopes=tuple(slopes), max_iterations=12)
+    return find_mode(target, fit.mode, slopes=tuple(slopes), tolerance=TOLERANCE, max_iterations=12)
 
 
 def _cut(campaign: Campaign, group: Sequence[int], smoothing: Smoothing | None) -> Campaign:

@@ -31,25 +31,19 @@ def force(y, v, d, t, z, touching, p, q):  # type: ignore[no-untyped-def]
     along = y if p[3] == 0.0 else t
     if p[3] < 0.0:
         along = d
-    x = (along - p[1]) / p[2]
-    if x < 0.0:
-        x = 0.0
-    if x > n - 3.0:
-        x = n - 3.0
-    i = int(x)
-    if i > n - 4:
-        i = n - 4
+    x = min(max((along - p[1]) / p[2], 0.0), n - 3.0)
+    i = min(int(x), n - 4)
     u = x - i
-    w = 1.0 - u
-    w0 = w * w * w / 6.0
-    w1 = (3.0 * u * u * u - 6.0 * u * u + 4.0) / 6.0
-    w2 = (3.0 * w * w * w - 6.0 * w * w + 4.0) / 6.0
-    w3 = u * u * u / 6.0
-    a = w0 * p[4 + i] + w1 * p[5 + i] + w2 * p[6 + i] + w3 * p[7 + i]
-    b = w0 * p[4 + n + i] + w1 * p[5 + n + i] + w2 * p[6 + n + i] + w3 * p[7 + n + i]
+    w, uu = 1.0 - u, u * u
+    w0, w3 = w * w * w, uu * u
+    w1, w2 = 4.0 + 3.0 * (w3 - 2.0 * uu), 4.0 + 3.0 * (w0 - 2.0 * w * w)
+    j = 4 + i
+    a = (w0 * p[j] + w1 * p[j + 1]) + (w2 * p[j + 2] + w3 * p[j + 3])
+    j += n
+    b = (w0 * p[j] + w1 * p[j + 1]) + (w2 * p[j + 2] + w3 * p[j + 3])
     if p[3] > 0.0:
         a *= y / p[3]
-    return a + b * v
+    return (a + b * v) * (1.0 / 6.0)
 
 
 def spline_basis(y: Array, low: float, spacing: float, count: int) -> Array:

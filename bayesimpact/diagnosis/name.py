@@ -64,9 +64,8 @@ def name(
     state = base = search.examine(base_candidate(fit))
     beam = [base]
     while not state.is_white and len(state.candidate.effects) < MOST_EFFECTS:
-        if all(search.is_hopeless(s) for s in beam):
-            break
-        better = search.ranked([c for s in beam for c in search.extended(s)])
+        promising = [s for s in beam if not search.is_hopeless(s)]
+        better = search.ranked([c for s in promising for c in search.extended(s)])
         if not better or search.worth(better[0]) <= search.worth(state.candidate):
             break
         if (
@@ -131,6 +130,7 @@ class _Search:
         """
         behind = max(map(self.worth, self.tried.values())) - self.worth(state.candidate)
         scores = worth_a_refit(state.scan, behind / RASH)
+        scores = [s for s in scores if not self.is_contradicted(s.effect)]
         found = [self.fit_one(state.candidate, state.scan, score) for score in scores]
         if not state.candidate.effects:
             best_single = max((c.log_evidence for c in found), default=-np.inf)
@@ -171,6 +171,13 @@ class _Search:
         more = MOST_EFFECTS - len(state.candidate.effects)
         instead = self.force_worth() - self.worth(state.candidate)
         return state.unknown.log_evidence > more * most or instead > most
+
+    def is_contradicted(self, effect: Effect) -> bool:
+        """Whether an effect alone is further below the base model than a free force is above it."""
+        alone, base = self.tried.get(frozenset([effect.id])), self.states.get(frozenset())
+        if alone is None or base is None:
+            return False
+        return self.worth(base.candidate) - self.worth(alone) > base.unknown.log_evidence
 
     def worth(self, candidate: Candidate) -> float:
         return tempered_evidence(candidate, self.spread()) - self.cost * len(candidate.effects)

@@ -27,11 +27,14 @@ ROUGH = np.log(4.0)  # steps that were off by more give derivatives for one step
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """Theta (d,) with the best noise levels; minus the log posterior there; sums of squares."""
+    """Theta (d,) with the best noise levels; minus the log posterior there; sums of squares and
+    residuals (where derivatives may serve several steps) of the recordings.
+    """
 
     theta: Array
     value: float
     sums: Array
+    residuals: tuple[Array, ...] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +66,7 @@ class Climb:
         self.steps, self.slopes = steps, slopes
         self.frozen = slopes is not None
         self.stale = False  # the derivatives are those of an earlier theta
+        self.roughly = steps is not None and not self.frozen  # good enough far from the mode
         self.iterations = 0
         self.noise = layout.roles("noise")
         free = layout.roles("physical", "effect", "nuisance")
@@ -74,12 +78,17 @@ class Climb:
     def evaluate(self, theta: Array) -> Point:
         """The point at theta, moved inside its bounds."""
         theta = np.clip(theta, self.lower, self.upper)
-        sums = self.target.likelihood.misfit(theta)[0]
+        likelihood, left = self.target.likelihood, None
+        if self.steps is None and not self.frozen:
+            sums = likelihood.misfit(theta)[0]
+        else:
+            left = tuple(white[0] for white in likelihood.residuals(theta[None]))
+            sums = np.array([white @ white for white in left])
         if not np.isfinite(sums).all():
-            return Point(theta, np.inf, sums)
+            return Point(theta, np.inf, sums, left)
         theta[self.noise] = best_sigma(self.target, sums)
         prior = float(self.target.priors.log_density(theta[None])[0])
-        return Point(theta, -float(self._log_likelihood(theta, sums)) - prior, sums)
+        return Point(theta, -float(self._log_likelihood(theta, sums)) - prior, sums, left)
 
     def _log_likelihood(self, theta: Array, sums: Array) -> float:
         likelihood = self.target.likelihood
@@ -88,10 +97,10 @@ class Climb:
         spread = np.sum(likelihood.sizes * np.log(sigma) + sums / (2 * sigma**2))
         return float(constant - spread)
 
-    def linear(self, theta: Array) -> Slope:
+    def linear(self, here: Point) -> Slope:
         """Normal equations of the next step; derivatives by differences serve several steps."""
-        likelihood, priors = self.target.likelihood, self.target.priors
-        parts = self._parts(theta)
+        likelihood, priors, theta = self.target.likelihood, self.target.priors, here.theta
+        parts = self._parts(here)
         matrix, vector = normal_equations(parts, theta[likelihood.sigma_columns], theta.size)
         information = prior_information(priors, theta)
         information[self.noise] = 0.0
@@ -108,20 +117,24 @@ class Climb:
             self.steps = steps
         return Slope(parts, matrix, vector)
 
-    def _parts(self, theta: Array) -> tuple[Linearisation, ...]:
-        likelihood = self.target.likelihood
-        if self.slopes is None or (self.steps is None and not self.frozen):
-            self.slopes, self.stale = likelihood.linearise(theta, self.steps), False
+    def _parts(self, here: Point) -> tuple[Linearisation, ...]:
+        if self.slopes is None or here.residuals is None:
+            likelihood = self.target.likelihood
+            self.slopes = likelihood.linearise(here.theta, self.steps, roughly=self.roughly)
+            self.stale = False
             return self.slopes
         self.stale = not self.frozen
-        return tuple(
-            replace(part, residual=likelihood.residual(r, theta[None])[0])
-            for r, part in enumerate(self.slopes)
-        )
+        pairs = zip(self.slopes, here.residuals, strict=True)
+        return tuple(replace(part, residual=white) for part, white in pairs)
 
     def renew(self) -> None:
         """New derivatives at the next step."""
         self.slopes = None
+
+    def refine(self) -> None:
+        """From now on derivatives to second order of their steps."""
+        self.roughly = False
+        self.renew()
 
     def descend(
         self, here: Point, slope: Slope, damping: float, *, once: bool
@@ -172,10 +185,9 @@ class Climb:
         """
         likelihood, part_way = self.target.likelihood, theta + BENT_AT * step
         ahead = []
-        for r, part in enumerate(slope.parts):
+        for part, white in zip(slope.parts, likelihood.residuals(part_way[None]), strict=True):
             straight = part.residual - BENT_AT * part.jacobian @ step[part.columns]
-            left = likelihood.residual(r, part_way[None])[0] - straight
-            ahead.append(replace(part, residual=left * 2.0 / BENT_AT**2))
+            ahead.append(replace(part, residual=(white[0] - straight) * 2.0 / BENT_AT**2))
         sigma = theta[likelihood.sigma_columns]
         _, vector = normal_equations(tuple(ahead), sigma, theta.size)
         if not np.isfinite(vector).all():
@@ -185,9 +197,9 @@ class Climb:
     def fit(self, here: Point, converged: bool) -> Fit:
         """The record of a climb that ends here."""
         theta, sums, iterations = here.theta, here.sums, self.iterations
-        if self.stale:
-            self.renew()
-        slope = self.linear(theta)
+        if self.stale or self.roughly:
+            self.refine()
+        slope = self.linear(here)
         parts, matrix = slope.parts, slope.matrix
         if not np.isfinite(matrix).all():  # not a mode of anything: the caller sees its value
             unknown = np.full(matrix.shape, np.nan)

@@ -22,9 +22,11 @@ from bayesimpact.inference.likelihood import Linearisation
 
 Array = NDArray[np.float64]
 
+NEAR = 1.0  # size of a step, standard deviations, from which on derivatives are to second order
 SLOW = 0.5  # of the last step's size: above that, old derivatives are renewed
 STALLED = 4.0  # tolerances: a gain that such a step would have brought, or less
 STALLS = 2  # such steps in a row, with new derivatives: these tell no more
+LITTLE = 0.1  # nats: of a step by differences that promised more; two in a row do not lead far
 DOUBTFUL = 1.0  # last step, in standard deviations, that rough derivatives may still promise then
 
 
@@ -45,17 +47,20 @@ def find_mode(
     near enough all the way (the chord method), where they are known and new ones would be dear.
     Parameters `held` stay where they start. The noise levels in `start` are ignored. Stops when a
     step is below `tolerance` standard deviations, or when new derivatives twice gain no more than a
-    few such steps would.
+    few such steps would (or than `LITTLE`, where differences promised more: not converged then).
     """
     climb = Climb(target, steps, slopes, held)
     here = climb.evaluate(start)
     damping, converged, last, stalls = 1e-3, False, np.inf, 0
     while climb.iterations < max_iterations and not converged:
-        slope = climb.linear(here.theta)
+        slope = climb.linear(here)
         if not slope.is_finite:
             break
         whole = climb.step(here.theta, slope, 0.0)
         size = float(np.sqrt(np.maximum(whole @ slope.matrix @ whole, 0.0)))  # undamped
+        if climb.roughly and size < NEAR:
+            climb.refine()  # rough derivatives do not decide either
+            continue
         if climb.stale and (size < tolerance or size > SLOW * last):
             climb.renew()  # old derivatives neither decide nor creep
             continue
@@ -67,8 +72,12 @@ def find_mode(
         if climb.stale and not moved:
             climb.renew()
         elif not (climb.stale or converged):
-            stalls = stalls + 1 if gain < 0.5 * (STALLED * tolerance) ** 2 else 0
-            if stalls == STALLS or not moved:
+            creeps = steps is not None and size > DOUBTFUL and gain < LITTLE
+            stalls = stalls + 1 if creeps or gain < 0.5 * (STALLED * tolerance) ** 2 else 0
+            if climb.roughly and (stalls == STALLS or not moved):
+                climb.refine()
+                stalls = 0
+            elif stalls == STALLS or not moved:
                 converged = moved and size < DOUBTFUL
                 break
     return climb.fit(here, converged)

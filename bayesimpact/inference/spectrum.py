@@ -34,10 +34,12 @@ WINDOWS = range(5, 62, 2)
 ORDERS = (2, 4)
 ABOVE = 10.0  # times the lowest frequency of the motion: noise only
 DECISIVE = 20.0  # nats that a filter needs over white and AR(1) noise
+LEAST_SHAPE = 5.0  # nats over white noise, for a filter worth comparing with anything else
 LEAST_ORDINATES = 40
 LINE_REACH = 17  # ordinates over which the noise has one level
 LINE = 7.0  # nats beyond the largest of as many ordinates of noise
 LEAST_FIT = 1e-4  # p-value of the scatter about the filter's spectrum
+FLOORS = (-30.0, 10.0)  # log of a white floor over the passband: none, and nothing else
 STRONG = 0.3  # of the largest variance: combinations of a half swing that the filter let pass
 
 
@@ -78,8 +80,11 @@ def find_smoothing(recordings: Sequence[Recording]) -> Fingerprint | None:
             stopband = _above(spectra, 0.8 * found[0]) if found else []
             if sum(p.size for _, p, _ in stopband) < LEAST_ORDINATES:
                 continue
+            filtered = _filtered(stopband, smoothing)
+            if filtered - _white(stopband) < LEAST_SHAPE:
+                continue
             unfiltered = max(_ar1(stopband), _falling(stopband))
-            ratio = _filtered(stopband, smoothing) - unfiltered
+            ratio = filtered - unfiltered
             if ratio > most:
                 best, most = (smoothing, found, stopband, unfiltered), ratio
     return None if best is None else _proved(*best)
@@ -242,6 +247,11 @@ def _ar1(spectra: Spectra) -> float:
     return -float(_minimize_scalar(negative, bounds=(-0.9, 0.999), method="bounded").fun)
 
 
+def _white(spectra: Spectra) -> float:
+    power = _power(spectra)
+    return _log_likelihood(power, np.full(power.size, power.mean()))
+
+
 def _power(spectra: Spectra) -> Array:
     return np.concatenate([p for _, p, _ in spectra])
 
@@ -278,10 +288,13 @@ def _levels(spectra: Spectra, smoothing: Smoothing) -> Array:
     shapes = [gain(smoothing, dt, f) ** 2 for f, _, dt in spectra]
     shape, power = np.concatenate(shapes), np.concatenate([p for _, p, _ in spectra])
 
-    def negative(x: Array) -> float:
-        return -_log_likelihood(power, np.exp(x[0]) * shape + np.exp(x[1]))
+    def expected(log_floor: float) -> Array:
+        relative = shape + np.exp(log_floor)
+        return np.asarray(relative * np.mean(power / relative))
 
-    level = float(np.mean(power) / np.mean(shape))
-    start = np.log([level, max(1e-3 * level, float(np.quantile(power, 0.05)))])
-    found = _minimize(negative, start, method="Nelder-Mead", options={"maxiter": 120})
-    return np.asarray(np.exp(found.x))
+    found = _minimize_scalar(
+        lambda x: -_log_likelihood(power, expected(x)), bounds=FLOORS, method="bounded"
+    )
+    relative = shape + np.exp(found.x)
+    level = float(np.mean(power / relative))
+    return np.array([level, level * np.exp(found.x)])

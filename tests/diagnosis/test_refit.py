@@ -48,13 +48,15 @@ class Linear:
         layout = SimpleNamespace(parameters=self.parameters, roles=roles)
         return SimpleNamespace(layout=layout)
 
-    def residual(self, r: int, theta: np.ndarray) -> np.ndarray:
-        return self.y - theta[:, :-1] @ self.x.T
+    def residuals(self, theta: np.ndarray) -> tuple[np.ndarray, ...]:
+        return (self.y - theta[:, :-1] @ self.x.T,)
 
     def misfit(self, theta: np.ndarray) -> np.ndarray:
-        return np.sum(self.residual(0, np.atleast_2d(theta)) ** 2, axis=1)[:, None]
+        return np.sum(self.residuals(np.atleast_2d(theta))[0] ** 2, axis=1)[:, None]
 
-    def linearise(self, theta: np.ndarray, steps: object = None) -> tuple[Linearisation, ...]:
+    def linearise(
+        self, theta: np.ndarray, steps: object = None, *, roughly: bool = False
+    ) -> tuple[Linearisation, ...]:
         return (Linearisation(self.y - self.x @ theta[:-1], self.x, np.arange(theta.size - 1)),)
 
 

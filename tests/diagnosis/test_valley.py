@@ -42,25 +42,27 @@ class Branch:
         effects = (BY_ID["contact_relaxation"],)
         self.oscillator = SimpleNamespace(layout=layout, effects=effects)
 
-    def residual(self, r: int, theta: np.ndarray) -> np.ndarray:
+    def residuals(self, theta: np.ndarray) -> tuple[np.ndarray, ...]:
         c, k, t = theta[:, 0], theta[:, 1], theta[:, 2]
         dashpot = c + k * t - (1.0 + STIFFNESS * TIME)
         inertia = k * t**2 - STIFFNESS * TIME**2
         slow = k * t**3 - STIFFNESS * TIME**3
         rest = np.tile(1e-3 * np.sin(np.arange(37.0)), (c.size, 1))
-        return np.column_stack([3e2 * dashpot, 1e1 * inertia, 3e2 * slow, rest])
+        return (np.column_stack([3e2 * dashpot, 1e1 * inertia, 3e2 * slow, rest]),)
 
     def misfit(self, theta: np.ndarray) -> np.ndarray:
-        return np.sum(self.residual(0, np.atleast_2d(theta)) ** 2, axis=1)[:, None]
+        return np.sum(self.residuals(np.atleast_2d(theta))[0] ** 2, axis=1)[:, None]
 
-    def linearise(self, theta: np.ndarray, steps: object = None) -> tuple[Linearisation, ...]:
+    def linearise(
+        self, theta: np.ndarray, steps: object = None, *, roughly: bool = False
+    ) -> tuple[Linearisation, ...]:
         at = np.repeat(theta[None], 6, axis=0)
         h = 1e-6 * np.abs(theta[:3])
         at[np.arange(3), np.arange(3)] += h
         at[np.arange(3, 6), np.arange(3)] -= h
-        r = self.residual(0, at)
+        r = self.residuals(at)[0]
         jacobian = -((r[:3] - r[3:]) / (2 * h)[:, None]).T
-        return (Linearisation(self.residual(0, theta[None])[0], jacobian, np.arange(3)),)
+        return (Linearisation(self.residuals(theta[None])[0][0], jacobian, np.arange(3)),)
 
 
 def problem() -> Target:

@@ -297,19 +297,21 @@ class Valley:
     def __post_init__(self) -> None:
         self.rng = np.random.default_rng(0)
 
-    def residual(self, r: int, theta: np.ndarray) -> np.ndarray:
+    def residuals(self, theta: np.ndarray) -> tuple[np.ndarray, ...]:
         x, y = theta[:, 0], theta[:, 1]
         rest = np.full_like(x, 1e-2)
-        return np.stack([self.steep * (y - x**2), 1 - x, rest, rest], axis=1)
+        return (np.stack([self.steep * (y - x**2), 1 - x, rest, rest], axis=1),)
 
     def misfit(self, theta: np.ndarray) -> np.ndarray:
-        return np.sum(self.residual(0, np.atleast_2d(theta)) ** 2, axis=1)[:, None]
+        return np.sum(self.residuals(np.atleast_2d(theta))[0] ** 2, axis=1)[:, None]
 
-    def linearise(self, theta: np.ndarray, steps: object = None) -> tuple[Linearisation, ...]:
+    def linearise(
+        self, theta: np.ndarray, steps: object = None, *, roughly: bool = False
+    ) -> tuple[Linearisation, ...]:
         a = self.steep
         jacobian = np.array([[2 * a * theta[0], -a], [1, 0], [0, 0], [0, 0]], dtype=float)
         jacobian *= self.sign * (1 + self.rough * self.rng.standard_normal((4, 2)))
-        return (Linearisation(self.residual(0, theta[None])[0], jacobian, np.array([0, 1])),)
+        return (Linearisation(self.residuals(theta[None])[0][0], jacobian, np.array([0, 1])),)
 
 
 def valley(**kind: float) -> Target:

@@ -134,6 +134,14 @@ def gain(y: Any, v: Any, t: Any, pace: Any, longest: Any, flow: Any, w: Any) -> 
     return min(max(np.sqrt(np.cbrt(weight)), LEAST_GAIN), MOST_GAIN)
 
 
+@compiled(forceinline=True)
+def beyond_surface(law: Any, y: Any, v: Any, t: Any, w: Any) -> Any:
+    """Whether a point lies on the other side of a law's own surface (if it has one)."""
+    if w.laws[LAW_COLUMNS * law + LAW_SURFACE] == 0:
+        return False
+    return w.s[SIDES + law] * surface_value(law, y, v, t, NOW, w) < 0.0
+
+
 @compiled()
 def left_out(y: Any, v: Any, t: Any, flow: Any, w: Any) -> Any:
     """Force that the linear flow leaves out at a point other than the present one, N.
@@ -143,8 +151,7 @@ def left_out(y: Any, v: Any, t: Any, flow: Any, w: Any) -> Any:
     total = flow.level + flow.slope * y
     for k in range(flow.count):
         law = w.acting[k]
-        bounded = w.laws[LAW_COLUMNS * law + LAW_SURFACE] != 0
-        if bounded and w.s[SIDES + law] * surface_value(law, y, v, t, NOW, w) < 0.0:
+        if beyond_surface(law, y, v, t, w):
             continue
         z = w.work[WORK_COLUMNS * law + NOW]
         total -= law_value(law, LAW_FORCE, y, v, t, z, flow.gap, flow.touching, w)
@@ -189,7 +196,7 @@ def fold(
         wide = w.laws[LAW_COLUMNS * law + LAW_FLAGS] & (POLYNOMIAL | ROUGH_AT_TOUCH) != 0
         wide = wide and not bounded and w.laws[LAW_COLUMNS * law + LAW_PACE] == 0
         start, end, speed = (low, high, 0.0) if wide else (y, y + shift, v)
-        if bounded and w.s[SIDES + law] * surface_value(law, end, v, t, NOW, w) < 0.0:
+        if beyond_surface(law, end, v, t, w):
             end = y - shift  # about to leave: what lies behind tells the stiffness
         if start == end:
             continue
