@@ -129,8 +129,7 @@ class _Search:
         Only those that may overtake the best model so far, as far as scores tell.
         """
         behind = max(map(self.worth, self.tried.values())) - self.worth(state.candidate)
-        scores = worth_a_refit(state.scan, behind / RASH)
-        scores = [s for s in scores if not self.is_contradicted(s.effect)]
+        scores = self.worth_a_refit(state.scan, behind / RASH)
         found = [self.fit_one(state.candidate, state.scan, score) for score in scores]
         if not state.candidate.effects:
             best_single = max((c.log_evidence for c in found), default=-np.inf)
@@ -172,12 +171,17 @@ class _Search:
         instead = self.force_worth() - self.worth(state.candidate)
         return state.unknown.log_evidence > more * most or instead > most
 
+    def worth_a_refit(self, scan: Scan, least: float = 0.0) -> list[Score]:
+        """Effects that promise something, but for those that have proved to be wrong here."""
+        return [s for s in worth_a_refit(scan, least) if not self.is_contradicted(s.effect)]
+
     def is_contradicted(self, effect: Effect) -> bool:
-        """Whether an effect alone is further below the base model than a free force is above it."""
-        alone, base = self.tried.get(frozenset([effect.id])), self.states.get(frozenset())
-        if alone is None or base is None:
+        """Whether an effect alone loses more than there is to gain, by what a free force gains."""
+        alone, base = self.tried.get(frozenset([effect.id])), self.states[frozenset()]
+        if alone is None:
             return False
-        return self.worth(base.candidate) - self.worth(alone) > base.unknown.log_evidence
+        lost = self.worth(base.candidate) - self.worth(alone)
+        return lost > max(LEAP, base.unknown.log_evidence)
 
     def worth(self, candidate: Candidate) -> float:
         return tempered_evidence(candidate, self.spread()) - self.cost * len(candidate.effects)
@@ -280,7 +284,7 @@ class _Search:
         for effect in chosen.effects:
             rest = self.drop(chosen, effect)
             found = scan(rest.fit, self.effects, self.scales, rng=self.rng)
-            for score in worth_a_refit(found):
+            for score in self.worth_a_refit(found):
                 if score.effect.id != effect.id:
                     self.fit_one(rest, found, score)
 

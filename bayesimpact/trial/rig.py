@@ -121,15 +121,19 @@ def record(
     rate: float,
     duration: float,
     rng: np.random.Generator,
+    rtol: float = 1e-12,
+    atol: float = 1e-14,
 ) -> NDArray[np.float64]:
     """One recording, (round(rate * duration),), m; draws as many normal numbers from `rng`.
+
+    `rtol`, `atol` as for `motion`.
 
     Raises
     ------
     InputError, SimulationError : as `motion`
     """
     effects, chain = effects or {}, chain or Chain()
-    truth = motion(rig, release, effects, rate=rate, duration=duration)
+    truth = motion(rig, release, effects, rate=rate, duration=duration, rtol=rtol, atol=atol)
     probe = Probe()
     for effect, given in effects.items():
         planted = _planted(effect)

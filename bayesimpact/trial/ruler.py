@@ -35,6 +35,7 @@ from bayesimpact.trial.rig_motion import sampling
 
 Array = NDArray[np.float64]
 
+RTOL, ATOL = 1e-9, 1e-11  # of the rig's motion: errors far below the noise, at half the cost
 WIDE = 1e3  # prior widths relative to the true values: no information
 
 
@@ -44,7 +45,15 @@ def clean_readings(design: Design, effects: Effects) -> tuple[Array, ...]:
     rng = np.random.default_rng(0)  # multiplied by a noise of zero
     return tuple(
         record(
-            design.rig, release, effects, chain, rate=design.rate, duration=design.duration, rng=rng
+            design.rig,
+            release,
+            effects,
+            chain,
+            rate=design.rate,
+            duration=design.duration,
+            rng=rng,
+            rtol=RTOL,
+            atol=ATOL,
         )
         for release in design.releases
     )

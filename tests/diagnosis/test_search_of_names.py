@@ -17,6 +17,7 @@ search = importlib.import_module("bayesimpact.diagnosis.name")
 
 A, B, C, D = "coulomb_friction", "quadratic_drag", "spring_cubic", "gap_wear"
 S = "contact_second_stage"  # has a depth
+N = "contact_no_tension"  # on or off
 EFFECTS = tuple(BY_ID[i] for i in (A, B, C, D, S))
 ENOUGH = 500.0  # a gain at which nothing is left
 
@@ -104,7 +105,7 @@ class Table:
 
 @pytest.fixture
 def run(monkeypatch):
-    def go(table: Table):
+    def go(table: Table, effects=EFFECTS):
         monkeypatch.setattr(search, "refit", table.refit)
         monkeypatch.setattr(search, "without", table.without)
         monkeypatch.setattr(search, "scan", table.scan)
@@ -119,7 +120,7 @@ def run(monkeypatch):
             search, "base_candidate", lambda fit: table.candidate((), table.gain(()))
         )
         fit = SimpleNamespace()
-        return search.name(fit, EFFECTS, None, rng=np.random.default_rng(0))
+        return search.name(fit, effects, None, rng=np.random.default_rng(0))
 
     return go
 
@@ -176,6 +177,23 @@ def test_the_search_ends_when_a_free_force_explains_what_is_left(run):
     for beside, reached in ((200.0, 1), (170.0, 2), (150.0, 3)):
         run(table := Table(steps, beside=beside))
         assert max(map(len, table.fitted)) == reached
+
+
+def test_a_model_beside_which_a_force_explains_the_rest_is_not_extended(run):
+    """Beside A a free force gains 200 nats, effects promise 20; beside B they promise 200."""
+    table = Table({A: 100.0, B: 90.0, f"{A} {C}": 120.0, f"{B} {D}": 290.0}, force=300.0)
+    run(table)
+    assert frozenset({A, C}) not in table.fitted and frozenset({B, D}) in table.fitted
+
+
+@pytest.mark.parametrize(("alone", "again"), [(-20.0, True), (-140.0, False)])
+def test_an_effect_that_loses_more_than_there_is_to_gain_is_not_tried_again(run, alone, again):
+    """A free force gains 130 nats; an effect that is on or off is fitted whatever its score."""
+    gains = {A: 100.0, B: 60.0, C: 55.0, f"{A} {B}": 150.0}
+    table = Table(gains, force=130.0, forward={N: alone})
+    run(table, (*EFFECTS, BY_ID[N]))
+    assert frozenset({N}) in table.fitted
+    assert (frozenset({A, N}) in table.fitted) == again
 
 
 def test_what_cannot_overtake_the_best_is_not_fitted(run):

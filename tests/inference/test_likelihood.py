@@ -13,7 +13,7 @@ from bayesimpact.data.campaign import Smoothing
 from bayesimpact.inference import likelihood as module
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.noise import Noise
-from bayesimpact.model.oscillator import build_oscillator
+from bayesimpact.model.oscillator import Oscillator, build_oscillator
 
 SAVGOL = Smoothing("savgol", window=11, polyorder=2)
 NOISES = {
@@ -154,9 +154,11 @@ def extrapolated(likelihood: Likelihood, theta: np.ndarray, i: int, step: float)
     return [(4 * f - c) / 3 for c, f in zip(coarse, fine, strict=True)]
 
 
-def check_jacobian(likelihood: Likelihood, steps: np.ndarray | None, tolerance: float) -> None:
+def check_jacobian(
+    likelihood: Likelihood, steps: np.ndarray | None, tolerance: float, *, roughly: bool = False
+) -> None:
     theta = start(likelihood)
-    parts = likelihood.linearise(theta, steps)
+    parts = likelihood.linearise(theta, steps, roughly=roughly)
     rows = zip(
         likelihood.oscillator.campaign.recordings,
         likelihood.oscillator.predict(theta),
@@ -200,6 +202,21 @@ def test_derivatives_by_differences(noise, effects):
     floor = [1e-2 if n.startswith("v0") else 1e-4 for n in likelihood.oscillator.layout.names]
     steps = 1e-5 * np.maximum(np.abs(theta), floor)
     check_jacobian(likelihood, steps, 3e-5)
+
+
+def test_rough_derivatives_are_of_first_order_and_half_as_dear(monkeypatch):
+    likelihood = build(Noise(), ("quadratic_drag", "contact_power_law"), duration=0.2)
+    theta, tried = start(likelihood), []
+    floor = [1e-2 if n.startswith("v0") else 1e-4 for n in likelihood.oscillator.layout.names]
+    steps = 1e-5 * np.maximum(np.abs(theta), floor)
+    check_jacobian(likelihood, steps, 3e-3, roughly=True)
+    predict = Oscillator.predict_recording
+    monkeypatch.setattr(
+        Oscillator, "predict_recording", lambda o, r, x: (tried.append(len(x)), predict(o, r, x))[1]
+    )
+    likelihood.linearise(theta, steps, [0], roughly=True)
+    likelihood.linearise(theta, steps, [0])
+    assert tried[0] - 1 == (tried[1] - 1) / 2
 
 
 def test_differences_at_a_bound_look_inward():

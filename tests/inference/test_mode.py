@@ -274,12 +274,14 @@ def test_iterations_are_limited():
 class Valley:
     """Rosenbrock's residuals 10 (y - x^2), 1 - x (and zeros) in place of an oscillator's.
 
-    Derivatives may have the wrong `sign`, or be off by the relative error `rough`.
+    Derivatives may have the wrong `sign`, or be off by the relative error `rough` (or, where rough
+    ones are asked for, `rougher`).
     """
 
     sign: float = 1.0
     steep: float = 10.0
     rough: float = 0.0
+    rougher: float = 0.0
     sizes = np.array([4.0])
     log_volume = np.array([0.0])
     sigma_columns = np.array([2])
@@ -296,6 +298,7 @@ class Valley:
 
     def __post_init__(self) -> None:
         self.rng = np.random.default_rng(0)
+        self.asked: list[bool] = []
 
     def residuals(self, theta: np.ndarray) -> tuple[np.ndarray, ...]:
         x, y = theta[:, 0], theta[:, 1]
@@ -310,7 +313,9 @@ class Valley:
     ) -> tuple[Linearisation, ...]:
         a = self.steep
         jacobian = np.array([[2 * a * theta[0], -a], [1, 0], [0, 0], [0, 0]], dtype=float)
-        jacobian *= self.sign * (1 + self.rough * self.rng.standard_normal((4, 2)))
+        error = self.rougher if roughly else self.rough
+        jacobian *= self.sign * (1 + error * self.rng.standard_normal((4, 2)))
+        self.asked.append(roughly)
         return (Linearisation(self.residuals(theta[None])[0][0], jacobian, np.array([0, 1])),)
 
 
@@ -336,6 +341,24 @@ def test_rough_derivatives_end_the_climb_where_they_tell_no_more():
     near = find_mode(valley(rough=0.3), start, max_iterations=300, tolerance=1e-6)
     assert near.converged
     assert abs(near.mode[0] - 1.0) < 0.01 * near.sd[0]
+
+
+def test_rough_derivatives_lead_near_the_mode_and_finer_ones_to_it():
+    problem = valley(rougher=0.05)
+    fit = find_mode(problem, np.array([-1.2, 1.0, 1.0]), steps=np.full(3, 1e-3))
+    assert fit.converged
+    np.testing.assert_allclose(fit.mode[:2], 1.0, atol=1e-4)
+    asked = problem.likelihood.asked
+    assert asked[0] and not asked[-1] and asked == sorted(asked, reverse=True)
+
+
+def test_a_climb_by_differences_that_gains_little_gives_up():
+    """Derivatives that promise more than a standard deviation and gain a tenth of a nat."""
+    start = np.array([0.5, 0.25, 1.0])
+    problem = valley(rough=0.03, steep=1e3)
+    fit = find_mode(problem, start, steps=np.full(3, 1e-3), max_iterations=300)
+    assert not fit.converged and fit.iterations < 60
+    assert find_mode(problem, start, max_iterations=300).iterations == 300
 
 
 def test_a_climb_ends_where_new_derivatives_gain_nothing():
