@@ -16,7 +16,10 @@ from typing import Any
 
 import numba
 import numpy as np
+from numba.core.ccallback import CFunc
+from numba.core.sigutils import normalize_signature
 
+_normalize: Any = normalize_signature  # without annotations
 _ROOT = Path(__file__).parents[2]
 _IMPORT = re.compile(r"^\s*from (bayesimpact[\w.]*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
 
@@ -51,7 +54,8 @@ def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     """
 
     def decorate(function: Callable[..., Any]) -> Any:
-        return _stamped(numba.njit(**{"cache": True, "error_model": "numpy", **options})(function))
+        compiler = numba.njit(**{"cache": True, "error_model": "numpy", **options})
+        return _stamped(compiler(function), function)
 
     return decorate
 
@@ -63,18 +67,21 @@ def compiled_callback(signature: Any) -> Callable[[Callable[..., Any]], Any]:
     """
 
     def decorate(function: Callable[..., Any]) -> Any:
-        kept = Path(function.__code__.co_filename).exists()
-        return numba.cfunc(signature, cache=kept, error_model="numpy")(function)
+        parsed = _normalize(signature)
+        callback: Any = CFunc(function, parsed, {}, {"error_model": "numpy"})
+        if Path(function.__code__.co_filename).exists():
+            callback.enable_caching()
+        _stamped(callback, function).compile()  # `numba.cfunc` leaves no room for the stamp
+        return callback
 
     return decorate
 
 
-def _stamped(dispatcher: Any) -> Any:
-    cache_file = getattr(dispatcher._cache, "_cache_file", None)
+def _stamped(made: Any, function: Callable[..., Any]) -> Any:
+    cache_file = getattr(made._cache, "_cache_file", None)
     if cache_file is not None:
-        path = Path(dispatcher.py_func.__code__.co_filename)
-        cache_file._source_stamp = source_stamp(path)
-    return dispatcher
+        cache_file._source_stamp = source_stamp(Path(function.__code__.co_filename))
+    return made
 
 
 @compiled()

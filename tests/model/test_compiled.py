@@ -35,3 +35,16 @@ def test_a_change_elsewhere_does_not(sources: Path) -> None:
     before = stamp(sources / "top.py")
     (sources / "other.py").write_text("x = 2\n")
     assert stamp(sources / "top.py") == before
+
+
+def half(x: float) -> float:
+    return 0.5 * x
+
+
+def test_a_callback_has_the_same_stamp_as_any_compiled_function() -> None:
+    compiled.source_stamp.cache_clear()
+    callback = compiled.compiled_callback("float64(float64)")(half)
+    assert callback.ctypes(3.0) == 1.5
+    found = callback._cache._cache_file._source_stamp
+    assert found == compiled.compiled()(half)._cache._cache_file._source_stamp
+    assert found == compiled.source_stamp(Path(__file__))

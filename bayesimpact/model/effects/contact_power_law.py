@@ -15,13 +15,14 @@ independent integrators.
 from __future__ import annotations
 
 from bayesimpact.model.effects.effect import Effect, EffectParameter, Law, Numbers
+from bayesimpact.model.power import power
 
 
 def force(
     y: float, v: float, d: float, t: float, z: float, touching: float, p: Numbers, q: Numbers
 ) -> float:
     """What the power law adds to k2 d, N; q[4] is k2."""
-    return q[4] * d * ((abs(d) / 1e-3) ** (p[0] - 1.0) - 1.0) if d != 0.0 else 0.0
+    return q[4] * d * (power(abs(d) * 1e3, p[0] - 1.0) - 1.0) if d != 0.0 else 0.0
 
 
 EFFECT = Effect(

@@ -127,7 +127,8 @@ class Law:
     indentation y - g m, time from the recording's first sample s, the law's own state, 1.0 in
     contact and 0.0 in flight, pointers to the law's parameters (in the effect's order) and to the
     oscillator's slots (`bayesimpact.model.parameters.SLOTS`). They are compiled one by one to C
-    callbacks, so they may call `math` functions but no other compiled ones.
+    callbacks, so they may call `math` functions and `bayesimpact.model.power.power`, but no
+    compiled ones of a user's own.
 
     Attributes
     ----------
