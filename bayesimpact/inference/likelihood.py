@@ -104,10 +104,12 @@ class Likelihood:
                 o.intervals,
             )
             return np.asarray(sums)
+        sums = np.empty((theta.shape[0], o.counts.size))
         size = max(1, _CHUNK_SAMPLES // (o.counts.size * int(o.counts.max())))
-        chunks = [theta[first : first + size] for first in range(0, theta.shape[0], size)]
-        white = (self.residuals(chunk) for chunk in chunks)
-        sums = np.vstack([np.stack([np.einsum("bn,bn->b", x, x) for x in w], 1) for w in white])
+        for first in range(0, theta.shape[0], size):
+            part = slice(first, first + size)
+            for r, white in enumerate(self.residuals(theta[part])):
+                sums[part, r] = np.einsum("bn,bn->b", white, white)
         return np.where(np.isfinite(sums), sums, np.inf)
 
     def residuals(self, theta: Array) -> tuple[Array, ...]:

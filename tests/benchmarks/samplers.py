@@ -30,6 +30,8 @@ from benchmarks.bundled import fit
 from benchmarks.record import keep, present
 from benchmarks.sampling import Sampled
 
+from bayesimpact.inference.convergence import quiet_arviz
+
 SEED = 0
 LIMIT = 5.0  # Monte Carlo errors; 70 normal numbers pass it once in 25,000 times
 ENOUGH = 50.0  # autocorrelation times, for an ESS to mean something
@@ -74,7 +76,8 @@ def row(found: Sampled, reference: Sampled, rival: Sampled) -> dict[str, Any]:
 def measure() -> dict[str, Any]:
     """Run all that are installed."""
     given = fit()
-    given.target(np.tile(given.mode, (64, 1)))  # compiled before anything is measured
+    given.target(np.tile(given.mode, (64, 1)))  # compiled before anything is measured,
+    quiet_arviz()  # and imported
     sampling.with_gradient(given)(given.mode)
     together = sampling.ours(given, SEED)
     alone = on_one_thread(lambda: sampling.ours(given, SEED))
