@@ -234,8 +234,9 @@ def trials_table() -> str:
 def single_table() -> str:
     """Blind trials of one effect of fixed size each."""
     rows, feet = [], []
-    for name in ("singles_5", "singles_2"):
+    for name in ("singles_5", "singles_paper", "singles_2"):
         t = stored(name)
+        benches = t["settings"]["benches"]
         said = [answer["outcome"] for answer in t["answers"]]
         wrong = t["confident_wrong_names"]
         undecided = len(said) - said.count("named") - wrong["hits"]
@@ -243,6 +244,7 @@ def single_table() -> str:
         rows.append(
             (
                 f"{t['settings']['strength'][0]:g} limits",
+                f"{len(benches)} rigs" if len(benches) > 1 else f"{benches[0]}'s",
                 share(t["right"]["single"]),
                 f"{undecided - missed}",
                 f"{missed}",
@@ -254,7 +256,16 @@ def single_table() -> str:
         feet.append(
             f"seeds {t['seeds'][0]} to {t['seeds'][1]}, commit {t['commit'][:7]}, {t['date']}"
         )
-    head = ("size", "named", "undecided", "missed", "wrong name", "right place", "sizes inside")
+    head = (
+        "size",
+        "rig",
+        "named",
+        "undecided",
+        "missed",
+        "wrong name",
+        "right place",
+        "sizes inside",
+    )
     return grid(head, rows, f"In brackets: 95 % interval. Runs: {'; '.join(feet)}.")
 
 
