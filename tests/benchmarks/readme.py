@@ -244,7 +244,7 @@ def single_table() -> str:
         rows.append(
             (
                 f"{t['settings']['strength'][0]:g} limits",
-                f"{len(benches)} rigs" if len(benches) > 1 else f"{benches[0]}'s",
+                f"{len(benches)} rigs" if len(benches) > 1 else f"the {benches[0]}'s",
                 share(t["right"]["single"]),
                 f"{undecided - missed}",
                 f"{missed}",
