@@ -32,7 +32,6 @@ from bayesimpact.model.added.situation import (
 )
 from bayesimpact.model.added.step import push, step
 from bayesimpact.model.added.world import (
-    AHEAD,
     C1,
     C2,
     CONTACT_MASS,
@@ -69,17 +68,14 @@ def admissible(q: Any, mass: Any) -> Any:
 @compiled()
 def cruise(y: Any, v: Any, n0: Any, j: Any, stride: Any, end: Any, flow: Any, w: Any) -> Any:
     """Strides from sample j - 1 to before `end` without an event: (y, v, push, next sample)."""
-    h, column = stride * w.interval, AHEAD if flow.memory else NOW
+    h = stride * w.interval
     at = quarters(h, flow.b, flow.K, flow.inverse)
-    n1 = 0.0
     while j + stride <= end:
         t = (j - 1) * w.interval
         w.s[HEADING] = heading(v, w)
-        y1, v1 = step(y, v, t, n0, at, flow, w)
+        y1, v1, n1 = step(y, v, t, n0, at, flow, w)
         if suspicious(y, v, y1, v1, t + h, h, flow, w):
             break
-        if not flow.plain:
-            n1 = push(y1, v1, t + h, column, flow, w)
         fill_in(j, j + stride - 1, t, True, at, flow, w, y, v, n0, h, y1, v1, n1)
         j += stride
         w.out[j - 1] = y1
@@ -96,10 +92,7 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
     flow, longest = flow_from(y, v, t, w)
     start, event = t, typed(NONE)
     ramp = first_step(y, v, t, longest, flow, w)
-    column = AHEAD if flow.memory else NOW
-    n0 = n1 = 0.0
-    if not flow.plain:
-        n0 = push(y, v, t, NOW, flow, w)
+    n0 = 0.0 if flow.plain else push(y, v, t, NOW, flow, w)
     stride = min(int(longest / w.interval), LONGEST_STRIDE)
     at = quarters(longest, flow.b, flow.K, flow.inverse)
     end = min(w.n, j + max(1, int(min(RENEWED * longest / w.interval, 1.0 * w.n))))
@@ -119,12 +112,10 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
         w.s[HEADING] = heading(v, w)
         if h != at.h:
             at = quarters(h, flow.b, flow.K, flow.inverse)
-        y1, v1 = step(y, v, t, n0, at, flow, w)
+        y1, v1, n1 = step(y, v, t, n0, at, flow, w)
         length = h
         if suspicious(y, v, y1, v1, t + h, h, flow, w):
-            event, length, y1, v1 = first_event(y, v, t, n0, h, y1, v1, flow, w)
-        if not flow.plain:
-            n1 = push(y1, v1, t + length, column, flow, w)
+            event, length, y1, v1, n1 = first_event(y, v, t, n0, h, y1, v1, n1, flow, w)
         lands = lands and event == NONE
         reached = min(int((t + length) / w.interval + 0.5 * lands) + 1, w.n)
         if reached > j + lands:

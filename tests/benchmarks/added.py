@@ -5,8 +5,9 @@
 Nine recordings of 6,000 samples at the paper's values, one effect at a time at its plausible size
 (the width of its prior), on one thread. Numba takes the step sizes as constants when it compiles,
 so each scale of the steps is a process of its own, compiled anew: 1 is what the package uses. The
-error is the largest difference to steps a quarter as long; `halving` that of 1 against 1/2. Writes
-added.json beside this file.
+error is the largest difference to steps a quarter as long; `halving` that of 1 against 1/2. The
+plain recurrence of the base model takes its turn among the effects, for the machine's speed changes
+from one quarter of an hour to the next. Writes added.json beside this file.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +25,7 @@ if __name__ == "__main__":  # imports go by the tests' folder, not by this one
     sys.path[0] = str(Path(__file__).resolve().parents[1])
 
 import numpy as np
+from benchmarks import kernel, recurrence
 from benchmarks.record import keep, rounds
 from effect_rigs import MOVING, TestRig, typical
 
@@ -31,7 +35,8 @@ from bayesimpact.model.oscillator import Oscillator, build_oscillator
 SCALES = (2.0, 1.0, 0.5, 0.25)  # of all step sizes
 STEPS = ("MAX_ANGLE", "MAX_ANGLE_PACE", "RAMP")
 GRADED = ("SINCE", "UNTIL")  # over the 3/4th power of a time in longest steps
-ROUNDS, REPEATS = 7, 3
+ROUNDS, REPEATS = 11, 3
+PLAIN = "plain recurrence"
 RIG = TestRig(
     k2=np.repeat([5350.156, 4776.275, 2959.249], 3),
     y0=np.tile([-6.5e-3, -5e-3, -4e-3], 3),
@@ -58,15 +63,15 @@ def child(scale: float, file: str) -> None:
         setattr(flows, name, scale * getattr(flows, name))
     for name in GRADED:
         setattr(flows, name, scale**0.75 * getattr(flows, name))
-    result = {}
-    for effect, oscillator, theta in resolved():
-        slots, recordings = oscillator.layout.slots(theta[None])[0], np.arange(9)
-
-        def run(o: Oscillator = oscillator, s: np.ndarray = slots) -> np.ndarray:
-            return o.motions_of(recordings, s)  # noqa: B023
-
-        result[f"{effect}.y"] = run()
-        taken = rounds({"it": run}, ROUNDS, REPEATS)["it"]
+    theta, _, rest = kernel.campaign()
+    subjects: dict[str, Callable[[], Any]] = {
+        PLAIN: lambda: recurrence.sums_of_squares(theta, *rest)
+    }
+    for effect, oscillator, values in resolved():
+        slots = oscillator.layout.slots(values[None])[0]
+        subjects[effect] = partial(oscillator.motions_of, np.arange(9), slots)
+    result: dict[str, Any] = {f"{effect}.y": run() for effect, run in subjects.items()}
+    for effect, taken in rounds(subjects, ROUNDS, REPEATS).items():
         result[f"{effect}.s"] = np.median(taken)
     np.savez(file, **result)
 
@@ -88,14 +93,24 @@ def measure() -> dict[str, Any]:
     def apart(one: dict[str, Any], other: dict[str, Any], effect: str) -> float:
         return float(np.abs(one[f"{effect}.y"] - other[f"{effect}.y"]).max())
 
+    def cost(effect: str) -> list[float]:
+        return [float(runs[scale][f"{effect}.s"]) / samples * 1e9 for scale in SCALES]
+
     effects = {}
     for effect in (name[:-2] for name in finest if name.endswith(".y")):
+        if effect == PLAIN:
+            continue
         effects[effect] = {
-            "ns_per_sample": [float(runs[s][f"{effect}.s"]) / samples * 1e9 for s in SCALES],
+            "ns_per_sample": cost(effect),
             "error_m": [apart(runs[s], finest, effect) for s in SCALES[:-1]],
             "halving_m": apart(runs[1.0], runs[0.5], effect),
         }
-    return {"samples": samples, "scales": list(SCALES), "effects": effects}
+    return {
+        "samples": samples,
+        "scales": list(SCALES),
+        "recurrence_ns_per_sample": cost(PLAIN),
+        "effects": effects,
+    }
 
 
 def main() -> None:

@@ -80,18 +80,23 @@ def added_table() -> str:
     """Cost and error of the steps that an added effect needs."""
     a = stored("added")
     here, half = a["scales"].index(1.0), a["scales"].index(0.5)
-    rows = [
-        (
+    plain = a["recurrence_ns_per_sample"]
+
+    def row_of(effect: str, row: dict[str, Any]) -> tuple[str, ...]:
+        cost = row["ns_per_sample"]
+        return (
             effect.replace("_", " "),
-            f"{row['ns_per_sample'][here]:.0f}",
+            f"{cost[here]:.0f}",
+            f"{cost[here] / plain[here]:.1f}",
             f"{row['halving_m']:.0e}",
-            f"{row['ns_per_sample'][half] / row['ns_per_sample'][here]:.1f}",
+            f"{cost[half] / plain[half] / (cost[here] / plain[here]):.1f}",
         )
-        for effect, row in sorted(
-            a["effects"].items(), key=lambda item: item[1]["ns_per_sample"][here]
-        )
-    ]
-    head = ("added effect", "ns per sample", "change with half the steps, m", "at what cost")
+
+    ranked = sorted(a["effects"].items(), key=lambda item: item[1]["ns_per_sample"][here])
+    rows = [("none: plain recurrence", f"{plain[here]:.0f}", "1.0", "", "")]
+    rows += [row_of(effect, row) for effect, row in ranked]
+    change = "change with half the steps, m"
+    head = ("added effect", "ns per sample", "over the first", change, "at what cost")
     return grid(head, rows, measured(a, f"{a['samples']:,} samples, one thread"))
 
 

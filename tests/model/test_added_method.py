@@ -1,11 +1,14 @@
-"""The Runge-Kutta method of the general simulator: order conditions and responses."""
+"""The two methods of the general simulator: order conditions and responses."""
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
-from bayesimpact.model.added.method import quarters, stage
+from bayesimpact.model.added.method import place_stage, quarters, stage
 from bayesimpact.model.flow import impulse_response
 
 NODES = np.array([0, 1, 1, 2, 3, 4]) / 4
@@ -50,6 +53,79 @@ def test_responses_belong_to_the_nodes():
             apart = round(4 * (here - NODES[j])) if weight else 0
             found = stage.py_func(number, 0.0, *responses, *unit)
             assert found == pytest.approx(weight * responses[apart], rel=1e-14)
+
+
+def place_tableau() -> tuple[np.ndarray, np.ndarray]:
+    """The Nystroem method's weights of each stage and of the end, before the responses."""
+    rows = [
+        [place_stage.py_func(number, 0.0, *[1.0] * 5, *unit) for unit in np.eye(5)]
+        for number in range(1, 5)
+    ]
+    A = np.zeros((4, 5))
+    A[1:] = rows[:3]
+    return A, np.array(rows[3])
+
+
+def test_order_conditions_where_no_force_depends_on_the_velocity():
+    """Order five with any linear flow: S(x) = x + s2 x^2 + s3 x^3 + ... within a step.
+
+    Hairer, Norsett and Wanner (1993, table II.14.3) have those with S(x) = x; the others follow in
+    the same way, with a weight for every power of S.
+    """
+    A, b = place_tableau()
+    c = np.arange(5) / 4
+    apart = c[:4, None] - c[None, :]
+    assert np.all(np.triu(A) == 0)
+    for k in range(6):  # Boole's rule
+        assert b @ c**k == pytest.approx(1 / (k + 1), abs=1e-14)
+    reach = np.zeros((5, 4, 4))  # [i, p, k]: what S^p and forces in c^k do at stage i
+    exact = np.zeros((5, 4, 4))
+    for p in range(1, 4):
+        for k in range(3):
+            reach[:4, p, k] = (A * apart**p) @ c**k
+            reach[4, p, k] = b @ ((1 - c) ** p * c**k)  # the end: y there is a stage as well
+            over = math.factorial(p) * math.factorial(k) / math.factorial(p + k + 1)
+            exact[:, p, k] = over * c ** (p + k + 1)
+    missing = reach - exact
+    for order in range(3, 6):  # of the velocity; those of the displacement have (1 - c) b for b
+        for p in range(1, order - 1):
+            for k in range(order - 1 - p):
+                power = order - 2 - p - k
+                assert b @ (c**power * missing[:, p, k]) == pytest.approx(0, abs=1e-15)
+                if power > 0 and order < 5:
+                    assert b @ ((1 - c) * c ** (power - 1) * missing[:, p, k]) == pytest.approx(
+                        0, abs=1e-15
+                    )
+    np.testing.assert_allclose(missing[:, 1, 0], 0, atol=1e-15)  # so nested trees add nothing
+
+
+def test_order_of_a_step_where_no_force_depends_on_the_velocity():
+    """A pendulum with drag: halving the steps divides the error by 2^5."""
+    b, K, end, errors = 0.4, 9.0, 2.0, []
+
+    def added(y: float) -> float:
+        return K * (y - math.sin(y))
+
+    def right(_: float, x: np.ndarray) -> list[float]:
+        return [x[1], -2 * b * x[1] - K * x[0] + added(x[0])]
+
+    exact = solve_ivp(right, (0, end), [1.2, 0.5], method="DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
+    for steps in (20, 40):
+        at, y, v = quarters(end / steps, b, K, 1.0), 1.2, 0.5
+        S = [0.0, at.S1, at.S2, at.S3, at.S4]
+        D = [1.0, at.D1, at.D2, at.D3, at.D4]
+        F, G = [0.0, at.F1, at.F2, at.F3, at.F4], [at.G0, at.G1, at.G2, at.G3, at.G4]
+        for _ in range(steps):
+            n = [added(y), 0.0, 0.0, 0.0, 0.0]
+            for k in range(1, 5):
+                base = D[k] * y + S[k] * (v + 2 * b * y)
+                ahead = place_stage.py_func(k, base, *F, *n)
+                n[k] = added(ahead)
+            v = place_stage.py_func(4, D[4] * v - S[4] * K * y, *G, *n)
+            y = ahead
+        errors.append(np.abs(np.array([y, v]) - exact).max())
+    assert errors[0] < 1e-4
+    assert 2**4.6 < errors[0] / errors[1] < 2**6
 
 
 @pytest.mark.parametrize(("b", "K"), [(0.15, 1600.0), (3.0, 12000.0), (200.0, 1600.0), (0.0, 4.0)])

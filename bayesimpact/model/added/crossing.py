@@ -6,7 +6,7 @@ from typing import Any
 
 from bayesimpact.model.added.method import quarters
 from bayesimpact.model.added.situation import GAP, HEADING, NONE, TURN, event_value, passed
-from bayesimpact.model.added.step import push, step
+from bayesimpact.model.added.step import step
 from bayesimpact.model.added.world import AHEAD, NOW
 from bayesimpact.model.compiled import compiled, typed
 
@@ -27,16 +27,18 @@ def value_and_slope(
     y: Any,
     v: Any,
     t: Any,
+    n: Any,
     column: Any,
     short: Any,
     flow: Any,
     w: Any,
 ) -> Any:
-    """An event's function, its slope along the trajectory by a difference over `short`, and y''."""
+    """An event's function, its slope along the trajectory by a difference over `short`, and y''.
+
+    n is `push` there.
+    """
     value = event_value(event, y, v, t, column, w)
-    a = -2.0 * flow.b * v - flow.K * (y - flow.rest)
-    if not flow.plain:
-        a += flow.inverse * push(y, v, t, column, flow, w)
+    a = flow.inverse * n - 2.0 * flow.b * v - flow.K * (y - flow.rest)
     if event == TURN:
         return value, a * w.s[HEADING], a
     later = event_value(event, y + v * short, v + a * short, t + short, column, w)
@@ -66,22 +68,23 @@ def locate(
     h: Any,
     y1: Any,
     v1: Any,
+    n1: Any,
     flow: Any,
     w: Any,
 ) -> Any:
-    """Length of the step from (y, v) to the event inside (0, h], and the state there.
+    """Length of the step from (y, v) to the event inside (0, h], and state and push there.
 
-    (y1, v1) is the state after h, where the event's function is negative.
+    (y1, v1) is the state after h, where the event's function is negative, and n1 the push.
     """
     now, column, short = typed(NOW), AHEAD if flow.memory else NOW, 1e-6 * h
-    f0, d0, _ = value_and_slope(event, y, v, t, now, short, flow, w)
-    f1, d1, _ = value_and_slope(event, y1, v1, t + h, column, short, flow, w)
+    f0, d0, _ = value_and_slope(event, y, v, t, n0, now, short, flow, w)
+    f1, d1, _ = value_and_slope(event, y1, v1, t + h, n1, column, short, flow, w)
     low, high, x = 0.0, h, h * guess(max(f0, 0.0), h * d0, f1, h * d1)
     for _ in range(TRIALS):
         if not low < x < high:
             x = 0.5 * (low + high)
-        y1, v1 = trial(y, v, t, n0, x, flow, w)
-        value, slope, a = value_and_slope(event, y1, v1, t + x, column, short, flow, w)
+        y1, v1, n1 = trial(y, v, t, n0, x, flow, w)
+        value, slope, a = value_and_slope(event, y1, v1, t + x, n1, column, short, flow, w)
         if value > 0.0:
             low = x
         else:
@@ -91,8 +94,8 @@ def locate(
             break
         x += change
         if abs(change) <= NEAR * h and low < x < high and not flow.memory:
-            return x, y1 + change * (v1 + 0.5 * change * a), v1 + change * a
-    return x, y1, v1
+            return x, y1 + change * (v1 + 0.5 * change * a), v1 + change * a, n1
+    return x, y1, v1, n1
 
 
 @compiled(forceinline=True)
@@ -125,19 +128,23 @@ def first_event(
     h: Any,
     y1: Any,
     v1: Any,
+    n1: Any,
     flow: Any,
     w: Any,
 ) -> Any:
-    """Earliest event of a step that ends at (y1, v1): (event, time to it, state there); or NONE."""
+    """Earliest event of a step that ends at (y1, v1) with the push n1, or NONE.
+
+    Returns the event, the time to it, and displacement, velocity and push there.
+    """
     column = AHEAD if flow.memory else NOW
     event, length = NONE, h
     if turn_matters(y, v, y1, v1, h, flow, w):
         event = typed(TURN)
-        length, y1, v1 = locate(event, y, v, t, n0, h, y1, v1, flow, w)
+        length, y1, v1, n1 = locate(event, y, v, t, n0, h, y1, v1, n1, flow, w)
     for _ in range(ROUNDS):
         found = passed(y1, v1, t + length, column, event, flow, w)
         if found == NONE:
             break
         event = found
-        length, y1, v1 = locate(event, y, v, t, n0, length, y1, v1, flow, w)
-    return event, length, y1, v1
+        length, y1, v1, n1 = locate(event, y, v, t, n0, length, y1, v1, n1, flow, w)
+    return event, length, y1, v1, n1

@@ -27,6 +27,7 @@ from bayesimpact.model.added.world import (
     LAW_SURFACE,
     NOW,
     OMEGA,
+    PLACED,
     POLYNOMIAL,
     ROUGH_AT_TOUCH,
     V0,
@@ -40,6 +41,7 @@ from bayesimpact.model.compiled import compiled
 MAX_ANGLE = 0.125  # longest step times natural frequency, rad
 MAX_ANGLE_PLAIN = 0.6  # the same where nothing is added: exact, but one turning point at most
 MAX_ANGLE_PACE = 0.35  # the same for an explicit dependence on time
+LONGER = 1.28  # where no force depends on the velocity: the method for these is the more accurate
 RENEWED = 64  # longest steps after which a flow is chosen anew: the swing may have grown
 MOST_CUTS = 4096  # steps per sample at most
 FOLDED = 0.1  # a law's stiffness above this share of the linear one is counted into the flow
@@ -48,7 +50,7 @@ REACH = np.sqrt(0.75)  # where a cubic spring's secant has its mean stiffness, o
 RAMP = 0.3  # first step of a contact over the time constant of a law's state
 # where a force is not smooth at the touch: shortest step over the longest; then, for times in units
 # of the longest step, step over the 3/4th power of the time since the touch, or to the release
-FIRST, SINCE, UNTIL = 1.0 / 320.0, 0.36, 0.26
+FIRST, SINCE, UNTIL = 1.0 / 80.0, 0.39, 0.26
 # a force without features admits longer steps the weaker it is: share of the linear force at which
 # they are the usual ones, and by how much they are shortened and lengthened at most
 SLIGHT, LEAST_GAIN, MOST_GAIN = 0.05, 0.4, 2.5
@@ -61,7 +63,7 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
     """Linear flow of the present kind of motion, and the longest step that resolves the rest."""
     q, s, laws = w.q, w.s, w.laws
     touching = s[MODE] == TOUCHING
-    count, memory, turns, rough, tame = 0, False, q[FRICTION] > 0.0, False, True
+    count, memory, turns, rough, tame, placed = 0, False, q[FRICTION] > 0.0, False, True, True
     for law in range(w.size):
         flags = laws[LAW_COLUMNS * law + LAW_FLAGS]
         if touching or flags & CONTACT_ONLY == 0:
@@ -71,6 +73,7 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
             turns = turns or flags & KINK_AT_TURN != 0 or laws[LAW_COLUMNS * law + LAW_SURFACE] != 0
             rough = rough or (touching and flags & ROUGH_AT_TOUCH != 0)
             tame = tame and flags & POLYNOMIAL != 0
+            placed = placed and flags & PLACED != 0
     mass, damping, stiffness, force = w.mass, q[C1], q[K1], -q[FRICTION] * s[SLIDING]
     if touching:
         mass += q[CONTACT_MASS]
@@ -93,9 +96,12 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
     longest = MAX_ANGLE_PLAIN / np.sqrt(K) if plain else MAX_ANGLE / np.sqrt(K + b * b)
     if pace > 0.0:
         longest = min(longest, MAX_ANGLE_PACE / pace)
+    placed = placed and not memory
+    if placed and not plain:
+        longest *= LONGER
     flow = Flow(
         1.0 / mass, b, K, (force - level) / stiffness, slope, level, s[GAP],
-        1.0 if touching else 0.0, count, memory, plain, forced, turns, rough,
+        1.0 if touching else 0.0, count, memory, plain, placed, forced, turns, rough,
     )  # fmt: skip
     if tame and not plain:
         longest *= gain(y, v, t, pace, longest, flow, w)
@@ -232,7 +238,7 @@ def next_step(y: Any, v: Any, t: Any, j: Any, aligned: Any, longest: Any, flow: 
         if v != 0.0:
             away = (y - flow.gap) / v  # time since the touch, or minus the time to the release
             root = np.sqrt(abs(away) / longest)
-            share = SINCE if away >= 0.0 else UNTIL
+            share = (SINCE if away >= 0.0 else UNTIL) * (LONGER if flow.placed else 1.0)
             longest *= min(1.0, max(FIRST, share * root * np.sqrt(root)))
         return max(longest, least), False
     longest = max(longest, least)

@@ -1,8 +1,11 @@
-"""Butcher's fifth-order Runge-Kutta method, carried along by an exact linear flow.
+"""Two fifth-order methods with Boole's weights, carried along by an exact linear flow.
 
-Nodes 0, 1/4, 1/4, 1/2, 3/4, 1 and Boole's weights (Butcher 1964, J. Austral. Math. Soc. 4:179). A
-force at one node acts on the later ones through the flow's impulse response (Lawson 1967, SIAM J.
+A force at one node acts on the later ones through the flow's impulse response (Lawson 1967, SIAM J.
 Numer. Anal. 4:372); all nodes are quarters of the step, so four responses serve for everything.
+`stage` is Butcher's Runge-Kutta method with nodes 0, 1/4, 1/4, 1/2, 3/4, 1 (Butcher 1964, J.
+Austral. Math. Soc. 4:179). Where no force depends on the velocity, one at each quarter is enough:
+`place_stage` is a Nystroem method, its coefficients the solution of the conditions of order five
+(Hairer, Norsett and Wanner 1993, Solving Ordinary Differential Equations I, section II.14).
 """
 
 from __future__ import annotations
@@ -78,3 +81,22 @@ def stage(
         return early - 12.0 / 7.0 * c2 * n3 + 8.0 / 7.0 * c1 * n4
     early = base + 7.0 / 90.0 * c4 * n0 + 32.0 / 90.0 * c3 * n2 + 12.0 / 90.0 * c2 * n3
     return early + 32.0 / 90.0 * c1 * n4 + 7.0 / 90.0 * c0 * n5
+
+
+@compiled(forceinline=True, fastmath={"contract"})
+def place_stage(
+    number: Any, base: Any, c0: Any, c1: Any, c2: Any, c3: Any, c4: Any,
+    n0: Any, n1: Any, n2: Any, n3: Any, n4: Any,
+) -> Any:  # fmt: skip
+    """`stage` for forces of place and time alone: stages 1 to 4 lie at 1 to 4 quarters.
+
+    Stage 4 is the end of the step; its displacement does not depend on n4, for c0 is zero there.
+    """
+    if number == 1:
+        return base + 1.0 / 8.0 * c1 * n0
+    if number == 2:
+        return base - 1.0 / 36.0 * c2 * n0 + 5.0 / 9.0 * c1 * n1
+    if number == 3:
+        return base + 5.0 / 48.0 * c3 * n0 + 13.0 / 48.0 * c2 * n1 + 13.0 / 48.0 * c1 * n2
+    early = base + 7.0 / 90.0 * c4 * n0 + 32.0 / 90.0 * c3 * n1 + 12.0 / 90.0 * c2 * n2
+    return early + 32.0 / 90.0 * c1 * n3 + 7.0 / 90.0 * c0 * n4

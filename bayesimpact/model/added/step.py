@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from bayesimpact.model.added.memory import begin_memory, kick, remember
-from bayesimpact.model.added.method import stage
+from bayesimpact.model.added.method import place_stage, stage
 from bayesimpact.model.added.world import (
     AHEAD,
     LAW_FORCE,
@@ -40,7 +40,7 @@ def push(y: Any, v: Any, t: Any, column: Any, flow: Any, w: Any) -> Any:
 
 @compiled(forceinline=True)
 def step(y: Any, v: Any, t: Any, n0: Any, at: Any, flow: Any, w: Any) -> Any:
-    """Displacement and velocity a time `at.h` on; the laws' states then stand in column AHEAD.
+    """Displacement, velocity and `push` a time `at.h` on; the laws' states then stand in AHEAD.
 
     n0 is `push` at the start; `at` are the `Quarters` of the step.
     """
@@ -48,12 +48,23 @@ def step(y: Any, v: Any, t: Any, n0: Any, at: Any, flow: Any, w: Any) -> Any:
     m, Ku = v + 2.0 * flow.b * u, flow.K * u
     y_end, v_end = rest + at.D4 * u + at.S4 * m, at.D4 * v - at.S4 * Ku
     if flow.plain:
-        return y_end, v_end
-    column, F1, F2, F3, F4 = STAGE if flow.memory else NOW, at.F1, at.F2, at.F3, at.F4
+        return y_end, v_end, 0.0
+    F1, F2, F3, F4 = at.F1, at.F2, at.F3, at.F4
     G0, G1, G2, G3, G4 = at.G0, at.G1, at.G2, at.G3, at.G4
-    ya, va = rest + at.D1 * u + at.S1 * m, at.D1 * v - at.S1 * Ku
-    yb, vb = rest + at.D2 * u + at.S2 * m, at.D2 * v - at.S2 * Ku
-    yc, vc = rest + at.D3 * u + at.S3 * m, at.D3 * v - at.S3 * Ku
+    ya, yb = rest + at.D1 * u + at.S1 * m, rest + at.D2 * u + at.S2 * m
+    yc = rest + at.D3 * u + at.S3 * m
+    if flow.placed:
+        y1 = place_stage(1, ya, 0.0, F1, F2, F3, F4, n0, 0.0, 0.0, 0.0, 0.0)
+        n1 = push(y1, v, t + 0.25 * h, NOW, flow, w)
+        y2 = place_stage(2, yb, 0.0, F1, F2, F3, F4, n0, n1, 0.0, 0.0, 0.0)
+        n2 = push(y2, v, t + 0.5 * h, NOW, flow, w)
+        y3 = place_stage(3, yc, 0.0, F1, F2, F3, F4, n0, n1, n2, 0.0, 0.0)
+        n3 = push(y3, v, t + 0.75 * h, NOW, flow, w)
+        y4 = place_stage(4, y_end, 0.0, F1, F2, F3, F4, n0, n1, n2, n3, 0.0)
+        n4 = push(y4, v, t + h, NOW, flow, w)
+        return y4, place_stage(4, v_end, G0, G1, G2, G3, G4, n0, n1, n2, n3, n4), n4
+    column = STAGE if flow.memory else NOW
+    va, vb, vc = at.D1 * v - at.S1 * Ku, at.D2 * v - at.S2 * Ku, at.D3 * v - at.S3 * Ku
     if flow.memory:
         begin_memory(y, v, t, n0, h, flow, w)
 
@@ -76,7 +87,7 @@ def step(y: Any, v: Any, t: Any, n0: Any, at: Any, flow: Any, w: Any) -> Any:
     v6 = stage(6, v_end, G0, G1, G2, G3, G4, n0, n1, n2, n3, n4, n5)
     if flow.memory:
         remember(6, AHEAD, y, v, y6, v6, h, flow, w)
-    return y6, v6
+    return y6, v6, push(y6, v6, t + h, AHEAD if flow.memory else NOW, flow, w)
 
 
 @compiled(forceinline=True)

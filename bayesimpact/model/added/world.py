@@ -14,7 +14,7 @@ C1, K1, C2, G, K2, Y0, V0, FORCE, OMEGA, PHASE, OFFSET = range(11)
 FRICTION, CONTACT_MASS, NO_TENSION, GAP_STEP = range(11, 15)
 # columns of the table of laws, and its flags: bayesimpact.model.effects.effect.law_row
 LAW_FORCE, LAW_RATE, LAW_SURFACE, LAW_FLAGS, LAW_FIRST, LAW_PACE, LAW_COLUMNS = range(7)
-CONTACT_ONLY, KINK_AT_TURN, ROUGH_AT_TOUCH, POLYNOMIAL = 1, 2, 4, 8
+CONTACT_ONLY, KINK_AT_TURN, ROUGH_AT_TOUCH, POLYNOMIAL, PLACED = 1, 2, 4, 8, 16
 # columns of the work array, one row per law: the law's state at the start of a step, at a stage and
 # at the end; the kicks of six stages; exp(-lambda h / 4), lambda, alpha, x_u, x_v
 NOW, STAGE, AHEAD, KICK = 0, 1, 2, 3
@@ -53,6 +53,7 @@ class Flow(NamedTuple):
     count: Any  # number of acting laws
     memory: Any  # True when a law has a state
     plain: Any  # True when nothing is added
+    placed: Any  # True when no added force depends on the velocity
     forced: Any  # True when the slots' harmonic force acts
     turns: Any  # True when a force has a kink or jump at v = 0
     rough: Any  # True when a force is not smooth at the touch

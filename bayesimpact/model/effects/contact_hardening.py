@@ -42,6 +42,6 @@ EFFECT = Effect(
             scale=lambda s: 0.05 * s.contact_stiffness / s.indentation**2,
         ),
     ),
-    law=Law(force, where="contact", polynomial=True),
+    law=Law(force, where="contact", polynomial=True, ignores_speed=True),
     needs_stop=True,
 )

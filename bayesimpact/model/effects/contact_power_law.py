@@ -37,6 +37,6 @@ EFFECT = Effect(
         "the linear law by up to {size} ({share} of the peak contact force)."
     ),
     parameters=(EffectParameter("exponent", "-", scale=lambda s: 0.2, lower=0.5, null=1.0),),
-    law=Law(force, where="contact", rough_at_touch=True),
+    law=Law(force, where="contact", rough_at_touch=True, ignores_speed=True),
     needs_stop=True,
 )

@@ -53,6 +53,6 @@ EFFECT = Effect(
             grid=lambda s: np.linspace(0.1, 0.9, 9) * s.indentation,
         ),
     ),
-    law=Law(force, where="contact", surface=surface, polynomial=True),
+    law=Law(force, where="contact", surface=surface, polynomial=True, ignores_speed=True),
     needs_stop=True,
 )

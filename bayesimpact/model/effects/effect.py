@@ -143,6 +143,7 @@ class Law:
     polynomial : between its kinks the force is a polynomial of low degree of y and v, and of sines
         of time no faster than `pace`: it has no features that a look at four points of a swing
         misses, so steps may be longer where it is weak
+    ignores_speed : the force does not depend on v: four evaluations a step are then enough, not six
 
     The state of a law that acts in contact only is not integrated in flight: its rate may there
     depend on the state alone, linearly (it decays, or it stays).
@@ -156,6 +157,7 @@ class Law:
     kink_at_turn: bool = False
     rough_at_touch: bool = False
     polynomial: bool = False
+    ignores_speed: bool = False
 
 
 Numbers = Sequence[float]
@@ -224,7 +226,7 @@ def law_row(law: Law, first: int) -> list[int]:
     """A law's row in the general simulator's table; its parameters begin at slot `first`."""
     functions = (law.force, law.rate, law.surface)
     flags = (law.where == "contact") + 2 * law.kink_at_turn + 4 * law.rough_at_touch
-    flags += 8 * law.polynomial
+    flags += 8 * law.polynomial + 16 * law.ignores_speed
     pace = address(law.pace) if law.pace else 0
     return [*(address(f) if f else 0 for f in functions), flags, first, pace]
 

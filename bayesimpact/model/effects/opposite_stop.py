@@ -54,6 +54,6 @@ EFFECT = Effect(
             grid=lambda s: np.array([0.2, 0.35, 0.5, 0.6, 0.7, 0.8, 0.87, 0.94]) * s.amplitude,
         ),
     ),
-    law=Law(force, surface=surface, polynomial=True),
+    law=Law(force, surface=surface, polynomial=True, ignores_speed=True),
     condition=lambda s: s.cases > 0,  # a rig that is said to have no stop has no second one
 )

@@ -37,5 +37,5 @@ EFFECT = Effect(
     parameters=(
         EffectParameter("stiffness", "N/m2", scale=lambda s: 0.05 * s.stiffness / s.amplitude),
     ),
-    law=Law(force, polynomial=True),
+    law=Law(force, polynomial=True, ignores_speed=True),
 )

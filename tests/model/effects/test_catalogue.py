@@ -188,3 +188,19 @@ def test_units_of_angles():
     found = {angular(p.unit) for e in EFFECTS for p in e.parameters}
     assert not any(re.search(r"\bm\d?\b", unit.replace("N m", "").replace("kg m2", ""))
                    for unit in found)  # fmt: skip
+
+
+def test_laws_that_are_said_to_ignore_the_speed_do():
+    """And no law without memory that does is forgotten: it would take six evaluations a step."""
+    rng, q = np.random.default_rng(0), np.full(len(SLOTS), 2.0)
+    for effect in EFFECTS:
+        if effect.law is None:
+            continue
+        p = np.full(8, 1.3)
+        changes = 0.0
+        for y, v, w in rng.normal(size=(20, 3)):
+            d = abs(y)
+            one, other = (effect.law.force(y, x, d, 0.7, 0.1, 1.0, p, q) for x in (v, w))
+            changes = max(changes, abs(one - other))
+        remembers = effect.law.rate is not None
+        assert effect.law.ignores_speed == (changes == 0.0 and not remembers), effect.id

@@ -142,7 +142,7 @@ def test_a_law_typed_into_a_session():
     """No source file, no cache, the same numbers."""
     space: dict = {}
     exec("def force(y, v, d, t, z, touching, p, q):\n    return p[0] * y * y * y\n", space)
-    own, values = effect(Law(space["force"], polynomial=True), 2e6)
+    own, values = effect(Law(space["force"], polynomial=True, ignores_speed=True), 2e6)
     known = moved([BY_ID["spring_cubic"]], {"spring_cubic.stiffness": 2e6}, RIG)
     np.testing.assert_array_equal(moved([own], values, RIG), known)
 
@@ -167,3 +167,4 @@ def test_rows_say_what_the_law_says(where):
     assert row[3] == 2 + (where == "contact")
     assert row[4] == 17
     assert law_row(Law(layer_edge_force, rough_at_touch=True, polynomial=True), 0)[3] == 4 + 8
+    assert law_row(Law(layer_edge_force, ignores_speed=True), 0)[3] == 16
