@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.model.added.crossing import first_event, suspicious
 from bayesimpact.model.added.dense import LONGEST_STRIDE, fill_in
-from bayesimpact.model.added.flows import RENEWED, first_step, flow_from, next_step
+from bayesimpact.model.added.flows import RENEWED, first_step, flow_from, next_step, stride_of
 from bayesimpact.model.added.memory import keep_memory, relax
 from bayesimpact.model.added.method import quarters
 from bayesimpact.model.added.rest import hold
@@ -67,14 +67,20 @@ def admissible(q: Any, mass: Any) -> Any:
 
 @compiled()
 def cruise(y: Any, v: Any, n0: Any, j: Any, stride: Any, end: Any, flow: Any, w: Any) -> Any:
-    """Strides from sample j - 1 to before `end` without an event: (y, v, push, next sample)."""
-    h = stride * w.interval
+    """Strides from sample j - 1 to before `end` without an event.
+
+    Returns displacement, velocity, push and next sample; whether an event ended it, and then
+    displacement, velocity and push at the end of the stride that contains it.
+    """
+    h, event = stride * w.interval, False
     at = quarters(h, flow.b, flow.K, flow.inverse)
+    y1, v1, n1 = y, v, n0
     while j + stride <= end:
         t = (j - 1) * w.interval
         w.s[HEADING] = heading(v, w)
         y1, v1, n1 = step(y, v, t, n0, at, flow, w)
-        if suspicious(y, v, y1, v1, t + h, h, flow, w):
+        event = suspicious(y, v, y1, v1, t + h, h, flow, w)
+        if event:
             break
         fill_in(j, j + stride - 1, t, True, at, flow, w, y, v, n0, h, y1, v1, n1)
         j += stride
@@ -83,7 +89,7 @@ def cruise(y: Any, v: Any, n0: Any, j: Any, stride: Any, end: Any, flow: Any, w:
         if flow.memory:
             keep_memory(w)
         settle(y, v, t + h, w)
-    return y, v, n0, j
+    return y, v, n0, j, event, y1, v1, n1
 
 
 @compiled()
@@ -93,28 +99,31 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
     start, event = t, typed(NONE)
     ramp = first_step(y, v, t, longest, flow, w)
     n0 = 0.0 if flow.plain else push(y, v, t, NOW, flow, w)
-    stride = min(int(longest / w.interval), LONGEST_STRIDE)
+    y1, v1, n1 = y, v, n0
+    stride = stride_of(longest, w)
     at = quarters(longest, flow.b, flow.K, flow.inverse)
     end = min(w.n, j + max(1, int(min(RENEWED * longest / w.interval, 1.0 * w.n))))
     while j < end:
-        aligned = t == (j - 1) * w.interval
+        aligned, expected = t == (j - 1) * w.interval, False
         if aligned and stride > 0 and ramp >= longest and not flow.rough:
-            y, v, n0, j = cruise(y, v, n0, j, stride, end, flow, w)
+            y, v, n0, j, expected, y1, v1, n1 = cruise(y, v, n0, j, stride, end, flow, w)
             t = (j - 1) * w.interval
             if j == end:
                 break
-        h, lands = next_step(y, v, t, j, aligned, min(longest, ramp), flow, w)
-        if not h > 0.0:  # an event on the sample itself
-            w.out[j] = y
-            t = j * w.interval
-            j += 1
-            continue
-        w.s[HEADING] = heading(v, w)
-        if h != at.h:
-            at = quarters(h, flow.b, flow.K, flow.inverse)
-        y1, v1, n1 = step(y, v, t, n0, at, flow, w)
+        h, lands = stride * w.interval, True
+        if not expected:
+            h, lands = next_step(y, v, t, j, aligned, min(longest, ramp), flow, w)
+            if not h > 0.0:  # an event on the sample itself
+                w.out[j] = y
+                t = j * w.interval
+                j += 1
+                continue
+            w.s[HEADING] = heading(v, w)
+            if h != at.h:
+                at = quarters(h, flow.b, flow.K, flow.inverse)
+            y1, v1, n1 = step(y, v, t, n0, at, flow, w)
         length = h
-        if suspicious(y, v, y1, v1, t + h, h, flow, w):
+        if expected or suspicious(y, v, y1, v1, t + h, h, flow, w):
             event, length, y1, v1, n1 = first_event(y, v, t, n0, h, y1, v1, n1, flow, w)
         lands = lands and event == NONE
         reached = min(int((t + length) / w.interval + 0.5 * lands) + 1, w.n)

@@ -12,7 +12,10 @@ from bayesimpact.model.compiled import compiled, typed
 
 TRIALS = 80
 ROUNDS = 8
-NEAR = 1e-7  # change over the step from which on the state follows by its own derivatives
+# last change over the step from which on the state follows by its own derivatives: short of the
+# event, if the slope changes by no more than STRAIGHT of itself, and behind it, where a force may
+# have had a kink; the first trial aims short
+NEAR, STRAIGHT, BEHIND, AIM = 1e-5, 1e-4, 1e-7, 5e-6
 
 
 @compiled()
@@ -79,7 +82,7 @@ def locate(
     now, column, short = typed(NOW), AHEAD if flow.memory else NOW, 1e-6 * h
     f0, d0, _ = value_and_slope(event, y, v, t, n0, now, short, flow, w)
     f1, d1, _ = value_and_slope(event, y1, v1, t + h, n1, column, short, flow, w)
-    low, high, x = 0.0, h, h * guess(max(f0, 0.0), h * d0, f1, h * d1)
+    low, high, x = 0.0, h, h * (guess(max(f0, 0.0), h * d0, f1, h * d1) - AIM)
     for _ in range(TRIALS):
         if not low < x < high:
             x = 0.5 * (low + high)
@@ -92,9 +95,14 @@ def locate(
         change = -value / slope if slope < 0.0 else h
         if abs(change) <= 1e-13 * h or high - low <= 1e-15 * h:
             break
+        bend = change * (slope - d0) / (x * slope)  # nearly
+        near = -BEHIND * h <= change <= NEAR * h and abs(bend) < STRAIGHT
+        if near and low < x + change < high and not flow.memory:
+            change *= 1.0 - 0.5 * bend
+            jerk = -2.0 * flow.b * a - flow.K * v1
+            y1 += change * (v1 + change * (0.5 * a + change * jerk / 6.0))
+            return x + change, y1, v1 + change * (a + 0.5 * change * jerk), n1
         x += change
-        if abs(change) <= NEAR * h and low < x < high and not flow.memory:
-            return x, y1 + change * (v1 + 0.5 * change * a), v1 + change * a, n1
     return x, y1, v1, n1
 
 

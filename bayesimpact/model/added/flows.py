@@ -40,8 +40,9 @@ from bayesimpact.model.compiled import compiled
 
 MAX_ANGLE = 0.125  # longest step times natural frequency, rad
 MAX_ANGLE_PLAIN = 0.6  # the same where nothing is added: exact, but one turning point at most
-MAX_ANGLE_PACE = 0.35  # the same for an explicit dependence on time
+MAX_ANGLE_PACE = 0.32  # the same for an explicit dependence on time
 LONGER = 1.28  # where no force depends on the velocity: the method for these is the more accurate
+ROUND_UP = 0.3  # of a sample: steps end on samples, and may be that much longer for it
 RENEWED = 64  # longest steps after which a flow is chosen anew: the swing may have grown
 MOST_CUTS = 4096  # steps per sample at most
 FOLDED = 0.1  # a law's stiffness above this share of the linear one is counted into the flow
@@ -50,11 +51,11 @@ REACH = np.sqrt(0.75)  # where a cubic spring's secant has its mean stiffness, o
 RAMP = 0.3  # first step of a contact over the time constant of a law's state
 # where a force is not smooth at the touch: shortest step over the longest; then, for times in units
 # of the longest step, step over the 3/4th power of the time since the touch, or to the release
-FIRST, SINCE, UNTIL = 1.0 / 80.0, 0.39, 0.26
+FIRST, SINCE, UNTIL = 1.0 / 80.0, 0.46, 0.27
 # a force without features admits longer steps the weaker it is: share of the linear force at which
 # they are the usual ones, and by how much they are shortened and lengthened at most
-SLIGHT, LEAST_GAIN, MOST_GAIN = 0.05, 0.4, 2.5
-OUTSIDE = 0.02  # of a force that does not depend on the motion: nothing feeds its errors back
+SLIGHT, LEAST_GAIN, MOST_GAIN = 0.07, 0.4, 3.2
+OUTSIDE = 0.04  # of a force that does not depend on the motion: nothing feeds its errors back
 OFF_TURN, OFF_PASSAGE = np.cos(np.pi / 8), np.sin(np.pi / 8)  # of the swing's four points
 
 
@@ -121,6 +122,7 @@ def gain(y: Any, v: Any, t: Any, pace: Any, longest: Any, flow: Any, w: Any) -> 
     y0, v0, wait = speed / w0 * OFF_TURN, speed * OFF_PASSAGE, RENEWED * longest / 3.0
     if pace > 0.0:
         wait = 0.5 * np.pi / pace
+    outside = left_out(flow.rest, 0.0, t, flow, w)
     for point in range(4):
         ys, vs, ts = y0, v0, t + point * wait
         if point % 2 == 1:
@@ -129,7 +131,8 @@ def gain(y: Any, v: Any, t: Any, pace: Any, longest: Any, flow: Any, w: Any) -> 
             ys, vs = -ys, -vs
         if flow.touching == 1.0:
             ys = max(ys, flow.gap - flow.rest)
-        outside = left_out(flow.rest, 0.0, ts, flow, w)
+        if pace > 0.0 and point > 0:
+            outside = left_out(flow.rest, 0.0, ts, flow, w)
         inside = left_out(flow.rest + ys, vs, ts, flow, w) - outside
         largest = max(largest, abs(inside) + OUTSIDE * abs(outside))
     largest += OUTSIDE * abs(q[FORCE])
@@ -227,6 +230,13 @@ def first_step(y: Any, v: Any, t: Any, longest: Any, flow: Any, w: Any) -> Any:
 
 
 @compiled(forceinline=True)
+def stride_of(longest: Any, w: Any) -> Any:
+    """Samples that a step from a sample on may span, 0 where it has to be cut."""
+    samples = longest / w.interval
+    return min(int(samples + ROUND_UP), LONGEST_STRIDE) if samples >= 1.0 else 0
+
+
+@compiled(forceinline=True)
 def next_step(y: Any, v: Any, t: Any, j: Any, aligned: Any, longest: Any, flow: Any, w: Any) -> Any:
     """Length of the next step, and whether it ends on a sample.
 
@@ -242,8 +252,9 @@ def next_step(y: Any, v: Any, t: Any, j: Any, aligned: Any, longest: Any, flow: 
             longest *= min(1.0, max(FIRST, share * root * np.sqrt(root)))
         return max(longest, least), False
     longest = max(longest, least)
-    if aligned and longest >= w.interval:
-        return min(int(longest / w.interval), LONGEST_STRIDE, w.n - j) * w.interval, True
+    stride = stride_of(longest, w)
+    if aligned and stride > 0:
+        return min(stride, w.n - j) * w.interval, True
     left = j * w.interval - t
     cuts = int(np.ceil(left / longest * (1.0 - 1e-12)))
     return (left / cuts, False) if cuts > 1 else (left, True)
