@@ -7,6 +7,7 @@ about one knot spacing.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -46,6 +47,11 @@ def force(y, v, d, t, z, touching, p, q):  # type: ignore[no-untyped-def]
     return (a + b * v) * (1.0 / 6.0)
 
 
+def grain(y, v, d, t, z, touching, p, q):  # type: ignore[no-untyped-def]
+    """Distance of the knots, m; those over time lie too far apart to matter to a step."""
+    return p[2] if p[3] <= 0.0 else math.inf
+
+
 def spline_basis(y: Array, low: float, spacing: float, count: int) -> Array:
     """Values (n, count) of the B-splines at displacements (n,)."""
     x = np.clip((y - low) / spacing, 0.0, count - 3.0)
@@ -79,7 +85,12 @@ def learned_contact(
 ) -> Effect:
     """a(d) + b(d) v for indentations up to `depth` m, in contact alone."""
     found = _learned(0.0, depth, -1.0, conservative, dissipative, knots)
-    return replace(found, regime="contact", law=Law(force, where="contact"), needs_stop=True)
+    return replace(
+        found,
+        regime="contact",
+        law=Law(force, where="contact", grain=grain, polynomial=True),
+        needs_stop=True,
+    )
 
 
 def _learned(
@@ -109,5 +120,5 @@ def _learned(
             "A force outside the catalogue acts, up to {size} ({share} of the peak elastic force)."
         ),
         parameters=head + a + b,
-        law=Law(force),
+        law=Law(force, grain=grain, polynomial=True),
     )

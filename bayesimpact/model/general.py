@@ -211,7 +211,7 @@ def integrate_many(
     q : (K, Q) slots, then the parameters of the laws, SI units
     mass : kg
     intervals, counts : (K,) sampling intervals, s, and numbers of samples
-    laws : (L, 5 or 6) table of laws, see `bayesimpact.model.effects.effect.law_row`
+    laws : (L, 5 to 7) table of laws, see `bayesimpact.model.effects.effect.law_row`
     out : (K, n) receives displacements, m, without the sensor's offset
     threads : share the work among threads; the numbers do not depend on it. None: where it pays
 

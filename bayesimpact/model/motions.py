@@ -36,7 +36,7 @@ def motions(q: Array, mass: float, counts: Counts, intervals: Array) -> Array:
 def general_motions(
     q: Array, mass: float, counts: Counts, intervals: Array, laws: NDArray[np.int64]
 ) -> Array:
-    """The same for oscillators with added effects: slots (K, Q), table of laws (L, 6)."""
+    """The same for oscillators with added effects: slots (K, Q), table of laws (L, 7)."""
     out = np.empty((q.shape[0], int(counts.max())))
     codes = integrate_many(q, mass, intervals, counts, laws, out)
     out[np.arange(out.shape[1]) >= counts[:, None]] = np.nan

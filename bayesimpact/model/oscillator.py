@@ -61,13 +61,13 @@ class Oscillator:
 
     @cached_property
     def laws(self) -> NDArray[np.int64]:
-        """Table of force laws for the general simulator, (L, 6)."""
+        """Table of force laws for the general simulator, (L, 7)."""
         rows, first = [], len(SLOTS)
         for effect in self.effects:
             if effect.law is not None:
                 rows.append(law_row(effect.law, first))
                 first += len(effect.parameters)
-        return np.array(rows, dtype=np.int64).reshape(-1, 6)
+        return np.array(rows, dtype=np.int64).reshape(-1, 7)
 
     @cached_property
     def is_base(self) -> bool:

@@ -7,6 +7,7 @@ import ctypes
 import numpy as np
 import pytest
 from effect_rigs import TestRig
+from scipy.integrate import solve_ivp
 from scipy.interpolate import BSpline
 
 from bayesimpact.diagnosis.learned import (
@@ -80,6 +81,28 @@ def test_a_linear_force_is_a_change_of_stiffness_and_damping():
     for one, other in zip(found, base.predict(theta), strict=True):
         assert np.abs(one).max() <= -LOW  # inside the splines' range
         np.testing.assert_allclose(one, other, atol=1e-10)
+
+
+def test_steps_resolve_the_knots():
+    """A rough force, a hundredth of the elastic one, against SciPy: steps by size alone miss it."""
+    rig, knots = TestRig(k2=(), y0=(-6e-3,), v0=(0.0,), duration=1.0), 24
+    a, b = np.random.default_rng(1).standard_normal((2, knots)) * [[0.05], [0.05]]
+    effect = learned_force(LOW, -LOW, 1.0, 1.0, knots)
+    values = {f"learned_force.a{i + 1}": x for i, x in enumerate(a)}
+    values |= {f"learned_force.b{i + 1}": x for i, x in enumerate(b)}
+    p = np.concatenate([[knots, LOW, -2 * LOW / (knots - 3), 0.0], a, b])
+
+    def right(t: float, x: np.ndarray) -> list[float]:
+        added = force(x[0], x[1], 0.0, t, 0.0, 0.0, p, None)
+        return [x[1], -(rig.c1 * x[1] + rig.k1 * x[0] + added) / rig.mass]
+
+    oscillator = build_oscillator(rig.campaign(), [effect])
+    found = oscillator.predict(rig.theta(oscillator, values))[0]
+    times, start = np.arange(found.size) / rig.rate, [rig.y0[0], rig.v0[0]]
+    exact = solve_ivp(
+        right, (0, times[-1]), start, "DOP853", times, rtol=1e-9, atol=1e-13, max_step=1e-3
+    ).y[0]
+    assert np.abs(found - exact).max() < 1e-8
 
 
 def test_its_priors_and_names():

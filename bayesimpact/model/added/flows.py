@@ -22,6 +22,7 @@ from bayesimpact.model.added.world import (
     LAW_COLUMNS,
     LAW_FLAGS,
     LAW_FORCE,
+    LAW_GRAIN,
     LAW_PACE,
     LAW_RATE,
     LAW_SURFACE,
@@ -42,6 +43,7 @@ MAX_ANGLE = 0.125  # longest step times natural frequency, rad
 MAX_ANGLE_PLAIN = 0.6  # the same where nothing is added: exact, but one turning point at most
 MAX_ANGLE_PACE = 0.32  # the same for an explicit dependence on time
 LONGER = 1.28  # where no force depends on the velocity: the method for these is the more accurate
+GRAINS = 1.1  # that a step may pass at the swing's highest speed
 ROUND_UP = 0.3  # of a sample: steps end on samples, and may be that much longer for it
 RENEWED = 64  # longest steps after which a flow is chosen anew: the swing may have grown
 MOST_CUTS = 4096  # steps per sample at most
@@ -82,14 +84,16 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
         stiffness += q[K2]
         force += q[K2] * s[GAP]
     slope, level, pace = 0.0, 0.0, abs(q[OMEGA]) if q[FORCE] != 0.0 else 0.0
+    grain = np.inf
     if count > 0:
         slope, level = fold(y, v, t, mass, damping, stiffness, force, count, w)
         for k in range(count):
             law = w.acting[k]
+            contact, z = 1.0 if touching else 0.0, w.work[WORK_COLUMNS * law + NOW]
             if laws[LAW_COLUMNS * law + LAW_PACE] != 0:
-                contact = 1.0 if touching else 0.0
-                z = w.work[WORK_COLUMNS * law + NOW]
                 pace = max(pace, law_value(law, LAW_PACE, y, v, t, z, s[GAP], contact, w))
+            if laws[LAW_COLUMNS * law + LAW_GRAIN] != 0:
+                grain = min(grain, law_value(law, LAW_GRAIN, y, v, t, z, s[GAP], contact, w))
     stiffness += slope
     b, K = 0.5 * damping / mass, stiffness / mass
     forced = q[FORCE] != 0.0
@@ -106,6 +110,8 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
     )  # fmt: skip
     if tame and not plain:
         longest *= gain(y, v, t, pace, longest, flow, w)
+    if grain < np.inf:
+        longest = min(longest, GRAINS * grain / np.sqrt(K * (y - flow.rest) ** 2 + v * v))
     return flow, longest
 
 

@@ -143,6 +143,8 @@ class Law:
     polynomial : between its kinks the force is a polynomial of low degree of y and v, and of sines
         of time no faster than `pace`: it has no features that a look at four points of a swing
         misses, so steps may be longer where it is weak
+    grain : length, m, below which the force does look like a polynomial (a spline's knots lie that
+        far apart): steps pass one or two of them
     ignores_speed : the force does not depend on v: four evaluations a step are then enough, not six
 
     The state of a law that acts in contact only is not integrated in flight: its rate may there
@@ -154,6 +156,7 @@ class Law:
     rate: Callable[..., float] | None = None
     surface: Callable[..., float] | None = None
     pace: Callable[..., float] | None = None
+    grain: Callable[..., float] | None = None
     kink_at_turn: bool = False
     rough_at_touch: bool = False
     polynomial: bool = False
@@ -227,8 +230,9 @@ def law_row(law: Law, first: int) -> list[int]:
     functions = (law.force, law.rate, law.surface)
     flags = (law.where == "contact") + 2 * law.kink_at_turn + 4 * law.rough_at_touch
     flags += 8 * law.polynomial + 16 * law.ignores_speed
-    pace = address(law.pace) if law.pace else 0
-    return [*(address(f) if f else 0 for f in functions), flags, first, pace]
+    extents = (law.pace, law.grain)
+    force, rate, surface, pace, grain = (address(f) if f else 0 for f in (*functions, *extents))
+    return [force, rate, surface, flags, first, pace, grain]
 
 
 @cache
