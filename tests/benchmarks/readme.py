@@ -240,7 +240,7 @@ def trials_table() -> str:
 def single_table() -> str:
     """Blind trials of one effect of fixed size each."""
     rows, feet = [], []
-    for name in ("singles_5", "singles_paper", "singles_2"):
+    for name in ("singles_5", "singles_paper", "singles_paper_again", "singles_2"):
         t = stored(name)
         benches = t["settings"]["benches"]
         said = [answer["outcome"] for answer in t["answers"]]

@@ -49,20 +49,12 @@ def step(y: Any, v: Any, t: Any, n0: Any, at: Any, flow: Any, w: Any) -> Any:
     y_end, v_end = rest + at.D4 * u + at.S4 * m, at.D4 * v - at.S4 * Ku
     if flow.plain:
         return y_end, v_end, 0.0
-    F1, F2, F3, F4 = at.F1, at.F2, at.F3, at.F4
-    G0, G1, G2, G3, G4 = at.G0, at.G1, at.G2, at.G3, at.G4
     ya, yb = rest + at.D1 * u + at.S1 * m, rest + at.D2 * u + at.S2 * m
     yc = rest + at.D3 * u + at.S3 * m
     if flow.placed:
-        y1 = place_stage(1, ya, 0.0, F1, F2, F3, F4, n0, 0.0, 0.0, 0.0, 0.0)
-        n1 = push(y1, v, t + 0.25 * h, NOW, flow, w)
-        y2 = place_stage(2, yb, 0.0, F1, F2, F3, F4, n0, n1, 0.0, 0.0, 0.0)
-        n2 = push(y2, v, t + 0.5 * h, NOW, flow, w)
-        y3 = place_stage(3, yc, 0.0, F1, F2, F3, F4, n0, n1, n2, 0.0, 0.0)
-        n3 = push(y3, v, t + 0.75 * h, NOW, flow, w)
-        y4 = place_stage(4, y_end, 0.0, F1, F2, F3, F4, n0, n1, n2, n3, 0.0)
-        n4 = push(y4, v, t + h, NOW, flow, w)
-        return y4, place_stage(4, v_end, G0, G1, G2, G3, G4, n0, n1, n2, n3, n4), n4
+        return place_step(ya, yb, yc, y_end, v, v_end, t, n0, at, flow, w)
+    F1, F2, F3, F4 = at.F1, at.F2, at.F3, at.F4
+    G0, G1, G2, G3, G4 = at.G0, at.G1, at.G2, at.G3, at.G4
     column = STAGE if flow.memory else NOW
     va, vb, vc = at.D1 * v - at.S1 * Ku, at.D2 * v - at.S2 * Ku, at.D3 * v - at.S3 * Ku
     if flow.memory:
@@ -88,6 +80,29 @@ def step(y: Any, v: Any, t: Any, n0: Any, at: Any, flow: Any, w: Any) -> Any:
     if flow.memory:
         remember(6, AHEAD, y, v, y6, v6, h, flow, w)
     return y6, v6, push(y6, v6, t + h, AHEAD if flow.memory else NOW, flow, w)
+
+
+@compiled(forceinline=True)
+def place_step(
+    ya: Any, yb: Any, yc: Any, y_end: Any, v: Any, v_end: Any, t: Any, n0: Any,
+    at: Any, flow: Any, w: Any,
+) -> Any:  # fmt: skip
+    """`step` where no added force depends on the velocity.
+
+    ya, yb, yc, y_end and v_end are what the flow alone gives after one, two, three and four
+    quarters.
+    """
+    F1, F2, F3, F4, h = at.F1, at.F2, at.F3, at.F4, at.h
+    y1 = place_stage(1, ya, 0.0, F1, F2, F3, F4, n0, 0.0, 0.0, 0.0, 0.0)
+    n1 = push(y1, v, t + 0.25 * h, NOW, flow, w)
+    y2 = place_stage(2, yb, 0.0, F1, F2, F3, F4, n0, n1, 0.0, 0.0, 0.0)
+    n2 = push(y2, v, t + 0.5 * h, NOW, flow, w)
+    y3 = place_stage(3, yc, 0.0, F1, F2, F3, F4, n0, n1, n2, 0.0, 0.0)
+    n3 = push(y3, v, t + 0.75 * h, NOW, flow, w)
+    y4 = place_stage(4, y_end, 0.0, F1, F2, F3, F4, n0, n1, n2, n3, 0.0)
+    n4 = push(y4, v, t + h, NOW, flow, w)
+    v4 = place_stage(4, v_end, at.G0, at.G1, at.G2, at.G3, at.G4, n0, n1, n2, n3, n4)
+    return y4, v4, n4
 
 
 @compiled(forceinline=True)
