@@ -90,7 +90,7 @@ def added_table() -> str:
             f"{cost[here]:.0f}",
             f"{cost[here] / plain[here]:.1f}",
             f"{row['halving_m']:.0e}",
-            f"{cost[half] / plain[half] / (cost[here] / plain[here]):.1f}",
+            f"{cost[half] / cost[here]:.1f}",
         )
 
     ranked = sorted(a["effects"].items(), key=lambda item: item[1]["ns_per_sample"][here])

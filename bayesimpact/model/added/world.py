@@ -13,8 +13,8 @@ from bayesimpact.model.compiled import compiled
 C1, K1, C2, G, K2, Y0, V0, FORCE, OMEGA, PHASE, OFFSET = range(11)
 FRICTION, CONTACT_MASS, NO_TENSION, GAP_STEP = range(11, 15)
 # columns of the table of laws, and its flags: bayesimpact.model.effects.effect.law_row
-LAW_FORCE, LAW_RATE, LAW_SURFACE, LAW_FLAGS, LAW_FIRST, LAW_PACE, LAW_GRAIN = range(7)
-LAW_COLUMNS = 7
+LAW_FORCE, LAW_RATE, LAW_SURFACE, LAW_FLAGS = range(4)
+LAW_FIRST, LAW_PACE, LAW_GRAIN, LAW_COLUMNS = range(4, 8)
 CONTACT_ONLY, KINK_AT_TURN, ROUGH_AT_TOUCH, POLYNOMIAL, PLACED = 1, 2, 4, 8, 16
 # columns of the work array, one row per law: the law's state at the start of a step, at a stage and
 # at the end; the kicks of six stages; exp(-lambda h / 4), lambda, alpha, x_u, x_v

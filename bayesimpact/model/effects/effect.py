@@ -144,7 +144,7 @@ class Law:
         of time no faster than `pace`: it has no features that a look at four points of a swing
         misses, so steps may be longer where it is weak
     grain : length, m, below which the force does look like a polynomial (a spline's knots lie that
-        far apart): steps pass one or two of them
+        far apart): a step passes about one of them
     ignores_speed : the force does not depend on v: four evaluations a step are then enough, not six
 
     The state of a law that acts in contact only is not integrated in flight: its rate may there
