@@ -122,8 +122,13 @@ def check(campaign: Path, out: Path | None, seed: int, quiet: bool) -> None:
 
 
 def telling(quiet: bool) -> Callable[[str], None]:
-    """Progress in words on stderr, with the seconds since the start; nothing when quiet."""
+    """Progress in words on stderr, with the seconds since the start; nothing when quiet.
+
+    What must be compiled is announced until the command ends.
+    """
     import time
+
+    from bayesimpact.model.compiled import compilation_announced
 
     began = time.perf_counter()
 
@@ -131,6 +136,7 @@ def telling(quiet: bool) -> Callable[[str], None]:
         if not quiet:
             click.echo(f"[{time.perf_counter() - began:6.1f} s] {message}", err=True)
 
+    click.get_current_context().with_resource(compilation_announced(say))
     return say
 
 

@@ -23,7 +23,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.model.compiled import compiled, typed
+from bayesimpact.model.compiled import compiled, inner, typed
 from bayesimpact.model.flow import forced_response, impulse_response, second_response
 from bayesimpact.model.tables import LENGTH, TERMS, fill_series, nearby, polynomial
 
@@ -117,7 +117,7 @@ def fill_basis(
         value[US], value[UC], rate[US], rate[UC] = Us, Uc, UsR, UcR
 
 
-@compiled()
+@inner()
 def fill_basis_series(series: Floats, b: float, K: float) -> None:
     """Fill `series` (3, TERMS): Taylor coefficients of S / t, D and G / t^3."""
     fill_series(series, b, K)
@@ -131,7 +131,7 @@ def fill_basis_series(series: Floats, b: float, K: float) -> None:
         )
 
 
-@compiled(forceinline=True, fastmath={"contract"})
+@inner(forceinline=True, fastmath={"contract"})
 def plain_basis(
     tables: Floats, series: Floats, side: int, b: float, K: float, slow: bool, t: float
 ) -> tuple[float, float, float, float]:
@@ -187,7 +187,7 @@ def fill_table(
         a *= 2
 
 
-@compiled()
+@inner()
 def _extend_forced(
     table: Floats, v: Floats, r: Floats, beta: float, K: float, w: float, a: int, count: int
 ) -> None:

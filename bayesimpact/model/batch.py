@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.model.blocks import Sink
-from bayesimpact.model.compiled import compiled
+from bayesimpact.model.compiled import compiled, inner
 from bayesimpact.model.kernel import run
 from bayesimpact.model.tables import shelf
 from bayesimpact.model.threads import SHARES_PER_THREAD, available
@@ -41,7 +41,7 @@ def share(part: int, parts: int, batch: int, recordings: int) -> tuple[Span, Spa
     return (0, batch), (part * recordings // parts, (part + 1) * recordings // parts)
 
 
-@compiled()
+@inner()
 def gather(q: Floats, theta: Floats, columns: Ints, constants: Floats) -> None:
     """Fill q (11,) of one recording from theta and the constants."""
     for i in range(11):

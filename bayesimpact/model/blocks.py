@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.model.compiled import compiled
+from bayesimpact.model.compiled import inner
 from bayesimpact.model.flow import advance, advance_forced, forced_response, impulse_response
 from bayesimpact.model.scaled import Scaled
 from bayesimpact.model.tables import LENGTH
@@ -34,7 +34,7 @@ class Sink(NamedTuple):
     events: Floats
 
 
-@compiled(forceinline=True, fastmath={"contract"})
+@inner(forceinline=True, fastmath={"contract"})
 def write(
     out: Floats, first: int, end: int, shift: float, tables: Floats, side: int, b: float, u: float,
     v: float,
@@ -49,7 +49,7 @@ def write(
         j += one
 
 
-@compiled()
+@inner()
 def add_force(
     out: Floats, first: int, end: int, tables: Floats, side: int, fs: float, fc: float
 ) -> None:
@@ -58,7 +58,7 @@ def add_force(
         out[first + j] += fs * tables[side, 2, j] + fc * tables[side, 3, j]
 
 
-@compiled()
+@inner()
 def write_speeds(
     speeds: Floats, first: int, end: int, tables: Floats, side: int, b: float, K: float, w: float,
     u: float, v: float, fs: float, fc: float,
@@ -72,7 +72,7 @@ def write_speeds(
             speeds[first + j] += fs * (S[j] - w * F[j]) + fc * w * E[j]
 
 
-@compiled(forceinline=True, fastmath={"reassoc", "contract", "nsz"})
+@inner(forceinline=True, fastmath={"reassoc", "contract", "nsz"})
 def squares(
     data: Floats, first: int, end: int, shift: float, tables: Floats, side: int,
     b: float, u: float, v: float,
@@ -89,7 +89,7 @@ def squares(
     return total
 
 
-@compiled(fastmath={"reassoc", "contract", "nsz"})
+@inner(fastmath={"reassoc", "contract", "nsz"})
 def squares_forced(
     data: Floats, first: int, end: int, shift: float, tables: Floats, side: int,
     b: float, u: float, v: float, fs: float, fc: float,
@@ -104,7 +104,7 @@ def squares_forced(
     return total
 
 
-@compiled(forceinline=True, fastmath={"contract"})
+@inner(forceinline=True, fastmath={"contract"})
 def pass_plain(
     data: Floats, out: Floats, speeds: Floats, tables: Floats, side: int, b: float, K: float,
     shift: float, u: float, v: float, i: int, end: int,
@@ -128,7 +128,7 @@ def pass_plain(
     return total
 
 
-@compiled()
+@inner()
 def pass_samples(
     sink: Sink, tables: Floats, side: int, motion: Scaled, b: float, K: float, rest: float,
     t: float, u: float, v: float, i: int, end: int,

@@ -9,13 +9,16 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numba
 import numpy as np
+from numba.core import event
 from numba.core.ccallback import CFunc
 from numba.core.sigutils import normalize_signature
 
@@ -52,12 +55,21 @@ def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
     Division by zero gives inf or NaN as in NumPy (no check in inner loops), never an exception.
     """
+    usual: dict[str, Any] = {"cache": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
     def decorate(function: Callable[..., Any]) -> Any:
-        compiler = numba.njit(**{"cache": True, "error_model": "numpy", **options})
-        return _stamped(compiler(function), function)
+        return _stamped(numba.njit(**usual | options)(function), function)
 
     return decorate
+
+
+def inner(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Decorate a function that only compiled functions call.
+
+    It has no entry from Python, whose compilation takes as long as that of a small function: called
+    from there, the interpreter crashes.
+    """
+    return compiled(no_cpython_wrapper=True, **options)
 
 
 def compiled_callback(signature: Any) -> Callable[[Callable[..., Any]], Any]:
@@ -88,3 +100,31 @@ def _stamped(made: Any, function: Callable[..., Any]) -> Any:
 def typed(number: int) -> int:
     """The same number as one of its type: numba compiles every callee once more for a literal."""
     return int(np.int64(number))
+
+
+@contextmanager
+def compilation_announced(say: Callable[[str], None]) -> Iterator[None]:
+    """Call `say` before and after whatever must be compiled; a later run finds it in the cache."""
+    listener: Any = _Announcer(say)
+    with event.install_listener("numba:compile", listener):  # type: ignore[no-untyped-call]
+        yield
+
+
+class _Announcer(event.Listener):  # type: ignore[misc]
+    """Speaks of the outermost function only, not of those that it calls."""
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self.say = say
+        self.starts: list[float] = []
+
+    def on_start(self, event: Any) -> None:
+        if not self.starts:
+            function = event.data["dispatcher"].py_func
+            name = f"{function.__module__}.{function.__name__}"
+            self.say(f"compiling {name}, once: later runs find it in the cache")
+        self.starts.append(time.perf_counter())
+
+    def on_end(self, event: Any) -> None:
+        seconds = time.perf_counter() - self.starts.pop()
+        if not self.starts:
+            self.say(f"compiled in {seconds:.1f} s")

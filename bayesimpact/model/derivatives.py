@@ -18,7 +18,7 @@ from bayesimpact.model.arguments import ModelArguments, check_model, check_sampl
 from bayesimpact.model.basis import FORCED, PLAIN
 from bayesimpact.model.batch import Floats, Ints, Span, gather
 from bayesimpact.model.blocks import Sink
-from bayesimpact.model.compiled import compiled
+from bayesimpact.model.compiled import compiled, inner
 from bayesimpact.model.kernel import run
 from bayesimpact.model.scaled import OK, OVERFLOW, A
 from bayesimpact.model.sweep import Lanes, desk, sweep
@@ -29,7 +29,7 @@ from bayesimpact.model.threads import in_shares
 EVENTS = 256
 
 
-@compiled()
+@inner()
 def wanted(active: Lanes, columns: Ints, forced: bool) -> Lanes:
     """Return those q of one recording, columns (11,), whose derivatives are wanted, in `active`.
 

@@ -45,7 +45,7 @@ from bayesimpact.model.added.world import (
     World,
 )
 from bayesimpact.model.callback import floats_at, integers_at
-from bayesimpact.model.compiled import compiled, typed
+from bayesimpact.model.compiled import compiled, inner, typed
 from bayesimpact.model.threads import in_shares
 
 OK, BAD_PARAMETERS, TOO_MANY_EVENTS, NOT_FINITE = 0, 1, 2, 3
@@ -53,7 +53,7 @@ THREADING_PAYS = 4  # trajectories from which on
 EVENTS_AT_LEAST, EVENTS_PER_SAMPLE = 1000, 50
 
 
-@compiled()
+@inner()
 def admissible(q: Any, mass: Any) -> Any:
     """True when the slots describe an oscillator."""
     for i in range(q.size):
@@ -65,7 +65,7 @@ def admissible(q: Any, mass: Any) -> Any:
     return positive and q[CONTACT_MASS] >= 0.0 and q[FRICTION] >= 0.0
 
 
-@compiled()
+@inner()
 def cruise(y: Any, v: Any, n0: Any, j: Any, stride: Any, end: Any, flow: Any, w: Any) -> Any:
     """Strides from sample j - 1 to before `end` without an event.
 
@@ -92,7 +92,7 @@ def cruise(y: Any, v: Any, n0: Any, j: Any, stride: Any, end: Any, flow: Any, w:
     return y, v, n0, j, event, y1, v1, n1
 
 
-@compiled()
+@inner()
 def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
     """Motion to the next event, or to where its flow is renewed: (y, v, t, next sample)."""
     flow, longest = flow_from(y, v, t, w)
@@ -147,7 +147,7 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
     return y, v, t, j
 
 
-@compiled()
+@inner(inline="always")
 def walk(w: Any) -> Any:
     """Displacements at the samples, without the sensor's offset; returns a failure code."""
     y, v = begin(w)
@@ -165,18 +165,16 @@ def walk(w: Any) -> Any:
     return OK
 
 
-@compiled()
-def integrate(q: Any, mass: Any, interval: Any, laws: Any, out: Any) -> Any:
-    """One trajectory, see `integrate_many`."""
+@inner(inline="always")
+def integrate(q: Any, mass: Any, interval: Any, laws: Any, out: Any, room: Any) -> Any:
+    """One trajectory, see `integrate_many`. The caller keeps `room`: w has only its addresses."""
     if not admissible(q, mass):
         return BAD_PARAMETERS
-    size = laws.shape[0]
-    s, acting = np.zeros(SIDES + size), np.zeros(size, dtype=np.int64)
-    work = np.zeros((size, WORK_COLUMNS))
-    tables, keys = np.empty((2, LONGEST_STRIDE, 2)), np.full((2, 2), np.nan)
+    s, acting, work, tables, keys = room
+    s[:], acting[:], work[:], keys[:] = 0.0, 0, 0.0, np.nan
     w = World(
         mass, interval, out.size, floats_at(out.ctypes.data), floats_at(tables.ctypes.data),
-        floats_at(keys.ctypes.data), size, floats_at(q.ctypes.data), q.ctypes.data,
+        floats_at(keys.ctypes.data), laws.shape[0], floats_at(q.ctypes.data), q.ctypes.data,
         integers_at(laws.ctypes.data), integers_at(acting.ctypes.data),
         floats_at(work.ctypes.data), floats_at(s.ctypes.data),
     )  # fmt: skip
@@ -186,12 +184,25 @@ def integrate(q: Any, mass: Any, interval: Any, laws: Any, out: Any) -> Any:
     return code
 
 
+@inner()
+def room_for(size: Any) -> Any:
+    """Work arrays for a number of laws: state, which laws act, memories, tables and their keys."""
+    return (
+        np.empty(SIDES + size),
+        np.empty(size, dtype=np.int64),
+        np.empty((size, WORK_COLUMNS)),
+        np.empty((2, LONGEST_STRIDE, 2)),
+        np.empty((2, 2)),
+    )
+
+
 @compiled(nogil=True)
 def _in_turn(
     q: Any, mass: Any, intervals: Any, counts: Any, laws: Any, out: Any, codes: Any
 ) -> Any:
+    room = room_for(laws.shape[0])
     for k in range(q.shape[0]):
-        codes[k] = integrate(q[k], mass, intervals[k], laws, out[k, : counts[k]])
+        codes[k] = integrate(q[k], mass, intervals[k], laws, out[k, : counts[k]], room)
 
 
 def integrate_many(

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.model.blocks import Sink, pass_samples
-from bayesimpact.model.compiled import compiled, typed
+from bayesimpact.model.compiled import inner, typed
 from bayesimpact.model.events import next_event
 from bayesimpact.model.quick import fast_lane
 from bayesimpact.model.scaled import (
@@ -37,7 +37,7 @@ EVENTS_AT_LEAST = 1000
 EVENTS_PER_SAMPLE = 50
 
 
-@compiled()
+@inner()
 def run(
     q: Floats, mass: float, interval: float, n: int, sink: Sink, shelf: Shelf
 ) -> tuple[float, int, int]:
@@ -100,7 +100,7 @@ def run(
     return total, count, OK
 
 
-@compiled(fastmath={"reassoc"})
+@inner(fastmath={"reassoc"})
 def finite(total: float, out: Floats) -> bool:
     """Say whether a recording's results are finite."""
     for i in range(out.size):  # 0 if finite, else nan; a test of each would not vectorise

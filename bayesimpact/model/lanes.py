@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.model.basis import D_, E_, F_, G_, H_, ONE, P_, PLAIN, PR, S_, UC, US, X_, XR
-from bayesimpact.model.compiled import compiled
+from bayesimpact.model.compiled import inner
 from bayesimpact.model.scaled import C1, C2, K1, K2, OFFSET, PHASE, A, G, W
 
 Floats = NDArray[np.float64]
@@ -24,7 +24,7 @@ Lanes = NDArray[np.uint64]
 RESIDUAL = 11
 
 
-@compiled()
+@inner()
 def fill_slopes(slopes: Floats, q: Floats, mass: float, interval: float) -> None:
     """Fill `slopes` (2, 3, 11): derivatives of 2 b, K and rest of flight and contact.
 
@@ -44,7 +44,7 @@ def fill_slopes(slopes: Floats, q: Floats, mass: float, interval: float) -> None
         slopes[1, 2, G] = q[K2] / stiffness
 
 
-@compiled(forceinline=True, fastmath={"contract"})
+@inner(forceinline=True, fastmath={"contract"})
 def fill_coefficients(
     stack: Floats, slot: int, active: Lanes, slopes: Floats, side: int, beta: float, K: float,
     u: float, v: float, dy: Floats, dv: Floats,
@@ -63,7 +63,7 @@ def fill_coefficients(
         stack[i, slot, H_] = -beta_i * v - K_i * u
 
 
-@compiled()
+@inner()
 def fill_forced_coefficients(
     stack: Floats, slot: int, active: Lanes, slopes: Floats, side: int, q: Floats, mass: float,
     interval: float, t: float,
@@ -89,7 +89,7 @@ def fill_forced_coefficients(
     return fs, fc
 
 
-@compiled(forceinline=True, fastmath={"contract"})
+@inner(forceinline=True, fastmath={"contract"})
 def carry(
     stack: Floats, slot: int, active: Lanes, beta: float, K: float, S: float, D: float, G: float,
     H: float, dy: Floats, dv: Floats,
@@ -104,7 +104,7 @@ def carry(
         dv[i] = b * D + c * D_rate + d * H + e * H_rate
 
 
-@compiled(forceinline=True, fastmath={"contract"})
+@inner(forceinline=True, fastmath={"contract"})
 def carry_forced(
     stack: Floats, slot: int, active: Lanes, value: Floats, rate: Floats, dy: Floats, dv: Floats
 ) -> None:
@@ -115,7 +115,7 @@ def carry_forced(
             dv[i] += stack[i, slot, k] * rate[k]
 
 
-@compiled(forceinline=True, fastmath={"contract"})
+@inner(forceinline=True, fastmath={"contract"})
 def multiply(
     stack: Floats,
     products: Floats,
@@ -149,7 +149,7 @@ def multiply(
         products[i, slot, 4] = w04 * a + w14 * b + w24 * c + w34 * d + w44 * e
 
 
-@compiled(fastmath={"reassoc", "contract", "nsz"})
+@inner(fastmath={"reassoc", "contract", "nsz"})
 def dot(a: Floats, b: Floats) -> float:
     """Return the scalar product of two vectors."""
     total = 0.0
@@ -158,7 +158,7 @@ def dot(a: Floats, b: Floats) -> float:
     return total
 
 
-@compiled()
+@inner()
 def add_products(
     gram: Floats, stack: Floats, products: Floats, moments: Floats, slots: int, active: Lanes,
     samples: int,

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.model.basis import D_, E_, F_, G_, H_, ONE, S_
-from bayesimpact.model.compiled import compiled
+from bayesimpact.model.compiled import inner
 
 Floats = NDArray[np.float64]
 Lanes = NDArray[np.uint64]
 
 
-@compiled()
+@inner()
 def prefix_grams(prefixes: Floats, tables: Floats, side: int) -> None:
     """Fill prefixes[side] (LENGTH + 1, basis, basis): sums over j < n of products of table rows."""
     size = tables.shape[1]
@@ -29,7 +29,7 @@ def prefix_grams(prefixes: Floats, tables: Floats, side: int) -> None:
                 prefixes[side, n + 1, k, m] = prefixes[side, n + 1, m, k] = total
 
 
-@compiled(fastmath={"reassoc", "contract", "nsz"})
+@inner(fastmath={"reassoc", "contract", "nsz"})
 def plain_moments(
     moments: Floats, slot: int, tables: Floats, side: int, data: Floats, first: int, end: int,
     shift: float, u: float, m: float,
@@ -57,7 +57,7 @@ def plain_moments(
     return total
 
 
-@compiled(fastmath={"reassoc", "contract", "nsz"})
+@inner(fastmath={"reassoc", "contract", "nsz"})
 def forced_moments(
     moments: Floats, slot: int, tables: Floats, side: int, data: Floats, first: int, end: int,
     shift: float, u: float, m: float, fs: float, fc: float,
@@ -75,7 +75,7 @@ def forced_moments(
     return total
 
 
-@compiled(fastmath={"contract"})
+@inner(fastmath={"contract"})
 def write_rows(
     stack: Floats, slot: int, active: Lanes, tables: Floats, side: int, shift: float, u: float,
     m: float, fs: float, fc: float, values: Floats, jacobian: Floats,

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.model.blocks import Sink, pass_plain
-from bayesimpact.model.compiled import compiled
+from bayesimpact.model.compiled import compiled, inner
 from bayesimpact.model.flow import advance
 from bayesimpact.model.scaled import Scaled
 from bayesimpact.model.tables import LENGTH, Shelf, nearby
@@ -30,21 +30,21 @@ CORRECTIONS = 5
 SMALL = 2e-14
 
 
-@compiled()
+@inner()
 def second_trough(b: float, K: float) -> float:
     """Return a time at which a motion that falls now cannot have begun to rise a second time."""
     square = K - b * b
     return 1.999 * math.pi / math.sqrt(square) if square > 0.0 else math.inf
 
 
-@compiled()
+@inner()
 def first_guess(K: float, z: float, v: float) -> float:
     """Return when a motion that falls from z with v < 0 would be back at z without damping."""
     rate = math.sqrt(K)
     return 2.0 * math.atan2(-v, -z * rate) / rate
 
 
-@compiled(forceinline=True, fastmath={"contract"})
+@inner(forceinline=True, fastmath={"contract"})
 def correct(b: float, K: float, z: float, v: float, level: float) -> tuple[float, float, bool]:
     """Return the time from (z, v) to the level, z' there, and whether both are exact to rounding.
 
@@ -63,14 +63,14 @@ def correct(b: float, K: float, z: float, v: float, level: float) -> tuple[float
     return step, rise, left < SMALL
 
 
-@compiled(forceinline=True)
+@inner(forceinline=True)
 def expect(history: Floats, side: int) -> float:
     """Return how long a regime is expected to last, by extrapolation; 0 at its first time."""
     total: float = history[side, 0] + history[side, 1] + history[side, 2] + history[side, 3]
     return total
 
 
-@compiled(forceinline=True)
+@inner(forceinline=True)
 def remember(history: Floats, side: int, wait: float) -> None:
     """Update a row of the history: last duration, three backward differences, how many so far."""
     seen = history[side, 4]

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.model import basis
 from bayesimpact.model.basis import fill_basis, fill_basis_series, fill_table, plain_basis
-from bayesimpact.model.compiled import compiled, typed
+from bayesimpact.model.compiled import inner, typed
 from bayesimpact.model.lanes import (
     RESIDUAL,
     add_products,
@@ -67,7 +67,7 @@ class Desk(NamedTuple):
     dv: Floats
 
 
-@compiled()
+@inner()
 def desk(size: int, with_grams: bool) -> Desk:
     """Return an empty desk for a basis of `size`."""
     lengths = LENGTH + 1 if with_grams else 0
@@ -86,7 +86,7 @@ def desk(size: int, with_grams: bool) -> Desk:
     )
 
 
-@compiled()
+@inner()
 def refill(room: Desk, side: int, b: float, K: float, w: float) -> None:
     """Fill tables, series and prefix sums of one regime."""
     forced = room.tables.shape[1] > basis.PLAIN
@@ -97,7 +97,7 @@ def refill(room: Desk, side: int, b: float, K: float, w: float) -> None:
     room.keys[side, 0], room.keys[side, 1], room.keys[side, 2] = b, K, w
 
 
-@compiled(fastmath={"contract"})
+@inner(fastmath={"contract"})
 def sweep(
     q: Floats, mass: float, interval: float, n: int, events: Floats, active: Lanes,
     data: Floats, values: Floats, jacobian: Floats, gram: Floats, room: Desk,

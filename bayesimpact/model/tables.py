@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.model.compiled import compiled
+from bayesimpact.model.compiled import compiled, inner
 from bayesimpact.model.flow import forced_response, impulse_response
 
 Floats = NDArray[np.float64]
@@ -96,7 +96,7 @@ def fill(table: Floats, b: float, K: float, w: float, forced: bool) -> None:
         a *= 2
 
 
-@compiled()
+@inner()
 def fill_series(series: Floats, b: float, K: float) -> None:
     """Fill `series` (2, TERMS): S = t sum(series[0, n] t^n), D = sum(series[1, n] t^n)."""
     S, D = series[0], series[1]
@@ -107,7 +107,7 @@ def fill_series(series: Floats, b: float, K: float) -> None:
         before, now = now, -(2.0 * b * (n + 1.0) * now + K * before) / ((n + 1.0) * (n + 2.0))
 
 
-@compiled(forceinline=True, fastmath={"contract"})
+@inner(forceinline=True, fastmath={"contract"})
 def polynomial(series: Floats, side: int, row: int, t: float) -> float:
     """Return sum(series[side, row, n] t^n), grouped in pairs so that terms do not wait."""
     t2 = t * t
@@ -122,7 +122,7 @@ def polynomial(series: Floats, side: int, row: int, t: float) -> float:
     return total
 
 
-@compiled(forceinline=True, fastmath={"contract"})
+@inner(forceinline=True, fastmath={"contract"})
 def nearby(series: Floats, side: int, t: float) -> tuple[float, float]:
     """Return S(t) and D(t) for |t| <= 1 from series[side]."""
     return t * polynomial(series, side, 0, t), polynomial(series, side, 1, t)

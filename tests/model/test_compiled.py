@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numba
 import pytest
 
 from bayesimpact.model import compiled
@@ -48,3 +49,22 @@ def test_a_callback_has_the_same_stamp_as_any_compiled_function() -> None:
     found = callback._cache._cache_file._source_stamp
     assert found == compiled.compiled()(half)._cache._cache_file._source_stamp
     assert found == compiled.source_stamp(Path(__file__))
+
+
+def test_the_outermost_compilation_is_announced_and_nothing_that_is_compiled() -> None:
+    @numba.njit  # type: ignore[untyped-decorator]
+    def below(x: float) -> float:
+        return x + 1.0
+
+    @numba.njit  # type: ignore[untyped-decorator]
+    def above(x: float) -> float:
+        return 2.0 * below(x)
+
+    said: list[str] = []
+    with compiled.compilation_announced(said.append):
+        assert above(3.0) == above(3.0) == 8.0
+    assert len(said) == 2
+    assert said[0].startswith(f"compiling {__name__}.above, once")
+    assert said[1].startswith("compiled in ")
+    above(1)  # compiles anew, for integers, and nobody listens
+    assert len(said) == 2

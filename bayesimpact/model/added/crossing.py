@@ -8,7 +8,7 @@ from bayesimpact.model.added.method import quarters
 from bayesimpact.model.added.situation import GAP, HEADING, NONE, TURN, event_value, passed
 from bayesimpact.model.added.step import step
 from bayesimpact.model.added.world import AHEAD, NOW
-from bayesimpact.model.compiled import compiled, typed
+from bayesimpact.model.compiled import inner, typed
 
 TRIALS = 80
 ROUNDS = 8
@@ -18,13 +18,13 @@ ROUNDS = 8
 NEAR, STRAIGHT, BEHIND, AIM = 1e-5, 1e-4, 1e-7, 5e-6
 
 
-@compiled()
+@inner()
 def trial(y: Any, v: Any, t: Any, n0: Any, h: Any, flow: Any, w: Any) -> Any:
     """A step of any length."""
     return step(y, v, t, n0, quarters(h, flow.b, flow.K, flow.inverse), flow, w)
 
 
-@compiled()
+@inner()
 def value_and_slope(
     event: Any,
     y: Any,
@@ -48,7 +48,7 @@ def value_and_slope(
     return value, (later - value) / short, a
 
 
-@compiled(forceinline=True)
+@inner(forceinline=True)
 def guess(f0: Any, d0: Any, f1: Any, d1: Any) -> Any:
     """Last root in (0, 1) of the cubic with values f0 >= 0 > f1 and slopes d0, d1 at 0 and 1."""
     c2, c3 = 3.0 * (f1 - f0) - 2.0 * d0 - d1, 2.0 * (f0 - f1) + d0 + d1
@@ -61,7 +61,7 @@ def guess(f0: Any, d0: Any, f1: Any, d1: Any) -> Any:
     return x
 
 
-@compiled()
+@inner()
 def locate(
     event: Any,
     y: Any,
@@ -106,7 +106,7 @@ def locate(
     return x, y1, v1, n1
 
 
-@compiled(forceinline=True)
+@inner(forceinline=True)
 def turn_matters(y: Any, v: Any, y1: Any, v1: Any, h: Any, flow: Any, w: Any) -> Any:
     """True when a step contains a turning point at which a force has a kink, or beyond the gap."""
     heading = w.s[HEADING]
@@ -118,7 +118,7 @@ def turn_matters(y: Any, v: Any, y1: Any, v1: Any, h: Any, flow: Any, w: Any) ->
     return min(y, y1) - reach < w.s[GAP] < max(y, y1) + reach
 
 
-@compiled(forceinline=True)
+@inner(forceinline=True)
 def suspicious(y: Any, v: Any, y1: Any, v1: Any, t1: Any, h: Any, flow: Any, w: Any) -> Any:
     """True when a step of length h from (y, v) to (y1, v1) at t1 contains an event."""
     column = AHEAD if flow.memory else NOW
@@ -127,7 +127,7 @@ def suspicious(y: Any, v: Any, y1: Any, v1: Any, t1: Any, h: Any, flow: Any, w: 
     )
 
 
-@compiled()
+@inner()
 def first_event(
     y: Any,
     v: Any,

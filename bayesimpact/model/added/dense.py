@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from bayesimpact.model.compiled import compiled
+from bayesimpact.model.compiled import inner
 from bayesimpact.model.flow import impulse_response
 
 LONGEST_STRIDE = 64  # samples that one step may span
 
 
-@compiled(forceinline=True)
+@inner(forceinline=True)
 def fill_in(
     first: Any, end: Any, t: Any, aligned: Any, at: Any, flow: Any, w: Any,
     y: Any, v: Any, n0: Any, h: Any, y1: Any, v1: Any, n1: Any,
@@ -51,7 +51,7 @@ def fill_in(
         w.out[first + i] = flow.rest + D * u + S * m + added
 
 
-@compiled(forceinline=True)
+@inner(forceinline=True)
 def tabulate(flow: Any, w: Any) -> Any:
     """Where the table of S, D after 1, 2, ... samples begins; computed unless it still holds."""
     side = int(flow.touching)

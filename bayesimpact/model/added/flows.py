@@ -37,7 +37,7 @@ from bayesimpact.model.added.world import (
     Flow,
     law_value,
 )
-from bayesimpact.model.compiled import compiled
+from bayesimpact.model.compiled import inner
 
 MAX_ANGLE = 0.125  # longest step times natural frequency, rad
 MAX_ANGLE_PLAIN = 0.6  # the same where nothing is added: exact, but one turning point at most
@@ -61,7 +61,7 @@ OUTSIDE = 0.04  # of a force that does not depend on the motion: nothing feeds i
 OFF_TURN, OFF_PASSAGE = np.cos(np.pi / 8), np.sin(np.pi / 8)  # of the swing's four points
 
 
-@compiled()
+@inner()
 def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
     """Linear flow of the present kind of motion, and the longest step that resolves the rest."""
     q, s, laws = w.q, w.s, w.laws
@@ -115,7 +115,7 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
     return flow, longest
 
 
-@compiled()
+@inner()
 def gain(y: Any, v: Any, t: Any, pace: Any, longest: Any, flow: Any, w: Any) -> Any:
     """Length of the steps over the usual one: longer where what is added to the flow is weak.
 
@@ -149,7 +149,7 @@ def gain(y: Any, v: Any, t: Any, pace: Any, longest: Any, flow: Any, w: Any) -> 
     return min(max(np.sqrt(np.cbrt(weight)), LEAST_GAIN), MOST_GAIN)
 
 
-@compiled(forceinline=True)
+@inner(forceinline=True)
 def beyond_surface(law: Any, y: Any, v: Any, t: Any, w: Any) -> Any:
     """Whether a point lies on the other side of a law's own surface (if it has one)."""
     if w.laws[LAW_COLUMNS * law + LAW_SURFACE] == 0:
@@ -157,7 +157,7 @@ def beyond_surface(law: Any, y: Any, v: Any, t: Any, w: Any) -> Any:
     return w.s[SIDES + law] * surface_value(law, y, v, t, NOW, w) < 0.0
 
 
-@compiled()
+@inner()
 def left_out(y: Any, v: Any, t: Any, flow: Any, w: Any) -> Any:
     """Force that the linear flow leaves out at a point other than the present one, N.
 
@@ -173,7 +173,7 @@ def left_out(y: Any, v: Any, t: Any, flow: Any, w: Any) -> Any:
     return total
 
 
-@compiled()
+@inner()
 def fold(
     y: Any,
     v: Any,
@@ -226,7 +226,7 @@ def fold(
     return slope, level
 
 
-@compiled(forceinline=True)
+@inner(forceinline=True)
 def first_step(y: Any, v: Any, t: Any, longest: Any, flow: Any, w: Any) -> Any:
     """Length of the first step, doubled from step to step: small where a law's state starts."""
     if not flow.memory:
@@ -235,14 +235,14 @@ def first_step(y: Any, v: Any, t: Any, longest: Any, flow: Any, w: Any) -> Any:
     return RAMP / fastest if flow.touching == 1.0 and fastest > 0.0 else np.inf
 
 
-@compiled(forceinline=True)
+@inner(forceinline=True)
 def stride_of(longest: Any, w: Any) -> Any:
     """Samples that a step from a sample on may span, 0 where it has to be cut."""
     samples = longest / w.interval
     return min(int(samples + ROUND_UP), LONGEST_STRIDE) if samples >= 1.0 else 0
 
 
-@compiled(forceinline=True)
+@inner(forceinline=True)
 def next_step(y: Any, v: Any, t: Any, j: Any, aligned: Any, longest: Any, flow: Any, w: Any) -> Any:
     """Length of the next step, and whether it ends on a sample.
 

@@ -26,10 +26,10 @@ from bayesimpact.model.added.world import (
     X_V,
     law_value,
 )
-from bayesimpact.model.compiled import compiled
+from bayesimpact.model.compiled import inner
 
 
-@compiled()
+@inner()
 def split_memory(y: Any, v: Any, t: Any, flow: Any, w: Any) -> Any:
     """Linear part of the rates of the laws' states, by differences; returns the largest lambda."""
     work, gap, touching, fastest = w.work, flow.gap, flow.touching, 0.0
@@ -53,7 +53,7 @@ def split_memory(y: Any, v: Any, t: Any, flow: Any, w: Any) -> Any:
     return fastest
 
 
-@compiled()
+@inner()
 def begin_memory(y: Any, v: Any, t: Any, n: Any, h: Any, flow: Any, w: Any) -> Any:
     """Decay over a quarter of a step of length h, and the kicks at its start."""
     for law in range(w.size):
@@ -62,7 +62,7 @@ def begin_memory(y: Any, v: Any, t: Any, n: Any, h: Any, flow: Any, w: Any) -> A
     kick(0, y, v, t, NOW, n, flow, w)
 
 
-@compiled()
+@inner()
 def kick(number: Any, y: Any, v: Any, t: Any, column: Any, n: Any, flow: Any, w: Any) -> Any:
     """What moves zeta at a stage beside its decay; n is `push` there."""
     work = w.work
@@ -75,7 +75,7 @@ def kick(number: Any, y: Any, v: Any, t: Any, column: Any, n: Any, flow: Any, w:
             work[at + KICK + number] = rate - linear - work[at + X_V] * n * flow.inverse
 
 
-@compiled()
+@inner()
 def remember(
     number: Any, column: Any, y: Any, v: Any, ys: Any, vs: Any, h: Any, flow: Any, w: Any
 ) -> Any:
@@ -96,7 +96,7 @@ def remember(
             )  # fmt: skip
 
 
-@compiled(forceinline=True)
+@inner(forceinline=True)
 def keep_memory(w: Any) -> Any:
     """Take the laws' states at the end of a step as those at the start of the next."""
     for law in range(w.size):
@@ -104,14 +104,14 @@ def keep_memory(w: Any) -> Any:
             w.work[WORK_COLUMNS * law + NOW] = w.work[WORK_COLUMNS * law + AHEAD]
 
 
-@compiled()
+@inner()
 def relax(y: Any, v: Any, t: Any, dt: Any, flow: Any, w: Any) -> Any:
     """The laws' states after a flight of dt in which none of them acts."""
     for law in range(w.size):
         relax_one(law, NOW, y, v, t, dt, flow, w)
 
 
-@compiled(forceinline=True)
+@inner(forceinline=True)
 def relax_one(law: Any, column: Any, y: Any, v: Any, t: Any, dt: Any, flow: Any, w: Any) -> Any:
     """State of a law, into `column`, after a time in which only itself changes its rate."""
     if w.laws[LAW_COLUMNS * law + LAW_RATE] != 0:

@@ -10,10 +10,10 @@ from bayesimpact.model.added.flows import flow_from
 from bayesimpact.model.added.memory import keep_memory, relax_one
 from bayesimpact.model.added.situation import SLIDING, static_force
 from bayesimpact.model.added.world import AHEAD, FORCE, FRICTION
-from bayesimpact.model.compiled import compiled
+from bayesimpact.model.compiled import inner
 
 
-@compiled()
+@inner()
 def hold(y: Any, t: Any, j: Any, w: Any) -> Any:
     """Rest under dry friction until the other forces exceed it: (t, next sample)."""
     if w.size == 0 and w.q[FORCE] == 0.0:
@@ -47,7 +47,7 @@ def hold(y: Any, t: Any, j: Any, w: Any) -> Any:
     return t, j
 
 
-@compiled()
+@inner()
 def pull_at(y: Any, t: Any, dt: Any, flow: Any, w: Any) -> Any:
     """Force on the mass after a rest of dt, N, dry friction apart."""
     for law in range(w.size):

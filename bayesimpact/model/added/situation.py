@@ -34,7 +34,7 @@ from bayesimpact.model.added.world import (
     forcing,
     law_value,
 )
-from bayesimpact.model.compiled import compiled
+from bayesimpact.model.compiled import inner
 
 # what holds between events: gap, kind of motion, direction of sliding (0: held), direction of
 # motion, whether the obstacle has pushed in this contact, then the side of every law's surface
@@ -43,13 +43,13 @@ FREE, TOUCHING, SEPARATED = 0.0, 1.0, 2.0
 NONE, TOUCH, LEAVE, TURN, SURFACE = range(-1, 4)  # SURFACE + i: surface of law i
 
 
-@compiled(forceinline=True)
+@inner(forceinline=True)
 def one_sided(q: Any) -> Any:
     """True when the obstacle cannot pull."""
     return q[NO_TENSION] != 0.0 or q[CONTACT_MASS] > 0.0
 
 
-@compiled(forceinline=True)
+@inner(forceinline=True)
 def laws_force(y: Any, v: Any, t: Any, column: Any, contact: Any, w: Any) -> Any:
     """Sum of the forces that act in contact only, or of those that act everywhere, N."""
     total, touching = 0.0, 1.0 if w.s[MODE] == TOUCHING or contact else 0.0
@@ -60,7 +60,7 @@ def laws_force(y: Any, v: Any, t: Any, column: Any, contact: Any, w: Any) -> Any
     return total
 
 
-@compiled()
+@inner()
 def reaction(y: Any, v: Any, t: Any, column: Any, w: Any) -> Any:
     """Force with which the obstacle pushes the mass back, N (negative: it would have to pull)."""
     q = w.q
@@ -72,7 +72,7 @@ def reaction(y: Any, v: Any, t: Any, column: Any, w: Any) -> Any:
     return (w.mass * obstacle - q[CONTACT_MASS] * other) / (w.mass + q[CONTACT_MASS])
 
 
-@compiled(forceinline=True)
+@inner(forceinline=True)
 def event_value(event: Any, y: Any, v: Any, t: Any, column: Any, w: Any) -> Any:
     """Smooth function that falls through zero when the event happens."""
     s = w.s
@@ -86,7 +86,7 @@ def event_value(event: Any, y: Any, v: Any, t: Any, column: Any, w: Any) -> Any:
     return s[SIDES + event - SURFACE] * surface_value(event - SURFACE, y, v, t, column, w)
 
 
-@compiled(forceinline=True)
+@inner(forceinline=True)
 def surface_value(law: Any, y: Any, v: Any, t: Any, column: Any, w: Any) -> Any:
     """Value of a law's surface function."""
     touching = 1.0 if w.s[MODE] == TOUCHING else 0.0
@@ -95,7 +95,7 @@ def surface_value(law: Any, y: Any, v: Any, t: Any, column: Any, w: Any) -> Any:
     )
 
 
-@compiled(forceinline=True)
+@inner(forceinline=True)
 def passed(y: Any, v: Any, t: Any, column: Any, known: Any, flow: Any, w: Any) -> Any:
     """An event other than `known` that lies behind this point of the trajectory, or NONE."""
     if w.s[MODE] == TOUCHING:
@@ -114,7 +114,7 @@ def passed(y: Any, v: Any, t: Any, column: Any, known: Any, flow: Any, w: Any) -
     return NONE
 
 
-@compiled()
+@inner()
 def begin(w: Any) -> Any:
     """Motion and situation at t = 0 from the slots: (y, v)."""
     q, s = w.q, w.s
@@ -135,7 +135,7 @@ def begin(w: Any) -> Any:
     return y, v
 
 
-@compiled()
+@inner()
 def static_force(y: Any, t: Any, column: Any, w: Any) -> Any:
     """What pulls at the mass at rest, dry friction apart, N; the laws' states stand in `column`."""
     q, s = w.q, w.s
@@ -145,14 +145,14 @@ def static_force(y: Any, t: Any, column: Any, w: Any) -> Any:
     return force
 
 
-@compiled()
+@inner()
 def set_sliding(y: Any, t: Any, w: Any) -> Any:
     """Direction of sliding from a standstill: 0 where dry friction holds the mass."""
     force = static_force(y, t, NOW, w)
     w.s[SLIDING] = np.sign(force) if abs(force) > w.q[FRICTION] else 0.0
 
 
-@compiled()
+@inner()
 def set_sides(y: Any, v: Any, t: Any, w: Any) -> Any:
     """Side of every law's surface that the motion is on."""
     for law in range(w.size):
@@ -161,7 +161,7 @@ def set_sides(y: Any, v: Any, t: Any, w: Any) -> Any:
             w.s[SIDES + law] = side if side != 0.0 else 1.0
 
 
-@compiled()
+@inner()
 def resolve(event: Any, y: Any, v: Any, t: Any, w: Any) -> Any:
     """Change what holds between events; returns displacement and velocity after the event."""
     q, s = w.q, w.s
@@ -187,7 +187,7 @@ def resolve(event: Any, y: Any, v: Any, t: Any, w: Any) -> Any:
     return y, v
 
 
-@compiled(forceinline=True)
+@inner(forceinline=True)
 def heading(v: Any, w: Any) -> Any:
     """Direction of the motion at the start of a step, 0 where it is about to be chosen."""
     if v != 0.0:
@@ -195,7 +195,7 @@ def heading(v: Any, w: Any) -> Any:
     return w.s[SLIDING] if w.q[FRICTION] > 0.0 else 0.0
 
 
-@compiled(forceinline=True)
+@inner(forceinline=True)
 def settle(y: Any, v: Any, t: Any, w: Any) -> Any:
     """What changes without a change of force: the obstacle has pushed; the mass fell back."""
     s = w.s

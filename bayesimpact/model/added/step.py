@@ -20,10 +20,10 @@ from bayesimpact.model.added.world import (
     forcing,
     law_value,
 )
-from bayesimpact.model.compiled import compiled
+from bayesimpact.model.compiled import inner
 
 
-@compiled(forceinline=True)
+@inner(forceinline=True)
 def push(y: Any, v: Any, t: Any, column: Any, flow: Any, w: Any) -> Any:
     """Force that the linear flow leaves out, N; the laws' states stand in `column`."""
     force = flow.level + flow.slope * y
@@ -38,7 +38,7 @@ def push(y: Any, v: Any, t: Any, column: Any, flow: Any, w: Any) -> Any:
     return force + forcing(t, w.q) if flow.forced else force
 
 
-@compiled(forceinline=True)
+@inner(forceinline=True)
 def step(y: Any, v: Any, t: Any, n0: Any, at: Any, flow: Any, w: Any) -> Any:
     """Displacement, velocity and `push` a time `at.h` on; the laws' states then stand in AHEAD.
 
@@ -82,7 +82,7 @@ def step(y: Any, v: Any, t: Any, n0: Any, at: Any, flow: Any, w: Any) -> Any:
     return y6, v6, push(y6, v6, t + h, AHEAD if flow.memory else NOW, flow, w)
 
 
-@compiled(forceinline=True)
+@inner(forceinline=True)
 def place_step(
     ya: Any, yb: Any, yc: Any, y_end: Any, v: Any, v_end: Any, t: Any, n0: Any,
     at: Any, flow: Any, w: Any,
@@ -105,7 +105,7 @@ def place_step(
     return y4, v4, n4
 
 
-@compiled(forceinline=True)
+@inner(forceinline=True)
 def stage_push(
     number: Any, y: Any, v: Any, ys: Any, vs: Any, t: Any, column: Any, h: Any, flow: Any, w: Any
 ) -> Any:

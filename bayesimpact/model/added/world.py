@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bayesimpact.model.callback import call_law
-from bayesimpact.model.compiled import compiled
+from bayesimpact.model.compiled import inner
 
 # slots of q: bayesimpact.model.parameters.SLOTS
 C1, K1, C2, G, K2, Y0, V0, FORCE, OMEGA, PHASE, OFFSET = range(11)
@@ -60,7 +60,7 @@ class Flow(NamedTuple):
     rough: Any  # True when a force is not smooth at the touch
 
 
-@compiled(forceinline=True)
+@inner(forceinline=True)
 def law_value(
     law: Any,
     column: Any,
@@ -77,7 +77,7 @@ def law_value(
     return call_law(w.laws[LAW_COLUMNS * law + column], y, v, y - gap, t, z, touching, p, w.base)
 
 
-@compiled(forceinline=True)
+@inner(forceinline=True)
 def forcing(t: Any, q: Any) -> Any:
     """The slots' harmonic force, N."""
     return q[FORCE] * np.sin(q[OMEGA] * t + q[PHASE])
