@@ -5,7 +5,8 @@
 Nine recordings of 6,000 samples at the paper's values, one effect at a time at its plausible size
 (the width of its prior), on one thread. Numba takes the step sizes as constants when it compiles,
 so each scale of the steps is a process of its own, compiled anew: 1 is what the package uses. The
-error is the largest difference to steps a quarter as long; `halving` that of 1 against 1/2. The
+error is the largest difference to steps a quarter as long; `halving` that of 1 against 1/2. Then
+all pairs of effects, with the package's steps and half of them. The
 plain recurrence of the base model takes its turn among the effects, for the machine's speed changes
 from one quarter of an hour to the next. Writes added.json beside this file.
 """
@@ -16,8 +17,9 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -30,13 +32,14 @@ from benchmarks.record import keep, rounds
 from effect_rigs import MOVING, TestRig, typical
 
 from bayesimpact.model.added import flows
-from bayesimpact.model.oscillator import Oscillator, build_oscillator
+from bayesimpact.model.oscillator import build_oscillator
 
 SCALES = (2.0, 1.0, 0.5, 0.25)  # of all step sizes
 STEPS = ("MAX_ANGLE", "MAX_ANGLE_PACE", "RAMP")
 GRADED = ("SINCE", "UNTIL")  # over the 3/4th power of a time in longest steps
 ROUNDS, REPEATS = 11, 3
-PLAIN = "plain recurrence"
+PAIRED = (1.0, 0.5)  # scales with which pairs of effects are simulated too
+PLAIN, PLUS = "plain recurrence", " + "
 RIG = TestRig(
     k2=np.repeat([5350.156, 4776.275, 2959.249], 3),
     y0=np.tile([-6.5e-3, -5e-3, -4e-3], 3),
@@ -44,14 +47,15 @@ RIG = TestRig(
 )
 
 
-def resolved() -> list[tuple[str, Oscillator, np.ndarray]]:
-    """Effects that need steps, with their oscillators and parameter vectors (d,)."""
-    found = []
-    for effect in MOVING:
-        oscillator = build_oscillator(RIG.campaign(), [effect])
+def resolved(together: int) -> Iterator[tuple[str, Callable[[], np.ndarray]]]:
+    """Sets of so many effects that need the general path: names, and what simulates them."""
+    for effects in combinations(MOVING, together):
+        oscillator = build_oscillator(RIG.campaign(), effects)
         if not oscillator.is_base:
-            found.append((effect.id, oscillator, RIG.theta(oscillator, typical(effect, RIG))))
-    return found
+            values = {k: v for effect in effects for k, v in typical(effect, RIG).items()}
+            slots = oscillator.layout.slots(RIG.theta(oscillator, values)[None])[0]
+            name = PLUS.join(effect.id for effect in effects)
+            yield name, partial(oscillator.motions_of, np.arange(9), slots)
 
 
 def child(scale: float, file: str) -> None:
@@ -67,9 +71,9 @@ def child(scale: float, file: str) -> None:
     subjects: dict[str, Callable[[], Any]] = {
         PLAIN: lambda: recurrence.sums_of_squares(theta, *rest)
     }
-    for effect, oscillator, values in resolved():
-        slots = oscillator.layout.slots(values[None])[0]
-        subjects[effect] = partial(oscillator.motions_of, np.arange(9), slots)
+    subjects |= resolved(1)
+    if scale in PAIRED:
+        subjects |= resolved(2)
     result: dict[str, Any] = {f"{effect}.y": run() for effect, run in subjects.items()}
     for effect, taken in rounds(subjects, ROUNDS, REPEATS).items():
         result[f"{effect}.s"] = np.median(taken)
@@ -93,23 +97,31 @@ def measure() -> dict[str, Any]:
     def apart(one: dict[str, Any], other: dict[str, Any], effect: str) -> float:
         return float(np.abs(one[f"{effect}.y"] - other[f"{effect}.y"]).max())
 
-    def cost(effect: str) -> list[float]:
-        return [float(runs[scale][f"{effect}.s"]) / samples * 1e9 for scale in SCALES]
+    def cost(effect: str, scales: tuple[float, ...] = SCALES) -> list[float]:
+        return [float(runs[scale][f"{effect}.s"]) / samples * 1e9 for scale in scales]
 
-    effects = {}
-    for effect in (name[:-2] for name in finest if name.endswith(".y")):
-        if effect == PLAIN:
-            continue
-        effects[effect] = {
-            "ns_per_sample": cost(effect),
-            "error_m": [apart(runs[s], finest, effect) for s in SCALES[:-1]],
-            "halving_m": apart(runs[1.0], runs[0.5], effect),
-        }
+    def halving(effect: str) -> float:
+        return apart(runs[1.0], runs[0.5], effect)
+
+    names = [name[:-2] for name in runs[1.0] if name.endswith(".y") and name[:-2] != PLAIN]
     return {
         "samples": samples,
         "scales": list(SCALES),
         "recurrence_ns_per_sample": cost(PLAIN),
-        "effects": effects,
+        "effects": {
+            effect: {
+                "ns_per_sample": cost(effect),
+                "error_m": [apart(runs[s], finest, effect) for s in SCALES[:-1]],
+                "halving_m": halving(effect),
+            }
+            for effect in names
+            if PLUS not in effect
+        },
+        "pairs": {
+            pair: {"ns_per_sample": cost(pair, (1.0,))[0], "halving_m": halving(pair)}
+            for pair in names
+            if PLUS in pair
+        },
     }
 
 

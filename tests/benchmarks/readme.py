@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Iterable
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from bayesimpact.model import effects
@@ -98,7 +99,20 @@ def added_table() -> str:
     rows += [row_of(effect, row) for effect, row in ranked]
     change = "change with half the steps, m"
     head = ("added effect", "ns per sample", "over the first", change, "at what cost")
-    return grid(head, rows, measured(a, f"{a['samples']:,} samples, one thread"))
+    note = measured(a, f"{a['samples']:,} samples, one thread")
+    return grid(head, rows, f"{of_pairs(a['pairs'])} {note}")
+
+
+def of_pairs(pairs: dict[str, dict[str, float]]) -> str:
+    """Cost and error of two added effects, in words."""
+    costs = {name: row["ns_per_sample"] for name, row in pairs.items()}
+    dearest = max(costs, key=costs.__getitem__)
+    return (
+        f"All {len(costs)} pairs of effects: median {median(costs.values()):.0f} ns, "
+        f"{sum(cost <= 40 for cost in costs.values())} within 40 ns, at most {costs[dearest]:.0f} "
+        f"({dearest.replace('_', ' ')}); half the steps change them by "
+        f"{max(row['halving_m'] for row in pairs.values()):.0e} m at most."
+    )
 
 
 def samplers_table() -> str:
