@@ -22,6 +22,7 @@ from bayesimpact.model.added.method import quarters
 from bayesimpact.model.added.rest import hold
 from bayesimpact.model.added.situation import (
     HEADING,
+    LEAVE,
     NONE,
     SIDES,
     SLIDING,
@@ -79,7 +80,7 @@ def cruise(y: Any, v: Any, n0: Any, j: Any, stride: Any, end: Any, flow: Any, w:
         t = (j - 1) * w.interval
         w.s[HEADING] = heading(v, w)
         y1, v1, n1 = step(y, v, t, n0, at, flow, w)
-        event = suspicious(y, v, y1, v1, t + h, h, flow, w)
+        event = suspicious(y, v, n0, y1, v1, n1, t + h, h, flow, w)
         if event:
             break
         fill_in(j, j + stride - 1, t, True, at, flow, w, y, v, n0, h, y1, v1, n1)
@@ -123,7 +124,7 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
                 at = quarters(h, flow.b, flow.K, flow.inverse)
             y1, v1, n1 = step(y, v, t, n0, at, flow, w)
         length = h
-        if expected or suspicious(y, v, y1, v1, t + h, h, flow, w):
+        if expected or suspicious(y, v, n0, y1, v1, n1, t + h, h, flow, w):
             event, length, y1, v1, n1 = first_event(y, v, t, n0, h, y1, v1, n1, flow, w)
         lands = lands and event == NONE
         reached = min(int((t + length) / w.interval + 0.5 * lands) + 1, w.n)
@@ -137,7 +138,8 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
         ramp *= 2.0
         if flow.memory:
             keep_memory(w)
-        settle(y, v, t, w)
+        if event != LEAVE:
+            settle(y, v, t, w)
         if event != NONE:
             break
     if flow.touching == 0.0 and not flow.memory:

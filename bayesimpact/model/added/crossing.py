@@ -4,8 +4,23 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from bayesimpact.model.added.method import quarters
-from bayesimpact.model.added.situation import GAP, HEADING, NONE, TURN, event_value, passed
+from bayesimpact.model.added.situation import (
+    GAP,
+    HEADING,
+    LEAVE,
+    NEVER,
+    NONE,
+    ONCE,
+    PUSHED,
+    SOON,
+    TURN,
+    event_value,
+    one_sided,
+    passed,
+)
 from bayesimpact.model.added.step import step
 from bayesimpact.model.added.world import AHEAD, NOW
 from bayesimpact.model.compiled import inner, typed
@@ -118,9 +133,53 @@ def turn_matters(y: Any, v: Any, y1: Any, v1: Any, h: Any, flow: Any, w: Any) ->
     return min(y, y1) - reach < w.s[GAP] < max(y, y1) + reach
 
 
+@inner()
+def foresee_push(
+    y: Any,
+    v: Any,
+    n0: Any,
+    y1: Any,
+    v1: Any,
+    n1: Any,
+    t1: Any,
+    h: Any,
+    flow: Any,
+    w: Any,
+) -> Any:
+    """Whether the reaction, negative at both ends of a step, is positive within: SOON, else NEVER.
+
+    Judged by the cubic through values and slopes at the ends.
+    """
+    if not (flow.touching == 1.0 and w.s[PUSHED] != ONCE and one_sided(w.q)):
+        return
+    w.s[PUSHED] = SOON  # LEAVE now stands for the reaction's way through zero
+    column, short = AHEAD if flow.memory else NOW, 1e-6 * h
+    f0, d0, _ = value_and_slope(LEAVE, y, v, t1 - h, n0, NOW, short, flow, w)
+    f1, d1, _ = value_and_slope(LEAVE, y1, v1, t1, n1, column, short, flow, w)
+    w.s[PUSHED] = NEVER
+    if d0 > 0.0 > d1 and f1 < 0.0:
+        d0, d1 = h * d0, h * d1
+        c2, c3 = 3.0 * (f1 - f0) - 2.0 * d0 - d1, 2.0 * (f0 - f1) + d0 + d1
+        x = d0 / (np.sqrt(c2 * c2 - 3.0 * c3 * d0) - c2)  # the summit
+        if f0 + x * (d0 + x * (c2 + x * c3)) > 0.0:
+            w.s[PUSHED] = SOON
+
+
 @inner(forceinline=True)
-def suspicious(y: Any, v: Any, y1: Any, v1: Any, t1: Any, h: Any, flow: Any, w: Any) -> Any:
+def suspicious(
+    y: Any,
+    v: Any,
+    n0: Any,
+    y1: Any,
+    v1: Any,
+    n1: Any,
+    t1: Any,
+    h: Any,
+    flow: Any,
+    w: Any,
+) -> Any:
     """True when a step of length h from (y, v) to (y1, v1) at t1 contains an event."""
+    foresee_push(y, v, n0, y1, v1, n1, t1, h, flow, w)
     column = AHEAD if flow.memory else NOW
     return (
         turn_matters(y, v, y1, v1, h, flow, w) or passed(y1, v1, t1, column, NONE, flow, w) != NONE
@@ -150,6 +209,8 @@ def first_event(
         event = typed(TURN)
         length, y1, v1, n1 = locate(event, y, v, t, n0, h, y1, v1, n1, flow, w)
     for _ in range(ROUNDS):
+        if length < h and event != LEAVE:
+            foresee_push(y, v, n0, y1, v1, n1, t + length, length, flow, w)
         found = passed(y1, v1, t + length, column, event, flow, w)
         if found == NONE:
             break

@@ -40,6 +40,7 @@ from bayesimpact.model.compiled import inner
 # motion, whether the obstacle has pushed in this contact, then the side of every law's surface
 GAP, MODE, SLIDING, HEADING, PUSHED, SIDES = range(6)
 FREE, TOUCHING, SEPARATED = 0.0, 1.0, 2.0
+NEVER, SOON, ONCE = 0.0, 0.5, 1.0  # the obstacle has pushed in this contact; SOON: in this step
 NONE, TOUCH, LEAVE, TURN, SURFACE = range(-1, 4)  # SURFACE + i: surface of law i
 
 
@@ -79,7 +80,7 @@ def event_value(event: Any, y: Any, v: Any, t: Any, column: Any, w: Any) -> Any:
     if event == TOUCH:
         return s[GAP] - y if s[MODE] == FREE else -reaction(y, v, t, column, w)
     if event == LEAVE:
-        pushed = one_sided(w.q) and s[PUSHED] != 0.0
+        pushed = one_sided(w.q) and s[PUSHED] != NEVER
         return reaction(y, v, t, column, w) if pushed else y - s[GAP]
     if event == TURN:
         return v * s[HEADING]
@@ -100,7 +101,7 @@ def passed(y: Any, v: Any, t: Any, column: Any, known: Any, flow: Any, w: Any) -
     """An event other than `known` that lies behind this point of the trajectory, or NONE."""
     if w.s[MODE] == TOUCHING:
         if known != LEAVE and event_value(LEAVE, y, v, t, column, w) < 0.0:
-            unpushed = one_sided(w.q) and w.s[PUSHED] == 0.0
+            unpushed = one_sided(w.q) and w.s[PUSHED] == NEVER
             if not unpushed or reaction(y, v, t, column, w) <= 0.0:
                 return LEAVE
     elif known != TOUCH and event_value(TOUCH, y, v, t, column, w) < 0.0:
@@ -124,7 +125,7 @@ def begin(w: Any) -> Any:
     if y > s[GAP]:
         s[MODE] = TOUCHING
         push = reaction(y, v, 0.0, NOW, w)
-        s[PUSHED] = 1.0 if push > 0.0 else 0.0
+        s[PUSHED] = ONCE if push > 0.0 else NEVER
         if one_sided(q) and push <= 0.0:
             s[MODE] = SEPARATED
     set_sides(y, v, 0.0, w)
@@ -170,10 +171,10 @@ def resolve(event: Any, y: Any, v: Any, t: Any, w: Any) -> Any:
             y = s[GAP]
             v *= w.mass / (w.mass + q[CONTACT_MASS])
         s[MODE] = TOUCHING
-        s[PUSHED] = 1.0 if reaction(y, v, t, NOW, w) > 0.0 else 0.0
+        s[PUSHED] = ONCE if reaction(y, v, t, NOW, w) > 0.0 else NEVER
         set_sides(y, v, t, w)
     elif event == LEAVE:
-        if not (one_sided(q) and s[PUSHED] != 0.0):
+        if not (one_sided(q) and s[PUSHED] != NEVER):
             y = s[GAP]
         s[GAP] += q[GAP_STEP]
         s[MODE] = SEPARATED if y > s[GAP] else FREE
@@ -201,6 +202,5 @@ def settle(y: Any, v: Any, t: Any, w: Any) -> Any:
     s = w.s
     if s[MODE] == SEPARATED and y < s[GAP]:
         s[MODE] = FREE
-    unpushed = s[MODE] == TOUCHING and s[PUSHED] == 0.0 and one_sided(w.q)
-    if unpushed and reaction(y, v, t, NOW, w) > 0.0:
-        s[PUSHED] = 1.0
+    if s[MODE] == TOUCHING and s[PUSHED] != ONCE and one_sided(w.q):
+        s[PUSHED] = ONCE if reaction(y, v, t, NOW, w) > 0.0 else NEVER
