@@ -11,19 +11,18 @@ from bayesimpact.inference.posterior import Posterior
 from bayesimpact.report import archive_arviz
 from bayesimpact.report.archive import load_results, save_results, write_text
 from bayesimpact.report.build import results_from_fit, results_from_posterior
-from bayesimpact.report.figures.save import all_figures, save_figures
+from bayesimpact.report.figures.shares import save_all
 from bayesimpact.report.groups import inference_groups
 from bayesimpact.report.html import render
 from bayesimpact.report.results import Array, Results
 
 REPORT_FILE = "report.html"
 POSTERIOR_FILE = "posterior.nc"
-FIGURES = "figures"
 
 
 def write_report(results: Results, folder: Path) -> Path:
-    """Figures and report.html of some results into an existing folder; path of the page."""
-    pictures = save_figures(all_figures(results), folder / FIGURES)
+    """Figures and report.html of the results that a folder holds; path of the page."""
+    pictures = save_all(results, folder)
     page = folder / REPORT_FILE
     write_text(page, render(results, pictures))
     return page

@@ -1,4 +1,4 @@
-"""Figures of a diagnosis; drawn from `Results.diagnosis` and `Results.diagnosis_arrays`."""
+"""Who draws the figures of a diagnosis, from `Results.diagnosis` and `Results.diagnosis_arrays`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ from bayesimpact.report.figures.improvement import improvement_figures
 from bayesimpact.report.figures.ranking import ranking_figures
 from bayesimpact.report.results import Results
 
-DRAWERS: tuple[Callable[[Results], Mapping[str, Figure]], ...] = (
+Drawer = Callable[[Results], Mapping[str, Figure]]
+
+DRAWERS: tuple[Drawer, ...] = (
     force_figures,
     gain_figures,
     ranking_figures,
@@ -23,10 +25,3 @@ DRAWERS: tuple[Callable[[Results], Mapping[str, Figure]], ...] = (
     gaussian_figures,
 )
 """Functions from results to figures by name; each returns {} when its arrays are not there."""
-
-
-def diagnosis_figures(results: Results) -> dict[str, Figure]:
-    """Figures by name; {} without a diagnosis."""
-    if results.diagnosis is None:
-        return {}
-    return {name: figure for draw in DRAWERS for name, figure in draw(results).items()}

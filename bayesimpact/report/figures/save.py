@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from bayesimpact.report.archive import atomic
 from bayesimpact.report.figures.backbone import backbone_figures
 from bayesimpact.report.figures.corner import corner_figure
-from bayesimpact.report.figures.diagnosis import diagnosis_figures
+from bayesimpact.report.figures.diagnosis import DRAWERS as DIAGNOSIS
+from bayesimpact.report.figures.diagnosis import Drawer
 from bayesimpact.report.figures.recordings import recording_figures
 from bayesimpact.report.figures.search import search_figure
 from bayesimpact.report.figures.style import STYLE
@@ -24,22 +25,32 @@ DPI = 150
 
 
 def all_figures(results: Results) -> dict[str, Figure]:
-    """Every figure that the results allow, by the name of its file."""
-    figures = dict(diagnosis_figures(results))
-    figures |= recording_figures(results)
-    if results.draws is not None:
-        truths = {
-            r.name: r.references[PUBLISHED] for r in results.rows if PUBLISHED in r.references
-        }
-        figures["corner"] = corner_figure(
-            results.draws, before=results.before, truths=truths, truth_label=PUBLISHED
-        )
-    figures |= backbone_figures(results)
-    if results.search is not None:
-        figures["search"] = search_figure(results.search)
-    if results.sampler is not None:
-        figures["traces"] = trace_figure(results.sampler)
-    return figures
+    """Every figure that the results allow, by the name of its file, in the order of the page."""
+    return {name: figure for draw in drawers(results) for name, figure in draw(results).items()}
+
+
+def drawers(results: Results) -> tuple[Drawer, ...]:
+    """Functions from results to figures by name; each may find nothing to draw."""
+    told = () if results.diagnosis is None else DIAGNOSIS
+    return (*told, recording_figures, _corner, backbone_figures, _search, _traces)
+
+
+def _corner(results: Results) -> dict[str, Figure]:
+    if results.draws is None:
+        return {}
+    truths = {r.name: r.references[PUBLISHED] for r in results.rows if PUBLISHED in r.references}
+    figure = corner_figure(
+        results.draws, before=results.before, truths=truths, truth_label=PUBLISHED
+    )
+    return {"corner": figure}
+
+
+def _search(results: Results) -> dict[str, Figure]:
+    return {} if results.search is None else {"search": search_figure(results.search)}
+
+
+def _traces(results: Results) -> dict[str, Figure]:
+    return {} if results.sampler is None else {"traces": trace_figure(results.sampler)}
 
 
 def save_figures(figures: Mapping[str, Figure], folder: Path) -> dict[str, bytes]:
