@@ -47,6 +47,7 @@ PAIRS = 4  # refitted at the first step
 STARTS = 2  # points of an effect's shape grid from which it is fitted
 SHORT = 60.0  # by how much a climb that gave up may have fallen short, nats
 EXCHANGES = 3  # rounds of leaving out and exchanging effects
+SAME = 0.05  # nats; two climbs to one mode differ by less
 
 Progress = Callable[[str], None]
 
@@ -106,7 +107,9 @@ class _Search:
         if is_gross(candidate.fit) and shakes_in_own_band(candidate.fit):
             candidate = replace(candidate, log_evidence=-np.inf)
         held = self.tried.get(key)
-        if held is None or candidate.log_evidence > held.log_evidence:
+        sooner = candidate.fit.converged and not (held and held.fit.converged)
+        least = SAME * (-1 if sooner else 1)
+        if held is None or candidate.log_evidence > held.log_evidence + least:
             self.tried[key] = candidate
         return self.tried[key]
 
@@ -210,7 +213,8 @@ class _Search:
             return state
         for effect in chosen.effects:
             if any(p.is_shape and not p.circular for p in effect.parameters):
-                rest = self.drop(chosen, effect)
+                smaller = frozenset(chosen.ids) - {effect.id}
+                rest = self.tried[smaller] if self.is_known(smaller) else self.drop(chosen, effect)
                 found = scan(rest.fit, [effect], self.scales, rng=self.rng)
                 for score in found.best():
                     for start in found.starts(score, STARTS):
@@ -290,14 +294,16 @@ class _Search:
 
     def naming(self, base: State, chosen: State) -> Naming:
         tried = tuple(sorted(self.tried.values(), key=self.worth, reverse=True))
-        best = self.best(len(chosen.candidate.effects))
-        if set(best.ids) != set(chosen.candidate.ids):
-            chosen = self.examine(best)
+        if chosen.is_white or is_gross(base.candidate.fit):  # else no name can be given
+            best = self.best(len(chosen.candidate.effects))
+            if set(best.ids) != set(chosen.candidate.ids):
+                chosen = self.examine(best)
         contact = missing_contact(base.candidate.fit, self.scales, rng=self.rng)
         odds = -np.inf
         many = len(chosen.candidate.effects) >= MANY and not is_gross(base.candidate.fit)
         if contact is not None and many:
-            self.progress("fitting a force in contact in place of " + " + ".join(best.ids))
+            replaced = " + ".join(chosen.candidate.ids)
+            self.progress(f"fitting a force in contact in place of {replaced}")
             fit = learn_force(base.candidate.fit, contact, self.scales)
             odds = model_evidence(fit) - base.candidate.log_evidence
         return Naming(base, chosen, tried, self.cost, self.spread(), contact, odds)

@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 
 FIRST = 0.2  # first move along the logarithm of the shape
 CLOSE = 0.02  # in that logarithm: how near the mode is found
+ENOUGH = 0.02  # nats: or so little above it
 FARTHEST = 5.0  # that the shape is followed, in its logarithm
 MOST = 12  # moves, and as many more of Brent's method
 ITERATIONS = 10  # of a climb beside the valley
@@ -114,6 +115,14 @@ class _Profile:
             self,
             bracket=(low, middle, high),
             method="brent",
-            options={"xtol": CLOSE / max(1.0, abs(middle)), "maxiter": MOST},
+            options={
+                "xtol": max(CLOSE, self.width(low, middle, high)) / max(1.0, abs(middle)),
+                "maxiter": MOST,
+            },
         )
         return True
+
+    def width(self, *bracket: float) -> float:
+        """How far from the lowest point of the parabola through three it lies ENOUGH higher."""
+        curvature = np.polyfit(np.array(bracket) - bracket[1], [self(x) for x in bracket], 2)[0]
+        return float(np.sqrt(ENOUGH / curvature))
