@@ -78,7 +78,7 @@ def name(
         if not state.is_white:
             state = search.restarted(state)
         if not state.is_white:
-            singles = [c for c in better[1:] if len(c.effects) == 1]
+            singles = [c for c in better[1:] if len(c.effects) == 1 and c.log_evidence > -np.inf]
             beam = [state, *(search.examine(c) for c in singles[: BEAM - 1])]
     if state.is_white or is_gross(base.candidate.fit):  # else no name can be given
         state = search.settled(state)
@@ -104,7 +104,7 @@ class _Search:
 
     def keep(self, candidate: Candidate) -> Candidate:
         key = frozenset(candidate.ids)
-        if is_gross(candidate.fit) and shakes_in_own_band(candidate.fit):
+        if shakes_in_own_band(candidate.fit, is_gross(candidate.fit)):
             candidate = replace(candidate, log_evidence=-np.inf)
         held = self.tried.get(key)
         sooner = candidate.fit.converged and not (held and held.fit.converged)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy import stats
 from scipy.signal import czt
 
+from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.directions import is_periodic, sigma_of
 from bayesimpact.diagnosis.force import whitened_one
 from bayesimpact.diagnosis.scores import LIMIT_SD, Score
@@ -75,30 +76,42 @@ def frequencies(fit: Fit, effect: Effect, scales: Scales) -> Array:
     return np.arange(max(2 * spacing, lowest), highest, spacing)
 
 
-def shakes_in_own_band(fit: Fit) -> bool:
+def shakes_in_own_band(fit: Fit, gross: bool) -> bool:
     """True when the model has a harmonic force at a frequency at which the motion swings anyway.
 
     There a decaying motion and a forced one differ only by phase, and the force passes for any slow
-    change of frequency or damping.
+    change of frequency or damping: over the whole band where the misfit is `gross`, and always
+    where the recordings are too short to tell both frequencies apart.
     """
     names = [f"{e.id}.frequency" for e in fit.target.oscillator.effects if _is_force(e)]
     found = [float(fit.mode[fit.names.index(name)]) for name in names]
-    return any(_swings(fit, frequency) for frequency in found)
+    recordings = fit.target.oscillator.campaign.recordings
+    swings = _swings if gross else _is_unresolved
+    return any(swings(recording, frequency) for frequency in found for recording in recordings)
 
 
 def _is_force(effect: Effect) -> bool:
     return is_periodic(effect) and effect.observe is None
 
 
-def _swings(fit: Fit, frequency: float) -> bool:
-    """Whether any recording has a good part of its spectrum's peak at a frequency, Hz."""
-    for recording in fit.target.oscillator.campaign.recordings:
-        spectrum = np.abs(np.fft.rfft(recording.samples - recording.samples.mean()))
-        at = frequency * recording.samples.size * recording.interval
-        near = spectrum[max(1, int(at) - 1) : int(at) + 3]
-        if near.size and near.max() > OWN_BAND * spectrum[1:].max():
-            return True
-    return False
+def _spectrum(recording: Recording) -> Array:
+    """Amplitudes at multiples of the reciprocal of the duration, but for the mean."""
+    return np.abs(np.fft.rfft(recording.samples - recording.samples.mean()))
+
+
+def _swings(recording: Recording, frequency: float) -> bool:
+    """Whether a recording has a good part of its spectrum's peak at a frequency, Hz."""
+    spectrum = _spectrum(recording)
+    at = frequency * recording.samples.size * recording.interval
+    near = spectrum[max(1, int(at) - 1) : int(at) + 3]
+    return bool(near.size and near.max() > OWN_BAND * spectrum[1:].max())
+
+
+def _is_unresolved(recording: Recording, frequency: float) -> bool:
+    """Whether a recording's strongest line lies closer to a frequency, Hz, than its duration can
+    separate."""
+    peak = 1 + int(np.argmax(_spectrum(recording)[1:]))
+    return abs(frequency * recording.samples.size * recording.interval - peak) < 1.0
 
 
 def _best_frequency(fit: Fit, effect: Effect, scales: Scales) -> Score | None:

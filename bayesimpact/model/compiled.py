@@ -19,6 +19,7 @@ from typing import Any
 import numba
 import numpy as np
 from numba.core import event
+from numba.core.caching import NullCache
 from numba.core.ccallback import CFunc
 from numba.core.sigutils import normalize_signature
 
@@ -119,9 +120,10 @@ class _Announcer(event.Listener):  # type: ignore[misc]
 
     def on_start(self, event: Any) -> None:
         if not self.starts:
-            function = event.data["dispatcher"].py_func
-            name = f"{function.__module__}.{function.__name__}"
-            self.say(f"compiling {name}, once: later runs find it in the cache")
+            dispatcher = event.data["dispatcher"]
+            kept = not isinstance(dispatcher._cache, NullCache)
+            name = f"{dispatcher.py_func.__module__}.{dispatcher.py_func.__name__}"
+            self.say(f"compiling {name}" + ", once: later runs find it in the cache" * kept)
         self.starts.append(time.perf_counter())
 
     def on_end(self, event: Any) -> None:

@@ -101,17 +101,24 @@ def test_a_model_without_a_line_has_nothing_to_be_steady(small):
     assert steadiness(small.fit, campaign_scales(small.fit)) == ()
 
 
-@pytest.mark.parametrize(("factor", "own"), [(1.0, True), (1.7, False)])
-def test_a_force_in_the_band_of_the_motion_is_told_apart(factor, own):
-    """A plain oscillator swings at one frequency only; a force elsewhere may be one."""
+@pytest.mark.parametrize(
+    ("apart", "gross", "own"),
+    [(0.0, True, True), (0.0, False, True), (0.7, False, True), (2.0, False, False),
+     (10.0, True, False)],
+)  # fmt: skip
+def test_a_force_in_the_band_of_the_motion_is_told_apart(apart, gross, own):
+    """A plain oscillator swings at one frequency only; a force elsewhere may be one.
+
+    `apart`: between both frequencies, in units of the reciprocal of the duration.
+    """
     rig, releases = small_rig.PLAIN, small_rig.PLAIN_RELEASES
     fit = identify(
         small_rig.record(rig=rig, releases=releases), rng=np.random.default_rng(0), search=False
     ).fit
-    assert not shakes_in_own_band(fit)
+    assert not shakes_in_own_band(fit, gross)
     scales, effects = campaign_scales(fit), (BY_ID["harmonic_forcing"],)
     target = extend(fit, effects, scales)
-    frequency = factor * np.sqrt(rig.k1 / rig.mass) / (2 * np.pi)
+    frequency = np.sqrt(rig.k1 / rig.mass) / (2 * np.pi) + apart / scales.duration
     shapes = {"harmonic_forcing.frequency": frequency}
     mode = transfer(fit, target.oscillator.layout, effects, scales, shapes)
-    assert shakes_in_own_band(replace(fit, target=target, mode=mode)) is own
+    assert shakes_in_own_band(replace(fit, target=target, mode=mode), gross) is own
