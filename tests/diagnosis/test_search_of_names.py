@@ -108,6 +108,7 @@ def run(monkeypatch):
     def go(table: Table, effects=EFFECTS):
         monkeypatch.setattr(search, "refit", table.refit)
         monkeypatch.setattr(search, "without", table.without)
+        monkeypatch.setattr(search, "shakes_in_own_band", lambda fit, gross: False)
         monkeypatch.setattr(search, "scan", table.scan)
         monkeypatch.setattr(search, "followed", table.followed)
         monkeypatch.setattr(search, "model_evidence", lambda fit: fit.gain)
