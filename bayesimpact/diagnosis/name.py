@@ -124,6 +124,9 @@ class _Search:
         drift = missing_drift(candidate.fit, self.scales, rng=self.rng)
         state = State(candidate, found, force, drift)
         self.states[frozenset(candidate.ids)] = state
+        gave_up = candidate.effects and not candidate.fit.converged
+        if gave_up and state.unknown.log_evidence < SHORT:  # else more is missing than that
+            return self.examine(self.finished(candidate))
         return state
 
     def extended(self, state: State) -> list[Candidate]:
@@ -265,9 +268,10 @@ class _Search:
         models = {frozenset(c.ids): c for c in candidates}
         if self.force_worth() > best + SHORT:
             best = np.inf  # a free force wins anyhow
-        for key, candidate in models.items():
-            if self.worth(candidate) > best - SHORT and not candidate.fit.converged:
-                models[key] = self.finished(candidate)
+        near = [key for key, c in models.items() if self.worth(c) > best - SHORT]
+        for key in near:
+            if len(near) > 1 and not models[key].fit.converged:
+                models[key] = self.finished(models[key])
         return sorted(models.values(), key=self.worth, reverse=True)
 
     def finished(self, candidate: Candidate) -> Candidate:

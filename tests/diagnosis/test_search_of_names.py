@@ -210,6 +210,14 @@ def test_a_climb_that_gave_up_near_the_best_is_finished_before_it_loses(run):
     assert table.finished == [frozenset({A})]  # once, and none that is far behind
 
 
+@pytest.mark.parametrize(("beside", "finished"), [(0.0, True), (20.0, False)])
+def test_the_best_model_s_valley_is_followed_where_that_may_be_all_it_lacks(run, beside, finished):
+    """A free force beside it gains 50 nats, or 70: more than a climb that gave up fell short of."""
+    table = Table({A: 470.0}, force=520.0, beside=beside, unfinished={A: 40.0})
+    assert run(table).chosen.is_white == finished
+    assert table.finished == [frozenset({A})] * finished
+
+
 def test_no_valley_is_followed_where_a_free_force_wins_anyhow(run):
     table = Table({A: 100.0, B: 120.0}, force=900.0, unfinished={A: 60.0})
     assert chosen(run(table)) != {A}
