@@ -160,6 +160,7 @@ def startup_table() -> str:
         for label, key in (
             ("`bayesimpact --help`", "help"),
             ("first likelihood, compiled before", "first_likelihood"),
+            ("mode from raw recordings, compiled before", "mode"),
             ("first likelihood, nothing compiled", "cold_first_likelihood"),
             ("everything compiled anew", "cold"),
         )

@@ -5,7 +5,8 @@
 Every number is the wall time of a fresh process, and beside it its processor time, which a busy
 machine lengthens less. `help`: `bayesimpact --help`. `first_likelihood`: read the bundled campaign
 and compute one likelihood, everything compiled before and found in the cache; also what an
-interpreter and numba's import take of it. `cold`: everything that the package compiles (simulator
+interpreter and numba's import take of it. `mode`: from the same files to the mode, with the global
+search, nothing given. `cold`: everything that the package compiles (simulator
 and likelihood on one and on several threads, derivatives, the general simulator, all effects' laws)
 with an empty NUMBA_CACHE_DIR; `cold_first_likelihood`: the first likelihood with one. Writes
 startup.json beside this file.
@@ -47,6 +48,15 @@ theta = np.array([values[name if name in values else name.split("[")[0]] for nam
 likelihood = Likelihood(oscillator, Noise())
 value = likelihood(theta)
 assert np.isfinite(value).all()
+"""
+
+MODE = f"""
+import numpy as np
+from bayesimpact.data.read import load_campaign
+from bayesimpact.inference.identify import identify
+
+fit = identify(load_campaign({str(PAPER)!r}), rng=np.random.default_rng(0)).fit
+assert fit.converged and fit.reduced_chi2 < 1.05
 """
 
 EVERYTHING = (
@@ -119,6 +129,7 @@ def measure(runs: int = RUNS) -> dict[str, Any]:
         time_it("cold", python(EVERYTHING), cache, 1)
         time_it("warm", python(EVERYTHING), cache)
         time_it("first_likelihood", python(FIRST), cache)
+        time_it("mode", python(MODE), cache)
     return result
 
 
