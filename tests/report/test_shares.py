@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,8 +9,8 @@ import pytest
 from diagnosed import diagnosed
 
 from bayesimpact.report.archive import save_results
-from bayesimpact.report.figures.save import all_figures
-from bayesimpact.report.figures.shares import save_all
+from bayesimpact.report.figures.save import all_figures, drawers
+from bayesimpact.report.figures.shares import read, save_all, started
 from bayesimpact.report.results import Results
 
 
@@ -31,17 +30,16 @@ def test_two_processes_draw_what_one_does(told: Results, tmp_path: Path) -> None
         assert (tmp_path / "figures" / f"{name}.png").read_bytes() == data
 
 
+@pytest.mark.parametrize("interpreter", ["/bin/false", "/no/such/file"])
 def test_one_process_draws_all_where_no_other_starts(
-    told: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    told: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, interpreter: str
 ) -> None:
-    monkeypatch.setattr("sys.executable", "/bin/false")
-    begun: list[object] = []
-    usual = subprocess.Popen
-
-    def popen(*arguments: object, **options: object) -> object:
-        begun.append(arguments)
-        return usual(*arguments, **options)  # type: ignore[call-overload]
-
-    monkeypatch.setattr(subprocess, "Popen", popen)
+    monkeypatch.setattr("sys.executable", interpreter)
     assert list(save_all(told, tmp_path)) == list(all_figures(told))
-    assert len(begun) == 1
+
+
+def test_the_second_process_draws_every_other_group(told: Results, tmp_path: Path) -> None:
+    other = started(tmp_path)
+    assert other is not None
+    names, _ = other.communicate()
+    assert read(names, tmp_path).keys() == set(range(1, len(drawers(told)), 2))

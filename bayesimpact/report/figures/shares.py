@@ -29,18 +29,26 @@ def save_all(results: Results, folder: Path) -> dict[str, bytes]:
     -------
     The PNG files' content by name, in the order of the page.
     """
-    if results.diagnosis is None:  # too few figures for a second process to pay
+    # other results have too few figures for a second process to pay
+    other = started(folder) if results.diagnosis is not None else None
+    if other is None:
         pictures = save_share(results, folder, 0, 1)
     else:
-        command = [sys.executable, "-m", __name__, str(folder)]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as other:
+        with other:
             pictures = save_share(results, folder, 0, 2)
             told, _ = other.communicate()
-        # where no second interpreter starts, the first one draws everything
-        pictures |= (
-            read(told, folder) if other.returncode == 0 else save_share(results, folder, 1, 2)
-        )
+        done = other.returncode == 0
+        pictures |= read(told, folder) if done else save_share(results, folder, 1, 2)
     return {name: data for i in sorted(pictures) for name, data in pictures[i].items()}
+
+
+def started(folder: Path) -> subprocess.Popen[bytes] | None:
+    """The second process; None where no interpreter can be started."""
+    command = [sys.executable, "-m", __name__, str(folder)]
+    try:
+        return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    except OSError:
+        return None
 
 
 def save_share(results: Results, folder: Path, share: int, shares: int) -> Pictures:
