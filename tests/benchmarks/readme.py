@@ -160,7 +160,7 @@ def startup_table() -> str:
         for label, key in (
             ("`bayesimpact --help`", "help"),
             ("first likelihood, compiled before", "first_likelihood"),
-            ("mode from raw recordings, compiled before", "mode"),
+            ("mode from raw recordings, after imports", "mode"),
             ("first likelihood, nothing compiled", "cold_first_likelihood"),
             ("everything compiled anew", "cold"),
         )
@@ -252,10 +252,13 @@ def trials_table() -> str:
     return grid(("concealed", "answers"), rows, foot)
 
 
+SINGLES = ("singles_5", "singles_5_again", "singles_paper", "singles_paper_again", "singles_2")
+
+
 def single_table() -> str:
     """Blind trials of one effect of fixed size each."""
     rows, feet = [], []
-    for name in ("singles_5", "singles_paper", "singles_paper_again", "singles_2"):
+    for name in SINGLES:
         t = stored(name)
         benches = t["settings"]["benches"]
         said = [answer["outcome"] for answer in t["answers"]]

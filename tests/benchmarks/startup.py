@@ -6,7 +6,7 @@ Every number is the wall time of a fresh process, and beside it its processor ti
 machine lengthens less. `help`: `bayesimpact --help`. `first_likelihood`: read the bundled campaign
 and compute one likelihood, everything compiled before and found in the cache; also what an
 interpreter and numba's import take of it. `mode`: from the same files to the mode, with the global
-search, nothing given. `cold`: everything that the package compiles (simulator
+search, nothing given; measured inside the process, after its imports. `cold`: everything that the package compiles (simulator
 and likelihood on one and on several threads, derivatives, the general simulator, all effects' laws)
 with an empty NUMBA_CACHE_DIR; `cold_first_likelihood`: the first likelihood with one. Writes
 startup.json beside this file.
@@ -51,11 +51,15 @@ assert np.isfinite(value).all()
 """
 
 MODE = f"""
+import time
+
 import numpy as np
 from bayesimpact.data.read import load_campaign
 from bayesimpact.inference.identify import identify
 
+began, used = time.perf_counter(), time.process_time()
 fit = identify(load_campaign({str(PAPER)!r}), rng=np.random.default_rng(0)).fit
+print(time.perf_counter() - began, time.process_time() - used)
 assert fit.converged and fit.reduced_chi2 < 1.05
 """
 
@@ -95,14 +99,16 @@ def processor() -> float:
     return used.ru_utime + used.ru_stime
 
 
-def seconds(command: list[str], cache: str | None = None) -> tuple[float, float]:
-    """Wall and processor time, s, of a fresh process that must succeed.
+def seconds(command: list[str], cache: str | None = None) -> tuple[float, ...]:
+    """Wall and processor time, s, of a fresh process that must succeed, or what it prints of them.
 
     cache : its folder of compiled code
     """
     surroundings = dict(os.environ) | ({} if cache is None else {"NUMBA_CACHE_DIR": cache})
     began, used = time.perf_counter(), processor()
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=surroundings)
+    done = subprocess.run(command, check=True, stdout=subprocess.PIPE, env=surroundings, text=True)
+    if MODE in command:
+        return tuple(map(float, done.stdout.split()))
     return time.perf_counter() - began, processor() - used
 
 
