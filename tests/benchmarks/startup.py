@@ -6,10 +6,10 @@ Every number is the wall time of a fresh process, and beside it its processor ti
 machine lengthens less. `help`: `bayesimpact --help`. `first_likelihood`: read the bundled campaign
 and compute one likelihood, everything compiled before and found in the cache; also what an
 interpreter and numba's import take of it. `mode`: from the same files to the mode, with the global
-search, nothing given; measured inside the process, after its imports. `cold`: everything that the package compiles (simulator
-and likelihood on one and on several threads, derivatives, the general simulator, all effects' laws)
-with an empty NUMBA_CACHE_DIR; `cold_first_likelihood`: the first likelihood with one. Writes
-startup.json beside this file.
+search, nothing given; measured inside the process, after its imports. `cold`: everything that the
+package compiles (simulator and likelihood on one and on several threads, derivatives, the general
+simulator, all effects' laws) with an empty NUMBA_CACHE_DIR; `cold_first_likelihood`: the first
+likelihood with one. Writes startup.json beside this file.
 """
 
 from __future__ import annotations
