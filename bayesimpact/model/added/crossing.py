@@ -135,16 +135,7 @@ def turn_matters(y: Any, v: Any, y1: Any, v1: Any, h: Any, flow: Any, w: Any) ->
 
 @inner()
 def foresee_push(
-    y: Any,
-    v: Any,
-    n0: Any,
-    y1: Any,
-    v1: Any,
-    n1: Any,
-    t1: Any,
-    h: Any,
-    flow: Any,
-    w: Any,
+    y: Any, v: Any, n0: Any, y1: Any, v1: Any, n1: Any, t1: Any, h: Any, flow: Any, w: Any
 ) -> Any:
     """Whether the reaction, negative at both ends of a step, is positive within: SOON, else NEVER.
 
@@ -167,16 +158,7 @@ def foresee_push(
 
 @inner(forceinline=True)
 def suspicious(
-    y: Any,
-    v: Any,
-    n0: Any,
-    y1: Any,
-    v1: Any,
-    n1: Any,
-    t1: Any,
-    h: Any,
-    flow: Any,
-    w: Any,
+    y: Any, v: Any, n0: Any, y1: Any, v1: Any, n1: Any, t1: Any, h: Any, flow: Any, w: Any
 ) -> Any:
     """True when a step of length h from (y, v) to (y1, v1) at t1 contains an event."""
     foresee_push(y, v, n0, y1, v1, n1, t1, h, flow, w)
