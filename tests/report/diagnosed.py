@@ -6,8 +6,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from synthetic import make_results
 
+from bayesimpact.report.figures.diagnosis import DRAWERS
 from bayesimpact.report.force_arrays import POINTS
 from bayesimpact.report.results import Array, Results
 
@@ -104,3 +106,8 @@ def diagnosed(count: int = 3, cases: int = 2, *, sampled: bool = True, **changes
         diagnosis=content,
         diagnosis_arrays=made_up_arrays(count, cases),
     )
+
+
+def diagnosis_figures(results: Results) -> dict[str, Figure]:
+    """What the drawers of a diagnosis draw."""
+    return {name: figure for draw in DRAWERS for name, figure in draw(results).items()}

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagnosed import MODELS, diagnosed, made_up_arrays
+from diagnosed import MODELS, diagnosed, diagnosis_figures, made_up_arrays
 from matplotlib.collections import PathCollection
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
@@ -15,19 +15,13 @@ from matplotlib.text import Text
 
 from bayesimpact.report.archive import load_results, save_results
 from bayesimpact.report.captions import caption
-from bayesimpact.report.figures.diagnosis import DRAWERS
 from bayesimpact.report.figures.improvement import shifts
 from bayesimpact.report.figures.ranking import MOST, ranked
 from bayesimpact.report.figures.save import all_figures, png
 from bayesimpact.report.figures.style import AFTER, BLACK
-from bayesimpact.report.results import Results
 from bayesimpact.report.write import rewrite_report
 
 NAMES = {"force_map", "gain", "ranking", "limits", "improvement", "shifts", "bands"}
-
-
-def diagnosis_figures(results: Results) -> dict[str, Figure]:
-    return {name: figure for draw in DRAWERS for name, figure in draw(results).items()}
 
 
 def words(figure: Figure) -> str:

@@ -8,13 +8,12 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pytest
-from diagnosed import diagnosed
+from diagnosed import diagnosed, diagnosis_figures
 from matplotlib.figure import Figure
 from synthetic import make_results
 
 from bayesimpact.report.figures.backbone import deviation
 from bayesimpact.report.figures.corner import corner_figure
-from bayesimpact.report.figures.diagnosis import diagnosis_figures
 from bayesimpact.report.figures.recordings import MOST, recording_figures, shown_recordings
 from bayesimpact.report.figures.save import all_figures, file_name, png, save_figures
 from bayesimpact.report.figures.style import polyline, scaled, symbol
