@@ -26,6 +26,7 @@ from bayesimpact.inference.identify import Identification, identify
 from bayesimpact.inference.spectrum import Fingerprint
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.effects.effect import Effect, Scales
+from bayesimpact.model.threads import linear_algebra_alone
 
 Array = NDArray[np.float64]
 NEARLY_ALL = 0.9  # of the squared residual
@@ -78,6 +79,7 @@ class Diagnosis:
         return self.verdict in ("named", "ambiguous") and not self.naming.chosen.is_white
 
 
+@linear_algebra_alone()
 def diagnose(
     campaign: Campaign,
     *,
@@ -129,6 +131,7 @@ def with_smoothing(
     )
 
 
+@linear_algebra_alone()
 def diagnose_fit(
     identification: Identification,
     *,

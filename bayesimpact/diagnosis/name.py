@@ -8,28 +8,24 @@ physics and decide between near-opposites that scores cannot tell apart.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 
 import numpy as np
 
 from bayesimpact.diagnosis.evidence import model_evidence
-from bayesimpact.diagnosis.force import missing_contact, missing_drift, missing_force
+from bayesimpact.diagnosis.force import missing_contact
+from bayesimpact.diagnosis.models import SHORT, STARTS, Models, Progress
 from bayesimpact.diagnosis.naming import DECISIVE, Naming, State, is_gross
 from bayesimpact.diagnosis.pairs import promising_pairs
-from bayesimpact.diagnosis.periodic import shakes_in_own_band
 from bayesimpact.diagnosis.refit import (
     Candidate,
     base_candidate,
     correlation_spread,
-    refit,
     tempered_evidence,
-    without,
 )
-from bayesimpact.diagnosis.scan import Scan, scan
+from bayesimpact.diagnosis.scan import Scan
 from bayesimpact.diagnosis.scores import Score
 from bayesimpact.diagnosis.unknown import learn_force
-from bayesimpact.diagnosis.valley import followed
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
 
@@ -44,12 +40,7 @@ RASH = 1.5  # by how much a score may underrate what a refit gains
 LEAST_STEP = 0.8  # an effect that takes less than this off a gross residual is not worth a name
 BEAM = 3  # models that are extended while the best one is not white: it, and single effects
 PAIRS = 4  # refitted at the first step
-STARTS = 2  # points of an effect's shape grid from which it is fitted
-SHORT = 60.0  # by how much a climb that gave up may have fallen short, nats
 EXCHANGES = 3  # rounds of leaving out and exchanging effects
-SAME = 0.05  # nats; two climbs to one mode differ by less
-
-Progress = Callable[[str], None]
 
 
 def name(
@@ -85,49 +76,13 @@ def name(
     return search.naming(base, state)
 
 
-class _Search:
-    """The models fitted so far."""
+class _Search(Models):
+    """Which models to fit next, and what they are worth."""
 
-    def __init__(
-        self,
-        effects: Sequence[Effect],
-        scales: Scales,
-        rng: np.random.Generator,
-        progress: Progress,
-    ) -> None:
-        self.effects, self.scales, self.rng, self.progress = effects, scales, rng, progress
-        self.cost = float(np.log(2 * len(effects)))
-        self.tried: dict[frozenset[str], Candidate] = {}
-        self.states: dict[frozenset[str], State] = {}
-        self.dropped: set[tuple[frozenset[str], str]] = set()
-        self.followed: set[frozenset[str]] = set()
-
-    def keep(self, candidate: Candidate) -> Candidate:
-        key = frozenset(candidate.ids)
-        if shakes_in_own_band(candidate.fit, is_gross(candidate.fit)):
-            candidate = replace(candidate, log_evidence=-np.inf)
-        held = self.tried.get(key)
-        sooner = candidate.fit.converged and not (held and held.fit.converged)
-        least = SAME * (-1 if sooner else 1)
-        if held is None or candidate.log_evidence > held.log_evidence + least:
-            self.tried[key] = candidate
-        return self.tried[key]
-
-    def examine(self, candidate: Candidate) -> State:
-        candidate = self.keep(candidate)
-        held = self.states.get(frozenset(candidate.ids))
-        if held is not None and held.candidate is candidate:
-            return held
-        self.progress("scoring what " + (" + ".join(candidate.ids) or "the base model") + " lacks")
-        found = scan(candidate.fit, self.effects, self.scales, rng=self.rng)
-        force = missing_force(candidate.fit, self.scales, rng=self.rng)
-        drift = missing_drift(candidate.fit, self.scales, rng=self.rng)
-        state = State(candidate, found, force, drift)
-        self.states[frozenset(candidate.ids)] = state
-        gave_up = candidate.effects and not candidate.fit.converged
-        if gave_up and state.unknown.log_evidence < SHORT:  # else more is missing than that
-            return self.examine(self.finished(candidate))
-        return state
+    @property
+    def cost(self) -> float:
+        """Nats per added effect, for multiplicity."""
+        return float(np.log(2 * len(self.effects)))
 
     def extended(self, state: State) -> list[Candidate]:
         """Models with one more effect; from the base model on also the most promising pairs.
@@ -144,26 +99,6 @@ class _Search:
                 if expected > best_single + self.cost:
                     found.append(self.fit_more(state.candidate, pair.scores))
         return found
-
-    def fit_one(self, candidate: Candidate, found: Scan, score: Score) -> Candidate:
-        """One more effect, from the best points of its shape grid."""
-        key = frozenset((*candidate.ids, score.effect.id))
-        if not self.is_known(key):
-            self.fit_more(candidate, [score])
-            for other in found.starts(score, STARTS)[1:]:
-                self.keep(refit(candidate.fit, [other], self.scales))
-        return self.tried[key]
-
-    def fit_more(self, candidate: Candidate, scores: Sequence[Score]) -> Candidate:
-        key = frozenset((*candidate.ids, *(s.effect.id for s in scores)))
-        if not self.is_known(key):
-            self.progress("fitting " + " + ".join((*candidate.ids, *(s.effect.id for s in scores))))
-            self.keep(refit(candidate.fit, scores, self.scales))
-        return self.tried[key]
-
-    def is_known(self, key: frozenset[str]) -> bool:
-        """Whether a model has its mode; a climb that gave up may do better from elsewhere."""
-        return key in self.tried and self.tried[key].fit.converged
 
     def is_hopeless(self, state: State) -> bool:
         """Whether a free force will explain what the effects still to come cannot, say the scores.
@@ -218,10 +153,11 @@ class _Search:
             if any(p.is_shape and not p.circular for p in effect.parameters):
                 smaller = frozenset(chosen.ids) - {effect.id}
                 rest = self.tried[smaller] if self.is_known(smaller) else self.drop(chosen, effect)
-                found = scan(rest.fit, [effect], self.scales, rng=self.rng)
+                found = self.scanned(rest, [effect])
                 for score in found.best():
-                    for start in found.starts(score, STARTS):
-                        self.keep(refit(rest.fit, [start], self.scales))
+                    if score.effect.id == effect.id:
+                        for start in found.starts(score, STARTS):
+                            self.start(rest, [start])
         return self.examine(self.ranked([self.tried[frozenset(chosen.ids)]])[0])
 
     def eliminated(self, state: State) -> State:
@@ -237,15 +173,6 @@ class _Search:
                 return state
             state = self.examine(best)
         return state
-
-    def drop(self, candidate: Candidate, effect: Effect) -> Candidate:
-        """The model without one effect, fitted from here even where it was fitted before."""
-        step = (frozenset(candidate.ids), effect.id)
-        if step not in self.dropped:
-            self.dropped.add(step)
-            self.progress("without " + effect.id)
-            self.keep(without(candidate, effect, self.scales))
-        return self.tried[frozenset(i for i in candidate.ids if i != effect.id)]
 
     def settled(self, state: State) -> State:
         """The model that neither leaving out nor exchanging an effect improves."""
@@ -274,16 +201,6 @@ class _Search:
                 models[key] = self.finished(models[key])
         return sorted(models.values(), key=self.worth, reverse=True)
 
-    def finished(self, candidate: Candidate) -> Candidate:
-        """A model whose climb gave up, at the lowest point of its valley."""
-        key = frozenset(candidate.ids)
-        if key not in self.followed:
-            self.followed.add(key)
-            self.progress("following the valley of " + " + ".join(candidate.ids))
-            fit = followed(candidate.fit)
-            self.keep(Candidate(candidate.effects, fit, model_evidence(fit)))
-        return self.tried[key]
-
     def compare_rivals(self, state: State) -> None:
         """Put every other effect in the place of each chosen one (for pairs and triples)."""
         chosen = state.candidate
@@ -291,7 +208,7 @@ class _Search:
             return
         for effect in chosen.effects:
             rest = self.drop(chosen, effect)
-            found = scan(rest.fit, self.effects, self.scales, rng=self.rng)
+            found = self.scanned(rest, self.effects)
             for score in self.worth_a_refit(found):
                 if score.effect.id != effect.id:
                     self.fit_one(rest, found, score)

@@ -30,6 +30,7 @@ RESPONSE_REACH = 2.0  # forcing is looked for up to so many times the natural fr
 FLIGHT_REACH = 4.0  # or in free flight
 HUM_ABOVE = 1.5  # times the natural frequency of free flight
 OWN_BAND = 0.1  # of the spectrum's peak
+AT_ONCE = 32  # frequencies whose responses fit into a processor's cache
 _FORCE, _OMEGA, _PHASE = (SLOTS.index(s) for s in ("A", "w", "phase"))
 
 
@@ -214,8 +215,15 @@ def _whitening_gain(fit: Fit, grid: Array, interval: float) -> Array:
 
 def _response_blocks(fit: Fit, r: int, grid: Array, scales: Scales) -> Blocks:
     """A force of one newton: simulated responses to its sine and cosine."""
-    pairs = force_responses(fit, r, grid, scales).reshape(grid.size, 2, -1)
-    return blocks_of(fit, r, pairs)
+    found = []
+    for some in np.array_split(grid, -(-grid.size // AT_ONCE)):
+        pairs = force_responses(fit, r, some, scales).reshape(some.size, 2, -1)
+        found.append(blocks_of(fit, r, pairs))
+    own, absorbed, score = (
+        np.concatenate([getattr(block, name) for block in found])
+        for name in ("own", "absorbed", "score")
+    )
+    return Blocks(own, absorbed, score, found[0].columns)
 
 
 def blocks_of(fit: Fit, r: int, columns: Array) -> Blocks:

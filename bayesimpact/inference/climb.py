@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 from bayesimpact.inference.fit import (
     Fit,
     Target,
+    gradient,
+    grams,
+    information,
     inverse,
     marginal_sd,
-    normal_equations,
     prior_information,
 )
 from bayesimpact.inference.likelihood import Linearisation
@@ -64,6 +66,7 @@ class Climb:
         layout = target.oscillator.layout
         self.target = target
         self.steps, self.slopes = steps, slopes
+        self.products = () if slopes is None else grams(slopes)
         self.frozen = slopes is not None
         self.stale = False  # the derivatives are those of an earlier theta
         self.roughly = steps is not None and not self.frozen  # good enough far from the mode
@@ -101,16 +104,17 @@ class Climb:
         """Normal equations of the next step; derivatives by differences serve several steps."""
         likelihood, priors, theta = self.target.likelihood, self.target.priors, here.theta
         parts = self._parts(here)
-        matrix, vector = normal_equations(parts, theta[likelihood.sigma_columns], theta.size)
-        information = prior_information(priors, theta)
-        information[self.noise] = 0.0
-        matrix += np.diag(information)
-        vector += priors.gradient(theta)
+        sigma = theta[likelihood.sigma_columns]
+        matrix = information(parts, self.products, sigma, theta.size)
+        vector = gradient(parts, sigma, theta.size) + priors.gradient(theta)
+        known = prior_information(priors, theta)
+        known[self.noise] = 0.0
+        matrix += np.diag(known)
         if self.steps is not None and not self.stale and np.isfinite(matrix).all():
-            known = np.diag(matrix)[self.moving] > 0
+            told = np.diag(matrix)[self.moving] > 0
             spread = marginal_sd(matrix[np.ix_(self.moving, self.moving)])
             steps = self.steps.copy()
-            better = known & np.isfinite(spread) & (spread > 0)
+            better = told & np.isfinite(spread) & (spread > 0)
             steps[self.moving[better]] = 0.05 * spread[better]
             if np.max(np.abs(np.log(steps / self.steps))) > ROUGH:
                 self.renew()
@@ -121,6 +125,7 @@ class Climb:
         if self.slopes is None or here.residuals is None:
             likelihood = self.target.likelihood
             self.slopes = likelihood.linearise(here.theta, self.steps, roughly=self.roughly)
+            self.products = grams(self.slopes)
             self.stale = False
             return self.slopes
         self.stale = not self.frozen
@@ -189,7 +194,7 @@ class Climb:
             straight = part.residual - BENT_AT * part.jacobian @ step[part.columns]
             ahead.append(replace(part, residual=(white[0] - straight) * 2.0 / BENT_AT**2))
         sigma = theta[likelihood.sigma_columns]
-        _, vector = normal_equations(tuple(ahead), sigma, theta.size)
+        vector = gradient(ahead, sigma, theta.size)
         if not np.isfinite(vector).all():
             return np.zeros(theta.size)
         return 0.5 * self.step(theta, replace(slope, vector=vector), damping)

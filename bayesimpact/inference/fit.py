@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -114,16 +114,27 @@ class Fit:
         return float(np.sqrt(np.mean(np.concatenate(self.residuals) ** 2)))
 
 
-def normal_equations(
-    linearisation: tuple[Linearisation, ...], sigma: Array, size: int
-) -> tuple[Array, Array]:
-    """J'J / sigma^2 (size, size) and J'r / sigma^2 (size,), summed; noise levels `sigma` (R,)."""
-    matrix, vector = np.zeros((size, size)), np.zeros(size)
+def grams(linearisation: Sequence[Linearisation]) -> tuple[Array, ...]:
+    """J'J (k, k) of every recording."""
+    return tuple(part.jacobian.T @ part.jacobian for part in linearisation)
+
+
+def information(
+    linearisation: Sequence[Linearisation], products: Sequence[Array], sigma: Array, size: int
+) -> Array:
+    """J'J / sigma^2 (size, size), summed; `products` of `grams`, noise levels `sigma` (R,)."""
+    matrix = np.zeros((size, size))
+    for part, product, level in zip(linearisation, products, sigma, strict=True):
+        matrix[np.ix_(part.columns, part.columns)] += product / level**2
+    return matrix
+
+
+def gradient(linearisation: Sequence[Linearisation], sigma: Array, size: int) -> Array:
+    """J'r / sigma^2 (size,), summed; noise levels `sigma` (R,)."""
+    vector = np.zeros(size)
     for part, level in zip(linearisation, sigma, strict=True):
-        scaled = part.jacobian / level
-        matrix[np.ix_(part.columns, part.columns)] += scaled.T @ scaled
-        vector[part.columns] += scaled.T @ (part.residual / level)
-    return matrix, vector
+        vector[part.columns] += part.jacobian.T @ part.residual / level**2
+    return vector
 
 
 def prior_information(priors: Priors, theta: Array) -> Array:

@@ -29,6 +29,7 @@ from bayesimpact.model.derivatives import grams
 from bayesimpact.model.oscillator import Oscillator, build_oscillator
 from bayesimpact.model.parameters import BASE_SLOTS
 from bayesimpact.model.simulate import sums_of_squares
+from bayesimpact.model.threads import linear_algebra_alone
 from bayesimpact.response.estimates import Estimates, estimate
 
 Array = NDArray[np.float64]
@@ -69,6 +70,7 @@ class Identification:
         return bool(np.all(distance < 0.1))
 
 
+@linear_algebra_alone()
 def identify(
     campaign: Campaign,
     *,

@@ -34,6 +34,7 @@ from bayesimpact.inference.whiten import cholesky, invert_lower, transform
 Array = NDArray[np.float64]
 
 _FORMAT = 1
+_BLOCK_STEPS, _BLOCK_DRAWS, _LEAST_BLOCK = 50, 3600, 8
 _QUICK_WALKERS = 16  # looked at before a full assessment is worth its time
 
 
@@ -128,7 +129,7 @@ def sample_posterior(
     seed: int,
     walkers: int | None = None,
     ensembles: int = 2,
-    block: int = 50,
+    block: int | None = None,
     max_steps: int = 20_000,
     target_ess: float = 2000.0,
     folder: Path | None = None,
@@ -157,7 +158,8 @@ def sample_posterior(
     seed : of all random numbers; same seed, same chain, whatever the number of threads
     walkers : of every ensemble, even and >= 2 d; None: max(32, 2 d + 2)
     ensembles : independent ones, >= 2
-    block : steps between two savings
+    block : steps between two savings, and of the burn-in's rounds; None: 50, or as many as make
+        about 3,600 draws of an ensemble
     max_steps : allowance of kept steps of every ensemble, rounded up to whole blocks
     target_ess : bulk and tail effective sample size demanded of every parameter
     folder : where the run is saved after every block; None: nowhere
@@ -180,6 +182,8 @@ def sample_posterior(
     dimension = mode.size
     if walkers is None:
         walkers = max(32, 2 * dimension + 2)
+    if block is None:
+        block = max(_LEAST_BLOCK, min(_BLOCK_STEPS, _BLOCK_DRAWS // max(walkers, 1)))
     _check(seed, walkers, ensembles, block, max_steps, dimension, names)
     bounds = [
         np.full(dimension, default) if bound is None else np.asarray(bound, dtype=np.float64)
@@ -247,7 +251,7 @@ def _check(
             f"an even number >= {max(4, 2 * dimension)} for {dimension} parameters",
         ),
         ("ensembles", ensembles, ensembles >= 2, "at least 2 independent ensembles"),
-        ("block", block, block >= 8, "at least 8 steps"),
+        ("block", block, block >= _LEAST_BLOCK, f"at least {_LEAST_BLOCK} steps"),
         ("max_steps", max_steps, max_steps >= 1, "at least 1 step"),
         ("names", names, names is None or len(names) == dimension, f"{dimension} names"),
     )

@@ -27,8 +27,12 @@ def motions(q: Array, mass: float, counts: Counts, intervals: Array) -> Array:
     flat, codes = predictions(
         base.reshape(1, -1), columns, np.zeros(base.shape), mass, counts, intervals, total
     )
-    out = np.full((q.shape[0], int(counts.max())), np.nan)
-    out[np.arange(out.shape[1]) < counts[:, None]] = flat[0]
+    shape = (q.shape[0], int(counts.max()))
+    if total == shape[0] * shape[1]:
+        out = flat.reshape(shape)
+    else:
+        out = np.full(shape, np.nan)
+        out[np.arange(shape[1]) < counts[:, None]] = flat[0]
     out[codes[0] != 0] = np.nan
     return out
 

@@ -127,9 +127,16 @@ class Oscillator:
         return tuple(p.reshape(*theta.shape[:-1], p.shape[-1]) for p in predicted)
 
     def predict_recording(self, r: int, theta: Array) -> Array:
-        """Readings of recording `r`, (B, n), for parameter vectors (B, d)."""
-        q = self.layout.slots(theta)[:, r : r + 1]
-        return self._read(r, self.motions_of(np.full(theta.shape[0], r), q), theta)
+        """Readings of recording `r`, (B, n), for parameter vectors (B, d).
+
+        What moves as the first one does, and differs in the measurement alone, is simulated once.
+        """
+        q = self.layout.slots(theta)[:, r]
+        other = (np.delete(q, _OFFSET, axis=1) != np.delete(q[0], _OFFSET)).any(axis=1)
+        other[0] = False
+        simulated = np.concatenate([[0], np.flatnonzero(other)])
+        motions = self.motions_of(np.full(simulated.size, r), q[simulated])
+        return self._read(r, motions[np.where(other, np.cumsum(other), 0)], theta)
 
     def _read(self, r: int, motion: Array, theta: Array) -> Array:
         """Sensor, rest offset and filter on true displacements (B, n) of recording `r`."""

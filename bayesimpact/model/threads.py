@@ -7,11 +7,13 @@ is for jobs of milliseconds; the likelihood's batches (`batch`) have numba's.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from functools import cache
 
 import numba
+from threadpoolctl import threadpool_limits
 
 SHARES_PER_THREAD = 4  # shares differ in cost
 
@@ -19,6 +21,17 @@ SHARES_PER_THREAD = 4  # shares differ in cost
 def available() -> int:
     """Threads that numba's settings (NUMBA_NUM_THREADS, `numba.set_num_threads`) allow."""
     return int(numba.get_num_threads())
+
+
+@contextmanager
+def linear_algebra_alone() -> Iterator[None]:
+    """While it lasts, NumPy's and SciPy's linear algebra runs on the thread that calls it.
+
+    Its own threads gain nothing on matrices of tens of columns, and those of OpenBLAS keep a core
+    busy while they wait for more, which `in_shares` could use: a diagnosis takes a third longer.
+    """
+    with threadpool_limits(limits=1, user_api="blas"):
+        yield
 
 
 def in_shares(work: Callable[[int, int], None], size: int) -> None:

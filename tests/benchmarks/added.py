@@ -5,10 +5,10 @@
 Nine recordings of 6,000 samples at the paper's values, one effect at a time at its plausible size
 (the width of its prior), on one thread. Numba takes the step sizes as constants when it compiles,
 so each scale of the steps is a process of its own, compiled anew: 1 is what the package uses. The
-error is the largest difference to steps a quarter as long; `halving` that of 1 against 1/2. Then
-all pairs of effects, with the package's steps and half of them. The
+error is the largest difference to steps a quarter as long; `halving` that of 1 against 1/2. The
 plain recurrence of the base model takes its turn among the effects, for the machine's speed changes
-from one quarter of an hour to the next. Writes added.json beside this file.
+from one quarter of an hour to the next. Then all pairs of effects, with the package's steps and
+half of them. Writes added.json beside this file.
 """
 
 from __future__ import annotations

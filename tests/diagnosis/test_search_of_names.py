@@ -14,6 +14,7 @@ from bayesimpact.diagnosis.scan import Scan
 from bayesimpact.diagnosis.scores import Score
 
 search = importlib.import_module("bayesimpact.diagnosis.name")
+models = importlib.import_module("bayesimpact.diagnosis.models")
 
 A, B, C, D = "coulomb_friction", "quadratic_drag", "spring_cubic", "gap_wear"
 S = "contact_second_stage"  # has a depth
@@ -58,7 +59,8 @@ class Table:
 
     def candidate(self, ids, gain: float) -> Candidate:
         fit = SimpleNamespace(
-            reduced_chi2=1.0, log_likelihood=gain + 10, rms=1.0, ids=tuple(ids), gain=gain,
+            reduced_chi2=1.0, log_likelihood=gain + 10, log_posterior=gain, rms=1.0,
+            ids=tuple(ids), gain=gain,
             converged=frozenset(ids) not in self.unfinished,
         )  # fmt: skip
         return Candidate(tuple(BY_ID[i] for i in ids), fit, gain)
@@ -106,17 +108,18 @@ class Table:
 @pytest.fixture
 def run(monkeypatch):
     def go(table: Table, effects=EFFECTS):
-        monkeypatch.setattr(search, "refit", table.refit)
-        monkeypatch.setattr(search, "without", table.without)
-        monkeypatch.setattr(search, "shakes_in_own_band", lambda fit, gross: False)
-        monkeypatch.setattr(search, "scan", table.scan)
-        monkeypatch.setattr(search, "followed", table.followed)
-        monkeypatch.setattr(search, "model_evidence", lambda fit: fit.gain)
+        monkeypatch.setattr(models, "refit", table.refit)
+        monkeypatch.setattr(models, "without", table.without)
+        monkeypatch.setattr(models, "shakes_in_own_band", lambda fit, gross: False)
+        monkeypatch.setattr(models, "scan", table.scan)
+        monkeypatch.setattr(models, "followed", table.followed)
+        for module in (search, models):
+            monkeypatch.setattr(module, "model_evidence", lambda fit: fit.gain)
         monkeypatch.setattr(search, "missing_contact", table.contact)
         monkeypatch.setattr(search, "learn_force", lambda fit, force, scales: force.fit)
         monkeypatch.setattr(search, "promising_pairs", lambda scan, count: ())
         for force in ("missing_force", "missing_drift"):
-            monkeypatch.setattr(search, force, table.missing)
+            monkeypatch.setattr(models, force, table.missing)
         monkeypatch.setattr(
             search, "base_candidate", lambda fit: table.candidate((), table.gain(()))
         )
@@ -237,7 +240,15 @@ def test_shapes_are_sought_anew_before_a_model_is_given_up(run):
     """The depth was found while friction was missing: a side minimum."""
     pair = f"{A} {S}"
     stuck = {f"{pair} {other}": 450.0 for other in (B, C, D)}
-    table = Table({A: 300.0, S: 200.0, pair: 600.0}, forward=stuck, once={pair: 450.0})
+    table = Table({S: 300.0, A: 200.0, pair: 600.0}, forward=stuck, once={pair: 450.0})
     found = run(table)
     assert chosen(found) == {A, S} and found.chosen.is_white
     assert found.chosen.candidate.log_evidence == 600.0
+
+
+def test_no_start_is_fitted_twice(run):
+    """The restart of the pair from its first effect is where the pair came from."""
+    steps = {A: 300.0, S: 100.0, f"{A} {S}": 400.0}
+    table = Table(steps | {f"{A} {S} {other}": 410.0 for other in (B, C, D)})
+    run(table)
+    assert table.fitted.count(frozenset({A, S})) == 1

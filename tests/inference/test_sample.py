@@ -234,6 +234,14 @@ def test_rarely_accepted_proposals_lengthen_the_burn_in():
     assert not chains.converged
 
 
+@pytest.mark.parametrize(("dimension", "steps"), [(35, 50), (83, 20)])
+def test_many_walkers_take_shorter_blocks(dimension, steps):
+    """Two rounds of half a block each: 3,600 draws, and no more than 50 steps."""
+    log_posterior, mode, covariance = correlated(dimension)
+    chains = sample_posterior(log_posterior, mode, covariance, seed=0, max_steps=1)
+    assert chains.burn_in == steps
+
+
 def test_nan_is_an_error_that_names_the_place():
     def log_posterior(x):
         values = -0.5 * np.square(x).sum(axis=1)

@@ -159,3 +159,33 @@ def test_recording_columns_are_all_that_a_recording_depends_on(effects):
             if not np.array_equal(oscillator.predict(other)[r], before[r]):
                 moved.add(i)
         assert moved == set(oscillator.recording_columns(r))
+
+
+def test_what_differs_in_the_measurement_alone_is_simulated_once(monkeypatch):
+    effects = (BY_ID["sensor_quadratic"], BY_ID["quadratic_drag"])
+    oscillator = build_oscillator(campaign(LAG), effects)
+    null = {"sensor_quadratic.gain": 0.0, "quadratic_drag.coefficient": 0.0}
+    theta = np.tile(vector(oscillator, **null), (6, 1))
+    names = oscillator.layout.names
+    changes = ("offset[b]", "k1", "sensor_quadratic.gain", "offset[b]", "y0[b]")
+    for row, name in enumerate(changes, 1):
+        theta[row, names.index(name)] += 1e-3
+    expected = np.array([oscillator.predict(t)[1] for t in theta])
+    simulated = []
+
+    def counted(self, recordings, slots):
+        simulated.append(recordings.size)
+        return found(self, recordings, slots)
+
+    found = Oscillator.motions_of
+    monkeypatch.setattr(Oscillator, "motions_of", counted)
+    close(oscillator.predict_recording(1, theta), expected)
+    assert simulated == [3]  # the first, k1's and y0's
+
+
+def test_a_first_row_that_cannot_be_simulated_stays_alone():
+    oscillator = build_oscillator(campaign())
+    theta = np.tile(vector(oscillator), (3, 1))
+    theta[0, oscillator.layout.names.index("k1")] = np.nan
+    readings = oscillator.predict_recording(0, theta)
+    assert np.isnan(readings[0]).all() and np.isfinite(readings[1:]).all()

@@ -9,8 +9,9 @@ import time
 import numba
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
-from bayesimpact.model.threads import available, in_shares
+from bayesimpact.model.threads import available, in_shares, linear_algebra_alone
 
 
 @pytest.fixture
@@ -99,3 +100,17 @@ def test_a_forked_process_has_helpers_of_its_own():
     finally:
         child.join(timeout=30)
         child.kill()
+
+
+def test_linear_algebra_runs_on_one_thread_for_a_while():
+    def threads() -> set[int]:
+        return {int(x["num_threads"]) for x in threadpool_info() if x["user_api"] == "blas"}
+
+    @linear_algebra_alone()
+    def inside() -> set[int]:
+        return threads()
+
+    with threadpool_limits(2, user_api="blas"):
+        before = threads()
+        assert before and inside() == {1}
+        assert threads() == before

@@ -64,9 +64,15 @@ def value_and_slope(
 
 
 @inner(forceinline=True)
+def cubic(f0: Any, d0: Any, f1: Any, d1: Any) -> Any:
+    """Coefficients of the square and the cube, where the values and slopes at 0 and 1 are known."""
+    return 3.0 * (f1 - f0) - 2.0 * d0 - d1, 2.0 * (f0 - f1) + d0 + d1
+
+
+@inner(forceinline=True)
 def guess(f0: Any, d0: Any, f1: Any, d1: Any) -> Any:
     """Last root in (0, 1) of the cubic with values f0 >= 0 > f1 and slopes d0, d1 at 0 and 1."""
-    c2, c3 = 3.0 * (f1 - f0) - 2.0 * d0 - d1, 2.0 * (f0 - f1) + d0 + d1
+    c2, c3 = cubic(f0, d0, f1, d1)
     x = f0 / (f0 - f1) if d0 <= 0.0 else 1.0
     for _ in range(6):
         slope = d0 + x * (2.0 * c2 + 3.0 * c3 * x)
@@ -150,7 +156,7 @@ def foresee_push(
     w.s[PUSHED] = NEVER
     if d0 > 0.0 > d1 and f1 < 0.0:
         d0, d1 = h * d0, h * d1
-        c2, c3 = 3.0 * (f1 - f0) - 2.0 * d0 - d1, 2.0 * (f0 - f1) + d0 + d1
+        c2, c3 = cubic(f0, d0, f1, d1)
         x = d0 / (np.sqrt(c2 * c2 - 3.0 * c3 * d0) - c2)  # the summit
         if f0 + x * (d0 + x * (c2 + x * c3)) > 0.0:
             w.s[PUSHED] = SOON

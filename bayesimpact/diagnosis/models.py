@@ -1,0 +1,132 @@
+"""The models of one search: each is fitted once from every start, and scored once.
+
+Of two ends of climbs to one model the better one is kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bayesimpact.diagnosis.evidence import model_evidence
+from bayesimpact.diagnosis.force import missing_drift, missing_force
+from bayesimpact.diagnosis.naming import State, is_gross
+from bayesimpact.diagnosis.periodic import shakes_in_own_band
+from bayesimpact.diagnosis.refit import Candidate, refit, without
+from bayesimpact.diagnosis.scan import Scan, scan
+from bayesimpact.diagnosis.scores import Score
+from bayesimpact.diagnosis.valley import followed
+from bayesimpact.model.effects.effect import Effect, Scales
+
+STARTS = 2  # points of an effect's shape grid from which it is fitted
+SHORT = 60.0  # by how much a climb that gave up may have fallen short, nats
+SAME = 0.05  # nats; two climbs to one mode differ by less
+
+Progress = Callable[[str], None]
+
+
+class Models:
+    """Models fitted so far, `tried`, and those examined, `states`, by the ids of their effects."""
+
+    def __init__(
+        self,
+        effects: Sequence[Effect],
+        scales: Scales,
+        rng: np.random.Generator,
+        progress: Progress,
+    ) -> None:
+        self.effects, self.scales, self.rng, self.progress = effects, scales, rng, progress
+        self.tried: dict[frozenset[str], Candidate] = {}
+        self.states: dict[frozenset[str], State] = {}
+        self.begun: set[tuple[object, ...]] = set()
+        self.dropped: set[tuple[frozenset[str], str]] = set()
+        self.followed: set[frozenset[str]] = set()
+
+    def keep(self, candidate: Candidate) -> Candidate:
+        """The better end of all climbs to the candidate's model, this one among them."""
+        key = frozenset(candidate.ids)
+        if shakes_in_own_band(candidate.fit, is_gross(candidate.fit)):
+            candidate = replace(candidate, log_evidence=-np.inf)
+        held = self.tried.get(key)
+        sooner = candidate.fit.converged and not (held and held.fit.converged)
+        least = SAME * (-1 if sooner else 1)
+        if held is None or candidate.log_evidence > held.log_evidence + least:
+            self.tried[key] = candidate
+        return self.tried[key]
+
+    def examine(self, candidate: Candidate) -> State:
+        """Whether anything is missing from a candidate.
+
+        One that is left in a valley, and may lack no more than the rest of it, is finished first.
+        """
+        candidate = self.keep(candidate)
+        held = self.states.get(frozenset(candidate.ids))
+        if held is not None and held.candidate is candidate:
+            return held
+        self.progress("scoring what " + (" + ".join(candidate.ids) or "the base model") + " lacks")
+        found = scan(candidate.fit, self.effects, self.scales, rng=self.rng)
+        force = missing_force(candidate.fit, self.scales, rng=self.rng)
+        drift = missing_drift(candidate.fit, self.scales, rng=self.rng)
+        state = State(candidate, found, force, drift)
+        self.states[frozenset(candidate.ids)] = state
+        gave_up = candidate.effects and not candidate.fit.converged
+        if gave_up and state.unknown.log_evidence < SHORT:  # else more is missing than that
+            return self.examine(self.finished(candidate))
+        return state
+
+    def scanned(self, candidate: Candidate, effects: Sequence[Effect]) -> Scan:
+        """Scores of effects on a candidate, and of all others where it was examined."""
+        held = self.states.get(frozenset(candidate.ids))
+        if held is not None and held.candidate is candidate:
+            return held.scan
+        return scan(candidate.fit, effects, self.scales, rng=self.rng)
+
+    def fit_one(self, candidate: Candidate, found: Scan, score: Score) -> Candidate:
+        """One more effect, from the best points of its shape grid."""
+        key = frozenset((*candidate.ids, score.effect.id))
+        if not self.is_known(key):
+            self.fit_more(candidate, [score])
+            for other in found.starts(score, STARTS)[1:]:
+                self.start(candidate, [other])
+        return self.tried[key]
+
+    def fit_more(self, candidate: Candidate, scores: Sequence[Score]) -> Candidate:
+        """The candidate's model with all of these effects, from where the scores point to."""
+        key = frozenset((*candidate.ids, *(s.effect.id for s in scores)))
+        if not self.is_known(key):
+            self.progress("fitting " + " + ".join((*candidate.ids, *(s.effect.id for s in scores))))
+            self.start(candidate, scores)
+        return self.tried[key]
+
+    def start(self, candidate: Candidate, scores: Sequence[Score]) -> None:
+        """Fit a model from where scores on a candidate point to, once."""
+        shapes = tuple((s.effect.id, *sorted(s.shapes.items())) for s in scores)
+        begun = (candidate.ids, candidate.fit.log_posterior, shapes)
+        if begun not in self.begun:
+            self.begun.add(begun)
+            self.keep(refit(candidate.fit, scores, self.scales))
+
+    def is_known(self, key: frozenset[str]) -> bool:
+        """Whether a model has its mode; a climb that gave up may do better from elsewhere."""
+        return key in self.tried and self.tried[key].fit.converged
+
+    def drop(self, candidate: Candidate, effect: Effect) -> Candidate:
+        """The model without one effect, fitted from here even where it was fitted before."""
+        step = (frozenset(candidate.ids), effect.id)
+        if step not in self.dropped:
+            self.dropped.add(step)
+            self.progress("without " + effect.id)
+            self.keep(without(candidate, effect, self.scales))
+        return self.tried[frozenset(i for i in candidate.ids if i != effect.id)]
+
+    def finished(self, candidate: Candidate) -> Candidate:
+        """A model whose climb gave up, at the lowest point of its valley."""
+        key = frozenset(candidate.ids)
+        if key not in self.followed:
+            self.followed.add(key)
+            self.progress("following the valley of " + " + ".join(candidate.ids))
+            fit = followed(candidate.fit)
+            self.keep(Candidate(candidate.effects, fit, model_evidence(fit)))
+        return self.tried[key]
