@@ -168,6 +168,41 @@ def startup_table() -> str:
     return grid(("a fresh process", "s", "processor time, s"), rows, measured(s))
 
 
+def loops_table() -> str:
+    """Whole diagnoses."""
+    found = stored("loops")
+    rows = []
+    for name, row in found["campaigns"].items():
+        verdicts = dict.fromkeys(r["verdict"] for r in row.values())
+        times = [
+            f"{row[c]['s']:.0f} ({row[c]['slowest_s']:.0f})" if c in row else ""
+            for c in ("quick", "sampled")
+        ]
+        rows.append((name, ", ".join(verdicts), *times))
+    foot = (
+        f"Median of {found['runs']} runs, in brackets the slowest; plain recurrence of the nine "
+        f"recordings {found['recurrence_us']:.0f} us in the same minutes. {measured(found)}"
+    )
+    return grid(("missing", "verdict", "`--quick`, s", "with sampling, s"), rows, foot)
+
+
+def controls_table() -> str:
+    """False alarms."""
+    t = stored("controls")
+    said = [(row["noise"], row["outcome"]) for row in t["answers"]]
+    rows = [
+        (noise, f"{sum(s == (noise, 'quiet') for s in said)} of "
+                f"{sum(kind == noise for kind, _ in said)}")
+        for noise in dict.fromkeys(kind for kind, _ in said)
+    ]  # fmt: skip
+    first, last = t["seeds"]
+    foot = (
+        f"All: {share(t['right']['control'])}; {len(t['by_bench'])} rigs, seeds {first} to {last}, "
+        f"commit {t['commit'][:7]}, {t['date']}. In brackets: 95 % interval."
+    )
+    return grid(("nothing missing, noise", "called adequate"), rows, foot)
+
+
 def coverage_table() -> str:
     """Coverage of the intervals."""
     c = stored("coverage")
@@ -306,6 +341,7 @@ def trial_coverage_table() -> str:
 
 TABLES = {
     "trials": trials_table,
+    "controls": controls_table,
     "trial_coverage": trial_coverage_table,
     "singles": single_table,
     "power": power_table,
@@ -316,6 +352,7 @@ TABLES = {
     "samplers": samplers_table,
     "scaling": scaling_table,
     "startup": startup_table,
+    "loops": loops_table,
     "coverage": coverage_table,
 }
 
