@@ -18,10 +18,35 @@ Result = Mapping[str, Any]
 
 def rate(hits: int, of: int) -> dict[str, Any]:
     """A proportion with its exact interval (Clopper and Pearson 1934)."""
+    return {
+        "hits": hits,
+        "of": of,
+        "rate": hits / of if of else None,
+        "interval": _interval(hits, of),
+    }
+
+
+def rate_in_groups(groups: Sequence[Sequence[bool]]) -> dict[str, Any]:
+    """The same for numbers of which those of one trial err together, such as phases.
+
+    The interval is that of as many independent numbers as have the variance found between trials
+    (Korn and Graubard 1998, Survey Methodology 24:193), of one per trial where there is none.
+    """
+    groups = [g for g in groups if len(g)]
+    found = rate(sum(map(sum, groups)), sum(map(len, groups)))
+    if not groups:
+        return found
+    share = found["rate"]
+    variance = sum((sum(g) - share * len(g)) ** 2 for g in groups) / found["of"] ** 2
+    of = min(found["of"], share * (1 - share) / variance) if variance > 0 else len(groups)
+    return found | {"interval": _interval(share * of, of)}
+
+
+def _interval(hits: float, of: float) -> list[float]:
     tail = (1 - CONFIDENCE) / 2
     low = float(stats.beta.ppf(tail, hits, of - hits + 1)) if hits > 0 else 0.0
     high = float(stats.beta.ppf(1 - tail, hits + 1, of - hits)) if hits < of else 1.0
-    return {"hits": hits, "of": of, "rate": hits / of if of else None, "interval": [low, high]}
+    return [low, high]
 
 
 def summarise(results: Sequence[Result]) -> dict[str, Any]:
@@ -85,8 +110,7 @@ def _share(rows: Sequence[Result], hit: Callable[[Mapping[str, Any]], Any]) -> d
 
 
 def _sizes(scored: Iterable[Result]) -> dict[str, Any]:
-    inside = [ok for r in scored for ok in r["score"]["sizes"].values()]
-    return rate(sum(inside), len(inside))
+    return rate_in_groups([[*map(bool, r["score"]["sizes"].values())] for r in scored])
 
 
 def _groups(scored: Sequence[Result]) -> dict[str, list[Result]]:
@@ -103,18 +127,16 @@ def _coverage(rows: Sequence[Result]) -> dict[str, Any]:
     """Per kind of base parameter: coverage and median error in standard deviations, three ways."""
     result: dict[str, Any] = {}
     for base in BASE:
-        found = [
-            row
+        trials = [
+            [row for name, row in r["score"]["coverage"].items() if name.split("[")[0] == base]
             for r in rows
-            for name, row in r["score"]["coverage"].items()
-            if name.split("[")[0] == base
         ]
         entry: dict[str, Any] = {}
         for label in ("before", "after", "honest"):
-            inside = [row[label] for row in found if label in row]
-            errors = [abs(row[f"{label}_error"]) for row in found if label in row]
-            if inside:
-                entry[label] = rate(sum(inside), len(inside))
+            inside = [[bool(row[label]) for row in found if label in row] for found in trials]
+            errors = [abs(row[f"{label}_error"]) for t in trials for row in t if label in row]
+            if errors:
+                entry[label] = rate_in_groups(inside)
                 entry[label]["median_error_sd"] = float(np.median(errors))
         if entry:
             result[base] = entry

@@ -14,6 +14,7 @@ from bayesimpact.model import effects
 EFFECTS = {effect.id: effect for effect in effects.EFFECTS}
 HERE = Path(__file__).resolve().parent
 README = HERE.parents[1] / "README.md"
+NOISES = {"white": "white", "ar1": "AR(1)", "smoothed": "smoothed by a declared filter"}
 BUSY = 0.25  # cores busy with something else, from which on times are not to be trusted
 
 
@@ -191,9 +192,9 @@ def controls_table() -> str:
     t = stored("controls")
     said = [(row["noise"], row["outcome"]) for row in t["answers"]]
     rows = [
-        (noise, f"{sum(s == (noise, 'quiet') for s in said)} of "
+        (words, f"{sum(s == (noise, 'quiet') for s in said)} of "
                 f"{sum(kind == noise for kind, _ in said)}")
-        for noise in dict.fromkeys(kind for kind, _ in said)
+        for noise, words in NOISES.items()
     ]  # fmt: skip
     first, last = t["seeds"]
     foot = (

@@ -29,6 +29,7 @@ def row(result: dict[str, Any]) -> dict[str, Any]:
         "strengths": [None if s is None else round(s, 2) for s in score["strengths"]],
         "named": score["named"],
         "outcome": score["outcome"],
+        "sizes_inside": [sum(score["sizes"].values()), len(score["sizes"])],
     }
 
 

@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from bayesimpact.trial.score import flat, judge, place, score, sizes
-from bayesimpact.trial.summary import confusion, rate, summarise
+from bayesimpact.trial.summary import confusion, rate, rate_in_groups, summarise
 from bayesimpact.trial.table import summary_text
 
 TRUTH = {
@@ -147,6 +147,26 @@ def test_intervals_are_exact(hits: int, of: int) -> None:
 
 def result(seed: int, truth: dict, answer: dict) -> dict:
     return {"seed": seed, "truth": truth, "answer": answer, "score": score(truth, answer)}
+
+
+@pytest.mark.parametrize("together", [1, 9])
+def test_numbers_that_err_together_count_as_one(together):
+    groups = [[k >= 3] * together for k in range(20)] + [[]]
+    found = rate_in_groups(groups)
+    assert (found["hits"], found["of"]) == (17 * together, 20 * together)
+    np.testing.assert_allclose(found["interval"], rate(17, 20)["interval"])
+
+
+def test_numbers_that_err_alone_count_each():
+    rng = np.random.default_rng(0)
+    groups = (rng.random((400, 5)) < 0.9).tolist()
+    low, high = rate_in_groups(groups)["interval"]
+    assert high - low == pytest.approx(2 * 1.96 * np.sqrt(0.09 / 2000), rel=0.1)
+
+
+def test_a_group_without_misses_still_leaves_doubt():
+    assert rate_in_groups([[True] * 5] * 10)["interval"] == rate(10, 10)["interval"]
+    assert rate_in_groups([])["interval"] == rate(0, 0)["interval"]
 
 
 def test_the_summary_adds_up() -> None:
