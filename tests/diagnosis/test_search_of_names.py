@@ -252,3 +252,30 @@ def test_no_start_is_fitted_twice(run):
     table = Table(steps | {f"{A} {S} {other}": 410.0 for other in (B, C, D)})
     run(table)
     assert table.fitted.count(frozenset({A, S})) == 1
+
+
+def test_an_examined_model_is_not_scored_again_for_a_restart(run, monkeypatch):
+    pair = f"{A} {S}"
+    table = Table({S: 300.0, A: 200.0, pair: 600.0}, forward={pair: 450.0}, once={pair: 450.0})
+    scored, scan = [], table.scan
+
+    def noted(fit, *rest, **more):
+        scored.append((fit.ids, fit.gain))
+        return scan(fit, *rest, **more)
+
+    monkeypatch.setattr(table, "scan", noted)
+    run(table)
+    assert len(scored) == len(set(scored))
+
+
+@pytest.mark.parametrize(("second", "kept"), [(-0.04, True), (-0.06, False), (0.04, True)])
+def test_of_two_equal_ends_the_one_that_came_to_rest_is_kept(monkeypatch, second, kept):
+    """Climbs to one mode differ by less than 0.05 nats."""
+    monkeypatch.setattr(models, "shakes_in_own_band", lambda fit, gross: False)
+    table = Table({A: 100.0}, unfinished={A: 0.0})
+    known = models.Models(EFFECTS, None, np.random.default_rng(0), lambda message: None)
+    first = known.keep(table.candidate((A,), 100.0))
+    table.unfinished.clear()
+    rested = table.candidate((A,), 100.0 + second)
+    assert (known.keep(rested) is rested) == kept
+    assert known.keep(first) is (rested if kept else first)

@@ -20,6 +20,7 @@ from bayesimpact.diagnosis.periodic import (
 )
 from bayesimpact.diagnosis.refit import refit
 from bayesimpact.diagnosis.steady import hums, steadiness
+from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.measurement import smooth
 from bayesimpact.trial.rig_chain import Chain
@@ -111,14 +112,37 @@ def test_a_force_in_the_band_of_the_motion_is_told_apart(apart, gross, own):
 
     `apart`: between both frequencies, in units of the reciprocal of the duration.
     """
-    rig, releases = small_rig.PLAIN, small_rig.PLAIN_RELEASES
-    fit = identify(
-        small_rig.record(rig=rig, releases=releases), rng=np.random.default_rng(0), search=False
-    ).fit
+    rig, fit = small_rig.PLAIN, plain_fit()
     assert not shakes_in_own_band(fit, gross)
+    own_frequency = np.sqrt(rig.k1 / rig.mass) / (2 * np.pi)
+    forced = with_force(fit, own_frequency + apart / campaign_scales(fit).duration)
+    assert shakes_in_own_band(forced, gross) is own
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+@pytest.mark.parametrize(("apart", "own"), [(0.98, True), (1.02, False)])
+def test_the_band_ends_where_the_recordings_can_separate_two_lines(side, apart, own):
+    """One reciprocal duration from the strongest of a recording's Fourier coefficients.
+
+    All recordings are as long as the first, and swing as it does.
+    """
+    fit = plain_fit()
+    recording = fit.target.oscillator.campaign.recordings[0]
+    spectrum = np.abs(np.fft.rfft(recording.samples - recording.samples.mean()))
+    line = (np.argmax(spectrum) + side * apart) / (recording.samples.size * recording.interval)
+    assert shakes_in_own_band(with_force(fit, line), False) is own
+
+
+def plain_fit() -> Fit:
+    """A fit of an oscillator without a stop."""
+    recorded = small_rig.record(rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES)
+    return identify(recorded, rng=np.random.default_rng(0), search=False).fit
+
+
+def with_force(fit: Fit, frequency: float) -> Fit:
+    """The same with a harmonic force at a frequency, Hz, in its model."""
     scales, effects = campaign_scales(fit), (BY_ID["harmonic_forcing"],)
     target = extend(fit, effects, scales)
-    frequency = np.sqrt(rig.k1 / rig.mass) / (2 * np.pi) + apart / scales.duration
     shapes = {"harmonic_forcing.frequency": frequency}
     mode = transfer(fit, target.oscillator.layout, effects, scales, shapes)
-    assert shakes_in_own_band(replace(fit, target=target, mode=mode), gross) is own
+    return replace(fit, target=target, mode=mode)
