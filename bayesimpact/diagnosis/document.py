@@ -113,6 +113,7 @@ def _evidence(d: Diagnosis) -> dict[str, Any]:
         "p_unknown_force_after": chosen.force.p_value,
         "p_unknown_drift_after": chosen.drift.p_value,
         "log_odds": d.naming.log_odds(chosen.candidate),
+        "free_force_log_odds": d.naming.force_log_odds,
         "decisive": DECISIVE,
         "models": [
             {"effects": list(c.ids), "log_odds": d.naming.log_odds(c)} for c in d.naming.tried[:20]

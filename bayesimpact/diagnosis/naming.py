@@ -107,19 +107,27 @@ class Naming:
             and not _is_elaboration(c, chosen)
         )
 
-    def prefers_learned_force(self) -> bool:
-        """True when one free force beats the chosen effects decisively.
+    @property
+    def force_log_odds(self) -> float:
+        """Log odds of one free force in the place of all effects against the base model.
 
-        An effect that imitates a force outside the catalogue loses to that force. Where the chosen
-        effects leave nothing, no force can gain more than they do, whatever the linearised problem
-        promises. Many effects that imitate one force in contact lose to that force when fitted.
+        Where the chosen effects leave nothing, no force can gain more than they do, whatever the
+        linearised problem promises. Many effects that may imitate one force in contact are compared
+        with that force as it was fitted.
         """
         force, chosen = self.base.unknown, self.chosen.candidate
         evidence = force.log_evidence
         if self.chosen.is_white:
             reached = chosen.fit.log_likelihood - self.base.candidate.fit.log_likelihood
             evidence -= max(0.0, force.gain - reached - DECISIVE)
-        return max(evidence / self.spread, self.contact_odds) > self.log_odds(chosen) + DECISIVE
+        return max(evidence / self.spread, self.contact_odds)
+
+    def prefers_learned_force(self) -> bool:
+        """True when one free force beats the chosen effects decisively.
+
+        An effect that imitates a force outside the catalogue loses to that force.
+        """
+        return self.force_log_odds > self.log_odds(self.chosen.candidate) + DECISIVE
 
     def probability(self, effect_id: str) -> float:
         """Probability that an effect is part of the model, over all models tried."""

@@ -24,7 +24,8 @@ DIAGNOSIS = {
         "Models that were fitted, by their log odds (evidence and the price of each added effect) "
         "behind the best one; linear up to 10 nats, logarithmic beyond. A name needs all rivals to "
         "lie beyond the dashed line. Right: probability among the models tried. Blue: the model "
-        "that was chosen."
+        "that was chosen; where the verdict is unknown, that is one free force in the place of all "
+        "effects, with the odds that the linearised problem gives it."
     ),
     "limits": (
         "What the recordings rule out. Dots: 95 % upper limit of each effect's size; bars: a size "

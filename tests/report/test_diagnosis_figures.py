@@ -16,7 +16,7 @@ from matplotlib.text import Text
 from bayesimpact.report.archive import load_results, save_results
 from bayesimpact.report.captions import caption
 from bayesimpact.report.figures.improvement import shifts
-from bayesimpact.report.figures.ranking import MOST, ranked
+from bayesimpact.report.figures.ranking import FREE_FORCE, MOST, ranked
 from bayesimpact.report.figures.save import all_figures, png
 from bayesimpact.report.figures.style import AFTER, BLACK
 from bayesimpact.report.write import rewrite_report
@@ -85,6 +85,20 @@ def test_ranking_marks_the_chosen_model_even_where_it_is_not_the_best() -> None:
     colours = [to_hex(c).upper() for c in dots.get_facecolors()]
     assert colours.index(AFTER) == 1 and colours.count(AFTER) == 1
     assert colours[-1] == BLACK  # the base model
+
+
+@pytest.mark.parametrize(("odds", "row"), [(900.0, 0), (790.0, 2)])
+def test_a_free_force_stands_among_the_models_where_the_verdict_is_unknown(odds, row) -> None:
+    evidence = {"models": MODELS, "decisive": 5.5, "free_force_log_odds": odds}
+    told = diagnosed(verdict="unknown", effects=[], evidence=evidence)
+    models = ranked(evidence, force=True)
+    assert models[row] == ((FREE_FORCE,), max(odds, 800.0) - odds)
+    figure = diagnosis_figures(told)["ranking"]
+    (dots,) = [c for c in figure.axes[0].collections if isinstance(c, PathCollection)]
+    assert [to_hex(c).upper() for c in dots.get_facecolors()].index(AFTER) == row
+    assert FREE_FORCE in words(figure)
+    assert "the best of the catalogue" in words(diagnosis_figures(told)["force_map"])
+    assert FREE_FORCE not in words(diagnosis_figures(diagnosed(evidence=evidence))["ranking"])
 
 
 def test_captions_say_what_holds_for_this_diagnosis_only() -> None:

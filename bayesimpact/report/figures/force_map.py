@@ -112,9 +112,11 @@ def _part(
         axis.text(gap, 0.02, " contact", transform=axis.get_xaxis_transform(), color="#555555",
                   fontsize=8, ha="left", va="bottom")  # fmt: skip
     axis.axhline(0.0, color=GREY, lw=0.6)
+    unknown = (results.diagnosis or {}).get("verdict") == "unknown"
+    best = "the best of the catalogue" if unknown else "what was added"
     for name, colour, words in (
         ("force", BEFORE, "left unexplained by the base model, 90 % band"),
-        ("left", AFTER, "still unexplained with what was added"),
+        ("left", AFTER, f"still unexplained with {best}"),
     ):
         if f"{name}_{part}" not in arrays:
             continue

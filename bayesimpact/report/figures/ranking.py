@@ -15,6 +15,7 @@ from bayesimpact.report.units import readable, significant, typeset
 
 MOST = 12
 """Models shown; the base model always is."""
+FREE_FORCE = "one free force"
 _ROW, _FRAME = 0.24, 1.05  # in
 _LINEAR = 10.0  # nats; beyond that the axis is logarithmic
 _ANSWERS = {"present": RED, "negligible": GREY, "absent": AFTER, "cannot tell": RED}
@@ -24,23 +25,26 @@ def ranking_figures(results: Results) -> Mapping[str, Figure]:
     """Ranking of the models that were tried, and limits of effects that were not found."""
     diagnosis = results.diagnosis or {}
     figures = {}
-    models = ranked(diagnosis.get("evidence") or {})
+    evidence = diagnosis.get("evidence") or {}
+    models = ranked(evidence, force=diagnosis.get("verdict") == "unknown")
     if len(models) > 1:
-        figures["ranking"] = _ranking(
-            models, chosen(diagnosis), diagnosis["evidence"].get("decisive")
-        )
+        figures["ranking"] = _ranking(models, chosen(diagnosis), evidence.get("decisive"))
     limits = [x for x in diagnosis.get("limits", ()) if _known(x)]
     if limits:
         figures["limits"] = _limits(limits)
     return figures
 
 
-def ranked(evidence: Mapping[str, Any]) -> list[tuple[tuple[str, ...], float]]:
+def ranked(
+    evidence: Mapping[str, Any], *, force: bool = False
+) -> list[tuple[tuple[str, ...], float]]:
     """Effects of every model to show and the log odds by which it trails the best one, best first.
 
-    The best is the most probable one of all that were tried.
+    The best is the most probable one of all that were tried; `force`: a free force among them.
     """
     models = [(tuple(m["effects"]), m["log_odds"]) for m in evidence.get("models", ())]
+    if force:
+        models.append(((FREE_FORCE,), evidence.get("free_force_log_odds")))
     models = [(effects, odds) for effects, odds in models if odds is not None]
     if () not in [effects for effects, _ in models]:
         models.append(((), 0.0))  # odds are against the base model
@@ -55,6 +59,8 @@ def ranked(evidence: Mapping[str, Any]) -> list[tuple[tuple[str, ...], float]]:
 
 def chosen(diagnosis: Mapping[str, Any]) -> frozenset[str]:
     """Effects of the model that the verdict stands for; a proved filter is in all of them."""
+    if diagnosis.get("verdict") == "unknown":
+        return frozenset([FREE_FORCE])
     return frozenset(e["id"] for e in diagnosis.get("effects", ()) if e["id"] != "smoothing")
 
 
