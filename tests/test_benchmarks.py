@@ -7,12 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks import bundled, figures, peers, readme, record, samplers, sampling, scaling
+from benchmarks import bundled, figures, loops, peers, readme, record, samplers, sampling, scaling
 from benchmarks.kernel import campaign, check
 from benchmarks.sampling import Sampled
 
+from bayesimpact.data.read import load_campaign
+
 BENCHMARKS = Path(record.__file__).parent
-MEASURED = ("added", "kernel", "peers", "samplers", "scaling", "startup")
+MEASURED = ("added", "kernel", "loops", "peers", "samplers", "scaling", "startup")
 
 
 @pytest.fixture(scope="module")
@@ -169,3 +171,17 @@ def test_figures_show_every_row(name: str) -> None:
     texts += [a.get_title(loc="left") for a in figure.axes]
     rows = ROWS[name](content)
     assert all(any(text.startswith(row) for text in texts) for row in rows)
+
+
+def test_timed_diagnoses_are_of_nine_recordings_of_6000_samples(tmp_path: Path) -> None:
+    for folder in (*loops.BUNDLED.values(), loops.outside("friction_pad", tmp_path / "outside")):
+        counts = [r.samples.size for r in load_campaign(folder).recordings]
+        assert len(counts) == 9 and min(counts) >= 6000
+
+
+def test_a_timed_diagnosis_says_the_same_every_time() -> None:
+    runs = [(30.0, 50.0, "unknown"), (33.0, 52.0, "unknown"), (31.0, 51.0, "unknown")]
+    found = loops.summary(runs)
+    assert (found["s"], found["slowest_s"], found["processor_s"]) == (31.0, 33.0, 51.0)
+    with pytest.raises(AssertionError):
+        loops.summary([*runs, (30.0, 50.0, "named")])
