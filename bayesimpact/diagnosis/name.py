@@ -35,7 +35,8 @@ WORTH_A_REFIT = 4.0  # expected gain in log likelihood, nats
 NEAR_BEST = 0.5  # of the best expected gain, less a margin: below that no refit makes a rival
 NEAR_MARGIN = 10.0  # nats
 FAR = 50.0  # nats; beyond four times that, the floor grows with the root of the best gain only
-LEAP = 30.0  # expected gain from which on effects that are on or off are always fitted, nats
+LEAP = 8.0  # expected gain from which on effects that are on or off are always fitted, nats
+LOST = 30.0  # by how much an effect alone must fall behind the base model to be given up, nats
 RASH = 1.5  # by how much a score may underrate what a refit gains
 LEAST_STEP = 0.8  # an effect that takes less than this off a gross residual is not worth a name
 BEAM = 3  # models that are extended while the best one is not white: it, and single effects
@@ -122,7 +123,7 @@ class _Search(Models):
         if alone is None:
             return False
         lost = self.worth(base.candidate) - self.worth(alone)
-        return lost > max(LEAP, base.unknown.log_evidence)
+        return lost > max(LOST, base.unknown.log_evidence)
 
     def worth(self, candidate: Candidate) -> float:
         return tempered_evidence(candidate, self.spread()) - self.cost * len(candidate.effects)

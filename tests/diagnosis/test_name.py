@@ -174,8 +174,8 @@ def test_what_is_worth_a_refit():
 
 def test_what_is_on_or_off_is_fitted_wherever_something_is_to_be_gained():
     for effect in ("contact_no_tension", "obstacle_mass"):
-        assert [s.gain for s in worth_a_refit(scores(40.0, 0.1, effect=effect))] == [40.0, 0.1]
-        assert [s.gain for s in worth_a_refit(scores(20.0, 0.1, effect=effect))] == [20.0]
+        assert [s.gain for s in worth_a_refit(scores(9.0, 0.1, effect=effect))] == [9.0, 0.1]
+        assert [s.gain for s in worth_a_refit(scores(7.0, 0.1, effect=effect))] == [7.0]
 
 
 def test_many_effects_that_imitate_one_force_in_contact_are_unknown():
