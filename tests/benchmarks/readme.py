@@ -10,6 +10,7 @@ from statistics import median
 from typing import Any
 
 from bayesimpact.model import effects
+from bayesimpact.trial.summary import rate, rate_in_groups
 
 EFFECTS = {effect.id: effect for effect in effects.EFFECTS}
 HERE = Path(__file__).resolve().parent
@@ -288,33 +289,59 @@ def trials_table() -> str:
     return grid(("concealed", "answers"), rows, foot)
 
 
-SINGLES = ("singles_5", "singles_5_again", "singles_paper", "singles_paper_again", "singles_2")
+SINGLES = (
+    ("singles_5",),
+    ("singles_5_again", "singles_5_more"),
+    ("singles_paper",),
+    ("singles_paper_again",),
+    ("singles_2",),
+)
+
+
+def together(rates: list[dict]) -> str:
+    """The rate of several runs, with its interval."""
+    if len(rates) == 1:
+        return share(rates[0])
+    return share(rate(sum(r["hits"] for r in rates), sum(r["of"] for r in rates)))
+
+
+def sizes_inside(runs: list[dict]) -> str:
+    """Sizes in their intervals; of several runs, those of one trial err together."""
+    if len(runs) == 1:
+        return share(runs[0]["sizes_inside"])
+    found = [answer["sizes_inside"] for run in runs for answer in run["answers"]]
+    return share(rate_in_groups([[True] * hits + [False] * (of - hits) for hits, of in found]))
 
 
 def single_table() -> str:
     """Blind trials of one effect of fixed size each."""
     rows, feet = [], []
-    for name in SINGLES:
-        t = stored(name)
-        benches = t["settings"]["benches"]
-        said = [answer["outcome"] for answer in t["answers"]]
-        wrong = t["confident_wrong_names"]
-        undecided = len(said) - said.count("named") - wrong["hits"]
+    for names in SINGLES:
+        runs = [stored(name) for name in names]
+        settings = runs[0]["settings"]
+        assert all(run["settings"] == settings for run in runs)
+        benches = settings["benches"]
+        said = [answer["outcome"] for run in runs for answer in run["answers"]]
+        wrong = [run["confident_wrong_names"] for run in runs]
         missed = said.count("missed")
+        undecided = len(said) - said.count("named") - sum(w["hits"] for w in wrong) - missed
         rows.append(
             (
-                f"{t['settings']['strength'][0]:g} limits",
+                f"{settings['strength'][0]:g} limits",
                 f"{len(benches)} rigs" if len(benches) > 1 else f"the {benches[0]}'s",
-                share(t["right"]["single"]),
-                f"{undecided - missed}",
+                together([run["right"]["single"] for run in runs]),
+                f"{undecided}",
                 f"{missed}",
-                share(wrong),
-                share(t["place"]),
-                share(t["sizes_inside"]),
+                together(wrong),
+                together([run["place"] for run in runs]),
+                sizes_inside(runs),
             )
         )
         feet.append(
-            f"seeds {t['seeds'][0]} to {t['seeds'][1]}, commit {t['commit'][:7]}, {t['date']}"
+            " and ".join(
+                f"seeds {t['seeds'][0]} to {t['seeds'][1]}, commit {t['commit'][:7]}, {t['date']}"
+                for t in runs
+            )
         )
     head = (
         "size",
