@@ -205,6 +205,25 @@ def controls_table() -> str:
     return grid(("nothing missing, noise", "called adequate"), rows, foot)
 
 
+def pairs_table() -> str:
+    """Pairs and what is outside the catalogue, with a later search."""
+    t = stored("pairs")
+    low, high = t["settings"]["strength"]
+    rows = [
+        ("two effects: both named", share(t["right"]["pair"])),
+        ("a force outside the catalogue: called unknown", share(t["right"]["outside"])),
+        ("a wrong name given with confidence", share(t["confident_wrong_names"])),
+        ("right place", share(t["place"])),
+        ("sizes inside their 90 % interval, where named", share(t["sizes_inside"])),
+    ]
+    first, last = t["seeds"]
+    foot = (
+        f"Sizes of {low:g} to {high:g} detection limits, {len(t['by_bench'])} rigs, seeds {first} "
+        f"to {last}, commit {t['commit'][:7]}, {t['date']}. In brackets: 95 % interval."
+    )
+    return grid(("concealed", "answers"), rows, foot)
+
+
 def coverage_table() -> str:
     """Coverage of the intervals."""
     c = stored("coverage")
@@ -369,6 +388,7 @@ def trial_coverage_table() -> str:
 
 TABLES = {
     "trials": trials_table,
+    "pairs": pairs_table,
     "controls": controls_table,
     "trial_coverage": trial_coverage_table,
     "singles": single_table,
