@@ -2,34 +2,29 @@
 
 from __future__ import annotations
 
-import json
 import re
-from collections.abc import Iterable
+import sys
 from pathlib import Path
 from statistics import median
 from typing import Any
 
+if __name__ == "__main__":  # imports go by the tests' folder, not by this one
+    sys.path[0] = str(Path(__file__).resolve().parents[1])
+
+from benchmarks.tables import HERE, grid, stored
+from benchmarks.trial_tables import (
+    controls_table,
+    pairs_table,
+    single_table,
+    trial_coverage_table,
+    trials_table,
+)
+
 from bayesimpact.model import effects
-from bayesimpact.trial.summary import rate, rate_in_groups
 
 EFFECTS = {effect.id: effect for effect in effects.EFFECTS}
-HERE = Path(__file__).resolve().parent
 README = HERE.parents[1] / "README.md"
-NOISES = {"white": "white", "ar1": "AR(1)", "smoothed": "smoothed by a declared filter"}
 BUSY = 0.25  # cores busy with something else, from which on times are not to be trusted
-
-
-def stored(name: str) -> dict:
-    """Content of a stored result."""
-    return json.loads((HERE / f"{name}.json").read_text(encoding="utf-8"))
-
-
-def grid(head: Iterable[str], rows: Iterable[Iterable[str]], foot: str) -> str:
-    """A table, and a line below it."""
-    cells = [tuple(head), *map(tuple, rows)]
-    lines = [f"| {' | '.join(row)} |" for row in cells]
-    lines.insert(1, "|---" * len(cells[0]) + "|")
-    return "\n".join([*lines, "", foot])
 
 
 def measured(result: dict, *more: str) -> str:
@@ -188,42 +183,6 @@ def loops_table() -> str:
     return grid(("missing", "verdict", "`--quick`, s", "with sampling, s"), rows, foot)
 
 
-def controls_table() -> str:
-    """False alarms."""
-    t = stored("controls")
-    said = [(row["noise"], row["outcome"]) for row in t["answers"]]
-    rows = [
-        (words, f"{sum(s == (noise, 'quiet') for s in said)} of "
-                f"{sum(kind == noise for kind, _ in said)}")
-        for noise, words in NOISES.items()
-    ]  # fmt: skip
-    first, last = t["seeds"]
-    foot = (
-        f"All: {share(t['right']['control'])}; {len(t['by_bench'])} rigs, seeds {first} to {last}, "
-        f"commit {t['commit'][:7]}, {t['date']}. In brackets: 95 % interval."
-    )
-    return grid(("nothing missing, noise", "called adequate"), rows, foot)
-
-
-def pairs_table() -> str:
-    """Pairs and what is outside the catalogue, with a later search."""
-    t = stored("pairs")
-    low, high = t["settings"]["strength"]
-    rows = [
-        ("two effects: both named", share(t["right"]["pair"])),
-        ("a force outside the catalogue: called unknown", share(t["right"]["outside"])),
-        ("a wrong name given with confidence", share(t["confident_wrong_names"])),
-        ("right place", share(t["place"])),
-        ("sizes inside their 90 % interval, where named", share(t["sizes_inside"])),
-    ]
-    first, last = t["seeds"]
-    foot = (
-        f"Sizes of {low:g} to {high:g} detection limits, {len(t['by_bench'])} rigs, seeds {first} "
-        f"to {last}, commit {t['commit'][:7]}, {t['date']}. In brackets: 95 % interval."
-    )
-    return grid(("concealed", "answers"), rows, foot)
-
-
 def coverage_table() -> str:
     """Coverage of the intervals."""
     c = stored("coverage")
@@ -277,113 +236,6 @@ def sbc_table() -> str:
         f"{out} of {count} outside, {0.01 * count:.1f} expected by chance; 300 replicates per run."
     )
     return grid(head, rows, f"{foot} Commits {commits}, {runs[-1]['date']}.")
-
-
-def share(row: dict) -> str:
-    """A rate with its interval."""
-    low, high = row["interval"]
-    return f"{row['hits']} of {row['of']} ({100 * low:.0f} to {100 * high:.0f} %)"
-
-
-def trials_table() -> str:
-    """Blind trials: what the diagnosis said of what was concealed."""
-    t = stored("trials")
-    low, high = t["settings"]["strength"]
-    rows = [
-        ("nothing concealed: called adequate", share(t["right"]["control"])),
-        ("one effect: named", share(t["right"]["single"])),
-        ("two effects: both named", share(t["right"]["pair"])),
-        ("a force outside the catalogue: called unknown", share(t["right"]["outside"])),
-        ("a wrong name given with confidence, all of these", share(t["confident_wrong_names"])),
-        ("right place", share(t["place"])),
-        ("sizes inside their 90 % interval, where named", share(t["sizes_inside"])),
-    ]
-    first, last = t["seeds"]
-    foot = (
-        f"{t['trials']} trials, seeds {first} to {last}; sizes of {low:g} to {high:g} detection "
-        f"limits (a limit is five standard errors); {len(t['by_bench'])} rigs, "
-        f"{len(t['by_noise'])} kinds of noise; median {t['seconds']['median']:.0f} s a diagnosis. "
-        f"In brackets: 95 % interval. Commit {t['commit'][:7]}, {t['date']}."
-    )
-    return grid(("concealed", "answers"), rows, foot)
-
-
-SINGLES = (
-    ("singles_5",),
-    ("singles_5_again", "singles_5_more"),
-    ("singles_paper",),
-    ("singles_paper_again",),
-    ("singles_2",),
-)
-
-
-def together(rates: list[dict]) -> str:
-    """The rate of several runs, with its interval."""
-    if len(rates) == 1:
-        return share(rates[0])
-    return share(rate(sum(r["hits"] for r in rates), sum(r["of"] for r in rates)))
-
-
-def sizes_inside(runs: list[dict]) -> str:
-    """Sizes in their intervals; of several runs, those of one trial err together."""
-    if len(runs) == 1:
-        return share(runs[0]["sizes_inside"])
-    found = [answer["sizes_inside"] for run in runs for answer in run["answers"]]
-    return share(rate_in_groups([[True] * hits + [False] * (of - hits) for hits, of in found]))
-
-
-def single_table() -> str:
-    """Blind trials of one effect of fixed size each."""
-    rows, feet = [], []
-    for names in SINGLES:
-        runs = [stored(name) for name in names]
-        settings = runs[0]["settings"]
-        assert all(run["settings"] == settings for run in runs)
-        benches = settings["benches"]
-        said = [answer["outcome"] for run in runs for answer in run["answers"]]
-        wrong = [run["confident_wrong_names"] for run in runs]
-        missed = said.count("missed")
-        undecided = len(said) - said.count("named") - sum(w["hits"] for w in wrong) - missed
-        rows.append(
-            (
-                f"{settings['strength'][0]:g} limits",
-                f"{len(benches)} rigs" if len(benches) > 1 else f"the {benches[0]}'s",
-                together([run["right"]["single"] for run in runs]),
-                f"{undecided}",
-                f"{missed}",
-                together(wrong),
-                together([run["place"] for run in runs]),
-                sizes_inside(runs),
-            )
-        )
-        feet.append(
-            " and ".join(
-                f"seeds {t['seeds'][0]} to {t['seeds'][1]}, commit {t['commit'][:7]}, {t['date']}"
-                for t in runs
-            )
-        )
-    head = (
-        "size",
-        "rig",
-        "named",
-        "undecided",
-        "missed",
-        "wrong name",
-        "right place",
-        "sizes inside",
-    )
-    return grid(head, rows, f"In brackets: 95 % interval. Runs: {'; '.join(feet)}.")
-
-
-def trial_coverage_table() -> str:
-    """Intervals before and after naming."""
-    t = stored("trials")["coverage"]
-    rows = [
-        (name, share(t["concealed"][name]["before"]), share(t["named"][name]["after"]))
-        for name in ("c1", "k1", "c2", "g", "k2")
-    ]
-    head = ("90 % intervals that hold the truth", "base model, something concealed", "after naming")
-    return grid(head, rows, "From the same trials.")
 
 
 TABLES = {
