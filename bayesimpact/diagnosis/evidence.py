@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special, stats
 
-from bayesimpact.inference.fit import Fit, inverse
+from bayesimpact.inference.fit import Fit, inverse, likelihood_gradient
 from bayesimpact.inference.prior import LogNormal, Normal, Uniform
 
 Array = NDArray[np.float64]
@@ -134,7 +134,5 @@ def _boundary(distance: float, index: int, fit: Fit) -> float:
 def gradient(fit: Fit) -> Array:
     """Gradient of the log posterior at a fit, (d,)."""
     sigma = fit.mode[fit.target.likelihood.sigma_columns]
-    vector = np.array(fit.target.priors.gradient(fit.mode))
-    for lin, s in zip(fit.linearisation, sigma, strict=True):
-        vector[lin.columns] += lin.jacobian.T @ lin.residual / s**2
-    return vector
+    slope = likelihood_gradient(fit.linearisation, sigma, fit.mode.size)
+    return np.asarray(slope + fit.target.priors.gradient(fit.mode))

@@ -20,7 +20,13 @@ from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.directions import is_periodic, sigma_of
 from bayesimpact.diagnosis.force import whitened_one
 from bayesimpact.diagnosis.scores import LIMIT_SD, Score
-from bayesimpact.inference.fit import Fit, inverse, prior_information
+from bayesimpact.inference.fit import (
+    Fit,
+    grams,
+    inverse,
+    likelihood_information,
+    prior_information,
+)
 from bayesimpact.model.effects.effect import Effect, Scales
 from bayesimpact.model.parameters import SLOTS
 
@@ -175,8 +181,8 @@ def projected(fit: Fit, blocks: Sequence[Blocks]) -> tuple[Array, Array]:
     matrix = np.diag(prior_information(fit.target.priors, fit.mode))
     noise = fit.target.oscillator.layout.roles("noise")
     matrix[noise, noise] = 0.0
-    for part, s in zip(fit.linearisation, sigma, strict=True):
-        matrix[np.ix_(part.columns, part.columns)] += part.jacobian.T @ part.jacobian / s**2
+    parts = fit.linearisation
+    matrix += likelihood_information(parts, grams(parts), sigma, fit.mode.size)
     shared = np.zeros((count, fit.mode.size, width))
     information = np.zeros((count, width, width))
     score = np.zeros((count, width))

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from bayesimpact.inference.fit import (
     Fit,
     Target,
-    gradient,
     grams,
-    information,
     inverse,
+    likelihood_gradient,
+    likelihood_information,
     marginal_sd,
     prior_information,
 )
@@ -105,8 +105,8 @@ class Climb:
         likelihood, priors, theta = self.target.likelihood, self.target.priors, here.theta
         parts = self._parts(here)
         sigma = theta[likelihood.sigma_columns]
-        matrix = information(parts, self.products, sigma, theta.size)
-        vector = gradient(parts, sigma, theta.size) + priors.gradient(theta)
+        matrix = likelihood_information(parts, self.products, sigma, theta.size)
+        vector = likelihood_gradient(parts, sigma, theta.size) + priors.gradient(theta)
         known = prior_information(priors, theta)
         known[self.noise] = 0.0
         matrix += np.diag(known)
@@ -194,7 +194,7 @@ class Climb:
             straight = part.residual - BENT_AT * part.jacobian @ step[part.columns]
             ahead.append(replace(part, residual=(white[0] - straight) * 2.0 / BENT_AT**2))
         sigma = theta[likelihood.sigma_columns]
-        vector = gradient(ahead, sigma, theta.size)
+        vector = likelihood_gradient(ahead, sigma, theta.size)
         if not np.isfinite(vector).all():
             return np.zeros(theta.size)
         return 0.5 * self.step(theta, replace(slope, vector=vector), damping)

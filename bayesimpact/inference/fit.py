@@ -119,7 +119,7 @@ def grams(linearisation: Sequence[Linearisation]) -> tuple[Array, ...]:
     return tuple(part.jacobian.T @ part.jacobian for part in linearisation)
 
 
-def information(
+def likelihood_information(
     linearisation: Sequence[Linearisation], products: Sequence[Array], sigma: Array, size: int
 ) -> Array:
     """J'J / sigma^2 (size, size), summed; `products` of `grams`, noise levels `sigma` (R,)."""
@@ -129,7 +129,7 @@ def information(
     return matrix
 
 
-def gradient(linearisation: Sequence[Linearisation], sigma: Array, size: int) -> Array:
+def likelihood_gradient(linearisation: Sequence[Linearisation], sigma: Array, size: int) -> Array:
     """J'r / sigma^2 (size,), summed; noise levels `sigma` (R,)."""
     vector = np.zeros(size)
     for part, level in zip(linearisation, sigma, strict=True):

@@ -28,7 +28,7 @@ def linear_algebra_alone() -> Iterator[None]:
     """While it lasts, NumPy's and SciPy's linear algebra runs on the thread that calls it.
 
     Its own threads gain nothing on matrices of tens of columns, and those of OpenBLAS keep a core
-    busy while they wait for more, which `in_shares` could use: a diagnosis takes a third longer.
+    busy while they wait for more, which `in_shares` could use.
     """
     with threadpool_limits(limits=1, user_api="blas"):
         yield

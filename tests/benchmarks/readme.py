@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -13,11 +14,10 @@ if __name__ == "__main__":  # imports go by the tests' folder, not by this one
 
 from benchmarks.tables import HERE, grid, stored
 from benchmarks.trial_tables import (
+    blind_table,
     controls_table,
-    pairs_table,
     single_table,
     trial_coverage_table,
-    trials_table,
 )
 
 from bayesimpact.model import effects
@@ -239,8 +239,8 @@ def sbc_table() -> str:
 
 
 TABLES = {
-    "trials": trials_table,
-    "pairs": pairs_table,
+    "trials": partial(blind_table, "trials"),
+    "pairs": partial(blind_table, "pairs"),
     "controls": controls_table,
     "trial_coverage": trial_coverage_table,
     "singles": single_table,

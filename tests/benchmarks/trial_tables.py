@@ -15,15 +15,20 @@ def share(row: dict) -> str:
     return f"{row['hits']} of {row['of']} ({100 * low:.0f} to {100 * high:.0f} %)"
 
 
-def trials_table() -> str:
+KINDS = {
+    "control": "nothing concealed: called adequate",
+    "single": "one effect: named",
+    "pair": "two effects: both named",
+    "outside": "a force outside the catalogue: called unknown",
+}
+
+
+def blind_table(name: str) -> str:
     """Blind trials: what the diagnosis said of what was concealed."""
-    t = stored("trials")
+    t = stored(name)
     low, high = t["settings"]["strength"]
-    rows = [
-        ("nothing concealed: called adequate", share(t["right"]["control"])),
-        ("one effect: named", share(t["right"]["single"])),
-        ("two effects: both named", share(t["right"]["pair"])),
-        ("a force outside the catalogue: called unknown", share(t["right"]["outside"])),
+    rows = [(words, share(t["right"][kind])) for kind, words in KINDS.items() if kind in t["right"]]
+    rows += [
         ("a wrong name given with confidence, all of these", share(t["confident_wrong_names"])),
         ("right place", share(t["place"])),
         ("sizes inside their 90 % interval, where named", share(t["sizes_inside"])),
@@ -131,22 +136,3 @@ def controls_table() -> str:
         f"commit {t['commit'][:7]}, {t['date']}. In brackets: 95 % interval."
     )
     return grid(("nothing missing, noise", "called adequate"), rows, foot)
-
-
-def pairs_table() -> str:
-    """Pairs and what is outside the catalogue, with a later search."""
-    t = stored("pairs")
-    low, high = t["settings"]["strength"]
-    rows = [
-        ("two effects: both named", share(t["right"]["pair"])),
-        ("a force outside the catalogue: called unknown", share(t["right"]["outside"])),
-        ("a wrong name given with confidence", share(t["confident_wrong_names"])),
-        ("right place", share(t["place"])),
-        ("sizes inside their 90 % interval, where named", share(t["sizes_inside"])),
-    ]
-    first, last = t["seeds"]
-    foot = (
-        f"Sizes of {low:g} to {high:g} detection limits, {len(t['by_bench'])} rigs, seeds {first} "
-        f"to {last}, commit {t['commit'][:7]}, {t['date']}. In brackets: 95 % interval."
-    )
-    return grid(("concealed", "answers"), rows, foot)
