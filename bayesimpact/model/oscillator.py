@@ -133,7 +133,6 @@ class Oscillator:
         """
         q = self.layout.slots(theta)[:, r]
         other = (np.delete(q, _OFFSET, axis=1) != np.delete(q[0], _OFFSET)).any(axis=1)
-        other[0] = False
         simulated = np.concatenate([[0], np.flatnonzero(other)])
         motions = self.motions_of(np.full(simulated.size, r), q[simulated])
         return self._read(r, motions[np.where(other, np.cumsum(other), 0)], theta)
