@@ -13,7 +13,7 @@ import numpy as np
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.force import missing_drift, missing_force
 from bayesimpact.diagnosis.naming import State, is_gross
-from bayesimpact.diagnosis.periodic import shakes_in_own_band
+from bayesimpact.diagnosis.own_band import shakes_in_own_band
 from bayesimpact.diagnosis.refit import Candidate, refit, without
 from bayesimpact.diagnosis.scan import Scan, scan
 from bayesimpact.diagnosis.scores import Score

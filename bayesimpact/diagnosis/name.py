@@ -72,7 +72,7 @@ def name(
         if not state.is_white:
             singles = [c for c in better[1:] if len(c.effects) == 1 and c.log_evidence > -np.inf]
             beam = [state, *(search.examine(c) for c in singles[: BEAM - 1])]
-    if state.is_white or is_gross(base.candidate.fit):  # else no name can be given
+    if search.may_be_named(state):
         state = search.settled(state)
     return search.naming(base, state)
 
@@ -112,6 +112,14 @@ class _Search(Models):
         more = MOST_EFFECTS - len(state.candidate.effects)
         instead = self.force_worth() - self.worth(state.candidate)
         return state.unknown.log_evidence > more * most or instead > most
+
+    def may_be_named(self, state: State) -> bool:
+        """Whether a search around a model may end with a name, white or not.
+
+        Not where a free force wins anyhow.
+        """
+        gross = is_gross(self.states[frozenset()].candidate.fit)
+        return state.is_white or gross or self.worth(state.candidate) > self.force_worth()
 
     def worth_a_refit(self, scan: Scan, least: float = 0.0) -> list[Score]:
         """Effects that promise something, but for those that have proved to be wrong here."""
@@ -179,7 +187,8 @@ class _Search(Models):
         """The model that neither leaving out nor exchanging an effect improves."""
         for _ in range(EXCHANGES):
             state = self.eliminated(state)
-            self.compare_rivals(state)
+            for candidate in self.near(state):
+                self.exchange(candidate)
             best = self.best(len(state.candidate.effects))
             if set(best.ids) == set(state.candidate.ids):
                 break
@@ -202,9 +211,17 @@ class _Search(Models):
                 models[key] = self.finished(models[key])
         return sorted(models.values(), key=self.worth, reverse=True)
 
-    def compare_rivals(self, state: State) -> None:
+    def near(self, state: State) -> list[Candidate]:
+        """The chosen model and those of at most its size that it does not beat decisively."""
+        least = self.worth(state.candidate) - DECISIVE
+        return [
+            c
+            for c in self.ranked(list(self.tried.values()))
+            if self.worth(c) >= least and len(c.effects) <= len(state.candidate.effects)
+        ]
+
+    def exchange(self, chosen: Candidate) -> None:
         """Put every other effect in the place of each chosen one (for pairs and triples)."""
-        chosen = state.candidate
         if len(chosen.effects) < 2:
             return
         for effect in chosen.effects:

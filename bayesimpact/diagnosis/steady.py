@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from bayesimpact.diagnosis.directions import is_periodic, sigma_of
-from bayesimpact.diagnosis.force import whitened_one
-from bayesimpact.diagnosis.periodic import Blocks, blocks_of, force_responses, projected
+from bayesimpact.diagnosis.directions import is_periodic
+from bayesimpact.diagnosis.harmonics import Blocks, blocks_of, force_responses, hums, projected
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
 
@@ -42,14 +41,6 @@ def _blocks(fit: Fit, r: int, effect: Effect, lines: Array, scales: Scales) -> B
         force_responses(fit, r, lines, scales) if effect.observe is None else hums(fit, r, lines)
     )
     return blocks_of(fit, r, columns[None])
-
-
-def hums(fit: Fit, r: int, lines: Array) -> Array:
-    """Whitened sines and cosines (2 F, n) of one metre."""
-    recording = fit.target.oscillator.campaign.recordings[r]
-    angle = 2 * np.pi * lines[:, None] * recording.times
-    waves = np.concatenate([np.sin(angle), np.cos(angle)])
-    return whitened_one(fit, r, waves, sigma_of(fit))
 
 
 def _p_value(fit: Fit, blocks: list[Blocks]) -> float:

@@ -31,7 +31,7 @@ CLOSE = 0.02  # in that logarithm: how near the mode is found
 ENOUGH = 0.02  # nats: or so little above it
 FARTHEST = 5.0  # that the shape is followed, in its logarithm
 MOST = 12  # moves, and as many more of Brent's method
-ITERATIONS = 10  # of a climb beside the valley
+ITERATIONS = 20  # of a climb beside the valley
 
 
 def valley(fit: Fit) -> int | None:
@@ -81,8 +81,7 @@ class _Profile:
         if x not in self.fits:
             near = min(self.fits, key=lambda known: abs(known - x), default=None)
             before = self.first if near is None else self.fits[near]
-            start = before.mode.copy()
-            start[self.column] = np.exp(x)
+            start = self.predicted(before, x)
             self.fits[x] = find_mode(
                 before.target,
                 start,
@@ -92,6 +91,23 @@ class _Profile:
                 max_iterations=ITERATIONS,
             )
         return -self.fits[x].log_posterior
+
+    def predicted(self, before: Fit, x: float) -> Array:
+        """Where the valley through a fit passes with the shape at exp(x): along its regression.
+
+        Positive parameters move by their logarithms, and at most as the square of the shape.
+        """
+        c = self.column
+        move = x - float(np.log(before.mode[c]))
+        change = before.covariance[:, c] / before.covariance[c, c] * before.mode[c] * move
+        lower = np.array([p.lower for p in before.target.oscillator.layout.parameters])
+        positive = (lower == 0.0) & (before.mode > 0.0)
+        change[positive] /= before.mode[positive]
+        factor = np.exp(np.clip(change[positive], -2 * abs(move), 2 * abs(move)))
+        start = np.asarray(before.mode + change)
+        start[positive] = before.mode[positive] * factor
+        start[c] = np.exp(x)
+        return start
 
     def search(self, x: float) -> bool:
         """Downhill in growing steps until the profile rises again, then Brent's method.

@@ -166,6 +166,21 @@ def test_an_exchange_replaces_an_imitation(run):
     assert chosen(run(table)) == {A, B, D}
 
 
+def test_an_exchange_begins_at_rivals_too(run):
+    """No exchange leads from {A, B} to {D, S}, one from its equal {C, D} does."""
+    singles = {A: 400.0, B: 390.0, C: 380.0, D: 100.0, S: 50.0}
+    equal, far = {f"{A} {B}": 520.0, f"{C} {D}": 518.0}, {f"{A} {B}": 520.0, f"{C} {D}": 510.0}
+    assert chosen(run(Table(singles | equal | {f"{D} {S}": 560.0}))) == {D, S}
+    assert chosen(run(Table(singles | far | {f"{D} {S}": 560.0}))) == {A, B}
+
+
+@pytest.mark.parametrize(("force", "found"), [(465.0, {C, D}), (490.0, {A, B, C})])
+def test_exchanges_are_tried_before_a_model_is_given_up(run, force, found):
+    """Three imitate two and leave something; not where a free force is likelier than the three."""
+    gains = {A: 300.0, B: 250.0, C: 100.0, D: 80.0, f"{A} {B}": 450.0, f"{A} {B} {C}": 480.0}
+    assert chosen(run(Table(gains | {f"{C} {D}": 520.0}, force=force))) == found
+
+
 def test_the_search_ends_when_a_free_force_will_beat_all_names(run):
     steps = {A: 100.0, f"{A} {B}": 120.0, f"{A} {B} {C}": 140.0}
     hopeless, hopeful = Table(steps, force=2000.0), Table(steps, force=130.0)

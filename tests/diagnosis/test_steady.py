@@ -12,17 +12,20 @@ from effect_rigs import BY_ID
 
 from bayesimpact.data.campaign import Measurement, Smoothing
 from bayesimpact.diagnosis.extend import campaign_scales, extend, transfer
-from bayesimpact.diagnosis.periodic import (
+from bayesimpact.diagnosis.harmonics import (
     blocks_of,
+    force_responses,
+    hums,
     line_blocks,
-    periodic_scores,
-    shakes_in_own_band,
+    projected,
 )
+from bayesimpact.diagnosis.own_band import shakes_in_own_band
+from bayesimpact.diagnosis.periodic import LEAST_GAIN, leaking, periodic_scores
 from bayesimpact.diagnosis.refit import refit
-from bayesimpact.diagnosis.steady import hums, steadiness
+from bayesimpact.diagnosis.steady import steadiness
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
-from bayesimpact.model.measurement import smooth
+from bayesimpact.model.measurement import gain, smooth
 from bayesimpact.trial.rig_chain import Chain
 
 FREQUENCY, AMPLITUDE = 61.3, 2e-6
@@ -65,37 +68,83 @@ def test_what_is_not_steady_does_not(envelope):
     assert p_value(4, envelope) < 1e-4
 
 
-def test_a_hum_behind_a_declared_filter_is_found():
-    """The search's Fourier sums say what simulated readings, filtered and whitened, say."""
-    filtered = Smoothing("savgol", window=9, polyorder=2)
+FILTERED = Smoothing("savgol", window=9, polyorder=2)
+
+
+def behind_a_filter(frequency: float, amplitude: float) -> Fit:
+    """A base fit of recordings with a hum of phase r in recording r, all behind `FILTERED`."""
     campaign = small_rig.record(
         5,
-        chain=Chain(noise=small_rig.NOISE, offsets=small_rig.OFFSETS, smoothing=filtered),
+        chain=Chain(noise=small_rig.NOISE, offsets=small_rig.OFFSETS, smoothing=FILTERED),
         duration=1.5,
-        measurement=Measurement(smoothing=filtered),
+        measurement=Measurement(smoothing=FILTERED),
     )
-    hum = [
-        AMPLITUDE * np.sin(2 * np.pi * FREQUENCY * x.times + r)
-        for r, x in enumerate(campaign.recordings)
-    ]
-    recordings = [
-        replace(x, samples=x.samples + smooth(h, filtered, x.interval))
-        for x, h in zip(campaign.recordings, hum, strict=True)
-    ]
+    recordings = []
+    for r, x in enumerate(campaign.recordings):
+        hum = amplitude * np.sin(2 * np.pi * frequency * x.times + r)
+        recordings.append(replace(x, samples=x.samples + smooth(hum, FILTERED, x.interval)))
     campaign = replace(campaign, recordings=tuple(recordings))
-    fit = identify(campaign, rng=np.random.default_rng(0), search=False).fit
+    return identify(campaign, rng=np.random.default_rng(0), search=False).fit
+
+
+def test_a_hum_behind_a_declared_filter_is_found():
+    """The search's Fourier sums say what simulated readings, filtered and whitened, say."""
+    fit = behind_a_filter(FREQUENCY, AMPLITUDE)
     (score,) = periodic_scores(fit, [BY_ID["sensor_hum"]], campaign_scales(fit))
     assert score.p_value < 1e-9
     assert score.shapes["sensor_hum.frequency"] == pytest.approx(FREQUENCY, abs=0.3)
     assert score.size[0] == pytest.approx(AMPLITUDE, abs=4 * score.size_sd[0])
-    phases = [score.shapes[f"sensor_hum.phase[{x.name}]"] for x in campaign.recordings]
+    phases = [
+        score.shapes[f"sensor_hum.phase[{x.name}]"]
+        for x in fit.target.oscillator.campaign.recordings
+    ]
     for r, phase in enumerate(phases):
         assert np.cos(phase - r) > 0.9
     lines = np.array([FREQUENCY - 1, FREQUENCY, FREQUENCY + 1])
-    waves = hums(fit, 0, lines).reshape(2, lines.size, -1).transpose(1, 0, 2)
+    waves = hums(fit, 0, lines).reshape(lines.size, 2, -1)
     direct, sums = blocks_of(fit, 0, waves), line_blocks(fit, 0, lines)
     np.testing.assert_allclose(sums.score, direct.score, rtol=0.05, atol=0.01 * sums.score.max())
     np.testing.assert_allclose(sums.own[:, 0, 0], direct.own[:, 0, 0], rtol=0.05)
+
+
+def test_a_hum_above_the_band_of_a_filter_is_found_by_what_leaks_into_it():
+    """The whitened numbers end at half power; the filter leaves this one 0.4 of its amplitude.
+
+    It is forty times the noise before the filter.
+    """
+    fit = behind_a_filter(0.0, 0.0)
+    interval = float(fit.target.oscillator.intervals[0])
+    above = leaking(fit, campaign_scales(fit))
+    assert np.all(gain(FILTERED, interval, above) >= LEAST_GAIN)
+    assert gain(FILTERED, interval, above[:1])[0] ** 2 == pytest.approx(0.5, abs=0.01)
+    frequency = 0.2 + float(above[np.argmin(np.abs(gain(FILTERED, interval, above) - 0.4))])
+    (nothing,) = periodic_scores(fit, [BY_ID["sensor_hum"]], campaign_scales(fit))
+    assert nothing.p_value > 0.01
+    fit = behind_a_filter(frequency, 100 * AMPLITUDE)
+    (score,) = periodic_scores(fit, [BY_ID["sensor_hum"]], campaign_scales(fit))
+    assert score.p_value < 1e-9
+    assert score.shapes["sensor_hum.frequency"] == pytest.approx(frequency, abs=0.7)
+
+
+def test_scores_are_those_of_the_mode_although_a_climb_ended_beside_it():
+    """Half a standard deviation away from the mode the fitted parameters take their part back."""
+    fit = identify(small_rig.record(6), rng=np.random.default_rng(0), search=False).fit
+    target, theta = fit.target, fit.mode.copy()
+    away = target.oscillator.layout.roles("physical", "nuisance")
+    theta[away] += 0.5 * fit.sd[away]
+    beside = replace(fit, mode=theta, linearisation=target.likelihood.linearise(theta))
+    scales = campaign_scales(fit)
+    lines = np.array([0.9, 1.0, 1.1]) * scales.natural_frequency
+
+    def numbers(at: Fit) -> np.ndarray:
+        waves = [
+            force_responses(at, r, lines, scales).reshape(lines.size, 2, -1)
+            for r in range(len(at.linearisation))
+        ]
+        information, score = projected(at, [blocks_of(at, r, w) for r, w in enumerate(waves)])
+        return score / np.sqrt(np.einsum("fii->fi", information))
+
+    np.testing.assert_allclose(numbers(beside), numbers(fit), atol=0.1)
 
 
 def test_a_model_without_a_line_has_nothing_to_be_steady(small):

@@ -97,6 +97,23 @@ def test_the_lowest_point_of_a_bent_valley_is_found():
     assert lost == pytest.approx(0.5 * bend * away**2, rel=0.3)
 
 
+@pytest.mark.parametrize("factor", [0.6, 0.8, 1.25, 1.6])
+def test_a_step_along_the_valley_begins_where_it_passes(factor):
+    """The branch keeps its inertia and the contact its damping; nothing turns negative."""
+    best = find_mode(problem(), np.array([1.0, STIFFNESS, TIME, 1e-3]), max_iterations=500)
+    profile = _Profile(2, best)
+    x = float(np.log(factor * best.mode[2]))
+    begun, straight = profile.predicted(best, x), best.mode.copy()
+    straight[2] = begun[2]
+    assert begun[2] == pytest.approx(factor * best.mode[2])
+    assert (begun[1:] > 0).all()
+    lost = [float(best.target.likelihood.misfit(at)[0, 0]) for at in (begun, straight)]
+    assert lost[0] < 0.2 * lost[1]
+    assert profile(x) == pytest.approx(-find_mode(
+        problem(), begun, held=[2], max_iterations=500
+    ).log_posterior, abs=0.01)  # fmt: skip
+
+
 def test_a_model_without_shapes_has_no_valley():
     fit = unfinished()
     fit.target.likelihood.oscillator.effects = ()

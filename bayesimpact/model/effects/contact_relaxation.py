@@ -52,7 +52,7 @@ EFFECT = Effect(
         "The obstacle relaxes: a Maxwell branch adds {size} ({share} of the peak contact force)."
     ),
     parameters=(
-        EffectParameter("stiffness", "N/m", scale=lambda s: 0.05 * s.contact_stiffness, lower=0.0),
+        EffectParameter("stiffness", "N/m", scale=lambda s: 0.5 * s.contact_stiffness, lower=0.0),
         EffectParameter(
             "time",
             "s",

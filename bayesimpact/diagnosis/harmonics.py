@@ -1,0 +1,140 @@
+"""Sines and cosines against a fit: their products with each other, J and the residual.
+
+A force on the mass answers through the model, a hum in the probe's signal through the filter alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import czt
+
+from bayesimpact.diagnosis.directions import sigma_of
+from bayesimpact.diagnosis.evidence import gradient
+from bayesimpact.diagnosis.force import whitened_one
+from bayesimpact.inference.fit import (
+    Fit,
+    grams,
+    inverse,
+    likelihood_information,
+    prior_information,
+)
+from bayesimpact.model.effects.effect import Scales
+from bayesimpact.model.parameters import SLOTS
+
+Array = NDArray[np.float64]
+
+AT_ONCE = 32  # frequencies whose responses fit into a processor's cache
+_FORCE, _OMEGA, _PHASE = (SLOTS.index(s) for s in ("A", "w", "phase"))
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """One recording at F frequencies: m columns (sine and cosine, or several of them) against each
+    other, J and the residual.
+    """
+
+    own: Array  # (F, m, m)
+    absorbed: Array  # (F, k, m)
+    score: Array  # (F, m)
+    columns: NDArray[np.int64]  # (k,)
+
+
+def blocks_of(fit: Fit, r: int, columns: Array) -> Blocks:
+    """Products of whitened columns (F, m, n) of recording r."""
+    part, sigma = fit.linearisation[r], float(sigma_of(fit)[r])
+    own = np.einsum("fin,fjn->fij", columns, columns, optimize=True)
+    absorbed = np.einsum("nk,fin->fki", part.jacobian / sigma, columns, optimize=True)
+    return Blocks(own, absorbed, columns @ (part.residual / sigma), part.columns)
+
+
+def blocks_in_parts(
+    fit: Fit, r: int, grid: Array, waves: Callable[[Array], Array]
+) -> Iterator[Blocks]:
+    """Blocks of whitened sines and cosines (2 F, n) at F frequencies, some of them at a time."""
+    for some in np.array_split(grid, -(-grid.size // AT_ONCE)) if grid.size else ():
+        yield blocks_of(fit, r, waves(some).reshape(some.size, 2, -1))
+
+
+def joined(parts: Iterable[Blocks]) -> Blocks:
+    """One recording's blocks at the frequencies of all parts."""
+    found = list(parts)
+    own, absorbed, score = (
+        np.concatenate([getattr(block, name) for block in found])
+        for name in ("own", "absorbed", "score")
+    )
+    return Blocks(own, absorbed, score, found[0].columns)
+
+
+def line_blocks(fit: Fit, r: int, grid: Array) -> Blocks:
+    """A hum of one metre: Fourier sums of the whitened residual and derivatives."""
+    part, sigma, noise = fit.linearisation[r], sigma_of(fit)[r], fit.target.likelihood.noise
+    oscillator = fit.target.oscillator
+    interval, count = float(oscillator.intervals[r]), int(oscillator.counts[r])
+    white = np.vstack([part.residual, part.jacobian.T]) / sigma
+    stacked, start = noise.in_time(white, count, interval)
+    step = 2 * np.pi * interval * (grid[1] - grid[0])
+    first = 2 * np.pi * interval * grid[0]
+    sums = czt(stacked, grid.size, np.exp(-1j * step), np.exp(1j * first), axis=-1)
+    lift = _whitening_gain(fit, grid, interval) / sigma
+    sums = sums * np.exp(-2j * np.pi * grid * start)
+    pairs = np.stack([-sums.imag, sums.real], axis=-1) * lift[:, None]  # (1 + k, F, 2)
+    n = stacked.shape[-1]
+    own = np.repeat((0.5 * n * lift**2)[:, None, None] * np.eye(2), 1, axis=0)
+    return Blocks(own, pairs[1:].transpose(1, 0, 2), pairs[0], part.columns)
+
+
+def _whitening_gain(fit: Fit, grid: Array, interval: float) -> Array:
+    rho = fit.target.likelihood.noise.correlation
+    angle = 2 * np.pi * grid * interval
+    return np.sqrt((1 - 2 * rho * np.cos(angle) + rho**2) / (1 - rho**2))
+
+
+def hums(fit: Fit, r: int, lines: Array) -> Array:
+    """Whitened sine and cosine of one metre at every frequency (F,), Hz: (2 F, n)."""
+    recording = fit.target.oscillator.campaign.recordings[r]
+    angle = 2 * np.pi * lines[:, None] * recording.times
+    waves = np.stack([np.sin(angle), np.cos(angle)], axis=1).reshape(2 * lines.size, -1)
+    return whitened_one(fit, r, waves, sigma_of(fit))
+
+
+def force_responses(fit: Fit, r: int, grid: Array, scales: Scales) -> Array:
+    """Whitened response to sine and cosine of one newton at every frequency (F,), Hz: (2 F, n)."""
+    oscillator, sigma = fit.target.oscillator, sigma_of(fit)
+    slots = oscillator.layout.slots(fit.mode)[r]
+    size = 1e-3 * float(sigma[r]) * scales.stiffness
+    q = np.tile(slots, (2 * grid.size + 1, 1))
+    q[1:, _FORCE] = size
+    q[1:, _OMEGA] = np.repeat(2 * np.pi * grid, 2)
+    q[1:, _PHASE] = np.tile([0.0, 0.5 * np.pi], grid.size)
+    motion = oscillator.motions_of(np.full(q.shape[0], r), q)
+    return whitened_one(fit, r, motion[1:] - motion[0], sigma) / size
+
+
+def projected(fit: Fit, blocks: Sequence[Blocks]) -> tuple[Array, Array]:
+    """Information (F, m R, m R) and score (F, m R) with what the parameters absorb taken off."""
+    count, own = blocks[0].score.shape
+    width = own * len(blocks)
+    sigma = sigma_of(fit)
+    matrix = np.diag(prior_information(fit.target.priors, fit.mode))
+    noise = fit.target.oscillator.layout.roles("noise")
+    matrix[noise, noise] = 0.0
+    parts = fit.linearisation
+    matrix += likelihood_information(parts, grams(parts), sigma, fit.mode.size)
+    shared = np.zeros((count, fit.mode.size, width))
+    information = np.zeros((count, width, width))
+    score = np.zeros((count, width))
+    for r, block in enumerate(blocks):
+        at = slice(own * r, own * (r + 1))
+        shared[:, block.columns, at] = block.absorbed
+        information[:, at, at] = block.own
+        score[:, at] = block.score
+    solve = inverse(matrix)
+    information -= np.einsum("fdi,de,fej->fij", shared, solve, shared, optimize=True)
+    slope = gradient(fit)  # zero at the mode; a climb ends near it
+    slope[noise] = 0.0
+    score -= np.einsum("fdi,d->fi", shared, solve @ slope)
+    return 0.5 * (information + information.transpose(0, 2, 1)), score
