@@ -20,7 +20,7 @@ from bayesimpact.model.effects.effect import Effect, Scales
 Array = NDArray[np.float64]
 
 SIDEBANDS = np.array([-1.0, 0.0, 1.0])  # reciprocals of the longest recording
-RANK = 1e-6
+RANK = 1e-2  # less of a line is what the model's own amplitude and phases leave, to second order
 
 
 def steadiness(fit: Fit, scales: Scales) -> tuple[float, ...]:
