@@ -1,4 +1,4 @@
-"""Is a harmonic force that a model holds one that the motion itself could pass for?"""
+"""Is a harmonic force, or a hum, that a model holds one that the motion itself could pass for?"""
 
 from __future__ import annotations
 
@@ -16,21 +16,26 @@ OWN_BAND = 0.1  # of the spectrum's peak
 
 
 def shakes_in_own_band(fit: Fit, gross: bool) -> bool:
-    """True when the model has a harmonic force at a frequency at which the motion swings anyway.
+    """True when the model has a harmonic force or a hum where the motion swings anyway.
 
-    There a decaying motion and a forced one differ only by phase, and the force passes for any slow
-    change of frequency or damping: over the whole band where the misfit is `gross`, and always
-    where the recordings are too short to tell both frequencies apart.
+    There a decaying motion and a steady one differ only by phase, and the steady one passes for any
+    slow change of frequency or damping: over the whole band where the misfit is `gross`. A force,
+    which has a motion of its own to begin with, passes for one always where the recordings are too
+    short to tell both frequencies apart.
     """
-    names = [f"{e.id}.frequency" for e in fit.target.oscillator.effects if _is_force(e)]
-    found = [float(fit.mode[fit.names.index(name)]) for name in names]
-    recordings = fit.target.oscillator.campaign.recordings
-    swings = _swings if gross else _is_unresolved
-    return any(swings(recording, frequency) for frequency in found for recording in recordings)
+    return any(
+        _swings(recording, frequency)
+        if gross
+        else effect.observe is None and _is_unresolved(recording, frequency)
+        for effect, frequency in _lines(fit)
+        for recording in fit.target.oscillator.campaign.recordings
+    )
 
 
-def _is_force(effect: Effect) -> bool:
-    return is_periodic(effect) and effect.observe is None
+def _lines(fit: Fit) -> list[tuple[Effect, float]]:
+    """Periodic effects of a model and their frequencies, Hz."""
+    effects = [e for e in fit.target.oscillator.effects if is_periodic(e)]
+    return [(e, fit.value(f"{e.id}.frequency")) for e in effects]
 
 
 def _spectrum(recording: Recording) -> Array:

@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 
 RESPONSE_REACH = 2.0  # forcing is looked for up to so many times the natural frequency in contact,
 FLIGHT_REACH = 4.0  # or in free flight
-HUM_ABOVE = 1.5  # times the natural frequency of free flight
+HUM_PERIODS = 5.0  # in the longest recording, at least: slower ones pass for a drift
 LEAST_GAIN = 0.1  # of a filter: hums that it lets through so far leak into the band below
 
 
@@ -63,8 +63,7 @@ def frequencies(fit: Fit, effect: Effect, scales: Scales) -> Array:
         contact = RESPONSE_REACH * np.sqrt(stiffest) / (2 * np.pi)
         highest = min(0.9 * highest, max(contact, FLIGHT_REACH * scales.natural_frequency))
         return np.arange(2 * spacing, highest, spacing)
-    lowest = HUM_ABOVE * scales.natural_frequency  # below, the motion itself would pass for a hum
-    return np.arange(max(2 * spacing, lowest), highest, spacing)
+    return np.arange(HUM_PERIODS / scales.duration, highest, spacing)
 
 
 def highest_known(fit: Fit) -> float:

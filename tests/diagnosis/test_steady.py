@@ -20,7 +20,7 @@ from bayesimpact.diagnosis.harmonics import (
     projected,
 )
 from bayesimpact.diagnosis.own_band import shakes_in_own_band
-from bayesimpact.diagnosis.periodic import LEAST_GAIN, leaking, periodic_scores
+from bayesimpact.diagnosis.periodic import LEAST_GAIN, frequencies, leaking, periodic_scores
 from bayesimpact.diagnosis.refit import refit
 from bayesimpact.diagnosis.steady import steadiness
 from bayesimpact.inference.fit import Fit
@@ -71,6 +71,24 @@ def test_what_is_not_steady_does_not(envelope):
     assert p_value(4, envelope) < 1e-4
 
 
+def test_a_hum_slower_than_the_motion_is_found():
+    """The mains on a stiff rig. A hum of less than five periods would pass for a drift."""
+    campaign = small_rig.record(7)
+    scales = campaign_scales(identify(campaign, rng=np.random.default_rng(0), search=False).fit)
+    frequency = 0.7 * scales.natural_frequency
+    recordings = [
+        replace(x, samples=x.samples + AMPLITUDE * np.sin(2 * np.pi * frequency * x.times + r))
+        for r, x in enumerate(campaign.recordings)
+    ]
+    campaign = replace(campaign, recordings=tuple(recordings))
+    fit = identify(campaign, rng=np.random.default_rng(0), search=False).fit
+    (score,) = periodic_scores(fit, [BY_ID["sensor_hum"]], scales)
+    assert score.p_value < 1e-9
+    assert score.shapes["sensor_hum.frequency"] == pytest.approx(frequency, abs=0.3)
+    grid = frequencies(fit, BY_ID["sensor_hum"], scales)
+    assert grid[0] * scales.duration == pytest.approx(5.0)
+
+
 FILTERED = Smoothing("savgol", window=9, polyorder=2)
 
 
@@ -97,12 +115,10 @@ def test_a_hum_behind_a_declared_filter_is_found():
     assert score.p_value < 1e-9
     assert score.shapes["sensor_hum.frequency"] == pytest.approx(FREQUENCY, abs=0.3)
     assert score.size[0] == pytest.approx(AMPLITUDE, abs=4 * score.size_sd[0])
-    phases = [
-        score.shapes[f"sensor_hum.phase[{x.name}]"]
-        for x in fit.target.oscillator.campaign.recordings
-    ]
-    for r, phase in enumerate(phases):
-        assert np.cos(phase - r) > 0.9
+    apart = score.shapes["sensor_hum.frequency"] - FREQUENCY  # by half a step of the scan at most
+    for r, x in enumerate(fit.target.oscillator.campaign.recordings):
+        middle = np.pi * apart * x.duration  # where phases are known best
+        assert np.cos(score.shapes[f"sensor_hum.phase[{x.name}]"] + middle - r) > 0.9
     lines = np.array([FREQUENCY - 1, FREQUENCY, FREQUENCY + 1])
     waves = hums(fit, 0, lines).reshape(lines.size, 2, -1)
     direct, sums = blocks_of(fit, 0, waves), line_blocks(fit, 0, lines)
@@ -155,20 +171,21 @@ def test_a_model_without_a_line_has_nothing_to_be_steady(small):
 
 
 @pytest.mark.parametrize(
-    ("apart", "gross", "own"),
-    [(0.0, True, True), (0.0, False, True), (0.7, False, True), (2.0, False, False),
-     (10.0, True, False)],
+    ("apart", "gross", "force", "hum"),
+    [(0.0, True, True, True), (0.0, False, True, False), (0.7, False, True, False),
+     (2.0, False, False, False), (10.0, True, False, False)],
 )  # fmt: skip
-def test_a_force_in_the_band_of_the_motion_is_told_apart(apart, gross, own):
-    """A plain oscillator swings at one frequency only; a force elsewhere may be one.
+def test_a_line_in_the_band_of_the_motion_is_told_apart(apart, gross, force, hum):
+    """A plain oscillator swings at one frequency only; a force or a hum elsewhere may be one.
 
     `apart`: between both frequencies, in units of the reciprocal of the duration.
     """
     rig, fit = small_rig.PLAIN, plain_fit()
     assert not shakes_in_own_band(fit, gross)
     own_frequency = np.sqrt(rig.k1 / rig.mass) / (2 * np.pi)
-    forced = with_force(fit, own_frequency + apart / campaign_scales(fit).duration)
-    assert shakes_in_own_band(forced, gross) is own
+    frequency = own_frequency + apart / campaign_scales(fit).duration
+    assert shakes_in_own_band(with_line(fit, frequency), gross) is force
+    assert shakes_in_own_band(with_line(fit, frequency, "sensor_hum"), gross) is hum
 
 
 @pytest.mark.parametrize("side", [-1, 1])
@@ -182,7 +199,7 @@ def test_the_band_ends_where_the_recordings_can_separate_two_lines(side, apart, 
     recording = fit.target.oscillator.campaign.recordings[0]
     spectrum = np.abs(np.fft.rfft(recording.samples - recording.samples.mean()))
     line = (np.argmax(spectrum) + side * apart) / (recording.samples.size * recording.interval)
-    assert shakes_in_own_band(with_force(fit, line), False) is own
+    assert shakes_in_own_band(with_line(fit, line), False) is own
 
 
 def plain_fit() -> Fit:
@@ -191,10 +208,10 @@ def plain_fit() -> Fit:
     return identify(recorded, rng=np.random.default_rng(0), search=False).fit
 
 
-def with_force(fit: Fit, frequency: float) -> Fit:
-    """The same with a harmonic force at a frequency, Hz, in its model."""
-    scales, effects = campaign_scales(fit), (BY_ID["harmonic_forcing"],)
+def with_line(fit: Fit, frequency: float, what: str = "harmonic_forcing") -> Fit:
+    """The same with a harmonic force or a hum of a frequency, Hz, in its model."""
+    scales, effects = campaign_scales(fit), (BY_ID[what],)
     target = extend(fit, effects, scales)
-    shapes = {"harmonic_forcing.frequency": frequency}
+    shapes = {f"{what}.frequency": frequency}
     mode = transfer(fit, target.oscillator.layout, effects, scales, shapes)
     return replace(fit, target=target, mode=mode)
