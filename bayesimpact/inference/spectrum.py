@@ -68,7 +68,7 @@ def find_smoothing(recordings: Sequence[Recording]) -> Fingerprint | None:
     Each filter is judged from just below its first null on: no motion can pass for a passband. The
     likeliest one for white noise must then stand, for white or AR(1) noise, against no filter.
     """
-    spectra = [_without_lines(*_periodogram(r)) for r in recordings]
+    spectra = [without_lines(*_periodogram(r)) for r in recordings]
     shortest = min(r.samples.size for r in recordings)
     best, most = None, -np.inf
     for window in WINDOWS:
@@ -100,7 +100,7 @@ def _proved(
     return Fingerprint(smoothing, ratio, found) if ratio > DECISIVE and scatters else None
 
 
-def _without_lines(frequency: Array, power: Array, interval: float) -> tuple[Array, Array, float]:
+def without_lines(frequency: Array, power: Array, interval: float) -> tuple[Array, Array, float]:
     """A periodogram without the ordinates of a hum: far above all that noise would give there."""
     level = ndimage.median_filter(power, LINE_REACH, mode="nearest") / np.log(2.0)
     noise = power < (np.log(power.size) + LINE) * level

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import small_rig
 
+from bayesimpact.data.campaign import Measurement, Smoothing
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.noise import Noise
@@ -84,6 +85,36 @@ def test_rounding_is_not_taken_for_a_weaker_correlation():
     found = refined_noise(fit)
     assert abs(found.correlation - RHO) < 3.5 * found.correlation_error
     assert abs(found.level / small_rig.NOISE - 1) < 3.5 * found.level_error
+
+
+def behind_a_filter(seed: int, rho: float, hum: float = 0.0) -> Noise:
+    """What is said of noise that passed a declared filter, beside a hum of 100 Hz."""
+    filtered = Smoothing("savgol", window=7, polyorder=2)
+    chain = Chain(
+        noise=small_rig.NOISE, correlation=rho, offsets=small_rig.OFFSETS, smoothing=filtered
+    )
+    campaign = small_rig.record(seed, chain=chain, measurement=Measurement(smoothing=filtered))
+    recordings = [
+        replace(r, samples=r.samples + hum * np.sin(2 * np.pi * 100.0 * r.times))
+        for r in campaign.recordings
+    ]
+    campaign = replace(campaign, recordings=tuple(recordings))
+    return identify(campaign, rng=RNG(0), search=False).fit.target.likelihood.noise
+
+
+def test_noise_is_coloured_behind_a_filter_too():
+    found = [behind_a_filter(seed, 0.65) for seed in range(SEEDS)]
+    z_rho = np.array([(n.correlation - 0.65) / n.correlation_error for n in found])
+    z_level = np.array([(n.level / small_rig.NOISE - 1) / n.level_error for n in found])
+    for z in (z_rho, z_level):
+        assert abs(z.mean()) < 3.5 / np.sqrt(SEEDS)
+        assert 0.4 < z.std(ddof=1) < 1.9
+
+
+@pytest.mark.parametrize("hum", [0.0, 3.0])
+def test_what_a_filter_leaves_of_white_noise_is_not_called_coloured(hum):
+    for seed in range(4):
+        assert behind_a_filter(seed, 0.0, hum * small_rig.NOISE).correlation == 0.0
 
 
 def test_noise_that_is_known_stays(small, coloured):
