@@ -10,7 +10,7 @@ colour: what the filter let pass of it is compared with what it makes of white n
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,50 @@ COLOURED = 20.0  # nats over white noise, behind a filter
 BEND = 0.01  # step in the correlation for the curvature of the likelihood
 
 
+@dataclass(frozen=True, eq=False)
+class Ordinates:
+    """Periodograms of residuals where they are noise.
+
+    Attributes
+    ----------
+    angle : (n,) angular frequencies per sample
+    power : (n,) ordinates, m2
+    passed : (n,) power that the filter let pass
+    rounding : its variance over that of the noise; white, whatever the noise is
+    """
+
+    angle: Array
+    power: Array
+    passed: Array
+    rounding: float
+
+    def _shape(self, rho: float) -> Array:
+        raw = (1 - rho**2) / (1 - 2 * rho * np.cos(self.angle) + rho**2)
+        return np.asarray(self.passed * raw + self.rounding)
+
+    def variance(self, rho: float) -> float:
+        """Of the raw noise, m2, at a given correlation."""
+        return float(np.mean(self.power / self._shape(rho)))
+
+    def surprise(self, rho: float) -> float:
+        """Minus the log likelihood of a correlation at its best variance, nats."""
+        spread = self.power.size * np.log(self.variance(rho))
+        return float(np.sum(np.log(self._shape(rho))) + spread)
+
+    def correlation(self) -> float:
+        """The likeliest one."""
+        return float(minimize_scalar(self.surprise, bounds=(-0.6, 0.99), method="bounded").x)
+
+    def errors(self, rho: float) -> tuple[float, float]:
+        """Standard error of the correlation and, relative, of the level that goes with it."""
+        step = min(BEND, 0.5 * (1.0 - abs(rho)))
+        low, high = rho - step, rho + step
+        bend = self.surprise(low) + self.surprise(high) - 2 * self.surprise(rho)
+        error = float(step / np.sqrt(max(bend, step**2)))
+        lean = 0.25 * np.log(self.variance(high) / self.variance(low)) / step
+        return error, float(np.hypot(np.sqrt(0.5 / self.power.size), error * lean))
+
+
 def refined_noise(fit: Fit) -> Noise:
     """The fit's noise with correlation and level from its residuals above the motion.
 
@@ -40,38 +84,22 @@ def refined_noise(fit: Fit) -> Noise:
     noise = fit.target.likelihood.noise
     if (noise.correlation == 0.0 and noise.smoothing is None) or fit.reduced_chi2 > GROSS:
         return noise
-    angle, power, passed = _ordinates(fit, lowest := ABOVE * fastest_frequency(fit))
-    if power.size < LEAST_ORDINATES:
+    found = _ordinates(fit, lowest := ABOVE * fastest_frequency(fit))
+    if found.power.size < LEAST_ORDINATES:
         return noise
-
-    rounding = rounding_variance(fit) / noise.level**2  # white, whatever the noise is
-
-    def shape(rho: float) -> Array:
-        return passed * _shape(angle, rho) + rounding
-
-    def variance(rho: float) -> float:
-        return float(np.mean(power / shape(rho)))
-
-    def negative(rho: float) -> float:
-        return float(np.sum(np.log(shape(rho))) + power.size * np.log(variance(rho)))
-
-    rho = float(minimize_scalar(negative, bounds=(-0.6, 0.99), method="bounded").x)
-    if noise.correlation == 0.0 and negative(0.0) - negative(rho) < COLOURED:
+    rho = found.correlation()
+    if noise.correlation == 0.0 and found.surprise(0.0) - found.surprise(rho) < COLOURED:
         return noise
-    step = min(BEND, 0.5 * (1.0 - abs(rho)))
-    bend = negative(rho + step) + negative(rho - step) - 2 * negative(rho)
-    error = float(step / np.sqrt(max(bend, step**2)))
-    lean = 0.25 * np.log(variance(rho + step) / variance(rho - step)) / step
-    return replace(
+    error, level_error = found.errors(rho)
+    refined = replace(
         noise,
         correlation=rho,
         correlation_error=error,
-        level=float(np.sqrt(variance(rho))) if noise.level_error else noise.level,
-        level_error=float(np.hypot(np.sqrt(0.5 / power.size), error * lean))
-        if noise.level_error
-        else 0.0,
         source=f"residuals above {lowest:.3g} Hz",
     )
+    if not noise.level_error:  # known beforehand
+        return refined
+    return replace(refined, level=float(np.sqrt(found.variance(rho))), level_error=level_error)
 
 
 def fastest_frequency(fit: Fit) -> float:
@@ -89,10 +117,8 @@ def rounding_variance(fit: Fit) -> float:
     return float(np.mean(np.square(digits)) / 12) if np.isfinite(digits).all() else 0.0
 
 
-def _ordinates(fit: Fit, lowest: float) -> tuple[Array, Array, Array]:
-    """Angular frequencies per sample, periodogram ordinates above `lowest` Hz, m2, and the power
-    that the filter let pass there.
-    """
+def _ordinates(fit: Fit, lowest: float) -> Ordinates:
+    """Of all recordings above `lowest` Hz, but for lines and what a filter has suppressed."""
     found, smoothing = [], fit.target.oscillator.smoothing
     for residual, interval in zip(fit.residuals, fit.target.oscillator.intervals, strict=True):
         frequency = np.fft.rfftfreq(residual.size, interval)
@@ -102,9 +128,6 @@ def _ordinates(fit: Fit, lowest: float) -> tuple[Array, Array, Array]:
         frequency, power, _ = without_lines(frequency[kept], power[kept], interval)
         passed = gain(smoothing, interval, frequency) ** 2
         found.append((2 * np.pi * frequency * interval, power, passed))
-    angles, powers, shares = zip(*found, strict=True)
-    return np.concatenate(angles), np.concatenate(powers), np.concatenate(shares)
-
-
-def _shape(angle: Array, rho: float) -> Array:
-    return np.asarray((1 - rho**2) / (1 - 2 * rho * np.cos(angle) + rho**2))
+    angle, power, passed = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    rounding = rounding_variance(fit) / fit.target.likelihood.noise.level**2
+    return Ordinates(angle, power, passed, rounding)
