@@ -22,6 +22,7 @@ from bayesimpact.model.effects.effect import Effect, Scales
 
 STARTS = 2  # points of an effect's shape grid from which it is fitted
 SHORT = 60.0  # by how much a climb that gave up may have fallen short, nats
+MORE = 2.0  # nats by which a score must promise more than a model has reached to fit it again
 SAME = 0.05  # nats; two climbs to one mode differ by less
 
 Progress = Callable[[str], None]
@@ -84,12 +85,17 @@ class Models:
         return scan(candidate.fit, effects, self.scales, rng=self.rng)
 
     def fit_one(self, candidate: Candidate, found: Scan, score: Score) -> Candidate:
-        """One more effect, from the best points of its shape grid."""
+        """One more effect, from the best points of its shape grid.
+
+        A model that is known is fitted from here too where the score promises more than it has
+        reached: it may have come to rest in a side minimum.
+        """
         key = frozenset((*candidate.ids, score.effect.id))
-        if not self.is_known(key):
-            self.fit_more(candidate, [score])
-            for other in found.starts(score, STARTS)[1:]:
-                self.start(candidate, [other])
+        promised = candidate.fit.log_likelihood + score.gain
+        if not self.is_known(key) or promised > self.tried[key].fit.log_likelihood + MORE:
+            self.progress("fitting " + " + ".join((*candidate.ids, score.effect.id)))
+            for start in found.starts(score, STARTS):
+                self.start(candidate, [start])
         return self.tried[key]
 
     def fit_more(self, candidate: Candidate, scores: Sequence[Score]) -> Candidate:

@@ -126,9 +126,12 @@ class _Search(Models):
         return [s for s in worth_a_refit(scan, least) if not self.is_contradicted(s.effect)]
 
     def is_contradicted(self, effect: Effect) -> bool:
-        """Whether an effect alone loses more than there is to gain, by what a free force gains."""
+        """Whether an effect alone loses more than there is to gain, by what a free force gains.
+
+        One that was refused says nothing of itself beside others.
+        """
         alone, base = self.tried.get(frozenset([effect.id])), self.states[frozenset()]
-        if alone is None:
+        if alone is None or alone.log_evidence == -np.inf:
             return False
         lost = self.worth(base.candidate) - self.worth(alone)
         return lost > max(LOST, base.unknown.log_evidence)

@@ -215,6 +215,23 @@ def test_an_effect_that_loses_more_than_there_is_to_gain_is_not_tried_again(run,
     assert (frozenset({A, N}) in table.fitted) == again
 
 
+def test_a_refusal_alone_is_no_contradiction_beside_others(run):
+    """A force refused alone (it swings where the motion does) may be what B lacks."""
+    gains = {A: 250.0, B: 300.0, f"{A} {B}": 520.0}
+    table = Table(gains, force=100.0, forward={A: -np.inf})
+    assert chosen(run(table)) == {A, B}
+
+
+@pytest.mark.parametrize(("stuck", "fits"), [(545.0, 2), (559.0, 1)])
+def test_a_model_is_fitted_again_from_where_more_is_promised(run, stuck, fits):
+    """{C, D} is reached from C first; an exchange of {A, D} promises 560 nats of it."""
+    gains = {A: 400.0, C: 390.0, D: 100.0, f"{A} {D}": 550.0, f"{C} {D}": 560.0}
+    table = Table(gains, once={f"{C} {D}": stuck})
+    found = run(table)
+    assert table.fitted.count(frozenset({C, D})) == fits
+    assert found.tried[0].log_evidence == (560.0 if fits == 2 else stuck)
+
+
 def test_what_cannot_overtake_the_best_is_not_fitted(run):
     """B has 250 nats less than A: C promises 150 more, D 250; scores underrate by half at most."""
     table = Table({A: 400.0, B: 150.0, f"{B} {C}": 300.0, f"{B} {D}": 400.0})
