@@ -70,7 +70,11 @@ def joined(parts: Iterable[Blocks]) -> Blocks:
 
 
 def line_blocks(fit: Fit, r: int, grid: Array) -> Blocks:
-    """A hum of one metre: Fourier sums of the whitened residual and derivatives."""
+    """A hum of one metre at equally spaced frequencies (F,), Hz, two or more of them.
+
+    By Fourier sums of the whitened residual and derivatives: all but exact where the fitted
+    parameters absorb little of it.
+    """
     part, sigma, noise = fit.linearisation[r], sigma_of(fit)[r], fit.target.likelihood.noise
     oscillator = fit.target.oscillator
     interval, count = float(oscillator.intervals[r]), int(oscillator.counts[r])
@@ -83,7 +87,7 @@ def line_blocks(fit: Fit, r: int, grid: Array) -> Blocks:
     sums = sums * np.exp(-2j * np.pi * grid * start)
     pairs = np.stack([-sums.imag, sums.real], axis=-1) * lift[:, None]  # (1 + k, F, 2)
     n = stacked.shape[-1]
-    own = np.repeat((0.5 * n * lift**2)[:, None, None] * np.eye(2), 1, axis=0)
+    own = (0.5 * n * lift**2)[:, None, None] * np.eye(2)
     return Blocks(own, pairs[1:].transpose(1, 0, 2), pairs[0], part.columns)
 
 

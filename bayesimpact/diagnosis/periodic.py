@@ -35,6 +35,8 @@ Array = NDArray[np.float64]
 RESPONSE_REACH = 2.0  # forcing is looked for up to so many times the natural frequency in contact,
 FLIGHT_REACH = 4.0  # or in free flight
 HUM_PERIODS = 5.0  # in the longest recording, at least: slower ones pass for a drift
+SWINGING = 2.0  # times the natural frequency: below, the parameters may absorb nearly all of a hum
+ABSORBED = 1e-6  # of a line's power: what is left of so much tells nothing but rounding
 LEAST_GAIN = 0.1  # of a filter: hums that it lets through so far leak into the band below
 
 
@@ -125,8 +127,13 @@ def _blocks(fit: Fit, r: int, effect: Effect, grid: Array, above: Array, scales:
     if effect.observe is None:
         shaken = partial(force_responses, fit, r, scales=scales)
         return joined(blocks_in_parts(fit, r, grid, shaken))
-    feet = blocks_in_parts(fit, r, above, partial(hums, fit, r))
-    return joined([line_blocks(fit, r, grid), *feet])
+    waves = partial(hums, fit, r)
+    slow = grid < SWINGING * scales.natural_frequency
+    sums = [line_blocks(fit, r, grid[~slow])] if np.sum(~slow) > 1 else []
+    near = grid[slow] if sums else grid
+    return joined(
+        [*blocks_in_parts(fit, r, near, waves), *sums, *blocks_in_parts(fit, r, above, waves)]
+    )
 
 
 def _shapes(fit: Fit, effect: Effect, frequency: float, sizes: Array) -> dict[str, float]:
@@ -141,7 +148,9 @@ def _shapes(fit: Fit, effect: Effect, frequency: float, sizes: Array) -> dict[st
 def _statistics(fit: Fit, blocks: Sequence[Blocks]) -> tuple[Array, Array, Array]:
     """Chi-squared (F,), sizes (F, 2 R) of sine and cosine, information (F, 2 R, 2 R)."""
     information, score = projected(fit, blocks)
-    scale = np.sqrt(np.maximum(np.einsum("fii->fi", information), 1e-300))
+    left = np.einsum("fii->fi", information)
+    whole = np.concatenate([np.einsum("fii->fi", block.own) for block in blocks], axis=1)
+    scale = np.sqrt(np.where(left > ABSORBED * whole, left, np.inf))
     scaled = information / (scale[:, :, None] * scale[:, None, :])
     ridge = 1e-9 * np.eye(scale.shape[1])
     sizes = np.linalg.solve(scaled + ridge, (score / scale)[..., None])[..., 0] / scale

@@ -290,6 +290,7 @@ def test_the_whole_catalogue_on_campaigns_that_cannot_show_all_of_it(settings):
     scales = campaign_scales(fit)
     found = scan(fit, EFFECTS, scales, rng=np.random.default_rng(0))
     assert 1e-3 < found.p_value <= 1.0
+    assert all(np.isfinite([s.z, s.p_value, s.gain]).all() for s in found.scores)
     scored = {s.effect.id for s in found.scores}
     assert "coulomb_friction" in scored
     assert not scored & {"contact_damping_per_case", "gap_per_recording"}
