@@ -7,6 +7,7 @@ import pytest
 from effect_rigs import BY_ID, MOVING, TestRig, by_hand, by_rig, moved, typical
 
 TOLERANCE = 1e-9  # m
+RELATIVE = 5e-8  # of the release height, where that is more (the heavy rig swings by 60 and 100 mm)
 PAPER = TestRig(duration=0.5)
 OTHERS = {
     "paper, long": TestRig(duration=3.0),
@@ -61,7 +62,7 @@ def test_independent_rig(effect, name):
     values = typical(effect, rig)
     for r in (0, 1):
         difference = moved([effect], values, rig, r) - by_rig([effect], values, rig, r)
-        assert np.abs(difference).max() < TOLERANCE
+        assert np.abs(difference).max() < max(TOLERANCE, RELATIVE * abs(rig.y0[r]))
 
 
 @pytest.mark.parametrize("names", COMBINATIONS, ids="+".join)
