@@ -116,10 +116,13 @@ class _Search(Models):
     def may_be_named(self, state: State) -> bool:
         """Whether a search around a model may end with a name, white or not.
 
-        Not where a free force wins anyhow.
+        Not where a free force wins anyhow, nor where one beside it still explains a lot.
         """
-        gross = is_gross(self.states[frozenset()].candidate.fit)
-        return state.is_white or gross or self.worth(state.candidate) > self.force_worth()
+        if state.is_white or is_gross(self.states[frozenset()].candidate.fit):
+            return True
+        return (
+            self.worth(state.candidate) > self.force_worth() and state.unknown.log_evidence < SHORT
+        )
 
     def worth_a_refit(self, scan: Scan, least: float = 0.0) -> list[Score]:
         """Effects that promise something, but for those that have proved to be wrong here."""

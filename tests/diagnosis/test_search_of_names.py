@@ -181,6 +181,14 @@ def test_exchanges_are_tried_before_a_model_is_given_up(run, force, found):
     assert chosen(run(Table(gains | {f"{C} {D}": 520.0}, force=force))) == found
 
 
+@pytest.mark.parametrize(("beside", "found"), [(100.0, {C, D}), (125.0, {A, B, C})])
+def test_no_exchange_is_tried_beside_which_a_force_explains_a_lot(run, beside, found):
+    """Beside the three a free force gains 40 nats, or 65."""
+    gains = {A: 250.0, B: 240.0, C: 100.0, D: 80.0, f"{A} {B}": 360.0, f"{A} {B} {C}": 480.0}
+    table = Table(gains | {f"{C} {D}": 520.0}, force=420.0, beside=beside)
+    assert chosen(run(table)) == found
+
+
 def test_the_search_ends_when_a_free_force_will_beat_all_names(run):
     steps = {A: 100.0, f"{A} {B}": 120.0, f"{A} {B} {C}": 140.0}
     hopeless, hopeful = Table(steps, force=2000.0), Table(steps, force=130.0)
