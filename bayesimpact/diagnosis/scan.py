@@ -27,7 +27,6 @@ Array = NDArray[np.float64]
 
 DRAWS = 4000  # of the joint law; resolves p down to 1/4000, beyond that Bonferroni bounds it
 RANK_TOLERANCE = 1e-7
-APART = 3  # points of a shape's grid: nearer ones are neighbours
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,14 +58,11 @@ class Scan:
     def starts(self, score: Score, count: int) -> tuple[Score, ...]:
         """A score and the next best ones of its effect with other shapes, `count` at most.
 
-        Those that promise less than half as much are left out; neighbours on the grid, from which a
-        climb ends in the same place, come last.
+        Those that promise less than half as much are left out.
         """
-        own = [s for s in self.scores if s.effect.id == score.effect.id]
-        here = next(i for i, s in enumerate(own) if s is score)
-        others = [i for i, s in enumerate(own) if i != here and s.gain > 0.5 * score.gain]
-        others.sort(key=lambda i: (abs(i - here) < APART, -own[i].gain))
-        return (score, *(own[i] for i in others[: count - 1]))
+        own = [s for s in self.scores if s.effect.id == score.effect.id and s is not score]
+        others = sorted((s for s in own if s.gain > 0.5 * score.gain), key=lambda s: -s.gain)
+        return (score, *others[: count - 1])
 
 
 def scan(fit: Fit, effects: Sequence[Effect], scales: Scales, *, rng: np.random.Generator) -> Scan:

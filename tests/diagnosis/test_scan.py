@@ -223,15 +223,6 @@ def test_an_effect_starts_from_its_best_shapes():
     assert [s.z for s in found.starts(best, 4)] == [-4.0, 3.5]
 
 
-def test_the_second_start_is_no_neighbour_of_the_first():
-    """Neighbours on the grid, however good, come after what lies three points away or more."""
-    z = np.array([3.6, 3.5, 3.7, 3.9, 4.0, 3.9, 3.8])
-    found = scan_of(np.eye(7), z, [record("spring_cubic", 1)] * 7)
-    best = found.best()[0]
-    assert [s.z for s in found.starts(best, 3)] == [4.0, 3.6, 3.5]
-    assert [s.z for s in found.starts(best, 4)] == [4.0, 3.6, 3.5, 3.9]
-
-
 def test_pairs_are_ranked_by_their_joint_gain():
     rng = np.random.default_rng(5)
     names = ("spring_cubic", "spring_quadratic", "stiffness_drift", "sensor_drift")
