@@ -93,7 +93,6 @@ class Models:
         key = frozenset((*candidate.ids, score.effect.id))
         promised = candidate.fit.log_likelihood + score.gain
         if not self.is_known(key) or promised > self.tried[key].fit.log_likelihood + MORE:
-            self.progress("fitting " + " + ".join((*candidate.ids, score.effect.id)))
             for start in found.starts(score, STARTS):
                 self.start(candidate, [start])
         return self.tried[key]
@@ -102,7 +101,6 @@ class Models:
         """The candidate's model with all of these effects, from where the scores point to."""
         key = frozenset((*candidate.ids, *(s.effect.id for s in scores)))
         if not self.is_known(key):
-            self.progress("fitting " + " + ".join((*candidate.ids, *(s.effect.id for s in scores))))
             self.start(candidate, scores)
         return self.tried[key]
 
@@ -112,6 +110,7 @@ class Models:
         begun = (candidate.ids, candidate.fit.log_posterior, shapes)
         if begun not in self.begun:
             self.begun.add(begun)
+            self.progress("fitting " + " + ".join((*candidate.ids, *(s.effect.id for s in scores))))
             self.keep(refit(candidate.fit, scores, self.scales))
 
     def is_known(self, key: frozenset[str]) -> bool:

@@ -239,7 +239,7 @@ class _Search(Models):
 
     def naming(self, base: State, chosen: State) -> Naming:
         tried = tuple(sorted(self.tried.values(), key=self.worth, reverse=True))
-        if chosen.is_white or is_gross(base.candidate.fit):  # else no name can be given
+        if self.may_be_named(chosen):
             best = self.best(len(chosen.candidate.effects))
             if set(best.ids) != set(chosen.candidate.ids):
                 chosen = self.examine(best)

@@ -76,7 +76,7 @@ def highest_known(fit: Fit) -> float:
 
 
 def leaking(fit: Fit, scales: Scales) -> Array:
-    """Frequencies of hums above the band of a filter whose feet reach into it, Hz.
+    """Frequencies of hums above the band of a filter that leak into it, Hz.
 
     The whitened numbers end at half power, where a filter still lets a strong hum through.
     """
@@ -160,7 +160,7 @@ def _statistics(fit: Fit, blocks: Sequence[Blocks]) -> tuple[Array, Array, Array
 def raw_power(fit: Fit, grid: Array) -> Array:
     """Power of all residuals as recorded, not whitened, at frequencies (F,), Hz.
 
-    Feet in the band tell that a line stands above it, not where.
+    What leaks into the band tells that a line stands above it, not where.
     """
     power = np.zeros(grid.size)
     for recording, residual in zip(

@@ -56,20 +56,20 @@ class Ordinates:
         """Of the raw noise, m2, at a given correlation."""
         return float(np.mean(self.power / self._shape(rho)))
 
-    def surprise(self, rho: float) -> float:
+    def cost(self, rho: float) -> float:
         """Minus the log likelihood of a correlation at its best variance, nats."""
         spread = self.power.size * np.log(self.variance(rho))
         return float(np.sum(np.log(self._shape(rho))) + spread)
 
     def correlation(self) -> float:
         """The likeliest one."""
-        return float(minimize_scalar(self.surprise, bounds=(-0.6, 0.99), method="bounded").x)
+        return float(minimize_scalar(self.cost, bounds=(-0.6, 0.99), method="bounded").x)
 
     def errors(self, rho: float) -> tuple[float, float]:
         """Standard error of the correlation and, relative, of the level that goes with it."""
         step = min(BEND, 0.5 * (1.0 - abs(rho)))
         low, high = rho - step, rho + step
-        bend = self.surprise(low) + self.surprise(high) - 2 * self.surprise(rho)
+        bend = self.cost(low) + self.cost(high) - 2 * self.cost(rho)
         error = float(step / np.sqrt(max(bend, step**2)))
         lean = 0.25 * np.log(self.variance(high) / self.variance(low)) / step
         return error, float(np.hypot(np.sqrt(0.5 / self.power.size), error * lean))
@@ -88,7 +88,7 @@ def refined_noise(fit: Fit) -> Noise:
     if found.power.size < LEAST_ORDINATES:
         return noise
     rho = found.correlation()
-    if noise.correlation == 0.0 and found.surprise(0.0) - found.surprise(rho) < COLOURED:
+    if noise.correlation == 0.0 and found.cost(0.0) - found.cost(rho) < COLOURED:
         return noise
     error, level_error = found.errors(rho)
     refined = replace(

@@ -10,7 +10,7 @@ import pytest
 import small_rig
 from effect_rigs import BY_ID
 
-from bayesimpact.data.campaign import Measurement, Smoothing
+from bayesimpact.data.campaign import Campaign, Measurement, Smoothing
 from bayesimpact.diagnosis.extend import campaign_scales, extend, transfer
 from bayesimpact.diagnosis.harmonics import (
     blocks_of,
@@ -20,7 +20,14 @@ from bayesimpact.diagnosis.harmonics import (
     projected,
 )
 from bayesimpact.diagnosis.own_band import shakes_in_own_band
-from bayesimpact.diagnosis.periodic import LEAST_GAIN, frequencies, leaking, periodic_scores
+from bayesimpact.diagnosis.periodic import (
+    LEAST_GAIN,
+    _blocks,
+    _statistics,
+    frequencies,
+    leaking,
+    periodic_scores,
+)
 from bayesimpact.diagnosis.refit import refit
 from bayesimpact.diagnosis.steady import steadiness
 from bayesimpact.inference.fit import Fit
@@ -32,17 +39,19 @@ FREQUENCY, AMPLITUDE = 61.3, 2e-6
 Envelope = Callable[[int, np.ndarray], np.ndarray]
 
 
+def hummed(campaign: Campaign, frequency: float, envelope: Envelope) -> Campaign:
+    """The campaign with a hum of phase r in recording r, behind the filter that it declares."""
+    recordings = []
+    for r, x in enumerate(campaign.recordings):
+        hum = envelope(r, x.times) * np.sin(2 * np.pi * frequency * x.times + r)
+        passed = smooth(hum, campaign.measurement.smoothing, x.interval)
+        recordings.append(replace(x, samples=x.samples + passed))
+    return replace(campaign, recordings=tuple(recordings))
+
+
 def p_value(seed: int, envelope: Envelope) -> float:
     """Of a hum with the envelope (recording, times), fitted as a steady one."""
-    campaign = small_rig.record(seed)
-    recordings = [
-        replace(
-            x,
-            samples=x.samples + envelope(r, x.times) * np.sin(2 * np.pi * FREQUENCY * x.times + r),
-        )
-        for r, x in enumerate(campaign.recordings)
-    ]
-    campaign = replace(campaign, recordings=tuple(recordings))
+    campaign = hummed(small_rig.record(seed), FREQUENCY, envelope)
     fit = identify(campaign, rng=np.random.default_rng(0), search=False).fit
     scales = campaign_scales(fit)
     (score,) = periodic_scores(fit, [BY_ID["sensor_hum"]], scales)
@@ -76,11 +85,7 @@ def test_a_hum_slower_than_the_motion_is_found():
     campaign = small_rig.record(7)
     scales = campaign_scales(identify(campaign, rng=np.random.default_rng(0), search=False).fit)
     frequency = 0.7 * scales.natural_frequency
-    recordings = [
-        replace(x, samples=x.samples + AMPLITUDE * np.sin(2 * np.pi * frequency * x.times + r))
-        for r, x in enumerate(campaign.recordings)
-    ]
-    campaign = replace(campaign, recordings=tuple(recordings))
+    campaign = hummed(campaign, frequency, lambda r, t: AMPLITUDE + 0 * t)
     fit = identify(campaign, rng=np.random.default_rng(0), search=False).fit
     (score,) = periodic_scores(fit, [BY_ID["sensor_hum"]], scales)
     assert score.p_value < 1e-9
@@ -100,11 +105,7 @@ def behind_a_filter(frequency: float, amplitude: float) -> Fit:
         duration=1.5,
         measurement=Measurement(smoothing=FILTERED),
     )
-    recordings = []
-    for r, x in enumerate(campaign.recordings):
-        hum = amplitude * np.sin(2 * np.pi * frequency * x.times + r)
-        recordings.append(replace(x, samples=x.samples + smooth(hum, FILTERED, x.interval)))
-    campaign = replace(campaign, recordings=tuple(recordings))
+    campaign = hummed(campaign, frequency, lambda r, t: amplitude + 0 * t)
     return identify(campaign, rng=np.random.default_rng(0), search=False).fit
 
 
@@ -164,6 +165,31 @@ def test_scores_are_those_of_the_mode_although_a_climb_ended_beside_it():
         return score / np.sqrt(np.einsum("fii->fi", information))
 
     np.testing.assert_allclose(numbers(beside), numbers(fit), atol=0.1)
+
+
+def test_a_hum_at_the_motion_s_own_frequency_is_scored_exactly():
+    """There the parameters absorb all but a few hundredths of it; sums alone err by as much."""
+    fit = plain_fit()
+    scales, recordings = campaign_scales(fit), range(len(fit.linearisation))
+    grid = frequencies(fit, BY_ID["sensor_hum"], scales)[:60]
+    found = [_blocks(fit, r, BY_ID["sensor_hum"], grid, grid[:0], scales) for r in recordings]
+    exact = [blocks_of(fit, r, hums(fit, r, grid).reshape(grid.size, 2, -1)) for r in recordings]
+    slow = grid < 2 * scales.natural_frequency
+    assert slow.any() and not slow.all()
+    for ours, direct in zip(projected(fit, found), projected(fit, exact), strict=True):
+        np.testing.assert_allclose(ours[slow], direct[slow], rtol=1e-9, atol=1e-9 * direct.max())
+    statistic, _, _ = _statistics(fit, found)
+    assert (statistic >= 0).all()
+
+
+def test_what_is_absorbed_but_for_rounding_tells_nothing(small):
+    fit = small.fit
+    own = fit.target.oscillator.layout.roles("nuisance")  # every recording's alone
+    columns = [x.jacobian[:, np.isin(x.columns, own)][:, :2].T[None] for x in fit.linearisation]
+    blocks = [blocks_of(fit, r, c / np.linalg.norm(c)) for r, c in enumerate(columns)]
+    statistic, sizes, _ = _statistics(fit, blocks)
+    np.testing.assert_array_equal(statistic, 0.0)
+    np.testing.assert_array_equal(sizes, 0.0)
 
 
 def test_a_model_without_a_line_has_nothing_to_be_steady(small):
