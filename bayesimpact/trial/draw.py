@@ -98,7 +98,7 @@ def _possible(settings: Settings, ids: tuple[str, ...]) -> list[str]:
     fits = [
         name
         for name, (cases, releases) in sizes.items()
-        if all(plant_of(e).fits(cases, releases * max(cases, 1)) for e in ids)
+        if all(plant_of(e).fits(cases, releases * max(cases, 1), BENCHES[name].angle) for e in ids)
     ]
     if not fits:
         raise InputError("trial, rig", ", ".join(settings.benches), f"a rig for {' + '.join(ids)}")
@@ -132,6 +132,7 @@ def _recorded(
         duration=design.duration,
         rng=rng,
         measurement=design.measurement,
+        quantity=design.quantity,
     )
     clean = clean_readings(design, effects)
     noise = [r.samples - c for r, c in zip(campaign.recordings, clean, strict=True)]

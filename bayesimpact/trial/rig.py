@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Beam, Campaign, Measurement
-from bayesimpact.data.recording import Recording
+from bayesimpact.data.recording import Quantity, Recording
 from bayesimpact.errors import InputError
 from bayesimpact.trial.rig_catalogue import CATALOGUE, Planted
 from bayesimpact.trial.rig_chain import Chain, Probe, measure
@@ -159,6 +159,7 @@ def make_campaign(
     rng: np.random.Generator,
     measurement: Measurement | None = None,
     beams: Mapping[str, Beam] | None = None,
+    quantity: Quantity = "displacement",
 ) -> Campaign:
     """Record a whole campaign, in the order of `releases`; the same `rng` state, the same bits.
 
@@ -166,6 +167,7 @@ def make_campaign(
     ----------
     measurement : what the campaign admits to know of its chain; nothing by default
     beams : case -> geometry of the obstacle, for the report
+    quantity : what is recorded; everything of an angle is per radian
     """
     recordings = tuple(
         Recording(
@@ -173,6 +175,7 @@ def make_campaign(
             case=release.case,
             samples=record(rig, release, effects, chain, rate=rate, duration=duration, rng=rng),
             interval=1 / rate,
+            quantity=quantity,
         )
         for release in releases
     )
