@@ -1,4 +1,4 @@
-"""Draws of the strong regime: two to four effects at once, the base misfit 3 to 300 times the noise.
+"""Draws of the strong regime: two to four effects at once, misfits of 3 to 300 times the noise.
 
 Shapes and sizes come first, each within what is physical for it; then the base model is fitted to
 what the rig records without noise; then the noise is drawn such that the misfit is in its range,
@@ -148,11 +148,7 @@ def _fit(
 ) -> list[str]:
     """Those that this rig can show."""
     cases, recordings = len(design.rig.k2), len(design.releases)
-    return [
-        e
-        for e in names
-        if plants[e].fits(cases, recordings) and not (resting and e in TIMED)
-    ]
+    return [e for e in names if plants[e].fits(cases, recordings) and not (resting and e in TIMED)]
 
 
 def _rivals(design: Design, ids: list[str], rng: Rng) -> dict[str, Any]:
