@@ -179,9 +179,11 @@ def log_uniform(rng: np.random.Generator, limits: Range) -> float:
     return exp(rng.uniform(log(limits[0]), log(limits[1])))
 
 
-def draw_bench(name: str, noise_kind: str, rng: np.random.Generator) -> Design:
-    """Draw a rig of the kind `name` with noise of the kind `noise_kind`."""
-    bench = BENCHES[name]
+def draw_bench(
+    name: str, noise_kind: str, rng: np.random.Generator, benches: Mapping[str, Bench] = BENCHES
+) -> Design:
+    """Draw a rig of the kind `name` of `benches` with noise of the kind `noise_kind`."""
+    bench = benches[name]
     amplitude = log_uniform(rng, bench.amplitude)
     rig = bench.fixed or _rig(bench, amplitude, rng)
     releases = _releases(bench, rig, amplitude, rng)

@@ -8,32 +8,23 @@ the same seed.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
-
 import numpy as np
 
-from bayesimpact.data.campaign import Campaign
 from bayesimpact.errors import InputError
 from bayesimpact.trial.benches import BENCHES, Design, draw_bench, log_uniform
+from bayesimpact.trial.drawn import Drawn
 from bayesimpact.trial.plants import CATALOGUE_PLANTS
 from bayesimpact.trial.rig import make_campaign
 from bayesimpact.trial.ruler import Ruler, clean_readings, true_parameters
 from bayesimpact.trial.settings import Settings
 from bayesimpact.trial.sizing import Sized, Unsuitable, outside, pair, plant_of, single
+from bayesimpact.trial.strong_draw import draw_strong
 
 Rng = np.random.Generator
 
 ATTEMPTS = 30
 
-
-@dataclass(frozen=True, eq=False)
-class Drawn:
-    """A campaign and the truth about it, as a JSON object."""
-
-    campaign: Campaign
-    truth: Mapping[str, Any]
+__all__ = ["Drawn", "draw"]
 
 
 def draw(settings: Settings, seed: int) -> Drawn:
@@ -44,6 +35,8 @@ def draw(settings: Settings, seed: int) -> Drawn:
     InputError : no rig of the settings can show the effect whose turn it is
     Unsuitable : no suitable draw in many attempts
     """
+    if settings.regime == "strong":
+        return draw_strong(settings, seed)
     kind = settings.kinds[seed % len(settings.kinds)]
     turn = seed // len(settings.kinds)
     reason = ""

@@ -41,6 +41,9 @@ def contact_forces(e, rig, k2, d, v, s):
         total += s["maxwell"]
     if "contact_preload" in e:
         total += e["contact_preload"]["force"]
+    if "contact_bump" in e:
+        p = e["contact_bump"]
+        total += p["force"] * exp(-(((d - p["depth"]) / p["width"]) ** 2))
     return total
 
 
@@ -52,6 +55,8 @@ def free_forces(e, rig, t, y, v, s):
         total += e["spring_quadratic"]["stiffness"] * y**2
     if "spring_cubic" in e:
         total += e["spring_cubic"]["stiffness"] * y**3
+    if "pendulum_sine" in e:
+        total += e["pendulum_sine"]["stiffness"] * (sin(y) - y)
     if "stiffness_drift" in e:
         total += rig.k1 * e["stiffness_drift"]["rate"] * t * y
     if "harmonic_forcing" in e:
