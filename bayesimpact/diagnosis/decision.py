@@ -19,6 +19,7 @@ A name never rests on one p-value, and nothing is compared by a rule of its own.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -51,7 +52,8 @@ class Decision:
 def decide(naming: Naming) -> Decision:
     """The verdict on a finished search.
 
-    Where something remains, `naming.states` must hold the chosen model without each of its effects.
+    Where something remains, `naming.states` and `naming.residual` must hold the chosen model and
+    what it is without each of its effects.
     """
     chosen = naming.chosen
     effects = ordered(naming, chosen.candidate.effects)
@@ -74,15 +76,20 @@ def is_needed(naming: Naming, effect: Effect) -> bool:
     if any(
         naming.log_odds(c) > naming.log_odds(chosen.candidate) - DECISIVE
         for c in naming.tried
-        if effect.id not in c.ids
+        if not holds(c.effects, effect)
     ):
         return False
-    reached = naming.with_residual_force(chosen) + DECISIVE
-    lacking = [s for s in naming.states.values() if effect.id not in s.candidate.ids]
-    if any(naming.with_residual_force(s) > reached for s in lacking):
+    reached = naming.with_residual_force(frozenset(chosen.candidate.ids)) + DECISIVE
+    lacking = [ids for ids in naming.residual if effect.id not in ids]
+    if any(naming.with_residual_force(ids) > reached for ids in lacking):
         return False
     without = naming.states[frozenset(chosen.candidate.ids) - {effect.id}]
     return misfit_above_noise(naming, without) > EXCESS * misfit_above_noise(naming, naming.chosen)
+
+
+def holds(effects: Sequence[Effect], effect: Effect) -> bool:
+    """Whether a model has an effect, or one that reduces to it (`Effect.prefer`)."""
+    return any(effect.id in (e.id, e.prefer) for e in effects)
 
 
 def misfit_above_noise(naming: Naming, state: State) -> float:

@@ -61,10 +61,15 @@ class Intervals:
 
 
 def intervals(fit: Fit, state: State | None = None) -> Intervals:
-    """Intervals of a fit; of the model of `state`, and with what it leaves, where that is given."""
+    """Intervals of a fit; `state` is the model whose remainder was examined, where one remains.
+
+    A fit that has the residual force among its effects carries it along already.
+    """
     if state is None:
         return _cut(fit, fit.mode, fit.covariance)
-    fit, force = state.candidate.fit, state.unknown
+    if fit is not state.candidate.fit:
+        return _cut(fit, fit.mode, sandwich(fit))
+    force = state.unknown
     absorbed, spread = force.projection.absorbed, force.covariance
     mean = fit.mode
     if is_large(fit):

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.diagnosis.decision import Decision, Verdict, decide
-from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.force import MissingForce
 from bayesimpact.diagnosis.heldout import HeldOut, held_out_cases, held_out_recordings
@@ -21,7 +20,7 @@ from bayesimpact.diagnosis.name import name
 from bayesimpact.diagnosis.naming import Naming, State, is_large
 from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.smoothing import SAVITZKY_GOLAY, proved_smoothing, whole_campaign
-from bayesimpact.diagnosis.unknown import learn_force
+from bayesimpact.diagnosis.unknown import with_force
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification, identify
 from bayesimpact.inference.spectrum import Fingerprint
@@ -182,22 +181,20 @@ def extension(
 ) -> tuple[Fit, State | None]:
     """The fit that a verdict stands for, never worse than the base fit, and what it leaves.
 
-    Where the verdict is unknown, a learned force is taken when it is likelier than the best of the
-    catalogue. About a fit with a large misfit none is learned: it would be linearised about a
-    motion that is not the recorded one. What remains then belongs to the base model, in whose
-    linearised problem the parameters are carried along with the force.
+    Where something remains, a residual force beside the effects, or in the place of all, is taken
+    when it makes the model likelier.
     """
-    base, chosen = naming.base.candidate, naming.chosen
-    if decision.verdict == "unknown":
-        best = chosen.candidate
-        if not is_large(base.fit):
-            say("learning the force")
-            learned = learn_force(base.fit, naming.unknown, scales)
-            worth = model_evidence(learned) - base.log_evidence - naming.prior_cost
-            better = learned.reduced_chi2 <= base.fit.reduced_chi2
-            if better and worth > naming.log_odds(best):
-                return learned, naming.base
-        if best.fit.reduced_chi2 <= base.fit.reduced_chi2:
-            return best.fit, chosen
-        return base.fit, naming.base
-    return chosen.candidate.fit, None if chosen.is_white else chosen
+    base, chosen = naming.base, naming.chosen
+    if decision.verdict in ("adequate", "named", "ambiguous"):
+        return chosen.candidate.fit, None
+    choices = [(chosen.candidate, chosen), (base.candidate, base)]
+    choices += [
+        (c, chosen) for ids, c in naming.residual.items() if ids == set(chosen.candidate.ids)
+    ]
+    if decision.verdict == "unknown" and not is_large(base.candidate.fit):
+        say("learning the force")
+        choices.append((with_force(base.candidate, naming.unknown, scales), base))
+    least = base.candidate.fit.reduced_chi2
+    choices = [(c, s) for c, s in choices if c.fit.reduced_chi2 <= least]
+    candidate, state = max(choices, key=lambda choice: naming.log_odds(choice[0]))
+    return candidate.fit, state

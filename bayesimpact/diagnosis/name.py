@@ -26,7 +26,7 @@ from bayesimpact.diagnosis.refit import (
 from bayesimpact.diagnosis.scan import Scan
 from bayesimpact.diagnosis.scores import Score
 from bayesimpact.diagnosis.thresholds import DECISIVE
-from bayesimpact.diagnosis.unknown import learn_force
+from bayesimpact.diagnosis.unknown import learn_force, with_force
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
 
@@ -108,6 +108,11 @@ class _Search(Models):
         if is_large(state.candidate.fit):
             found += [self.fit_more(state.candidate, j) for j in families(state.scan)]
         return found
+
+    def with_residual(self, state: State) -> Candidate:
+        """A model with the likelier form of a residual force beside its effects."""
+        self.progress("fitting a residual force beside " + " + ".join(state.candidate.ids))
+        return with_force(state.candidate, state.unknown, self.scales)
 
     def beside(self, state: State, found: Sequence[Candidate]) -> list[Candidate]:
         """Models that are extended beside the best one.
@@ -276,9 +281,11 @@ class _Search(Models):
                 chosen = self.examine(best)
         contact = missing_contact(base.candidate.fit, self.scales, rng=self.rng)
         odds = -np.inf
-        if not chosen.is_white:
-            for effect in chosen.candidate.effects:
-                self.examine(self.drop(chosen.candidate, effect))
+        residual: dict[frozenset[str], Candidate] = {}
+        if not chosen.is_white and chosen.candidate.effects:
+            smaller = [self.drop(chosen.candidate, e) for e in chosen.candidate.effects]
+            for part in (chosen.candidate, *smaller):
+                residual[frozenset(part.ids)] = self.with_residual(self.examine(part))
             tried = tuple(sorted(self.tried.values(), key=self.worth, reverse=True))
         many = len(chosen.candidate.effects) >= MANY and not is_large(base.candidate.fit)
         if contact is not None and many:
@@ -288,7 +295,7 @@ class _Search(Models):
             odds = model_evidence(fit) - base.candidate.log_evidence
         return Naming(
             base, chosen, tried, self.cost, self.repetition(), contact, odds,
-            dict(self.states), self.may_go_on(),
+            dict(self.states), residual, self.may_go_on(),
         )  # fmt: skip
 
 

@@ -71,6 +71,8 @@ class Naming:
     contact_odds : its log evidence over the base model when it is fitted with the parameters, where
         many chosen effects may imitate it
     states : every model that was examined, by its ids
+    residual : models with a residual force beside their effects, fitted in full, by the ids of
+        these effects; where something remains beside the chosen model
     finished : False when the budget ended the search
     """
 
@@ -82,6 +84,7 @@ class Naming:
     contact: MissingForce | None = None
     contact_odds: float = -np.inf
     states: Mapping[frozenset[str], State] = field(default_factory=dict)
+    residual: Mapping[frozenset[str], Candidate] = field(default_factory=dict)
     finished: bool = True
 
     @property
@@ -136,13 +139,13 @@ class Naming:
         """
         return self.force_log_odds > self.log_odds(self.chosen.candidate) + DECISIVE
 
-    def with_residual_force(self, state: State) -> float:
+    def with_residual_force(self, ids: frozenset[str]) -> float:
         """Log odds of a model, with a residual force beside its effects where that is likelier."""
-        fit, force = state.candidate.fit, state.unknown
-        promised = profiled_gain(fit, force.gain) / self.repetition
-        price = force.gain - force.log_evidence  # Occam factors
-        beside = promised - price - self.prior_cost
-        return self.log_odds(state.candidate) + max(0.0, beside)
+        alone = [self.log_odds(c) for c in self.tried if frozenset(c.ids) == ids]
+        beside = self.residual.get(ids)
+        if beside is not None:  # the residual force counts as one of its effects
+            alone.append(self.log_odds(beside))
+        return max(alone, default=-np.inf)
 
     def probability(self, effect_id: str) -> float:
         """Probability that an effect is part of the model, over all models tried."""
@@ -150,18 +153,6 @@ class Naming:
         weight = np.exp(odds - odds.max())
         have = np.array([effect_id in c.ids for c in self.tried])
         return float(weight[have].sum() / weight.sum())
-
-
-def profiled_gain(fit: Fit, gain: float) -> float:
-    """Gain in log likelihood of what takes `gain` nats off a residual at the fit's noise level.
-
-    The noise level is profiled out: a share s of the sum of squares is worth -n/2 log(1 - s), and
-    nothing takes away more than what lies above the noise.
-    """
-    n = float(fit.target.likelihood.sizes.sum())
-    noise = min(1.0 / max(fit.reduced_chi2, 1e-300), 1.0)
-    left = max(1.0 - 2.0 * max(gain, 0.0) / n, 0.5 * noise)
-    return -0.5 * n * float(np.log(left))
 
 
 def is_large(fit: Fit) -> bool:

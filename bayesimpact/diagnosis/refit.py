@@ -18,7 +18,7 @@ from bayesimpact.diagnosis.extend import (
 )
 from bayesimpact.diagnosis.scores import Score
 from bayesimpact.inference.climb import Climb
-from bayesimpact.inference.fit import Fit, Target
+from bayesimpact.inference.fit import Fit, Target, inverse, prior_information
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.model.effects.effect import Effect, Scales
 from bayesimpact.model.parameters import is_added
@@ -157,7 +157,16 @@ def tempered_evidence(candidate: Candidate, repetition: float) -> float:
     if repetition <= 1.0 or not np.isfinite(candidate.log_evidence):
         return candidate.log_evidence
     lost = (1.0 - 1.0 / repetition) * fit.log_likelihood
-    return candidate.log_evidence - lost + 0.5 * fit.mode.size * float(np.log(repetition))
+    known = prior_information(fit.target.priors, fit.mode)
+    noise = fit.target.oscillator.layout.roles("noise")
+    moving = np.setdiff1d(np.arange(fit.mode.size), noise)
+    scale = fit.sd[moving]
+    precision = inverse(fit.covariance[np.ix_(moving, moving)]) * np.outer(scale, scale)
+    prior = np.diag(known[moving] * scale**2)
+    flatter = (precision - prior) / repetition + prior
+    gained = 0.5 * (np.linalg.slogdet(precision)[1] - np.linalg.slogdet(flatter)[1])
+    gained += 0.5 * noise.size * np.log(repetition)
+    return candidate.log_evidence - lost + float(gained)
 
 
 def residual_repetition(fit: Fit) -> float:
