@@ -16,7 +16,6 @@ SETTINGS = strong_settings(
     kinds=("several",),
     effects=("pendulum_sine", "coulomb_friction", "quadratic_drag"),
     benches=("one_pendulum",),
-    misfit=(3.0, 8.0),
     rest=0.0,
     search=False,
     report=True,
