@@ -155,9 +155,10 @@ def _rivals(design: Design, ids: list[str], rng: Rng) -> dict[str, Any]:
     """Every other effect of the catalogue that this rig can show, each a little of it."""
     slots = {CATALOGUE_STRONG[e].slot for e in ids if e in CATALOGUE_STRONG} - {""}
     result = {}
-    for effect in _fit(tuple(CATALOGUE_STRONG), CATALOGUE_STRONG, design, False):
+    known = tuple(e for e in CATALOGUE_STRONG if e not in ("pendulum_sine", *ids))
+    for effect in _fit(known, CATALOGUE_STRONG, design, False):
         plant = CATALOGUE_STRONG[effect]
-        if effect not in ids and plant.slot not in slots:
+        if plant.slot not in slots:
             form = plant.form(design, rng)
             result[effect] = form.build(form.start)
     return result

@@ -167,8 +167,9 @@ def strong_table() -> str:
     foot = (
         f"{len(every)} trials, seeds {first} to {last}: two to four effects, base misfit "
         f"{low:g} to {high:g} times the noise (median {chosen['misfit'][1]:.0f}), "
-        f"{len(t['by_bench'])} rigs; {chosen['resting']} begin before the release. {chosen['kept']} of {chosen['draws']} "
-        f"draws were kept; thrown away: {thrown or 'none'}. Median {t['seconds']['median']:.0f} s "
-        f"a diagnosis. In brackets: 95 % interval. Commit {t['commit'][:7]}, {t['date']}."
+        f"{len(t['by_bench'])} rigs; {chosen['resting']} begin before the release. "
+        f"{chosen['kept']} of {chosen['draws']} draws were kept; thrown away: "
+        f"{thrown or 'none'}. Median {t['seconds']['median']:.0f} s a diagnosis. In brackets: "
+        f"95 % interval. Commit {t['commit'][:7]}, {t['date']}."
     )
     return grid(("several effects at once", "trials or intervals"), rows, foot)

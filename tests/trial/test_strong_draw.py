@@ -157,7 +157,7 @@ def test_what_no_column_can_imitate() -> None:
 def small():
     rng = np.random.default_rng(2)
     design = draw_bench("small", "white", rng)
-    return replace(design, duration=1.2, releases=design.releases[::2])
+    return replace(design, duration=0.7, releases=design.releases[::2])
 
 
 def _small(design, effect: str, size: float, seed: int = 0) -> Chosen:
@@ -183,11 +183,16 @@ def test_an_effect_is_hidden_by_its_like(small) -> None:
     beside_like, beside_other = (stand_outs(small, [drag, x])[0] for x in (alike, other))
     assert beside_like < 0.9 * alone
     assert beside_other == pytest.approx(alone, rel=0.1)
-    bump = _small(small, "contact_preload", 30.0)
-    rivals = _rivals(small, ["contact_preload"], np.random.default_rng(0))
-    assert "contact_hardening" in rivals
-    few = {name: rivals[name] for name in ("contact_hardening", "contact_power_law")}
-    assert stand_outs(small, [bump], few)[0] < stand_outs(small, [bump])[0]
+
+
+def test_a_force_from_outside_has_the_whole_catalogue_against_it(small) -> None:
+    short = replace(small, duration=0.3)
+    preload = _small(short, "contact_preload", 30.0)
+    rivals = _rivals(short, ["contact_preload"], np.random.default_rng(0))
+    assert {"contact_hardening", "coulomb_friction", "sensor_hum"} < set(rivals)
+    assert set(rivals) == set(CATALOGUE_STRONG) - {"pendulum_sine"}
+    few = {name: rivals[name] for name in ("contact_power_law", "obstacle_mass")}
+    assert stand_outs(short, [preload], few)[0] < 0.9 * stand_outs(short, [preload])[0]
 
 
 def test_settings_of_the_regime() -> None:
