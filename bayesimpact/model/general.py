@@ -115,7 +115,7 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
                 break
         h, lands = stride * w.interval, True
         if not expected:
-            h, lands = next_step(y, v, t, j, aligned, min(longest, ramp), flow, w)
+            h, lands = next_step(y, v, t, n0, j, aligned, min(longest, ramp), flow, w)
             if not h > 0.0:  # an event on the sample itself
                 w.out[j] = y
                 t = j * w.interval

@@ -252,8 +252,10 @@ def stride_of(longest: Any, w: Any) -> Any:
 
 
 @inner(forceinline=True)
-def next_step(y: Any, v: Any, t: Any, j: Any, aligned: Any, longest: Any, flow: Any, w: Any) -> Any:
-    """Length of the next step, and whether it ends on a sample.
+def next_step(
+    y: Any, v: Any, t: Any, n0: Any, j: Any, aligned: Any, longest: Any, flow: Any, w: Any
+) -> Any:
+    """Length of the next step, and whether it ends on a sample; n0 is `push` at its start.
 
     Near a touch that is not smooth the steps follow from the motion alone, not from the samples, so
     that they change smoothly with the parameters.
@@ -267,7 +269,7 @@ def next_step(y: Any, v: Any, t: Any, j: Any, aligned: Any, longest: Any, flow: 
             longest *= min(1.0, max(FIRST, share * root * np.sqrt(root)))
         return max(longest, least), False
     if flow.rough_turn:
-        pull = 2.0 * flow.b * v + flow.K * (y - flow.rest)
+        pull = 2.0 * flow.b * v + flow.K * (y - flow.rest) - flow.inverse * n0
         if pull != 0.0:  # v / pull is the time since the turning point, or minus that to the next
             share = -SINCE_TURN if v * pull < 0.0 else UNTIL_TURN
             longest *= min(1.0, max(FIRST_AT_TURN, share * v / (pull * longest)))

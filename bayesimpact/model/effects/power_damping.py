@@ -5,8 +5,9 @@ without unit.
 At its null: c = 0 is the base model; n then means nothing. n = 1 is more of c1, n = 2 is
 quadratic_drag, which is simpler and preferred, n -> 0 is coulomb_friction but does not stick.
 Energy: dissipates, power -c |v|^(n + 1).
-Valid: 0.1 < n < 5; n of a half to one for lubricated guides and rubber, 1.5 to 1.75 for
-flow in narrow gaps (Blasius), 2 for wakes, 3 for losses in magnets and at large amplitude.
+Valid: 0.25 < n < 5; n of a half to one for lubricated guides and rubber, 1.5 to 1.75 for flow in
+narrow gaps (Blasius), 2 for wakes, 3 for losses in magnets and at large amplitude. Below 0.01 mm/s
+it is continued as a viscous law.
 Its absence shows as a damping that changes with amplitude as a^(n - 1): c_eq = c (w a)^(n - 1)
 times 2 Gamma(n / 2 + 1) / (sqrt(pi) Gamma(n / 2 + 3 / 2)).
 Source: Lazan 1968, Damping of Materials and Members, chapter 2; Elliott, Ghandchi Tehrani and
@@ -22,15 +23,14 @@ import numpy as np
 from bayesimpact.model.effects.effect import Effect, EffectParameter, Law, Numbers
 from bayesimpact.model.power import power
 
+SLOW = 1e-5  # m/s; below it the law is viscous, or a root of the speed would let the mass creep
+
 
 def force(
     y: float, v: float, d: float, t: float, z: float, touching: float, p: Numbers, q: Numbers
 ) -> float:
     """Damping force c |v|^n sign(v), N."""
-    speed = abs(v)
-    if speed < 1e-300:
-        return 0.0
-    return float(p[0] * power(speed, p[1] - 1.0) * v)
+    return float(p[0] * power(v * v + SLOW * SLOW, 0.5 * (p[1] - 1.0)) * v)
 
 
 EFFECT = Effect(
@@ -56,7 +56,7 @@ EFFECT = Effect(
             "exponent",
             "-",
             scale=lambda s: 1.5,
-            lower=0.1,
+            lower=0.25,
             upper=5.0,
             null=None,
             # next to 0, 1 and 2 stand dry friction, c1 and quadratic drag
