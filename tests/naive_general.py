@@ -35,7 +35,8 @@ class Naive:
         self.gap, self.m2 = self.g, self.number("obstacle_mass", "mass")
         self.one_sided = bool({"contact_no_tension", "obstacle_mass"} & set(self.effects))
         self.friction = self.number("coulomb_friction", "force")
-        self.t, self.state, self.slide = 0.0, [self.y0, self.v0, 0.0], np.sign(self.v0)
+        self.t, self.slide = 0.0, np.sign(self.v0)
+        self.state = [self.y0, self.v0, 0.0, 0.0, 0.0]  # y, v, relaxation, second mode
         self.mode = FREE
 
     def number(self, effect: str, name: str, default: float = 0.0) -> float:
@@ -77,16 +78,26 @@ class Naive:
 
     def reaction(self, t: float, state: list[float]) -> float:
         """Force of the obstacle on the mass, N: what moves the obstacle's own mass comes on top."""
-        y, v, z = state
+        y, v, z = state[:3]
         return self.in_contact(y, v, z) + self.m2 * self.acceleration(t, y, v, z, CONTACT)
 
     def right_hand_side(self, t: float, state: list[float]) -> list[float]:
-        y, v, z = state
+        y, v, z = state[:3]
         touching = self.mode == CONTACT
         stiffness, time = (self.number("contact_relaxation", n) for n in ("stiffness", "time"))
         rate = stiffness * v * touching - z / time if time else 0.0
         held = self.friction > 0 and self.slide == 0
-        return [0.0, 0.0, rate] if held else [v, self.acceleration(t, y, v, z, self.mode), rate]
+        slope = [0.0, 0.0, rate] if held else [v, self.acceleration(t, y, v, z, self.mode), rate]
+        return slope + self.second_mode(t, state, held)
+
+    def second_mode(self, t: float, state: list[float], held: bool) -> list[float]:
+        """Rates of the mode that the contact force excites."""
+        p, force = self.number, 0.0
+        if self.mode == CONTACT:
+            force = self.in_contact(*state[:3]) if held else self.reaction(t, state)
+        w = 2 * np.pi * p("second_mode", "frequency")
+        pull = w**2 * state[3] + 2 * p("second_mode", "damping") * w * state[4]
+        return [state[4], p("second_mode", "gain") * force - pull]
 
     def watches(self, sign: float) -> dict[str, tuple[object, float]]:
         """Event -> (function of t and state, direction in which it crosses zero)."""
@@ -134,7 +145,7 @@ class Naive:
             end = answer.t[-1]
             upto = times.size if answer.status == 0 else int(np.searchsorted(times, end))
             if upto > filled:
-                out[filled:upto] = answer.sol(times[filled:upto])[0]
+                out[filled:upto] = answer.sol(times[filled:upto])[[0, 3]].sum(axis=0)
             filled = upto
             self.t, self.state = end, list(answer.y[:, -1])
             for name, hits in zip(watches, answer.t_events, strict=True):
@@ -144,7 +155,7 @@ class Naive:
 
     def start(self) -> float:
         """Direction of the piece that begins now; 0 while dry friction holds."""
-        y, v, z = self.state
+        y, v, z = self.state[:3]
         if v != 0:
             self.slide = np.sign(v)
             return self.slide
@@ -164,7 +175,10 @@ class Naive:
             self.state[1] = 0.0
         elif name == "touch":
             self.mode, self.state[0] = CONTACT, self.gap
+            before = self.state[1]
             self.state[1] *= self.mass / (self.mass + self.m2)
+            lost = self.mass * (before - self.state[1])
+            self.state[4] += self.number("second_mode", "gain") * lost
         elif name == "gap" and self.mode == RELEASED:
             self.mode = FREE
         elif name in ("gap", "release"):

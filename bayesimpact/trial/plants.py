@@ -130,6 +130,18 @@ def _obstacle_mass(design: Design, rng: Rng) -> Form:
     return Form(lambda size: {"mass": size}, 1e-5 * mass, reference, largest=0.3 * mass)
 
 
+def _second_mode(design: Design, rng: Rng) -> Form:
+    """Faster than a contact; what it adds stays below a third of the depth of contact."""
+    omega = design.contact_omega * log_uniform(rng, (1.5, 8.0))
+    damping, sign = log_uniform(rng, (0.005, 0.1)), _sign(rng)
+
+    def build(size: float) -> Parameters:
+        return {"frequency": omega / (2 * pi), "damping": damping, "gain": sign * size}
+
+    largest = 0.3 * omega**2 / design.contact_stiffness
+    return Form(build, 1e-5 * largest, largest=largest)
+
+
 def _forcing(design: Design, rng: Rng) -> Form:
     side = (0.4, 0.85) if rng.random() < 0.5 else (1.2, 4.0)
     frequency = design.omega / (2 * pi) * log_uniform(rng, side)
@@ -187,6 +199,7 @@ CATALOGUE_PLANTS: Mapping[str, Plant] = {
     "contact_no_tension": Plant(("contact",), lambda d, r: Form(lambda s: {}, 0.0), 1, slot="end"),
     "contact_relaxation": Plant(("contact",), _relaxation, 1),
     "obstacle_mass": Plant(("contact",), _obstacle_mass, 1, slot="end"),
+    "second_mode": Plant(("contact",), _second_mode, 1),
     "gap_wear": Plant(("contact",), _one("step", lambda d: 0.1 * d.indentation), 1, slot="wear"),
     "gap_per_recording": Plant(("contact",), _gaps, 1, 2, slot="g"),
     "coulomb_friction": Plant(("free",), _one("force", lambda d: 0.1 * d.rig.k1 * d.amplitude)),

@@ -112,8 +112,8 @@ class NaiveRig:
         self.one_sided = "obstacle_mass" in effects or "contact_no_tension" in effects
         self.touching = release.y0 > self.gap
         self.stuck = self.released = False
-        self.names = ("maxwell", "bouc", "x", "u")
-        self.state = [release.y0, release.v0, 0.0, 0.0, release.y0, release.v0]
+        self.names = ("maxwell", "bouc", "x", "u", "q", "q_rate")
+        self.state = [release.y0, release.v0, 0.0, 0.0, release.y0, release.v0, 0.0, 0.0]
 
     def named(self, state):
         """Own states, and where the step began: it decides what is switched on."""
@@ -139,7 +139,7 @@ class NaiveRig:
             force = self.sums(t, state)[0]
             force += level * (sign(begun[1]) or -sign(force))
             acceleration = -force / (self.rig.mass + self.m2 * self.touching)
-        out = [v, acceleration, 0.0, 0.0, 0.0, 0.0]
+        out = [v, acceleration, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
         if "contact_relaxation" in self.e:
             p = self.e["contact_relaxation"]
             out[2] = p["stiffness"] * v * self.touching - s["maxwell"] / p["time"]
@@ -147,7 +147,13 @@ class NaiveRig:
             out[3] = v - abs(v) * s["bouc"] / self.e["hysteresis"]["width"]
         if "resonator" in self.e:
             p = self.e["resonator"]
-            out[4:] = [s["u"], resonator_pull(p, y, v, s) / p["mass"]]
+            out[4:6] = [s["u"], resonator_pull(p, y, v, s) / p["mass"]]
+        if "second_mode" in self.e:
+            p = self.e["second_mode"]
+            w = 2 * pi * p["frequency"]
+            push = self.sums(t, state)[1] + self.m2 * acceleration * self.touching
+            pull = 2 * p["damping"] * w * s["q_rate"] + w**2 * s["q"]
+            out[6:] = [s["q_rate"], p["gain"] * push - pull]
         return out
 
     def rk4(self, t, h):
@@ -205,6 +211,8 @@ class NaiveRig:
         elif not self.touching and not self.released and y >= self.gap:
             self.touching = True
             self.state[1] *= self.rig.mass / (self.rig.mass + self.m2)
+            lost = self.rig.mass * (v - self.state[1])
+            self.state[7] += self.e.get("second_mode", {}).get("gain", 0.0) * lost
         level = dry_level(self.e, y, 0.0, self.touching)
         if self.stuck:
             self.stuck = abs(self.sums(t, self.state)[0]) <= level
@@ -220,6 +228,6 @@ class NaiveRig:
         count = round(duration / h)
         out = np.empty(count)
         for i in range(count):
-            out[i] = self.state[0]
+            out[i] = self.state[0] + self.state[6]
             self.advance(i * h, h)
         return out

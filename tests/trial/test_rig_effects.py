@@ -24,6 +24,7 @@ STRONG = {
     "contact_no_tension": {},
     "obstacle_mass": {"mass": 0.01},
     "contact_relaxation": {"stiffness": 600.0, "time": 5e-3},
+    "second_mode": {"frequency": 25.0, "damping": 0.03, "gain": 1.5},
     "gap_wear": {"step": 2e-5},
     "gap_per_recording": {"g": {"r": 1.3e-3}},
     "coulomb_friction": {"force": 0.4},
@@ -79,6 +80,7 @@ def test_equation_against_the_naive_twin(effect):
         ("contact_no_tension", "contact_relaxation", "resonator", "hysteresis", "friction_pad"),
         ("obstacle_mass", "contact_preload", "contact_friction", "knock", "eddy_brake"),
         ("contact_second_stage", "gap_wear"),
+        ("second_mode", "obstacle_mass", "contact_relaxation", "coulomb_friction"),
         ("contact_damping_per_case", "gap_per_recording", "gap_wear", "contact_hardening"),
     ],
 )
@@ -108,6 +110,7 @@ NULL = {
     "contact_power_law": {"exponent": 1.0},
     "contact_second_stage": {"stiffness": 0.0, "depth": 1e-4},
     "contact_relaxation": {"stiffness": 0.0, "time": 1e-3},
+    "second_mode": {"frequency": 70.0, "damping": 0.03, "gain": 0.0},
     "gap_wear": {"step": 0.0},
     "gap_per_recording": {"g": {"r": 1.1e-3}},
     "coulomb_friction": {"force": 0.0},

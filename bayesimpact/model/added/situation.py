@@ -27,6 +27,7 @@ from bayesimpact.model.added.world import (
     LAW_SURFACE,
     NO_TENSION,
     NOW,
+    SECOND_GAIN,
     V0,
     WORK_COLUMNS,
     Y0,
@@ -37,8 +38,10 @@ from bayesimpact.model.added.world import (
 from bayesimpact.model.compiled import inner
 
 # what holds between events: gap, kind of motion, direction of sliding (0: held), direction of
-# motion, whether the obstacle has pushed in this contact, then the side of every law's surface
-GAP, MODE, SLIDING, HEADING, PUSHED, SIDES = range(6)
+# motion, whether the obstacle has pushed in this contact; displacement and velocity of a second
+# mode, and what it keeps for a sampling interval; then the side of every law's surface
+GAP, MODE, SLIDING, HEADING, PUSHED, SECOND_Q, SECOND_P, HOP = range(8)
+SIDES = HOP + 8
 FREE, TOUCHING, SEPARATED = 0.0, 1.0, 2.0
 NEVER, SOON, ONCE = 0.0, 0.5, 1.0  # the obstacle has pushed in this contact; SOON: in this step
 NONE, TOUCH, LEAVE, TURN, SURFACE = range(-1, 4)  # SURFACE + i: surface of law i
@@ -168,8 +171,9 @@ def resolve(event: Any, y: Any, v: Any, t: Any, w: Any) -> Any:
     q, s = w.q, w.s
     if event == TOUCH:
         if s[MODE] == FREE:
-            y = s[GAP]
+            y, before = s[GAP], v
             v *= w.mass / (w.mass + q[CONTACT_MASS])
+            s[SECOND_P] += q[SECOND_GAIN] * w.mass * (before - v)
         s[MODE] = TOUCHING
         s[PUSHED] = ONCE if reaction(y, v, t, NOW, w) > 0.0 else NEVER
         set_sides(y, v, t, w)

@@ -12,6 +12,7 @@ from bayesimpact.model.compiled import inner
 # slots of q: bayesimpact.model.parameters.SLOTS
 C1, K1, C2, G, K2, Y0, V0, FORCE, OMEGA, PHASE, OFFSET = range(11)
 FRICTION, CONTACT_MASS, NO_TENSION, GAP_STEP = range(11, 15)
+SECOND_FREQUENCY, SECOND_DAMPING, SECOND_GAIN = range(15, 18)
 # columns of the table of laws, and its flags: bayesimpact.model.effects.effect.law_row
 LAW_FORCE, LAW_RATE, LAW_SURFACE, LAW_FLAGS = range(4)
 LAW_FIRST, LAW_PACE, LAW_GRAIN, LAW_COLUMNS = range(4, 8)

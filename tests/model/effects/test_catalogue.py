@@ -28,6 +28,7 @@ CONTRACT = {
     "contact_no_tension": [],
     "contact_relaxation": ["stiffness", "time"],
     "obstacle_mass": ["mass"],
+    "second_mode": ["frequency", "damping", "gain"],
     "gap_wear": ["step"],
     "gap_per_recording": ["g[recording]"],
     "coulomb_friction": ["force"],
@@ -52,6 +53,7 @@ DISSIPATIVE = {
 SIGNED = {
     "contact_hardening.stiffness", "spring_quadratic.stiffness", "spring_cubic.stiffness",
     "stiffness_drift.rate", "sensor_drift.rate", "sensor_quadratic.gain", "sensor_cubic.gain",
+    "second_mode.gain",
 }  # fmt: skip
 
 

@@ -35,6 +35,9 @@ COMBINATIONS = (
     ("stiffness_drift", "contact_hardening", "gap_per_recording"),
     ("obstacle_mass", "contact_damping_indentation", "gap_wear", "spring_quadratic"),
     ("contact_relaxation", "contact_damping_per_case", "spring_cubic", "quadratic_drag"),
+    ("second_mode", "contact_power_law"),
+    ("second_mode", "obstacle_mass", "contact_relaxation", "coulomb_friction"),
+    ("second_mode", "contact_second_stage", "harmonic_forcing", "gap_wear"),
 )
 
 
@@ -73,7 +76,7 @@ def test_combinations(names):
         assert np.abs(difference).max() < TOLERANCE
 
 
-@pytest.mark.parametrize("names", COMBINATIONS[:4], ids="+".join)
+@pytest.mark.parametrize("names", COMBINATIONS[:4] + COMBINATIONS[9:11], ids="+".join)
 def test_combinations_by_hand(names):
     effects, values = combined(names, PAPER)
     difference = moved(effects, values, PAPER) - by_hand(effects, values, PAPER)
