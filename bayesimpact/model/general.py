@@ -5,7 +5,7 @@ part of one. An event (touch, release, turning point, surface of a law) ends a s
 on the integrator's own trajectory, so that the state there is as accurate as anywhere. The parts:
 `added.world` (arrays, laws), `added.flows` (between events), `added.step` and `added.method` (how),
 `added.crossing` (when), `added.situation` (what then), `added.memory`, `added.rest`, `added.dense`,
-`added.second`.
+`added.second`, `added.resonator`.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from bayesimpact.model.added.dense import LONGEST_STRIDE, fill_in
 from bayesimpact.model.added.flows import RENEWED, first_step, flow_from, next_step, stride_of
 from bayesimpact.model.added.memory import keep_memory, relax
 from bayesimpact.model.added.method import quarters
+from bayesimpact.model.added.resonator import ROWS
 from bayesimpact.model.added.rest import hold
 from bayesimpact.model.added.second import listens, respond
 from bayesimpact.model.added.situation import (
@@ -39,11 +40,13 @@ from bayesimpact.model.added.world import (
     C1,
     C2,
     CONTACT_MASS,
+    FRAME_DAMPING,
     FRICTION,
     K1,
     K2,
     LAW_COLUMNS,
     NOW,
+    OBSTACLE_MASS,
     SECOND_DAMPING,
     SECOND_FREQUENCY,
     SECOND_GAIN,
@@ -71,6 +74,9 @@ def admissible(q: Any, mass: Any) -> Any:
     positive = mass > 0.0 and q[K1] > 0.0 and q[K2] >= 0.0 and q[C1] >= 0.0 and q[C2] >= 0.0
     if q[SECOND_GAIN] != 0.0 and not (q[SECOND_FREQUENCY] > 0.0 and q[SECOND_DAMPING] >= 0.0):
         return False
+    for i in range(OBSTACLE_MASS, FRAME_DAMPING + 1):
+        if not q[i] >= 0.0:
+            return False
     return positive and q[CONTACT_MASS] >= 0.0 and q[FRICTION] >= 0.0
 
 
@@ -203,7 +209,7 @@ def room_for(size: Any) -> Any:
     return (
         np.empty(SIDES + size),
         np.empty(size, dtype=np.int64),
-        np.empty((size, WORK_COLUMNS)),
+        np.empty((size + ROWS, WORK_COLUMNS)),
         np.empty((2, LONGEST_STRIDE, 2)),
         np.empty((2, 2)),
     )

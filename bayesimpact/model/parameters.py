@@ -24,6 +24,8 @@ BASE_SLOTS = ("c1", "k1", "c2", "g", "k2", "y0", "v0", "A", "w", "phase", "offse
 ADDED_SLOTS = (
     "friction", "contact_mass", "no_tension", "gap_step",
     "second_frequency", "second_damping", "second_gain",
+    "obstacle_mass", "obstacle_frequency", "obstacle_damping",
+    "frame_ratio", "frame_frequency", "frame_damping",
 )  # fmt: skip
 SLOTS = BASE_SLOTS + ADDED_SLOTS
 

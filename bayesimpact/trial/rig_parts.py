@@ -63,6 +63,7 @@ class Part:
     states : initial values of own states
     rates : Piece -> time derivatives of the own states
     heard : in place of `rates`, where the states follow the force between obstacle and mass
+    felt : in place of `rates`, where the states follow the acceleration of the mass
     struck : (state, impulse of the obstacle on the mass, N s) changes the own states at a touch
     seen : positions in the state of what the probe sees beside the mass
     kinks : displacements at which the law is not smooth, m
@@ -77,6 +78,7 @@ class Part:
     states: tuple[float, ...] = ()
     rates: Callable[[Piece], Rates] | None = None
     heard: Heard | None = None
+    felt: Callable[[float, float, float, State], tuple[float, ...]] | None = None
     struck: Callable[[State, float], None] | None = None
     seen: tuple[int, ...] = ()
     kinks: tuple[float, ...] = ()

@@ -8,6 +8,7 @@ import numpy as np
 
 from bayesimpact.model.added.flows import flow_from
 from bayesimpact.model.added.memory import keep_memory, relax_one
+from bayesimpact.model.added.resonator import fastest_body, relax_bodies
 from bayesimpact.model.added.second import listens, respond_at_rest
 from bayesimpact.model.added.situation import SECOND_Q, SLIDING, static_force
 from bayesimpact.model.added.world import AHEAD, FORCE, FRICTION, NOW
@@ -18,7 +19,7 @@ from bayesimpact.model.compiled import inner
 def hold(y: Any, t: Any, j: Any, w: Any) -> Any:
     """Rest under dry friction until the other forces exceed it: (t, next sample)."""
     second = listens(w)
-    if w.size == 0 and w.q[FORCE] == 0.0:
+    if w.size == 0 and w.q[FORCE] == 0.0 and fastest_body(True, w) == 0.0:
         for i in range(j, w.n):
             if second:
                 respond_at_rest(y, t, i * w.interval - t, NOW, w)
@@ -61,4 +62,5 @@ def pull_at(y: Any, t: Any, dt: Any, flow: Any, w: Any) -> Any:
     """Force on the mass after a rest of dt, N, dry friction apart."""
     for law in range(w.size):
         relax_one(law, AHEAD, y, 0.0, t, dt, flow, w)
+    relax_bodies(AHEAD, y, dt, flow.touching == 1.0, flow.gap, w)
     return static_force(y, t + dt, AHEAD, w)

@@ -13,6 +13,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from bayesimpact.model.added.resonator import (
+    OBSTACLE,
+    body,
+    body_force,
+    share_of_frame,
+    shift_bodies,
+)
 from bayesimpact.model.added.situation import (
     GAP,
     HOP,
@@ -207,9 +214,11 @@ def linear_force(y: Any, v: Any, u: Any, t: Any, w: Any) -> Any:
     `level` is such that the force at (y, v) itself is right, whatever acts.
     """
     q = w.q
-    share = q[CONTACT_MASS] / (w.mass + q[CONTACT_MASS])
-    c = (1.0 - share) * q[C2] - share * q[C1]
-    k = (1.0 - share) * q[K2] - share * q[K1]
+    mass = w.mass * (1.0 - share_of_frame(w))
+    share = q[CONTACT_MASS] / (mass + q[CONTACT_MASS])
+    m2, W, drag = body(OBSTACLE, w)
+    c = (1.0 - share) * (q[C2] + m2 * drag) - share * q[C1]
+    k = (1.0 - share) * (q[K2] + m2 * W) - share * q[K1]
     return c, k, reaction(y, v, t, NOW, w) - c * v - k * u
 
 
@@ -249,6 +258,8 @@ def force_slope(
                 z = w.work[row + column]
                 rate = law_value(law, LAW_RATE, y, v, t, z, flow.gap, flow.touching, w)
                 w.work[row + STAGE] = z + short * rate
+        if flow.bodies:
+            shift_bodies(y, v, column, short, flow, w)
     return (reaction(y + short * v, v + short * a, t + short, at, w) - here) / short
 
 
@@ -260,7 +271,9 @@ def respond_at_rest(y: Any, t: Any, dt: Any, column: Any, w: Any) -> Any:
     if s[MODE] == TOUCHING:
         spring = w.q[K2] * (y - s[GAP])
         force = spring + laws_force(y, 0.0, t, NOW, True, w)
+        force += body_force(OBSTACLE, y, 0.0, s[GAP], NOW, w)
         later = spring + laws_force(y, 0.0, t + dt, column, True, w)
+        later += body_force(OBSTACLE, y, 0.0, s[GAP], column, w)
     gain = w.q[SECOND_GAIN]
     growth = (later - force) / dt if dt > 0.0 else 0.0
     s[SECOND_Q], s[SECOND_P] = polynomial_response(

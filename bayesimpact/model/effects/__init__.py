@@ -1,6 +1,7 @@
 """The catalogue: one effect, one file; `EFFECTS` is the only registration."""
 
 from bayesimpact.model.effects import (
+    base_motion,
     contact_damping_indentation,
     contact_damping_per_case,
     contact_damping_speed,
@@ -14,6 +15,7 @@ from bayesimpact.model.effects import (
     gap_wear,
     harmonic_forcing,
     obstacle_mass,
+    obstacle_mode,
     opposite_stop,
     quadratic_drag,
     second_mode,
@@ -38,7 +40,9 @@ EFFECTS: tuple[Effect, ...] = (
     contact_no_tension.EFFECT,
     contact_relaxation.EFFECT,
     obstacle_mass.EFFECT,
+    obstacle_mode.EFFECT,
     second_mode.EFFECT,
+    base_motion.EFFECT,
     gap_wear.EFFECT,
     gap_per_recording.EFFECT,
     coulomb_friction.EFFECT,

@@ -28,6 +28,8 @@ CONTRACT = {
     "contact_no_tension": [],
     "contact_relaxation": ["stiffness", "time"],
     "obstacle_mass": ["mass"],
+    "obstacle_mode": ["mass", "frequency", "damping"],
+    "base_motion": ["frequency", "damping", "mass_ratio"],
     "second_mode": ["frequency", "damping", "gain"],
     "gap_wear": ["step"],
     "gap_per_recording": ["g[recording]"],
@@ -48,7 +50,7 @@ DISSIPATIVE = {
     "contact_damping_indentation.coefficient", "contact_damping_speed.coefficient",
     "contact_relaxation.stiffness", "contact_second_stage.stiffness", "obstacle_mass.mass",
     "gap_wear.step", "coulomb_friction.force", "quadratic_drag.coefficient",
-    "opposite_stop.stiffness",
+    "opposite_stop.stiffness", "obstacle_mode.mass", "base_motion.mass_ratio",
 }  # fmt: skip
 SIGNED = {
     "contact_hardening.stiffness", "spring_quadratic.stiffness", "spring_cubic.stiffness",

@@ -36,6 +36,9 @@ COMBINATIONS = (
     ("obstacle_mass", "contact_damping_indentation", "gap_wear", "spring_quadratic"),
     ("contact_relaxation", "contact_damping_per_case", "spring_cubic", "quadratic_drag"),
     ("second_mode", "contact_power_law"),
+    ("obstacle_mode", "base_motion", "contact_no_tension", "quadratic_drag"),
+    ("second_mode", "obstacle_mode", "coulomb_friction", "gap_wear"),
+    ("base_motion", "obstacle_mass", "second_mode", "spring_cubic"),
     ("second_mode", "obstacle_mass", "contact_relaxation", "coulomb_friction"),
     ("second_mode", "contact_second_stage", "harmonic_forcing", "gap_wear"),
 )
@@ -76,7 +79,7 @@ def test_combinations(names):
         assert np.abs(difference).max() < TOLERANCE
 
 
-@pytest.mark.parametrize("names", COMBINATIONS[:4] + COMBINATIONS[9:11], ids="+".join)
+@pytest.mark.parametrize("names", COMBINATIONS[:4] + COMBINATIONS[9:14], ids="+".join)
 def test_combinations_by_hand(names):
     effects, values = combined(names, PAPER)
     difference = moved(effects, values, PAPER) - by_hand(effects, values, PAPER)
