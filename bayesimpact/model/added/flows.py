@@ -57,6 +57,7 @@ GRAINS = 1.1  # that a step may pass at the swing's highest speed
 ROUND_UP = 0.3  # of a sample: steps end on samples, and may be that much longer for it
 RENEWED = 64  # longest steps after which a flow is chosen anew: the swing may have grown
 MOST_CUTS = 4096  # steps per sample at most
+MOST_HOPS = 64  # per sample, of an exact flow with a body too fast to be seen
 FOLDED = 0.1  # a law's stiffness above this share of the linear one is counted into the flow
 LEAST = 0.25  # of the linear stiffness, which the flow keeps
 REACH = np.sqrt(0.75)  # where a cubic spring's secant has its mean stiffness, over the swing
@@ -128,6 +129,7 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
         longest = MAX_ANGLE_PLAIN / (np.sqrt(K) + bodies)
         if listens(w):
             longest = min(longest, MAX_ANGLE_PACE / pace)
+        longest = max(longest, w.interval / MOST_HOPS)
         longest = w.interval / np.ceil(w.interval / longest)
     flow = Flow(
         1.0 / mass, b, K, (force - level) / stiffness, slope, level, s[GAP],

@@ -100,31 +100,33 @@ def joint_response(
 def polynomial_response(
     q: float, p: float, beta: float, W: float, a0: float, a1: float, a2: float, a3: float, t: float
 ) -> tuple[float, float]:
-    """(q, q') after a time t under q'' + 2 beta q' + W q = a0 + a1 s + a2 s^2 + a3 s^3, by series.
+    """(q, q') after a time t under q'' + 2 beta q' + W q = a0 + a1 s + a2 s^2 + a3 s^3, W > 0.
 
-    s counts from the start; the time is cut into pieces of at most half a radian.
+    s counts from the start. Over less than half a radian by power series; over more as a cubic
+    that solves the equation and a free motion, which then do not cancel.
     """
     if not t > 0.0:
         return q, p
-    pieces = max(1, math.ceil(2.0 * t * (math.sqrt(W) + 2.0 * beta)))
-    h = t / pieces
-    hh, betah, Wh = h * h, 2.0 * beta * h, W * h * h
-    for _ in range(pieces):
-        f0, f1, f2, f3 = a0, a1 * h, a2 * hh, a3 * hh * h
-        total, rate, c0, c1 = q + p * h, p, q, p * h
-        for n in range(TERMS):
-            force = f0
-            f0, f1, f2, f3 = f1, f2, f3, 0.0
-            c2 = (hh * force - betah * (n + 1.0) * c1 - Wh * c0) / ((n + 1.0) * (n + 2.0))
-            total, rate = total + c2, rate + (n + 2.0) * c2 / h
-            c0, c1 = c1, c2
-        q, p = total, rate
-        a0, a1, a2 = (
-            a0 + h * (a1 + h * (a2 + h * a3)),
-            a1 + h * (2.0 * a2 + 3.0 * h * a3),
-            a2 + 3.0 * h * a3,
+    if (math.sqrt(W) + 2.0 * beta) * t > 0.5:
+        b3 = a3 / W
+        b2 = (a2 - 6.0 * beta * b3) / W
+        b1 = (a1 - 4.0 * beta * b2 - 6.0 * b3) / W
+        b0 = (a0 - 2.0 * beta * b1 - 2.0 * b2) / W
+        M, N = impulse_response(beta, W, t)
+        q, p = q - b0, p - b1
+        return (
+            b0 + t * (b1 + t * (b2 + t * b3)) + N * q + M * (p + 2.0 * beta * q),
+            b1 + t * (2.0 * b2 + 3.0 * t * b3) + N * p - W * M * q,
         )
-    return q, p
+    betat, Wt = 2.0 * beta * t, W * t * t
+    f0, f1, f2, f3 = a0, a1 * t, a2 * t * t, a3 * t * t * t
+    total, rate, c0, c1 = q + p * t, p, q, p * t
+    for n in range(TERMS):
+        c2 = (t * t * f0 - betat * (n + 1.0) * c1 - Wt * c0) / ((n + 1.0) * (n + 2.0))
+        f0, f1, f2, f3 = f1, f2, f3, 0.0
+        total, rate = total + c2, rate + (n + 2.0) * c2 / t
+        c0, c1 = c1, c2
+    return total, rate
 
 
 @inner(forceinline=True)

@@ -36,6 +36,7 @@ COMBINATIONS = (
     ("obstacle_mass", "contact_damping_indentation", "gap_wear", "spring_quadratic"),
     ("contact_relaxation", "contact_damping_per_case", "spring_cubic", "quadratic_drag"),
     ("second_mode", "contact_power_law"),
+    ("second_mode", "coulomb_friction"),
     ("obstacle_mode", "base_motion", "contact_no_tension", "quadratic_drag"),
     ("second_mode", "obstacle_mode", "coulomb_friction", "gap_wear"),
     ("base_motion", "obstacle_mass", "second_mode", "spring_cubic"),
@@ -79,7 +80,7 @@ def test_combinations(names):
         assert np.abs(difference).max() < TOLERANCE
 
 
-@pytest.mark.parametrize("names", COMBINATIONS[:4] + COMBINATIONS[9:14], ids="+".join)
+@pytest.mark.parametrize("names", COMBINATIONS[:4] + COMBINATIONS[9:15], ids="+".join)
 def test_combinations_by_hand(names):
     effects, values = combined(names, PAPER)
     difference = moved(effects, values, PAPER) - by_hand(effects, values, PAPER)

@@ -36,7 +36,7 @@ def test_joint_response_is_the_matrix_exponential(b, K, beta, W, t):
     np.testing.assert_allclose(found / scale, expected / scale, rtol=1e-11, atol=3e-12)
 
 
-@pytest.mark.parametrize("t", [0.0, 1e-5, 1e-3, 0.03])
+@pytest.mark.parametrize("t", [0.0, 1e-5, 8e-4, 1.2e-3, 0.03])
 def test_polynomial_response_is_the_matrix_exponential(t):
     beta, W, force = 12.0, 3e5, np.array([0.7, -30.0, 4e3, 1e5])
     rates = np.zeros((6, 6))  # q, q', then s^3, s^2, s, 1
