@@ -44,7 +44,7 @@ EFFECT = Effect(
             scale=lambda s: 3.0 * s.natural_frequency,
             lower=0.0,
             null=None,
-            grid=lambda s: np.geomspace(0.4, 12.0, 12) * s.natural_frequency,
+            grid=lambda s: np.geomspace(0.4, 12.0, 32) * s.natural_frequency,
         ),
         EffectParameter(
             "damping",
@@ -52,7 +52,7 @@ EFFECT = Effect(
             scale=lambda s: 0.02,
             lower=0.0,
             null=None,
-            grid=lambda s: np.array([0.003, 0.01, 0.03, 0.1]),
+            grid=lambda s: np.array([0.01, 0.05]),
         ),
         EffectParameter("mass_ratio", "-", scale=lambda s: 0.03, lower=0.0),
     ),

@@ -46,7 +46,7 @@ EFFECT = Effect(
             scale=lambda s: 3.0 * s.contact_rate / (2.0 * math.pi),
             lower=0.0,
             null=None,
-            grid=lambda s: np.geomspace(0.8, 12.0, 10) * s.contact_rate / (2.0 * math.pi),
+            grid=lambda s: np.geomspace(0.8, 12.0, 32) * s.contact_rate / (2.0 * math.pi),
         ),
         EffectParameter(
             "damping",
@@ -54,7 +54,7 @@ EFFECT = Effect(
             scale=lambda s: 0.03,
             lower=0.0,
             null=None,
-            grid=lambda s: np.array([0.003, 0.01, 0.03, 0.1]),
+            grid=lambda s: np.array([0.01, 0.05]),
         ),
     ),
     binds=MappingProxyType(

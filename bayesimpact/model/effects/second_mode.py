@@ -50,7 +50,7 @@ EFFECT = Effect(
             scale=lambda s: 4.0 * s.contact_rate / (2.0 * math.pi),
             lower=0.0,
             null=None,
-            grid=lambda s: np.geomspace(0.8, 20.0, 14) * s.contact_rate / (2.0 * math.pi),
+            grid=lambda s: np.geomspace(0.8, 20.0, 32) * s.contact_rate / (2.0 * math.pi),
         ),
         EffectParameter(
             "damping",
@@ -58,7 +58,7 @@ EFFECT = Effect(
             scale=lambda s: 0.02,
             lower=0.0,
             null=None,
-            grid=lambda s: np.array([0.003, 0.01, 0.03, 0.1]),
+            grid=lambda s: np.array([0.01, 0.05]),
         ),
         EffectParameter("gain", "1/kg", scale=lambda s: 0.3 / s.mass),
     ),
