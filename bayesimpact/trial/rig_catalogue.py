@@ -12,6 +12,7 @@ from math import pi, sin
 
 from bayesimpact.data.campaign import Smoothing
 from bayesimpact.trial.rig_chain import Chain, Probe
+from bayesimpact.trial.rig_modes import base_inertia, base_motion, obstacle_mode, second_mode
 from bayesimpact.trial.rig_parts import Law, Part, Piece, Rates, Site, State
 
 Numbers = Mapping[str, float]
@@ -240,6 +241,11 @@ CATALOGUE: Mapping[str, Planted] = {
         site=lambda site, p: replace(site, unilateral=True, obstacle_mass=p["mass"]),
     ),
     "contact_relaxation": Planted(("stiffness", "time"), obstacle=True, part=_relaxation),
+    "obstacle_mode": Planted(("mass", "frequency", "damping"), obstacle=True, part=obstacle_mode),
+    "base_motion": Planted(
+        ("frequency", "damping", "mass_ratio"), part=base_motion, site=base_inertia
+    ),
+    "second_mode": Planted(("frequency", "damping", "gain"), obstacle=True, part=second_mode),
     "gap_wear": Planted(
         ("step",), obstacle=True, site=lambda site, p: replace(site, gap_step=p["step"])
     ),

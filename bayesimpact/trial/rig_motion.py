@@ -43,7 +43,8 @@ class Motion:
     Attributes
     ----------
     times : (n,), s
-    displacement, velocity : (n,), m and m/s
+    displacement, velocity : (n,), m and m/s; the displacement is that of the place at which the
+        probe looks, further modes included
     touches, leaves : instants at which contacts began and ended, s
     """
 
@@ -98,6 +99,7 @@ class _Run:
         self.end = float(times[-1])
         self.state: State = [site.y0, site.v0, *(s for part in parts for s in part.states)]
         self.samples = np.empty((2, times.size))
+        self.seen = [place for part in parts for place in part.seen]
         self.filled = 0
         self.gap = site.gap
         self.touches: list[float] = []
@@ -202,7 +204,10 @@ class _Run:
         """Fill in the samples before `until`; the one at the very end of a piece is the next's."""
         upto = int(np.searchsorted(self.times, until, side="left"))
         if upto > self.filled:
-            self.samples[:, self.filled : upto] = dense(self.times[self.filled : upto])[:2]
+            states = dense(self.times[self.filled : upto])
+            self.samples[:, self.filled : upto] = states[:2]
+            for place in self.seen:
+                self.samples[0, self.filled : upto] += states[place]
             self.filled = upto
 
     def _first_event(
@@ -278,7 +283,11 @@ class _Run:
     def _touch(self) -> None:
         self.touches.append(self.t)
         self.mode = _CONTACT
+        before = self.state[1]
         self.state[1] *= self.site.mass / (self.site.mass + self.site.obstacle_mass)
+        for part in self.parts:
+            if part.struck is not None:
+                part.struck(self.state, self.site.mass * (before - self.state[1]))
 
     def _leave(self) -> None:
         self.leaves.append(self.t)

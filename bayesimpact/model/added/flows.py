@@ -8,6 +8,15 @@ import numpy as np
 
 from bayesimpact.model.added.dense import LONGEST_STRIDE
 from bayesimpact.model.added.memory import split_memory
+from bayesimpact.model.added.resonator import (
+    BODIES,
+    OBSTACLE,
+    acts,
+    body,
+    fastest_body,
+    share_of_frame,
+)
+from bayesimpact.model.added.second import listens
 from bayesimpact.model.added.situation import GAP, MODE, SIDES, SLIDING, TOUCHING, surface_value
 from bayesimpact.model.added.world import (
     C1,
@@ -44,11 +53,13 @@ from bayesimpact.model.compiled import inner
 MAX_ANGLE = 0.125  # longest step times natural frequency, rad
 MAX_ANGLE_PLAIN = 0.6  # the same where nothing is added: exact, but one turning point at most
 MAX_ANGLE_PACE = 0.32  # the same for an explicit dependence on time
+FINER = 2.4  # of a body on a spring of its own: it is not small, as other added forces are
 LONGER = 1.28  # where no force depends on the velocity: the method for these is the more accurate
 GRAINS = 1.1  # that a step may pass at the swing's highest speed
 ROUND_UP = 0.3  # of a sample: steps end on samples, and may be that much longer for it
 RENEWED = 64  # longest steps after which a flow is chosen anew: the swing may have grown
 MOST_CUTS = 4096  # steps per sample at most
+MOST_HOPS = 64  # per sample, of an exact flow with a body too fast to be seen
 FOLDED = 0.1  # a law's stiffness above this share of the linear one is counted into the flow
 LEAST = 0.25  # of the linear stiffness, which the flow keeps
 REACH = np.sqrt(0.75)  # where a cubic spring's secant has its mean stiffness, over the swing
@@ -91,8 +102,17 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
         damping += q[C2]
         stiffness += q[K2]
         force += q[K2] * s[GAP]
+    bodies = fastest_body(touching, w)
+    if bodies > 0.0:
+        memory, tame = True, False
+        mass -= share_of_frame(w) * w.mass
+        for which in range(BODIES):
+            if acts(which, touching, w):
+                m2, W, drag = body(which, w)
+                damping, stiffness = damping + m2 * drag, stiffness + m2 * W
+                force += m2 * W * s[GAP] if which == OBSTACLE else 0.0
     slope, level, pace = 0.0, 0.0, abs(q[OMEGA]) if q[FORCE] != 0.0 else 0.0
-    grain = np.inf
+    pace, grain = max(pace, FINER * bodies), np.inf
     if count > 0:
         slope, level = fold(y, v, t, mass, damping, stiffness, force, count, w)
         for k in range(count):
@@ -112,10 +132,17 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
     placed = placed and not memory
     if placed and not plain:
         longest *= LONGER
+    joint = bodies > 0.0 and count == 0 and not forced
+    if joint:
+        longest = MAX_ANGLE_PLAIN / (np.sqrt(K) + bodies)
+        if listens(w):
+            longest = min(longest, MAX_ANGLE_PACE / pace)
+        longest = max(longest, w.interval / MOST_HOPS)
+        longest = w.interval / np.ceil(w.interval / longest)
     flow = Flow(
         1.0 / mass, b, K, (force - level) / stiffness, slope, level, s[GAP],
-        1.0 if touching else 0.0, count, memory, plain, placed, forced, turns, rough,
-        rough_turn,
+        1.0 if touching else 0.0, count, memory, plain, placed, forced, turns, rough, rough_turn,
+        bodies > 0.0, joint, longest,
     )  # fmt: skip
     if tame and not plain:
         longest *= gain(y, v, t, pace, longest, flow, w)

@@ -1,6 +1,7 @@
 """The catalogue: one effect, one file; `EFFECTS` is the only registration."""
 
 from bayesimpact.model.effects import (
+    base_motion,
     contact_damping_indentation,
     contact_damping_per_case,
     contact_damping_speed,
@@ -14,11 +15,13 @@ from bayesimpact.model.effects import (
     gap_wear,
     harmonic_forcing,
     obstacle_mass,
+    obstacle_mode,
     opposite_stop,
     pendulum_sine,
     pendulum_with_spring,
     power_damping,
     quadratic_drag,
+    second_mode,
     sensor_cubic,
     sensor_drift,
     sensor_hum,
@@ -42,6 +45,9 @@ EFFECTS: tuple[Effect, ...] = (
     contact_no_tension.EFFECT,
     contact_relaxation.EFFECT,
     obstacle_mass.EFFECT,
+    obstacle_mode.EFFECT,
+    second_mode.EFFECT,
+    base_motion.EFFECT,
     gap_wear.EFFECT,
     gap_per_recording.EFFECT,
     coulomb_friction.EFFECT,

@@ -28,6 +28,9 @@ CONTRACT = {
     "contact_no_tension": [],
     "contact_relaxation": ["stiffness", "time"],
     "obstacle_mass": ["mass"],
+    "obstacle_mode": ["mass", "frequency", "damping"],
+    "base_motion": ["frequency", "damping", "mass_ratio"],
+    "second_mode": ["frequency", "damping", "gain"],
     "gap_wear": ["step"],
     "gap_per_recording": ["g[recording]"],
     "coulomb_friction": ["force"],
@@ -53,12 +56,13 @@ DISSIPATIVE = {
     "contact_relaxation.stiffness", "contact_second_stage.stiffness", "obstacle_mass.mass",
     "gap_wear.step", "coulomb_friction.force", "quadratic_drag.coefficient",
     "opposite_stop.stiffness", "power_damping.coefficient", "structural_damping.loss",
+    "obstacle_mode.mass", "base_motion.mass_ratio",
 }  # fmt: skip
 OF_ANGLES = {"pendulum_sine", "pendulum_with_spring"}
 SIGNED = {
     "contact_hardening.stiffness", "spring_quadratic.stiffness", "spring_cubic.stiffness",
     "stiffness_drift.rate", "sensor_drift.rate", "sensor_quadratic.gain", "sensor_cubic.gain",
-    "spring_quintic.stiffness",
+    "spring_quintic.stiffness", "second_mode.gain",
 }  # fmt: skip
 
 
@@ -149,12 +153,13 @@ def test_priors_scale_with_the_rig(effect):
 def test_shapes_have_grids_within_their_bounds():
     scales = TestRig().scales()
     for effect in EFFECTS:
-        for parameter in effect.parameters:
-            assert parameter.is_shape == (parameter.grid is not None)
-            if parameter.grid is not None:
-                values = parameter.grid(scales)
-                assert values.size >= 4
-                assert np.all((values >= parameter.lower) & (values <= parameter.upper))
+        shapes = [p for p in effect.parameters if p.is_shape]
+        assert shapes == [p for p in effect.parameters if p.grid is not None]
+        grids = [p.grid(scales) for p in shapes if p.grid is not None]
+        assert not shapes or max(values.size for values in grids) >= 4
+        for parameter, values in zip(shapes, grids, strict=True):
+            assert values.size >= 2
+            assert np.all((values >= parameter.lower) & (values <= parameter.upper))
 
 
 def test_admissible_only_where_it_could_show():

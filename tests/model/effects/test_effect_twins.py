@@ -38,6 +38,13 @@ COMBINATIONS = (
     ("structural_damping", "obstacle_mass", "contact_relaxation"),
     ("power_damping", "spring_quintic", "contact_power_law"),
     ("structural_damping", "coulomb_friction", "harmonic_forcing"),
+    ("second_mode", "contact_power_law"),
+    ("second_mode", "coulomb_friction"),
+    ("obstacle_mode", "base_motion", "contact_no_tension", "quadratic_drag"),
+    ("second_mode", "obstacle_mode", "coulomb_friction", "gap_wear"),
+    ("base_motion", "obstacle_mass", "second_mode", "spring_cubic"),
+    ("second_mode", "obstacle_mass", "contact_relaxation", "coulomb_friction"),
+    ("second_mode", "contact_second_stage", "harmonic_forcing", "gap_wear"),
 )
 
 
@@ -77,7 +84,7 @@ def test_combinations(names):
         assert np.abs(difference).max() < TOLERANCE
 
 
-@pytest.mark.parametrize("names", COMBINATIONS[:4], ids="+".join)
+@pytest.mark.parametrize("names", COMBINATIONS[:4] + COMBINATIONS[9:15], ids="+".join)
 def test_combinations_by_hand(names):
     effects, values = combined(names, PAPER)
     difference = moved(effects, values, PAPER) - by_hand(effects, values, PAPER)
