@@ -24,7 +24,7 @@ from bayesimpact.diagnosis.unknown import with_force
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification, identify
 from bayesimpact.inference.spectrum import Fingerprint
-from bayesimpact.model.effects import EFFECTS
+from bayesimpact.model.effects import SEARCHED
 from bayesimpact.model.effects.effect import Effect, Scales
 from bayesimpact.model.threads import linear_algebra_alone
 
@@ -80,7 +80,7 @@ def diagnose(
     campaign: Campaign,
     *,
     rng: np.random.Generator,
-    effects: Sequence[Effect] = EFFECTS,
+    effects: Sequence[Effect] = SEARCHED,
     search: bool = True,
     progress: Progress | None = None,
 ) -> Diagnosis:
@@ -132,7 +132,7 @@ def diagnose_fit(
     identification: Identification,
     *,
     rng: np.random.Generator,
-    effects: Sequence[Effect] = EFFECTS,
+    effects: Sequence[Effect] = SEARCHED,
     progress: Progress | None = None,
 ) -> Diagnosis:
     """The loop from a base fit on."""

@@ -267,7 +267,7 @@ CATALOGUE: Mapping[str, Planted] = {
     ),
     "sensor_cubic": Planted(("gain",), probe=lambda probe, p: replace(probe, cubic=p["gain"])),
     "sensor_hum": Planted(("amplitude", "frequency"), per_recording=("phase",), probe=_hum),
-    "pendulum_sine": Planted(part=_pendulum),
+    "pendulum_sine": Planted(optional=("stiffness",), part=_pendulum),
     "pendulum_with_spring": Planted(("stiffness",), part=_pendulum),
     "spring_quintic": Planted(("stiffness",), part=_spring_quintic),
     "power_damping": Planted(("coefficient", "exponent"), part=_power_damping),

@@ -1,4 +1,4 @@
-"""Forces that only the strong trials plant: gravity on a pendulum, a narrow bump in the contact.
+"""A force that only the strong trials plant: a narrow bump in the contact.
 
 Written from the equations, like the rest of the rig; the package's own laws are not looked at.
 """
@@ -6,20 +6,10 @@ Written from the equations, like the rest of the rig; the package's own laws are
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import exp, sin
+from math import exp
 
-from bayesimpact.trial.rig_catalogue import Numbers, Planted, everywhere, in_contact
-from bayesimpact.trial.rig_parts import Part, Site, State
-
-
-def _pendulum(site: Site, p: Numbers, slot: int) -> Part:
-    """K (sin y - y): with K = k1 the linear spring becomes gravity's moment k1 sin y."""
-    moment = p["stiffness"]
-
-    def law(t: float, y: float, v: float, state: State) -> float:
-        return moment * (sin(y) - y)
-
-    return Part(everywhere(law))
+from bayesimpact.trial.rig_catalogue import Numbers, Planted, in_contact
+from bayesimpact.trial.rig_parts import Part, Site
 
 
 def _contact_bump(site: Site, p: Numbers, slot: int) -> Part:
@@ -29,7 +19,6 @@ def _contact_bump(site: Site, p: Numbers, slot: int) -> Part:
 
 
 STRONG: Mapping[str, Planted] = {
-    "pendulum_sine": Planted(("stiffness",), part=_pendulum),
     "contact_bump": Planted(("force", "depth", "width"), obstacle=True, part=_contact_bump),
 }
-"""Effect -> how it enters the rig; pendulum_sine is one of the catalogue, contact_bump is not."""
+"""Effect -> how it enters the rig."""

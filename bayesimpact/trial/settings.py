@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 from bayesimpact.errors import InputError
+from bayesimpact.model.effects import UNTRIED
 from bayesimpact.trial.benches import BENCHES, NOISES
 from bayesimpact.trial.plants import CATALOGUE_PLANTS, OUTSIDE_PLANTS
 from bayesimpact.trial.strong_plants import CATALOGUE_STRONG, STRONG_OUTSIDE
@@ -17,6 +18,7 @@ REGIMES = ("weak", "strong")
 KINDS = ("control", "single", "pair", "outside")
 DEFAULT_STRENGTH = (1.5, 6.0)  # times the detection limit
 DEFAULT_BENCHES = tuple(name for name in BENCHES if name != "small")
+PLANTED = tuple(e for e in CATALOGUE_PLANTS if e not in UNTRIED)
 DEFAULT_MISFIT = (3.0, 300.0)  # base misfit over the noise, as real recordings have it
 STRONG_KINDS = ("several", "several_outside")
 STRONG_DEFAULTS: Mapping[str, Any] = {
@@ -50,7 +52,7 @@ class Settings:
     """
 
     kinds: tuple[str, ...] = KINDS
-    effects: tuple[str, ...] = tuple(CATALOGUE_PLANTS)
+    effects: tuple[str, ...] = PLANTED
     outside: tuple[str, ...] = tuple(OUTSIDE_PLANTS)
     strength: tuple[float, float] = DEFAULT_STRENGTH
     benches: tuple[str, ...] = DEFAULT_BENCHES

@@ -55,8 +55,6 @@ def free_forces(e, rig, t, y, v, s):
         total += e["spring_quadratic"]["stiffness"] * y**2
     if "spring_cubic" in e:
         total += e["spring_cubic"]["stiffness"] * y**3
-    if "pendulum_sine" in e:
-        total += e["pendulum_sine"]["stiffness"] * (sin(y) - y)
     if "stiffness_drift" in e:
         total += rig.k1 * e["stiffness_drift"]["rate"] * t * y
     if "harmonic_forcing" in e:
@@ -66,7 +64,7 @@ def free_forces(e, rig, t, y, v, s):
         p = e["opposite_stop"]
         total += p["stiffness"] * min(y + p["gap"], 0.0)
     if "pendulum_sine" in e:
-        total += rig.k1 * (sin(y) - y)
+        total += e["pendulum_sine"].get("stiffness", rig.k1) * (sin(y) - y)
     if "pendulum_with_spring" in e:
         total += e["pendulum_with_spring"]["stiffness"] * (sin(y) - y)
     if "spring_quintic" in e:
