@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 TOLERANCE = 0.02  # last step of a refit, standard deviations
 ITERATIONS = 40
 SHARES = (0.5, 0.25, 0.125, 0.0625)  # of the predicted shift, where the whole of it goes too far
-SAME_MODE = 1.0  # nats by which a model may fall short of one that it contains
+GAINED = 1.0  # nats: what gains less than this over a model that it contains begins again
 WHITE_SD = 4.0  # one lag of 16,000 of white noise lies beyond: none in a recording
 
 
@@ -63,7 +63,7 @@ def refit(fit: Fit, scores: Sequence[Score], scales: Scales) -> Candidate:
 
     The scores are linear predictions. Where the misfit is large they may point beyond the mode, so
     the climb begins at the best point between the unshifted model and the predicted one; one that
-    ends below a model which it contains begins again unshifted.
+    gains nothing begins again at either end.
     """
     effects = (*fit.target.oscillator.effects, *(s.effect for s in scores))
     shapes = {name: value for s in scores for name, value in s.shapes.items()}
@@ -73,20 +73,19 @@ def refit(fit: Fit, scores: Sequence[Score], scales: Scales) -> Candidate:
     predicted = unshifted.copy()
     _shift(fit, names, predicted, scores)
     steps = difference_steps(fit, target, step_sizes(names, effects, scales, scores))
-    start, moved = best_start(target, unshifted, predicted, steps)
+    start = best_start(target, unshifted, predicted, steps)
     options: dict[str, Any] = {"steps": steps, "tolerance": TOLERANCE, "max_iterations": ITERATIONS}
     found = find_mode(target, start, **options)
-    nested = all(s.effect.parameters for s in scores)
-    if nested and moved and not found.log_likelihood > fit.log_likelihood - SAME_MODE:
-        again = find_mode(target, unshifted, **options)
+    for other in (predicted, unshifted):
+        if found.log_likelihood > fit.log_likelihood + GAINED or np.array_equal(start, other):
+            continue
+        again = find_mode(target, other, **options)
         found = max(found, again, key=lambda f: np.nan_to_num(f.log_posterior, nan=-np.inf))
     return Candidate(effects, found, model_evidence(found))
 
 
-def best_start(
-    target: Target, unshifted: Array, predicted: Array, steps: Array
-) -> tuple[Array, bool]:
-    """The likeliest point on the line from one start to another, and whether it is not the first.
+def best_start(target: Target, unshifted: Array, predicted: Array, steps: Array) -> Array:
+    """The likeliest point on the line from one start to another (d,).
 
     The predicted end is taken where it is no worse than the unshifted one.
     """
@@ -101,8 +100,8 @@ def best_start(
             break
     best = int(np.argmin(np.nan_to_num(values, nan=np.inf)))
     if not values[best] < least and values[0] > least:
-        return unshifted, False
-    return unshifted + shares[best] * (predicted - unshifted), True
+        return unshifted
+    return np.asarray(unshifted + shares[best] * (predicted - unshifted))
 
 
 def without(candidate: Candidate, effect: Effect, scales: Scales) -> Candidate:

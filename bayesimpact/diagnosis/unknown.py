@@ -36,7 +36,7 @@ def learn_force(fit: Fit, force: MissingForce, scales: Scales) -> Fit:
     floor = 1e-9 * np.repeat([scales.force, scales.force / scales.speed], force.knots)
     sizes = dict(zip(coefficients, np.maximum(sd, floor), strict=True))
     steps = difference_steps(fit, target, sizes)
-    start, _ = best_start(target, unshifted, start, steps)
+    start = best_start(target, unshifted, start, steps)
     return find_mode(target, start, steps=steps, tolerance=TOLERANCE, max_iterations=ITERATIONS)
 
 

@@ -125,7 +125,7 @@ def run(monkeypatch):
         monkeypatch.setattr(
             search, "base_candidate", lambda fit: table.candidate((), table.gain(()))
         )
-        fit = SimpleNamespace()
+        fit = SimpleNamespace(reduced_chi2=1.0)
         return search.name(fit, effects, None, rng=np.random.default_rng(0))
 
     return go
