@@ -6,7 +6,8 @@ Nothing heavy is imported before a command runs: every command imports what it n
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -87,6 +88,8 @@ def main() -> None:
 
     CAMPAIGN is a folder with campaign.toml and recordings, or that file.
     """
+    # Numbers that overflow in a trial step are dealt with there; the warning tells a user nothing.
+    warnings.filterwarnings("ignore", category=RuntimeWarning)
     # A terminal that lacks a character shows a question mark in its place.
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
@@ -152,10 +155,20 @@ def announce(outcome: Any, out: Path, quiet: bool) -> None:
 
 
 def finish(ctx: click.Context, *outcomes: Any) -> None:
-    """Exit code 3 when something did not converge."""
+    """Exit code 3 when something did not converge, or a part of the report could not be made."""
+    unmade = [name for outcome in outcomes for name in outcome.failed]
+    words = [unmade_words(unmade)] if unmade else []
     if not all(outcome.converged for outcome in outcomes):
-        click.echo("bayesimpact: not converged; the report says what did not", err=True)
+        words.insert(0, "not converged; the report says what did not")
+    if words:
+        click.echo(f"bayesimpact: {'; '.join(words)}", err=True)
         ctx.exit(NOT_CONVERGED)
+
+
+def unmade_words(names: Sequence[str]) -> str:
+    """What a report lacks, and what finishes it."""
+    some = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+    return f"the report lacks {some} and says why; `bayesimpact report DIR` tries again"
 
 
 @main.command()
@@ -238,13 +251,17 @@ def diagnose(
 @main.command()
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 @common
-def report(folder: Path, seed: int, quiet: bool) -> None:
+@click.pass_context
+def report(ctx: click.Context, folder: Path, seed: int, quiet: bool) -> None:
     """Write the report of whatever DIR holds, from its files alone."""
     from bayesimpact.report.write import rewrite_report
 
-    page = rewrite_report(folder)
+    written = rewrite_report(folder)
     if not quiet:
-        click.echo(f"report: {page}")
+        click.echo(f"report: {written.page}")
+    if written.failed:
+        click.echo(f"bayesimpact: {unmade_words(list(written.failed))}", err=True)
+        ctx.exit(NOT_CONVERGED)
 
 
 @main.command()

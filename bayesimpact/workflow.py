@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +20,9 @@ from bayesimpact.inference.posterior import Posterior, sample
 from bayesimpact.report.archive import write_text
 from bayesimpact.report.build import versions
 from bayesimpact.report.diagnosis_arrays import diagnosis_arrays
+from bayesimpact.report.figures.save import reason
 from bayesimpact.report.results import Results
-from bayesimpact.report.write import write_fit, write_posterior
+from bayesimpact.report.write import Written, write_fit, write_posterior
 
 DIAGNOSIS_FILE = "diagnosis.json"
 CHAIN_FOLDER = "chain"
@@ -44,11 +45,13 @@ class Outcome:
     results : everything the report shows
     converged : False when the search or the sampler did not
     diagnosis : the content of diagnosis.json, where there is one
+    failed : parts of the report that could not be made, with their reasons
     """
 
     results: Results
     converged: bool
     diagnosis: dict[str, Any] | None = None
+    failed: Mapping[str, str] = field(default_factory=dict)
 
 
 def fit_campaign(
@@ -60,8 +63,8 @@ def fit_campaign(
     identification = identify(campaign, rng=np.random.default_rng(seed))
     seconds = time.perf_counter() - began
     say("writing the report")
-    results = write_fit(identification, out, seed=seed, command=command, seconds=seconds)
-    return Outcome(results, identification.fit.converged)
+    made = write_fit(identification, out, seed=seed, command=command, seconds=seconds)
+    return Outcome(made.results, identification.fit.converged, failed=made.failed)
 
 
 def sample_campaign(
@@ -82,8 +85,9 @@ def sample_campaign(
     posterior = sampled(identification, seed, out / CHAIN_FOLDER, resume, say)
     seconds = time.perf_counter() - began
     say("writing the report")
-    results = write_posterior(posterior, identification, out, command=command, seconds=seconds)
-    return Outcome(results, identification.fit.converged and posterior.chains.converged)
+    made = write_posterior(posterior, identification, out, command=command, seconds=seconds)
+    converged = identification.fit.converged and posterior.chains.converged
+    return Outcome(made.results, converged, failed=made.failed)
 
 
 def sampled(
@@ -132,9 +136,9 @@ def diagnose_campaign(
         certified=certified,
     )
     say("writing the report")
-    results = _write_diagnosis(diagnosis, content, before, after, out, seed, command)
+    made = _write_diagnosis(diagnosis, content, before, after, out, seed, command)
     sure = all(p is None or p.chains.converged for p in (before, after))
-    return Outcome(results, diagnosis.after.converged and sure, content)
+    return Outcome(made.results, diagnosis.after.converged and sure, content, made.failed)
 
 
 def _write_diagnosis(
@@ -145,15 +149,21 @@ def _write_diagnosis(
     out: Path,
     seed: int,
     command: str,
-) -> Results:
+) -> Written:
     out.mkdir(parents=True, exist_ok=True)
     plain = _strict(content)
     write_text(out / DIAGNOSIS_FILE, json.dumps(plain, indent=1))
+    failed = {}
+    try:
+        arrays = diagnosis_arrays(diagnosis)
+    except Exception as error:
+        arrays, failed["arrays of the diagnosis' figures"] = {}, reason(error)
     told: dict[str, Any] = {
         "command": command,
         "seconds": float(content["seconds"]),
         "diagnosis": plain,
-        "diagnosis_arrays": diagnosis_arrays(diagnosis),
+        "diagnosis_arrays": arrays,
+        "failed": failed,
     }
     if after is None:
         final = replace(diagnosis.identification, fit=diagnosis.after, search=None)
