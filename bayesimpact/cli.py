@@ -9,12 +9,15 @@ import sys
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
 from bayesimpact.errors import BayesimpactError, InputError
 from bayesimpact.trial.command import trial
+
+if TYPE_CHECKING:
+    from bayesimpact.data.campaign import Campaign
 
 BAD_INPUT = 2
 NOT_CONVERGED = 3
@@ -57,7 +60,32 @@ def common(command: Callable[..., None]) -> Callable[..., None]:
     return command
 
 
-campaign_argument = click.argument("campaign", type=click.Path(path_type=Path))
+_DATA = "bayesimpact.data"  # in a context's meta: folders of --data
+
+
+def campaign_argument(command: Callable[..., None]) -> Callable[..., None]:
+    """CAMPAIGN, and `--data FOLDER` for recordings that lie outside its folder."""
+
+    def kept(ctx: click.Context, _: click.Parameter, folders: tuple[Path, ...]) -> None:
+        ctx.meta[_DATA] = folders
+
+    option = click.option(
+        "--data",
+        type=click.Path(exists=True, file_okay=False, path_type=Path),
+        multiple=True,
+        metavar="FOLDER",
+        expose_value=False,
+        callback=kept,
+        help="A folder beside CAMPAIGN whose files campaign.toml may name; may be repeated.",
+    )
+    return click.argument("campaign", type=click.Path(path_type=Path))(option(command))
+
+
+def loaded_campaign(campaign: Path) -> Campaign:
+    """CAMPAIGN, read and checked."""
+    from bayesimpact.data.read import load_campaign
+
+    return load_campaign(campaign, click.get_current_context().meta[_DATA])
 
 
 def out_option(required: bool) -> Callable[[Callable[..., None]], Callable[..., None]]:
@@ -106,10 +134,9 @@ def check(campaign: Path, out: Path | None, seed: int, quiet: bool) -> None:
     With --out the plot is saved as DIR/check.png. Nothing is drawn at random here: --seed is taken
     for the sake of scripts that pass it to every command.
     """
-    from bayesimpact.data.read import load_campaign
     from bayesimpact.report.check_text import campaign_text, campaign_warnings, measured_noise
 
-    loaded = load_campaign(campaign)
+    loaded = loaded_campaign(campaign)
     noise = measured_noise(loaded)
     if not quiet:
         click.echo(campaign_text(loaded, noise))
@@ -178,9 +205,7 @@ def unmade_words(names: Sequence[str]) -> str:
 @click.pass_context
 def fit(ctx: click.Context, campaign: Path, out: Path, seed: int, quiet: bool) -> None:
     """Find the mode: differential evolution with the Metropolis criterion, then a polish."""
-    from bayesimpact.data.read import load_campaign
-
-    loaded = load_campaign(campaign)
+    loaded = loaded_campaign(campaign)
     from bayesimpact.workflow import fit_campaign
 
     command = f"bayesimpact fit {campaign} --out {out} --seed {seed}"
@@ -199,9 +224,7 @@ def sample(
     ctx: click.Context, campaign: Path, out: Path, resume: bool, seed: int, quiet: bool
 ) -> None:
     """Sample the posterior by emcee; the backbone is the posterior-predictive check."""
-    from bayesimpact.data.read import load_campaign
-
-    loaded = load_campaign(campaign)
+    loaded = loaded_campaign(campaign)
     from bayesimpact.workflow import sample_campaign
 
     command = f"bayesimpact sample {campaign} --out {out} --seed {seed}"
@@ -229,9 +252,7 @@ def diagnose(
     ctx: click.Context, campaign: Path, out: Path, quick: bool, certify: int, seed: int, quiet: bool
 ) -> None:
     """Locate, name, model and show what the base model leaves out of CAMPAIGN."""
-    from bayesimpact.data.read import load_campaign
-
-    loaded = load_campaign(campaign)
+    loaded = loaded_campaign(campaign)
     from bayesimpact.workflow import diagnose_campaign
 
     command = f"bayesimpact diagnose {campaign} --out {out} --seed {seed}"

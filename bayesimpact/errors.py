@@ -2,6 +2,22 @@
 
 from __future__ import annotations
 
+# A message fills ten lines of a terminal at most: these are characters of its three parts.
+WHERE, FOUND, ACCEPTED = 240, 260, 280
+
+
+def seen(text: str, most: int) -> str:
+    """Text from a file as a terminal may show it: control characters escaped, the middle left out
+    where it is longer than `most` characters.
+    """
+    if len(text) > most:
+        half = (most - 5) // 2
+        text = f"{text[:half]} ... {text[-half:]}"
+    if text.isprintable():
+        return text
+    shown = (c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
+    return "".join(shown)
+
 
 class BayesimpactError(Exception):
     """Base of every error that the package raises on purpose."""
@@ -18,7 +34,8 @@ class InputError(BayesimpactError, ValueError):
     """
 
     def __init__(self, where: str, found: str, accepted: str) -> None:
-        super().__init__(f"{where}: found {found}; accepted: {accepted}")
+        parts = (seen(where, WHERE), seen(found, FOUND), seen(accepted, ACCEPTED))
+        super().__init__("{}: found {}; accepted: {}".format(*parts))
         self.where = where
         self.found = found
         self.accepted = accepted
