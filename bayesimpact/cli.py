@@ -5,6 +5,7 @@ Nothing heavy is imported before a command runs: every command imports what it n
 
 from __future__ import annotations
 
+import errno
 import sys
 import warnings
 from collections.abc import Callable, Sequence
@@ -13,7 +14,13 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
-from bayesimpact.errors import BayesimpactError, InputError
+from bayesimpact.data.lock import locked
+from bayesimpact.errors import (
+    BayesimpactError,
+    InputError,
+    system_words,
+    terminated_like_ctrl_c,
+)
 from bayesimpact.trial.command import trial
 
 if TYPE_CHECKING:
@@ -22,21 +29,41 @@ if TYPE_CHECKING:
 BAD_INPUT = 2
 NOT_CONVERGED = 3
 INTERRUPTED = 130
+FAILED_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+_GO_ON = "bayesimpact.go_on"  # in a context's meta: what to type after an interruption
 
 
 class Commands(click.Group):
     """A group that turns what goes wrong in any command into one message and its exit code."""
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command; `InputError` exits 2, other errors of the package 1, Ctrl-C 130."""
-        try:
-            return super().invoke(ctx)
-        except InputError as error:
-            _end(ctx, f"bayesimpact: {error}", BAD_INPUT)
-        except BayesimpactError as error:
-            _end(ctx, f"bayesimpact: {error}", 1)
-        except KeyboardInterrupt:
-            _end(ctx, "bayesimpact: interrupted", INTERRUPTED)
+        """Run the command; `InputError` exits 2, other errors of the package 1, Ctrl-C and SIGTERM
+        130; a place that cannot be written exits 2, a disk that is full or fails 1.
+        """
+        with terminated_like_ctrl_c():
+            try:
+                return super().invoke(ctx)
+            except InputError as error:
+                _end(ctx, f"bayesimpact: {error}", BAD_INPUT)
+            except BayesimpactError as error:
+                _end(ctx, f"bayesimpact: {error}", 1)
+            except KeyboardInterrupt:
+                _end(ctx, f"bayesimpact: interrupted{_how_to_go_on(ctx)}", INTERRUPTED)
+            except MemoryError:
+                words = "out of memory; shorter recordings, or fewer samples a second, need less"
+                _end(ctx, f"bayesimpact: {words}{_how_to_go_on(ctx)}", 1)
+            except BrokenPipeError:
+                raise
+            except OSError as error:
+                failed = error.errno in FAILED_DISK
+                again = _how_to_go_on(ctx) if failed else ""
+                code = 1 if failed else BAD_INPUT
+                _end(ctx, f"bayesimpact: {system_words(error)}{again}", code)
+
+
+def _how_to_go_on(ctx: click.Context) -> str:
+    words = ctx.meta.get(_GO_ON)
+    return f"; {words}" if words else ""
 
 
 def _end(ctx: click.Context, message: str, code: int) -> NoReturn:
@@ -99,13 +126,19 @@ def out_option(required: bool) -> Callable[[Callable[..., None]], Callable[..., 
     )
 
 
-def made_folder(out: Path) -> Path:
-    """Make the folder of `--out`; called once the input has proved good."""
+def made_folder(out: Path, go_on: str = "") -> Path:
+    """Make the folder of `--out` and hold it until the command ends; called once the input has
+    proved good. `go_on`: the command that goes on after an interruption.
+    """
+    ctx = click.get_current_context()
     try:
         out.mkdir(parents=True, exist_ok=True)
+        ctx.with_resource(locked(out))
     except OSError as error:
         reason = error.strerror or str(error)
         raise InputError(f"--out {out}", reason.lower(), "a folder that can be written") from None
+    if go_on:
+        ctx.meta[_GO_ON] = f"what was done is kept in {out}; to go on: {go_on}"
     return out
 
 
@@ -209,7 +242,8 @@ def fit(ctx: click.Context, campaign: Path, out: Path, seed: int, quiet: bool) -
     from bayesimpact.workflow import fit_campaign
 
     command = f"bayesimpact fit {campaign} --out {out} --seed {seed}"
-    outcome = fit_campaign(loaded, made_folder(out), seed=seed, command=command, say=telling(quiet))
+    folder = made_folder(out, command)
+    outcome = fit_campaign(loaded, folder, seed=seed, command=command, say=telling(quiet))
     announce(outcome, out, quiet)
     finish(ctx, outcome)
 
@@ -228,8 +262,9 @@ def sample(
     from bayesimpact.workflow import sample_campaign
 
     command = f"bayesimpact sample {campaign} --out {out} --seed {seed}"
+    folder = made_folder(out, f"{command} --resume")
     outcome = sample_campaign(
-        loaded, made_folder(out), seed=seed, resume=resume, command=command, say=telling(quiet)
+        loaded, folder, seed=seed, resume=resume, command=command, say=telling(quiet)
     )
     announce(outcome, out, quiet)
     finish(ctx, outcome)
@@ -246,22 +281,32 @@ def sample(
     metavar="N",
     help="Repeat the loop on N simulated controls, and on N campaigns with what was named.",
 )
+@click.option("--resume", is_flag=True, help="Go on with the chains that DIR holds.")
 @common
 @click.pass_context
 def diagnose(
-    ctx: click.Context, campaign: Path, out: Path, quick: bool, certify: int, seed: int, quiet: bool
+    ctx: click.Context,
+    campaign: Path,
+    out: Path,
+    quick: bool,
+    certify: int,
+    resume: bool,
+    seed: int,
+    quiet: bool,
 ) -> None:
     """Locate, name, model and show what the base model leaves out of CAMPAIGN."""
     loaded = loaded_campaign(campaign)
     from bayesimpact.workflow import diagnose_campaign
 
     command = f"bayesimpact diagnose {campaign} --out {out} --seed {seed}"
+    again = command + " --quick" * quick + f" --certify {certify}" * bool(certify)
     outcome = diagnose_campaign(
         loaded,
-        made_folder(out),
+        made_folder(out, again + " --resume" * (not quick)),
         seed=seed,
         quick=quick,
         certify=certify,
+        resume=resume,
         command=command,
         say=telling(quiet),
     )
@@ -277,6 +322,8 @@ def report(ctx: click.Context, folder: Path, seed: int, quiet: bool) -> None:
     """Write the report of whatever DIR holds, from its files alone."""
     from bayesimpact.report.write import rewrite_report
 
+    if folder.is_dir() and (folder / "results.nc").exists():
+        made_folder(folder, f"bayesimpact report {folder}")
     written = rewrite_report(folder)
     if not quiet:
         click.echo(f"report: {written.page}")
@@ -314,7 +361,7 @@ def demo(ctx: click.Context, out: Path, seed: int, quiet: bool) -> None:
     say = telling(quiet)
     told: dict[str, Any] = {"seed": seed, "command": "bayesimpact demo", "say": say}
     say("part 1: recordings that hide nothing")
-    first = sample_campaign(open_book, made_folder(out), **told)
+    first = sample_campaign(open_book, made_folder(out, "bayesimpact demo"), **told)
     announce(first, out, quiet)
     say("part 2: recordings that hide something")
     second = diagnose_campaign(concealed, made_folder(out / "concealed"), quick=True, **told)

@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
 # A message fills ten lines of a terminal at most: these are characters of its three parts.
 WHERE, FOUND, ACCEPTED = 240, 260, 280
 
@@ -43,3 +49,27 @@ class InputError(BayesimpactError, ValueError):
 
 class SimulationError(BayesimpactError, RuntimeError):
     """A simulation ended with a failure code (see `bayesimpact.model.simulate.CODES`)."""
+
+
+def system_words(error: OSError) -> str:
+    """What the operating system refused, and where, in one line."""
+    place = "" if error.filename is None else f"{seen(os.fsdecode(error.filename), 300)}: "
+    return f"{place}{(error.strerror or str(error)).lower()}"
+
+
+@contextmanager
+def terminated_like_ctrl_c() -> Iterator[None]:
+    """A polite request to end (SIGTERM, as a scheduler or a shutdown sends it) is as Ctrl-C."""
+
+    def interrupt(number: int, frame: Any) -> None:
+        raise KeyboardInterrupt
+
+    try:
+        before = signal.signal(signal.SIGTERM, interrupt)
+    except ValueError:  # not in the main thread: the caller has its own way
+        yield
+        return
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)

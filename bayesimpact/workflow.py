@@ -95,7 +95,7 @@ def sampled(
 ) -> Posterior:
     """Posterior around the mode of an identification, with progress in words."""
     say("sampling the posterior")
-    return sample(identification.fit, seed=seed, folder=folder, resume=resume)
+    return sample(identification.fit, seed=seed, folder=folder, resume=resume, tell=say)
 
 
 def diagnose_campaign(
@@ -105,22 +105,27 @@ def diagnose_campaign(
     seed: int = 0,
     quick: bool = False,
     certify: int = 0,
+    resume: bool = False,
     command: str = "",
     say: Say = silent,
 ) -> Outcome:
-    """The whole loop: diagnosis.json, posterior.nc, figures and report in `out`.
+    """The whole loop: diagnosis.json, posterior.nc, figures and report in `out`; the chains of both
+    models are kept in `out`/chain.
 
-    `certify`: how often the loop is repeated on simulated campaigns of this design.
+    `certify`: how often the loop is repeated on simulated campaigns of this design. `resume`: go on
+    with the chains that `out` holds; the search, which has no randomness of its own, is repeated.
     """
     began = time.perf_counter()
     diagnosis = diagnose(campaign, rng=np.random.default_rng(seed), search=not quick, progress=say)
     before = after = None
     if not quick:
         say("sampling both models")
-        before = after = sample(diagnosis.before, seed=seed)
+        chains = out / CHAIN_FOLDER
+        kept: dict[str, Any] = {"seed": seed, "resume": resume, "tell": say}
+        before = after = sample(diagnosis.before, folder=chains / "before", **kept)
         if diagnosis.after is not diagnosis.before:
             allowed = LEARNED_STEPS if diagnosis.verdict == "unknown" else MAX_STEPS
-            after = sample(diagnosis.after, seed=seed, max_steps=allowed)
+            after = sample(diagnosis.after, folder=chains / "after", max_steps=allowed, **kept)
     certified = None
     if certify:
         certified = certificate(

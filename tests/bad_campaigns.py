@@ -48,6 +48,7 @@ BEAM = "length_mm = 110\nwidth_mm = 20\nthickness_mm = 5\n"
 BAD_TOML = [
     _toml("deep lists", "0.503", "[" * 9000 + "]" * 9000, "nested without end"),
     _toml("deep keys", "mass_kg", "a" + ".a" * 9000 + " = 1\nmass_kg", "unknown key"),
+    _toml("a key without end", "mass_kg", "a" + ".a" * 60_000 + " = 1", "line 2", "in a line"),
     _toml("digits without end", "0.503", "9" * 5000, "a value that is none"),
     _toml("mass of a galaxy", "0.503", "1e200", "key mass_kg", "1e+200", "1e-15 to 1e+12"),
     _toml("mass of nothing", "0.503", "1e-300", "key mass_kg", "1e-300", "1e-15 to 1e+12"),

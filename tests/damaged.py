@@ -266,7 +266,7 @@ def outcome(folder: Path, case: Case) -> tuple[str, str]:
         fine = rows <= LINES and words.isprintable()
         return ("refused" if fine else "long message"), words
     except Hang:
-        return "hang", f"{time.process_time() - began:.1f} s"
+        return "hang", f"{time.process_time() - began:.1f} s\n{traceback.format_exc()}"
     except Exception:
         return "traceback", traceback.format_exc()
     shown = words.replace("\n", "").isprintable()

@@ -31,6 +31,7 @@ ORDER = 20  # of a Savitzky-Golay filter
 NAME_LENGTH = 200  # characters of a title, a case or a column
 FILE_LENGTH = 1000  # characters of a path; each folder and file 255 bytes, as file systems allow
 TOML_BYTES = 4 * 2**20
+TOML_LINE = 20_000  # characters: the time that a key of n dotted parts takes goes with n squared
 TABLE_BYTES = 2**30
 
 # Control characters, line and paragraph separators, and marks that turn the direction of writing:

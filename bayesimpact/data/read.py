@@ -98,6 +98,10 @@ def _bytes(path: Path, where: str, most: int) -> bytes:
 
 
 def _parse(file: Path, content: bytes) -> dict[str, Any]:
+    long = next((i for i, x in enumerate(content.splitlines(), 1) if len(x) > bounds.TOML_LINE), 0)
+    if long:
+        found = f"more than {bounds.TOML_LINE} characters in a line"
+        raise InputError(f"{file}, line {long}", found, "shorter lines")
     try:
         document = tomllib.loads(content.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
