@@ -161,7 +161,7 @@ def test_other_ends(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def fail(path: Path) -> None:
+    def fail(path: Path, folders: object) -> None:
         raise raised
 
     monkeypatch.setattr("bayesimpact.data.read.load_campaign", fail)

@@ -41,7 +41,9 @@ def gaussian_figures(results: Results) -> Mapping[str, Figure]:
 
 def _normal(mean: Array, covariance: Array) -> Array:
     """Draws (S, d), the same in every run."""
-    values, vectors = np.linalg.eigh(covariance / np.outer(*[np.sqrt(np.diag(covariance))] * 2))
+    sd = np.sqrt(np.diag(covariance))
+    unit = np.where(sd > 0, sd, 1.0)  # a parameter held at its bound does not vary
+    values, vectors = np.linalg.eigh(covariance / np.outer(unit, unit))
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     standard = np.random.default_rng(0).standard_normal((_DRAWS, mean.size))
-    return np.asarray(mean + (standard @ root.T) * np.sqrt(np.diag(covariance)))
+    return np.asarray(mean + (standard @ root.T) * sd)

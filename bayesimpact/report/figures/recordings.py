@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 
+from bayesimpact.data.period import rough_period
 from bayesimpact.report.figures.style import (
     GREY,
     MODEL,
@@ -110,8 +111,25 @@ def _legend(figure: Figure, motion: Axes, residual: Axes) -> None:
 
 
 def _period(results: Results) -> float:
-    """Period of free motion, s."""
-    return float(2 * np.pi * np.sqrt(results.mass / results.row("k1").median))
+    """Period of free motion, s; of the recordings where the fit has no stiffness."""
+    k1 = results.row("k1").median
+    if k1 > 0 and np.isfinite(k1):
+        return float(2 * np.pi * np.sqrt(results.mass / k1))
+    found = [rough_period(r.samples, r.interval) for r in results.recordings]
+    known = [period for period in found if period is not None]
+    longest = max(float(r.times[-1]) for r in results.recordings)
+    return float(np.median(known)) if known else longest / CLOSE_UP_CYCLES
+
+
+def _gap(results: Results, recording: RecordingResult) -> float:
+    """From true rest to the stop, m: the recording's own gap where an effect gives it one; NaN
+    where there is none.
+    """
+    own = f".g[{recording.name}]"
+    for row in results.rows:
+        if row.name == "g" or row.name.endswith(own):
+            return row.median
+    return float("nan")
 
 
 def _release(recording: RecordingResult) -> float:
@@ -128,20 +146,24 @@ def _motion(axis: Axes, results: Results, recording: RecordingResult, *, dots: b
     else:
         axis.plot(*polyline(t, y), ".", color=RECORDED, ms=2.0, mew=0, rasterized=True)
     axis.plot(*polyline(t, fit), color=MODEL, lw=0.8, label="model at the mode")
-    if results.stop and np.isfinite(results.row("g").median):
-        level = results.row("g").median + results.row(f"offset[{recording.name}]").median
+    gap = _gap(results, recording)
+    if results.stop and np.isfinite(gap):
+        level = gap + results.row(f"offset[{recording.name}]").median
         axis.axhline(level * shown.scale, color=GREY, lw=0.8, ls=(0, (4, 3)), label="stop")
     axis.set_ylabel(label(response_word(results), shown.unit))
     axis.grid(axis="y")
 
 
 def _residual(axis: Axes, results: Results, recording: RecordingResult) -> None:
-    shown = display(results.unit, max(recording.rms, recording.noise_rms))
+    sizes = [x for x in (recording.rms, recording.noise_rms) if np.isfinite(x)]
+    shown = display(results.unit, max(sizes, default=0.0))
     r = recording.residual * shown.scale
     axis.plot(*polyline(recording.times, r), color="#555555", lw=0.45, rasterized=True)
     band = 2 * recording.noise_rms * shown.scale
     for level in (-band, band):
         axis.axhline(level, color=ORANGE, lw=0.9, label="± 2 standard deviations of the noise")
-    limit = 1.08 * max(float(np.max(np.abs(r))), 1.1 * band)
-    axis.set_ylim(-limit, limit)
+    largest = float(np.max(np.abs(r[np.isfinite(r)]), initial=0.0))
+    limit = 1.08 * max(largest, 1.1 * band)
+    if 0 < limit < np.inf:
+        axis.set_ylim(-limit, limit)
     axis.set_ylabel(label("residual", shown.unit))
