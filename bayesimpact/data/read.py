@@ -6,6 +6,8 @@ import hashlib
 import math
 import re
 import tomllib
+from collections.abc import Callable
+from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 from types import MappingProxyType
@@ -23,7 +25,7 @@ from bayesimpact.data.schema import (
     UniformTable,
     parse_campaign,
 )
-from bayesimpact.data.table import read_table
+from bayesimpact.data.table import Table, read_table
 from bayesimpact.errors import InputError
 
 CAMPAIGN_FILE = "campaign.toml"
@@ -47,25 +49,49 @@ def load_campaign(path: Path | str) -> Campaign:
     content = _bytes(file, str(file))
     table = parse_campaign(_parse(file, content), str(file))
     digest = hashlib.sha256(content)
+
+    def read(entry: RecordingTable, where: str) -> tuple[str, Table]:
+        source = file.parent / entry.file
+        data = _bytes(source, f"{where}, key file")
+        digest.update(data)
+        return str(source), _table(source, entry, data)
+
+    campaign = build_campaign(str(file), table, read)
+    return replace(campaign, sha256=digest.hexdigest(), folder=file.parent)
+
+
+def build_campaign(
+    file: str, table: CampaignTable, read: Callable[[RecordingTable, str], tuple[str, Table]]
+) -> Campaign:
+    """Check what campaign.toml says together with the samples, wherever they come from.
+
+    Parameters
+    ----------
+    file : for messages
+    table : the content of campaign.toml
+    read : gives the samples of an entry, and what messages call their source; its second argument
+        names the entry in messages
+
+    Raises
+    ------
+    InputError
+        as `load_campaign`.
+    """
     recordings: list[Recording] = []
     for number, entry in enumerate(table.recording, 1):
         where = f"{file}, recording {number} ({entry.file})"
         _check_entry(where, entry, table.stop, recordings)
-        source = file.parent / entry.file
-        data = _bytes(source, f"{where}, key file")
-        digest.update(data)
-        recordings.append(_recording(source, where, entry, table.stop, data))
-    _check_together(str(file), table, recordings)
+        source, samples = read(entry, where)
+        recordings.append(_recording(source, where, entry, table.stop, samples))
+    _check_together(file, table, recordings)
     return Campaign(
         name=table.name,
         mass=table.mass_kg,
         recordings=tuple(recordings),
         stop=table.stop,
-        measurement=_measurement(str(file), table, recordings),
-        priors=MappingProxyType(_priors(str(file), table, recordings)),
-        beams=MappingProxyType(_beams(str(file), table)),
-        sha256=digest.hexdigest(),
-        folder=file.parent,
+        measurement=_measurement(file, table, recordings),
+        priors=MappingProxyType(_priors(file, table, recordings)),
+        beams=MappingProxyType(_beams(file, table)),
     )
 
 
@@ -128,7 +154,7 @@ def _check_entry(where: str, entry: RecordingTable, stop: bool, earlier: list[Re
     if stop and entry.case is None:
         accepted = 'the obstacle\'s name, as case = "1"; or stop = false for a rig without obstacle'
         raise InputError(f"{where}, key case", "nothing", accepted)
-    name = Path(entry.file).stem
+    name = entry.name or Path(entry.file).stem
     if name in (recording.name for recording in earlier):
         found = f'a second recording called "{name}"'
         accepted = "file names that differ without their endings, for they name the parameters"
@@ -138,12 +164,15 @@ def _check_entry(where: str, entry: RecordingTable, stop: bool, earlier: list[Re
         raise InputError(f"{where}, key end_s", f"{end:g} s", f"a time after start_s = {start:g} s")
 
 
-def _recording(
-    source: Path, where: str, entry: RecordingTable, stop: bool, data: bytes
-) -> Recording:
-    table = read_table(
+def _table(source: Path, entry: RecordingTable, data: bytes) -> Table:
+    return read_table(
         source, data, column=entry.column, unit=entry.unit, sample_rate=entry.sample_rate_hz
     )
+
+
+def _recording(
+    source: str, where: str, entry: RecordingTable, stop: bool, table: Table
+) -> Recording:
     # A sample at the very start or end counts in, however its time was rounded.
     margin = 1e-6
     size, interval = table.samples.size, table.interval
@@ -160,14 +189,14 @@ def _recording(
             f"{where}, key {key}", f"no samples left ({asked})", f"times within the file's {span}"
         )
     recording = Recording(
-        name=Path(entry.file).stem,
+        name=entry.name or Path(entry.file).stem,
         case=entry.case if stop and entry.case is not None else "",
         samples=table.samples[first:stop_at],
         interval=interval,
         start=table.start + first * interval,
         quantity=table.quantity,
     )
-    _check_motion(str(source), recording)
+    _check_motion(source, recording)
     return recording
 
 

@@ -17,6 +17,10 @@ Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 POSITIVE = "a number above 0"
 NUMBER = "a number"
+Name = Annotated[
+    str, Field(pattern=r"^[^\[\]/\\\s\x00-\x1f]([^\[\]/\\\x00-\x1f]*[^\[\]/\\\s\x00-\x1f])?$")
+]
+NAME_RULE = "a name for the parameters, in quotes, without brackets, slashes and blanks at its ends"
 
 
 class _Table(BaseModel):
@@ -28,6 +32,7 @@ class RecordingTable(_Table):
 
     file: Text = Field(description="a file name relative to campaign.toml, in quotes")
     case: Text | None = Field(None, description='the obstacle\'s name in quotes, as case = "1"')
+    name: Name | None = Field(None, description=NAME_RULE)
     sample_rate_hz: Positive | None = Field(None, description=f"{POSITIVE}, Hz")
     column: Text | None = Field(None, description="the name of a column, in quotes")
     unit: Literal["m", "mm", "um", "rad", "deg"] | None = Field(

@@ -1,0 +1,20 @@
+"""Read-only mappings to and from plain ones: pickle knows only the latter."""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+from typing import Any
+
+
+def thawed(value: Any) -> Any:
+    """The same with every read-only mapping, however deep, as a `dict`."""
+    if isinstance(value, MappingProxyType):
+        return {key: thawed(item) for key, item in value.items()}
+    return value
+
+
+def frozen(value: Any) -> Any:
+    """The same with every `dict`, however deep, as a read-only mapping."""
+    if isinstance(value, dict):
+        return MappingProxyType({key: frozen(item) for key, item in value.items()})
+    return value
