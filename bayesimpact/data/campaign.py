@@ -9,7 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
 
-from bayesimpact.data.frozen import frozen, thawed
+from bayesimpact.data.frozen import Picklable
 from bayesimpact.data.recording import Recording
 
 
@@ -67,7 +67,7 @@ class Beam:
 
 
 @dataclass(frozen=True, eq=False)
-class Campaign:
+class Campaign(Picklable):
     """Recordings of one oscillator, with one or more obstacles.
 
     Attributes
@@ -182,12 +182,6 @@ class Campaign:
             self, Path(folder), overwrite=overwrite
         )
         return file
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {key: thawed(value) for key, value in self.__dict__.items()}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update({key: frozen(value) for key, value in state.items()})
 
     def truncated(self, duration: float) -> Campaign:
         """The same campaign with only the first `duration` seconds of every recording."""

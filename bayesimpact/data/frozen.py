@@ -18,3 +18,13 @@ def frozen(value: Any) -> Any:
     if isinstance(value, dict):
         return MappingProxyType({key: frozen(item) for key, item in value.items()})
     return value
+
+
+class Picklable:
+    """Pickles a record whose attributes hold read-only mappings."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {key: thawed(value) for key, value in self.__dict__.items()}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update({key: frozen(value) for key, value in state.items()})

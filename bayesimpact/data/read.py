@@ -14,6 +14,8 @@ from types import MappingProxyType
 from typing import Any
 
 from bayesimpact.data.campaign import Beam, Campaign, Measurement, Smoothing
+from bayesimpact.data.entries import filled_in
+from bayesimpact.data.foreign import file_bytes, is_foreign, read_foreign
 from bayesimpact.data.period import rough_period
 from bayesimpact.data.recording import Quantity, Recording
 from bayesimpact.data.schema import (
@@ -47,12 +49,12 @@ def load_campaign(path: Path | str) -> Campaign:
     """
     file = _campaign_file(Path(path))
     content = _bytes(file, str(file))
-    table = parse_campaign(_parse(file, content), str(file))
+    table = filled_in(parse_campaign(_parse(file, content), str(file)), file.parent, str(file))
     digest = hashlib.sha256(content)
 
     def read(entry: RecordingTable, where: str) -> tuple[str, Table]:
         source = file.parent / entry.file
-        data = _bytes(source, f"{where}, key file")
+        data = file_bytes(source, f"{where}, key file") or _bytes(source, f"{where}, key file")
         digest.update(data)
         return str(source), _table(source, entry, data)
 
@@ -165,8 +167,11 @@ def _check_entry(where: str, entry: RecordingTable, stop: bool, earlier: list[Re
 
 
 def _table(source: Path, entry: RecordingTable, data: bytes) -> Table:
+    if is_foreign(source, entry, data):
+        return read_foreign(source, entry, data)
+    column = None if entry.column is None else str(entry.column)
     return read_table(
-        source, data, column=entry.column, unit=entry.unit, sample_rate=entry.sample_rate_hz
+        source, data, column=column, unit=entry.unit, sample_rate=entry.sample_rate_hz
     )
 
 

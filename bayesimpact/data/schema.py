@@ -15,7 +15,9 @@ from bayesimpact.errors import InputError
 Text = Annotated[str, Field(pattern=r"\S")]
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
+Number = Annotated[int, Field(ge=1)]
 POSITIVE = "a number above 0"
+COLUMN = "the name of a column in quotes, or its number counted from 1"
 NUMBER = "a number"
 Name = Annotated[
     str, Field(pattern=r"^[^\[\]/\\\s\x00-\x1f]([^\[\]/\\\x00-\x1f]*[^\[\]/\\\s\x00-\x1f])?$")
@@ -34,7 +36,14 @@ class RecordingTable(_Table):
     case: Text | None = Field(None, description='the obstacle\'s name in quotes, as case = "1"')
     name: Name | None = Field(None, description=NAME_RULE)
     sample_rate_hz: Positive | None = Field(None, description=f"{POSITIVE}, Hz")
-    column: Text | None = Field(None, description="the name of a column, in quotes")
+    column: Text | Number | None = Field(None, description=COLUMN)
+    channel: Text | Number | None = Field(None, description=COLUMN)
+    time_column: Text | Number | None = Field(None, description=COLUMN)
+    block: Text | Number | None = Field(
+        None, description="the name of a group, sheet or data set in quotes, or its number"
+    )
+    skip_rows: int | None = Field(None, ge=0, description="a whole number of lines, 0 or more")
+    encoding: Text | None = Field(None, description='in quotes, as "latin-1", "utf-16"')
     unit: Literal["m", "mm", "um", "rad", "deg"] | None = Field(
         None, description="m, mm, um, rad or deg, in quotes"
     )

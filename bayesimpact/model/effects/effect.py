@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.data.frozen import frozen, thawed
+from bayesimpact.data.frozen import Picklable
 
 Scope = Literal["campaign", "case", "recording"]
 Where = Literal["everywhere", "contact"]
@@ -176,7 +176,7 @@ Observe = Callable[
 
 
 @dataclass(frozen=True)
-class Effect:
+class Effect(Picklable):
     """One physical effect that the base model leaves out.
 
     It acts in one or more of four ways: `law` adds a force; `binds` feeds its parameters into slots
@@ -220,12 +220,6 @@ class Effect:
         if _catalogued(self.id) is self:
             return _catalogued, (self.id,)
         return super().__reduce_ex__(protocol)
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {key: thawed(value) for key, value in self.__dict__.items()}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update({key: frozen(value) for key, value in state.items()})
 
     def admissible(self, scales: Scales) -> bool:
         """True when a campaign of these scales could show the effect at all."""
