@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
@@ -107,3 +108,21 @@ def test_lvm_leaves_nothing_behind(tmp_path: Path) -> None:
     made.lvm(tmp_path / "a.lvm")
     load_campaign(_folder(tmp_path, "a.lvm"))
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.lvm", "campaign.toml"]
+
+
+def _real_recordings() -> Path:
+    beside = Path(__file__).resolve().parents[2].parent / "shared" / "recordings"
+    return Path(os.environ.get("BAYESIMPACT_RECORDINGS", beside))
+
+
+@pytest.mark.skipif(not _real_recordings().is_dir(), reason="the real recordings are not here")
+def test_real_instrument_files(tmp_path: Path) -> None:
+    board = _real_recordings() / "pcb_ringdown" / "board_4_3_impact_05.lvm"
+    time, first, second, _ = read_channels(board, board.read_bytes())
+    assert np.median(np.diff(time.samples)) == pytest.approx(5e-6, rel=1e-6)
+    assert (first.samples[0], second.samples[0]) == (146.646210, 86.173867)
+    box = _real_recordings() / "silverbox" / "SNLS80mV.csv"
+    keys = 'column = "V2"\nunit = "m"\nsample_rate_hz = 610.3515625\n'
+    (recording,) = load_campaign(_folder(tmp_path, box.as_posix(), keys)).recordings
+    assert recording.samples.size == 131_072
+    assert recording.samples[1] == 0.012971

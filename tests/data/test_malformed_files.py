@@ -132,6 +132,7 @@ BAD: dict[str, tuple[str, Change, str, tuple[str, ...]]] = {
     "UFF text": ("a.uff", _bytes(b"    -1\n    58\nnothing\n"), "", ("a UFF file",)),
     "UFF cut": ("a.uff", _cut("UFF58", 0.3), "", ("a UFF file",)),
     "TDMS cut": ("a.tdms", _cut("TDMS", 0.02), "", ("a TDMS file",)),
+    "TDMS without its end": ("a.tdms", _cut("TDMS", 0.9), "", (UNREADABLE, "less data", "a TDMS")),
     "TDMS text": ("a.tdms", _bytes(b"TDSmnothing"), "", ("a TDMS file",)),
     "LVM cut": ("a.lvm", _cut("LVM", 0.005), "", ("an LVM file",)),
     "LVM no numbers": ("a.lvm", _bytes(b"a\tb\nc\td\n"), "", ("no columns of numbers",)),
@@ -223,14 +224,16 @@ BAD: dict[str, tuple[str, Change, str, tuple[str, ...]]] = {
 
 
 @pytest.mark.parametrize("kind", BAD)
-def test_refused_with_one_message(tmp_path: Path, kind: str) -> None:
+def test_refused_with_one_message(
+    tmp_path: Path, kind: str, capfd: pytest.CaptureFixture[str]
+) -> None:
     name, change, keys, words = BAD[kind]
     change(tmp_path / name)
     write(tmp_path, ONE.format(name) + keys, a=None, b=None)
     before = sorted(tmp_path.rglob("*"))
     result = CliRunner().invoke(main, ["check", str(tmp_path)])
     assert result.exit_code == 2, result.output
-    message = result.stderr.strip()
+    message = (result.stderr + capfd.readouterr().err).strip()
     assert len(message.splitlines()) == 1 and message.startswith("bayesimpact: ")
     assert [word for word in (name, "found", "accepted", *words) if word not in message] == []
     assert sorted(tmp_path.rglob("*")) == before

@@ -126,7 +126,7 @@ def _response(path: Path, channels: Sequence[Channel], wanted: Wanted) -> Channe
     if wanted.column is not None:
         return _named(path, channels, "column", wanted.column)
     fitting = guessed_response(channels)
-    if not fitting and wanted.unit is not None:
+    if not fitting:
         times = (
             ()
             if wanted.time_column is None

@@ -27,6 +27,9 @@ def read(path: Path, content: bytes) -> list[Channel]:
     """Variables of a NetCDF file, classic (by SciPy) or version 4 (by h5netcdf)."""
     xarray = library("xarray", "xarray", path)
     engine = "scipy" if content[:3] == b"CDF" else "h5netcdf"
+    if engine == "h5netcdf":
+        # h5netcdf prints a traceback of its own for what is no HDF5 file
+        library("h5py", "h5py", path).File(BytesIO(content), "r").close()
     with xarray.open_dataset(BytesIO(content), engine=engine, **_HOW) as data:
         return _channels(path, data)
 
