@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from bayesimpact.inference.posterior import sample as sample
     from bayesimpact.model.effects import EFFECTS as EFFECTS
     from bayesimpact.model.effects import Effect as Effect
-    from bayesimpact.model.simulate import simulate as simulate
+    from bayesimpact.model.experiment import simulate as simulate
+    from bayesimpact.report.check_figure import plot as plot
     from bayesimpact.report.notebook import corner as corner
     from bayesimpact.response.backbone import backbone as backbone
 
@@ -31,10 +32,11 @@ _NAMES = {
     "Campaign": ("bayesimpact.data.campaign", "Campaign"),
     "Recording": ("bayesimpact.data.recording", "Recording"),
     "load": ("bayesimpact.data.read", "load_campaign"),
-    "simulate": ("bayesimpact.model.simulate", "simulate"),
+    "simulate": ("bayesimpact.model.experiment", "simulate"),
     "backbone": ("bayesimpact.response.backbone", "backbone"),
     "fit": ("bayesimpact.inference.identify", "identify"),
     "sample": ("bayesimpact.inference.posterior", "sample"),
+    "plot": ("bayesimpact.report.check_figure", "plot"),
     "corner": ("bayesimpact.report.notebook", "corner"),
     "diagnose": ("bayesimpact.diagnosis.loop", "diagnose"),
     "EFFECTS": ("bayesimpact.model.effects", "EFFECTS"),
@@ -51,6 +53,7 @@ __all__ = [
     "diagnose",
     "fit",
     "load",
+    "plot",
     "sample",
     "simulate",
 ]

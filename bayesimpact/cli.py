@@ -184,6 +184,55 @@ def check(campaign: Path, out: Path | None, seed: int, quiet: bool) -> None:
             click.echo(f"plot: {file}")
 
 
+@main.command()
+@click.argument("folder", metavar="FOLDER", type=click.Path(file_okay=False, path_type=Path))
+@click.argument(
+    "files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path)
+)
+@click.option("--mass", type=click.FloatRange(min=0, min_open=True), help="Moving mass, kg.")
+@click.option("--stop/--no-stop", default=None, help="Is there an obstacle?")
+@click.option("--case", metavar="NAME", help="The obstacle's name.")
+@click.option("--plot", is_flag=True, help="Draw all channels into FOLDER/channels.png.")
+@common
+def new(
+    folder: Path, files: tuple[Path, ...], mass: float | None, stop: bool | None, case: str | None,
+    plot: bool, seed: int, quiet: bool,
+) -> None:  # fmt: skip
+    """Look at instrument files FILE... and write FOLDER/campaign.toml with comments.
+
+    Says which channels the files hold and what it assumed. A campaign.toml that is there already
+    is never replaced. Nothing is drawn at random: --seed is taken for the sake of scripts.
+    """
+    from bayesimpact.data import draft
+    from bayesimpact.data.read import load_campaign
+
+    if (folder / "campaign.toml").exists():
+        accepted = "a folder without one; it is never replaced"
+        raise InputError(str(folder / "campaign.toml"), "a campaign already", accepted)
+    looks = [draft.look(folder, file) for file in files]
+    title = folder.resolve().name or "campaign"
+    made = draft.draft(title, looks, draft.Rig(mass, stop, case))
+    file = draft.write(folder, made)
+    if plot:
+        from bayesimpact.report.channel_figure import channel_figure
+
+        channel_figure([(one.file, one.channels) for one in looks]).savefig(folder / "channels.png")
+    if quiet:
+        return
+    for one in looks:
+        click.echo(f"{one.file}:")
+        for channel in one.channels:
+            click.echo(f"  {draft.listing(channel)}")
+    click.echo(f"written: {file}" + (f", {folder / 'channels.png'}" if plot else ""))
+    for line in (*made.assumed, *made.needed):
+        click.echo(f"  {line}")
+    try:
+        load_campaign(folder)
+        click.echo(f"ready for: bayesimpact check {folder}")
+    except InputError as error:
+        click.echo(f"not yet complete: {error}")
+
+
 def telling(quiet: bool) -> Callable[[str], None]:
     """Progress in words on stderr, with the seconds since the start; nothing when quiet.
 

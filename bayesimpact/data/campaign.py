@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
 
+from bayesimpact.data.frozen import Picklable
 from bayesimpact.data.recording import Recording
 
 
@@ -65,7 +67,7 @@ class Beam:
 
 
 @dataclass(frozen=True, eq=False)
-class Campaign:
+class Campaign(Picklable):
     """Recordings of one oscillator, with one or more obstacles.
 
     Attributes
@@ -95,6 +97,92 @@ class Campaign:
         """Obstacles in order of first appearance; () without a stop."""
         return tuple(dict.fromkeys(r.case for r in self.recordings)) if self.stop else ()
 
+    @classmethod
+    def from_arrays(
+        cls,
+        recordings: Iterable[Recording | Mapping[str, Any]],
+        *,
+        name: str,
+        mass_kg: float,
+        **tables: Any,
+    ) -> Campaign:
+        """A campaign from samples in memory, checked as a campaign.toml and its files are.
+
+        Parameters
+        ----------
+        recordings : one or more, each a `Recording` (SI units) or a mapping with the keys of a
+            [[recording]]: `name`, `case`, `samples` (n,) and their `unit` (m, mm, um, rad, deg),
+            and either `times_s` (n,), evenly spaced, or `sample_rate_hz`; `start_s`, `end_s`
+        name, mass_kg, tables : any other key of campaign.toml, as there: `stop = False`,
+            `measurement = {"noise_um": 5.0}`, `priors = {"k1": {...}}`, `beam`, ...
+
+        Raises
+        ------
+        InputError
+            for whatever cannot be used: the message names the recording and key, what was found
+            and what is accepted.
+        """
+        campaign: Campaign = _memory().campaign_from_arrays(recordings, name, mass_kg, tables)
+        return campaign
+
+    @classmethod
+    def from_dataframe(
+        cls,
+        frame: Any,
+        *,
+        name: str,
+        mass_kg: float,
+        recordings: Iterable[Mapping[str, Any]] = (),
+        **tables: Any,
+    ) -> Campaign:
+        """A campaign from a pandas DataFrame; checks and `tables` as in `from_arrays`.
+
+        Parameters
+        ----------
+        frame : a column `time_s` or `time_ms` (or the index, by one of these names). Without
+            `recordings`: one response column, named as in a file (`displacement_mm`, ...), and
+            where there are several recordings, a column `recording` with their names and a column
+            `case`
+        recordings : for a frame with a column per recording: mappings with `column` and `unit`,
+            and the other keys of `from_arrays`
+        """
+        campaign: Campaign = _memory().campaign_from_dataframe(
+            frame, name, mass_kg, tuple(recordings), tables
+        )
+        return campaign
+
+    @classmethod
+    def from_xarray(cls, data: Any, *, name: str, mass_kg: float, **tables: Any) -> Campaign:
+        """A campaign from an xarray Dataset or DataArray; checks and `tables` as in `from_arrays`.
+
+        Parameters
+        ----------
+        data : a Dataset with one variable per recording, or a DataArray whose coordinate
+            `recording` names them. Each has a coordinate `time` (s, or what its attribute `units`
+            says, or datetimes), an attribute `units` and an attribute or coordinate `case`. NaN at
+            the end of a row of a DataArray is filling and left out
+        """
+        campaign: Campaign = _memory().campaign_from_xarray(data, name, mass_kg, tables)
+        return campaign
+
+    def save(self, folder: Path | str, *, overwrite: bool = False) -> Path:
+        """Write campaign.toml and a CSV file per recording, every digit; returns campaign.toml.
+
+        Parameters
+        ----------
+        folder : made when missing
+        overwrite : replace a campaign that is there already
+
+        Raises
+        ------
+        InputError
+            when `folder` holds a campaign.toml already, or cannot be written.
+        """
+        file: Path = import_module("bayesimpact.data.write").save_campaign(
+            self, Path(folder), overwrite=overwrite
+        )
+        return file
+
     def truncated(self, duration: float) -> Campaign:
         """The same campaign with only the first `duration` seconds of every recording."""
         kept = tuple(
@@ -110,3 +198,8 @@ class Campaign:
             step = max(1, int(interval / r.interval))
             kept.append(replace(r, samples=r.samples[::step], interval=r.interval * step))
         return replace(self, recordings=tuple(kept))
+
+
+def _memory() -> Any:
+    """The doors for samples in memory. By name: they build on this record, not it on them."""
+    return import_module("bayesimpact.data.memory")

@@ -37,6 +37,10 @@ class Recording:
         samples.setflags(write=False)
         object.__setattr__(self, "samples", samples)
 
+    def __setstate__(self, state: dict[str, object]) -> None:
+        self.__dict__.update(state)
+        self.__post_init__()  # unpickled arrays can be written
+
     @property
     def times(self) -> NDArray[np.float64]:
         """Time since the first sample, (n,), s."""

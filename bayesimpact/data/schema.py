@@ -23,8 +23,14 @@ Time = Annotated[float, Field(ge=-bounds.TIME, le=bounds.TIME)]
 Mass = Annotated[float, Field(gt=0, ge=bounds.MASS[0], le=bounds.MASS[1])]
 Rate = Annotated[float, Field(gt=0, ge=bounds.RATE[0], le=bounds.RATE[1])]
 Length = Annotated[float, Field(gt=0, ge=1e-9, le=1e12)]  # in the key's unit; noise and beams
+Count = Annotated[int, Field(ge=1, le=1_000_000)]
 POSITIVE = "a number above 0"
+COLUMN = "the name of a column in quotes, or its number counted from 1"
 NUMBER = "a number"
+Name = Annotated[
+    str, Field(pattern=r"^[^\[\]/\\\s\x00-\x1f]([^\[\]/\\\x00-\x1f]*[^\[\]/\\\s\x00-\x1f])?$")
+]
+NAME_RULE = "a name for the parameters, in quotes, without brackets, slashes and blanks at its ends"
 
 
 def _from(ends: tuple[float, float]) -> str:
@@ -40,8 +46,18 @@ class RecordingTable(_Table):
 
     file: FileName = Field(description="a file name relative to campaign.toml, in quotes")
     case: Text | None = Field(None, description='the obstacle\'s name in quotes, as case = "1"')
+    name: Name | None = Field(None, description=NAME_RULE)
     sample_rate_hz: Rate | None = Field(None, description=f"{POSITIVE}, Hz {_from(bounds.RATE)}")
-    column: Text | None = Field(None, description="the name of a column, in quotes")
+    column: Text | Count | None = Field(None, description=COLUMN)
+    channel: Text | Count | None = Field(None, description=COLUMN)
+    time_column: Text | Count | None = Field(None, description=COLUMN)
+    block: Text | Count | None = Field(
+        None, description="the name of a group, sheet or data set in quotes, or its number"
+    )
+    skip_rows: int | None = Field(
+        None, ge=0, le=1_000_000, description="a whole number of lines, 0 to a million"
+    )
+    encoding: Text | None = Field(None, description='in quotes, as "latin-1", "utf-16"')
     unit: Literal["m", "mm", "um", "rad", "deg"] | None = Field(
         None, description="m, mm, um, rad or deg, in quotes"
     )

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from matplotlib.figure import Figure
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.recording import Recording
+from bayesimpact.errors import InputError
 from bayesimpact.report.figures.save import escaped
 from bayesimpact.report.figures.style import styled
 
@@ -37,3 +41,21 @@ def campaign_figure(campaign: Campaign) -> Figure:
     rest = len(campaign.recordings) - len(shown)
     figure.suptitle(escaped(campaign.name) + (f" (and {rest} more recordings)" if rest else ""))
     return figure
+
+
+def plot(what: Campaign | Recording | Iterable[Recording]) -> Figure:
+    """`campaign_figure` of a campaign, or of one or more recordings.
+
+    Raises
+    ------
+    InputError
+        when there is nothing to plot.
+    """
+    if isinstance(what, Campaign):
+        return campaign_figure(what)
+    recordings = (what,) if isinstance(what, Recording) else tuple(what)
+    if not recordings or not all(isinstance(r, Recording) for r in recordings):
+        found = ", ".join(type(r).__name__ for r in recordings) or "nothing"
+        raise InputError("plot", found, "a Campaign, a Recording, or several of them")
+    title = recordings[0].name if len(recordings) == 1 else f"{len(recordings)} recordings"
+    return campaign_figure(Campaign(title, 1.0, recordings, stop=False))

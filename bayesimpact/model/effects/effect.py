@@ -6,11 +6,15 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
+from importlib import import_module
+from importlib.util import find_spec
 from types import MappingProxyType
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from bayesimpact.data.frozen import Picklable
 
 Scope = Literal["campaign", "case", "recording"]
 Where = Literal["everywhere", "contact"]
@@ -180,7 +184,7 @@ Observe = Callable[
 
 
 @dataclass(frozen=True)
-class Effect:
+class Effect(Picklable):
     """One physical effect that the base model leaves out.
 
     It acts in one or more of four ways: `law` adds a force; `binds` feeds its parameters into slots
@@ -219,6 +223,12 @@ class Effect:
     condition: Callable[[Scales], bool] | None = None
     size: Callable[[Numbers, Scales], Size] | None = None
 
+    def __reduce_ex__(self, protocol: Any) -> Any:
+        """Pickle an effect of the catalogue by its id: its functions cannot be pickled."""
+        if _catalogued(self.id) is self:
+            return _catalogued, (self.id,)
+        return super().__reduce_ex__(protocol)
+
     def admissible(self, scales: Scales) -> bool:
         """True when a campaign of these scales could show the effect at all."""
         if self.needs_stop and scales.impacts == 0:
@@ -231,6 +241,15 @@ class Effect:
             if parameter.name == name:
                 return parameter
         raise KeyError(f"{self.id} has no parameter {name!r}")
+
+
+def _catalogued(id: str) -> Effect | None:
+    """The catalogue's effect of that id; None when there is none."""
+    name = f"{__package__}.{id}"
+    if not id.isidentifier() or find_spec(name) is None:
+        return None
+    effect: Effect | None = getattr(import_module(name), "EFFECT", None)
+    return effect
 
 
 def law_row(law: Law, first: int) -> list[int]:
