@@ -49,7 +49,7 @@ def even_interval(path: Path, times: NDArray[np.float64], rows: NDArray[np.int64
         raise InputError(
             f"{path}, line {rows[i + 1]}",
             found,
-            f"evenly spaced samples, here {typical:.6g} s apart",
+            f"evenly spaced samples, here {typical:.6g} s apart, or resample = true",
         )
     count = np.arange(times.size)
     interval = float(times[-1] - times[0]) / (times.size - 1)
@@ -63,6 +63,9 @@ def even_interval(path: Path, times: NDArray[np.float64], rows: NDArray[np.int64
         found = (
             f"a sample at {times[worst]:.9g} s, {late[worst] / interval:+.1%} of an interval off"
         )
-        accepted = f"evenly spaced samples: every time within {JITTER:.0%} of an interval"
+        accepted = (
+            f"evenly spaced samples: every time within {JITTER:.0%} of an interval, "
+            "or resample = true"
+        )
         raise InputError(f"{path}, line {rows[worst]}", found, accepted)
     return interval

@@ -35,6 +35,16 @@ class RecordingTable(_Table):
     )
     start_s: float | None = Field(None, description=f"{NUMBER}, s on the file's own clock")
     end_s: float | None = Field(None, description=f"{NUMBER}, s on the file's own clock")
+    exclude_s: list[Annotated[list[float], Field(min_length=2, max_length=2)]] | None = Field(
+        None, description="pairs of times, s on the file's own clock, as [[115.55, 115.60]]"
+    )
+    invert: bool = Field(False, description="true or false, without quotes")
+    scale: float | None = Field(None, description="a number other than 0, times the readings")
+    clock_ratio: Positive | None = Field(
+        None, description=f"{POSITIVE}, true time over the file's time"
+    )
+    resample: bool = Field(False, description="true or false, without quotes")
+    skip: Text | None = Field(None, description="the reason to leave it out, in quotes")
 
 
 class SavgolTable(_Table):
@@ -52,16 +62,24 @@ class LagTable(_Table):
     time_constant_s: Positive = Field(description=f"{POSITIVE}, s")
 
 
+class UnfilteredTable(_Table):
+    """No filter, and none may be supposed; written `smoothing = "none"`."""
+
+    kind: Literal["none"]
+
+
 class MeasurementTable(_Table):
     """[measurement]."""
 
     noise_um: Positive | None = Field(None, description=f"{POSITIVE}, um")
     noise_mrad: Positive | None = Field(None, description=f"{POSITIVE}, mrad")
     noise_deg: Positive | None = Field(None, description=f"{POSITIVE}, degrees")
-    smoothing: Annotated[SavgolTable | LagTable, Field(discriminator="kind")] | None = Field(
+    smoothing: (
+        Annotated[SavgolTable | LagTable | UnfilteredTable, Field(discriminator="kind")] | None
+    ) = Field(
         None,
         description='{ kind = "savgol", window = 21, polyorder = 2 }'
-        ' or { kind = "lag", time_constant_s = 0.001 }',
+        ' or { kind = "lag", time_constant_s = 0.001 }, or "none" for no filter at all',
     )
     clock_uncertainty_ppm: NotNegative = Field(0.0, description="a number, 0 or more, ppm")
     gain_uncertainty_percent: NotNegative = Field(0.0, description="a number, 0 or more, %")
@@ -141,10 +159,13 @@ class CampaignTable(_Table):
         default_factory=dict, description="a table [priors] of distributions"
     )
     beam: dict[str, BeamTable] = Field(default_factory=dict, description="tables [beam.<case>]")
+    faults: Literal["set aside", "keep"] = Field(
+        "set aside", description='"set aside" or "keep": what becomes of faults of a recording'
+    )
 
 
 _TAGGED: dict[str, dict[str, type[_Table]]] = {
-    "smoothing": {"savgol": SavgolTable, "lag": LagTable},
+    "smoothing": {"savgol": SavgolTable, "lag": LagTable, "none": UnfilteredTable},
     "distribution": {
         "uniform": UniformTable,
         "normal": NormalTable,
@@ -157,6 +178,9 @@ _TAGGED: dict[str, dict[str, type[_Table]]] = {
 
 def parse_campaign(document: dict[str, Any], where: str) -> CampaignTable:
     """Check a parsed campaign.toml; `where` names the file in the `InputError` that refuses it."""
+    chain = document.get("measurement")
+    if isinstance(chain, dict) and chain.get("smoothing") == "none":
+        document = document | {"measurement": chain | {"smoothing": {"kind": "none"}}}
     try:
         return CampaignTable.model_validate(document)
     except ValidationError as error:

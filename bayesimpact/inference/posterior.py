@@ -128,5 +128,10 @@ def _fingerprint(fit: Fit) -> str:
         repr(target.priors.parameters),
         repr(target.likelihood.noise),
         repr(target.oscillator.smoothing),
+        *(
+            r.used.tobytes().hex()
+            for r in target.oscillator.campaign.recordings
+            if r.used is not None
+        ),
     )
     return hashlib.sha256("|".join(parts).encode()).hexdigest()
