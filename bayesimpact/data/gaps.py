@@ -20,7 +20,8 @@ from bayesimpact.errors import InputError
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-SHORT = 0.125  # of a period: up to here a cubic bridges a gap
+SHORT = 0.3  # of a period: up to here a cubic bridges a gap
+NEAR = 6  # samples on either side that tell its ends
 LEAST = 0.2  # of a recording's samples that have to be left
 GAP = 2.5  # typical intervals between two stamps: more is a gap
 
@@ -84,7 +85,7 @@ def excluded_spans(where: str, recording: Recording, spans: Sequence[Sequence[fl
 def bridged(samples: Array, used: Mask) -> Array:
     """Samples (n,) with a smooth stand-in where they are set aside.
 
-    Up to an eighth of a period, a cubic through the neighbours; beyond, what the signal did whole
+    Up to 0.3 of a period, a cubic from the neighbours; beyond, what the signal did whole
     periods before and after, the nearer the more; at the ends, the value of the neighbour.
     """
     good = np.flatnonzero(used)
@@ -103,13 +104,20 @@ def bridged(samples: Array, used: Mask) -> Array:
 
 
 def _cubic(samples: Array, good: NDArray[np.int64], first: int, end: int) -> Array:
-    from scipy.interpolate import CubicSpline
-
+    """The cubic that leaves and meets the parabolas through six neighbours on either side."""
     at = int(np.searchsorted(good, first))
-    around = good[max(at - 4, 0) : at + 4]
-    if around.size < 4:
-        return np.asarray(np.interp(np.arange(first, end), around, samples[around]))
-    return np.asarray(CubicSpline(around, samples[around])(np.arange(first, end)))
+    left, right = good[max(at - NEAR, 0) : at], good[at : at + NEAR]
+    if min(left.size, right.size) < 3:
+        return np.asarray(np.interp(np.arange(first, end), good, samples[good]))
+    ends = []
+    for places, origin in ((left, first - 1), (right, end)):
+        fit = np.polynomial.Polynomial.fit(places - origin, samples[places], 2).convert().coef
+        ends.append(np.append(fit, np.zeros(3))[:2])
+    (y0, v0), (y1, v1) = ends
+    span = end - first + 1
+    t = np.arange(1, span) / span
+    h = [2 * t**3 - 3 * t**2 + 1, t**3 - 2 * t**2 + t, -2 * t**3 + 3 * t**2, t**3 - t**2]
+    return np.asarray(h[0] * y0 + h[1] * span * v0 + h[2] * y1 + h[3] * span * v1)
 
 
 def _repeated(samples: Array, first: int, end: int, period: float) -> Array:

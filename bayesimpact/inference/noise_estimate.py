@@ -10,7 +10,7 @@ kinks that no polynomial follows. Windows that something else disturbs stand out
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from scipy.linalg import null_space, toeplitz
 from scipy.optimize import minimize_scalar
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.faults.flat import reading_step
 from bayesimpact.data.gaps import runs
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
@@ -80,7 +81,19 @@ def raw_noise(recordings: Sequence[Recording]) -> Noise:
     if chosen is None:
         total = sum(r.samples.size for r in recordings)
         raise InputError("noise estimate", f"{total} samples in all", f"at least {5 * SMALLEST}")
-    return chosen
+    return _with_step(chosen, recordings)
+
+
+def _with_step(noise: Noise, recordings: Sequence[Recording]) -> Noise:
+    """No less than a twelfth of the squared step that readings come in (Sheppard 1898).
+
+    Where a step is coarser than the noise, slow motion stays on one reading for whole windows, and
+    their remainders hide it.
+    """
+    floor = float(np.sqrt(np.mean([reading_step(r.samples) ** 2 for r in recordings]) / 12))
+    if noise.level >= floor:
+        return noise
+    return replace(noise, level=floor, source="the step of the readings")
 
 
 def _rises(before: Noise, after: Noise) -> bool:

@@ -30,8 +30,8 @@ def test_excluded_samples_are_marked_and_bridged(tmp_path: Path) -> None:
     assert recording.used is not None
     assert np.flatnonzero(~recording.used).tolist() == [100, 101, 102, 103, 250]
     assert recording.count == recording.samples.size - 5
-    # a cubic over four samples of a cosine with 78 per period: f'''' h^4 / 24 at most
-    np.testing.assert_allclose(recording.samples, decay(), atol=1e-6)
+    # a cubic from parabolas, 78 samples per period: the stand-in is no evidence, only near
+    np.testing.assert_allclose(recording.samples, decay(), atol=1e-5)
     with pytest.raises(ValueError, match="read-only"):
         recording.used[0] = False
 
