@@ -81,7 +81,8 @@ class Campaign:
     beams : case -> geometry of its obstacle, where given
     sha256 : of campaign.toml and every recording's file; "" for a campaign built in memory
     keep_faults : campaign.toml says that faults found in the recordings stay in (`faults = "keep"`)
-    skipped : recording -> why campaign.toml leaves it out
+    skipped : recording -> why it is left out
+    notes : what was set aside in the recordings and why, in words, for reports
     """
 
     name: str
@@ -95,6 +96,7 @@ class Campaign:
     folder: Path | None = None
     keep_faults: bool = False
     skipped: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    notes: tuple[str, ...] = ()
 
     @property
     def cases(self) -> tuple[str, ...]:

@@ -77,6 +77,7 @@ def load_campaign(path: Path | str) -> Campaign:
         folder=file.parent,
         keep_faults=table.faults == "keep",
         skipped=MappingProxyType(skipped),
+        notes=tuple(f"{name} is skipped ({reason})" for name, reason in skipped.items()),
     )
 
 

@@ -11,6 +11,7 @@ from click.testing import CliRunner
 from bayesimpact.cli import main
 from bayesimpact.data.faults.find import find_faults, set_aside
 from bayesimpact.data.read import load_campaign
+from bayesimpact.report.archive import load_results
 
 HEAD = 'name = "rig"\nmass_kg = 0.5\nstop = false\n'
 ENTRY = '[[recording]]\nfile = "a.csv"\n'
@@ -62,3 +63,15 @@ def test_keeping_is_said(tmp_path: Path) -> None:
     told = CliRunner().invoke(main, ["check", str(campaign)])
     assert 'kept in: campaign.toml says faults = "keep"' in told.stdout
     assert "exclude_s = " not in told.stdout
+
+
+def test_a_fit_sets_faults_aside_and_its_report_says_so(tmp_path: Path) -> None:
+    campaign = folder(tmp_path)
+    told = CliRunner().invoke(main, ["fit", str(campaign), "--out", str(tmp_path / "fit")])
+    assert told.exit_code == 0, told.output
+    page = (tmp_path / "fit" / "report.html").read_text()
+    assert "Set aside: a, " in page and "Shaded samples are set aside" in page
+    results = load_results(tmp_path / "fit")
+    assert results.recordings[0].count == results.recordings[0].samples.size - 32
+    assert 0.9 < results.reduced_chi2 < 1.1
+    assert results.rms < 5.5e-6

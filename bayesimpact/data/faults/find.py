@@ -91,7 +91,8 @@ def set_aside(campaign: Campaign) -> tuple[Campaign, tuple[Fault, ...]]:
     """The campaign without the faults found in its recordings, and the faults.
 
     With `faults = "keep"` in campaign.toml the campaign stays as it is; faults are told all the
-    same. A campaign without faults is returned as it is.
+    same. A campaign without faults is returned as it is. What was done stands in `Campaign.notes`,
+    which reports print.
     """
     faults = find_faults(campaign)
     if campaign.keep_faults or not any(f.action != "notice" for f in faults):
@@ -101,8 +102,13 @@ def set_aside(campaign: Campaign) -> tuple[Campaign, tuple[Fault, ...]]:
         own = [f for f in faults if f.recording == recording.name]
         if not any(f.action == "skip" for f in own):
             kept.append(applied(recording, own)[0])
-    skipped = {f.recording: f.statement for f in faults if f.action == "skip"}
-    return (
-        replace(campaign, recordings=tuple(kept), skipped={**campaign.skipped, **skipped}),
-        faults,
+    hard = [f for f in faults if f.action != "notice"]
+    skipped = {f.recording: f.statement for f in hard if f.action == "skip"}
+    notes = tuple(f"{f.recording}, {f.statement}" for f in hard)
+    cleaned = replace(
+        campaign,
+        recordings=tuple(kept),
+        skipped={**campaign.skipped, **skipped},
+        notes=(*campaign.notes, *notes),
     )
+    return cleaned, faults

@@ -40,7 +40,7 @@ def find_noise(recording: Recording) -> list[Fault]:
     least = gaussian_threshold(count)
     ratio = sixth / usual
     strong = (ratio > FACTOR) & ((ratio - 1.0) / sd > least)
-    strong &= np.abs(fourth / other / ratio - 1.0) < SAME
+    strong &= np.abs(fourth / other - ratio) < SAME * ratio
     if not strong.any() or strong.sum() > count // 2:
         return []
     spans = tuple(parts[k] for k in np.flatnonzero(strong))
