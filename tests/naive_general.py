@@ -65,6 +65,14 @@ class Naive:
         w = 2 * np.pi * p("harmonic_forcing", "frequency")
         phase = p("harmonic_forcing", "phase")
         force -= p("harmonic_forcing", "amplitude") * np.sin(w * t + phase)
+        K = p("pendulum_with_spring", "stiffness") + self.k1 * ("pendulum_sine" in self.effects)
+        force += K * (np.sin(y) - y) + p("spring_quintic", "stiffness") * y**5
+        force += (
+            p("power_damping", "coefficient")
+            * abs(v) ** p("power_damping", "exponent")
+            * (np.sign(v))
+        )
+        force += p("structural_damping", "loss") * self.k1 * abs(y) * self.slide
         if y < -p("opposite_stop", "gap", np.inf):
             force += p("opposite_stop", "stiffness") * (y + p("opposite_stop", "gap"))
         return force
@@ -100,6 +108,7 @@ class Naive:
         for effect, name, scale in (
             ("opposite_stop", "gap", -1.0),
             ("contact_second_stage", "depth", 1.0),
+            ("structural_damping", "", -1.0),
         ):
             if effect in self.effects:
                 base = 0.0 if scale < 0 else self.gap

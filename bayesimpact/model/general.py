@@ -29,6 +29,7 @@ from bayesimpact.model.added.situation import (
     begin,
     heading,
     resolve,
+    set_directions,
     settle,
 )
 from bayesimpact.model.added.step import push, step
@@ -96,6 +97,7 @@ def cruise(y: Any, v: Any, n0: Any, j: Any, stride: Any, end: Any, flow: Any, w:
 @inner()
 def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
     """Motion to the next event, or to where its flow is renewed: (y, v, t, next sample)."""
+    set_directions(y, v, t, w)
     flow, longest = flow_from(y, v, t, w)
     start, event = t, typed(NONE)
     ramp = first_step(y, v, t, longest, flow, w)
@@ -106,7 +108,7 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
     end = min(w.n, j + max(1, int(min(RENEWED * longest / w.interval, 1.0 * w.n))))
     while j < end:
         aligned, expected = t == (j - 1) * w.interval, False
-        if aligned and stride > 0 and ramp >= longest and not flow.rough:
+        if aligned and stride > 0 and ramp >= longest and not (flow.rough or flow.rough_turn):
             y, v, n0, j, expected, y1, v1, n1 = cruise(y, v, n0, j, stride, end, flow, w)
             t = (j - 1) * w.interval
             if j == end:

@@ -14,9 +14,9 @@ import numpy as np
 
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.force import missing_drift, missing_force
-from bayesimpact.diagnosis.naming import ALPHA
 from bayesimpact.diagnosis.scan import scan
 from bayesimpact.diagnosis.smoothing import proved_smoothing
+from bayesimpact.diagnosis.thresholds import ALPHA
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.trial.draw import draw

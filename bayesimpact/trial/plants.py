@@ -50,6 +50,7 @@ class Plant:
     obstacles, recordings : how many it needs at least
     slot : effects with the same slot exclude each other
     by_noise : its trace in the noise shows it, however small its response
+    angle : it means something for angles only
     """
 
     regimes: tuple[str, ...]
@@ -58,10 +59,15 @@ class Plant:
     recordings: int = 1
     slot: str = ""
     by_noise: bool = False
+    angle: bool = False
 
-    def fits(self, cases: int, recordings: int) -> bool:
-        """Whether a campaign with so many obstacles and recordings can show it."""
-        return cases >= self.obstacles and recordings >= self.recordings
+    def fits(self, cases: int, recordings: int, angle: bool = False) -> bool:
+        """Whether a campaign with so many obstacles and recordings can show it.
+
+        `angle` says that the recordings are of an angle.
+        """
+        enough = cases >= self.obstacles and recordings >= self.recordings
+        return enough and (angle or not self.angle)
 
 
 def _sign(rng: Rng) -> float:
@@ -148,6 +154,17 @@ def _opposite_stop(design: Design, rng: Rng) -> Form:
     return Form(lambda size: {"stiffness": size, "gap": gap}, 1e-4 * k1, largest=5 * k1)
 
 
+def _power_damping(design: Design, rng: Rng) -> Form:
+    """An exponent that none of the simpler laws has."""
+    exponent = float(
+        rng.choice([rng.uniform(0.3, 0.7), rng.uniform(1.4, 1.65), rng.uniform(2.5, 4)])
+    )
+    unit = design.rig.c1 * design.speed / design.speed**exponent
+    return Form(
+        lambda size: {"coefficient": size, "exponent": exponent}, 1e-3 * unit, largest=10 * unit
+    )
+
+
 def _hum(design: Design, rng: Rng) -> Form:
     below = [f for f in (50.0, 60.0, 100.0, 150.0) if f < 0.4 * design.rate]
     frequency = float(rng.choice(below or [0.2 * design.rate])) * (1 + 1e-3 * rng.standard_normal())
@@ -212,6 +229,13 @@ CATALOGUE_PLANTS: Mapping[str, Plant] = {
         ("measurement",), _one("gain", lambda d: 0.3 / d.amplitude**2, signed=True)
     ),
     "sensor_hum": Plant(("measurement",), _hum),
+    "pendulum_sine": Plant(("free",), lambda d, r: Form(lambda s: {}, 0.0), angle=True),
+    "pendulum_with_spring": Plant(("free",), _one("stiffness", lambda d: d.rig.k1), angle=True),
+    "spring_quintic": Plant(
+        ("free",), _one("stiffness", lambda d: 0.3 * d.rig.k1 / d.amplitude**4, signed=True)
+    ),
+    "power_damping": Plant(("free",), _power_damping),
+    "structural_damping": Plant(("free",), _one("loss", lambda d: 0.1), obstacles=1),
     "smoothing": Plant(("measurement",), _smoothing, slot="smoothing", by_noise=True),
 }
 """Every effect of the catalogue that may be planted, by its id."""

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from typing import Any
 
@@ -153,7 +153,8 @@ class _Run:
             return 1 if v > 0 else -1
         if self.slip:
             return self.slip
-        forces = balance(self.site, self.parts, self._piece_going(-self.last_sign))
+        at_rest = replace(self._piece_going(-self.last_sign), sign=0)
+        forces = balance(self.site, self.parts, at_rest)
         force = forces.drive(self.t, self.state[0], 0.0, self.state)
         if abs(force) <= forces.level:
             return 0

@@ -41,6 +41,9 @@ def contact_forces(e, rig, k2, d, v, s):
         total += s["maxwell"]
     if "contact_preload" in e:
         total += e["contact_preload"]["force"]
+    if "contact_bump" in e:
+        p = e["contact_bump"]
+        total += p["force"] * exp(-(((d - p["depth"]) / p["width"]) ** 2))
     return total
 
 
@@ -52,6 +55,8 @@ def free_forces(e, rig, t, y, v, s):
         total += e["spring_quadratic"]["stiffness"] * y**2
     if "spring_cubic" in e:
         total += e["spring_cubic"]["stiffness"] * y**3
+    if "pendulum_sine" in e:
+        total += e["pendulum_sine"]["stiffness"] * (sin(y) - y)
     if "stiffness_drift" in e:
         total += rig.k1 * e["stiffness_drift"]["rate"] * t * y
     if "harmonic_forcing" in e:
@@ -60,6 +65,17 @@ def free_forces(e, rig, t, y, v, s):
     if "opposite_stop" in e:
         p = e["opposite_stop"]
         total += p["stiffness"] * min(y + p["gap"], 0.0)
+    if "pendulum_sine" in e:
+        total += rig.k1 * (sin(y) - y)
+    if "pendulum_with_spring" in e:
+        total += e["pendulum_with_spring"]["stiffness"] * (sin(y) - y)
+    if "spring_quintic" in e:
+        total += e["spring_quintic"]["stiffness"] * y**5
+    if "power_damping" in e:
+        p = e["power_damping"]
+        total += p["coefficient"] * abs(v) ** p["exponent"] * sign(v)
+    if "structural_damping" in e:
+        total += e["structural_damping"]["loss"] * rig.k1 * abs(y) * s["going"]
     if "detent" in e:
         p = e["detent"]
         x = y - p["place"]
@@ -117,7 +133,11 @@ class NaiveRig:
 
     def named(self, state):
         """Own states, and where the step began: it decides what is switched on."""
-        return {**dict(zip(self.names, state[2:], strict=True)), "from": self.state[0]}
+        return {
+            **dict(zip(self.names, state[2:], strict=True)),
+            "from": self.state[0],
+            "going": sign(self.state[1]),
+        }
 
     def sums(self, t, state):
         """(all forces but dry friction, obstacle's force on the mass without inertia)."""
@@ -165,6 +185,8 @@ class NaiveRig:
         """Everything that switches a force on or off."""
         y, v = state[:2]
         out = [y >= self.gap, v > 0]
+        if "structural_damping" in self.e:
+            out.append(y > 0)
         for effect, key, place in KINKS:
             if effect in self.e:
                 gap = self.gap if key == "depth" else 0.0

@@ -33,6 +33,10 @@ STRONG = {
     "stiffness_drift": {"rate": 0.1},
     "harmonic_forcing": {"amplitude": 0.3, "frequency": 9.0, "phase": {"r": 0.7}},
     "opposite_stop": {"stiffness": 1500.0, "gap": 3e-3},
+    "pendulum_with_spring": {"stiffness": 3e6},
+    "spring_quintic": {"stiffness": 5e10},
+    "power_damping": {"coefficient": 0.5, "exponent": 1.5},
+    "structural_damping": {"loss": 0.05},
     "detent": {"stiffness": 400.0, "place": -1e-3, "width": 1e-3},
     "hysteresis": {"stiffness": 150.0, "width": 1e-3},
     "friction_pad": {"force": 0.3, "extra": 0.2, "speed": 0.05, "low": -2e-3, "high": 0.5e-3},
@@ -46,11 +50,12 @@ STRONG = {
 }
 SENSOR = ("sensor_drift", "sensor_quadratic", "sensor_cubic", "sensor_hum")
 CHAIN = ("smoothing", "noise_correlated")
+SINE = "pendulum_sine"  # nothing at these amplitudes, and pendulum_with_spring with K = k1
 RELEASE = Release("r", "1", -6e-3, 0.01)
 
 
 def test_every_effect_is_in_the_lists_of_these_tests():
-    assert set(STRONG) == (set(CATALOGUE) | set(OUTSIDE)) - set(SENSOR) - set(CHAIN)
+    assert set(STRONG) == (set(CATALOGUE) | set(OUTSIDE)) - set(SENSOR) - set(CHAIN) - {SINE}
 
 
 def against_naive(effects, release, *, duration, step, tolerance):
@@ -63,7 +68,7 @@ def against_naive(effects, release, *, duration, step, tolerance):
 @pytest.mark.parametrize("effect", STRONG)
 def test_equation_against_the_naive_twin(effect):
     # the naive twin loses its order at the root of d^n
-    tolerance = 5e-10 if effect == "contact_power_law" else 1e-11
+    tolerance = 5e-10 if effect in ("contact_power_law", "power_damping") else 1e-11
     effects = {effect: STRONG[effect]}
     run = against_naive(effects, RELEASE, duration=0.35, step=1e-4, tolerance=tolerance)
     base = motion(PAPER_RIG, RELEASE, rate=1e4, duration=0.35)
@@ -117,6 +122,10 @@ NULL = {
     "stiffness_drift": {"rate": 0.0},
     "harmonic_forcing": {"amplitude": 0.0, "frequency": 9.0, "phase": {"r": 0.7}},
     "opposite_stop": {"stiffness": 0.0, "gap": 3e-3},
+    "pendulum_with_spring": {"stiffness": 0.0},
+    "spring_quintic": {"stiffness": 0.0},
+    "power_damping": {"coefficient": 0.0, "exponent": 0.5},
+    "structural_damping": {"loss": 0.0},
 }
 
 
@@ -125,6 +134,18 @@ def test_null_value_is_the_base_oscillator(effect):
     base = motion(PAPER_RIG, RELEASE, rate=1000, duration=1)
     run = motion(PAPER_RIG, RELEASE, {effect: NULL[effect]}, rate=1000, duration=1)
     assert np.abs(run.displacement - base.displacement).max() < 1e-12
+
+
+def test_a_plain_pendulum_is_one_whose_weight_is_all_of_k1():
+    rig, release = Rig(mass=0.1, c1=0.01, k1=1.0), Release("r", "", 1.5)
+    spring = {"pendulum_with_spring": {"stiffness": 1.0}}
+    one = motion(rig, release, {SINE: {}}, rate=50, duration=9)
+    assert np.array_equal(
+        one.displacement, motion(rig, release, spring, rate=50, duration=9).displacement
+    )
+    assert (
+        np.abs(one.displacement - motion(rig, release, rate=50, duration=9).displacement).max() > 1
+    )
 
 
 def test_massless_obstacle_is_one_that_cannot_pull():
@@ -138,6 +159,7 @@ POTENTIALS = {
     "spring_quadratic": lambda y: 1e4 * y**3 / 3,
     "spring_cubic": lambda y: 3e6 * y**4 / 4,
     "opposite_stop": lambda y: 750 * np.minimum(y + 3e-3, 0) ** 2,
+    "spring_quintic": lambda y: 5e10 * y**6 / 6,
     "detent": lambda y: -200e-6 * np.exp(-(((y + 1e-3) / 1e-3) ** 2)),
 }
 
@@ -178,6 +200,8 @@ def test_conservative_effects_keep_the_energy(effect):
         "obstacle_mass",
         "coulomb_friction",
         "quadratic_drag",
+        "power_damping",
+        "structural_damping",
         "friction_pad",
         "damping_bump",
         "eddy_brake",

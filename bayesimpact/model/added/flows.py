@@ -16,6 +16,7 @@ from bayesimpact.model.added.world import (
     CONTACT_ONLY,
     FORCE,
     FRICTION,
+    JUMP_AT_TURN,
     K1,
     K2,
     KINK_AT_TURN,
@@ -31,6 +32,7 @@ from bayesimpact.model.added.world import (
     PLACED,
     POLYNOMIAL,
     ROUGH_AT_TOUCH,
+    ROUGH_AT_TURN,
     V0,
     WORK_COLUMNS,
     Y0,
@@ -54,6 +56,9 @@ RAMP = 0.3  # first step of a contact over the time constant of a law's state
 # where a force is not smooth at the touch: shortest step over the longest; then, for times in units
 # of the longest step, step over the 3/4th power of the time since the touch, or to the release
 FIRST, SINCE, UNTIL = 1.0 / 80.0, 0.46, 0.27
+# the same where it is not smooth at a turning point: there the step is a share of the time itself
+FIRST_AT_TURN, SINCE_TURN, UNTIL_TURN = 1e-4, 0.5, 0.3
+ENDS_ON_TURNS = KINK_AT_TURN | ROUGH_AT_TURN | JUMP_AT_TURN
 # a force without features admits longer steps the weaker it is: share of the linear force at which
 # they are the usual ones, and by how much they are shortened and lengthened at most
 SLIGHT, LEAST_GAIN, MOST_GAIN = 0.07, 0.4, 3.2
@@ -67,13 +72,16 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
     q, s, laws = w.q, w.s, w.laws
     touching = s[MODE] == TOUCHING
     count, memory, turns, rough, tame, placed = 0, False, q[FRICTION] > 0.0, False, True, True
+    rough_turn = False
     for law in range(w.size):
         flags = laws[LAW_COLUMNS * law + LAW_FLAGS]
         if touching or flags & CONTACT_ONLY == 0:
             memory = memory or laws[LAW_COLUMNS * law + LAW_RATE] != 0
             w.acting[count] = law
             count += 1
-            turns = turns or flags & KINK_AT_TURN != 0 or laws[LAW_COLUMNS * law + LAW_SURFACE] != 0
+            bounded = laws[LAW_COLUMNS * law + LAW_SURFACE] != 0
+            turns = turns or flags & ENDS_ON_TURNS != 0 or bounded
+            rough_turn = rough_turn or flags & ROUGH_AT_TURN != 0
             rough = rough or (touching and flags & ROUGH_AT_TOUCH != 0)
             tame = tame and flags & POLYNOMIAL != 0
             placed = placed and flags & PLACED != 0
@@ -107,6 +115,7 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
     flow = Flow(
         1.0 / mass, b, K, (force - level) / stiffness, slope, level, s[GAP],
         1.0 if touching else 0.0, count, memory, plain, placed, forced, turns, rough,
+        rough_turn,
     )  # fmt: skip
     if tame and not plain:
         longest *= gain(y, v, t, pace, longest, flow, w)
@@ -256,6 +265,12 @@ def next_step(y: Any, v: Any, t: Any, j: Any, aligned: Any, longest: Any, flow: 
             root = np.sqrt(abs(away) / longest)
             share = (SINCE if away >= 0.0 else UNTIL) * (LONGER if flow.placed else 1.0)
             longest *= min(1.0, max(FIRST, share * root * np.sqrt(root)))
+        return max(longest, least), False
+    if flow.rough_turn:
+        pull = 2.0 * flow.b * v + flow.K * (y - flow.rest)
+        if pull != 0.0:  # v / pull is the time since the turning point, or minus that to the next
+            share = -SINCE_TURN if v * pull < 0.0 else UNTIL_TURN
+            longest *= min(1.0, max(FIRST_AT_TURN, share * v / (pull * longest)))
         return max(longest, least), False
     longest = max(longest, least)
     stride = stride_of(longest, w)

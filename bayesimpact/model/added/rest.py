@@ -8,8 +8,8 @@ import numpy as np
 
 from bayesimpact.model.added.flows import flow_from
 from bayesimpact.model.added.memory import keep_memory, relax_one
-from bayesimpact.model.added.situation import SLIDING, static_force
-from bayesimpact.model.added.world import AHEAD, FORCE, FRICTION
+from bayesimpact.model.added.situation import SLIDING, holding_force, static_force
+from bayesimpact.model.added.world import AHEAD, FORCE
 from bayesimpact.model.compiled import inner
 
 
@@ -21,17 +21,18 @@ def hold(y: Any, t: Any, j: Any, w: Any) -> Any:
             w.out[i] = y
         return t, w.n
     flow, longest = flow_from(y, 0.0, t, w)
+    most = holding_force(y, t, w)
     while j < w.n:
         h = j * w.interval - t
         cuts = max(int(np.ceil(h / longest)), 1)
         h /= cuts
         force = pull_at(y, t, h, flow, w)
-        if abs(force) > w.q[FRICTION]:
+        if abs(force) > most:
             low, high = 0.0, h
             for _ in range(60):
                 middle = 0.5 * (low + high)
                 force = pull_at(y, t, middle, flow, w)
-                if abs(force) > w.q[FRICTION]:
+                if abs(force) > most:
                     high = middle
                 else:
                     low = middle

@@ -13,12 +13,14 @@ from typing import Any
 import numpy as np
 
 from bayesimpact.model.added.world import (
+    AHEAD,
     C1,
     C2,
     CONTACT_MASS,
     CONTACT_ONLY,
     FRICTION,
     GAP_STEP,
+    JUMP_AT_TURN,
     K1,
     K2,
     LAW_COLUMNS,
@@ -27,6 +29,7 @@ from bayesimpact.model.added.world import (
     LAW_SURFACE,
     NO_TENSION,
     NOW,
+    STAGE,
     V0,
     WORK_COLUMNS,
     Y0,
@@ -147,10 +150,43 @@ def static_force(y: Any, t: Any, column: Any, w: Any) -> Any:
 
 
 @inner()
+def point_laws(direction: Any, w: Any) -> Any:
+    """Tell the laws whose force jumps at a turning point which way the motion goes."""
+    for law in range(w.size):
+        if w.laws[LAW_COLUMNS * law + LAW_FLAGS] & JUMP_AT_TURN != 0:
+            at = WORK_COLUMNS * law
+            w.work[at + NOW] = w.work[at + STAGE] = w.work[at + AHEAD] = direction
+
+
+@inner()
+def set_directions(y: Any, v: Any, t: Any, w: Any) -> Any:
+    """The same for the motion that begins here; from rest, where everything else pulls."""
+    direction = np.sign(v)
+    if v == 0.0:
+        point_laws(0.0, w)
+        direction = w.s[SLIDING] if w.q[FRICTION] > 0.0 else np.sign(static_force(y, t, NOW, w))
+    point_laws(direction, w)
+
+
+@inner()
+def holding_force(y: Any, t: Any, w: Any) -> Any:
+    """Force up to which the mass is held at rest, N: dry friction, and laws that jump there."""
+    if w.q[FRICTION] == 0.0:
+        return 0.0
+    point_laws(0.0, w)
+    free = static_force(y, t, NOW, w)
+    point_laws(1.0, w)
+    jump = abs(free - static_force(y, t, NOW, w))
+    point_laws(0.0, w)
+    return w.q[FRICTION] + jump
+
+
+@inner()
 def set_sliding(y: Any, t: Any, w: Any) -> Any:
     """Direction of sliding from a standstill: 0 where dry friction holds the mass."""
+    most = holding_force(y, t, w)
     force = static_force(y, t, NOW, w)
-    w.s[SLIDING] = np.sign(force) if abs(force) > w.q[FRICTION] else 0.0
+    w.s[SLIDING] = np.sign(force) if abs(force) > most else 0.0
 
 
 @inner()

@@ -16,6 +16,7 @@ FRICTION, CONTACT_MASS, NO_TENSION, GAP_STEP = range(11, 15)
 LAW_FORCE, LAW_RATE, LAW_SURFACE, LAW_FLAGS = range(4)
 LAW_FIRST, LAW_PACE, LAW_GRAIN, LAW_COLUMNS = range(4, 8)
 CONTACT_ONLY, KINK_AT_TURN, ROUGH_AT_TOUCH, POLYNOMIAL, PLACED = 1, 2, 4, 8, 16
+ROUGH_AT_TURN, JUMP_AT_TURN = 32, 64
 # columns of the work array, one row per law: the law's state at the start of a step, at a stage and
 # at the end; the kicks of six stages; exp(-lambda h / 4), lambda, alpha, x_u, x_v
 NOW, STAGE, AHEAD, KICK = 0, 1, 2, 3
@@ -58,6 +59,7 @@ class Flow(NamedTuple):
     forced: Any  # True when the slots' harmonic force acts
     turns: Any  # True when a force has a kink or jump at v = 0
     rough: Any  # True when a force is not smooth at the touch
+    rough_turn: Any  # True when a force is not smooth where the motion turns
 
 
 @inner(forceinline=True)

@@ -15,6 +15,9 @@ from bayesimpact.model.effects import (
     harmonic_forcing,
     obstacle_mass,
     opposite_stop,
+    pendulum_sine,
+    pendulum_with_spring,
+    power_damping,
     quadratic_drag,
     sensor_cubic,
     sensor_drift,
@@ -23,7 +26,9 @@ from bayesimpact.model.effects import (
     smoothing,
     spring_cubic,
     spring_quadratic,
+    spring_quintic,
     stiffness_drift,
+    structural_damping,
 )
 from bayesimpact.model.effects.effect import Effect, EffectParameter, Law, Scales, address
 
@@ -51,6 +56,11 @@ EFFECTS: tuple[Effect, ...] = (
     sensor_cubic.EFFECT,
     sensor_hum.EFFECT,
     smoothing.EFFECT,
+    pendulum_sine.EFFECT,
+    pendulum_with_spring.EFFECT,
+    spring_quintic.EFFECT,
+    power_damping.EFFECT,
+    structural_damping.EFFECT,
 )
 
 __all__ = ["EFFECTS", "Effect", "EffectParameter", "Law", "Scales", "address"]
