@@ -22,10 +22,10 @@ DETECTORS: tuple[Callable[[Recording], list[Fault]], ...] = (
     find_quantised,
     find_held,
     find_clipped,
-    find_spikes,
     find_start,
-    find_slips,
     find_noise,
+    find_spikes,
+    find_slips,
 )
 """In this order, each on the recording without what the earlier ones found."""
 

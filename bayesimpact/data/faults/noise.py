@@ -8,12 +8,14 @@ import numpy as np
 
 from bayesimpact.data.faults.fault import Fault, amount, excluded, file_time, gaussian_threshold
 from bayesimpact.data.faults.flat import reading_step
+from bayesimpact.data.gaps import runs
 from bayesimpact.data.period import noise_level
 from bayesimpact.data.recording import Recording
 
 BLOCKS = 12
 LEAST_BLOCK = 150  # samples
 FACTOR = 2.0  # times the usual level: less is told by no test that motion does not spoil
+EDGE = 0.6  # of a block, beside a loud one: a median does not see what fills less than half
 LOUD = 3.0  # times the usual level: samples that carry a ninth of the others' weight
 SAME = 0.25  # how far fourth and sixth differences may disagree on a level of noise
 SCATTER = 1.6  # of the level from a median of correlated differences, times 1 / sqrt(n)
@@ -43,7 +45,11 @@ def find_noise(recording: Recording) -> list[Fault]:
     strong &= np.abs(fourth / other - ratio) < SAME * ratio
     if not strong.any() or strong.sum() > count // 2:
         return []
-    spans = tuple(parts[k] for k in np.flatnonzero(strong))
+    reach = int(EDGE * x.size / count)
+    loud = np.zeros(x.size, dtype=bool)
+    for k in np.flatnonzero(strong):
+        loud[max(parts[k][0] - reach, 0) : parts[k][1] + reach] = True
+    spans = tuple(runs(loud))
     worst = float(ratio[strong].max())
     return [
         Fault(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from bayesimpact.data.faults.fault import Array, Fault, amount, file_time
 from bayesimpact.data.faults.flat import reading_step
@@ -13,6 +14,7 @@ BAND = 5.0  # standard deviations of the noise, or two steps, about the first re
 NATURAL = 3.0  # times as long as a free motion stays in that band at a turning point
 SHORTEST = 0.08  # of a period
 LATE = 1.1  # of a period: a free decay is largest before
+WIDE = 11  # samples of a running median: spikes of five do not show in it
 UNCROSSED = 0.75  # of a period: a free motion passes its rest within half a period
 GROWTH = 1.3  # largest excursion over what came before it on the same side
 
@@ -24,13 +26,13 @@ def find_start(recording: Recording) -> list[Fault]:
     point, sqrt(2 b / A) of a radian for a band b and an amplitude A. Hand: the largest excursion
     comes late and exceeds what came before on its side; the free decay begins where it is left.
     """
-    x = recording.samples
+    x = median_filter(recording.samples, WIDE, mode="nearest")  # blind to spikes
     if recording.used is not None and not recording.used[:3].all():
         return []
     period = rough_period(x, 1.0)
     if period is None:
         return []
-    noise, step = noise_level(x), reading_step(x)
+    noise, step = noise_level(recording.samples), reading_step(recording.samples)
     band = max(BAND * noise, 2.0 * step, 1e-9 * float(np.ptp(x)))
     settled = float(np.median(x[x.size // 2 :]))
     peak = int(np.argmax(np.abs(x - settled)))

@@ -160,7 +160,8 @@ def test_noise_that_rises_for_a_while(paper: Campaign) -> None:
         return x
 
     fault = only(spoiled(paper, change))
-    assert fault.id == "recording_noise" and covered(fault) == set(range(3000, 4000))
+    assert fault.id == "recording_noise"
+    assert set(range(3000, 4000)) <= covered(fault) <= set(range(2600, 4400))
 
 
 @pytest.mark.parametrize("first", [0, 777])
