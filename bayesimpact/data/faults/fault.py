@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +55,23 @@ class Fault:
     threshold: float
     action: Action = "exclude"
     false_alarm: float = FALSE_ALARM
+
+
+def fault_document(fault: Fault) -> dict[str, Any]:
+    """A fault as a JSON object: what scripts and scores read."""
+    return {
+        "id": fault.id,
+        "recording": fault.recording,
+        "start_s": float(fault.start_s),
+        "end_s": float(fault.end_s),
+        "samples": [[int(first), int(end)] for first, end in fault.spans],
+        "size": float(fault.size) if np.isfinite(fault.size) else None,
+        "unit": fault.unit,
+        "statement": fault.statement,
+        "remedy": fault.remedy,
+        "strength": float(fault.strength) if np.isfinite(fault.strength) else None,
+        "threshold": float(fault.threshold),
+    }
 
 
 def gaussian_threshold(count: int) -> float:
