@@ -167,19 +167,24 @@ def check(campaign: Path, out: Path | None, seed: int, quiet: bool) -> None:
     With --out the plot is saved as DIR/check.png. Nothing is drawn at random here: --seed is taken
     for the sake of scripts that pass it to every command.
     """
+    from bayesimpact.data.faults.find import set_aside
     from bayesimpact.report.check_text import campaign_text, campaign_warnings, measured_noise
+    from bayesimpact.report.fault_text import fault_lines
 
     loaded = loaded_campaign(campaign)
-    noise = measured_noise(loaded)
+    cleaned, faults = set_aside(loaded)
+    noise = measured_noise(cleaned)
     if not quiet:
         click.echo(campaign_text(loaded, noise))
+    for line in fault_lines(loaded, faults):
+        click.echo(line, err=quiet)
     for warning in campaign_warnings(loaded, noise):
         click.echo(f"warning: {warning}", err=True)
     if out is not None:
         from bayesimpact.report.check_figure import campaign_figure
 
         file = made_folder(out) / "check.png"
-        campaign_figure(loaded).savefig(file)
+        campaign_figure(loaded, faults).savefig(file)
         if not quiet:
             click.echo(f"plot: {file}")
 

@@ -41,6 +41,7 @@ class Measurement:
     mass_sd : standard uncertainty of the mass, relative
     clock_sd : standard uncertainty of the clock rate, relative
     gain_sd : standard uncertainty of the probe's gain, relative
+    unfiltered : campaign.toml says that the recordings passed no filter (`smoothing = "none"`)
     """
 
     noise: float | None = None
@@ -48,6 +49,7 @@ class Measurement:
     mass_sd: float = 0.0
     clock_sd: float = 0.0
     gain_sd: float = 0.0
+    unfiltered: bool = False
 
 
 @dataclass(frozen=True)
@@ -80,6 +82,9 @@ class Campaign(Picklable):
     priors : parameter name -> the table of campaign.toml's [priors], SI; validated
     beams : case -> geometry of its obstacle, where given
     sha256 : of campaign.toml and every recording's file; "" for a campaign built in memory
+    keep_faults : campaign.toml says that faults found in the recordings stay in (`faults = "keep"`)
+    skipped : recording -> why it is left out
+    notes : what was set aside in the recordings and why, in words, for reports
     """
 
     name: str
@@ -91,6 +96,9 @@ class Campaign(Picklable):
     beams: Mapping[str, Beam] = field(default_factory=lambda: MappingProxyType({}))
     sha256: str = ""
     folder: Path | None = None
+    keep_faults: bool = False
+    skipped: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    notes: tuple[str, ...] = ()
 
     @property
     def cases(self) -> tuple[str, ...]:
@@ -196,7 +204,9 @@ class Campaign(Picklable):
         kept = []
         for r in self.recordings:
             step = max(1, int(interval / r.interval))
-            kept.append(replace(r, samples=r.samples[::step], interval=r.interval * step))
+            used = None if r.used is None else r.used[::step]
+            samples, interval = r.samples[::step], r.interval * step
+            kept.append(replace(r, samples=samples, interval=interval, used=used))
         return replace(self, recordings=tuple(kept))
 
 

@@ -52,7 +52,7 @@ def even_interval(
         raise InputError(
             f"{path}, {place} {rows[i + 1]}",
             found,
-            f"evenly spaced samples, here {typical:.6g} s apart",
+            f"evenly spaced samples, here {typical:.6g} s apart, or resample = true",
         )
     count = np.arange(times.size)
     interval = float(times[-1] - times[0]) / (times.size - 1)
@@ -66,6 +66,9 @@ def even_interval(
         found = (
             f"a sample at {times[worst]:.9g} s, {late[worst] / interval:+.1%} of an interval off"
         )
-        accepted = f"evenly spaced samples: every time within {JITTER:.0%} of an interval"
+        accepted = (
+            f"evenly spaced samples: every time within {JITTER:.0%} of an interval, "
+            "or resample = true"
+        )
         raise InputError(f"{path}, {place} {rows[worst]}", found, accepted)
     return interval

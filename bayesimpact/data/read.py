@@ -17,6 +17,7 @@ from bayesimpact.data import bounds
 from bayesimpact.data.campaign import Beam, Campaign, Measurement, Smoothing
 from bayesimpact.data.entries import filled_in
 from bayesimpact.data.foreign import file_bytes, is_foreign, read_foreign
+from bayesimpact.data.gaps import excluded_spans
 from bayesimpact.data.period import rough_period
 from bayesimpact.data.recording import Quantity, Recording
 from bayesimpact.data.schema import (
@@ -25,6 +26,7 @@ from bayesimpact.data.schema import (
     LogUniformTable,
     MeasurementTable,
     RecordingTable,
+    UnfilteredTable,
     UniformTable,
     parse_campaign,
 )
@@ -87,9 +89,15 @@ def build_campaign(
     recordings: list[Recording] = []
     for number, entry in enumerate(table.recording, 1):
         where = f"{file}, recording {number} ({entry.file})"
+        if entry.skip is not None:
+            continue
         _check_entry(where, entry, table.stop, recordings)
         source, samples = read(entry, where)
         recordings.append(_recording(source, where, entry, table.stop, samples))
+    skipped = {e.name or Path(e.file).stem: e.skip for e in table.recording if e.skip}
+    table = table.model_copy(update={"recording": [e for e in table.recording if e.skip is None]})
+    if not recordings:
+        raise InputError(f"{file}, key skip", "on every recording", "one recording without skip")
     _check_together(file, table, recordings)
     return Campaign(
         name=table.name,
@@ -99,6 +107,9 @@ def build_campaign(
         measurement=_measurement(file, table, recordings),
         priors=MappingProxyType(_priors(file, table, recordings)),
         beams=MappingProxyType(_beams(file, table)),
+        keep_faults=table.faults == "keep",
+        skipped=MappingProxyType(skipped),
+        notes=tuple(f"{name} is skipped ({reason})" for name, reason in skipped.items()),
     )
 
 
@@ -177,6 +188,12 @@ def _check_entry(where: str, entry: RecordingTable, stop: bool, earlier: list[Re
     start, end = entry.start_s, entry.end_s
     if start is not None and end is not None and start >= end:
         raise InputError(f"{where}, key end_s", f"{end:g} s", f"a time after start_s = {start:g} s")
+    if entry.scale == 0.0:
+        raise InputError(f"{where}, key scale", "0", "a number other than 0")
+    for start, end in entry.exclude_s or ():
+        if start > end:
+            found = f"a span from {start:g} to {end:g} s"
+            raise InputError(f"{where}, key exclude_s", found, "spans that end after they begin")
 
 
 def _table(source: Path, entry: RecordingTable, data: bytes) -> Table:
@@ -184,7 +201,12 @@ def _table(source: Path, entry: RecordingTable, data: bytes) -> Table:
         return read_foreign(source, entry, data)
     column = None if entry.column is None else str(entry.column)
     return read_table(
-        source, data, column=column, unit=entry.unit, sample_rate=entry.sample_rate_hz
+        source,
+        data,
+        column=column,
+        unit=entry.unit,
+        sample_rate=entry.sample_rate_hz,
+        resample=entry.resample,
     )
 
 
@@ -208,16 +230,21 @@ def _recording(
         raise InputError(
             f"{where}, key {key}", f"no samples left ({asked})", f"times within the file's {span}"
         )
+    factor = (-1.0 if entry.invert else 1.0) * (1.0 if entry.scale is None else entry.scale)
     recording = Recording(
         name=entry.name or Path(entry.file).stem,
         case=entry.case if stop and entry.case is not None else "",
-        samples=table.samples[first:stop_at],
+        samples=table.samples[first:stop_at] * factor,
         interval=interval,
         start=table.start + first * interval,
         quantity=table.quantity,
+        used=None if table.used is None else table.used[first:stop_at],
     )
+    recording = excluded_spans(f"{where}, key exclude_s", recording, entry.exclude_s or ())
     _check_motion(source, recording)
-    return recording
+    if entry.clock_ratio is None:
+        return recording
+    return replace(recording, interval=interval * entry.clock_ratio)
 
 
 def _check_motion(where: str, recording: Recording) -> None:
@@ -258,6 +285,7 @@ def _measurement(where: str, table: CampaignTable, recordings: list[Recording]) 
         mass_sd=table.mass_uncertainty_kg / table.mass_kg,
         clock_sd=given.clock_uncertainty_ppm * 1e-6,
         gain_sd=given.gain_uncertainty_percent * 1e-2,
+        unfiltered=isinstance(given.smoothing, UnfilteredTable),
     )
 
 
@@ -284,7 +312,7 @@ def _smoothing(
     where: str, given: MeasurementTable, recordings: list[Recording]
 ) -> Smoothing | None:
     table = given.smoothing
-    if table is None:
+    if table is None or isinstance(table, UnfilteredTable):
         return None
     if isinstance(table, LagTable):
         return Smoothing(kind="lag", time_constant=table.time_constant_s)

@@ -63,6 +63,18 @@ class RecordingTable(_Table):
     )
     start_s: Time | None = Field(None, description=f"{NUMBER}, s on the file's own clock")
     end_s: Time | None = Field(None, description=f"{NUMBER}, s on the file's own clock")
+    exclude_s: list[Annotated[list[Time], Field(min_length=2, max_length=2)]] | None = Field(
+        None, description="pairs of times, s on the file's own clock, as [[115.55, 115.60]]"
+    )
+    invert: bool = Field(False, description="true or false, without quotes")
+    scale: Annotated[float, Field(ge=-1e12, le=1e12)] | None = Field(
+        None, description="a number other than 0, times the readings (-1e+12 to 1e+12)"
+    )
+    clock_ratio: Annotated[float, Field(gt=0, ge=1e-3, le=1e3)] | None = Field(
+        None, description=f"{POSITIVE}, true time over the file's time (0.001 to 1000)"
+    )
+    resample: bool = Field(False, description="true or false, without quotes")
+    skip: Text | None = Field(None, description="the reason to leave it out, in quotes")
 
 
 class SavgolTable(_Table):
@@ -84,16 +96,24 @@ class LagTable(_Table):
     time_constant_s: Length = Field(description=f"{POSITIVE}, s (1e-09 to 1e+12)")
 
 
+class UnfilteredTable(_Table):
+    """No filter, and none may be supposed; written `smoothing = "none"`."""
+
+    kind: Literal["none"]
+
+
 class MeasurementTable(_Table):
     """[measurement]."""
 
     noise_um: Length | None = Field(None, description=f"{POSITIVE}, um (1e-09 to 1e+12)")
     noise_mrad: Length | None = Field(None, description=f"{POSITIVE}, mrad (1e-09 to 1e+12)")
     noise_deg: Length | None = Field(None, description=f"{POSITIVE}, degrees (1e-09 to 1e+12)")
-    smoothing: Annotated[SavgolTable | LagTable, Field(discriminator="kind")] | None = Field(
+    smoothing: (
+        Annotated[SavgolTable | LagTable | UnfilteredTable, Field(discriminator="kind")] | None
+    ) = Field(
         None,
         description='{ kind = "savgol", window = 21, polyorder = 2 }'
-        ' or { kind = "lag", time_constant_s = 0.001 }',
+        ' or { kind = "lag", time_constant_s = 0.001 }, or "none" for no filter at all',
     )
     clock_uncertainty_ppm: NotNegative = Field(
         0.0, le=1e6, description="a number, 0 or more, ppm (at most 1e6)"
@@ -180,10 +200,13 @@ class CampaignTable(_Table):
         default_factory=dict, description="a table [priors] of distributions"
     )
     beam: dict[str, BeamTable] = Field(default_factory=dict, description="tables [beam.<case>]")
+    faults: Literal["set aside", "keep"] = Field(
+        "set aside", description='"set aside" or "keep": what becomes of faults of a recording'
+    )
 
 
 _TAGGED: dict[str, dict[str, type[_Table]]] = {
-    "smoothing": {"savgol": SavgolTable, "lag": LagTable},
+    "smoothing": {"savgol": SavgolTable, "lag": LagTable, "none": UnfilteredTable},
     "distribution": {
         "uniform": UniformTable,
         "normal": NormalTable,
@@ -196,6 +219,9 @@ _TAGGED: dict[str, dict[str, type[_Table]]] = {
 
 def parse_campaign(document: dict[str, Any], where: str) -> CampaignTable:
     """Check a parsed campaign.toml; `where` names the file in the `InputError` that refuses it."""
+    chain = document.get("measurement")
+    if isinstance(chain, dict) and chain.get("smoothing") == "none":
+        document = document | {"measurement": chain | {"smoothing": {"kind": "none"}}}
     try:
         return CampaignTable.model_validate(document)
     except RecursionError:

@@ -13,6 +13,7 @@ import numpy as np
 from bayesimpact.errors import InputError
 from bayesimpact.trial.benches import BENCHES, Design, draw_bench, log_uniform
 from bayesimpact.trial.drawn import Drawn
+from bayesimpact.trial.faults import PLANTS, plant_fault
 from bayesimpact.trial.plants import CATALOGUE_PLANTS
 from bayesimpact.trial.rig import make_campaign
 from bayesimpact.trial.ruler import Ruler, clean_readings, true_parameters
@@ -63,11 +64,22 @@ def _attempt(settings: Settings, seed: int, kind: str, turn: int, rng: Rng) -> D
         found = pair(Ruler(design, rng), ids, strengths, settings.strength[0], rng)
     elif kind == "outside":
         found = (outside(Ruler(design, rng), ids[0], strengths[0], rng),)
-    return _recorded(settings, seed, kind, design, found, rng)
+    drawn = _recorded(settings, seed, kind, design, found, rng)
+    return _with_fault(drawn, turn, rng) if kind == "fault" else drawn
+
+
+def _with_fault(drawn: Drawn, turn: int, rng: Rng) -> Drawn:
+    """The same trial with the fault whose turn it is in one recording."""
+    kind = list(PLANTS)[turn % len(PLANTS)]
+    planted = plant_fault(drawn.campaign, kind, drawn.truth["noise_m"], rng)
+    if planted is None:
+        raise Unsuitable(f"a rig that cannot show the fault {kind}")
+    campaign, fault = planted
+    return Drawn(campaign, {**drawn.truth, "fault": fault})
 
 
 def _effects(settings: Settings, kind: str, turn: int, rng: Rng) -> tuple[str, ...]:
-    if kind == "control":
+    if kind in ("control", "fault"):
         return ()
     if kind == "outside":
         return (settings.outside[turn % len(settings.outside)],)

@@ -14,11 +14,12 @@ neither. Several effects at once: `score_strong`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from bayesimpact.trial.faults import judge_fault
 from bayesimpact.trial.score_strong import inconsistent, judge_several, quality
 
 NORMAL_90 = 1.6448536269514722
@@ -31,10 +32,12 @@ def score(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> dict[str, Any]
     """Score an answer (the content of diagnosis.json) against the opened truth."""
     planted = [p["id"] for p in truth["planted"]]
     named = [e["id"] for e in answer["effects"] if e["id"] not in QUIET]
-    outcome = _outcome(truth, answer["verdict"], named)
+    outcome = _outcome(truth, answer["verdict"], named, answer.get("faults", ()))
     sets = [set(named), *(set(a["id"].split(" + ")) for a in answer["alternatives"])]
     return {
-        "truth": " + ".join(sorted(planted)) or "control",
+        "truth": truth["fault"]["id"]
+        if "fault" in truth
+        else " + ".join(sorted(planted)) or "control",
         "verdict": answer["verdict"],
         "named": " + ".join(sorted(named)) or answer["verdict"],
         "outcome": outcome,
@@ -54,8 +57,14 @@ def score(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> dict[str, Any]
     }
 
 
-def _outcome(truth: Mapping[str, Any], verdict: str, named: list[str]) -> str:
+def _outcome(
+    truth: Mapping[str, Any], verdict: str, named: list[str], faults: Sequence[Mapping[str, Any]]
+) -> str:
     """The outcome by the rules of its regime."""
+    if "fault" in truth:
+        outcome = judge_fault(truth["fault"], faults)
+        physics = verdict == "named" and outcome == "missed" and named
+        return "wrong name" if physics else outcome
     if not truth["kind"].startswith("several"):
         return judge(truth["kind"], [p["id"] for p in truth["planted"]], verdict, named)
     there = [p["id"] for p in truth["planted"] if not p["outside"]]

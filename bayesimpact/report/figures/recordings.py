@@ -81,6 +81,10 @@ def _page(results: Results, recordings: Sequence[RecordingResult]) -> Figure:
         _motion(near, results, recording, dots=True)
         _residual(below, results, recording)
         _residual(near_below, results, recording)
+        for first, past in recording.excluded:
+            for axis in (whole, below, near, near_below):
+                span = ((first - 1) * recording.interval, past * recording.interval)
+                axis.axvspan(*span, color=GREY, alpha=0.3, lw=0.8)
         end = recording.times[-1]
         close = min(end, _release(recording) + CLOSE_UP_CYCLES * period)
         whole.set_xlim(0, end)
