@@ -131,6 +131,12 @@ def symbol(name: str) -> str:
     return f"{base}[{key}]" if key else base
 
 
+def full_symbol(name: str) -> str:
+    """`symbol`, with the effect that an added parameter belongs to: "gap wear: step"."""
+    effect, dot, _ = name.partition("[")[0].partition(".")
+    return f"{effect.replace('_', ' ')}: {symbol(name)}" if dot else symbol(name)
+
+
 @dataclass(frozen=True)
 class Scaled:
     """An axis for values that may differ only in their last digits.
