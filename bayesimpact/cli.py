@@ -237,14 +237,24 @@ def diagnose(
 
 @main.command()
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.option("--pdf", is_flag=True, help="Print it as DIR/report.pdf by an installed Chromium.")
+@click.option("--latex", is_flag=True, help="Write its tables for a paper: DIR/tables.tex.")
 @common
-def report(folder: Path, seed: int, quiet: bool) -> None:
+def report(folder: Path, pdf: bool, latex: bool, seed: int, quiet: bool) -> None:
     """Write the report of whatever DIR holds, from its files alone."""
-    from bayesimpact.report.write import rewrite_report
+    from bayesimpact.report.write import rewrite_report, write_latex
 
-    page = rewrite_report(folder)
+    files = [rewrite_report(folder)]
+    if latex:
+        files.append(write_latex(folder))
+    if pdf:
+        from bayesimpact.report.pdf import print_page
+
+        files.append(files[0].with_suffix(".pdf"))
+        print_page(files[0], files[-1])
     if not quiet:
-        click.echo(f"report: {page}")
+        for file in files:
+            click.echo(f"report: {file}")
 
 
 @main.command()

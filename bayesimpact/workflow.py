@@ -132,12 +132,12 @@ def diagnose_campaign(
         certified=certified,
     )
     say("writing the report")
-    results = _write_diagnosis(diagnosis, content, before, after, out, seed, command)
+    results = write_diagnosis(diagnosis, content, before, after, out, seed, command)
     sure = all(p is None or p.chains.converged for p in (before, after))
     return Outcome(results, diagnosis.after.converged and sure, content)
 
 
-def _write_diagnosis(
+def write_diagnosis(
     diagnosis: Diagnosis,
     content: dict[str, Any],
     before: Posterior | None,
@@ -146,6 +146,7 @@ def _write_diagnosis(
     seed: int,
     command: str,
 ) -> Results:
+    """diagnosis.json, results, figures and report of a diagnosis, sampled or not, in `out`."""
     out.mkdir(parents=True, exist_ok=True)
     plain = _strict(content)
     write_text(out / DIAGNOSIS_FILE, json.dumps(plain, indent=1))

@@ -18,6 +18,7 @@ from bayesimpact.report.results import Array, Results
 
 REPORT_FILE = "report.html"
 POSTERIOR_FILE = "posterior.nc"
+LATEX_FILE = "tables.tex"
 
 
 def write_report(results: Results, folder: Path) -> Path:
@@ -44,6 +45,15 @@ def rewrite_report(folder: Path) -> Path:
     InputError : the folder holds no results
     """
     return write_report(load_results(folder), folder)
+
+
+def write_latex(folder: Path) -> Path:
+    """The tables of the results that a folder holds, for LaTeX; path of the file."""
+    from bayesimpact.report.latex import latex_tables
+
+    path = folder / LATEX_FILE
+    write_text(path, latex_tables(load_results(folder)))
+    return path
 
 
 def write_fit(
