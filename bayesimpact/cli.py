@@ -192,9 +192,12 @@ def sample(
     from bayesimpact.workflow import sample_campaign
 
     command = f"bayesimpact sample {campaign} --out {out} --seed {seed}"
-    outcome = sample_campaign(
-        loaded, made_folder(out), seed=seed, resume=resume, command=command, say=telling(quiet)
-    )
+    try:
+        outcome = sample_campaign(
+            loaded, made_folder(out), seed=seed, resume=resume, command=command, say=telling(quiet)
+        )
+    except KeyboardInterrupt:
+        _end(ctx, f"bayesimpact: interrupted; to go on: {command} --resume", INTERRUPTED)
     announce(outcome, out, quiet)
     finish(ctx, outcome)
 

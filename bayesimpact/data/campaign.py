@@ -90,6 +90,11 @@ class Campaign:
     sha256: str = ""
     folder: Path | None = None
 
+    def __repr__(self) -> str:
+        """One line."""
+        stop = f"cases {', '.join(self.cases)}" if self.stop else "no stop"
+        return f"<Campaign {self.name!r}: {len(self.recordings)} recordings, {stop}>"
+
     @property
     def cases(self) -> tuple[str, ...]:
         """Obstacles in order of first appearance; () without a stop."""

@@ -32,6 +32,12 @@ class Recording:
     start: float = 0.0
     quantity: Quantity = "displacement"
 
+    def __repr__(self) -> str:
+        """One line."""
+        case = f", case {self.case}" if self.case else ""
+        rate = f"{1 / self.interval:g} Hz"
+        return f"<Recording {self.name!r}{case}: {self.samples.size} samples at {rate}>"
+
     def __post_init__(self) -> None:
         samples = np.array(self.samples, dtype=np.float64)
         samples.setflags(write=False)

@@ -34,8 +34,9 @@ _SENTENCE_END = re.compile(r"(?<=[a-z0-9)])\. (?=[A-Z])")
 
 @dataclass(frozen=True)
 class Picture:
-    """An embedded PNG: base64 data, size on the page in CSS pixels, words."""
+    """An embedded PNG: kind of figure, base64 data, size on the page in CSS pixels, words."""
 
+    kind: str
     data: str
     width: int
     height: int
@@ -165,6 +166,7 @@ def _picture(name: str, data: bytes, results: Results) -> Picture:
     text = caption(name, results)
     first = _SENTENCE_END.split(text, maxsplit=1)[0].rstrip(".")
     return Picture(
+        kind=name.split("_")[0],
         data=base64.b64encode(data).decode("ascii"),
         width=round(width * _PIXELS_PER_INCH / DPI),
         height=round(height * _PIXELS_PER_INCH / DPI),

@@ -90,7 +90,8 @@
     const gap = { dash: [6, 4], width: 1, stroke: "#888" };
     const motion = [data.times, data.samples, data.models[k]];
     const lines = [
-      { label: "recorded (" + content.unit + ")", stroke: colours.recorded, width: 3 },
+      // circles about the model's line as soon as there is room for them
+      { label: "recorded (" + content.unit + ")", stroke: colours.recorded, width: 3, points: { size: 7, space: 9, width: 1.5, fill: "#fff" } },
       { label: content.models[k], stroke: colour, width: 1.5 },
     ];
     if (r.level !== null) {
