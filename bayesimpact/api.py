@@ -6,8 +6,7 @@ neither is given, so that the same call gives the same result.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +18,7 @@ from bayesimpact.errors import InputError
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification, identify
 from bayesimpact.inference.posterior import Posterior
-from bayesimpact.inference.sample import Progress
+from bayesimpact.inference.progress import progress_bar
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -92,24 +91,6 @@ def sample(
         return posterior.sample(
             mode, seed=number, folder=place, resume=resume, callback=callback, **settings
         )
-
-
-@contextmanager
-def progress_bar(shown: bool | None = None) -> Iterator[Callable[[Progress], None]]:
-    """A bar of the sampler's kept steps on standard error, quiet where that is no terminal."""
-    from tqdm.auto import tqdm
-
-    bar = tqdm(unit=" steps", disable=None if shown is None else not shown, leave=False)
-
-    def tell(where: Progress) -> None:
-        bar.total, bar.n = where.max_steps, where.steps
-        effective = "" if where.ess is None else f", {where.ess:.0f} effective draws"
-        bar.set_description(f"sampling{', burn-in' if where.burning else effective}")
-
-    try:
-        yield tell
-    finally:
-        bar.close()
 
 
 def diagnose(

@@ -194,7 +194,13 @@ def sample(
     command = f"bayesimpact sample {campaign} --out {out} --seed {seed}"
     try:
         outcome = sample_campaign(
-            loaded, made_folder(out), seed=seed, resume=resume, command=command, say=telling(quiet)
+            loaded,
+            made_folder(out),
+            seed=seed,
+            resume=resume,
+            command=command,
+            say=telling(quiet),
+            bar=False if quiet else None,
         )
     except KeyboardInterrupt:
         _end(ctx, f"bayesimpact: interrupted; to go on: {command} --resume", INTERRUPTED)

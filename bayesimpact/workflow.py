@@ -17,6 +17,7 @@ from bayesimpact.diagnosis.document import document
 from bayesimpact.diagnosis.loop import Diagnosis, diagnose
 from bayesimpact.inference.identify import Identification, identify
 from bayesimpact.inference.posterior import Posterior, sample
+from bayesimpact.inference.progress import progress_bar
 from bayesimpact.report.archive import write_text
 from bayesimpact.report.build import versions
 from bayesimpact.report.diagnosis_arrays import diagnosis_arrays
@@ -72,14 +73,15 @@ def sample_campaign(
     resume: bool = False,
     command: str = "",
     say: Say = silent,
+    bar: bool | None = False,
 ) -> Outcome:
     """Posterior of the base model: posterior.nc, figures and report in `out`; the chain is kept in
-    `out`/chain.
+    `out`/chain. `bar`: show the sampler's progress; None where standard error is a terminal.
     """
     began = time.perf_counter()
     say("searching the mode")
     identification = identify(campaign, rng=np.random.default_rng(seed))
-    posterior = sampled(identification, seed, out / CHAIN_FOLDER, resume, say)
+    posterior = sampled(identification, seed, out / CHAIN_FOLDER, resume, say, bar)
     seconds = time.perf_counter() - began
     say("writing the report")
     results = write_posterior(posterior, identification, out, command=command, seconds=seconds)
@@ -87,11 +89,19 @@ def sample_campaign(
 
 
 def sampled(
-    identification: Identification, seed: int, folder: Path | None, resume: bool, say: Say
+    identification: Identification,
+    seed: int,
+    folder: Path | None,
+    resume: bool,
+    say: Say,
+    bar: bool | None = False,
 ) -> Posterior:
     """Posterior around the mode of an identification, with progress in words."""
     say("sampling the posterior")
-    return sample(identification.fit, seed=seed, folder=folder, resume=resume)
+    with progress_bar(bar) as callback:
+        return sample(
+            identification.fit, seed=seed, folder=folder, resume=resume, callback=callback
+        )
 
 
 def diagnose_campaign(
