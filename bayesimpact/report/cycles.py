@@ -34,9 +34,10 @@ class Cycle:
 def stop_level(results: Results, recording: RecordingResult) -> float | None:
     """Reading of the probe where the stop begins, m; None where no single one is known."""
     known = {row.name: row.median for row in results.rows}
-    if not results.stop or not np.isfinite(known.get("g", float("nan"))):
-        return None
-    return known["g"] + known.get(f"offset[{recording.name}]", 0.0)
+    own = [value for name, value in known.items() if name.endswith(f".g[{recording.name}]")]
+    gap = own[0] if own else known.get("g", float("nan"))
+    level = gap + known.get(f"offset[{recording.name}]", 0.0)
+    return level if results.stop and np.isfinite(level) else None
 
 
 def touches(recording: RecordingResult, level: float) -> np.ndarray:
@@ -78,5 +79,4 @@ def cycles(results: Results) -> list[Cycle]:
 
 def telling_cycle(results: Results) -> Cycle | None:
     """The cycle in which the extended model gains most; None where none gains."""
-    best = max(cycles(results), key=lambda c: c.gain, default=None)
-    return best if best is not None and best.gain > 0 else None
+    return max((c for c in cycles(results) if c.gain > 0), key=lambda c: c.gain, default=None)

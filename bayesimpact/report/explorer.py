@@ -87,7 +87,7 @@ def explorer_data(results: Results) -> str:
             "case": recording.case,
             "interval": recording.interval,
             "level": None if level is None else level * response(results).scale,
-            "noise": recording.noise_rms * residual.scale,
+            "noise": _number(recording.noise_rms * residual.scale),
             "impacts": [] if level is None else touches(recording, level).tolist(),
             "best": best.first if best is not None and best.recording == r else None,
             "samples": _floats(recording.samples[:size] * response(results).scale),
@@ -125,12 +125,18 @@ def _extent(results: Results) -> tuple[list[int], int]:
     return shown, max(most, 2)
 
 
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
 def _floats(values: Array) -> str:
     return base64.b64encode(values.astype("<f4").tobytes()).decode("ascii")
 
 
 def _integers(values: Array) -> dict[str, Any]:
-    """16-bit integers, and what one is worth."""
-    scale = float(np.max(np.abs(values), initial=0.0)) / _INTEGERS or 1.0
-    data = base64.b64encode(np.round(values / scale).astype("<i2").tobytes())
+    """16-bit integers, and what one is worth; the lowest stands for what is not finite."""
+    known = np.isfinite(values)
+    scale = float(np.max(np.abs(values[known]), initial=0.0)) / _INTEGERS or 1.0
+    integers = np.where(known, np.round(np.where(known, values, 0.0) / scale), -_INTEGERS - 1)
+    data = base64.b64encode(integers.astype("<i2").tobytes())
     return {"scale": scale, "data": data.decode("ascii")}

@@ -13,12 +13,13 @@ import numpy as np
 import pytest
 from browser import Tab, browser, chromium
 from diagnosed import diagnosed
-from synthetic import make_results
+from synthetic import make_results, row
 
 from bayesimpact.report.archive import save_results
 from bayesimpact.report.cycles import cycles, telling_cycle, touches
 from bayesimpact.report.explorer import MOST_SAMPLES, explorer_data, explorer_words, script
 from bayesimpact.report.figures.force_map import force_unit
+from bayesimpact.report.figures.recordings import close_up
 from bayesimpact.report.force_in_time import force_in_time
 from bayesimpact.report.html import render
 from bayesimpact.report.results import Array, Results
@@ -93,6 +94,30 @@ def test_force_in_time_is_the_map_along_the_motion() -> None:
     unit = force_unit(results, arrays)
     assert integers(packed)[k] == pytest.approx(unit.scale * found[0][k], abs=packed["scale"])
     assert force_in_time(make_results(), 0, y) is None
+
+
+def test_what_is_not_finite_is_left_out() -> None:
+    results = compared()
+    broken = results.recordings[0].predicted.copy()
+    broken[50:60] = np.nan
+    first = replace(results.recordings[0], predicted=broken, noise_rms=float("nan"))
+    results = replace(results, recordings=(first, *results.recordings[1:]))
+    item = json.loads(explorer_data(results))["recordings"][0]
+    values = integers(item["residuals"][1]) / item["residuals"][1]["scale"]
+    assert (values[50:60] == -32768).all() and (
+        np.abs(np.delete(values, range(50, 60))) < 32768
+    ).all()
+    assert item["noise"] is None
+    assert telling_cycle(results) is None or telling_cycle(results).recording != 0
+    close_up(results, first)
+
+
+def test_a_recording_may_have_a_gap_of_its_own() -> None:
+    results = compared()
+    own = row("gap_per_recording.g[run_1]", 2e-3, 1e-8, "m", "effect")
+    results = replace(results, rows=(*results.rows, own))
+    levels = [item["level"] for item in json.loads(explorer_data(results))["recordings"]]
+    assert levels == [pytest.approx(1.1095), pytest.approx(2.0095), pytest.approx(1.1095)]
 
 
 def test_long_campaigns_keep_their_size() -> None:

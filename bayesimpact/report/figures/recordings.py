@@ -126,7 +126,7 @@ def close_up(results: Results, recording: RecordingResult) -> tuple[float, float
     """Start and end of the close-up, s, and what it shows: the deepest impact, or first cycles."""
     level, t = stop_level(results, recording), recording.times
     deepest = int(np.argmax(recording.predicted))
-    if level is None or recording.predicted[deepest] < level:
+    if level is None or not recording.predicted[deepest] >= level:
         close = min(float(t[-1]), _release(recording) + CLOSE_UP_CYCLES * _period(results))
         return max(0.0, close - CLOSE_UP_CYCLES * _period(results)), close, "first cycles"
     free = np.flatnonzero(recording.predicted < level)
@@ -139,8 +139,10 @@ def close_up(results: Results, recording: RecordingResult) -> tuple[float, float
 
 def _residual_limit(results: Results) -> float:
     """One scale for the residuals of all figures, m."""
-    largest = max(float(np.max(np.abs(r.residual))) for r in shown_recordings(results))
-    return 1.08 * max(largest, *(2.2 * r.noise_rms for r in shown_recordings(results)))
+    shown = shown_recordings(results)
+    sizes = [float(np.max(np.abs(r.residual), initial=0.0)) for r in shown]
+    sizes += [2.2 * r.noise_rms for r in shown]
+    return 1.08 * max((size for size in sizes if np.isfinite(size)), default=0.0)
 
 
 def _motion(axis: Axes, results: Results, recording: RecordingResult, *, dots: bool) -> None:
@@ -167,5 +169,6 @@ def _residual(axis: Axes, results: Results, recording: RecordingResult, limit: f
     band = 2 * recording.noise_rms * shown.scale
     for level in (-band, band):
         axis.axhline(level, color=ORANGE, lw=0.9, label="± 2 standard deviations of the noise")
-    axis.set_ylim(-limit * shown.scale, limit * shown.scale)
+    if limit > 0:
+        axis.set_ylim(-limit * shown.scale, limit * shown.scale)
     axis.set_ylabel(label("residual\n", shown.unit).replace("\n ", "\n"))

@@ -17,20 +17,20 @@
     return out.buffer;
   }
   function integers(packed) {
-    return Float64Array.from(new Int16Array(bytes(packed.data)), (x) => x * packed.scale);
+    return Array.from(new Int16Array(bytes(packed.data)), (x) => (x === -32768 ? null : x * packed.scale));
   }
   function unpack(r) {
     if (r.unpacked) return r.unpacked;
-    const samples = Float64Array.from(new Float32Array(bytes(r.samples)));
+    const samples = Array.from(new Float32Array(bytes(r.samples)), (x) => (isFinite(x) ? x : null));
     const times = samples.map((_, i) => i * r.interval);
     const residuals = r.residuals.map(integers);
-    const models = residuals.map((e) => samples.map((y, i) => y - e[i] * r.toUnit));
+    const models = residuals.map((e) => samples.map((y, i) => (y === null || e[i] === null ? null : y - e[i] * r.toUnit)));
     const found = { times: times, samples: samples, residuals: residuals, models: models };
     if (r.force) {
       found.force = integers(r.force);
       const half = integers(r.forceBand);
-      found.low = found.force.map((f, i) => f - half[i]);
-      found.high = found.force.map((f, i) => f + half[i]);
+      found.low = found.force.map((f, i) => (f === null || half[i] === null ? null : f - half[i]));
+      found.high = found.force.map((f, i) => (f === null || half[i] === null ? null : f + half[i]));
     }
     r.unpacked = found;
     return found;
