@@ -3,7 +3,7 @@
     import bayesimpact as bi
     campaign = bi.load("data/paper")
     found = bi.fit(campaign)
-    posterior = bi.sample(found.fit)
+    posterior = bi.sample(found)
     bi.corner(posterior)
 
 Importing the package imports nothing heavy; each name is loaded when it is first used.
@@ -12,15 +12,19 @@ Importing the package imports nothing heavy; each name is loaded when it is firs
 from __future__ import annotations
 
 from importlib import import_module
+from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from bayesimpact.api import diagnose as diagnose
+    from bayesimpact.api import fit as fit
+    from bayesimpact.api import open_results as open
+    from bayesimpact.api import sample as sample
+    from bayesimpact.api import save as save
+    from bayesimpact.api import summary as summary
     from bayesimpact.data.campaign import Campaign as Campaign
     from bayesimpact.data.read import load_campaign as load
     from bayesimpact.data.recording import Recording as Recording
-    from bayesimpact.diagnosis.loop import diagnose as diagnose
-    from bayesimpact.inference.identify import identify as fit
-    from bayesimpact.inference.posterior import sample as sample
     from bayesimpact.model.effects import EFFECTS as EFFECTS
     from bayesimpact.model.effects import Effect as Effect
     from bayesimpact.model.experiment import simulate as simulate
@@ -34,11 +38,14 @@ _NAMES = {
     "load": ("bayesimpact.data.read", "load_campaign"),
     "simulate": ("bayesimpact.model.experiment", "simulate"),
     "backbone": ("bayesimpact.response.backbone", "backbone"),
-    "fit": ("bayesimpact.inference.identify", "identify"),
-    "sample": ("bayesimpact.inference.posterior", "sample"),
+    "fit": ("bayesimpact.api", "fit"),
+    "sample": ("bayesimpact.api", "sample"),
+    "summary": ("bayesimpact.api", "summary"),
+    "save": ("bayesimpact.api", "save"),
+    "open": ("bayesimpact.api", "open_results"),
     "plot": ("bayesimpact.report.check_figure", "plot"),
     "corner": ("bayesimpact.report.notebook", "corner"),
-    "diagnose": ("bayesimpact.diagnosis.loop", "diagnose"),
+    "diagnose": ("bayesimpact.api", "diagnose"),
     "EFFECTS": ("bayesimpact.model.effects", "EFFECTS"),
     "Effect": ("bayesimpact.model.effects", "Effect"),
 }
@@ -53,13 +60,18 @@ __all__ = [
     "diagnose",
     "fit",
     "load",
+    "open",
     "plot",
     "sample",
+    "save",
     "simulate",
+    "summary",
 ]
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        return version("bayesimpact")
     if name not in _NAMES:
         raise AttributeError(f"module 'bayesimpact' has no attribute {name!r}")
     module, attribute = _NAMES[name]

@@ -318,7 +318,13 @@ def sample(
     command = f"bayesimpact sample {campaign} --out {out} --seed {seed}"
     folder = made_folder(out, f"{command} --resume")
     outcome = sample_campaign(
-        loaded, folder, seed=seed, resume=resume, command=command, say=telling(quiet)
+        loaded,
+        folder,
+        seed=seed,
+        resume=resume,
+        command=command,
+        say=telling(quiet),
+        bar=False if quiet else None,
     )
     announce(outcome, out, quiet)
     finish(ctx, outcome)
@@ -370,17 +376,30 @@ def diagnose(
 
 @main.command()
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.option("--pdf", is_flag=True, help="Print it as DIR/report.pdf by an installed Chromium.")
+@click.option("--latex", is_flag=True, help="Write its tables for a paper: DIR/tables.tex.")
 @common
 @click.pass_context
-def report(ctx: click.Context, folder: Path, seed: int, quiet: bool) -> None:
+def report(
+    ctx: click.Context, folder: Path, pdf: bool, latex: bool, seed: int, quiet: bool
+) -> None:
     """Write the report of whatever DIR holds, from its files alone."""
-    from bayesimpact.report.write import rewrite_report
+    from bayesimpact.report.write import rewrite_report, write_latex
 
     if folder.is_dir() and (folder / "results.nc").exists():
         made_folder(folder, f"bayesimpact report {folder}")
     written = rewrite_report(folder)
+    files = [written.page]
+    if latex:
+        files.append(write_latex(folder))
+    if pdf:
+        from bayesimpact.report.pdf import print_page
+
+        files.append(files[0].with_suffix(".pdf"))
+        print_page(files[0], files[-1])
     if not quiet:
-        click.echo(f"report: {written.page}")
+        for file in files:
+            click.echo(f"report: {file}")
     if written.failed:
         click.echo(f"bayesimpact: {unmade_words(list(written.failed))}", err=True)
         ctx.exit(NOT_CONVERGED)

@@ -18,6 +18,7 @@ from bayesimpact.diagnosis.document import document
 from bayesimpact.diagnosis.loop import Diagnosis, diagnose
 from bayesimpact.inference.identify import Identification, identify
 from bayesimpact.inference.posterior import Posterior, sample
+from bayesimpact.inference.progress import progress_bar
 from bayesimpact.report.archive import write_text
 from bayesimpact.report.build import versions
 from bayesimpact.report.diagnosis_arrays import diagnosis_arrays
@@ -86,15 +87,16 @@ def sample_campaign(
     resume: bool = False,
     command: str = "",
     say: Say = silent,
+    bar: bool | None = False,
 ) -> Outcome:
     """Posterior of the base model: posterior.nc, figures and report in `out`; the chain is kept in
-    `out`/chain.
+    `out`/chain. `bar`: show the sampler's progress; None where standard error is a terminal.
     """
     began = time.perf_counter()
     campaign = without_faults(campaign, say)
     say("searching the mode")
     identification = identify(campaign, rng=np.random.default_rng(seed))
-    posterior = sampled(identification, seed, out / CHAIN_FOLDER, resume, say)
+    posterior = sampled(identification, seed, out / CHAIN_FOLDER, resume, say, bar)
     seconds = time.perf_counter() - began
     say("writing the report")
     made = write_posterior(posterior, identification, out, command=command, seconds=seconds)
@@ -103,11 +105,24 @@ def sample_campaign(
 
 
 def sampled(
-    identification: Identification, seed: int, folder: Path | None, resume: bool, say: Say
+    identification: Identification,
+    seed: int,
+    folder: Path | None,
+    resume: bool,
+    say: Say,
+    bar: bool | None = False,
 ) -> Posterior:
     """Posterior around the mode of an identification, with progress in words."""
     say("sampling the posterior")
-    return sample(identification.fit, seed=seed, folder=folder, resume=resume, tell=say)
+    with progress_bar(bar) as callback:
+        return sample(
+            identification.fit,
+            seed=seed,
+            folder=folder,
+            resume=resume,
+            tell=say,
+            callback=callback,
+        )
 
 
 def diagnose_campaign(
@@ -153,12 +168,12 @@ def diagnose_campaign(
         certified=certified,
     )
     say("writing the report")
-    made = _write_diagnosis(diagnosis, content, before, after, out, seed, command)
+    made = write_diagnosis(diagnosis, content, before, after, out, seed, command)
     sure = all(p is None or p.chains.converged for p in (before, after))
     return Outcome(made.results, diagnosis.after.converged and sure, content, made.failed)
 
 
-def _write_diagnosis(
+def write_diagnosis(
     diagnosis: Diagnosis,
     content: dict[str, Any],
     before: Posterior | None,
@@ -167,6 +182,7 @@ def _write_diagnosis(
     seed: int,
     command: str,
 ) -> Written:
+    """diagnosis.json, results, figures and report of a diagnosis, sampled or not, in `out`."""
     out.mkdir(parents=True, exist_ok=True)
     plain = _strict(content)
     write_text(out / DIAGNOSIS_FILE, json.dumps(plain, indent=1))

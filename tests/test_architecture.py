@@ -22,8 +22,10 @@ LAYERS = (
     "diagnosis",
     "report",
     "workflow",
+    "api",
     "trial",
     "cli",
+    "__main__",
 )
 FILES = sorted(PACKAGE.rglob("*.py"))
 

@@ -170,6 +170,20 @@ def test_other_ends(
     assert words in err and "Traceback" not in err
 
 
+def test_interrupted_sampling_says_how_to_go_on(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("bayesimpact.data.read.load_campaign", lambda path: None)
+    monkeypatch.setattr("bayesimpact.workflow.sample_campaign", stop)
+    out = tmp_path / "out"
+    got, _, err = run("sample", tmp_path, "--out", out, "--seed", "3")
+    assert got == 130
+    assert f"bayesimpact sample {tmp_path} --out {out} --seed 3 --resume" in err
+
+
 def test_every_command_takes_the_common_options() -> None:
     for command in main.commands.values():
         options = {o for parameter in command.params for o in parameter.opts}

@@ -100,6 +100,11 @@ class Campaign(Picklable):
     skipped: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     notes: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        """One line."""
+        stop = f"cases {', '.join(self.cases)}" if self.stop else "no stop"
+        return f"<Campaign {self.name!r}: {len(self.recordings)} recordings, {stop}>"
+
     @property
     def cases(self) -> tuple[str, ...]:
         """Obstacles in order of first appearance; () without a stop."""

@@ -36,6 +36,12 @@ class Recording:
     quantity: Quantity = "displacement"
     used: NDArray[np.bool_] | None = None
 
+    def __repr__(self) -> str:
+        """One line."""
+        case = f", case {self.case}" if self.case else ""
+        rate = f"{1 / self.interval:g} Hz"
+        return f"<Recording {self.name!r}{case}: {self.samples.size} samples at {rate}>"
+
     def __post_init__(self) -> None:
         samples = np.array(self.samples, dtype=np.float64)
         samples.setflags(write=False)

@@ -70,6 +70,12 @@ class Fit:
     iterations: int
     linearisation: tuple[Linearisation, ...]
 
+    def __repr__(self) -> str:
+        """One line."""
+        state = "at rest" if self.converged else "not converged"
+        campaign = self.target.oscillator.campaign.name
+        return f"<Fit of {campaign!r}: {self.mode.size} parameters, {state}>"
+
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the parameters."""

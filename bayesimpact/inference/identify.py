@@ -61,6 +61,11 @@ class Identification:
     from_guess: Fit
     from_search: Fit | None
 
+    def __repr__(self) -> str:
+        """One line."""
+        ends = "guess and search agree" if self.agree else "guess and search differ"
+        return f"<Identification: {self.fit!r}, {ends}>"
+
     @property
     def agree(self) -> bool:
         """True when guess and search ended within 0.1 standard deviations of each other."""

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.errors import InputError
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.sample import Chains, sample_posterior
 from bayesimpact.model.measurement import smooth
@@ -49,11 +50,30 @@ class Posterior:
         """Draws of one parameter, (S,)."""
         return np.asarray(self.draws[:, self.fit.target.oscillator.layout.index(name)])
 
-    def interval(self, name: str, probability: float = 0.9) -> tuple[float, float]:
-        """Central credible interval of one parameter."""
+    def interval(
+        self, name: str, probability: float = 0.9
+    ) -> tuple[float, float] | dict[str, tuple[float, float]]:
+        """Central credible interval of one parameter, SI.
+
+        A name without its case or recording ("k2") gives those of all, by name.
+
+        Raises
+        ------
+        InputError : the model has no such parameter
+        """
         tail = 50 * (1 - probability)
-        low, high = np.percentile(self.column(name), [tail, 100 - tail])
-        return float(low), float(high)
+        family = [n for n in self.names if n == name or n.partition("[")[0] == name]
+        if not family:
+            raise InputError("parameter", repr(name), ", ".join(self.names))
+        ends = {n: np.percentile(self.column(n), [tail, 100 - tail]) for n in family}
+        found = {n: (float(low), float(high)) for n, (low, high) in ends.items()}
+        return found.get(name, found)
+
+    def __repr__(self) -> str:
+        """One line."""
+        state = "converged" if self.chains.converged else "not converged"
+        campaign = self.fit.target.oscillator.campaign.name
+        return f"<Posterior of {campaign!r}: {self.draws.shape[0]} draws, {state}>"
 
     def thinned(self, count: int, rng: np.random.Generator) -> Array:
         """`count` draws (count, d), without replacement where there are enough."""

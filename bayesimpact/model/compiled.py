@@ -122,10 +122,14 @@ class _Announcer(event.Listener):  # type: ignore[misc]
     def __init__(self, say: Callable[[str], None]) -> None:
         self.say = say
         self.starts: list[float] = []
+        self.told = False
 
     def on_start(self, event: Any) -> None:
         if not self.starts:
             dispatcher = event.data["dispatcher"]
+            # numba compiles helpers of its own, for a moment each
+            self.told = not dispatcher.py_func.__module__.startswith("numba.")
+        if not self.starts and self.told:
             kept = not isinstance(dispatcher._cache, NullCache)
             name = f"{dispatcher.py_func.__module__}.{dispatcher.py_func.__name__}"
             self.say(f"compiling {name}" + ", once: later runs find it in the cache" * kept)
@@ -133,5 +137,5 @@ class _Announcer(event.Listener):  # type: ignore[misc]
 
     def on_end(self, event: Any) -> None:
         seconds = time.perf_counter() - self.starts.pop()
-        if not self.starts:
+        if not self.starts and self.told:
             self.say(f"compiled in {seconds:.1f} s")

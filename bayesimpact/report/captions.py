@@ -9,6 +9,11 @@ from bayesimpact.report.force_arrays import QUIET_WIDTH
 from bayesimpact.report.results import Results
 
 DIAGNOSIS = {
+    "story": (
+        "The cycle in which what was added explains most. Above: the recording and both models. "
+        "Middle: the same less the base model: were it right, the points would scatter about the "
+        "orange line; they follow the blue one. Grey area: contact."
+    ),
     "force": (
         "The force that the base model leaves unexplained, on the left-hand side of the equation "
         "of motion (positive resists motion towards the stop). Left: its posterior mean wherever "
@@ -72,6 +77,11 @@ def _more(stem: str, results: Results) -> str:
     arrays, diagnosis = results.diagnosis_arrays, results.diagnosis or {}
     if stem == "gain" and "impact_gain" in arrays:
         return " Impacts are shown as far as half of the recordings have them."
+    if stem == "story" and "force_y" in arrays:
+        return (
+            " Below: the force that the base model lacks, as far as it depends on displacement "
+            "and velocity, with its 90 % band."
+        )
     if stem == "improvement" and "held_out_recordings" in arrays:
         words = " Right: gain in the log score with which each recording is predicted from the"
         return f"{words} others."
@@ -94,9 +104,10 @@ def _more(stem: str, results: Results) -> str:
 
 def _fit(results: Results) -> str:
     stop = " The dashed line is the stop." if results.stop else ""
+    close = "the deepest impact" if results.stop else "the first cycles after the release"
     return (
-        "Recordings (dots), model at the mode (line), residuals below; on the right the first "
-        f"cycles after the release.{stop} Orange lines: twice the standard deviation of the noise "
+        "Recordings (light) and model at the mode (line), residuals below, all on one scale; on "
+        f"the right {close}.{stop} Orange lines: twice the standard deviation of the noise "
         "as estimated without the model."
     )
 
@@ -112,7 +123,7 @@ def _corner(results: Results) -> str:
     return (
         "Posterior of the parameters of interest: marginals on the diagonal with median ± half "
         "of the 90 % interval, pairs below with the contours of one and two standard deviations "
-        f"(39 % and 86 %). Axes count from a value near the median.{some}{before}"
+        f"(39 % and 86 %). Δ: from the median that the title states.{some}{before}"
     )
 
 
@@ -120,7 +131,8 @@ def _gaussian() -> str:
     return (
         "Gaussian approximations at the modes (nothing was sampled): marginals on the diagonal "
         "with median ± half of the 90 % interval, pairs below with the contours of one and two "
-        "standard deviations. Orange: the base model; blue: with what was added."
+        "standard deviations. Δ: from the median that the title states. Orange: the base model; "
+        "blue: with what was added."
     )
 
 

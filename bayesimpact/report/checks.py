@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from bayesimpact.report.results import Check, Results
-from bayesimpact.report.units import display, number, p_value, p_words, significant, typeset
+from bayesimpact.report.units import chi2, display, number, p_value, p_words, significant, typeset
 from bayesimpact.report.whiteness import whiteness
 
 __all__ = ["amount", "judge", "judged", "model_name", "whiteness"]
@@ -144,7 +144,7 @@ def _misfit(results: Results) -> Check:
     return Check(
         MISFIT,
         _status(results.verdict == "adequate"),
-        f"reduced χ² {significant(results.reduced_chi2, 4)}, {far} standard errors {side} 1",
+        f"reduced χ² {chi2(results.reduced_chi2)}, {far} standard errors {side} 1",
         "The noise level comes from the recordings alone, not from what a model leaves over.",
     )
 

@@ -27,6 +27,7 @@ def diagnosis_arrays(d: Diagnosis) -> dict[str, Array]:
     force_*, left_*, learned_*, gap : see `force_arrays`
     gain : (R, bins) log likelihood gained per recording and stretch of time, nats
     impact_gain : (R, K) the same from each touch to the next, NaN after the last
+    before_predicted : (N,) reading of the base model, recordings one after the other, m
     before_chi2 : (R,) reduced chi2 of the base model
     spectrum : (k, 5) frequency, Hz; power of the whitened residual over that of the noise before
         and after; ends of the 90 % band for white noise
@@ -43,6 +44,7 @@ def diagnosis_arrays(d: Diagnosis) -> dict[str, Array]:
     if d.location is not None and d.location.gain.shape[1] > 1:
         arrays["gain"] = d.location.gain
     arrays |= _impacts(d)
+    arrays["before_predicted"] = np.concatenate(d.before.predicted)
     arrays["before_chi2"] = np.array([r.reduced_chi2 for r in recording_results(d.before)])
     arrays["spectrum"] = spectrum(d.before, d.after)
     for name, held in (("recordings", d.held_out), ("cases", d.held_out_cases)):

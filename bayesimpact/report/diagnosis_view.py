@@ -10,22 +10,29 @@ from markupsafe import Markup
 
 from bayesimpact.report.results import Results
 from bayesimpact.report.rows import Z90
-from bayesimpact.report.tables import signed, span, symbol
+from bayesimpact.report.tables import span, symbol
 from bayesimpact.report.units import (
+    chi2,
     decimals,
     number,
     p_value,
     p_words,
+    percent,
     readable,
+    signed,
     significant,
     typeset,
 )
+from bayesimpact.report.units import quantity as amount
+
+__all__ = ["amount"]
 
 Rows = list[dict[str, Any]]
 
 VERDICTS = {
     "adequate": "Nothing is missing",
     "named": "What is missing is named",
+    "partly": "Part of what is missing is named; something unexplained remains",
     "ambiguous": "Several effects fit alike",
     "unknown": "The missing physics is outside the catalogue",
 }
@@ -65,6 +72,8 @@ def diagnosis_view(results: Results) -> dict[str, Any] | None:
             }
             for other in diagnosis.get("alternatives", [])
         ],
+        "remainder": remainder_rows(diagnosis.get("remainder"), unit),
+        "formulas": [_formula(formula) for formula in diagnosis.get("formulas") or ()],
         "fit": _fit(diagnosis.get("fit", {}), unit) + _backbones(results),
         "held_out": _held_out(diagnosis.get("fit", {})),
         "parameters": [
@@ -106,20 +115,61 @@ def span_of(ends: Sequence[float], unit: str) -> str:
     """A range with its unit."""
     low, high = ends
     shown = readable(unit, max(abs(low), abs(high)))
-    places = decimals((high - low) * shown.scale)
+    places = decimals((high - low) * shown.scale, 2)
     return f"{span(low, high, shown.scale, places)} {typeset(shown.unit)}"
 
 
-def amount(value: float, unit: str, digits: int = 3) -> str:
-    """A size with its unit."""
-    shown = readable(unit, abs(value))
-    return f"{significant(value * shown.scale, digits)} {typeset(shown.unit)}"
+def size_words(size: Mapping[str, Any] | None) -> str:
+    """How large an effect is: "3.1 µm, 0.12 % of the deepest indentation"; "" where not known."""
+    if not size or size.get("value") is None:
+        return ""
+    words = amount(float(size["value"]), str(size.get("unit") or ""))
+    if size.get("percent") is not None:
+        words += f", {significant(float(size['percent']), 2)}\N{NO-BREAK SPACE}%"
+        words += f" of {size['of']}" if size.get("of") else ""
+    return words
+
+
+def remainder_rows(remainder: Mapping[str, Any] | None, unit: str) -> list[tuple[str, str]]:
+    """What stays unexplained beside the named effects, as name and value."""
+    if not remainder:
+        return []
+    rows = []
+    if remainder.get("rms_m") is not None:
+        rows.append(("rms", amount(float(remainder["rms_m"]), unit)))
+    for key, words, after in (
+        ("share_of_signal_percent", "of the signal", "\N{NO-BREAK SPACE}%"),
+        ("over_noise", "over the noise", ""),
+    ):
+        if remainder.get(key) is not None:
+            rows.append((words, significant(float(remainder[key]), 2) + after))
+    if remainder.get("regime"):
+        rows.append(("regime", REGIMES.get(str(remainder["regime"]), str(remainder["regime"]))))
+    if remainder.get("displacement_m"):
+        rows.append(("displacement", span_of(remainder["displacement_m"], unit)))
+    if remainder.get("recordings"):
+        rows.append(("recordings", ", ".join(str(x) for x in remainder["recordings"])))
+    if remainder.get("guess"):
+        rows.append(("likely", str(remainder["guess"])))
+    return rows
+
+
+def _formula(formula: Mapping[str, Any]) -> dict[str, str]:
+    """A formula for a learned force, as a row of the table."""
+    return {
+        "formula": str(formula.get("formula", "")),
+        "unit": typeset(str(formula.get("unit") or "")),
+        "probability": probability(formula.get("probability")),
+        "odds": _plain(formula.get("log_odds"), 1),
+    }
 
 
 def _effect(effect: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "id": effect["id"],
+        "title": effect.get("title") or str(effect["id"]).replace("_", " "),
         "family": effect.get("family", ""),
+        "size": size_words(effect.get("size")),
         "statement": effect.get("statement", ""),
         "probability": probability(effect.get("probability")),
         "evidence": _plain(effect.get("delta_log_evidence"), 1),
@@ -130,12 +180,18 @@ def _effect(effect: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def estimate(content: Mapping[str, Any], *, median: bool = True) -> str:
-    """Median with its 90 % interval and unit, or the interval alone."""
+def estimate(
+    content: Mapping[str, Any], *, median: bool = True, like: Mapping[str, Any] | None = None
+) -> str:
+    """Median with its 90 % interval and unit, or the interval alone.
+
+    `like`: another estimate of the same parameter, told with the same digits.
+    """
     low, high = content["ci90"]
     half = 0.5 * (high - low)
     shown = readable(content["unit"], max(abs(content["median"]), half))
-    places = decimals(half * shown.scale)
+    wider = half if like is None else max(half, 0.5 * (like["ci90"][1] - like["ci90"][0]))
+    places = decimals(wider * shown.scale)
     ends = span(low, high, shown.scale, places)
     if not median:
         return f"{ends} {typeset(shown.unit)}".rstrip()
@@ -175,7 +231,7 @@ def _merit(value: float | None, kind: str, unit: str) -> str:
         return amount(value, unit)
     if kind == "nats":
         return number(value, 0)
-    return p_value(value) if kind == "p" else significant(value, 4)
+    return p_value(value) if kind == "p" else chi2(value)
 
 
 def _backbones(results: Results) -> list[tuple[str, str, str]]:
@@ -192,12 +248,20 @@ def _held_out(fit: Mapping[str, Any]) -> str:
     value, error = gain.get("value"), gain.get("se")
     if value is None or error is None or not isfinite(value) or gain.get("of") == 0:
         return ""
-    words = (
-        f"On recordings held out, the log score changes by {signed(value, 1)} ± {number(error, 1)} "
-        "(standard error)"
-    )
+    words = f"On recordings held out, the log score changes by {gain_words(gain)} (standard error)"
     improved = gain.get("improved", value > 2 * error)
     return f"{words}: an improvement." if improved else f"{words}: no clear improvement."
+
+
+def gain_words(gain: Mapping[str, Any]) -> str:
+    """Held-out gain with its standard error, nats: the same digits wherever it is told."""
+    value, error = gain.get("value"), gain.get("se")
+    if value is None or not isfinite(value):
+        return ""
+    if error is None or not isfinite(error) or error <= 0:
+        return signed(value, 1)
+    places = decimals(error, 2)
+    return f"{signed(value, places)} ± {number(error, places)}"
 
 
 def _shift(
@@ -206,12 +270,14 @@ def _shift(
     """A parameter before and after, and the shift in standard deviations of before."""
     sd = (before["ci90"][1] - before["ci90"][0]) / (2 * Z90)
     moved = (after["median"] - before["median"]) / sd if sd > 0 else float("nan")
+    old = before["median"]
     return {
         "name": name,
         "symbol": symbol(name),
-        "before": estimate(before),
-        "after": estimate(after),
-        "honest": estimate({**after, "ci90": after["ci90_honest"]}, median=False)
+        "change": percent((after["median"] - old) / abs(old)) if old else "–",
+        "before": estimate(before, like=after),
+        "after": estimate(after, like=before),
+        "honest": estimate({**after, "ci90": after["ci90_honest"]}, median=False, like=before)
         if after.get("ci90_honest")
         else "",
         "shift": signed(moved, 1) if abs(moved) < 1000 else f"{significant(moved, 2)}",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -12,7 +13,7 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
-from bayesimpact.report import tables, words
+from bayesimpact.report import explorer, tables, words
 from bayesimpact.report.captions import caption
 from bayesimpact.report.checks import MISFIT
 from bayesimpact.report.diagnosis_view import diagnosis_view
@@ -20,20 +21,23 @@ from bayesimpact.report.figures.save import DPI
 from bayesimpact.report.policy import with_policy
 from bayesimpact.report.results import Results
 from bayesimpact.report.story import corrected, story_rows
+from bayesimpact.report.units import bound
 
 TEMPLATES = Path(__file__).parent / "template"
 _VERDICT_CLASS = {"adequate": "good", "inadequate": "bad", "slight": "", "overestimated": ""}
 _GROUPS = (
-    *("fit", "corner", "backbone", "search", "traces"),
+    *("story", "fit", "corner", "backbone", "search", "traces"),
     *("force", "gain", "ranking", "limits", "improvement", "bands", "shifts"),
 )
 _PIXELS_PER_INCH = 96
+_SENTENCE_END = re.compile(r"(?<=[a-z0-9)])\. (?=[A-Z])")
 
 
 @dataclass(frozen=True)
 class Picture:
-    """An embedded PNG: base64 data, size on the page in CSS pixels, words."""
+    """An embedded PNG: kind of figure, base64 data, size on the page in CSS pixels, words."""
 
+    kind: str
     data: str
     width: int
     height: int
@@ -78,6 +82,7 @@ def _environment() -> jinja2.Environment:
         lstrip_blocks=True,
     )
     environment.filters["lower_first"] = lambda text: text[:1].lower() + text[1:]
+    environment.filters["bound"] = bound
     return environment
 
 
@@ -90,6 +95,10 @@ def _context(results: Results, pictures: Mapping[str, bytes]) -> dict[str, Any]:
     return {
         "r": results,
         "css": Markup((TEMPLATES / "style.css").read_text(encoding="utf-8")),
+        "library_css": Markup(explorer.style()),
+        "script": Markup(explorer.script()),
+        "explorer_data": Markup(explorer.explorer_data(results)),
+        "explorer_words": explorer.explorer_words(results),
         "d": told,
         "story": story_rows(results),
         "corrected": [p for p in told["parameters"] if p["name"] in first] if told else [],
@@ -129,7 +138,8 @@ def _context(results: Results, pictures: Mapping[str, bytes]) -> dict[str, Any]:
 def _verdict_class(results: Results) -> str:
     if results.sampler is not None and not results.sampler.converged:
         return "bad"
-    if results.diagnosis is not None and results.diagnosis["verdict"] in ("ambiguous", "unknown"):
+    open_ended = ("partly", "ambiguous", "unknown")
+    if results.diagnosis is not None and results.diagnosis["verdict"] in open_ended:
         return ""
     return _VERDICT_CLASS[results.verdict]
 
@@ -137,6 +147,7 @@ def _verdict_class(results: Results) -> str:
 def _contents(results: Results, groups: Mapping[str, list[Picture]]) -> list[tuple[str, str]]:
     """Anchors and words of the sections that the page has."""
     sections = [
+        ("explore", "Explore", True),
         ("diagnosis", "Diagnosis", results.diagnosis is not None),
         ("parameters", "Parameters", True),
         ("checks", "Checks", True),
@@ -165,11 +176,13 @@ def _grouped(results: Results, pictures: Mapping[str, bytes]) -> dict[str, list[
 def _picture(name: str, data: bytes, results: Results) -> Picture:
     width, height = png_size(data)
     text = caption(name, results)
+    first = _SENTENCE_END.split(text, maxsplit=1)[0].rstrip(".")
     return Picture(
+        kind=name.split("_")[0],
         data=base64.b64encode(data).decode("ascii"),
         width=round(width * _PIXELS_PER_INCH / DPI),
         height=round(height * _PIXELS_PER_INCH / DPI),
-        alt=f"Figure {name}: {text.split('.')[0]}.",
+        alt=f"{name.replace('_', ' ').capitalize()}: {first}.",
         caption=text,
     )
 

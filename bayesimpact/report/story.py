@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 from typing import Any
 
 from markupsafe import Markup
@@ -14,12 +13,15 @@ from bayesimpact.report.diagnosis_view import (
     VERDICTS,
     amount,
     estimate,
+    gain_words,
     probability,
+    remainder_rows,
+    size_words,
     span_of,
 )
 from bayesimpact.report.results import Results
-from bayesimpact.report.tables import signed, symbol
-from bayesimpact.report.units import number, significant
+from bayesimpact.report.tables import symbol
+from bayesimpact.report.units import percent, significant
 
 MOST_NAMES = 4
 """Recordings called by name; more are counted."""
@@ -35,6 +37,7 @@ def story_rows(results: Results) -> list[tuple[str, list[str | Markup]]]:
         ("place", _place(results, diagnosis.get("location"))),
         ("physics", _physics(diagnosis)),
         ("size", _size(results, diagnosis)),
+        ("remains", _remains(results, diagnosis.get("remainder"))),
         ("improvement", _improvement(results, diagnosis)),
         ("could still hide", _hidden(diagnosis)),
         ("certificate", _certificate(diagnosis.get("certificate"))),
@@ -102,16 +105,37 @@ def _physics(diagnosis: Mapping[str, Any]) -> list[str | Markup]:
 
 
 def _size(results: Results, diagnosis: Mapping[str, Any]) -> list[str | Markup]:
-    lines: list[str | Markup] = [
-        Markup("{} = {}").format(symbol(name), estimate(content))
-        for effect in diagnosis.get("effects", ())
-        for name, content in effect.get("parameters", {}).items()
-    ]
+    lines: list[str | Markup] = []
+    for effect in diagnosis.get("effects", ()):
+        if size_words(effect.get("size")):
+            title = effect.get("title") or effect["id"].replace("_", " ")
+            lines.append(f"{title}: {size_words(effect['size'])}")
+        lines += [
+            Markup("{} = {}").format(symbol(name), estimate(content))
+            for name, content in effect.get("parameters", {}).items()
+        ]
     force = (diagnosis.get("location") or {}).get("force_rms_n")
-    if force:
+    if force and not lines:
         unit = "N m" if results.quantity == "angle" else "N"
-        lines.append(f"unexplained force there: {amount(force, unit, 2)} rms")
+        lines.append(f"unexplained force there: {amount(force, unit)} rms")
     return lines
+
+
+def _remains(results: Results, remainder: Mapping[str, Any] | None) -> list[str | Markup]:
+    """What no named effect explains, in one sentence."""
+    rows = dict(remainder_rows(remainder, results.unit))
+    if not rows:
+        return []
+    words = f"unexplained: {rows['rms']} rms" if "rms" in rows else "something unexplained"
+    sizes = [
+        f"{rows[key]} {after}"
+        for key, after in (("of the signal", "of the signal"), ("over the noise", "× the noise"))
+        if key in rows
+    ]
+    words += f" ({', '.join(sizes)})" if sizes else ""
+    words += f", in {rows['regime']}" if "regime" in rows else ""
+    words += f", at {rows['displacement']}" if "displacement" in rows else ""
+    return [words, *([f"likely: {rows['likely']}"] if "likely" in rows else [])]
 
 
 def _improvement(results: Results, diagnosis: Mapping[str, Any]) -> list[str | Markup]:
@@ -120,21 +144,13 @@ def _improvement(results: Results, diagnosis: Mapping[str, Any]) -> list[str | M
     fit = diagnosis.get("fit") or {}
     before, after, gain = (fit.get(k) or {} for k in ("before", "after", "held_out_gain"))
     lines: list[str | Markup] = []
-    pairs = (
-        ("rms_m", "residual rms", partial(amount, unit=results.unit)),
-        ("reduced_chi2", "reduced χ²", partial(significant, digits=4)),
-    )
-    changes = [
-        f"{words} {write(before[key])} → {write(after[key])}"
-        for key, words, write in pairs
-        if before.get(key) is not None and after.get(key) is not None
-    ]
-    if changes:
-        lines.append(", ".join(changes))
-    if gain.get("value") is not None and gain.get("of") != 0:
-        spread = "" if gain.get("se") is None else f" ± {number(gain['se'], 0)}"
+    if gain_words(gain) and gain.get("of") != 0:
         better = f", {gain['wins']} of {gain['of']} better" if gain.get("of") else ""
-        lines.append(f"held-out recordings: log score {signed(gain['value'], 0)}{spread}{better}")
+        lines.append(f"recordings held out: log score {gain_words(gain)}{better}")
+    old, new = before.get("rms_m"), after.get("rms_m")
+    if old and new is not None:
+        ends = f"{amount(old, results.unit)} → {amount(new, results.unit)}"
+        lines.append(f"residual rms {ends} ({percent(new / old - 1)})")
     return lines
 
 

@@ -11,12 +11,13 @@ from markupsafe import Markup, escape
 from bayesimpact.report.results import Results, Row
 from bayesimpact.report.rows import Z90
 from bayesimpact.report.units import (
-    MINUS,
+    chi2,
     decimals,
     display,
     number,
     p_value,
     readable,
+    signed,
     significant,
     typeset,
 )
@@ -52,7 +53,8 @@ def symbol(name: str) -> Markup:
     base, bracket, key = name.partition("[")
     if "." in base:
         effect, _, own = base.partition(".")
-        html = Markup("<span class=effect>{}.</span>{}").format(effect, own)
+        words = (effect.replace("_", " "), own.replace("_", " "))
+        html = Markup("<span class=effect>{}:</span> {}").format(*words)
     elif base == "sigma":
         html = Markup("<i>σ</i>")
     elif base[-1].isdigit():
@@ -108,9 +110,7 @@ def _reference(row: Row, label: str, scale: float, places: int) -> Cell:
     if label not in row.references:
         return Cell("")
     value = row.references[label]
-    written = significant(value * scale, 7).rstrip("0").rstrip(".")
-    text = written if "." in written else number(value * scale, 0)
-    return Cell(text, deviation(row, value))
+    return Cell(number(value * scale, places), deviation(row, value))
 
 
 def deviation(row: Row, value: float) -> str:
@@ -120,12 +120,6 @@ def deviation(row: Row, value: float) -> str:
     if sd > 0 and abs(off) < 10 * sd:
         return f"{signed(off / sd, 1)} sd"
     return f"{signed(100 * off / abs(value), 2)} %" if value else ""
-
-
-def signed(value: float, places: int) -> str:
-    """A number with its sign."""
-    text = number(value, places)
-    return text if text.startswith(MINUS) else f"+{text}"
 
 
 def recording_views(results: Results) -> list[dict[str, str]]:
@@ -144,7 +138,7 @@ def recording_views(results: Results) -> list[dict[str, str]]:
                 "largest": significant(float(np.max(np.abs(r.samples))) * scale, 3),
                 "rms": significant(r.rms * shown.scale, 3),
                 "share": significant(100 * r.share, 2),
-                "chi2": significant(r.reduced_chi2, 3),
+                "chi2": chi2(r.reduced_chi2),
                 "white": p_value(r.whiteness_p),
             }
         )

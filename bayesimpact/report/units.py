@@ -115,7 +115,7 @@ def readable(unit: str, size: float) -> Display:
     if not isfinite(size) or size <= 0 or 1e-3 <= size * shown.scale < 1e5:
         return shown
     power = floor(log10(size))
-    ten = f"10{str(power).translate(_SUPERSCRIPT)}"
+    ten = f"× 10{str(power).translate(_SUPERSCRIPT)}"
     return Display(10.0**-power, ten if unit in ("-", "1", "") else f"{ten} {unit}")
 
 
@@ -128,11 +128,20 @@ def typeset(unit: str) -> str:
     return raised.replace(" ", "\N{NO-BREAK SPACE}")
 
 
-def decimals(half_width: float, digits: int = 2) -> int:
-    """Decimals that show `digits` significant digits of a half-width; may be negative."""
+def decimals(half_width: float, digits: int | None = None) -> int:
+    """Decimals that show `digits` significant digits of a half-width; may be negative.
+
+    Without `digits` the rule of the Particle Data Group (Review of Particle Physics, Introduction,
+    section 5.3): two where the leading ones are 10 to 35, else one.
+    """
     if not isfinite(half_width) or half_width <= 0:
         return 3
-    place = digits - 1 - floor(log10(half_width))
+    size = floor(log10(half_width))
+    if digits is None:
+        digits = 2 if half_width < 3.55 * 10.0**size else 1
+        if half_width >= 9.5 * 10.0**size:  # rounds up to 10, which has two
+            return -size
+    place = digits - 1 - size
     # 0.0996 would be rounded to 0.10, with one digit too many.
     return place - 1 if round(half_width, place) >= 10.0 ** (digits - place) else place
 
@@ -160,6 +169,40 @@ def significant(value: float, digits: int = 3) -> str:
         return number(value, digits - 1 - size)
     exponent = str(size).translate(_SUPERSCRIPT)
     return f"{number(value / 10.0**size, digits - 1)}{THIN}×{THIN}10{exponent}"
+
+
+def quantity(value: float, unit: str, digits: int = 3) -> str:
+    """A size with its unit, with a power of ten where no prefix helps: "3.3 × 10⁻⁴ 1/s"."""
+    shown = readable(unit, abs(value))
+    text = f"{significant(value * shown.scale, digits)} {typeset(shown.unit)}"
+    return text.rstrip().replace(" ", "\N{NO-BREAK SPACE}")
+
+
+def signed(value: float, places: int) -> str:
+    """A number with its sign."""
+    text = number(value, places)
+    return text if text.startswith(MINUS) else f"+{text}"
+
+
+def percent(part: float) -> str:
+    """A change as a share with its sign: "−0.17 %"; two digits."""
+    if part == 0 or not isfinite(part):
+        return f"{number(100 * part, 0)}\N{NO-BREAK SPACE}%"
+    sign = MINUS if part < 0 else "+"
+    return f"{sign}{significant(100 * abs(part), 2)}\N{NO-BREAK SPACE}%"
+
+
+def chi2(value: float) -> str:
+    """A reduced χ²: three decimals, fewer where it is far from 1."""
+    return number(value, 3) if abs(value) < 10 else significant(value, 3)
+
+
+_BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:%|[numkM]?(?:m|N|s|g|rad)\b|µ[mNs]|Hz\b|kg\b))")
+
+
+def bound(text: str) -> str:
+    """A sentence in which no line ends between a number and its unit."""
+    return _BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", text)
 
 
 def p_words(p: float) -> str:

@@ -8,7 +8,7 @@ from bayesimpact.diagnosis.whiteness import LAGS
 from bayesimpact.report.checks import amount
 from bayesimpact.report.figures.recordings import MOST as MOST_RECORDINGS
 from bayesimpact.report.results import Results, Row
-from bayesimpact.report.units import number, significant, typeset
+from bayesimpact.report.units import chi2, number, significant, typeset
 
 
 def kind_words(results: Results) -> str:
@@ -41,7 +41,7 @@ def facts(results: Results) -> list[tuple[str, str]]:
         ("unknowns", str(len(results.rows))),
         ("noise, from the recordings alone", amount(results.noise.level, results.unit)),
         ("residual rms", amount(results.rms, results.unit)),
-        ("reduced χ²", significant(results.reduced_chi2, 4)),
+        ("reduced χ²", chi2(results.reduced_chi2)),
     ]
     if results.cases:
         found.insert(2, ("cases", ", ".join(results.cases)))

@@ -20,6 +20,7 @@ from bayesimpact.report.results import Array, Results
 
 REPORT_FILE = "report.html"
 POSTERIOR_FILE = "posterior.nc"
+LATEX_FILE = "tables.tex"
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +72,15 @@ def rewrite_report(folder: Path) -> Written:
     InputError : the folder holds no results
     """
     return write_report(load_results(folder), folder)
+
+
+def write_latex(folder: Path) -> Path:
+    """The tables of the results that a folder holds, for LaTeX; path of the file."""
+    from bayesimpact.report.latex import latex_tables
+
+    path = folder / LATEX_FILE
+    write_text(path, latex_tables(load_results(folder)))
+    return path
 
 
 def write_fit(

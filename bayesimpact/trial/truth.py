@@ -10,8 +10,7 @@ from typing import Any
 
 from bayesimpact.errors import InputError
 from bayesimpact.report.rows import Z90
-from bayesimpact.report.tables import signed
-from bayesimpact.report.units import decimals, display, number, significant, typeset
+from bayesimpact.report.units import decimals, display, number, signed, significant, typeset
 from bayesimpact.trial.rig_files import TRUTH_FILE
 
 NAMES = ("c1", "k1", "c2", "g", "k2")

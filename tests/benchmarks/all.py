@@ -1,7 +1,7 @@
 """Measure everything about speed anew: `python tests/benchmarks/all.py [script ...]`.
 
 Runs the scripts one after the other, each in a process of its own, then draws the plots and writes
-the README's tables. Wants an otherwise idle machine, and 40 minutes on two cores; names
+the evidence page's tables. Wants an otherwise idle machine, and 40 minutes on two cores; names
 (`peers`, `samplers`) run only those. Peers: `pip install ".[bench]"`, see pyproject.toml.
 Accuracy, coverage, trials, power and calibration are not timings, and have scripts of their own.
 """

@@ -1,4 +1,4 @@
-"""Draws the README's plots from the stored results: `python tests/benchmarks/figures.py`.
+"""Draws the evidence page's plots from the stored results: `python tests/benchmarks/figures.py`.
 
 peers.svg: time of one simulation against its error. samplers.svg: effective draws per second.
 added.svg: the same for the steps of added effects. trials.svg: what the diagnosis said of every

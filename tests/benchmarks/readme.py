@@ -1,4 +1,4 @@
-"""Writes the README's tables from the stored results: `python tests/benchmarks/readme.py`."""
+"""Writes the evidence page's tables from stored results: `python tests/benchmarks/readme.py`."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from benchmarks.trial_tables import (
 from bayesimpact.model import effects
 
 EFFECTS = {effect.id: effect for effect in effects.EFFECTS}
-README = HERE.parents[1] / "README.md"
+PAGE = HERE / "EVIDENCE.md"
 BUSY = 0.25  # cores busy with something else, from which on times are not to be trusted
 
 
@@ -260,7 +260,7 @@ TABLES = {
 
 
 def rendered(text: str) -> str:
-    """The README with its tables made anew."""
+    """The evidence page with its tables made anew."""
     for name, table in TABLES.items():
         pattern = rf"(<!-- {name} -->\n).*?(<!-- end -->)"
         text = re.sub(pattern, lambda m, t=table: m[1] + t() + "\n" + m[2], text, flags=re.DOTALL)
@@ -268,4 +268,4 @@ def rendered(text: str) -> str:
 
 
 if __name__ == "__main__":
-    README.write_text(rendered(README.read_text(encoding="utf-8")), encoding="utf-8")
+    PAGE.write_text(rendered(PAGE.read_text(encoding="utf-8")), encoding="utf-8")

@@ -1,4 +1,4 @@
-"""What the README's tables share: stored results, rows and columns."""
+"""What the evidence page's tables share: stored results, rows and columns."""
 
 from __future__ import annotations
 

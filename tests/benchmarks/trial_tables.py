@@ -1,4 +1,4 @@
-"""The README's tables of blind trials."""
+"""The evidence page's tables of blind trials."""
 
 from __future__ import annotations
 

@@ -148,6 +148,12 @@ def test_intervals_columns_and_thinning():
         low, high = posterior.interval("k1", probability)
         inside = np.mean((draws[..., 1] > low) & (draws[..., 1] < high))
         assert inside == pytest.approx(probability, abs=1e-3)
+    ends = posterior.interval("y0[a]")
+    assert posterior.interval("y0") == {"y0[a]": ends} and len(ends) == 2
+    with pytest.raises(InputError, match=r"'k9'; accepted: c1, k1, y0\[a\]"):
+        posterior.interval("k9")
+    short = replace(posterior, chains=SimpleNamespace(draws=draws, converged=True))
+    assert repr(short) == "<Posterior of 'x': 2400 draws, converged>" and len(repr(fit)) < 80
     few = posterior.thinned(500, np.random.default_rng(1))
     assert few.shape == (500, start.size) and len(np.unique(few[:, 0])) == 500
     assert posterior.thinned(10**6, np.random.default_rng(1)).shape == (2400, start.size)

@@ -66,5 +66,9 @@ def test_the_outermost_compilation_is_announced_once() -> None:
     assert len(said) == 2
     assert said[0] == f"compiling {__name__}.above"  # this one is not kept
     assert said[1].startswith("compiled in ")
+    below.py_func.__module__ = "numba.cpython.builtins"
+    with compiled.compilation_announced(said.append):
+        below(1)  # numba's own are not worth a word
+    assert len(said) == 2
     above(1)  # compiles anew, for integers, and nobody listens
     assert len(said) == 2

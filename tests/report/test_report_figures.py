@@ -13,8 +13,13 @@ from matplotlib.figure import Figure
 from synthetic import make_results
 
 from bayesimpact.report.figures.backbone import deviation
-from bayesimpact.report.figures.corner import corner_figure
-from bayesimpact.report.figures.recordings import MOST, recording_figures, shown_recordings
+from bayesimpact.report.figures.corner import Normal, corner_figure
+from bayesimpact.report.figures.recordings import (
+    MOST,
+    close_up,
+    recording_figures,
+    shown_recordings,
+)
 from bayesimpact.report.figures.save import all_figures, file_name, png, save_drawn, save_figures
 from bayesimpact.report.figures.style import polyline, scaled, symbol
 from bayesimpact.report.html import png_size
@@ -29,7 +34,7 @@ def axis_labels(figure: Figure) -> set[str]:
     found = {axis.get_xlabel() for axis in figure.axes} | {
         axis.get_ylabel() for axis in figure.axes
     }
-    return found - {""}
+    return {text.replace("\n", " ") for text in found} - {""}
 
 
 def test_all_figures() -> None:
@@ -131,7 +136,7 @@ def test_corner_of_two_posteriors_shows_both() -> None:
     low, high = first.get_xlim()
     axis = scaled("k1", "N/m", np.concatenate([after.values[:, 0], before.values[:, 0]]))
     for values in (after.values[:, 0], before.values[:, 0]):
-        middle = float(axis(np.median(values)))
+        middle = float(np.median(values) - np.median(after.values[:, 0])) * axis.scale
         assert low < middle < high
     assert [t.get_text() for t in figure.legends[0].get_texts()] == ["before", "after"]
 
@@ -139,12 +144,48 @@ def test_corner_of_two_posteriors_shows_both() -> None:
 def test_corner_marks_a_near_truth_and_leaves_a_far_one_out() -> None:
     after, _ = two_posteriors()
     near = corner_figure(after, truths={"k1": 808.51}, truth_label="Table 2")
-    axis = scaled("k1", "N/m", after.values[:, 0])
+    axis, middle = scaled("k1", "N/m", after.values[:, 0]), np.median(after.values[:, 0])
     low, high = near.axes[0].get_xlim()
-    assert low < float(axis(np.array(808.51))) < high
+    assert low < float(808.51 - middle) * axis.scale < high
     far = corner_figure(after, truths={"k1": 900.0})
     low, high = far.axes[0].get_xlim()
-    assert not low < float(axis(np.array(900.0))) < high
+    assert not low < float(900.0 - middle) * axis.scale < high
+
+
+def test_corner_tells_the_numbers_it_is_given() -> None:
+    after, _ = two_posteriors()
+    figure = corner_figure(after, estimates={"k1": (808.5006, 808.496, 808.505)})
+    assert "808.501 ± 0.005 N/m" in figure.axes[0].get_title(loc="left").replace("\xa0", " ")
+
+
+def test_corner_of_normal_laws_is_drawn_in_closed_form() -> None:
+    covariance = np.array([[4.0, 1.5], [1.5, 1.0]])
+    law = Normal("posterior", ("k1", "c1"), ("N/m", "N s/m"), np.array([10.0, 5.0]), covariance)
+    figure = corner_figure(law)
+    marginal = next(a for a in figure.axes if a.get_subplotspec().get_geometry()[2] == 0)
+    x, density = marginal.lines[0].get_data()
+    shape = np.exp(-0.5 * ((x - 10.0) / 2.0) ** 2)
+    assert np.allclose(density / density.max(), shape)
+    pair = next(a for a in figure.axes if a.get_subplotspec().get_geometry()[2] == 2)
+    x, y = pair.lines[1].get_data()  # two standard deviations
+    off = np.stack([x - 10.0, y - 5.0])
+    distance = np.einsum("in,ij,jn->n", off, np.linalg.inv(covariance), off)
+    assert np.allclose(distance, 4.0)
+
+
+def test_close_up_holds_the_deepest_impact_and_residuals_have_one_scale() -> None:
+    results = make_results(2, 1)
+    recording = results.recordings[0]
+    start, end, words = close_up(results, recording)
+    deepest = recording.times[np.argmax(recording.predicted)]
+    assert start < deepest < end < start + 0.2 and words == "deepest impact"
+    flat = replace(recording, predicted=np.minimum(recording.predicted, 1e-3))
+    assert close_up(results, flat)[2] == "first cycles"
+    free = make_results(1, stop=False)
+    assert close_up(free, free.recordings[0])[2] == "first cycles"
+    figure = recording_figures(results)["fit_case_1"]
+    residuals = [a.get_ylim() for a in figure.axes if "residual" in a.get_ylabel()]
+    assert len(residuals) == 2 and len(set(residuals)) == 1
 
 
 def test_corner_of_one_parameter_and_of_a_constant() -> None:

@@ -12,12 +12,15 @@ from bayesimpact.report.results import Chain
 from bayesimpact.report.rows import Z90, scaling_unit, widened
 from bayesimpact.report.units import (
     Dimensions,
+    bound,
     decimals,
     dimensions,
     display,
     number,
     p_value,
     per_mass_unit,
+    percent,
+    quantity,
     readable,
     significant,
     typeset,
@@ -151,14 +154,32 @@ def test_display(unit: str, size: float, scale: float, shown: str) -> None:
 def test_power_of_ten_where_no_prefix_helps() -> None:
     shown = readable("1/s", 4.2e-5)
     assert 4.2e-5 * shown.scale == pytest.approx(4.2)
-    assert typeset(shown.unit) == "10⁻⁵\N{NO-BREAK SPACE}1/s"
+    assert typeset(shown.unit) == "×\N{NO-BREAK SPACE}10⁻⁵\N{NO-BREAK SPACE}1/s"
+    assert quantity(3.34e-4, "-").replace("\N{NO-BREAK SPACE}", " ") == "3.34 × 10⁻⁴"
 
 
 @pytest.mark.parametrize(
-    ("half", "places"), [(0.46, 2), (0.0996, 2), (0.0994, 3), (4.7e-3, 4), (12.0, 0), (1234.0, -2)]
-)
-def test_two_digits_of_uncertainty(half: float, places: int) -> None:
+    ("half", "places"),
+    [(0.354, 2), (0.36, 1), (0.0996, 2), (0.0949, 2), (1.2e-3, 4), (4.7e-3, 3), (12.0, 0),
+     (1234.0, -2), (96.0, -1), (1.0, 1)],
+)  # fmt: skip
+def test_one_or_two_digits_of_uncertainty(half: float, places: int) -> None:
     assert decimals(half) == places
+
+
+@pytest.mark.parametrize(("half", "places"), [(0.46, 2), (0.0996, 2), (0.0994, 3), (1234.0, -2)])
+def test_two_digits_where_asked_for(half: float, places: int) -> None:
+    assert decimals(half, 2) == places
+
+
+def test_no_line_ends_between_a_number_and_its_unit() -> None:
+    words = bound("the force reaches 0.003 N (0.026 % of the peak), by 3.1 µm in 4 recordings")
+    assert words.count("\N{NO-BREAK SPACE}") == 3 and "4 recordings" in words
+
+
+def test_changes_in_per_cent() -> None:
+    shown = [percent(x).replace("\N{NO-BREAK SPACE}", " ") for x in (-0.00173, 0.12, 0.0)]
+    assert shown == ["\N{MINUS SIGN}0.17 %", "+12 %", "0 %"]
 
 
 @pytest.mark.parametrize(

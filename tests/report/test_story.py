@@ -38,7 +38,7 @@ def test_every_question_of_a_named_effect() -> None:
 def test_the_story_comes_before_everything_else() -> None:
     source, parsed = page(diagnosed(parameters=STIFF))
     text = parsed.text
-    marks = ("What is missing is named", "corrected", "5358.17", "5349.00", "recordings 3",
+    marks = ("What is missing is named", "corrected", "5358.2", "5349.0", "recordings 3",
              "Diagnosis: what is missing", "Parameters Medians")  # fmt: skip
     places = [text.index(mark) for mark in marks]
     assert places == sorted(places) and source.count('class="story"') == 1
@@ -54,6 +54,32 @@ def test_unknown_physics_is_not_given_a_name() -> None:
     story = told(diagnosed(verdict="unknown", effects=[]))
     assert "no effect of the catalogue" in story["physics"]
     assert "140 µN rms" in story["size"]
+
+
+def test_sizes_in_units_and_per_cent_and_what_remains() -> None:
+    size = {"value": 3.1e-6, "unit": "m", "percent": 0.12, "of": "the deepest indentation"}
+    effect = {**DIAGNOSIS["effects"][0], "title": "a gap that grows", "size": size}  # type: ignore[dict-item, index]
+    remainder = {
+        "rms_m": 2.4e-6, "share_of_signal_percent": 0.11, "over_noise": 0.48, "regime": "exit",
+        "displacement_m": [1e-3, 3e-3], "recordings": ["run_1"], "guess": "a rattle",
+    }  # fmt: skip
+    results = diagnosed(verdict="partly", effects=[effect], remainder=remainder, parameters=STIFF)
+    story = told(results)
+    assert "something unexplained remains" in story["verdict"]
+    assert "a gap that grows: 3.10 µm, 0.12 % of the deepest indentation" in story["size"]
+    assert "unexplained: 2.40 µm rms (0.11 % of the signal, 0.48 × the noise)" in story["remains"]
+    assert "the end of contact" in story["remains"] and "likely: a rattle" in story["remains"]
+    source, parsed = page(results)
+    assert "What remains unexplained" in parsed.text and "run_1" in parsed.text
+    assert "\N{MINUS SIGN}0.17 %" in parsed.text  # (5349.0 - 5358.17) / 5358.17
+    assert 'class="verdict "' in source
+    assert "remains" not in told(diagnosed())
+
+
+def test_formulas_of_a_learned_force() -> None:
+    formulas = [{"formula": "a abs(v) v", "unit": "N s2/m2", "log_odds": 12.34, "probability": 0.8}]
+    text = page(diagnosed(verdict="unknown", effects=[], formulas=formulas))[1].text
+    assert "a abs(v) v N s²/m² +12.3 0.80" in text
 
 
 def test_alternatives_are_told_when_several_fit_alike() -> None:

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from bayesimpact.report.figures.style import (
     BLUE,
-    GREY,
-    RED,
+    ORANGE,
     Array,
     label,
     new_figure,
@@ -27,7 +27,9 @@ from bayesimpact.report.units import p_words
 PER_PAGE = 3
 MOST = 12
 """Cases shown."""
-BRANCH_COLOURS = {"upper": RED, "lower": BLUE}
+BRANCH_COLOURS = {"upper": ORANGE, "lower": BLUE}
+BRANCH_MARKERS = {"upper": "^", "lower": "v"}
+"""Told apart without colour too."""
 BRANCH_WORDS = {"upper": "above rest", "lower": "below rest"}
 _BAND: dict[str, Any] = {"alpha": 0.3, "lw": 0}
 
@@ -59,9 +61,9 @@ def _backbone(results: Results, summary: BackboneSummary, cases: Sequence[str]) 
             low, _, high = curve.frequency_band.T
             order = np.argsort(amplitude)
             top.fill_betweenx(amplitude[order], low[order], high[order], color=colour, **_BAND)
-            top.plot(curve.frequency, amplitude, ".", color=colour, ms=4.0, mew=0)
+            top.plot(curve.frequency, amplitude, **branch_style(curve.branch))
             off = deviation(curve.frequency, curve.frequency_band)
-            bottom.plot(amplitude, off, ".", color=colour, ms=4.0, mew=0)
+            bottom.plot(amplitude, off, **branch_style(curve.branch))
         _title(top, summary, case)
         top.set_xlabel(label("frequency", "Hz"))
         bottom.set_xlabel(label("amplitude", shown.unit))
@@ -80,14 +82,20 @@ def _damping(results: Results, summary: BackboneSummary, cases: Sequence[str]) -
             colour, t = BRANCH_COLOURS[curve.branch], curve.times
             low, _, high = 100 * curve.damping_band.T
             top.fill_between(t, low, high, color=colour, **_BAND)
-            top.plot(t, 100 * curve.damping_ratio, ".", color=colour, ms=4.0, mew=0)
+            top.plot(t, 100 * curve.damping_ratio, **branch_style(curve.branch))
             off = deviation(curve.damping_ratio, curve.damping_band)
-            bottom.plot(t, off, ".", color=colour, ms=4.0, mew=0)
+            bottom.plot(t, off, **branch_style(curve.branch))
         _title(top, summary, case)
         bottom.set_xlabel(label("time since the first sample", "s"))
     panels[0, 0].set_ylabel("damping ratio (%)")
     _finish(figure, panels, summary)
     return figure
+
+
+def branch_style(branch: str) -> dict[str, Any]:
+    """How the recorded points of a branch are drawn."""
+    colour, marker = BRANCH_COLOURS[branch], BRANCH_MARKERS[branch]
+    return {"ls": "", "marker": marker, "color": colour, "ms": 3.5, "mew": 0}
 
 
 def deviation(recorded: Array, band: Array) -> Array:
@@ -146,11 +154,9 @@ def _title(axis: Axes, summary: BackboneSummary, case: str) -> None:
 
 
 def _legend(figure: Figure, summary: BackboneSummary) -> None:
-    points = [
-        Line2D([], [], ls="", marker=".", color=BRANCH_COLOURS[b], label=f"recorded, {words}")
-        for b, words in BRANCH_WORDS.items()
-    ]
-    band = Patch(
-        color=GREY, alpha=0.4, lw=0, label=f"{100 * summary.probability:.0f} % of simulated"
-    )
-    figure.legend(handles=[*points, band], loc="outside upper right", ncols=3)
+    handles: list[Any] = [Line2D([], [], **branch_style(branch)) for branch in BRANCH_WORDS]
+    handles.append(tuple(Patch(color=BRANCH_COLOURS[b], **_BAND) for b in BRANCH_WORDS))
+    words = [f"recorded, {words}" for words in BRANCH_WORDS.values()]
+    words.append(f"{100 * summary.probability:.0f} % of simulated")
+    pairs = {tuple: HandlerTuple(ndivide=None, pad=0.0)}
+    figure.legend(handles, words, loc="outside upper right", ncols=3, handler_map=pairs)

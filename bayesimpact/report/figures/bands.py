@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bayesimpact.report.figures.backbone import (
-    BRANCH_COLOURS,
     BRANCH_WORDS,
+    branch_style,
     deviation,
     deviation_limit,
 )
@@ -56,5 +56,5 @@ def _swings(row: np.ndarray, summary: BackboneSummary, scale: float) -> None:
             (row[0], curve.amplitude * scale, curve.frequency, curve.frequency_band),
             (row[1], curve.times, curve.damping_ratio, curve.damping_band),
         ):
-            axis.plot(x, deviation(recorded, band), ".", color=BRANCH_COLOURS[curve.branch],
-                      ms=4.0, mew=0, label=BRANCH_WORDS[curve.branch])  # fmt: skip
+            style = branch_style(curve.branch)
+            axis.plot(x, deviation(recorded, band), label=BRANCH_WORDS[curve.branch], **style)

@@ -12,11 +12,13 @@ from bayesimpact.report.figures.gain import gain_figures
 from bayesimpact.report.figures.gaussian import gaussian_figures
 from bayesimpact.report.figures.improvement import improvement_figures
 from bayesimpact.report.figures.ranking import ranking_figures
+from bayesimpact.report.figures.story import story_figures
 from bayesimpact.report.results import Results
 
 Drawer = Callable[[Results], Mapping[str, Figure]]
 
 DRAWERS: tuple[Drawer, ...] = (
+    story_figures,
     force_figures,
     gain_figures,
     ranking_figures,

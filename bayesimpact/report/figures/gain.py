@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from bayesimpact.report.figures.style import AFTER, Array, new_figure, rows_axis, styled
 from bayesimpact.report.results import Results
 
-_ROW, _LEAST, _MOST = 0.22, 2.6, 8.0  # in
+_ROW, _LEAST, _MOST = 0.22, 3.2, 8.0  # in
 
 
 def gain_figures(results: Results) -> Mapping[str, Figure]:
@@ -26,7 +26,7 @@ def gain_figures(results: Results) -> Mapping[str, Figure]:
 def _figure(results: Results, arrays: Mapping[str, Array]) -> Figure:
     rows = len(results.recordings)
     impacts = arrays.get("impact_gain")
-    figure = new_figure(min(_MOST, max(_LEAST, _ROW * rows + 1.2)))
+    figure = new_figure(min(_MOST, max(_LEAST, _ROW * rows + 1.9)))
     ratios = [1.5, 0.8] if impacts is None else [1.5, 0.8, 1.2]
     panels = figure.subplots(1, len(ratios), width_ratios=ratios, squeeze=False)[0]
     _by_time(figure, panels[0], results, arrays["gain"])
@@ -47,7 +47,8 @@ def _by_time(figure: Figure, axis: Axes, results: Results, gain: Array) -> None:
     axis.grid(visible=False)
     axis.set_xlabel("time since the first sample (s)")
     axis.set_title("by recording and time", loc="left")
-    bar = figure.colorbar(mesh, ax=axis, pad=0.01, aspect=30)
+    # Beneath its own panel: beside it, the label reads as the next panel's.
+    bar = figure.colorbar(mesh, ax=axis, orientation="horizontal", pad=0.02, aspect=40)
     bar.set_label("gain in log likelihood (nats)")
     bar.outline.set_visible(False)  # type: ignore[operator]
 

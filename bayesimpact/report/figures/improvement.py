@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 
+from bayesimpact.report.diagnosis_view import gain_words
 from bayesimpact.report.figures.style import (
     AFTER,
     BEFORE,
@@ -24,7 +25,6 @@ from bayesimpact.report.figures.style import (
 )
 from bayesimpact.report.results import Results
 from bayesimpact.report.rows import Z90
-from bayesimpact.report.units import number
 
 NUISANCES = ("y0", "v0", "offset", "sigma")
 MOST = 16
@@ -109,11 +109,8 @@ def _held_out(axis: Axes, gain: Array, total: Mapping[str, Any]) -> None:
 
 
 def _total(gain: Mapping[str, Any]) -> str:
-    value, error = gain.get("value"), gain.get("se")
-    if value is None:
-        return "by recording"
-    spread = "" if error is None else f" ± {number(error, 0)}"
-    return f"{number(value, 0)}{spread} in all"
+    words = gain_words(gain)
+    return f"{words} in all" if words else "by recording"
 
 
 def shifts(parameters: Mapping[str, Any]) -> list[tuple[str, Array, Array, Array | None]]:

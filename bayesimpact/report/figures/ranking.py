@@ -9,16 +9,26 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from bayesimpact.report.figures.style import AFTER, BLACK, GREY, RED, new_figure, rows_axis, styled
+from bayesimpact.report.diagnosis_view import probability
+from bayesimpact.report.figures.style import (
+    AFTER,
+    BLACK,
+    GREY,
+    ORANGE,
+    RED,
+    new_figure,
+    rows_axis,
+    styled,
+)
 from bayesimpact.report.results import Results
-from bayesimpact.report.units import readable, significant, typeset
+from bayesimpact.report.units import quantity
 
 MOST = 12
 """Models shown; the base model always is."""
 FREE_FORCE = "one free force"
 _ROW, _FRAME = 0.24, 1.05  # in
 _LINEAR = 10.0  # nats; beyond that the axis is logarithmic
-_ANSWERS = {"present": RED, "negligible": GREY, "absent": AFTER, "cannot tell": RED}
+_ANSWERS = {"present": ORANGE, "negligible": GREY, "absent": AFTER, "cannot tell": ORANGE}
 
 
 def ranking_figures(results: Results) -> Mapping[str, Figure]:
@@ -87,7 +97,7 @@ def _ranking(
     rows_axis(axis, [" + ".join(e) or "base model" for e, _ in models], above=1.1)
     axis.set_xlabel("log odds behind the best model (nats)")
     axis.set_title("models tried, best first", loc="left")
-    _beside(axis, "probability", [_probability(float(w)) for w in weight])
+    _beside(axis, "probability", [probability(float(w)) for w in weight])
     return figure
 
 
@@ -95,15 +105,11 @@ def _beside(axis: Axes, title: str, cells: Sequence[str]) -> None:
     """A column of text on the right."""
     side = axis.secondary_yaxis("right")
     side.set_yticks(range(len(cells)), cells)
-    side.tick_params(length=0)
+    side.tick_params(length=0, pad=8)
     side.spines["right"].set_visible(False)
-    axis.set_title(title, loc="right")
-
-
-def _probability(p: float) -> str:
-    if p > 0.999:
-        return "> 0.999"
-    return "< 0.001" if p < 0.001 else f"{p:.3f}"
+    axis.annotate(
+        title, (1.0, 1.0), (8.0, 6.0), xycoords="axes fraction", textcoords="offset points"
+    )
 
 
 def _known(limit: Mapping[str, Any]) -> bool:
@@ -142,5 +148,4 @@ def _frame(axis: Axes, ordered: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _size(limit: Mapping[str, Any]) -> str:
-    shown = readable(str(limit["unit"]), limit["upper95"])
-    return f"{significant(limit['upper95'] * shown.scale, 2)} {typeset(shown.unit)}"
+    return quantity(float(limit["upper95"]), str(limit["unit"]))

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 
 from bayesimpact.data.period import rough_period
+from bayesimpact.report.cycles import stop_level
 from bayesimpact.report.figures.style import (
     GREY,
     MODEL,
@@ -30,7 +31,9 @@ MOST = 12
 """Recordings shown; a table in the report has all of them."""
 PER_PAGE = 3
 CLOSE_UP_CYCLES = 3.0
-_ROW, _TOP, _BOTTOM = 2.75, 0.55, 0.5  # in
+CLOSE_UP_MARGIN = 1.0  # on either side of an impact, in times in contact
+CLOSE_UP_SAMPLES = 10  # on either side, at least
+_ROW, _TOP, _BOTTOM = 2.15, 0.55, 0.5  # in; two figures of three recordings on a page of A4
 
 
 def shown_recordings(results: Results) -> tuple[RecordingResult, ...]:
@@ -66,9 +69,9 @@ def _page(results: Results, recordings: Sequence[RecordingResult]) -> Figure:
     height = _ROW * len(recordings) + _TOP + _BOTTOM
     figure = Figure(figsize=(WIDTH, height), dpi=150)
     # Placed by hand: a layout engine takes longer than all the drawing.
-    outer = GridSpec(len(recordings), 1, figure, hspace=0.25, left=0.075, right=0.978,
+    outer = GridSpec(len(recordings), 1, figure, hspace=0.25, left=0.08, right=0.978,
                      bottom=_BOTTOM / height, top=1 - _TOP / height)  # fmt: skip
-    period = _period(results)
+    limit = _residual_limit(results)
     for i, recording in enumerate(recordings):
         grid = outer[i].subgridspec(
             2, 2, height_ratios=[2.0, 1.0], width_ratios=[2.1, 1.0], hspace=0.12, wspace=0.09
@@ -79,19 +82,18 @@ def _page(results: Results, recordings: Sequence[RecordingResult]) -> Figure:
         near_below = figure.add_subplot(grid[1, 1], sharex=near, sharey=below)
         _motion(whole, results, recording, dots=False)
         _motion(near, results, recording, dots=True)
-        _residual(below, results, recording)
-        _residual(near_below, results, recording)
+        _residual(below, results, recording, limit)
+        _residual(near_below, results, recording, limit)
         for first, past in recording.excluded:
             for axis in (whole, below, near, near_below):
                 span = ((first - 1) * recording.interval, past * recording.interval)
                 axis.axvspan(*span, color=GREY, alpha=0.3, lw=0.8)
-        end = recording.times[-1]
-        close = min(end, _release(recording) + CLOSE_UP_CYCLES * period)
-        whole.set_xlim(0, end)
-        near.set_xlim(max(0.0, close - CLOSE_UP_CYCLES * period), close)
+        start, end, words = close_up(results, recording)
+        whole.set_xlim(0, recording.times[-1])
+        near.set_xlim(start, end)
         case = f", case {recording.case}" if recording.case else ""
         whole.set_title(f"{recording.name}{case}", loc="left", fontweight="bold")
-        near.set_title("close-up", loc="left")
+        near.set_title(f"close-up: {words}", loc="left")
         for axis in (whole, near):
             axis.tick_params(labelbottom=False)
         if i == len(recordings) - 1:
@@ -125,49 +127,59 @@ def _period(results: Results) -> float:
     return float(np.median(known)) if known else longest / CLOSE_UP_CYCLES
 
 
-def _gap(results: Results, recording: RecordingResult) -> float:
-    """From true rest to the stop, m: the recording's own gap where an effect gives it one; NaN
-    where there is none.
-    """
-    own = f".g[{recording.name}]"
-    for row in results.rows:
-        if row.name == "g" or row.name.endswith(own):
-            return row.median
-    return float("nan")
-
-
 def _release(recording: RecordingResult) -> float:
     """When the motion is largest first, s: earlier samples are of less interest."""
     size = np.abs(recording.predicted - recording.predicted.mean())
     return float(recording.times[int(np.argmax(size > 0.9 * size.max()))])
 
 
+def close_up(results: Results, recording: RecordingResult) -> tuple[float, float, str]:
+    """Start and end of the close-up, s, and what it shows: the deepest impact, or first cycles."""
+    level, t = stop_level(results, recording), recording.times
+    deepest = int(np.argmax(recording.predicted))
+    if level is None or not recording.predicted[deepest] >= level:
+        close = min(float(t[-1]), _release(recording) + CLOSE_UP_CYCLES * _period(results))
+        return max(0.0, close - CLOSE_UP_CYCLES * _period(results)), close, "first cycles"
+    free = np.flatnonzero(recording.predicted < level)
+    first = int(np.max(free[free < deepest], initial=0))
+    last = int(np.min(free[free > deepest], initial=t.size - 1))
+    margin = max(CLOSE_UP_SAMPLES, round(CLOSE_UP_MARGIN * (last - first)))
+    ends = max(first - margin, 0), min(last + margin, t.size - 1)
+    return float(t[ends[0]]), float(t[ends[1]]), "deepest impact"
+
+
+def _residual_limit(results: Results) -> float:
+    """One scale for the residuals of all figures, m."""
+    shown = shown_recordings(results)
+    sizes = [float(np.max(np.abs(r.residual), initial=0.0)) for r in shown]
+    sizes += [2.2 * r.noise_rms for r in shown]
+    return 1.08 * max((size for size in sizes if np.isfinite(size)), default=0.0)
+
+
 def _motion(axis: Axes, results: Results, recording: RecordingResult, *, dots: bool) -> None:
     shown = response(results)
     t, y, fit = recording.times, recording.samples * shown.scale, recording.predicted * shown.scale
+    # The recording is the wider of the two lines, or circles about the model's: both are seen.
     if dots:
-        axis.plot(t, y, ".", color=RECORDED, ms=4.5, mew=0, label="recorded", rasterized=True)
+        axis.plot(t, y, "o", mfc="none", mec=RECORDED, ms=4.5, mew=0.9, label="recorded",
+                  rasterized=True)  # fmt: skip
     else:
-        axis.plot(*polyline(t, y), ".", color=RECORDED, ms=2.0, mew=0, rasterized=True)
+        axis.plot(*polyline(t, y), color=RECORDED, lw=2.6, rasterized=True)
     axis.plot(*polyline(t, fit), color=MODEL, lw=0.8, label="model at the mode")
-    gap = _gap(results, recording)
-    if results.stop and np.isfinite(gap):
-        level = gap + results.row(f"offset[{recording.name}]").median
+    level = stop_level(results, recording)
+    if level is not None:
         axis.axhline(level * shown.scale, color=GREY, lw=0.8, ls=(0, (4, 3)), label="stop")
-    axis.set_ylabel(label(response_word(results), shown.unit))
+    axis.set_ylabel(label(f"{response_word(results)}\n", shown.unit).replace("\n ", "\n"))
     axis.grid(axis="y")
 
 
-def _residual(axis: Axes, results: Results, recording: RecordingResult) -> None:
-    sizes = [x for x in (recording.rms, recording.noise_rms) if np.isfinite(x)]
-    shown = display(results.unit, max(sizes, default=0.0))
+def _residual(axis: Axes, results: Results, recording: RecordingResult, limit: float) -> None:
+    shown = display(results.unit, max(results.rms, results.noise.level))
     r = recording.residual * shown.scale
     axis.plot(*polyline(recording.times, r), color="#555555", lw=0.45, rasterized=True)
     band = 2 * recording.noise_rms * shown.scale
     for level in (-band, band):
         axis.axhline(level, color=ORANGE, lw=0.9, label="± 2 standard deviations of the noise")
-    largest = float(np.max(np.abs(r[np.isfinite(r)]), initial=0.0))
-    limit = 1.08 * max(largest, 1.1 * band)
     if 0 < limit < np.inf:
-        axis.set_ylim(-limit, limit)
-    axis.set_ylabel(label("residual", shown.unit))
+        axis.set_ylim(-limit * shown.scale, limit * shown.scale)
+    axis.set_ylabel(label("residual\n", shown.unit).replace("\n ", "\n"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from bayesimpact.report.figures.style import BLUE, ORANGE, RED, new_figure, styled
+from bayesimpact.report.figures.style import BLUE, ORANGE, new_figure, styled
 from bayesimpact.report.results import Array, SearchSummary
 
 
@@ -22,7 +22,7 @@ def search_figure(search: SearchSummary) -> Figure:
     right.plot(
         n, _positive(search.spread), color=BLUE, label="standard deviation of the population"
     )
-    right.plot(n, _positive(search.temperature), color=RED, label="temperature")
+    right.plot(n, _positive(search.temperature), color=ORANGE, ls="--", label="temperature")
     right.set_ylabel("objective (nats)")
     for axis in (left, right):
         axis.set_yscale("log")

@@ -26,7 +26,7 @@ YELLOW, BLUE, RED, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
 GREY = "#8A8A8A"
 RECORDED, MODEL = SKY, RED
 BEFORE, AFTER = ORANGE, BLUE
-CYCLE = (BLUE, RED, GREEN, PURPLE, ORANGE, SKY, BLACK)
+CYCLE = (BLUE, ORANGE, GREEN, PURPLE, RED, SKY, BLACK)
 
 WIDTH = 10.0
 """Width of a figure, in."""
@@ -138,6 +138,12 @@ def symbol(name: str) -> str:
     else:
         base = f"${base}$" if len(base) == 1 else base
     return f"{base}[{key}]" if key else base
+
+
+def full_symbol(name: str) -> str:
+    """`symbol`, with the effect that an added parameter belongs to: "gap wear: step"."""
+    effect, dot, _ = name.partition("[")[0].partition(".")
+    return f"{effect.replace('_', ' ')}: {symbol(name)}" if dot else symbol(name)
 
 
 @dataclass(frozen=True)

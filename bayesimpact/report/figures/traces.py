@@ -5,7 +5,15 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from bayesimpact.report.figures.style import CYCLE, WIDTH, new_figure, scaled, styled
+from bayesimpact.report.figures.style import (
+    CYCLE,
+    WIDTH,
+    full_symbol,
+    new_figure,
+    scaled,
+    styled,
+    symbol,
+)
 from bayesimpact.report.results import SamplerSummary
 from bayesimpact.report.units import typeset
 
@@ -30,7 +38,8 @@ def trace_figure(sampler: SamplerSummary) -> Figure:
             axis.plot(sampler.trace_steps, shown(draws[e]), color=CYCLE[e % len(CYCLE)],
                       lw=0.45, alpha=0.6, rasterized=True)  # fmt: skip
         unit = typeset(shown.unit)
-        title = shown.quantity + (f", in {unit}" if unit else "")
+        effect = full_symbol(names[k]).removesuffix(symbol(names[k]))
+        title = effect + shown.quantity + (f", in {unit}" if unit else "")
         axis.set_title(title, loc="left", fontsize=8.0)
         axis.set_xlim(0, max(float(sampler.trace_steps[-1]), 1.0))
         axis.tick_params(labelbottom=k >= len(names) - columns)

@@ -1,0 +1,142 @@
+"""The interactive part of report.html: its data, compactly, and its one script.
+
+Everything is inside the page: recordings as base64 of 32-bit floats, residuals and forces as 16-bit
+integers with a scale, the plotting library and the page's own script as one inline block that is
+the same in every report (so that its hash can be named in a content security policy).
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bayesimpact.report.cycles import before_predicted, stop_level, telling_cycle, touches
+from bayesimpact.report.figures.force_map import force_unit
+from bayesimpact.report.figures.recordings import shown_recordings
+from bayesimpact.report.figures.style import response
+from bayesimpact.report.force_in_time import force_in_time
+from bayesimpact.report.results import Array, Results
+from bayesimpact.report.rows import Z90
+from bayesimpact.report.units import display, typeset
+
+FOLDER = Path(__file__).parent / "template"
+LIBRARY = FOLDER / "vendor" / "uPlot-1.6.32.iife.min.js"
+LIBRARY_STYLE = FOLDER / "vendor" / "uPlot-1.6.32.min.css"
+LICENCE = FOLDER / "vendor" / "uPlot-LICENSE.txt"
+MOST_SAMPLES = 120_000
+"""Samples in the page, 16 bytes each as base64: 1.9 MB of the 6 MB that a report may have."""
+_INTEGERS = 32767
+
+
+@cache
+def script() -> str:
+    """The one inline script: library with its licence, then the explorer. The same in all pages."""
+    library = LIBRARY.read_text(encoding="utf-8").partition("\n")[2]  # the first line is an address
+    licence = LICENCE.read_text(encoding="utf-8").strip()
+    own = (FOLDER / "explorer.js").read_text(encoding="utf-8")
+    return f"/* uPlot 1.6.32\n{licence}\n*/\n{library}\n{own}"
+
+
+@cache
+def style() -> str:
+    """Style of the plotting library."""
+    return LIBRARY_STYLE.read_text(encoding="utf-8").strip()
+
+
+def explorer_words(results: Results) -> str:
+    """What is in the explorer, where that is not everything."""
+    shown, most = _extent(results)
+    words = []
+    if len(shown) < len(results.recordings):
+        words.append(
+            f"{len(shown)} of {len(results.recordings)} recordings are here: those of every case "
+            "that fit worst."
+        )
+    if any(results.recordings[r].samples.size > most for r in shown):
+        words.append(f"Of each recording the first {most} samples are here.")
+    return " ".join(words)
+
+
+def explorer_data(results: Results) -> str:
+    """Content of the page's data block: JSON that holds no "<"."""
+    shown, most = _extent(results)
+    before = before_predicted(results)
+    best = telling_cycle(results)
+    force = force_unit(results, results.diagnosis_arrays) if _has_force(results) else None
+    residual = display(results.unit, max(results.rms, results.noise.level))
+    content: dict[str, Any] = {
+        "word": "angle" if results.quantity == "angle" else "displacement",
+        "unit": typeset(response(results).unit),
+        "residualUnit": typeset(residual.unit),
+        "forceUnit": "" if force is None else typeset(force.unit),
+        "models": ["model"] if before is None else ["base model", "with what was added"],
+        "first": 0 if best is None or best.recording not in shown else shown.index(best.recording),
+        "recordings": [],
+    }
+    for r in shown:
+        recording, size = results.recordings[r], min(results.recordings[r].samples.size, most)
+        level = stop_level(results, recording)
+        old = None if before is None else before[r]
+        item: dict[str, Any] = {
+            "name": recording.name,
+            "case": recording.case,
+            "interval": recording.interval,
+            "level": None if level is None else level * response(results).scale,
+            "noise": _number(recording.noise_rms * residual.scale),
+            "impacts": [] if level is None else touches(recording, level).tolist(),
+            "best": best.first if best is not None and best.recording == r else None,
+            "samples": _floats(recording.samples[:size] * response(results).scale),
+            "residuals": [
+                _integers((recording.samples - model)[:size] * residual.scale)
+                for model in ([recording.predicted] if old is None else [old, recording.predicted])
+            ],
+            "toUnit": response(results).scale / residual.scale,
+        }
+        found = force_in_time(results, r, recording.predicted if old is None else old)
+        if found is not None and force is not None:
+            mean, sd = found
+            item["force"] = _integers(mean[:size] * force.scale)
+            item["forceBand"] = _integers(Z90 * sd[:size] * force.scale)
+        content["recordings"].append(item)
+    text = json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c")
+
+
+def _has_force(results: Results) -> bool:
+    return "force_y" in results.diagnosis_arrays
+
+
+def _extent(results: Results) -> tuple[list[int], int]:
+    """Positions of the recordings that are shown, and most samples of each."""
+    shown = list(range(len(results.recordings)))
+    if sum(r.samples.size for r in results.recordings) > MOST_SAMPLES:
+        names = {r.name for r in shown_recordings(results)}
+        shown = [i for i, r in enumerate(results.recordings) if r.name in names]
+    sizes = sorted(results.recordings[i].samples.size for i in shown)
+    most, left = MOST_SAMPLES, MOST_SAMPLES
+    for k, size in enumerate(sizes):  # short ones are whole, the others share what is left
+        most = left // (len(sizes) - k)
+        left -= min(size, most)
+    return shown, max(most, 2)
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _floats(values: Array) -> str:
+    return base64.b64encode(values.astype("<f4").tobytes()).decode("ascii")
+
+
+def _integers(values: Array) -> dict[str, Any]:
+    """16-bit integers, and what one is worth; the lowest stands for what is not finite."""
+    known = np.isfinite(values)
+    scale = float(np.max(np.abs(values[known]), initial=0.0)) / _INTEGERS or 1.0
+    integers = np.where(known, np.round(np.where(known, values, 0.0) / scale), -_INTEGERS - 1)
+    data = base64.b64encode(integers.astype("<i2").tobytes())
+    return {"scale": scale, "data": data.decode("ascii")}

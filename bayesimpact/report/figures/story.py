@@ -1,0 +1,120 @@
+"""The finding in one picture: a cycle in which it shows, both models, and the missing force."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from bayesimpact.report.cycles import Cycle, before_predicted, stop_level, telling_cycle
+from bayesimpact.report.figures.force_map import force_unit
+from bayesimpact.report.figures.style import (
+    AFTER,
+    BEFORE,
+    GREY,
+    SKY,
+    Array,
+    label,
+    new_figure,
+    response,
+    response_word,
+    styled,
+)
+from bayesimpact.report.force_in_time import force_in_time
+from bayesimpact.report.results import Results
+from bayesimpact.report.rows import Z90
+from bayesimpact.report.units import display, number
+
+_CONTACT = "#ECECEC"
+_MARGIN = 0.25  # of the cycle, before it
+
+
+def story_figures(results: Results) -> Mapping[str, Figure]:
+    """The picture of the first page; nothing where nothing was added to the base model."""
+    before, cycle = before_predicted(results), telling_cycle(results)
+    if before is None or cycle is None or (results.diagnosis or {}).get("verdict") == "adequate":
+        return {}
+    return {"story": _figure(results, cycle, before[cycle.recording])}
+
+
+def best_gain(results: Results) -> str:
+    """Recording and impact of the picture, in words."""
+    cycle = telling_cycle(results)
+    if cycle is None:
+        return ""
+    recording = results.recordings[cycle.recording]
+    word = "cycle" if stop_level(results, recording) is None else "impact"
+    return f"{recording.name}, {word} {cycle.number}"
+
+
+@styled
+def _figure(results: Results, cycle: Cycle, before: Array) -> Figure:
+    recording = results.recordings[cycle.recording]
+    first = max(0, cycle.first - round(_MARGIN * (cycle.last - cycle.first)))
+    part = slice(first, cycle.last + 1)
+    force = force_in_time(results, cycle.recording, before)
+    rows = 2 if force is None else 3
+    figure = new_figure(1.85 * rows + 0.6)
+    panels = figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
+    t = recording.times[part]
+    for axis in panels:
+        if cycle.leave > cycle.first:
+            ends = recording.times[[cycle.first, cycle.leave]]
+            axis.axvspan(*ends, color=_CONTACT, lw=0, zorder=0)
+        axis.grid(axis="y")
+    _motion(panels[0], results, t, recording.samples[part], before[part],
+            recording.predicted[part])  # fmt: skip
+    _difference(panels[1], results, t, recording.samples[part] - before[part],
+                recording.predicted[part] - before[part])  # fmt: skip
+    if force is not None:
+        _force(panels[2], results, t, force[0][part], force[1][part])
+    panels[-1].set_xlabel(label("time since the first sample", "s"))
+    panels[0].set_title(
+        f"{best_gain(results)}: the extended model gains {number(cycle.gain, 1)} nats here",
+        loc="left",
+    )
+    panels[0].set_xlim(t[0], t[-1])
+    return figure
+
+
+def _legend(axis: Axes) -> None:
+    """Above the panel, clear of the data."""
+    axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, borderaxespad=0.1)
+
+
+def _motion(
+    axis: Axes, results: Results, t: Array, samples: Array, before: Array, after: Array
+) -> None:
+    shown = response(results)
+    axis.plot(t, samples * shown.scale, "o", mfc="none", mec=SKY, ms=5, label="recorded")
+    axis.plot(t, before * shown.scale, color=BEFORE, lw=2.4, label="base model")
+    axis.plot(t, after * shown.scale, color=AFTER, lw=1.0, label="with what was added")
+    axis.set_ylabel(label(f"{response_word(results)}\n", shown.unit).replace("\n ", "\n"))
+    _legend(axis)
+
+
+def _difference(axis: Axes, results: Results, t: Array, samples: Array, after: Array) -> None:
+    """Both relative to the base model: what was added has to pass through the recorded points."""
+    shown = display(results.unit, max(results.rms, results.noise.level))
+    axis.plot(t, samples * shown.scale, "o", color=SKY, ms=3.5, mew=0, label="recorded")
+    width = max(3, 2 * (t.size // 24) + 1)
+    mean = np.convolve(samples, np.full(width, 1 / width), "valid") * shown.scale
+    inside = slice(width // 2, width // 2 + mean.size)
+    axis.plot(t[inside], mean, color=GREY, lw=1.0, ls=(0, (4, 2)),
+              label=f"recorded, mean of {width} samples")  # fmt: skip
+    axis.plot(t, after * shown.scale, color=AFTER, lw=1.8, label="with what was added")
+    axis.axhline(0.0, color=BEFORE, lw=1.8, label="base model")
+    axis.set_ylabel(label("minus the base\nmodel", shown.unit))
+    _legend(axis)
+
+
+def _force(axis: Axes, results: Results, t: Array, mean: Array, sd: Array) -> None:
+    unit = force_unit(results, results.diagnosis_arrays)
+    low, high = ((mean + sign * Z90 * sd) * unit.scale for sign in (-1, 1))
+    axis.fill_between(t, low, high, color=BEFORE, alpha=0.3, lw=0, label="90 % band")
+    axis.plot(t, mean * unit.scale, color=BEFORE, lw=1.4, label="posterior mean")
+    axis.axhline(0.0, color=GREY, lw=0.6)
+    axis.set_ylabel(label("missing force\n", unit.unit).replace("\n ", "\n"))
+    _legend(axis)

@@ -1,0 +1,36 @@
+"""The force that the base model leaves unexplained, along the recorded motion."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bayesimpact.report.results import Array, Results
+
+
+def force_in_time(results: Results, r: int, predicted: Array) -> tuple[Array, Array] | None:
+    """Posterior mean and standard deviation (n,) of the unexplained force, N.
+
+    The force is a(y) + b(y) v (see `force_arrays`), taken where the motion is.
+
+    Parameters
+    ----------
+    r : the recording
+    predicted : (n,) reading of the model whose motion it is, m
+
+    Returns
+    -------
+    None where the results hold no force
+    """
+    arrays = results.diagnosis_arrays
+    if "force_y" not in arrays:
+        return None
+    recording = results.recordings[r]
+    known = {row.name: row.median for row in results.rows}
+    y = predicted - known.get(f"offset[{recording.name}]", 0.0)
+    v = np.gradient(y, recording.interval)
+    a, b, a_sd, b_sd, ab = (
+        np.interp(y, arrays["force_y"], arrays[f"force_{key}"])
+        for key in ("a", "b", "a_sd", "b_sd", "ab")
+    )
+    variance = a_sd**2 + (b_sd * v) ** 2 + 2 * v * ab
+    return a + b * v, np.sqrt(np.maximum(variance, 0.0))

@@ -1,0 +1,125 @@
+"""Tables for a paper's supplement: LaTeX with booktabs, nothing else needed."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from bayesimpact.report.diagnosis_view import NUISANCES
+from bayesimpact.report.results import Results, Row
+from bayesimpact.report.units import MINUS, decimals, number, percent, quantity, readable
+
+_SPECIAL = {c: f"\\{c}" for c in "&%$#_{}"} | {
+    "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
+}  # fmt: skip
+_TYPESET = {
+    MINUS: "$-$", "×": r"$\times$", "µ": r"$\mu$", "χ": r"$\chi$", "±": r"$\pm$", "–": "--",
+    "\N{NO-BREAK SPACE}": "~", "\N{NARROW NO-BREAK SPACE}": r"\,", "<": "$<$", ">": "$>$",
+}  # fmt: skip
+_RAISED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+_SUPERSCRIPTS = re.compile("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+")
+
+
+def latex_tables(results: Results) -> str:
+    """Parameters, and of a diagnosis both models and the limits of what was not found."""
+    blocks = [_parameters(results)]
+    diagnosis = results.diagnosis or {}
+    if diagnosis.get("verdict") not in (None, "adequate"):
+        blocks.append(_models(diagnosis))
+    limits = [x for x in diagnosis.get("limits", ()) if x.get("upper95") is not None]
+    if limits:
+        blocks.append(_limits(limits))
+    head = f"% {escaped(results.name)}: tables by bayesimpact; needs \\usepackage{{booktabs}}\n"
+    return head + "\n".join(block for block in blocks if block)
+
+
+def escaped(text: str) -> str:
+    """Any text as LaTeX: special characters escaped, signs and superscripts as mathematics."""
+    text = _SUPERSCRIPTS.sub(lambda m: f"\0{m[0].translate(_RAISED)}\1", text)
+    text = "".join(_SPECIAL.get(c) or _TYPESET.get(c, c) for c in text)
+    return text.replace("\0", "$^{").replace("\1", "}$")
+
+
+def symbol(name: str) -> str:
+    """A parameter's name: "k2[1]" becomes "$k_{2}$[1]"."""
+    base, bracket, key = name.partition("[")
+    if "." in base:
+        words = base.replace("_", " ").replace(".", ": ")
+    elif base[-1].isdigit():
+        words = f"${base[:-1]}_{{{base[-1]}}}$"
+    else:
+        words = f"${base}$" if len(base) == 1 else base
+    plain = words if words.startswith("$") else escaped(words)
+    return plain + escaped(bracket + key)
+
+
+def _table(caption: str, columns: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    body = "\n".join(f"{' & '.join(row)} \\\\" for row in rows)
+    return (
+        f"\\begin{{table}}\n\\caption{{{caption}}}\n\\begin{{tabular}}{{{columns}}}\n\\toprule\n"
+        f"{' & '.join(head)} \\\\\n\\midrule\n{body}\n\\bottomrule\n\\end{{tabular}}\n"
+        "\\end{table}\n"
+    )
+
+
+def _parameters(results: Results) -> str:
+    centre = "median" if results.kind == "posterior" else "mode"
+    rows = [_row(row) for row in results.select("physical", "effect")]
+    caption = f"Parameters of {escaped(results.name)}: {centre} and 90\\,\\% interval."
+    return _table(caption, "lrll", ("parameter", centre, r"90\,\% interval", "unit"), rows)
+
+
+def _row(row: Row) -> tuple[str, ...]:
+    return (symbol(row.name), *_cells(row.unit, row.median, row.ci90))
+
+
+def _cells(unit: str, median: float, ends: Sequence[float]) -> tuple[str, str, str]:
+    low, high = ends
+    shown = readable(unit, max(abs(median), 0.5 * (high - low)))
+    places = decimals(0.5 * (high - low) * shown.scale)
+    numbers = [escaped(number(x * shown.scale, places)) for x in (median, low, high)]
+    printed = escaped(quantity(1.0 / shown.scale, unit).partition("\N{NO-BREAK SPACE}")[2])
+    return numbers[0], f"{numbers[1]} to {numbers[2]}", printed
+
+
+def _models(diagnosis: Mapping[str, Any]) -> str:
+    both = diagnosis.get("parameters") or {}
+    before, after = both.get("before", {}), both.get("after", {})
+    rows = []
+    for name, old in before.items():
+        if name not in after or name.partition("[")[0] in NUISANCES:
+            continue
+        new = after[name]
+        first, second = (_cells(x["unit"], x["median"], x["ci90"]) for x in (old, new))
+        change = percent(new["median"] / old["median"] - 1) if old["median"] else "–"
+        rows.append((symbol(name), *first[:2], *second, escaped(change)))
+    if not rows:
+        return ""
+    ids = ", ".join(r"\texttt{" + escaped(e["id"]) + "}" for e in diagnosis.get("effects", ()))
+    caption = "Parameters of the base model and with what was added" + (
+        f" ({ids})." if ids else "."
+    )
+    head = (
+        "parameter",
+        "base",
+        r"90\,\% interval",
+        "extended",
+        r"90\,\% interval",
+        "unit",
+        "change",
+    )
+    return _table(caption, "lrlrllr", head, rows)
+
+
+def _limits(limits: Sequence[Mapping[str, Any]]) -> str:
+    rows = [
+        (
+            r"\texttt{" + escaped(str(x["id"])) + "}",
+            escaped(str(x.get("parameter", "")).replace("_", " ")),
+            escaped(quantity(float(x["upper95"]), str(x.get("unit", "")))),
+        )
+        for x in limits
+    ]
+    caption = r"Effects that were not found: 95\,\% upper limits of their sizes."
+    return _table(caption, "llr", ("effect", "parameter", "upper limit"), rows)
