@@ -48,10 +48,10 @@ def campaign_from_arrays(
     document = {"name": name, "mass_kg": mass, **tables}
     document = {key: _plain(value) for key, value in document.items()} | {"recording": plain}
     table = parse_campaign(document, door)
-    remaining = iter(given)
+    by_name = {entry["name"]: entry for entry in given}
 
     def read(entry: RecordingTable, where: str) -> tuple[str, Table]:
-        samples = _samples(where, entry, next(remaining))
+        samples = _samples(where, entry, by_name[str(entry.name)])
         _check_speed(where, samples)
         return where, samples
 
