@@ -14,13 +14,14 @@ from bayesimpact.diagnosis.intervals import Intervals, intervals
 from bayesimpact.diagnosis.limits import PRACTICAL, Limit
 from bayesimpact.diagnosis.locate import Location
 from bayesimpact.diagnosis.loop import Diagnosis
+from bayesimpact.diagnosis.recording_faults import as_effects, fault_entries, in_words, place
 from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.remainder import Remainder, remainder
 from bayesimpact.diagnosis.size import size, size_in_words, yardstick
 from bayesimpact.diagnosis.smoothing import filter_parameters, filter_words
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.diagnosis.whiteness import whiteness_p
-from bayesimpact.diagnosis.words import parameter_shifts, remaining, statement, summary
+from bayesimpact.diagnosis.words import failure, parameter_shifts, remaining, statement, summary
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect
 from bayesimpact.model.parameters import angular, bare_name, is_added
@@ -55,11 +56,13 @@ def document(
     before = _parameters(d.before, intervals(d.before), draws_before)
     after = _parameters(d.after, d.intervals, draws_after if d.remains is None else None)
     statements = tuple(_statement(d, e) for e in d.effects)
+    faulty = d.corrected.faults if d.corrected else ()
     alternatives = tuple(" + ".join(c.ids) or "nothing at all" for c in d.alternatives)
     return {
         "schema": "bayesimpact/diagnosis/2",
         "verdict": d.verdict,
-        "summary": summary(
+        "summary": failure(d.identification.fit)
+        + summary(
             d.verdict,
             d.effects,
             statements,
@@ -68,15 +71,16 @@ def document(
             parameter_shifts(before, after) if d.verdict != "adequate" else {},
             _detectable(d),
             remaining(left, angle=angle),
+            faults=in_words(faulty),
             angle=angle,
             drifts=d.naming.unknown.reach > 0,
         ),
-        "location": _location(d.location),
+        "location": _location(d.location) or (place(faulty) if faulty else None),
+        "faults": fault_entries(d.corrected) if d.corrected else [],
         "remainder": _remainder(left),
         "formulas": [],
-        "effects": [
-            _effect(d, e, text, after) for e, text in zip(d.effects, statements, strict=True)
-        ],
+        "effects": (as_effects(d.corrected) if d.corrected else [])
+        + [_effect(d, e, text, after) for e, text in zip(d.effects, statements, strict=True)],
         "alternatives": [_alternative(d, c) for c in _others(d)],
         "fit": _fit(d),
         "parameters": {"before": before, "after": after},

@@ -268,9 +268,9 @@ def basis_responses(fit: Fit, effect: Effect, knots: int, scales: Scales) -> tup
 def whitened_one(fit: Fit, r: int, values: Array, sigma: Array) -> Array:
     """Filtered, whitened signals (k, n) of one recording in units of the noise."""
     oscillator, noise = fit.target.oscillator, fit.target.likelihood.noise
-    interval = oscillator.campaign.recordings[r].interval
-    filtered = smooth(values, oscillator.smoothing, interval)
-    return np.asarray(noise.whiten(filtered, interval) / sigma[r])
+    recording = oscillator.campaign.recordings[r]
+    filtered = smooth(values, oscillator.smoothing, recording.interval)
+    return np.asarray(noise.whiten(filtered, recording.interval, recording.used) / sigma[r])
 
 
 def _with_law(oscillator: Oscillator, effect: Effect) -> NDArray[np.int64]:

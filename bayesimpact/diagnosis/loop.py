@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +18,7 @@ from bayesimpact.diagnosis.limits import Limit, limits
 from bayesimpact.diagnosis.locate import Location, locate, locate_effect
 from bayesimpact.diagnosis.name import name
 from bayesimpact.diagnosis.naming import Naming, State, is_large
+from bayesimpact.diagnosis.recording_faults import Corrected, corrected_campaign
 from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.smoothing import SAVITZKY_GOLAY, proved_smoothing, whole_campaign
 from bayesimpact.diagnosis.unknown import with_force
@@ -30,6 +31,14 @@ from bayesimpact.model.threads import linear_algebra_alone
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
+BESIDE: Mapping[Verdict, Verdict] = {
+    "adequate": "named",
+    "named": "named",
+    "partly": "partly",
+    "ambiguous": "ambiguous",
+    "unknown": "partly",
+}
+"""Verdicts where a fault of a recording or a filter has been named already."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +63,7 @@ class Diagnosis:
     remains : what is left beside the effects, examined; None where that is noise
     scales : physical sizes of the campaign
     filtered : the filter that the noise spectrum proves and campaign.toml does not declare
+    corrected : faults of the recordings, set aside or corrected before anything else
     """
 
     verdict: Verdict
@@ -73,6 +83,7 @@ class Diagnosis:
     remains: State | None
     scales: Scales
     filtered: Fingerprint | None = None
+    corrected: Corrected | None = None
 
 
 @linear_algebra_alone()
@@ -100,25 +111,32 @@ def diagnose(
     """
     say = progress or (lambda message: None)
     say("fitting the base model")
-    identification = identify(campaign, rng=rng, search=search)
+    corrected = corrected_campaign(campaign, rng=rng, search=search)
+    for fault in corrected.faults:
+        say(f"set aside or corrected: {fault.recording}: {fault.statement} ({fault.id})")
+    identification = corrected.identification
+    campaign = identification.fit.target.oscillator.campaign
     filtered = proved_smoothing(campaign)
     if filtered is None:
-        return diagnose_fit(identification, rng=rng, effects=effects, progress=say)
-    say("the noise spectrum proves a filter: fitting through it")
-    measurement = replace(campaign.measurement, smoothing=filtered.smoothing)
-    through = identify(replace(campaign, measurement=measurement), rng=rng, search=False)
-    found = diagnose_fit(through, rng=rng, effects=effects, progress=say)
-    return with_smoothing(found, identification, filtered)
+        found = diagnose_fit(identification, rng=rng, effects=effects, progress=say)
+    else:
+        say("the noise spectrum proves a filter: fitting through it")
+        measurement = replace(campaign.measurement, smoothing=filtered.smoothing)
+        through = identify(replace(campaign, measurement=measurement), rng=rng, search=False)
+        found = diagnose_fit(through, rng=rng, effects=effects, progress=say)
+        found = with_smoothing(found, identification, filtered)
+    if not corrected.faults:
+        return replace(found, corrected=corrected)
+    return replace(found, verdict=BESIDE[found.verdict], corrected=corrected)
 
 
 def with_smoothing(
     found: Diagnosis, identification: Identification, filtered: Fingerprint
 ) -> Diagnosis:
     """The diagnosis made through the filter, told from the fit that knew nothing of it."""
-    verdicts: dict[Verdict, Verdict] = {"adequate": "named", "unknown": "partly"}
     return replace(
         found,
-        verdict=verdicts.get(found.verdict, found.verdict),
+        verdict=BESIDE[found.verdict],
         identification=replace(found.identification, search=identification.search),
         before=identification.fit,
         effects=(SAVITZKY_GOLAY, *found.effects),

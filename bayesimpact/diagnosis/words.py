@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from bayesimpact.diagnosis.faults.compare import base_failed
 from bayesimpact.diagnosis.locate import Location
 from bayesimpact.diagnosis.remainder import Remainder
 from bayesimpact.diagnosis.size import amount, two_digits
+from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect
 
 SHARED = ("k2", "k1", "c1", "c2", "g")
@@ -58,6 +60,17 @@ def remaining(left: Remainder | None, *, angle: bool = False) -> str:
     )
 
 
+def failure(fit: Fit) -> str:
+    """A sentence where the base model leaves more than half of the signal; else empty."""
+    if not base_failed(fit):
+        return ""
+    return (
+        "The base fit failed: it leaves more than half of the signal. Likely reasons are a wrong "
+        "sign, unit or clock of the recordings, a stop that is not there or not declared, or "
+        "strong physics outside the base model. "
+    )
+
+
 def _moved(shifts: Mapping[str, float]) -> str:
     """What ignoring the missing physics did to the stiffest parameter, in per cent."""
     chosen = [n for n in shifts if n.startswith("k2")] or list(shifts)
@@ -79,17 +92,20 @@ def summary(
     detectable: str,
     remains: str = "",
     *,
+    faults: str = "",
     angle: bool = False,
     drifts: bool = False,
 ) -> str:
-    """One paragraph; `remains` says what is left beside the named effects.
+    """One paragraph; `remains` says what is left beside the named effects, `faults` what was wrong
+    with recordings.
 
     `drifts`: the likelier unknown force changes with time.
     """
     if verdict == "adequate":
         found = "Nothing is missing: the base model describes the recordings down to the noise."
         return f"{found} {detectable}".strip()
-    assert location is not None
+    if location is None:
+        return f"Nothing is missing beside faults of the recordings:{faults} {detectable}".strip()
     place, cost = _REGIMES[location.regime], _moved(shifts)
     if verdict == "unknown":
         scale, length, force = (1.0, "rad", "N m") if angle else (1e3, "mm", "N")
@@ -98,19 +114,19 @@ def summary(
         return (
             f"Something is missing that the catalogue does not hold. It acts {place}, mostly "
             f"between {low:.2f} and {high:.2f} {length}, with {location.force_rms:.2g} {force} "
-            f"rms.{slowly}{cost}{remains}"
+            f"rms.{slowly}{cost}{remains}{faults}"
         )
     titles = " and ".join(e.title for e in effects)
     if verdict == "ambiguous":
         others = ", ".join(alternatives)
         return (
             f"Something is missing {place}; the likeliest is {titles}, but the recordings cannot "
-            f"tell it from {others}.{cost}"
+            f"tell it from {others}.{cost}{faults}"
         )
     if verdict == "partly":
         needed = "is needed" if len(effects) == 1 else "are needed"
         return (
             f"{titles[0].upper()}{titles[1:]} {needed} by every likely model, but something else "
-            f"is missing too. {' '.join(statements)}{cost}{remains}"
+            f"is missing too. {' '.join(statements)}{cost}{remains}{faults}"
         )
-    return f"The base model leaves out {titles}, {place}. {' '.join(statements)}{cost}"
+    return f"The base model leaves out {titles}, {place}. {' '.join(statements)}{cost}{faults}"
