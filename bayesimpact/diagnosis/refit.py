@@ -17,6 +17,7 @@ from bayesimpact.diagnosis.extend import (
     transfer,
 )
 from bayesimpact.diagnosis.scores import Score
+from bayesimpact.diagnosis.thresholds import LARGE
 from bayesimpact.inference.climb import Climb
 from bayesimpact.inference.fit import Fit, Target, inverse, prior_information
 from bayesimpact.inference.mode import find_mode
@@ -63,7 +64,7 @@ def refit(fit: Fit, scores: Sequence[Score], scales: Scales) -> Candidate:
 
     The scores are linear predictions. Where the misfit is large they may point beyond the mode, so
     the climb begins at the best point between the unshifted model and the predicted one; one that
-    gains nothing begins again at either end.
+    gains nothing begins again at either end, and where the misfit is large both starts are taken.
     """
     effects = (*fit.target.oscillator.effects, *(s.effect for s in scores))
     shapes = {name: value for s in scores for name, value in s.shapes.items()}
@@ -76,8 +77,11 @@ def refit(fit: Fit, scores: Sequence[Score], scales: Scales) -> Candidate:
     start = best_start(target, unshifted, predicted, steps)
     options: dict[str, Any] = {"steps": steps, "tolerance": TOLERANCE, "max_iterations": ITERATIONS}
     found = find_mode(target, start, **options)
+    large = fit.reduced_chi2 > LARGE**2
     for other in (predicted, unshifted):
-        if found.log_likelihood > fit.log_likelihood + GAINED or np.array_equal(start, other):
+        gained = found.log_likelihood > fit.log_likelihood + GAINED
+        both = large and other is predicted  # side minima lie close where much is missing
+        if np.array_equal(start, other) or (gained and not both):
             continue
         again = find_mode(target, other, **options)
         found = max(found, again, key=lambda f: np.nan_to_num(f.log_posterior, nan=-np.inf))
