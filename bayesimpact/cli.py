@@ -5,34 +5,65 @@ Nothing heavy is imported before a command runs: every command imports what it n
 
 from __future__ import annotations
 
+import errno
 import sys
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
-from bayesimpact.errors import BayesimpactError, InputError
+from bayesimpact.data.lock import locked
+from bayesimpact.errors import (
+    BayesimpactError,
+    InputError,
+    system_words,
+    terminated_like_ctrl_c,
+)
 from bayesimpact.trial.command import trial
+
+if TYPE_CHECKING:
+    from bayesimpact.data.campaign import Campaign
 
 BAD_INPUT = 2
 NOT_CONVERGED = 3
 INTERRUPTED = 130
+FAILED_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+_GO_ON = "bayesimpact.go_on"  # in a context's meta: what to type after an interruption
 
 
 class Commands(click.Group):
     """A group that turns what goes wrong in any command into one message and its exit code."""
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command; `InputError` exits 2, other errors of the package 1, Ctrl-C 130."""
-        try:
-            return super().invoke(ctx)
-        except InputError as error:
-            _end(ctx, f"bayesimpact: {error}", BAD_INPUT)
-        except BayesimpactError as error:
-            _end(ctx, f"bayesimpact: {error}", 1)
-        except KeyboardInterrupt:
-            _end(ctx, "bayesimpact: interrupted", INTERRUPTED)
+        """Run the command; `InputError` exits 2, other errors of the package 1, Ctrl-C and SIGTERM
+        130; a place that cannot be written exits 2, a disk that is full or fails 1.
+        """
+        with terminated_like_ctrl_c():
+            try:
+                return super().invoke(ctx)
+            except InputError as error:
+                _end(ctx, f"bayesimpact: {error}", BAD_INPUT)
+            except BayesimpactError as error:
+                _end(ctx, f"bayesimpact: {error}", 1)
+            except KeyboardInterrupt:
+                _end(ctx, f"bayesimpact: interrupted{_how_to_go_on(ctx)}", INTERRUPTED)
+            except MemoryError:
+                words = "out of memory; shorter recordings, or fewer samples a second, need less"
+                _end(ctx, f"bayesimpact: {words}{_how_to_go_on(ctx)}", 1)
+            except BrokenPipeError:
+                raise
+            except OSError as error:
+                failed = error.errno in FAILED_DISK
+                again = _how_to_go_on(ctx) if failed else ""
+                code = 1 if failed else BAD_INPUT
+                _end(ctx, f"bayesimpact: {system_words(error)}{again}", code)
+
+
+def _how_to_go_on(ctx: click.Context) -> str:
+    words = ctx.meta.get(_GO_ON)
+    return f"; {words}" if words else ""
 
 
 def _end(ctx: click.Context, message: str, code: int) -> NoReturn:
@@ -56,7 +87,32 @@ def common(command: Callable[..., None]) -> Callable[..., None]:
     return command
 
 
-campaign_argument = click.argument("campaign", type=click.Path(path_type=Path))
+_DATA = "bayesimpact.data"  # in a context's meta: folders of --data
+
+
+def campaign_argument(command: Callable[..., None]) -> Callable[..., None]:
+    """CAMPAIGN, and `--data FOLDER` for recordings that lie outside its folder."""
+
+    def kept(ctx: click.Context, _: click.Parameter, folders: tuple[Path, ...]) -> None:
+        ctx.meta[_DATA] = folders
+
+    option = click.option(
+        "--data",
+        type=click.Path(exists=True, file_okay=False, path_type=Path),
+        multiple=True,
+        metavar="FOLDER",
+        expose_value=False,
+        callback=kept,
+        help="A folder beside CAMPAIGN whose files campaign.toml may name; may be repeated.",
+    )
+    return click.argument("campaign", type=click.Path(path_type=Path))(option(command))
+
+
+def loaded_campaign(campaign: Path) -> Campaign:
+    """CAMPAIGN, read and checked."""
+    from bayesimpact.data.read import load_campaign
+
+    return load_campaign(campaign, click.get_current_context().meta[_DATA])
 
 
 def out_option(required: bool) -> Callable[[Callable[..., None]], Callable[..., None]]:
@@ -70,13 +126,19 @@ def out_option(required: bool) -> Callable[[Callable[..., None]], Callable[..., 
     )
 
 
-def made_folder(out: Path) -> Path:
-    """Make the folder of `--out`; called once the input has proved good."""
+def made_folder(out: Path, go_on: str = "") -> Path:
+    """Make the folder of `--out` and hold it until the command ends; called once the input has
+    proved good. `go_on`: the command that goes on after an interruption.
+    """
+    ctx = click.get_current_context()
     try:
         out.mkdir(parents=True, exist_ok=True)
+        ctx.with_resource(locked(out))
     except OSError as error:
         reason = error.strerror or str(error)
         raise InputError(f"--out {out}", reason.lower(), "a folder that can be written") from None
+    if go_on:
+        ctx.meta[_GO_ON] = f"what was done is kept in {out}; to go on: {go_on}"
     return out
 
 
@@ -87,6 +149,8 @@ def main() -> None:
 
     CAMPAIGN is a folder with campaign.toml and recordings, or that file.
     """
+    # Numbers that overflow in a trial step are dealt with there; the warning tells a user nothing.
+    warnings.filterwarnings("ignore", category=RuntimeWarning)
     # A terminal that lacks a character shows a question mark in its place.
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
@@ -103,10 +167,9 @@ def check(campaign: Path, out: Path | None, seed: int, quiet: bool) -> None:
     With --out the plot is saved as DIR/check.png. Nothing is drawn at random here: --seed is taken
     for the sake of scripts that pass it to every command.
     """
-    from bayesimpact.data.read import load_campaign
     from bayesimpact.report.check_text import campaign_text, campaign_warnings, measured_noise
 
-    loaded = load_campaign(campaign)
+    loaded = loaded_campaign(campaign)
     noise = measured_noise(loaded)
     if not quiet:
         click.echo(campaign_text(loaded, noise))
@@ -152,10 +215,20 @@ def announce(outcome: Any, out: Path, quiet: bool) -> None:
 
 
 def finish(ctx: click.Context, *outcomes: Any) -> None:
-    """Exit code 3 when something did not converge."""
+    """Exit code 3 when something did not converge, or a part of the report could not be made."""
+    unmade = [name for outcome in outcomes for name in outcome.failed]
+    words = [unmade_words(unmade)] if unmade else []
     if not all(outcome.converged for outcome in outcomes):
-        click.echo("bayesimpact: not converged; the report says what did not", err=True)
+        words.insert(0, "not converged; the report says what did not")
+    if words:
+        click.echo(f"bayesimpact: {'; '.join(words)}", err=True)
         ctx.exit(NOT_CONVERGED)
+
+
+def unmade_words(names: Sequence[str]) -> str:
+    """What a report lacks, and what finishes it."""
+    some = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+    return f"the report lacks {some} and says why; `bayesimpact report DIR` tries again"
 
 
 @main.command()
@@ -165,13 +238,12 @@ def finish(ctx: click.Context, *outcomes: Any) -> None:
 @click.pass_context
 def fit(ctx: click.Context, campaign: Path, out: Path, seed: int, quiet: bool) -> None:
     """Find the mode: differential evolution with the Metropolis criterion, then a polish."""
-    from bayesimpact.data.read import load_campaign
-
-    loaded = load_campaign(campaign)
+    loaded = loaded_campaign(campaign)
     from bayesimpact.workflow import fit_campaign
 
     command = f"bayesimpact fit {campaign} --out {out} --seed {seed}"
-    outcome = fit_campaign(loaded, made_folder(out), seed=seed, command=command, say=telling(quiet))
+    folder = made_folder(out, command)
+    outcome = fit_campaign(loaded, folder, seed=seed, command=command, say=telling(quiet))
     announce(outcome, out, quiet)
     finish(ctx, outcome)
 
@@ -186,24 +258,13 @@ def sample(
     ctx: click.Context, campaign: Path, out: Path, resume: bool, seed: int, quiet: bool
 ) -> None:
     """Sample the posterior by emcee; the backbone is the posterior-predictive check."""
-    from bayesimpact.data.read import load_campaign
-
-    loaded = load_campaign(campaign)
+    loaded = loaded_campaign(campaign)
     from bayesimpact.workflow import sample_campaign
 
     command = f"bayesimpact sample {campaign} --out {out} --seed {seed}"
-    try:
-        outcome = sample_campaign(
-            loaded,
-            made_folder(out),
-            seed=seed,
-            resume=resume,
-            command=command,
-            say=telling(quiet),
-            bar=False if quiet else None,
-        )
-    except KeyboardInterrupt:
-        _end(ctx, f"bayesimpact: interrupted; to go on: {command} --resume", INTERRUPTED)
+    folder = made_folder(out, f"{command} --resume")
+    told: dict[str, Any] = {"say": telling(quiet), "bar": False if quiet else None}
+    outcome = sample_campaign(loaded, folder, seed=seed, resume=resume, command=command, **told)
     announce(outcome, out, quiet)
     finish(ctx, outcome)
 
@@ -219,24 +280,32 @@ def sample(
     metavar="N",
     help="Repeat the loop on N simulated controls, and on N campaigns with what was named.",
 )
+@click.option("--resume", is_flag=True, help="Go on with the chains that DIR holds.")
 @common
 @click.pass_context
 def diagnose(
-    ctx: click.Context, campaign: Path, out: Path, quick: bool, certify: int, seed: int, quiet: bool
+    ctx: click.Context,
+    campaign: Path,
+    out: Path,
+    quick: bool,
+    certify: int,
+    resume: bool,
+    seed: int,
+    quiet: bool,
 ) -> None:
     """Locate, name, model and show what the base model leaves out of CAMPAIGN."""
-    from bayesimpact.data.read import load_campaign
-
-    loaded = load_campaign(campaign)
+    loaded = loaded_campaign(campaign)
     from bayesimpact.workflow import diagnose_campaign
 
     command = f"bayesimpact diagnose {campaign} --out {out} --seed {seed}"
+    again = command + " --quick" * quick + f" --certify {certify}" * bool(certify)
     outcome = diagnose_campaign(
         loaded,
-        made_folder(out),
+        made_folder(out, again + " --resume" * (not quick)),
         seed=seed,
         quick=quick,
         certify=certify,
+        resume=resume,
         command=command,
         say=telling(quiet),
     )
@@ -249,21 +318,22 @@ def diagnose(
 @click.option("--pdf", is_flag=True, help="Print it as DIR/report.pdf by an installed Chromium.")
 @click.option("--latex", is_flag=True, help="Write its tables for a paper: DIR/tables.tex.")
 @common
-def report(folder: Path, pdf: bool, latex: bool, seed: int, quiet: bool) -> None:
+@click.pass_context
+def report(
+    ctx: click.Context, folder: Path, pdf: bool, latex: bool, seed: int, quiet: bool
+) -> None:
     """Write the report of whatever DIR holds, from its files alone."""
-    from bayesimpact.report.write import rewrite_report, write_latex
+    from bayesimpact.report.write import more_files, rewrite_report
 
-    files = [rewrite_report(folder)]
-    if latex:
-        files.append(write_latex(folder))
-    if pdf:
-        from bayesimpact.report.pdf import print_page
-
-        files.append(files[0].with_suffix(".pdf"))
-        print_page(files[0], files[-1])
-    if not quiet:
-        for file in files:
+    if folder.is_dir() and (folder / "results.nc").exists():
+        made_folder(folder, f"bayesimpact report {folder}")
+    written = rewrite_report(folder)
+    for file in (written.page, *more_files(folder, pdf=pdf, latex=latex)):
+        if not quiet:
             click.echo(f"report: {file}")
+    if written.failed:
+        click.echo(f"bayesimpact: {unmade_words(list(written.failed))}", err=True)
+        ctx.exit(NOT_CONVERGED)
 
 
 @main.command()
@@ -295,7 +365,7 @@ def demo(ctx: click.Context, out: Path, seed: int, quiet: bool) -> None:
     say = telling(quiet)
     told: dict[str, Any] = {"seed": seed, "command": "bayesimpact demo", "say": say}
     say("part 1: recordings that hide nothing")
-    first = sample_campaign(open_book, made_folder(out), **told)
+    first = sample_campaign(open_book, made_folder(out, "bayesimpact demo"), **told)
     announce(first, out, quiet)
     say("part 2: recordings that hide something")
     second = diagnose_campaign(concealed, made_folder(out / "concealed"), quick=True, **told)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +21,9 @@ from bayesimpact.inference.progress import progress_bar
 from bayesimpact.report.archive import write_text
 from bayesimpact.report.build import versions
 from bayesimpact.report.diagnosis_arrays import diagnosis_arrays
+from bayesimpact.report.figures.save import reason
 from bayesimpact.report.results import Results
-from bayesimpact.report.write import write_fit, write_posterior
+from bayesimpact.report.write import Written, write_fit, write_posterior
 
 DIAGNOSIS_FILE = "diagnosis.json"
 CHAIN_FOLDER = "chain"
@@ -45,11 +46,13 @@ class Outcome:
     results : everything the report shows
     converged : False when the search or the sampler did not
     diagnosis : the content of diagnosis.json, where there is one
+    failed : parts of the report that could not be made, with their reasons
     """
 
     results: Results
     converged: bool
     diagnosis: dict[str, Any] | None = None
+    failed: Mapping[str, str] = field(default_factory=dict)
 
 
 def fit_campaign(
@@ -61,8 +64,8 @@ def fit_campaign(
     identification = identify(campaign, rng=np.random.default_rng(seed))
     seconds = time.perf_counter() - began
     say("writing the report")
-    results = write_fit(identification, out, seed=seed, command=command, seconds=seconds)
-    return Outcome(results, identification.fit.converged)
+    made = write_fit(identification, out, seed=seed, command=command, seconds=seconds)
+    return Outcome(made.results, identification.fit.converged, failed=made.failed)
 
 
 def sample_campaign(
@@ -84,8 +87,9 @@ def sample_campaign(
     posterior = sampled(identification, seed, out / CHAIN_FOLDER, resume, say, bar)
     seconds = time.perf_counter() - began
     say("writing the report")
-    results = write_posterior(posterior, identification, out, command=command, seconds=seconds)
-    return Outcome(results, identification.fit.converged and posterior.chains.converged)
+    made = write_posterior(posterior, identification, out, command=command, seconds=seconds)
+    converged = identification.fit.converged and posterior.chains.converged
+    return Outcome(made.results, converged, failed=made.failed)
 
 
 def sampled(
@@ -100,7 +104,12 @@ def sampled(
     say("sampling the posterior")
     with progress_bar(bar) as callback:
         return sample(
-            identification.fit, seed=seed, folder=folder, resume=resume, callback=callback
+            identification.fit,
+            seed=seed,
+            folder=folder,
+            resume=resume,
+            callback=callback,
+            tell=say,
         )
 
 
@@ -111,22 +120,27 @@ def diagnose_campaign(
     seed: int = 0,
     quick: bool = False,
     certify: int = 0,
+    resume: bool = False,
     command: str = "",
     say: Say = silent,
 ) -> Outcome:
-    """The whole loop: diagnosis.json, posterior.nc, figures and report in `out`.
+    """The whole loop: diagnosis.json, posterior.nc, figures and report in `out`; the chains of both
+    models are kept in `out`/chain.
 
-    `certify`: how often the loop is repeated on simulated campaigns of this design.
+    `certify`: how often the loop is repeated on simulated campaigns of this design. `resume`: go on
+    with the chains that `out` holds; the search, which has no randomness of its own, is repeated.
     """
     began = time.perf_counter()
     diagnosis = diagnose(campaign, rng=np.random.default_rng(seed), search=not quick, progress=say)
     before = after = None
     if not quick:
         say("sampling both models")
-        before = after = sample(diagnosis.before, seed=seed)
+        chains = out / CHAIN_FOLDER
+        kept: dict[str, Any] = {"seed": seed, "resume": resume, "tell": say}
+        before = after = sample(diagnosis.before, folder=chains / "before", **kept)
         if diagnosis.after is not diagnosis.before:
             allowed = LEARNED_STEPS if diagnosis.verdict == "unknown" else MAX_STEPS
-            after = sample(diagnosis.after, seed=seed, max_steps=allowed)
+            after = sample(diagnosis.after, folder=chains / "after", max_steps=allowed, **kept)
     certified = None
     if certify:
         certified = certificate(
@@ -142,9 +156,9 @@ def diagnose_campaign(
         certified=certified,
     )
     say("writing the report")
-    results = write_diagnosis(diagnosis, content, before, after, out, seed, command)
+    made = write_diagnosis(diagnosis, content, before, after, out, seed, command)
     sure = all(p is None or p.chains.converged for p in (before, after))
-    return Outcome(results, diagnosis.after.converged and sure, content)
+    return Outcome(made.results, diagnosis.after.converged and sure, content, made.failed)
 
 
 def write_diagnosis(
@@ -155,16 +169,22 @@ def write_diagnosis(
     out: Path,
     seed: int,
     command: str,
-) -> Results:
+) -> Written:
     """diagnosis.json, results, figures and report of a diagnosis, sampled or not, in `out`."""
     out.mkdir(parents=True, exist_ok=True)
     plain = _strict(content)
     write_text(out / DIAGNOSIS_FILE, json.dumps(plain, indent=1))
+    failed = {}
+    try:
+        arrays = diagnosis_arrays(diagnosis)
+    except Exception as error:
+        arrays, failed["arrays of the diagnosis' figures"] = {}, reason(error)
     told: dict[str, Any] = {
         "command": command,
         "seconds": float(content["seconds"]),
         "diagnosis": plain,
-        "diagnosis_arrays": diagnosis_arrays(diagnosis),
+        "diagnosis_arrays": arrays,
+        "failed": failed,
     }
     if after is None:
         final = replace(diagnosis.identification, fit=diagnosis.after, search=None)

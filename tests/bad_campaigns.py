@@ -46,6 +46,19 @@ def _without(*lines: int) -> str:
 BEAM = "length_mm = 110\nwidth_mm = 20\nthickness_mm = 5\n"
 
 BAD_TOML = [
+    _toml("deep lists", "0.503", "[" * 9000 + "]" * 9000, "nested without end"),
+    _toml("deep keys", "mass_kg", "a" + ".a" * 9000 + " = 1\nmass_kg", "unknown key"),
+    _toml("a key without end", "mass_kg", "a" + ".a" * 60_000 + " = 1", "line 2", "in a line"),
+    _toml("digits without end", "0.503", "9" * 5000, "a value that is none"),
+    _toml("mass of a galaxy", "0.503", "1e200", "key mass_kg", "1e+200", "1e-15 to 1e+12"),
+    _toml("mass of nothing", "0.503", "1e-300", "key mass_kg", "1e-300", "1e-15 to 1e+12"),
+    _toml("escape sequence", '"rig"', '"a\\u001b[2J"', "key name", "\\x1b[2J", "a title"),
+    _toml("turned writing", '"2"', '"\\u202e2"', "key case", "\\u202e"),
+    _toml("long case", '"2"', f'"{"n" * 201}"', "key case", "nnnn"),
+    _toml("NUL in a path", "b.csv", "b\\u0000.csv", "recording 2", "key file", "\\x00"),
+    _toml("path without end", "b.csv", "d/" * 400 + "b.csv", "recording 2", "no such file"),
+    _toml("a device", "b.csv", "/dev/zero", "recording 2", "leads out", "--data"),
+    _more("start at the end of time", "start_s = 1e200\n", "key start_s", "1e+200"),
     _toml("syntax", "mass_kg = 0.503", "mass_kg = ", "line 2", "syntax"),
     _toml("syntax at the end", 'case = "2"', 'case = "2', "line 10", "syntax"),
     _toml("key twice", "mass_kg = 0.503", "mass_kg = 1\nmass_kg = 2", "line 3", "syntax"),
@@ -183,6 +196,9 @@ BAD_TOML = [
 ]
 
 BAD_FILES = [
+    _file("far too large", csv(decay() * 1e200), "a reading of", "at most 1e+06 m"),
+    _file("far too small", csv(decay() * 1e-20), "differ by", "1e-15 m or more"),
+    _file("picoseconds", csv(interval=1e-12), "1e-12 s apart", "1e-09 s to 1e+09 s"),
     _file("empty file", "", "an empty file", "a header row"),
     _file("only blank lines", "\n \n", "an empty file", "a header row"),
     _file("only comments", "# nothing\n# here\n", "no header row", "a header row"),

@@ -6,11 +6,13 @@ import hashlib
 import math
 import re
 import tomllib
+from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from bayesimpact.data import bounds
 from bayesimpact.data.campaign import Beam, Campaign, Measurement, Smoothing
 from bayesimpact.data.period import rough_period
 from bayesimpact.data.recording import Quantity, Recording
@@ -30,12 +32,13 @@ CAMPAIGN_FILE = "campaign.toml"
 _EFFECT_PARAMETER = re.compile(r"[a-z]\w*\.[a-z]\w*(\[.+\])?")
 
 
-def load_campaign(path: Path | str) -> Campaign:
+def load_campaign(path: Path | str, folders: Sequence[Path | str] = ()) -> Campaign:
     """Read and check a campaign.
 
     Parameters
     ----------
     path : the folder that holds campaign.toml, or that file
+    folders : others, beside the campaign's own, whose files campaign.toml may name
 
     Raises
     ------
@@ -44,7 +47,7 @@ def load_campaign(path: Path | str) -> Campaign:
         what is accepted.
     """
     file = _campaign_file(Path(path))
-    content = _bytes(file, str(file))
+    content = _bytes(file, str(file), bounds.TOML_BYTES)
     table = parse_campaign(_parse(file, content), str(file))
     digest = hashlib.sha256(content)
     recordings: list[Recording] = []
@@ -52,7 +55,8 @@ def load_campaign(path: Path | str) -> Campaign:
         where = f"{file}, recording {number} ({entry.file})"
         _check_entry(where, entry, table.stop, recordings)
         source = file.parent / entry.file
-        data = _bytes(source, f"{where}, key file")
+        bounds.inside(source, (file.parent, *map(Path, folders)), f"{where}, key file")
+        data = _bytes(source, f"{where}, key file", bounds.TABLE_BYTES)
         digest.update(data)
         recordings.append(_recording(source, where, entry, table.stop, data))
     _check_together(str(file), table, recordings)
@@ -70,9 +74,12 @@ def load_campaign(path: Path | str) -> Campaign:
 
 
 def _campaign_file(path: Path) -> Path:
-    if path.is_dir():
-        path = path / CAMPAIGN_FILE
-    if not path.is_file():
+    try:
+        path = path / CAMPAIGN_FILE if path.is_dir() else path
+        there = path.is_file()
+    except (OSError, ValueError):  # no path at all: too long, or with a NUL
+        there = False
+    if not there:
         raise InputError(str(path), "no such file", f"a folder with {CAMPAIGN_FILE}, or that file")
     if path.suffix != ".toml":
         raise InputError(
@@ -81,19 +88,20 @@ def _campaign_file(path: Path) -> Path:
     return path
 
 
-def _bytes(path: Path, where: str) -> bytes:
+def _bytes(path: Path, where: str, most: int) -> bytes:
+    bounds.regular_file(path, where, most)
     try:
         return path.read_bytes()
-    except IsADirectoryError:
-        found = "a folder"
-    except FileNotFoundError:
-        found = "no such file"
     except OSError as error:
         found = (error.strerror or str(error)).lower()
     raise InputError(where, f"{found} at {path}", "a readable file")
 
 
 def _parse(file: Path, content: bytes) -> dict[str, Any]:
+    long = next((i for i, x in enumerate(content.splitlines(), 1) if len(x) > bounds.TOML_LINE), 0)
+    if long:
+        found = f"more than {bounds.TOML_LINE} characters in a line"
+        raise InputError(f"{file}, line {long}", found, "shorter lines")
     try:
         document = tomllib.loads(content.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
@@ -107,6 +115,10 @@ def _parse(file: Path, content: bytes) -> dict[str, Any]:
         line = int(place.group(1) or last) if place else last
         found = text.replace(place.group(0), "") if place else text
         raise InputError(f"{file}, line {line}", f"an error of syntax ({found})", "TOML") from None
+    except RecursionError:
+        raise InputError(str(file), "lists or tables nested without end", "TOML") from None
+    except (ValueError, OverflowError) as error:  # a number of thousands of digits
+        raise InputError(str(file), f"a value that is none ({error})", "TOML") from None
     if isinstance(document.get("priors"), dict):
         document["priors"] = _dotted(document["priors"])
     return document
@@ -144,12 +156,14 @@ def _recording(
     table = read_table(
         source, data, column=entry.column, unit=entry.unit, sample_rate=entry.sample_rate_hz
     )
+    bounds.check_readings(table.samples, "rad" if table.quantity == "angle" else "m", str(source))
+    bounds.check_interval(table.interval, str(source))
     # A sample at the very start or end counts in, however its time was rounded.
     margin = 1e-6
     size, interval = table.samples.size, table.interval
     first, stop_at = 0, size
     if entry.start_s is not None:
-        first = max(0, math.ceil((entry.start_s - table.start) / interval - margin))
+        first = min(size, max(0, math.ceil((entry.start_s - table.start) / interval - margin)))
     if entry.end_s is not None:
         stop_at = min(size, math.floor((entry.end_s - table.start) / interval + margin) + 1)
     if stop_at - first < 2:
@@ -278,7 +292,7 @@ def _priors(
     names = _prior_names(table.stop, recordings)
     for name, prior in table.priors.items():
         if name not in names and not _EFFECT_PARAMETER.fullmatch(name):
-            near = get_close_matches(name, names, 1, 0.4)
+            near = get_close_matches(name[:100], names[:200], 1, 0.4)
             hint = f" (did you mean {near[0]}?)" if near else ""
             raise InputError(
                 f"{where}, [priors], key {name}",

@@ -10,13 +10,25 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from bayesimpact.data import bounds
 from bayesimpact.errors import InputError
 
-Text = Annotated[str, Field(pattern=r"\S")]
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
+_SEEN = rf"^[^{bounds.UNSEEN}]*[^{bounds.UNSEEN}\s][^{bounds.UNSEEN}]*$"
+Text = Annotated[str, Field(pattern=_SEEN, max_length=bounds.NAME_LENGTH)]
+FileName = Annotated[str, Field(pattern=_SEEN, max_length=bounds.FILE_LENGTH)]
+Positive = Annotated[float, Field(gt=0, ge=1 / bounds.PRIOR, le=bounds.PRIOR)]
+NotNegative = Annotated[float, Field(ge=0, le=bounds.PRIOR)]
+Number = Annotated[float, Field(ge=-bounds.PRIOR, le=bounds.PRIOR)]
+Time = Annotated[float, Field(ge=-bounds.TIME, le=bounds.TIME)]
+Mass = Annotated[float, Field(gt=0, ge=bounds.MASS[0], le=bounds.MASS[1])]
+Rate = Annotated[float, Field(gt=0, ge=bounds.RATE[0], le=bounds.RATE[1])]
+Length = Annotated[float, Field(gt=0, ge=1e-9, le=1e12)]  # in the key's unit; noise and beams
 POSITIVE = "a number above 0"
 NUMBER = "a number"
+
+
+def _from(ends: tuple[float, float]) -> str:
+    return f"({ends[0]:g} to {ends[1]:g})"
 
 
 class _Table(BaseModel):
@@ -26,69 +38,77 @@ class _Table(BaseModel):
 class RecordingTable(_Table):
     """One [[recording]]."""
 
-    file: Text = Field(description="a file name relative to campaign.toml, in quotes")
+    file: FileName = Field(description="a file name relative to campaign.toml, in quotes")
     case: Text | None = Field(None, description='the obstacle\'s name in quotes, as case = "1"')
-    sample_rate_hz: Positive | None = Field(None, description=f"{POSITIVE}, Hz")
+    sample_rate_hz: Rate | None = Field(None, description=f"{POSITIVE}, Hz {_from(bounds.RATE)}")
     column: Text | None = Field(None, description="the name of a column, in quotes")
     unit: Literal["m", "mm", "um", "rad", "deg"] | None = Field(
         None, description="m, mm, um, rad or deg, in quotes"
     )
-    start_s: float | None = Field(None, description=f"{NUMBER}, s on the file's own clock")
-    end_s: float | None = Field(None, description=f"{NUMBER}, s on the file's own clock")
+    start_s: Time | None = Field(None, description=f"{NUMBER}, s on the file's own clock")
+    end_s: Time | None = Field(None, description=f"{NUMBER}, s on the file's own clock")
 
 
 class SavgolTable(_Table):
     """Savitzky-Golay smoothing; an even window loses one sample, as in MATLAB's `smooth`."""
 
     kind: Literal["savgol"]
-    window: int = Field(ge=3, description="a whole number of samples, 3 or more")
-    polyorder: int = Field(ge=0, description="a whole number, 0 or more and below window")
+    window: int = Field(ge=3, le=bounds.WINDOW, description="a whole number of samples, 3 or more")
+    polyorder: int = Field(
+        ge=0,
+        le=bounds.ORDER,
+        description=f"a whole number, 0 or more, below window and at most {bounds.ORDER}",
+    )
 
 
 class LagTable(_Table):
     """A first-order low pass."""
 
     kind: Literal["lag"]
-    time_constant_s: Positive = Field(description=f"{POSITIVE}, s")
+    time_constant_s: Length = Field(description=f"{POSITIVE}, s (1e-09 to 1e+12)")
 
 
 class MeasurementTable(_Table):
     """[measurement]."""
 
-    noise_um: Positive | None = Field(None, description=f"{POSITIVE}, um")
-    noise_mrad: Positive | None = Field(None, description=f"{POSITIVE}, mrad")
-    noise_deg: Positive | None = Field(None, description=f"{POSITIVE}, degrees")
+    noise_um: Length | None = Field(None, description=f"{POSITIVE}, um (1e-09 to 1e+12)")
+    noise_mrad: Length | None = Field(None, description=f"{POSITIVE}, mrad (1e-09 to 1e+12)")
+    noise_deg: Length | None = Field(None, description=f"{POSITIVE}, degrees (1e-09 to 1e+12)")
     smoothing: Annotated[SavgolTable | LagTable, Field(discriminator="kind")] | None = Field(
         None,
         description='{ kind = "savgol", window = 21, polyorder = 2 }'
         ' or { kind = "lag", time_constant_s = 0.001 }',
     )
-    clock_uncertainty_ppm: NotNegative = Field(0.0, description="a number, 0 or more, ppm")
-    gain_uncertainty_percent: NotNegative = Field(0.0, description="a number, 0 or more, %")
+    clock_uncertainty_ppm: NotNegative = Field(
+        0.0, le=1e6, description="a number, 0 or more, ppm (at most 1e6)"
+    )
+    gain_uncertainty_percent: NotNegative = Field(
+        0.0, le=100, description="a number, 0 or more, % (at most 100)"
+    )
 
 
 class BeamTable(_Table):
     """One [beam.<case>]: a cantilever."""
 
-    length_mm: Positive = Field(description=f"{POSITIVE}, mm")
-    width_mm: Positive = Field(description=f"{POSITIVE}, mm")
-    thickness_mm: Positive = Field(description=f"{POSITIVE}, mm")
-    youngs_modulus_mpa: Positive = Field(description=f"{POSITIVE}, MPa")
+    length_mm: Length = Field(description=f"{POSITIVE}, mm (1e-09 to 1e+12)")
+    width_mm: Length = Field(description=f"{POSITIVE}, mm (1e-09 to 1e+12)")
+    thickness_mm: Length = Field(description=f"{POSITIVE}, mm (1e-09 to 1e+12)")
+    youngs_modulus_mpa: Length = Field(description=f"{POSITIVE}, MPa (1e-09 to 1e+12)")
 
 
 class UniformTable(_Table):
     """Equal density from lower to upper."""
 
     distribution: Literal["uniform"]
-    lower: float = Field(description=f"{NUMBER} below upper, SI")
-    upper: float = Field(description=f"{NUMBER} above lower, SI")
+    lower: Number = Field(description=f"{NUMBER} below upper, SI (within +-1e30)")
+    upper: Number = Field(description=f"{NUMBER} above lower, SI (within +-1e30)")
 
 
 class NormalTable(_Table):
     """Gaussian."""
 
     distribution: Literal["normal"]
-    mean: float = Field(description=f"{NUMBER}, SI")
+    mean: Number = Field(description=f"{NUMBER}, SI (within +-1e30)")
     sd: Positive = Field(description=f"{POSITIVE}, SI")
 
 
@@ -104,7 +124,9 @@ class LogNormalTable(_Table):
 
     distribution: Literal["lognormal"]
     median: Positive = Field(description=f"{POSITIVE}, SI")
-    sigma: Positive = Field(description=f"{POSITIVE}, standard deviation of the logarithm")
+    sigma: Positive = Field(
+        le=100, description=f"{POSITIVE}, standard deviation of the logarithm, at most 100"
+    )
 
 
 class LogUniformTable(_Table):
@@ -125,8 +147,9 @@ class CampaignTable(_Table):
     """The whole of campaign.toml."""
 
     name: Text = Field(description="a title in quotes")
-    mass_kg: Positive = Field(
-        description=f"{POSITIVE}, kg (for an angle: inertia in kg m2, or 1.0)"
+    mass_kg: Mass = Field(
+        description=f"{POSITIVE}, kg (for an angle: inertia in kg m2, or 1.0), "
+        f"{bounds.MASS[0]:g} to {bounds.MASS[1]:g}"
     )
     mass_uncertainty_kg: NotNegative = Field(0.0, description="a number, 0 or more, kg")
     stop: bool = Field(True, description="true or false, without quotes")
@@ -159,6 +182,8 @@ def parse_campaign(document: dict[str, Any], where: str) -> CampaignTable:
     """Check a parsed campaign.toml; `where` names the file in the `InputError` that refuses it."""
     try:
         return CampaignTable.model_validate(document)
+    except RecursionError:
+        raise InputError(where, "tables nested without end", "campaign.toml's own keys") from None
     except ValidationError as error:
         # An unknown key first: it is often the misspelt one that another error misses.
         problems = sorted(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
@@ -177,7 +202,8 @@ def described(value: Any) -> str:
         )
     if isinstance(value, list):
         return "a list" if value else "an empty list"
-    return str(value)
+    text = str(value) if not isinstance(value, int) or abs(value) < 10**40 else "a huge number"
+    return text
 
 
 def _refusal(problem: Any, document: dict[str, Any], where: str) -> InputError:
@@ -186,7 +212,7 @@ def _refusal(problem: Any, document: dict[str, Any], where: str) -> InputError:
     place = ", ".join([where, *path] if whole else [where, *path, f"key {key}"])
     kind = problem["type"]
     if kind == "extra_forbidden":
-        near = get_close_matches(key, table.model_fields, 1, 0.5)
+        near = get_close_matches(key[:50], table.model_fields, 1, 0.5)
         hint = f" (did you mean {near[0]}?)" if near else ""
         return InputError(place, f"an unknown key{hint}", ", ".join(table.model_fields))
     if kind == "union_tag_invalid":

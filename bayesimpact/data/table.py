@@ -169,7 +169,9 @@ def _response_column(
             f"several response columns ({columns})",
             'one, or column = "..." in campaign.toml',
         )
-    near = [n for name in names for n in get_close_matches(name, RESPONSE_COLUMNS, 1, 0.75)]
+    near = [
+        n for name in names[:50] for n in get_close_matches(name[:50], RESPONSE_COLUMNS, 1, 0.75)
+    ]
     accepted = f"one of {', '.join(RESPONSE_COLUMNS)}, or column and unit in campaign.toml"
     hint = f" (did you mean {near[0]}?)" if near else ""
     raise InputError(where, f"no response column among {columns}{hint}", accepted)

@@ -86,7 +86,8 @@ class Climb:
             sums = likelihood.misfit(theta)[0]
         else:
             left = tuple(white[0] for white in likelihood.residuals(theta[None]))
-            sums = np.array([white @ white for white in left])
+            with np.errstate(over="ignore", invalid="ignore"):  # a motion that ran away: no point
+                sums = np.array([white @ white for white in left])
         if not np.isfinite(sums).all():
             return Point(theta, np.inf, sums, left)
         theta[self.noise] = best_sigma(self.target, sums)

@@ -156,15 +156,23 @@ def prior_information(priors: Priors, theta: Array) -> Array:
     information = np.maximum(np.nan_to_num(-priors.hessian(theta)), flat)
     for i, prior in enumerate(priors.parameters):
         if isinstance(prior, LogNormal):
-            information[i] = 1.0 / (prior.sigma * theta[i]) ** 2
+            with np.errstate(divide="ignore", over="ignore"):  # at 0, where its density is 0
+                information[i] = 1.0 / (prior.sigma * theta[i]) ** 2
     return np.asarray(information)
 
 
 def inverse(matrix: Array) -> Array:
-    """Inverse of a symmetric positive (semi)definite matrix, after scaling to unit diagonal."""
+    """Inverse of a symmetric positive (semi)definite matrix, after scaling to unit diagonal.
+
+    NaN throughout where the matrix is not finite; inf where an inverse exceeds what a number holds.
+    """
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    scaled = np.linalg.pinv(matrix / np.outer(scale, scale), rcond=1e-14, hermitian=True)
-    return np.asarray(scaled / np.outer(scale, scale))
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        unit = matrix / np.outer(scale, scale)
+        if not np.isfinite(unit).all():
+            return np.full(matrix.shape, np.nan)
+        scaled = np.linalg.pinv(unit, rcond=1e-14, hermitian=True)
+        return np.asarray(scaled / np.outer(scale, scale))
 
 
 def marginal_sd(matrix: Array) -> Array:

@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -110,7 +111,8 @@ def sample(
     seed : of every random number
     folder : where blocks of the chain are kept, so that `resume` can go on; None keeps nothing
     callback : called with the sampler's progress after every block
-    settings : further settings of `bayesimpact.inference.sample.sample_posterior`
+    settings : further settings of `bayesimpact.inference.sample.sample_posterior`; its `tell` says
+        which saved blocks could not be used
 
     Raises
     ------
@@ -136,17 +138,26 @@ def sample(
     return Posterior(fit, chains, seed)
 
 
-def _fingerprint(fit: Fit) -> str:
-    """What a saved chain must belong to: data, parameters, priors, noise."""
+def _fingerprint(fit: Fit) -> dict[str, str]:
+    """What a saved chain must belong to, by name: what the campaign says, not how its files say it,
+    the model with its priors and noise, and the package's version.
+    """
     target = fit.target
-    parts = (
-        target.oscillator.campaign.sha256,
-        hashlib.sha256(target.oscillator.samples.tobytes()).hexdigest(),
-        f"{target.oscillator.campaign.mass!r} {target.oscillator.intervals.tolist()!r}",
-        ",".join(fit.names),
-        ",".join(effect.id for effect in target.oscillator.effects),
-        repr(target.priors.parameters),
-        repr(target.likelihood.noise),
-        repr(target.oscillator.smoothing),
-    )
-    return hashlib.sha256("|".join(parts).encode()).hexdigest()
+    oscillator = target.oscillator
+    recordings = oscillator.campaign.recordings
+    long = {
+        "recordings": [(r.name, r.case, r.quantity, r.samples.size) for r in recordings],
+        "samples": hashlib.sha256(oscillator.samples.tobytes()).hexdigest(),
+        "intervals": oscillator.intervals.tolist(),
+        "parameters": fit.names,
+        "effects": [effect.id for effect in oscillator.effects],
+        "priors": target.priors.parameters,
+        "noise": target.likelihood.noise,
+    }
+    short = {name: hashlib.sha256(repr(v).encode()).hexdigest()[:16] for name, v in long.items()}
+    return {
+        **short,
+        "mass": repr(oscillator.campaign.mass),
+        "smoothing": repr(oscillator.smoothing),
+        "version": metadata.version("bayesimpact"),
+    }

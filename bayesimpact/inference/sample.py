@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from math import ceil, isfinite
 from pathlib import Path
@@ -17,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.data.lock import locked
 from bayesimpact.errors import InputError
 from bayesimpact.inference.chainfile import ChainFolder
 from bayesimpact.inference.convergence import ConvergenceRecord, assess, autocorrelation_time
@@ -134,11 +136,12 @@ def sample_posterior(
     target_ess: float = 2000.0,
     folder: Path | None = None,
     resume: bool = False,
-    fingerprint: str = "",
+    fingerprint: str | Mapping[str, str] = "",
     lower: Array | None = None,
     upper: Array | None = None,
     names: Sequence[str] | None = None,
     progress: Callable[[Progress], None] | None = None,
+    tell: Callable[[str], None] | None = None,
 ) -> Chains:
     """Samples a posterior from its mode and curvature until independent ensembles agree.
 
@@ -165,14 +168,17 @@ def sample_posterior(
     folder : where the run is saved after every block; None: nowhere
     resume : go on from what `folder` holds (from the start when it holds nothing yet); the saved
         mode and covariance are used. `max_steps`, `target_ess` and `names` may differ
-    fingerprint : of data, model and priors; a saved run with another one is refused
+    fingerprint : of data, model and priors, one text or several by what they stand for; a saved run
+        with another one is refused, naming the one that differs
     lower, upper : (d,) bounds of the parameters; inadmissible outside
     names : d parameter names, for the words of the verdict
     progress : called after every block
+    tell : called with a line when saved blocks cannot be used and are sampled anew
 
     Raises
     ------
-    InputError : an argument cannot be used, or the saved run is of another posterior
+    InputError : an argument cannot be used, the saved run is of another posterior, or another
+        process is at work in `folder`
     SimulationError : the log posterior gave NaN, or no admissible start was found
 
     A KeyboardInterrupt passes through; what was saved stays usable.
@@ -191,7 +197,7 @@ def sample_posterior(
     ]
     settings = {
         "format": _FORMAT,
-        "fingerprint": fingerprint,
+        "fingerprint": fingerprint if isinstance(fingerprint, str) else dict(fingerprint),
         "seed": seed,
         "walkers": walkers,
         "ensembles": ensembles,
@@ -201,12 +207,19 @@ def sample_posterior(
         "upper": [repr(float(value)) for value in bounds[1]],
     }
     target = Target(log_posterior, mode, cholesky(covariance), bounds[0], bounds[1])
-    files = ChainFolder(folder) if folder is not None else None
-    if resume and files is not None and files.started():
-        run = _resumed(files, settings, target, block)
-    else:
-        run = _begun(files, settings, target, seed)
-    record, cut = _until_converged(run, files, max_steps, target_ess, names, progress)
+    with ExitStack() as held:
+        files = None
+        if folder is not None:
+            Path(folder).mkdir(parents=True, exist_ok=True)
+            held.enter_context(locked(Path(folder)))
+            files = ChainFolder(folder)
+        if resume and files is not None and files.started():
+            run = _resumed(files, settings, target, block)
+            if files.dropped and tell is not None:
+                tell(files.dropped)
+        else:
+            run = _begun(files, settings, target, seed)
+        record, cut = _until_converged(run, files, max_steps, target_ess, names, progress)
     return _chains(run, record, cut, seed, time.perf_counter() - began)
 
 
@@ -278,6 +291,10 @@ def _resumed(files: ChainFolder, settings: Mapping[str, Any], asked: Target, blo
     """The saved run, with the mode and factor that it began with: those asked for may differ in
     the last bits when they were computed with another number of threads."""
     saved = files.start(settings)
+    missing = {"mode", "factor"} - saved.keys()
+    if missing or saved["mode"].shape != asked.mode.shape:
+        accepted = "a run of the same posterior; or start anew without resuming"
+        raise InputError(str(files.folder), "a start that holds no mode of this size", accepted)
     shift = transform((asked.mode - saved["mode"])[None], invert_lower(saved["factor"]))
     if np.abs(shift).max() > 0.01:
         raise InputError(
@@ -288,7 +305,11 @@ def _resumed(files: ChainFolder, settings: Mapping[str, Any], asked: Target, blo
     target = Target(asked.function, saved["mode"], saved["factor"], asked.lower, asked.upper)
     run = Run(target, unpack(saved), block)
     for content in files.blocks():
-        run.load(content)
+        try:
+            run.load(content)
+        except (KeyError, ValueError, IndexError, TypeError):
+            files.refuse(run.index, "of another make")
+            return _resumed(files, settings, asked, block)
     for snapshot in run.snapshots:
         now = target(snapshot.walkers)
         if not np.allclose(now, snapshot.log_posterior, rtol=1e-9, atol=1e-6):

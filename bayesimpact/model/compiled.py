@@ -24,6 +24,11 @@ from numba.core.ccallback import CFunc
 from numba.core.sigutils import normalize_signature
 
 _normalize: Any = normalize_signature  # without annotations
+# numba reads settings from a .numba_config.yaml of the working folder (a cache of foreign machine
+# code among them): a name that no file can have takes that back.
+_settings: Any = numba.core.config
+_settings._config_fname = "\N{REPLACEMENT CHARACTER}/"
+_settings.reload_config()
 _ROOT = Path(__file__).parents[2]
 _IMPORT = re.compile(r"^\s*from (bayesimpact[\w.]*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
 

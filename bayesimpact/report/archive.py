@@ -1,11 +1,13 @@
 """The files of DIR: `results.nc` for the report, `fit.json` for people and scripts.
 
 Every file is written beside its place and moved there when complete, so an interrupted run leaves
-the old one. Nothing is pickled. (`posterior.nc` is ArviZ's: see `archive_arviz`.)
+the old one; NetCDF is put together in memory, for its library ends the process where a disk is
+full. Nothing is pickled. (`posterior.nc` is ArviZ's: see `archive_arviz`.)
 """
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import os
@@ -48,9 +50,16 @@ def _umask() -> int:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file in one go."""
-    with atomic(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    """Write a text file in one go; what UTF-8 cannot say (bytes of a foreign path) becomes a ?."""
+    write_bytes(path, text.encode("utf-8", "replace"))
+
+
+def write_bytes(path: Path, content: bytes | memoryview) -> None:
+    """Write a file in one go, down to the disk."""
+    with atomic(path) as temporary, open(temporary, "wb") as stream:
+        stream.write(content)
+        stream.flush()
+        os.fsync(stream.fileno())
 
 
 def save_results(results: Results, folder: Path) -> None:
@@ -59,7 +68,9 @@ def save_results(results: Results, folder: Path) -> None:
     import h5py  # type: ignore[import-untyped]
 
     text, arrays = encode(results)
-    with atomic(folder / RESULTS_FILE) as temporary, h5netcdf.File(temporary, "w") as file:
+    text = text.encode("utf-8", "replace").decode("utf-8")
+    buffer = io.BytesIO()
+    with h5netcdf.File(buffer, "w") as file:
         file.attrs["format"] = FORMAT
         file.create_variable("record", (), dtype=h5py.string_dtype("utf-8"))[...] = text
         for name, array in arrays.items():
@@ -67,6 +78,7 @@ def save_results(results: Results, folder: Path) -> None:
             for dimension, size in zip(dimensions, array.shape, strict=True):
                 file.dimensions[dimension] = size
             file.create_variable(name, dimensions, data=array)
+    write_bytes(folder / RESULTS_FILE, buffer.getbuffer())
     write_text(folder / FIT_FILE, fit_json(results))
 
 
@@ -91,7 +103,7 @@ def load_results(folder: Path | str) -> Results:
             text = file.variables["record"][...]
             arrays = {k: np.asarray(v[...]) for k, v in file.variables.items() if k != "record"}
         return decode(Results, _text(text), arrays)
-    except (OSError, KeyError, ValueError, TypeError) as error:
+    except (OSError, KeyError, ValueError, TypeError, AttributeError, RuntimeError) as error:
         if isinstance(error, InputError):
             raise
         raise InputError(str(path), f"a file that cannot be read ({error})", FORMAT) from None

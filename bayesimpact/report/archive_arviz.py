@@ -8,6 +8,7 @@ missing physics was added stand below the group `before`.
 
 from __future__ import annotations
 
+import io
 import json
 import re
 from collections.abc import Mapping, Sequence
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.errors import InputError
 from bayesimpact.inference.convergence import quiet_arviz
-from bayesimpact.report.archive import atomic
+from bayesimpact.report.archive import write_bytes
 
 DRAW_GROUPS = ("posterior", "log_likelihood", "posterior_predictive", "sample_stats")
 DATA_GROUPS = ("observed_data", "constant_data")
@@ -142,14 +143,18 @@ def write_posterior(path: Path, after: Inference, before: Inference | None = Non
     ------
     InputError : a group of another name, or an array whose axes are not all named
     """
+    import h5netcdf
+    from xarray.backends import H5NetCDFStore
+
     sections = {"": after} if before is None else {"": after, BEFORE: before}
-    with atomic(Path(path)) as temporary:
-        mode = "w"
+    buffer = io.BytesIO()  # on a full disk HDF5 ends the process
+    with h5netcdf.File(buffer, "w") as file:
         for section, inference in sections.items():
             for group, dataset in _datasets(inference).items():
                 where = "/".join(part for part in (section, group) if part)
-                dataset.to_netcdf(temporary, mode=mode, group=where or None, engine=_ENGINE)
-                mode = "a"
+                place = file.create_group(where) if where else file
+                dataset.dump_to_store(H5NetCDFStore(place))
+    write_bytes(Path(path), buffer.getbuffer())
 
 
 def read_posterior(path: Path, section: str = "") -> Inference:

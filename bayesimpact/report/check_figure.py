@@ -5,11 +5,14 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.report.figures.save import escaped
+from bayesimpact.report.figures.style import styled
 
 MOST = 60
 """Panels in one figure; what is beyond is named in the title."""
 
 
+@styled
 def campaign_figure(campaign: Campaign) -> Figure:
     """One panel per recording, time against displacement in mm (or angle in rad)."""
     shown = campaign.recordings[:MOST]
@@ -24,7 +27,7 @@ def campaign_figure(campaign: Campaign) -> Figure:
         scale, label = (1.0, "angle, rad") if angle else (1e3, "displacement, mm")
         axis.plot(recording.start + recording.times, recording.samples * scale, lw=0.6)
         case = f", case {recording.case}" if recording.case else ""
-        axis.set_title(f"{recording.name}{case}", fontsize="small")
+        axis.set_title(escaped(f"{recording.name}{case}"), fontsize="small")
         if panel >= len(shown) - columns:
             axis.set_xlabel("time, s", fontsize="small")
         if panel % columns == 0:
@@ -32,5 +35,5 @@ def campaign_figure(campaign: Campaign) -> Figure:
         axis.tick_params(labelsize="small")
         axis.grid(alpha=0.3)
     rest = len(campaign.recordings) - len(shown)
-    figure.suptitle(campaign.name + (f" (and {rest} more recordings)" if rest else ""))
+    figure.suptitle(escaped(campaign.name) + (f" (and {rest} more recordings)" if rest else ""))
     return figure

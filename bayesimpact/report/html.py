@@ -18,6 +18,7 @@ from bayesimpact.report.captions import caption
 from bayesimpact.report.checks import MISFIT
 from bayesimpact.report.diagnosis_view import diagnosis_view
 from bayesimpact.report.figures.save import DPI
+from bayesimpact.report.policy import with_policy
 from bayesimpact.report.results import Results
 from bayesimpact.report.story import corrected, story_rows
 from bayesimpact.report.units import bound
@@ -49,15 +50,26 @@ class Picture:
         return self.width < 900
 
 
-def render(results: Results, pictures: Mapping[str, bytes]) -> str:
+def render(
+    results: Results, pictures: Mapping[str, bytes], failed: Mapping[str, str] | None = None
+) -> str:
     """The page.
 
     Parameters
     ----------
     results : what to report
     pictures : PNG files by the name of the figure, as `figures.save.save_figures` returns them
+    failed : what could not be drawn, with its reason
     """
-    return _environment().get_template("report.html.j2").render(**_context(results, pictures))
+    context = _context(results, pictures) | {"failures": dict(failed or {})}
+    return with_policy(_environment().get_template("report.html.j2").render(**context))
+
+
+def unfinished(results: Results, failed: Mapping[str, str]) -> str:
+    """The page where even its words could not be written: the verdict, and why there is no more."""
+    css = Markup((TEMPLATES / "style.css").read_text(encoding="utf-8"))
+    page = _environment().get_template("unfinished.html.j2")
+    return with_policy(page.render(r=results, css=css, failures=dict(failed)))
 
 
 @cache
@@ -84,7 +96,7 @@ def _context(results: Results, pictures: Mapping[str, bytes]) -> dict[str, Any]:
         "r": results,
         "css": Markup((TEMPLATES / "style.css").read_text(encoding="utf-8")),
         "library_css": Markup(explorer.style()),
-        "script": Markup(explorer.script()),
+        "scripts": [Markup(script) for script in explorer.scripts()],
         "explorer_data": Markup(explorer.explorer_data(results)),
         "explorer_words": explorer.explorer_words(results),
         "d": told,

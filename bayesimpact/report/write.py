@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,34 +12,63 @@ from bayesimpact.inference.posterior import Posterior
 from bayesimpact.report import archive_arviz
 from bayesimpact.report.archive import load_results, save_results, write_text
 from bayesimpact.report.build import results_from_fit, results_from_posterior
+from bayesimpact.report.figures.save import reason
 from bayesimpact.report.figures.shares import save_all
 from bayesimpact.report.groups import inference_groups
-from bayesimpact.report.html import render
+from bayesimpact.report.html import render, unfinished
+from bayesimpact.report.latex import latex_tables
+from bayesimpact.report.pdf import print_page
 from bayesimpact.report.results import Array, Results
 
 REPORT_FILE = "report.html"
 POSTERIOR_FILE = "posterior.nc"
 LATEX_FILE = "tables.tex"
+PDF_FILE = "report.pdf"
 
 
-def write_report(results: Results, folder: Path) -> Path:
-    """Figures and report.html of the results that a folder holds; path of the page."""
-    pictures = save_all(results, folder)
+@dataclass(frozen=True, eq=False)
+class Written:
+    """What a folder holds now: the results, the page, and the reason by what failed to be made."""
+
+    results: Results
+    page: Path
+    failed: Mapping[str, str]
+
+
+def write_report(
+    results: Results, folder: Path, failed: Mapping[str, str] | None = None
+) -> Written:
+    """Figures and report.html of the results that a folder holds.
+
+    What cannot be drawn or worded is replaced by its reason; `failed` is what failed before.
+
+    Raises
+    ------
+    OSError : the folder cannot be written
+    """
+    drawn = save_all(results, folder)
+    without = {**(failed or {}), **drawn.failed}
     page = folder / REPORT_FILE
-    write_text(page, render(results, pictures))
-    return page
+    try:
+        text = render(results, drawn.pictures, without)
+    except Exception as error:
+        without["report"] = reason(error)
+        text = unfinished(results, without)
+    write_text(page, text)
+    return Written(results, page, without)
 
 
-def write_results(results: Results, folder: Path) -> Results:
+def write_results(
+    results: Results, folder: Path, failed: Mapping[str, str] | None = None
+) -> Written:
     """results.nc, fit.json, figures and report.html into a folder, made if absent."""
     folder.mkdir(parents=True, exist_ok=True)
     save_results(results, folder)
-    write_report(results, folder)
-    return results
+    return write_report(results, folder, failed)
 
 
-def rewrite_report(folder: Path) -> Path:
-    """The report of whatever a folder holds, from its files alone; path of the page.
+def rewrite_report(folder: Path) -> Written:
+    """The report of whatever a folder holds, from its files alone.
 
     Raises
     ------
@@ -47,13 +77,16 @@ def rewrite_report(folder: Path) -> Path:
     return write_report(load_results(folder), folder)
 
 
-def write_latex(folder: Path) -> Path:
-    """The tables of the results that a folder holds, for LaTeX; path of the file."""
-    from bayesimpact.report.latex import latex_tables
-
-    path = folder / LATEX_FILE
-    write_text(path, latex_tables(load_results(folder)))
-    return path
+def more_files(folder: Path, *, pdf: bool, latex: bool) -> list[Path]:
+    """The report of a folder as PDF, its tables for LaTeX; paths of what was asked for."""
+    files = []
+    if latex:
+        files.append(folder / LATEX_FILE)
+        write_text(files[-1], latex_tables(load_results(folder)))
+    if pdf:
+        files.append(folder / PDF_FILE)
+        print_page(folder / REPORT_FILE, files[-1])
+    return files
 
 
 def write_fit(
@@ -66,8 +99,12 @@ def write_fit(
     references: Mapping[str, Mapping[str, float]] | None = None,
     diagnosis: Mapping[str, Any] | None = None,
     diagnosis_arrays: Mapping[str, Array] | None = None,
-) -> Results:
-    """Write the results of a fit; parameters as in `build.results_from_fit`."""
+    failed: Mapping[str, str] | None = None,
+) -> Written:
+    """Write the results of a fit; parameters as in `build.results_from_fit`.
+
+    `failed` is what could not be made before, with its reason, for the page.
+    """
     results = results_from_fit(
         identification,
         seed=seed,
@@ -77,7 +114,7 @@ def write_fit(
         diagnosis=diagnosis,
         diagnosis_arrays=diagnosis_arrays,
     )
-    return write_results(results, folder)
+    return write_results(results, folder, failed)
 
 
 def write_posterior(
@@ -91,27 +128,39 @@ def write_posterior(
     references: Mapping[str, Mapping[str, float]] | None = None,
     diagnosis: Mapping[str, Any] | None = None,
     diagnosis_arrays: Mapping[str, Array] | None = None,
-) -> Results:
+    failed: Mapping[str, str] | None = None,
+) -> Written:
     """Write the results of sampling, and posterior.nc for ArviZ.
 
-    Parameters as in `build.results_from_posterior`.
+    Parameters as in `build.results_from_posterior`; `failed` as in `write_fit`. The results are
+    written first: neither the backbone check nor ArviZ can lose them.
     """
-    results = results_from_posterior(
-        posterior,
-        identification,
-        before=before,
-        command=command,
-        seconds=seconds,
-        references=references,
-        diagnosis=diagnosis,
-        diagnosis_arrays=diagnosis_arrays,
-    )
+    without = dict(failed or {})
+    told: dict[str, Any] = {
+        "before": before,
+        "command": command,
+        "seconds": seconds,
+        "references": references,
+        "diagnosis": diagnosis,
+        "diagnosis_arrays": diagnosis_arrays,
+    }
+    try:
+        results = results_from_posterior(posterior, identification, **told)
+    except Exception as error:
+        without["backbone"] = reason(error)
+        results = results_from_posterior(posterior, identification, backbone=False, **told)
     folder.mkdir(parents=True, exist_ok=True)
-    archive_arviz.write_posterior(
-        folder / POSTERIOR_FILE,
-        inference_groups(posterior, results.provenance),
-        None
-        if before is None or before is posterior
-        else inference_groups(before, results.provenance),
-    )
-    return write_results(results, folder)
+    save_results(results, folder)
+    try:
+        archive_arviz.write_posterior(
+            folder / POSTERIOR_FILE,
+            inference_groups(posterior, results.provenance),
+            None
+            if before is None or before is posterior
+            else inference_groups(before, results.provenance),
+        )
+    except OSError:
+        raise
+    except Exception as error:
+        without[POSTERIOR_FILE] = reason(error)
+    return write_report(results, folder, without)

@@ -164,12 +164,21 @@ def test_unequal_lengths_and_rates(tmp_path: Path) -> None:
     assert second.start == -0.3
 
 
-def test_files_elsewhere(tmp_path: Path) -> None:
-    write(tmp_path / "campaign", TOML.replace("a.csv", "../c.csv"), a=None)
-    (tmp_path / "c.csv").write_text(csv())
-    assert load_campaign(tmp_path / "campaign").recordings[0].name == "c"
-    absolute = TOML.replace("a.csv", (tmp_path / "c.csv").as_posix())
-    assert load_campaign(write(tmp_path / "campaign", absolute)).recordings[0].name == "c"
+def test_files_elsewhere_only_where_their_folder_is_given(tmp_path: Path) -> None:
+    data = tmp_path / "data"
+    data.mkdir()
+    (data / "c.csv").write_text(csv())
+    absolute, folder = (data / "c.csv").as_posix(), tmp_path / "campaign"
+    for place in ("../data/c.csv", absolute):
+        write(folder, TOML.replace("a.csv", place), a=None)
+        assert load_campaign(folder, [data]).recordings[0].name == "c"
+        with pytest.raises(InputError, match="leads out of the campaign's folder"):
+            load_campaign(folder)
+    write(folder, TOML.replace("a.csv", "link.csv"), a=None)
+    (folder / "link.csv").symlink_to(data / "c.csv")
+    with pytest.raises(InputError, match="leads out of the campaign's folder"):
+        load_campaign(folder)
+    assert load_campaign(folder, [tmp_path]).recordings[0].name == "link"
 
 
 def test_measuring_chain(tmp_path: Path) -> None:

@@ -185,14 +185,6 @@ def test_last_bits_of_mode_and_covariance_do_not_matter_on_resuming(tmp_path, un
     assert_same(chains, uninterrupted)
 
 
-def test_a_damaged_file_is_named(tmp_path):
-    small(Interrupted(), folder=tmp_path, max_steps=20)
-    damaged = tmp_path / "block-000001.npz"
-    damaged.write_bytes(damaged.read_bytes()[:200])
-    with pytest.raises(InputError, match="block-000001"):
-        small(Interrupted(), folder=tmp_path, resume=True)
-
-
 def test_saved_files_hold_no_pickles(tmp_path):
     small(Interrupted(), folder=tmp_path, max_steps=20)
     paths = list(tmp_path.glob("*.npz"))

@@ -20,7 +20,7 @@ from bayesimpact.report.figures.recordings import (
     recording_figures,
     shown_recordings,
 )
-from bayesimpact.report.figures.save import all_figures, file_name, png, save_figures
+from bayesimpact.report.figures.save import all_figures, file_name, png, save_drawn, save_figures
 from bayesimpact.report.figures.style import polyline, scaled, symbol
 from bayesimpact.report.html import png_size
 from bayesimpact.report.results import Draws, Results
@@ -233,7 +233,9 @@ def test_files(tmp_path: Path) -> None:
         assert (tmp_path / "figures" / f"{name}.png").read_bytes() == data
         assert data.startswith(b"\x89PNG") and png_size(data)[0] == 1500
         assert (tmp_path / "figures" / f"{name}.pdf").read_bytes().startswith(b"%PDF")
-    assert file_name('fit_case_1/2 "ß"') == "fit_case_1_2__ß_"
+    assert file_name('fit_case_1/2 "ß"').startswith("fit_case_1_2__ß_-")
+    assert file_name("fit_case_a b") != file_name("fit_case_a_b") == "fit_case_a_b"
+    assert len(f".{file_name('ß' * 300)}.png.12345678.png".encode()) < 255
 
 
 def test_style_stays_inside(tmp_path: Path) -> None:
@@ -243,3 +245,52 @@ def test_style_stays_inside(tmp_path: Path) -> None:
         figures = all_figures(results)
         save_figures({"search": figures["search"]}, tmp_path)
         assert dict(matplotlib.rcParams) == before
+
+
+def test_names_with_dollar_signs_are_shown_as_they_are(tmp_path: Path) -> None:
+    """Two of them would begin and end mathematics: none of these is valid there."""
+    name = r"$\frac$ a_{b $x$"
+    plain = make_results(2, 1, n=200)
+    first = replace(plain.recordings[0], name=name, case="$^$")
+    draws = plain.draws
+    assert draws is not None
+    rows = tuple(
+        replace(r, name=r.name.replace("[run_0]", f"[{name}]").replace("k2[1]", "k2[$^$]"))
+        for r in plain.rows
+    )
+    names = tuple(n.replace("k2[1]", "k2[$^$]") for n in draws.names)
+    results = replace(
+        plain, recordings=(first, plain.recordings[1]), rows=rows, draws=replace(draws, names=names)
+    )
+    figures = all_figures(results)
+    assert set(figures) >= {"fit_case_$^$", "corner"}
+    for drawn in ("fit_case_$^$", "corner"):
+        png(figures[drawn])
+    assert f"{name}, case $^$".replace("$", r"\$") in titles(figures["fit_case_$^$"])
+
+
+def test_a_figure_that_fails_leaves_its_reason_and_the_others(tmp_path: Path) -> None:
+    results = make_results(1, 1, n=200, sampled=False)
+
+    def broken_figure(results: Results) -> dict[str, Figure]:
+        raise KeyError("g")
+
+    def half(results: Results) -> dict[str, Figure]:
+        bad, good = Figure(), Figure()
+        bad.text(0, 0, r"$\frac$")
+        return {"bad_one": bad, "good": good}
+
+    assert dict(save_drawn(broken_figure, results, tmp_path).failed) == {
+        "broken figure": "KeyError: 'g'"
+    }
+    made = save_drawn(half, results, tmp_path)
+    assert list(made.pictures) == ["good"] and list(made.failed) == ["bad one"]
+    assert made.failed["bad one"].startswith("ValueError") and "\n" not in made.failed["bad one"]
+
+
+def test_a_full_disk_is_no_failed_figure(tmp_path: Path) -> None:
+    def full(results: Results) -> dict[str, Figure]:
+        raise OSError(28, "No space left on device")
+
+    with pytest.raises(OSError, match="space"):
+        save_drawn(full, make_results(1, 1, n=200, sampled=False), tmp_path)

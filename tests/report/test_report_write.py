@@ -107,7 +107,7 @@ def test_folder_of_a_posterior(
     posterior: Posterior, identification: Identification, tmp_path: Path
 ) -> None:
     base = replace(posterior, seed=4)
-    results = write_posterior(posterior, identification, tmp_path, command="x", before=base)
+    results = write_posterior(posterior, identification, tmp_path, command="x", before=base).results
     names = {f.name for f in tmp_path.iterdir()}
     assert names == {"results.nc", "fit.json", POSTERIOR_FILE, REPORT_FILE, "figures"}
     assert load_results(tmp_path).headline == results.headline
@@ -119,7 +119,7 @@ def test_report_again_from_files_alone(tmp_path: Path) -> None:
     write_results(make_results(1, 1, n=200, sampled=False), tmp_path)
     page = (tmp_path / REPORT_FILE).read_text()
     (tmp_path / REPORT_FILE).unlink()
-    assert rewrite_report(tmp_path) == tmp_path / REPORT_FILE
+    assert rewrite_report(tmp_path).page == tmp_path / REPORT_FILE
     assert (tmp_path / REPORT_FILE).read_text() == page
 
 
@@ -193,7 +193,7 @@ def softening_pendulum() -> Campaign:
 
 def test_report_of_a_linear_oscillator_that_does_not_fit(tmp_path: Path) -> None:
     found = identify(softening_pendulum(), rng=np.random.default_rng(1), search=False)
-    results = write_fit(found, tmp_path, seed=1)
+    results = write_fit(found, tmp_path, seed=1).results
     assert results.verdict == "inadequate"
     page = (tmp_path / REPORT_FILE).read_text()
     body = page.index('class="verdict bad"')

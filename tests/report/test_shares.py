@@ -22,7 +22,7 @@ def told(tmp_path: Path) -> Results:
 
 
 def test_two_processes_draw_what_one_does(told: Results, tmp_path: Path) -> None:
-    pictures = save_all(told, tmp_path)
+    pictures = save_all(told, tmp_path).pictures
     assert list(pictures) == list(all_figures(told))
     files = {f.name for f in (tmp_path / "figures").iterdir()}
     assert files == {f"{name}.{kind}" for name in pictures for kind in ("png", "pdf")}
@@ -35,11 +35,12 @@ def test_one_process_draws_all_where_no_other_starts(
     told: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, interpreter: str
 ) -> None:
     monkeypatch.setattr("sys.executable", interpreter)
-    assert list(save_all(told, tmp_path)) == list(all_figures(told))
+    assert list(save_all(told, tmp_path).pictures) == list(all_figures(told))
 
 
 def test_the_second_process_draws_every_other_group(told: Results, tmp_path: Path) -> None:
     other = started(tmp_path)
     assert other is not None
     names, _ = other.communicate()
-    assert read(names, tmp_path).keys() == set(range(1, len(drawers(told)), 2))
+    found = read(names, tmp_path)
+    assert found is not None and found.keys() == set(range(1, len(drawers(told)), 2))

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 
+from bayesimpact.data.period import rough_period
 from bayesimpact.report.cycles import stop_level
 from bayesimpact.report.figures.style import (
     GREY,
@@ -112,8 +113,14 @@ def _legend(figure: Figure, motion: Axes, residual: Axes) -> None:
 
 
 def _period(results: Results) -> float:
-    """Period of free motion, s."""
-    return float(2 * np.pi * np.sqrt(results.mass / results.row("k1").median))
+    """Period of free motion, s; of the recordings where the fit has no stiffness."""
+    k1 = results.row("k1").median
+    if k1 > 0 and np.isfinite(k1):
+        return float(2 * np.pi * np.sqrt(results.mass / k1))
+    found = [rough_period(r.samples, r.interval) for r in results.recordings]
+    known = [period for period in found if period is not None]
+    longest = max(float(r.times[-1]) for r in results.recordings)
+    return float(np.median(known)) if known else longest / CLOSE_UP_CYCLES
 
 
 def _release(recording: RecordingResult) -> float:
@@ -163,7 +170,8 @@ def _motion(axis: Axes, results: Results, recording: RecordingResult, *, dots: b
 
 
 def _residual(axis: Axes, results: Results, recording: RecordingResult, limit: float) -> None:
-    shown = display(results.unit, max(results.rms, results.noise.level))
+    sizes = [x for x in (results.rms, results.noise.level) if np.isfinite(x)]
+    shown = display(results.unit, max(sizes, default=0.0))
     r = recording.residual * shown.scale
     axis.plot(*polyline(recording.times, r), color="#555555", lw=0.45, rasterized=True)
     band = 2 * recording.noise_rms * shown.scale

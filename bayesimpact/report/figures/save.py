@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
+import warnings
 from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 from matplotlib.figure import Figure
@@ -24,11 +28,45 @@ from bayesimpact.report.results import Results
 
 DPI = 150
 _COLOURS = 256  # in a picture: a third of the bytes, no difference to be seen
+LONGEST_NAME = 40
+"""Characters of a file's name: with its ending and a temporary name's below 255 bytes."""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """PNG files by the name of the figure; the reason, by what could not be drawn."""
+
+    pictures: Mapping[str, bytes] = field(default_factory=dict)
+    failed: Mapping[str, str] = field(default_factory=dict)
 
 
 def all_figures(results: Results) -> dict[str, Figure]:
     """Every figure that the results allow, by the name of its file, in the order of the page."""
-    return {name: figure for draw in drawers(results) for name, figure in draw(results).items()}
+    return {name: f for draw in drawers(results) for name, f in figures_of(draw, results).items()}
+
+
+def figures_of(draw: Drawer, results: Results) -> dict[str, Figure]:
+    """What one function draws; names that hold a $ are shown as they are, not as mathematics."""
+    return {n.replace(r"\$", "$"): figure for n, figure in draw(escaped(results)).items()}
+
+
+def escaped(record: Any) -> Any:
+    """The same record with every $ of its texts escaped for matplotlib's mathematics."""
+    if isinstance(record, str):
+        return record.replace("$", r"\$") if "$" in record else record
+    if is_dataclass(record) and not isinstance(record, type):
+        old = {f.name: getattr(record, f.name) for f in fields(record)}
+        changed = {name: new for name, value in old.items() if (new := escaped(value)) is not value}
+        return replace(record, **changed) if changed else record
+    if isinstance(record, Mapping):
+        pairs = {escaped(key): escaped(value) for key, value in record.items()}
+        same = all(pairs.get(key) is value for key, value in record.items())
+        return record if same else pairs
+    if isinstance(record, (tuple, list)):
+        items = [escaped(item) for item in record]
+        same = all(new is item for new, item in zip(items, record, strict=True))
+        return record if same else type(record)(items)
+    return record
 
 
 def drawers(results: Results) -> tuple[Drawer, ...]:
@@ -66,18 +104,52 @@ def save_figures(figures: Mapping[str, Figure], folder: Path) -> dict[str, bytes
     -------
     The PNG files' content by name, for the page.
     """
+    return {name: _saved(name, figure, folder) for name, figure in figures.items()}
+
+
+def save_drawn(draw: Drawer, results: Results, folder: Path) -> Drawn:
+    """Draw and save what one function draws; a figure that fails leaves its reason, not a gap.
+
+    Raises
+    ------
+    OSError : the folder cannot be written
+    """
+    try:
+        figures = figures_of(draw, results)
+    except OSError:
+        raise
+    except Exception as error:
+        return Drawn(failed={draw.__name__.strip("_").replace("_", " "): reason(error)})
+    pictures, failed = {}, {}
+    for name, figure in figures.items():
+        try:
+            pictures[name] = _saved(name, figure, folder)
+        except OSError:
+            raise
+        except Exception as error:
+            failed[name.replace("_", " ")] = reason(error)
+    return Drawn(pictures, failed)
+
+
+def reason(error: Exception) -> str:
+    """An error as one line."""
+    words = " ".join(str(error).split())
+    return f"{type(error).__name__}: {words[:200]}" if words else type(error).__name__
+
+
+def _saved(name: str, figure: Figure, folder: Path) -> bytes:
     folder.mkdir(parents=True, exist_ok=True)
-    pictures = {}
-    with matplotlib.rc_context(STYLE):
-        for name, figure in figures.items():
-            safe = file_name(name)
-            pictures[name] = png(figure)
-            figure.set_layout_engine("none")  # laid out once is enough
-            with atomic(folder / f"{safe}.png") as temporary:
-                temporary.write_bytes(pictures[name])
-            with atomic(folder / f"{safe}.pdf") as temporary:
-                figure.savefig(temporary, metadata={"CreationDate": None})
-    return pictures
+    safe = file_name(name)
+    with matplotlib.rc_context(STYLE), warnings.catch_warnings():
+        # a name in letters that the font lacks shows boxes there; that is all
+        warnings.filterwarnings("ignore", message="Glyph .* missing from")
+        picture = png(figure)
+        figure.set_layout_engine("none")  # laid out once is enough
+        with atomic(folder / f"{safe}.png") as temporary:
+            temporary.write_bytes(picture)
+        with atomic(folder / f"{safe}.pdf") as temporary:
+            figure.savefig(temporary, metadata={"CreationDate": None})
+    return picture
 
 
 def png(figure: Figure) -> bytes:
@@ -91,5 +163,11 @@ def png(figure: Figure) -> bytes:
 
 
 def file_name(name: str) -> str:
-    """A file name for a figure that carries a case's name: letters, digits, - and _ only."""
-    return "".join(c if c.isalnum() or c in "-_" else "_" for c in name)
+    """A file name for a figure that carries a case's name: letters, digits, - and _ only.
+
+    Where that changes the name or cuts it, a digest keeps different names apart.
+    """
+    safe = "".join(c if c.isalnum() or c in "-_" else "_" for c in name)[:LONGEST_NAME]
+    if safe == name:
+        return name
+    return f"{safe}-{hashlib.sha256(name.encode('utf-8', 'replace')).hexdigest()[:6]}"

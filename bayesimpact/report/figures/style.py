@@ -31,7 +31,16 @@ CYCLE = (BLUE, ORANGE, GREEN, PURPLE, RED, SKY, BLACK)
 WIDTH = 10.0
 """Width of a figure, in."""
 
+# Only these of matplotlib's settings belong to a process, not to a figure.
+_OF_THE_PROCESS = ("backend", "backend_fallback", "interactive", "toolbar", "timezone", "webagg")
+
 STYLE: dict[Any, Any] = {
+    # matplotlib reads a matplotlibrc of the working folder: its own defaults take that back
+    **{
+        key: value
+        for key, value in matplotlib.rcParamsDefault.items()
+        if not key.startswith((*_OF_THE_PROCESS, "tk.", "date.epoch", "docstring"))
+    },
     "font.size": 9.0,
     "font.family": "DejaVu Sans",
     "axes.titlesize": 9.0,

@@ -1,0 +1,134 @@
+"""A report is made whatever effect a diagnosis names: no parameter that an effect takes away or
+brings along is missing anywhere.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from diagnosed import DIAGNOSIS, LIMITS, MODELS, estimate, made_up_arrays
+from effect_rigs import BY_ID, with_effect
+from matplotlib.figure import Figure
+
+from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.identify import Identification
+from bayesimpact.report.archive import load_results
+from bayesimpact.report.figures import gaussian, save, shares
+from bayesimpact.report.figures.corner import Normal, corner_figure
+from bayesimpact.report.figures.gaussian import gaussian_figures
+from bayesimpact.report.figures.improvement import improvement_figures
+from bayesimpact.report.write import Written, write_fit
+
+VERDICTS = ("named", "ambiguous", "unknown")
+
+
+def few_pairs(after: Normal, *, before: Normal, **told: Any) -> Figure:
+    """The corner plot of two parameters: the first of the base model and the last added one."""
+    assert len(after.names) == after.mean.size
+
+    def some(law: Normal) -> Normal:
+        ends = [0, len(law.names) - 1]
+        names, units = (tuple(text[i] for i in ends) for text in (law.names, law.units))
+        return replace(law, names=names, units=units, mean=law.mean[ends],
+                       covariance=law.covariance[np.ix_(ends, ends)])  # fmt: skip
+
+    return corner_figure(some(after), before=some(before), **told)
+
+
+@pytest.fixture(autouse=True)
+def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What reads parameters is drawn, with few pixels, no PDF and no second process."""
+
+    def saved(name: str, figure: Figure, folder: Path) -> bytes:
+        figure.set_layout_engine("none")
+        stream = io.BytesIO()
+        figure.savefig(stream, format="png", dpi=12)
+        return stream.getvalue()
+
+    monkeypatch.setattr(save, "_saved", saved)
+    monkeypatch.setattr(save, "DIAGNOSIS", (improvement_figures, gaussian_figures))
+    monkeypatch.setattr(gaussian, "corner_figure", few_pairs)
+    monkeypatch.setattr(shares, "started", lambda folder: None)
+
+
+def extended(small: Identification, effect_id: str) -> Fit:
+    """The small rig's fit with an effect at its null beside it, and made-up uncertainties."""
+    fit = with_effect(small, effect_id)
+    known = dict(zip(small.fit.names, small.fit.sd, strict=True))
+    sd = [known.get(n, 0.01 * abs(m) + 1e-9) for n, m in zip(fit.names, fit.mode, strict=True)]
+    return replace(fit, covariance=np.diag(np.square(sd)))
+
+
+def table(fit: Fit) -> dict[str, Any]:
+    units = [p.unit for p in fit.target.oscillator.layout.parameters]
+    rows = zip(fit.names, fit.mode, fit.sd, units, strict=True)
+    return {name: estimate(float(mode), float(sd), unit) for name, mode, sd, unit in rows}
+
+
+def written(small: Identification, fit: Fit, folder: Path, verdict: str = "named") -> Written:
+    """The report of a diagnosis that ends with this fit."""
+    ids = [e.id for e in fit.target.oscillator.effects]
+    own = {name: row for name, row in table(fit).items() if "." in name}
+    content = {
+        **DIAGNOSIS,
+        "verdict": verdict,
+        "effects": [
+            {**DIAGNOSIS["effects"][0], "id": i, "family": BY_ID[i].family,
+             "parameters": {n: row for n, row in own.items() if n.startswith(f"{i}.")}}
+            for i in ids
+        ],
+        "parameters": {"before": table(small.fit), "after": table(fit)},
+        "limits": LIMITS,
+        "evidence": {"models": [{"effects": ids, "log_odds": 900.0}, *MODELS], "decisive": 5.5},
+    }  # fmt: skip
+    arrays = made_up_arrays(3, 2)
+    arrays |= {"before_mode": small.fit.mode, "before_covariance": small.fit.covariance}
+    final = replace(small, fit=fit, search=None)
+    return write_fit(final, folder, diagnosis=content, diagnosis_arrays=arrays)
+
+
+@pytest.mark.parametrize("effect_id", list(BY_ID))
+def test_report_of_every_effect(small: Identification, effect_id: str, tmp_path: Path) -> None:
+    made = written(small, extended(small, effect_id), tmp_path)
+    assert dict(made.failed) == {}
+    page = made.page.read_text()
+    assert effect_id in page and page.count("<img") >= 4
+    names = [row.name for row in load_results(tmp_path).rows]
+    assert names == [row.name for row in made.results.rows]
+
+
+@pytest.fixture
+def pair(small: Identification) -> Iterator[Fit]:
+    """Two effects that take c2 and g away together."""
+    from bayesimpact.diagnosis.extend import campaign_scales, extend, transfer
+
+    effects = tuple(BY_ID[i] for i in ("contact_damping_per_case", "gap_per_recording"))
+    scales = campaign_scales(small.fit)
+    target = extend(small.fit, effects, scales)
+    mode = transfer(small.fit, target.oscillator.layout, effects, scales, {})
+    covariance = np.diag(np.square(1e-3 * np.abs(mode) + 1e-9))
+    yield replace(small.fit, target=target, mode=mode, covariance=covariance)
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_report_of_every_verdict(
+    small: Identification, pair: Fit, verdict: str, tmp_path: Path
+) -> None:
+    assert {"c2", "g"}.isdisjoint(pair.names)
+    assert dict(written(small, pair, tmp_path, verdict).failed) == {}
+
+
+def test_report_of_a_fit_without_stiffness(small: Identification, tmp_path: Path) -> None:
+    fit = extended(small, "coulomb_friction")
+    mode, covariance = fit.mode.copy(), fit.covariance.copy()
+    k1 = fit.names.index("k1")
+    mode[k1], covariance[k1, k1] = 0.0, 0.0
+    assert (
+        dict(written(small, replace(fit, mode=mode, covariance=covariance), tmp_path).failed) == {}
+    )
