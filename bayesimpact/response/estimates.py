@@ -117,7 +117,7 @@ def estimate(campaign: Campaign) -> Estimates:
 def _free(mass: float, flight: Flight) -> Free:
     """The free oscillator from its flights, with standard errors that allow for a small misfit."""
     c1, k1 = 2 * mass * flight.decay, mass * (flight.omega**2 + flight.decay**2)
-    sd_c1 = float(np.hypot(2 * mass * flight.sd_decay, 0.01 * abs(c1))) + 1e-9 * flight.omega
+    sd_c1 = float(np.hypot(2 * mass * flight.sd_decay, 0.01 * abs(c1))) + 1e-9 * mass * flight.omega
     sd_k1 = float(np.hypot(2 * flight.sd_omega / flight.omega, 2e-5)) * k1
     return Free(mass=mass, c1=max(c1, 0.0), k1=k1, sd_c1=sd_c1, sd_k1=sd_k1)
 
