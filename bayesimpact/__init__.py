@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from bayesimpact.data.recording import Recording as Recording
     from bayesimpact.model.effects import EFFECTS as EFFECTS
     from bayesimpact.model.effects import Effect as Effect
-    from bayesimpact.model.simulate import simulate as simulate
+    from bayesimpact.model.experiment import simulate as simulate
+    from bayesimpact.report.check_figure import plot as plot
     from bayesimpact.report.notebook import corner as corner
     from bayesimpact.response.backbone import backbone as backbone
 
@@ -35,13 +36,14 @@ _NAMES = {
     "Campaign": ("bayesimpact.data.campaign", "Campaign"),
     "Recording": ("bayesimpact.data.recording", "Recording"),
     "load": ("bayesimpact.data.read", "load_campaign"),
-    "simulate": ("bayesimpact.model.simulate", "simulate"),
+    "simulate": ("bayesimpact.model.experiment", "simulate"),
     "backbone": ("bayesimpact.response.backbone", "backbone"),
     "fit": ("bayesimpact.api", "fit"),
     "sample": ("bayesimpact.api", "sample"),
     "summary": ("bayesimpact.api", "summary"),
     "save": ("bayesimpact.api", "save"),
     "open": ("bayesimpact.api", "open_results"),
+    "plot": ("bayesimpact.report.check_figure", "plot"),
     "corner": ("bayesimpact.report.notebook", "corner"),
     "diagnose": ("bayesimpact.api", "diagnose"),
     "EFFECTS": ("bayesimpact.model.effects", "EFFECTS"),
@@ -59,6 +61,7 @@ __all__ = [
     "fit",
     "load",
     "open",
+    "plot",
     "sample",
     "save",
     "simulate",

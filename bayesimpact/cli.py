@@ -167,21 +167,75 @@ def check(campaign: Path, out: Path | None, seed: int, quiet: bool) -> None:
     With --out the plot is saved as DIR/check.png. Nothing is drawn at random here: --seed is taken
     for the sake of scripts that pass it to every command.
     """
+    from bayesimpact.data.faults.find import set_aside
     from bayesimpact.report.check_text import campaign_text, campaign_warnings, measured_noise
+    from bayesimpact.report.fault_text import fault_lines
 
     loaded = loaded_campaign(campaign)
-    noise = measured_noise(loaded)
+    cleaned, faults = set_aside(loaded)
+    noise = measured_noise(cleaned)
     if not quiet:
         click.echo(campaign_text(loaded, noise))
+    for line in fault_lines(loaded, faults):
+        click.echo(line, err=quiet)
     for warning in campaign_warnings(loaded, noise):
         click.echo(f"warning: {warning}", err=True)
     if out is not None:
         from bayesimpact.report.check_figure import campaign_figure
 
         file = made_folder(out) / "check.png"
-        campaign_figure(loaded).savefig(file)
+        campaign_figure(loaded, faults).savefig(file)
         if not quiet:
             click.echo(f"plot: {file}")
+
+
+@main.command()
+@click.argument("folder", metavar="FOLDER", type=click.Path(file_okay=False, path_type=Path))
+@click.argument(
+    "files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path)
+)
+@click.option("--mass", type=click.FloatRange(min=0, min_open=True), help="Moving mass, kg.")
+@click.option("--stop/--no-stop", default=None, help="Is there an obstacle?")
+@click.option("--case", metavar="NAME", help="The obstacle's name.")
+@click.option("--plot", is_flag=True, help="Draw all channels into FOLDER/channels.png.")
+@common
+def new(
+    folder: Path, files: tuple[Path, ...], mass: float | None, stop: bool | None, case: str | None,
+    plot: bool, seed: int, quiet: bool,
+) -> None:  # fmt: skip
+    """Look at instrument files FILE... and write FOLDER/campaign.toml with comments.
+
+    Says which channels the files hold and what it assumed. A campaign.toml that is there already
+    is never replaced. Nothing is drawn at random: --seed is taken for the sake of scripts.
+    """
+    from bayesimpact.data import draft
+    from bayesimpact.data.read import load_campaign
+
+    if (folder / "campaign.toml").exists():
+        accepted = "a folder without one; it is never replaced"
+        raise InputError(str(folder / "campaign.toml"), "a campaign already", accepted)
+    looks = [draft.look(folder, file) for file in files]
+    title = folder.resolve().name or "campaign"
+    made = draft.draft(title, looks, draft.Rig(mass, stop, case))
+    file = draft.write(folder, made)
+    if plot:
+        from bayesimpact.report.channel_figure import channel_figure
+
+        channel_figure([(one.file, one.channels) for one in looks]).savefig(folder / "channels.png")
+    if quiet:
+        return
+    for one in looks:
+        click.echo(f"{one.file}:")
+        for channel in one.channels:
+            click.echo(f"  {draft.listing(channel)}")
+    click.echo(f"written: {file}" + (f", {folder / 'channels.png'}" if plot else ""))
+    for line in (*made.assumed, *made.needed):
+        click.echo(f"  {line}")
+    try:
+        load_campaign(folder)
+        click.echo(f"ready for: bayesimpact check {folder}")
+    except InputError as error:
+        click.echo(f"not yet complete: {error}")
 
 
 def telling(quiet: bool) -> Callable[[str], None]:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.faults.find import set_aside
 from bayesimpact.diagnosis.certificate import certificate
 from bayesimpact.diagnosis.document import document
 from bayesimpact.diagnosis.loop import Diagnosis, diagnose
@@ -55,11 +56,21 @@ class Outcome:
     failed: Mapping[str, str] = field(default_factory=dict)
 
 
+def without_faults(campaign: Campaign, say: Say = silent) -> Campaign:
+    """The campaign without the faults found in its recordings; each is told."""
+    cleaned, faults = set_aside(campaign)
+    for fault in faults:
+        verb = "noticed" if fault.action == "notice" or campaign.keep_faults else "set aside"
+        say(f"{verb}: {fault.recording}: {fault.statement} ({fault.id})")
+    return cleaned
+
+
 def fit_campaign(
     campaign: Campaign, out: Path, *, seed: int = 0, command: str = "", say: Say = silent
 ) -> Outcome:
     """Mode of the base model: fit.json, figures and report in `out`."""
     began = time.perf_counter()
+    campaign = without_faults(campaign, say)
     say("searching the mode")
     identification = identify(campaign, rng=np.random.default_rng(seed))
     seconds = time.perf_counter() - began
@@ -82,6 +93,7 @@ def sample_campaign(
     `out`/chain. `bar`: show the sampler's progress; None where standard error is a terminal.
     """
     began = time.perf_counter()
+    campaign = without_faults(campaign, say)
     say("searching the mode")
     identification = identify(campaign, rng=np.random.default_rng(seed))
     posterior = sampled(identification, seed, out / CHAIN_FOLDER, resume, say, bar)
@@ -108,8 +120,8 @@ def sampled(
             seed=seed,
             folder=folder,
             resume=resume,
-            callback=callback,
             tell=say,
+            callback=callback,
         )
 
 

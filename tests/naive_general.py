@@ -35,7 +35,10 @@ class Naive:
         self.gap, self.m2 = self.g, self.number("obstacle_mass", "mass")
         self.one_sided = bool({"contact_no_tension", "obstacle_mass"} & set(self.effects))
         self.friction = self.number("coulomb_friction", "force")
-        self.t, self.state, self.slide = 0.0, [self.y0, self.v0, 0.0], np.sign(self.v0)
+        self.t, self.slide = 0.0, np.sign(self.v0)
+        # y, v, relaxation, then displacement and velocity of second mode, obstacle, frame
+        self.state = [self.y0, self.v0, *[0.0] * 7]
+        self.ratio = self.number("base_motion", "mass_ratio")
         self.mode = FREE
 
     def number(self, effect: str, name: str, default: float = 0.0) -> float:
@@ -65,28 +68,71 @@ class Naive:
         w = 2 * np.pi * p("harmonic_forcing", "frequency")
         phase = p("harmonic_forcing", "phase")
         force -= p("harmonic_forcing", "amplitude") * np.sin(w * t + phase)
+        K = p("pendulum_with_spring", "stiffness") + self.k1 * ("pendulum_sine" in self.effects)
+        force += K * (np.sin(y) - y) + p("spring_quintic", "stiffness") * y**5
+        force += (
+            p("power_damping", "coefficient")
+            * abs(v) ** p("power_damping", "exponent")
+            * (np.sign(v))
+        )
+        force += p("structural_damping", "loss") * self.k1 * abs(y) * self.slide
         if y < -p("opposite_stop", "gap", np.inf):
             force += p("opposite_stop", "stiffness") * (y + p("opposite_stop", "gap"))
         return force
 
-    def acceleration(self, t: float, y: float, v: float, z: float, mode: str) -> float:
-        force = self.everywhere(t, y, v) + self.friction * self.slide
-        if mode == CONTACT:
-            return -(force + self.in_contact(y, v, z)) / (self.mass + self.m2)
-        return -force / self.mass
+    def mode_of(self, effect: str) -> tuple[float, float]:
+        """Squared angular frequency and damping rate of an effect's mode."""
+        w = 2 * np.pi * self.number(effect, "frequency")
+        return w**2, 2 * self.number(effect, "damping") * w
+
+    def ringing(self, state: list[float]) -> float:
+        """Pull of the place of contact on the mass inside the obstacle, per kg of it."""
+        W, drag = self.mode_of("obstacle_mode")
+        place, speed = (state[0] - self.gap, state[1]) if self.mode == CONTACT else (0.0, 0.0)
+        return W * (place - state[5]) + drag * (speed - state[6])
+
+    def obstacle(self, state: list[float]) -> float:
+        """Everything between obstacle and mass, the mass inside the obstacle included, N."""
+        inside = self.number("obstacle_mode", "mass") * self.ringing(state)
+        return self.in_contact(*state[:3]) + inside
+
+    def frame_pull(self, state: list[float]) -> float:
+        """What spring and damper of the frame do to it, per kg of it."""
+        W, drag = self.mode_of("base_motion")
+        return -W * state[7] - drag * state[8]
+
+    def acceleration(self, t: float, state: list[float]) -> float:
+        """y'' from m (y'' + X'') + N = 0, X'' = pull + r N / m; N contains m2 y''."""
+        force = self.everywhere(t, *state[:2]) + self.friction * self.slide
+        touching, rest = self.mode == CONTACT, 1 + self.ratio
+        if touching:
+            force += self.obstacle(state)
+        inertia = self.mass + rest * self.m2 * touching
+        return -(rest * force + self.mass * self.frame_pull(state)) / inertia
 
     def reaction(self, t: float, state: list[float]) -> float:
         """Force of the obstacle on the mass, N: what moves the obstacle's own mass comes on top."""
-        y, v, z = state
-        return self.in_contact(y, v, z) + self.m2 * self.acceleration(t, y, v, z, CONTACT)
+        return self.obstacle(state) + self.m2 * self.acceleration(t, state)
 
     def right_hand_side(self, t: float, state: list[float]) -> list[float]:
-        y, v, z = state
+        v, z = state[1:3]
         touching = self.mode == CONTACT
         stiffness, time = (self.number("contact_relaxation", n) for n in ("stiffness", "time"))
         rate = stiffness * v * touching - z / time if time else 0.0
         held = self.friction > 0 and self.slide == 0
-        return [0.0, 0.0, rate] if held else [v, self.acceleration(t, y, v, z, self.mode), rate]
+        a = 0.0 if held else self.acceleration(t, state)
+        slope = [0.0 if held else v, a, rate]
+        slope += [*self.second_mode(t, state, held), state[6], self.ringing(state)]
+        shaken = -(self.ratio * a - self.frame_pull(state)) / (1 + self.ratio)
+        return [*slope, state[8], shaken]
+
+    def second_mode(self, t: float, state: list[float], held: bool) -> list[float]:
+        """Rates of the mode that the contact force excites."""
+        p, force = self.number, 0.0
+        if self.mode == CONTACT:
+            force = self.obstacle(state) if held else self.reaction(t, state)
+        W, drag = self.mode_of("second_mode")
+        return [state[4], p("second_mode", "gain") * force - W * state[3] - drag * state[4]]
 
     def watches(self, sign: float) -> dict[str, tuple[object, float]]:
         """Event -> (function of t and state, direction in which it crosses zero)."""
@@ -100,6 +146,7 @@ class Naive:
         for effect, name, scale in (
             ("opposite_stop", "gap", -1.0),
             ("contact_second_stage", "depth", 1.0),
+            ("structural_damping", "", -1.0),
         ):
             if effect in self.effects:
                 base = 0.0 if scale < 0 else self.gap
@@ -134,7 +181,7 @@ class Naive:
             end = answer.t[-1]
             upto = times.size if answer.status == 0 else int(np.searchsorted(times, end))
             if upto > filled:
-                out[filled:upto] = answer.sol(times[filled:upto])[0]
+                out[filled:upto] = answer.sol(times[filled:upto])[[0, 3]].sum(axis=0)
             filled = upto
             self.t, self.state = end, list(answer.y[:, -1])
             for name, hits in zip(watches, answer.t_events, strict=True):
@@ -144,27 +191,33 @@ class Naive:
 
     def start(self) -> float:
         """Direction of the piece that begins now; 0 while dry friction holds."""
-        y, v, z = self.state
-        if v != 0:
-            self.slide = np.sign(v)
+        if self.state[1] != 0:
+            self.slide = np.sign(self.state[1])
             return self.slide
         self.slide = 0.0
-        mass = self.mass + self.m2 * (self.mode == CONTACT)
-        pull = mass * self.acceleration(self.t, y, 0.0, z, self.mode)
+        pull = self.inertia() * self.acceleration(self.t, self.state)
         if abs(pull) > self.friction:
             self.slide = np.sign(pull)
         return self.slide
 
+    def inertia(self) -> float:
+        return self.mass / (1 + self.ratio) + self.m2 * (self.mode == CONTACT)
+
     def slack(self, t: float, state: list[float]) -> float:
-        mass = self.mass + self.m2 * (self.mode == CONTACT)
-        return self.friction - mass * abs(self.acceleration(t, state[0], 0.0, state[2], self.mode))
+        at_rest = [state[0], 0.0, *state[2:]]
+        return self.friction - self.inertia() * abs(self.acceleration(t, at_rest))
 
     def happen(self, name: str) -> None:
         if name == "turn":
             self.state[1] = 0.0
         elif name == "touch":
             self.mode, self.state[0] = CONTACT, self.gap
-            self.state[1] *= self.mass / (self.mass + self.m2)
+            before = self.state[1]
+            mass = self.mass / (1 + self.ratio)
+            self.state[1] *= mass / (mass + self.m2)
+            lost = mass * (before - self.state[1])
+            self.state[4] += self.number("second_mode", "gain") * lost
+            self.state[8] += self.ratio * lost / self.mass
         elif name == "gap" and self.mode == RELEASED:
             self.mode = FREE
         elif name in ("gap", "release"):

@@ -104,6 +104,30 @@ def test_a_chain_that_is_a_file(
     assert code == 2 and error.count("\n") == 1 and "chain" in error
 
 
+def test_a_figure_that_fails_costs_nothing_else_and_report_finishes_it(
+    capsys: pytest.CaptureFixture[str],
+    campaign: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def search_figure(results: object) -> dict[str, object]:
+        raise KeyError("g")
+
+    with monkeypatch.context() as broken:
+        broken.setattr("bayesimpact.report.figures.save.search_figure", search_figure)
+        code, error = ended(capsys, "fit", campaign, "--out", tmp_path, "--quiet")
+    assert code == 3 and error.count("\n") == 1 and "bayesimpact report" in error
+    page = (tmp_path / "report.html").read_text()
+    assert "KeyError: &#39;g&#39;" in page and page.count("<img") == 2
+    with monkeypatch.context() as broken:
+        broken.setattr("bayesimpact.report.write.render", search_figure)
+        code, error = ended(capsys, "report", tmp_path, "--quiet")
+    assert code == 3 and error.count("\n") == 1
+    assert "unfinished report" in (tmp_path / "report.html").read_text()
+    assert ended(capsys, "report", tmp_path, "--quiet") == (0, "")
+    assert (tmp_path / "report.html").read_text().count("<img") == 3
+
+
 def test_sigterm_is_like_ctrl_c_and_says_how_to_go_on(campaign: Path, tmp_path: Path) -> None:
     process = subprocess.Popen(
         [COMMAND, "sample", str(campaign), "--out", str(tmp_path)],

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
 
+from bayesimpact.data.frozen import Picklable
 from bayesimpact.data.recording import Recording
 
 
@@ -39,6 +41,7 @@ class Measurement:
     mass_sd : standard uncertainty of the mass, relative
     clock_sd : standard uncertainty of the clock rate, relative
     gain_sd : standard uncertainty of the probe's gain, relative
+    unfiltered : campaign.toml says that the recordings passed no filter (`smoothing = "none"`)
     """
 
     noise: float | None = None
@@ -46,6 +49,7 @@ class Measurement:
     mass_sd: float = 0.0
     clock_sd: float = 0.0
     gain_sd: float = 0.0
+    unfiltered: bool = False
 
 
 @dataclass(frozen=True)
@@ -65,7 +69,7 @@ class Beam:
 
 
 @dataclass(frozen=True, eq=False)
-class Campaign:
+class Campaign(Picklable):
     """Recordings of one oscillator, with one or more obstacles.
 
     Attributes
@@ -78,6 +82,9 @@ class Campaign:
     priors : parameter name -> the table of campaign.toml's [priors], SI; validated
     beams : case -> geometry of its obstacle, where given
     sha256 : of campaign.toml and every recording's file; "" for a campaign built in memory
+    keep_faults : campaign.toml says that faults found in the recordings stay in (`faults = "keep"`)
+    skipped : recording -> why it is left out
+    notes : what was set aside in the recordings and why, in words, for reports
     """
 
     name: str
@@ -89,6 +96,9 @@ class Campaign:
     beams: Mapping[str, Beam] = field(default_factory=lambda: MappingProxyType({}))
     sha256: str = ""
     folder: Path | None = None
+    keep_faults: bool = False
+    skipped: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    notes: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         """One line."""
@@ -99,6 +109,92 @@ class Campaign:
     def cases(self) -> tuple[str, ...]:
         """Obstacles in order of first appearance; () without a stop."""
         return tuple(dict.fromkeys(r.case for r in self.recordings)) if self.stop else ()
+
+    @classmethod
+    def from_arrays(
+        cls,
+        recordings: Iterable[Recording | Mapping[str, Any]],
+        *,
+        name: str,
+        mass_kg: float,
+        **tables: Any,
+    ) -> Campaign:
+        """A campaign from samples in memory, checked as a campaign.toml and its files are.
+
+        Parameters
+        ----------
+        recordings : one or more, each a `Recording` (SI units) or a mapping with the keys of a
+            [[recording]]: `name`, `case`, `samples` (n,) and their `unit` (m, mm, um, rad, deg),
+            and either `times_s` (n,), evenly spaced, or `sample_rate_hz`; `start_s`, `end_s`
+        name, mass_kg, tables : any other key of campaign.toml, as there: `stop = False`,
+            `measurement = {"noise_um": 5.0}`, `priors = {"k1": {...}}`, `beam`, ...
+
+        Raises
+        ------
+        InputError
+            for whatever cannot be used: the message names the recording and key, what was found
+            and what is accepted.
+        """
+        campaign: Campaign = _memory().campaign_from_arrays(recordings, name, mass_kg, tables)
+        return campaign
+
+    @classmethod
+    def from_dataframe(
+        cls,
+        frame: Any,
+        *,
+        name: str,
+        mass_kg: float,
+        recordings: Iterable[Mapping[str, Any]] = (),
+        **tables: Any,
+    ) -> Campaign:
+        """A campaign from a pandas DataFrame; checks and `tables` as in `from_arrays`.
+
+        Parameters
+        ----------
+        frame : a column `time_s` or `time_ms` (or the index, by one of these names). Without
+            `recordings`: one response column, named as in a file (`displacement_mm`, ...), and
+            where there are several recordings, a column `recording` with their names and a column
+            `case`
+        recordings : for a frame with a column per recording: mappings with `column` and `unit`,
+            and the other keys of `from_arrays`
+        """
+        campaign: Campaign = _memory().campaign_from_dataframe(
+            frame, name, mass_kg, tuple(recordings), tables
+        )
+        return campaign
+
+    @classmethod
+    def from_xarray(cls, data: Any, *, name: str, mass_kg: float, **tables: Any) -> Campaign:
+        """A campaign from an xarray Dataset or DataArray; checks and `tables` as in `from_arrays`.
+
+        Parameters
+        ----------
+        data : a Dataset with one variable per recording, or a DataArray whose coordinate
+            `recording` names them. Each has a coordinate `time` (s, or what its attribute `units`
+            says, or datetimes), an attribute `units` and an attribute or coordinate `case`. NaN at
+            the end of a row of a DataArray is filling and left out
+        """
+        campaign: Campaign = _memory().campaign_from_xarray(data, name, mass_kg, tables)
+        return campaign
+
+    def save(self, folder: Path | str, *, overwrite: bool = False) -> Path:
+        """Write campaign.toml and a CSV file per recording, every digit; returns campaign.toml.
+
+        Parameters
+        ----------
+        folder : made when missing
+        overwrite : replace a campaign that is there already
+
+        Raises
+        ------
+        InputError
+            when `folder` holds a campaign.toml already, or cannot be written.
+        """
+        file: Path = import_module("bayesimpact.data.write").save_campaign(
+            self, Path(folder), overwrite=overwrite
+        )
+        return file
 
     def truncated(self, duration: float) -> Campaign:
         """The same campaign with only the first `duration` seconds of every recording."""
@@ -113,5 +209,12 @@ class Campaign:
         kept = []
         for r in self.recordings:
             step = max(1, int(interval / r.interval))
-            kept.append(replace(r, samples=r.samples[::step], interval=r.interval * step))
+            used = None if r.used is None else r.used[::step]
+            samples, interval = r.samples[::step], r.interval * step
+            kept.append(replace(r, samples=samples, interval=interval, used=used))
         return replace(self, recordings=tuple(kept))
+
+
+def _memory() -> Any:
+    """The doors for samples in memory. By name: they build on this record, not it on them."""
+    return import_module("bayesimpact.data.memory")

@@ -16,7 +16,9 @@ Room for stamps that were rounded when written, as 25.6 kHz in microseconds.
 """
 
 
-def even_interval(path: Path, times: NDArray[np.float64], rows: NDArray[np.int64]) -> float:
+def even_interval(
+    path: Path | str, times: NDArray[np.float64], rows: NDArray[np.int64], place: str = "line"
+) -> float:
     """Interval of evenly spaced time stamps, s.
 
     First to last stamp over the number of intervals; where the stamps are rounded, the slope of the
@@ -27,6 +29,7 @@ def even_interval(path: Path, times: NDArray[np.float64], rows: NDArray[np.int64
     path : for messages
     times : (n,) s, n >= 2
     rows : (n,) line of each stamp, for messages
+    place : what messages call a row
 
     Raises
     ------
@@ -40,16 +43,16 @@ def even_interval(path: Path, times: NDArray[np.float64], rows: NDArray[np.int64
         i = int(still[0])
         found = "the same time twice" if steps[i] == 0.0 else "time running backwards"
         found += f" ({times[i + 1]:.9g} s after {times[i]:.9g} s)"
-        raise InputError(f"{path}, line {rows[i + 1]}", found, "times that increase evenly")
+        raise InputError(f"{path}, {place} {rows[i + 1]}", found, "times that increase evenly")
     typical = float(np.median(steps))
     gaps = np.flatnonzero(steps > 1.5 * typical)
     if gaps.size:
         i = int(gaps[0])
         found = f"a gap from {times[i]:.9g} s to {times[i + 1]:.9g} s"
         raise InputError(
-            f"{path}, line {rows[i + 1]}",
+            f"{path}, {place} {rows[i + 1]}",
             found,
-            f"evenly spaced samples, here {typical:.6g} s apart",
+            f"evenly spaced samples, here {typical:.6g} s apart, or resample = true",
         )
     count = np.arange(times.size)
     interval = float(times[-1] - times[0]) / (times.size - 1)
@@ -63,6 +66,9 @@ def even_interval(path: Path, times: NDArray[np.float64], rows: NDArray[np.int64
         found = (
             f"a sample at {times[worst]:.9g} s, {late[worst] / interval:+.1%} of an interval off"
         )
-        accepted = f"evenly spaced samples: every time within {JITTER:.0%} of an interval"
-        raise InputError(f"{path}, line {rows[worst]}", found, accepted)
+        accepted = (
+            f"evenly spaced samples: every time within {JITTER:.0%} of an interval, "
+            "or resample = true"
+        )
+        raise InputError(f"{path}, {place} {rows[worst]}", found, accepted)
     return interval

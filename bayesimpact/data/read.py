@@ -6,7 +6,8 @@ import hashlib
 import math
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 from types import MappingProxyType
@@ -14,6 +15,9 @@ from typing import Any
 
 from bayesimpact.data import bounds
 from bayesimpact.data.campaign import Beam, Campaign, Measurement, Smoothing
+from bayesimpact.data.entries import filled_in
+from bayesimpact.data.foreign import file_bytes, is_foreign, read_foreign
+from bayesimpact.data.gaps import excluded_spans
 from bayesimpact.data.period import rough_period
 from bayesimpact.data.recording import Quantity, Recording
 from bayesimpact.data.schema import (
@@ -22,10 +26,11 @@ from bayesimpact.data.schema import (
     LogUniformTable,
     MeasurementTable,
     RecordingTable,
+    UnfilteredTable,
     UniformTable,
     parse_campaign,
 )
-from bayesimpact.data.table import read_table
+from bayesimpact.data.table import Table, read_table
 from bayesimpact.errors import InputError
 
 CAMPAIGN_FILE = "campaign.toml"
@@ -48,28 +53,63 @@ def load_campaign(path: Path | str, folders: Sequence[Path | str] = ()) -> Campa
     """
     file = _campaign_file(Path(path))
     content = _bytes(file, str(file), bounds.TOML_BYTES)
-    table = parse_campaign(_parse(file, content), str(file))
+    table = filled_in(parse_campaign(_parse(file, content), str(file)), file.parent, str(file))
     digest = hashlib.sha256(content)
+
+    def read(entry: RecordingTable, where: str) -> tuple[str, Table]:
+        source = file.parent / entry.file
+        bounds.inside(source, (file.parent, *map(Path, folders)), f"{where}, key file")
+        data = file_bytes(source, f"{where}, key file")
+        if not data:
+            data = _bytes(source, f"{where}, key file", bounds.TABLE_BYTES)
+        digest.update(data)
+        return str(source), _table(source, entry, data)
+
+    campaign = build_campaign(str(file), table, read)
+    return replace(campaign, sha256=digest.hexdigest(), folder=file.parent)
+
+
+def build_campaign(
+    file: str, table: CampaignTable, read: Callable[[RecordingTable, str], tuple[str, Table]]
+) -> Campaign:
+    """Check what campaign.toml says together with the samples, wherever they come from.
+
+    Parameters
+    ----------
+    file : for messages
+    table : the content of campaign.toml
+    read : gives the samples of an entry, and what messages call their source; its second argument
+        names the entry in messages
+
+    Raises
+    ------
+    InputError
+        as `load_campaign`.
+    """
     recordings: list[Recording] = []
     for number, entry in enumerate(table.recording, 1):
         where = f"{file}, recording {number} ({entry.file})"
+        if entry.skip is not None:
+            continue
         _check_entry(where, entry, table.stop, recordings)
-        source = file.parent / entry.file
-        bounds.inside(source, (file.parent, *map(Path, folders)), f"{where}, key file")
-        data = _bytes(source, f"{where}, key file", bounds.TABLE_BYTES)
-        digest.update(data)
-        recordings.append(_recording(source, where, entry, table.stop, data))
-    _check_together(str(file), table, recordings)
+        source, samples = read(entry, where)
+        recordings.append(_recording(source, where, entry, table.stop, samples))
+    skipped = {e.name or Path(e.file).stem: e.skip for e in table.recording if e.skip}
+    table = table.model_copy(update={"recording": [e for e in table.recording if e.skip is None]})
+    if not recordings:
+        raise InputError(f"{file}, key skip", "on every recording", "one recording without skip")
+    _check_together(file, table, recordings)
     return Campaign(
         name=table.name,
         mass=table.mass_kg,
         recordings=tuple(recordings),
         stop=table.stop,
-        measurement=_measurement(str(file), table, recordings),
-        priors=MappingProxyType(_priors(str(file), table, recordings)),
-        beams=MappingProxyType(_beams(str(file), table)),
-        sha256=digest.hexdigest(),
-        folder=file.parent,
+        measurement=_measurement(file, table, recordings),
+        priors=MappingProxyType(_priors(file, table, recordings)),
+        beams=MappingProxyType(_beams(file, table)),
+        keep_faults=table.faults == "keep",
+        skipped=MappingProxyType(skipped),
+        notes=tuple(f"{name} is skipped ({reason})" for name, reason in skipped.items()),
     )
 
 
@@ -140,7 +180,7 @@ def _check_entry(where: str, entry: RecordingTable, stop: bool, earlier: list[Re
     if stop and entry.case is None:
         accepted = 'the obstacle\'s name, as case = "1"; or stop = false for a rig without obstacle'
         raise InputError(f"{where}, key case", "nothing", accepted)
-    name = Path(entry.file).stem
+    name = entry.name or Path(entry.file).stem
     if name in (recording.name for recording in earlier):
         found = f'a second recording called "{name}"'
         accepted = "file names that differ without their endings, for they name the parameters"
@@ -148,16 +188,33 @@ def _check_entry(where: str, entry: RecordingTable, stop: bool, earlier: list[Re
     start, end = entry.start_s, entry.end_s
     if start is not None and end is not None and start >= end:
         raise InputError(f"{where}, key end_s", f"{end:g} s", f"a time after start_s = {start:g} s")
+    if entry.scale == 0.0:
+        raise InputError(f"{where}, key scale", "0", "a number other than 0")
+    for start, end in entry.exclude_s or ():
+        if start > end:
+            found = f"a span from {start:g} to {end:g} s"
+            raise InputError(f"{where}, key exclude_s", found, "spans that end after they begin")
+
+
+def _table(source: Path, entry: RecordingTable, data: bytes) -> Table:
+    if is_foreign(source, entry, data):
+        return read_foreign(source, entry, data)
+    column = None if entry.column is None else str(entry.column)
+    return read_table(
+        source,
+        data,
+        column=column,
+        unit=entry.unit,
+        sample_rate=entry.sample_rate_hz,
+        resample=entry.resample,
+    )
 
 
 def _recording(
-    source: Path, where: str, entry: RecordingTable, stop: bool, data: bytes
+    source: str, where: str, entry: RecordingTable, stop: bool, table: Table
 ) -> Recording:
-    table = read_table(
-        source, data, column=entry.column, unit=entry.unit, sample_rate=entry.sample_rate_hz
-    )
-    bounds.check_readings(table.samples, "rad" if table.quantity == "angle" else "m", str(source))
-    bounds.check_interval(table.interval, str(source))
+    bounds.check_readings(table.samples, "rad" if table.quantity == "angle" else "m", source)
+    bounds.check_interval(table.interval, source)
     # A sample at the very start or end counts in, however its time was rounded.
     margin = 1e-6
     size, interval = table.samples.size, table.interval
@@ -173,16 +230,21 @@ def _recording(
         raise InputError(
             f"{where}, key {key}", f"no samples left ({asked})", f"times within the file's {span}"
         )
+    factor = (-1.0 if entry.invert else 1.0) * (1.0 if entry.scale is None else entry.scale)
     recording = Recording(
-        name=Path(entry.file).stem,
+        name=entry.name or Path(entry.file).stem,
         case=entry.case if stop and entry.case is not None else "",
-        samples=table.samples[first:stop_at],
+        samples=table.samples[first:stop_at] * factor,
         interval=interval,
         start=table.start + first * interval,
         quantity=table.quantity,
+        used=None if table.used is None else table.used[first:stop_at],
     )
-    _check_motion(str(source), recording)
-    return recording
+    recording = excluded_spans(f"{where}, key exclude_s", recording, entry.exclude_s or ())
+    _check_motion(source, recording)
+    if entry.clock_ratio is None:
+        return recording
+    return replace(recording, interval=interval * entry.clock_ratio)
 
 
 def _check_motion(where: str, recording: Recording) -> None:
@@ -223,6 +285,7 @@ def _measurement(where: str, table: CampaignTable, recordings: list[Recording]) 
         mass_sd=table.mass_uncertainty_kg / table.mass_kg,
         clock_sd=given.clock_uncertainty_ppm * 1e-6,
         gain_sd=given.gain_uncertainty_percent * 1e-2,
+        unfiltered=isinstance(given.smoothing, UnfilteredTable),
     )
 
 
@@ -249,7 +312,7 @@ def _smoothing(
     where: str, given: MeasurementTable, recordings: list[Recording]
 ) -> Smoothing | None:
     table = given.smoothing
-    if table is None:
+    if table is None or isinstance(table, UnfilteredTable):
         return None
     if isinstance(table, LagTable):
         return Smoothing(kind="lag", time_constant=table.time_constant_s)

@@ -23,6 +23,9 @@ class Recording:
     interval : sampling interval, s
     start : time of the first sample on the file's own clock, s
     quantity : what was measured
+    used : (n,) read-only, False where a sample is set aside; None when all count. Samples that are
+        set aside hold a smooth stand-in, for what needs a whole recording to start from; a longer
+        mask is cut to the samples, so that a recording can be shortened at its end
     """
 
     name: str
@@ -31,6 +34,7 @@ class Recording:
     interval: float
     start: float = 0.0
     quantity: Quantity = "displacement"
+    used: NDArray[np.bool_] | None = None
 
     def __repr__(self) -> str:
         """One line."""
@@ -42,6 +46,17 @@ class Recording:
         samples = np.array(self.samples, dtype=np.float64)
         samples.setflags(write=False)
         object.__setattr__(self, "samples", samples)
+        if self.used is None:
+            return
+        used = np.array(self.used, dtype=np.bool_)[: samples.size]
+        if used.size < samples.size:
+            raise ValueError(f"{samples.size} samples, and a mask for {used.size} of them")
+        used.setflags(write=False)
+        object.__setattr__(self, "used", None if used.all() else used)
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        self.__dict__.update(state)
+        self.__post_init__()  # unpickled arrays can be written
 
     @property
     def times(self) -> NDArray[np.float64]:
@@ -52,6 +67,11 @@ class Recording:
     def duration(self) -> float:
         """Time from the first to the last sample, s."""
         return float((self.samples.size - 1) * self.interval)
+
+    @property
+    def count(self) -> int:
+        """Number of samples that count."""
+        return self.samples.size if self.used is None else int(self.used.sum())
 
     @property
     def unit(self) -> str:

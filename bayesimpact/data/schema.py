@@ -23,8 +23,14 @@ Time = Annotated[float, Field(ge=-bounds.TIME, le=bounds.TIME)]
 Mass = Annotated[float, Field(gt=0, ge=bounds.MASS[0], le=bounds.MASS[1])]
 Rate = Annotated[float, Field(gt=0, ge=bounds.RATE[0], le=bounds.RATE[1])]
 Length = Annotated[float, Field(gt=0, ge=1e-9, le=1e12)]  # in the key's unit; noise and beams
+Count = Annotated[int, Field(ge=1, le=1_000_000)]
 POSITIVE = "a number above 0"
+COLUMN = "the name of a column in quotes, or its number counted from 1"
 NUMBER = "a number"
+Name = Annotated[
+    str, Field(pattern=r"^[^\[\]/\\\s\x00-\x1f]([^\[\]/\\\x00-\x1f]*[^\[\]/\\\s\x00-\x1f])?$")
+]
+NAME_RULE = "a name for the parameters, in quotes, without brackets, slashes and blanks at its ends"
 
 
 def _from(ends: tuple[float, float]) -> str:
@@ -40,13 +46,35 @@ class RecordingTable(_Table):
 
     file: FileName = Field(description="a file name relative to campaign.toml, in quotes")
     case: Text | None = Field(None, description='the obstacle\'s name in quotes, as case = "1"')
+    name: Name | None = Field(None, description=NAME_RULE)
     sample_rate_hz: Rate | None = Field(None, description=f"{POSITIVE}, Hz {_from(bounds.RATE)}")
-    column: Text | None = Field(None, description="the name of a column, in quotes")
+    column: Text | Count | None = Field(None, description=COLUMN)
+    channel: Text | Count | None = Field(None, description=COLUMN)
+    time_column: Text | Count | None = Field(None, description=COLUMN)
+    block: Text | Count | None = Field(
+        None, description="the name of a group, sheet or data set in quotes, or its number"
+    )
+    skip_rows: int | None = Field(
+        None, ge=0, le=1_000_000, description="a whole number of lines, 0 to a million"
+    )
+    encoding: Text | None = Field(None, description='in quotes, as "latin-1", "utf-16"')
     unit: Literal["m", "mm", "um", "rad", "deg"] | None = Field(
         None, description="m, mm, um, rad or deg, in quotes"
     )
     start_s: Time | None = Field(None, description=f"{NUMBER}, s on the file's own clock")
     end_s: Time | None = Field(None, description=f"{NUMBER}, s on the file's own clock")
+    exclude_s: list[Annotated[list[Time], Field(min_length=2, max_length=2)]] | None = Field(
+        None, description="pairs of times, s on the file's own clock, as [[115.55, 115.60]]"
+    )
+    invert: bool = Field(False, description="true or false, without quotes")
+    scale: Annotated[float, Field(ge=-1e12, le=1e12)] | None = Field(
+        None, description="a number other than 0, times the readings (-1e+12 to 1e+12)"
+    )
+    clock_ratio: Annotated[float, Field(gt=0, ge=1e-3, le=1e3)] | None = Field(
+        None, description=f"{POSITIVE}, true time over the file's time (0.001 to 1000)"
+    )
+    resample: bool = Field(False, description="true or false, without quotes")
+    skip: Text | None = Field(None, description="the reason to leave it out, in quotes")
 
 
 class SavgolTable(_Table):
@@ -68,16 +96,24 @@ class LagTable(_Table):
     time_constant_s: Length = Field(description=f"{POSITIVE}, s (1e-09 to 1e+12)")
 
 
+class UnfilteredTable(_Table):
+    """No filter, and none may be supposed; written `smoothing = "none"`."""
+
+    kind: Literal["none"]
+
+
 class MeasurementTable(_Table):
     """[measurement]."""
 
     noise_um: Length | None = Field(None, description=f"{POSITIVE}, um (1e-09 to 1e+12)")
     noise_mrad: Length | None = Field(None, description=f"{POSITIVE}, mrad (1e-09 to 1e+12)")
     noise_deg: Length | None = Field(None, description=f"{POSITIVE}, degrees (1e-09 to 1e+12)")
-    smoothing: Annotated[SavgolTable | LagTable, Field(discriminator="kind")] | None = Field(
+    smoothing: (
+        Annotated[SavgolTable | LagTable | UnfilteredTable, Field(discriminator="kind")] | None
+    ) = Field(
         None,
         description='{ kind = "savgol", window = 21, polyorder = 2 }'
-        ' or { kind = "lag", time_constant_s = 0.001 }',
+        ' or { kind = "lag", time_constant_s = 0.001 }, or "none" for no filter at all',
     )
     clock_uncertainty_ppm: NotNegative = Field(
         0.0, le=1e6, description="a number, 0 or more, ppm (at most 1e6)"
@@ -164,10 +200,13 @@ class CampaignTable(_Table):
         default_factory=dict, description="a table [priors] of distributions"
     )
     beam: dict[str, BeamTable] = Field(default_factory=dict, description="tables [beam.<case>]")
+    faults: Literal["set aside", "keep"] = Field(
+        "set aside", description='"set aside" or "keep": what becomes of faults of a recording'
+    )
 
 
 _TAGGED: dict[str, dict[str, type[_Table]]] = {
-    "smoothing": {"savgol": SavgolTable, "lag": LagTable},
+    "smoothing": {"savgol": SavgolTable, "lag": LagTable, "none": UnfilteredTable},
     "distribution": {
         "uniform": UniformTable,
         "normal": NormalTable,
@@ -180,6 +219,9 @@ _TAGGED: dict[str, dict[str, type[_Table]]] = {
 
 def parse_campaign(document: dict[str, Any], where: str) -> CampaignTable:
     """Check a parsed campaign.toml; `where` names the file in the `InputError` that refuses it."""
+    chain = document.get("measurement")
+    if isinstance(chain, dict) and chain.get("smoothing") == "none":
+        document = document | {"measurement": chain | {"smoothing": {"kind": "none"}}}
     try:
         return CampaignTable.model_validate(document)
     except RecursionError:

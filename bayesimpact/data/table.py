@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.clock import even_interval
+from bayesimpact.data.gaps import on_even_clock
 from bayesimpact.data.recording import Quantity
 from bayesimpact.errors import InputError
 
@@ -36,12 +37,14 @@ class Table:
     interval : s
     start : time of the first sample on the file's clock, s; 0 for a file without a time column
     quantity : "displacement" or "angle"
+    used : (n,) False where an uneven clock left a gap; None where every sample counts
     """
 
     samples: NDArray[np.float64]
     interval: float
     start: float
     quantity: Quantity
+    used: NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True)
@@ -62,6 +65,7 @@ def read_table(
     column: str | None = None,
     unit: str | None = None,
     sample_rate: float | None = None,
+    resample: bool = False,
 ) -> Table:
     """Parse the content of a recording's file.
 
@@ -72,6 +76,7 @@ def read_table(
     column, unit : name and unit (a key of `UNITS`) of the response column, where it is not one of
         `RESPONSE_COLUMNS` or there are several
     sample_rate : Hz, for a file without a time column
+    resample : the clock is uneven: take the readings over to even times
 
     Raises
     ------
@@ -86,8 +91,12 @@ def read_table(
         )
     layout = _layout(path, header + 1, lines[header], column, unit)
     numbers, rows = _numbers(path, lines, header + 1, layout)
-    interval, start = _clock(path, numbers, rows, layout, sample_rate)
     quantity, factor = UNITS[layout.unit]
+    if resample and layout.time is not None:
+        times = numbers[:, 0] * TIME_COLUMNS[layout.names[layout.time]]
+        even = on_even_clock(path, times, numbers[:, -1] * factor, rows)
+        return Table(even.samples, even.interval, float(times[0]), quantity, even.used)
+    interval, start = _clock(path, numbers, rows, layout, sample_rate)
     return Table(numbers[:, -1] * factor, interval, start, quantity)
 
 

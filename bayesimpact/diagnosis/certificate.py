@@ -16,7 +16,7 @@ import numpy as np
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.diagnosis.loop import Diagnosis, diagnose
 from bayesimpact.inference.fit import Fit
-from bayesimpact.model.effects import EFFECTS
+from bayesimpact.model.effects import SEARCHED
 from bayesimpact.model.effects.effect import Effect
 from bayesimpact.model.measurement import smooth
 
@@ -46,7 +46,7 @@ def certificate(
     count: int,
     *,
     rng: Rng,
-    effects: Sequence[Effect] = EFFECTS,
+    effects: Sequence[Effect] = SEARCHED,
     progress: Callable[[str], None] | None = None,
 ) -> Certificate:
     """Repeat the loop `count` times with nothing missing and `count` times with what was named."""

@@ -1,4 +1,4 @@
-"""diagnosis.json: the diagnosis as scripts read it (schema bayesimpact/diagnosis/1)."""
+"""diagnosis.json: the diagnosis as scripts read it (schema bayesimpact/diagnosis/2)."""
 
 from __future__ import annotations
 
@@ -10,20 +10,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.diagnosis.certificate import Certificate
+from bayesimpact.diagnosis.intervals import Intervals, intervals
 from bayesimpact.diagnosis.limits import PRACTICAL, Limit
+from bayesimpact.diagnosis.locate import Location
 from bayesimpact.diagnosis.loop import Diagnosis
-from bayesimpact.diagnosis.naming import DECISIVE
+from bayesimpact.diagnosis.recording_faults import as_effects, fault_entries, in_words, place
 from bayesimpact.diagnosis.refit import Candidate
-from bayesimpact.diagnosis.size import size_in_words
+from bayesimpact.diagnosis.remainder import Remainder, remainder
+from bayesimpact.diagnosis.size import size, size_in_words, yardstick
 from bayesimpact.diagnosis.smoothing import filter_parameters, filter_words
+from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.diagnosis.whiteness import whiteness_p
-from bayesimpact.diagnosis.words import parameter_shifts, statement, summary
+from bayesimpact.diagnosis.words import failure, parameter_shifts, remaining, statement, summary
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect
-from bayesimpact.model.parameters import bare_name, is_added
+from bayesimpact.model.parameters import angular, bare_name, is_added
 
 Array = NDArray[np.float64]
 NORMAL_90 = 1.6448536269514722
+MOST_OTHERS = 5  # models of the catalogue that are listed beside the answer
 
 
 def document(
@@ -46,34 +51,39 @@ def document(
     """
     d = diagnosis
     noise = d.identification.noise
+    angle = d.before.target.oscillator.campaign.recordings[0].quantity == "angle"
+    left = remainder(d.naming, d.after, d.remains)
+    before = _parameters(d.before, intervals(d.before), draws_before)
+    after = _parameters(d.after, d.intervals, draws_after if d.remains is None else None)
     statements = tuple(_statement(d, e) for e in d.effects)
-    shifts = parameter_shifts(d.before, d.after) if d.verdict != "adequate" else {}
+    faulty = d.corrected.faults if d.corrected else ()
     alternatives = tuple(" + ".join(c.ids) or "nothing at all" for c in d.alternatives)
     return {
-        "schema": "bayesimpact/diagnosis/1",
+        "schema": "bayesimpact/diagnosis/2",
         "verdict": d.verdict,
-        "summary": summary(
+        "summary": failure(d.identification.fit)
+        + summary(
             d.verdict,
             d.effects,
             statements,
             d.location,
             alternatives,
-            shifts,
+            parameter_shifts(before, after) if d.verdict != "adequate" else {},
             _detectable(d),
-            _remains(d),
-            angle=d.before.target.oscillator.campaign.recordings[0].quantity == "angle",
+            remaining(left, angle=angle),
+            faults=in_words(faulty),
+            angle=angle,
             drifts=d.naming.unknown.reach > 0,
         ),
-        "location": _location(d),
-        "effects": [
-            _effect(d, e, text, draws_after) for e, text in zip(d.effects, statements, strict=True)
-        ],
+        "location": _location(d.location) or (place(faulty) if faulty else None),
+        "faults": fault_entries(d.corrected) if d.corrected else [],
+        "remainder": _remainder(left),
+        "formulas": [],
+        "effects": (as_effects(d.corrected) if d.corrected else [])
+        + [_effect(d, e, text, after) for e, text in zip(d.effects, statements, strict=True)],
         "alternatives": [_alternative(d, c) for c in _others(d)],
         "fit": _fit(d),
-        "parameters": {
-            "before": _parameters(d.before, draws_before),
-            "after": _parameters(d.after, draws_after, d),
-        },
+        "parameters": {"before": before, "after": after},
         "limits": [
             {
                 "id": x.effect_id,
@@ -142,28 +152,16 @@ def _detectable(d: Diagnosis) -> str:
     )
 
 
-def _remains(d: Diagnosis) -> str:
-    if not d.remains:
-        return ""
-    ratio = d.after.reduced_chi2**0.5
-    return (
-        f" Something smaller remains: the residual is still {ratio:.1f} times the noise and not "
-        f"white, so the intervals are widened."
-    )
-
-
 def _statement(d: Diagnosis, effect: Effect) -> str:
     if d.filtered is not None and effect.id == "smoothing":
         return effect.statement.format(size=filter_words(d.filtered))
     size, share = size_in_words(effect, d.before, d.after, d.scales)
-    alone = len(d.effects) == 1  # of several effects nobody can say which one moved a parameter
-    return statement(effect, size, share, parameter_shifts(d.before, d.after) if alone else {})
+    return statement(effect, size, share)
 
 
-def _location(d: Diagnosis) -> dict[str, Any] | None:
-    if d.location is None:
+def _location(x: Location | None) -> dict[str, Any] | None:
+    if x is None:
         return None
-    x = d.location
     return {
         "regime": x.regime,
         "share": x.share,
@@ -178,50 +176,83 @@ def _location(d: Diagnosis) -> dict[str, Any] | None:
     }
 
 
-def _effect(d: Diagnosis, effect: Effect, text: str, draws: Array | None) -> dict[str, Any]:
-    if d.filtered is not None and effect.id == "smoothing":
-        return {
-            "id": effect.id,
-            "title": effect.title,
-            "family": effect.family,
-            "statement": text,
-            "probability": 1.0,
-            "delta_log_evidence": d.filtered.log_ratio,
-            "parameters": dict(filter_parameters(d.filtered)),
-        }
-    chosen = d.naming.chosen.candidate
-    without = set(chosen.ids) - {effect.id}
-    smaller = next((c for c in d.naming.tried if set(c.ids) == without), d.naming.base.candidate)
-    values = _parameters(d.after, draws)
-    own = {n: v for n, v in values.items() if n.startswith(effect.id + ".")}
+def _remainder(left: Remainder | None) -> dict[str, Any] | None:
+    if left is None:
+        return None
     return {
+        "rms_m": left.rms,
+        "share_of_signal_percent": 100 * left.share,
+        "over_noise": left.over_noise,
+        "regime": left.regime,
+        "displacement_m": list(left.displacement),
+        "recordings": list(left.recordings),
+        "guess": left.guess,
+    }
+
+
+def _effect(
+    d: Diagnosis, effect: Effect, text: str, values: Mapping[str, dict[str, Any]]
+) -> dict[str, Any]:
+    common = {
         "id": effect.id,
         "title": effect.title,
         "family": effect.family,
         "statement": text,
+    }
+    if d.filtered is not None and effect.id == "smoothing":
+        return common | {
+            "probability": 1.0,
+            "delta_log_evidence": d.filtered.log_ratio,
+            "parameters": dict(filter_parameters(d.filtered)),
+            "location": _location(d.location),
+            "size": {
+                "value": float(d.filtered.smoothing.window or 0),
+                "unit": "samples",
+                "percent": None,
+                "of": "",
+            },
+        }
+    model = {e.id for e in d.after.target.oscillator.effects}
+    kept = {frozenset(c.ids): c for c in d.naming.tried}
+    whole = kept.get(frozenset(model), d.naming.chosen.candidate)
+    smaller = kept.get(frozenset(model - {effect.id}), d.naming.base.candidate)
+    value, unit, share = size(effect, d.before, d.after, d.scales)
+    quantity = d.after.target.oscillator.campaign.recordings[0].quantity
+    own = [e.id for e in d.effects if e.id != "smoothing" or d.filtered is None]
+    return common | {
         "probability": d.naming.probability(effect.id),
-        "delta_log_evidence": chosen.log_evidence - smaller.log_evidence,
-        "parameters": own,
+        "delta_log_evidence": whole.log_evidence - smaller.log_evidence,
+        "parameters": {n: v for n, v in values.items() if n.startswith(effect.id + ".")},
+        "location": _location(d.locations[own.index(effect.id)]),
+        "size": {
+            "value": value,
+            "unit": angular(unit) if quantity == "angle" else unit,
+            "percent": 100 * share,
+            "of": yardstick(effect),
+        },
     }
 
 
 def _others(d: Diagnosis) -> tuple[Candidate, ...]:
+    """The best models of the catalogue beside the one that the verdict stands for."""
     if d.verdict == "adequate":
         return ()
-    if d.alternatives:
-        return d.alternatives
-    chosen = set(d.naming.chosen.candidate.ids)
-    lacking = [c for c in d.naming.tried if c.ids and not chosen <= set(c.ids)]
-    return tuple(lacking[:3])
+    named = {e.id for e in d.effects}
+    rest = [c for c in d.naming.tried if c.ids and set(c.ids) != named]
+    if d.verdict in ("named", "ambiguous"):
+        rest = [c for c in rest if not named <= set(c.ids)]
+    others = [*d.alternatives, *(c for c in rest if c not in d.alternatives)]
+    return tuple(others[: max(len(d.alternatives), MOST_OTHERS)])
 
 
 def _alternative(d: Diagnosis, candidate: Candidate) -> dict[str, Any]:
-    gain = candidate.log_evidence - d.naming.base.candidate.log_evidence
-    odds = d.naming.log_odds(candidate) - d.naming.log_odds(d.naming.chosen.candidate)
+    odds = np.array([d.naming.log_odds(c) for c in d.naming.tried])
+    weights = np.exp(odds - odds.max())
+    own = np.exp(d.naming.log_odds(candidate) - odds.max())
     return {
         "id": " + ".join(candidate.ids) or "none",
-        "probability": float(np.exp(min(odds, 0.0)) / (1 + np.exp(min(odds, 0.0)))),
-        "delta_log_evidence": gain,
+        "probability": float(own / weights.sum()),
+        "delta_log_evidence": candidate.log_evidence - d.naming.base.candidate.log_evidence,
     }
 
 
@@ -251,27 +282,17 @@ def _fit(d: Diagnosis) -> dict[str, Any]:
     return result
 
 
-def _parameters(
-    fit: Fit, draws: Array | None, diagnosis: Diagnosis | None = None
-) -> dict[str, dict[str, Any]]:
+def _parameters(fit: Fit, posterior: Intervals, draws: Array | None) -> dict[str, dict[str, Any]]:
+    """Median and 90 % interval of every parameter: of the draws, else of the posterior given."""
     result: dict[str, dict[str, Any]] = {}
+    ordinary = intervals(fit)
     for i, parameter in enumerate(fit.target.oscillator.layout.parameters):
-        middle, spread = float(fit.mode[i]), NORMAL_90 * float(fit.sd[i])
-        entry: dict[str, Any] = {
-            "unit": parameter.unit,
-            "median": middle,
-            "ci90": [max(middle - spread, parameter.lower), min(middle + spread, parameter.upper)],
-        }
-        if draws is not None:
-            low, median, high = np.percentile(draws[:, i], [5, 50, 95])
-            entry.update(median=float(median), ci90=[float(low), float(high)])
-        if diagnosis is not None and parameter.name in diagnosis.honest.names:
-            low, high = diagnosis.honest.interval(parameter.name)
-            honest = [max(low, parameter.lower), min(high, parameter.upper)]
-            entry["ci90_honest"] = honest
-            if diagnosis.remains:  # the narrow one would claim what the residual denies
-                entry["ci90_if_white"] = entry["ci90"]
-                entry["ci90"] = honest
+        known = posterior if parameter.name in posterior.names else ordinary
+        if draws is None:
+            low, median, high = known.quantiles(parameter.name)
+        else:
+            low, median, high = map(float, np.percentile(draws[:, i], [5, 50, 95]))
+        entry = {"unit": parameter.unit, "median": median, "ci90": [low, high]}
         result[parameter.name] = entry
     _add_means(fit, result)
     return result

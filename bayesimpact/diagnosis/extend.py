@@ -50,6 +50,7 @@ def campaign_scales(fit: Fit) -> Scales:
         gap=float(gap.mean()) if o.campaign.stop else 0.0,
         cases=len(o.campaign.cases),
         recordings=len(o.campaign.recordings),
+        angle=o.campaign.recordings[0].quantity == "angle",
     )
 
 

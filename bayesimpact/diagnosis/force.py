@@ -5,15 +5,15 @@ coefficient's response is simulated, whitened and projected off everything the m
 remains of the misfit is explained by force, not by displacement errors that an earlier force left
 behind. A second form, a(t) y + b(t) v, catches stiffness and damping that change with time; a third
 one, a(d) + b(d) v in contact alone, what begins with a jump at the touch. In the linearised problem
-the coefficients' posterior and the evidence are closed forms; the prior widths maximise the
-evidence.
+the coefficients' posterior and the evidence are closed forms; the prior widths and the number of
+knots maximise the evidence.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,7 @@ from bayesimpact.model.parameters import SLOTS
 Array = NDArray[np.float64]
 
 NULL_DRAWS = 1000
+FACTORS = (1, 3, 7)  # 24, 10 and 6 knots: the evidence chooses how smooth a force is
 _OFFSET = SLOTS.index("offset")
 
 
@@ -118,63 +119,122 @@ class MissingForce:
         return a + b * v
 
 
-Learned = Callable[[float, float], Effect]
-"""An unknown force with given prior widths of its conservative and dissipative part."""
+@dataclass(frozen=True)
+class Form:
+    """One form of an unknown force.
+
+    Attributes
+    ----------
+    learned : the effect for a number of knots and prior widths of a, N, and b, N s/m
+    low, length : first displacement (or time) and extent, m (or s)
+    intervals : between the knots, at the finest resolution
+    factors : divisors of it: how much coarser the other resolutions are
+    reach, touching : as in `MissingForce`
+    """
+
+    learned: Callable[[int, float, float], Effect]
+    low: float
+    length: float
+    intervals: int
+    factors: tuple[int, ...]
+    reach: float = 0.0
+    touching: bool = False
 
 
 def missing_force(
     fit: Fit, scales: Scales, *, rng: np.random.Generator, knots: int = KNOTS
 ) -> MissingForce:
-    """Posterior of the force of displacement and velocity that the fit's model leaves out."""
+    """Posterior of the force of displacement and velocity that the fit's model leaves out; `knots`
+    at the finest resolution.
+    """
     low, high = motion_range(fit)
-    spacing = (high - low) / (knots - 3)
-    return _missing(fit, scales, rng, partial(learned_force, low, high, knots=knots), low, spacing)
+
+    def learned(count: int, a: float, b: float) -> Effect:
+        return learned_force(low, high, a, b, count)
+
+    factors = tuple(f for f in FACTORS if (knots - 3) % f == 0)
+    return _missing(fit, scales, rng, Form(learned, low, high - low, knots - 3, factors))
 
 
-def missing_drift(
-    fit: Fit, scales: Scales, *, rng: np.random.Generator, knots: int = TIMES
-) -> MissingForce:
+def missing_drift(fit: Fit, scales: Scales, *, rng: np.random.Generator) -> MissingForce:
     """Posterior of a change of stiffness and damping with time that the model leaves out."""
-    learned = partial(learned_drift, scales.duration, scales.amplitude, knots=knots)
-    found = _missing(fit, scales, rng, learned, 0.0, scales.duration / (knots - 3))
-    return replace(found, reach=scales.amplitude)
+
+    def learned(knots: int, a: float, b: float) -> Effect:
+        return learned_drift(scales.duration, scales.amplitude, a, b, knots)
+
+    form = Form(learned, 0.0, scales.duration, TIMES - 3, (1,), reach=scales.amplitude)
+    return _missing(fit, scales, rng, form)
 
 
-def missing_contact(
-    fit: Fit, scales: Scales, *, rng: np.random.Generator, knots: int = DEPTHS
-) -> MissingForce | None:
+def missing_contact(fit: Fit, scales: Scales, *, rng: np.random.Generator) -> MissingForce | None:
     """Posterior of a force in contact that the model leaves out; None where nothing is touched."""
     if scales.indentation <= 0.0:
         return None
-    learned = partial(learned_contact, scales.indentation, knots=knots)
-    found = _missing(fit, scales, rng, learned, scales.gap, scales.indentation / (knots - 3))
-    return replace(found, touching=True)
+
+    def learned(knots: int, a: float, b: float) -> Effect:
+        return learned_contact(scales.indentation, a, b, knots)
+
+    form = Form(learned, scales.gap, scales.indentation, DEPTHS - 3, (1,), touching=True)
+    return _missing(fit, scales, rng, form)
 
 
 def _missing(
     fit: Fit,
     scales: Scales,
     rng: np.random.Generator,
-    learned: Learned,
-    low: float,
-    spacing: float,
+    form: Form,
 ) -> MissingForce:
-    effect = learned(scales.force, scales.force / scales.speed)
-    knots = int(effect.parameter("knots").fixed or 0)
-    responses = basis_responses(fit, effect, knots, scales)
-    projection = project(fit, responses)
-    unit = np.concatenate(
-        [np.full(knots, scales.force), np.full(knots, scales.force / scales.speed)]
+    """The likeliest resolution and prior widths of one form, and their odds by chance.
+
+    Responses are simulated at the finest resolution; coarser splines are combinations of its own.
+    """
+    unit = scales.force, scales.force / scales.speed
+    knots = form.intervals + 3
+    responses = basis_responses(fit, form.learned(knots, *unit), knots, scales)
+    fine = project(fit, responses)
+    draws = ForceEvidence(fine.information, np.repeat(unit, knots), knots).null_draws(
+        rng, NULL_DRAWS
     )
-    evidence = ForceEvidence(projection.information, unit, knots)
-    found, which = evidence.maximum(projection.score[None])
-    best, (width_a, width_b) = float(found[0]), evidence.pairs[which[0]]
-    null, _ = evidence.maximum(evidence.null_draws(rng, NULL_DRAWS))
+    best: tuple[float, int, float, float, Projection] | None = None
+    null: Any = np.full(NULL_DRAWS, -np.inf)
+    for factor in form.factors:
+        count = form.intervals // factor + 3
+        weights: Array = np.kron(np.eye(2), refinement(count, factor)).astype(np.float64)
+        projection = fine.combined(weights)
+        evidence = ForceEvidence(projection.information, np.repeat(unit, count), count)
+        found, which = evidence.maximum(projection.score[None])
+        null = np.maximum(null, evidence.maximum(draws @ weights)[0])
+        if best is None or found[0] > best[0]:
+            best = (float(found[0]), count, *evidence.pairs[int(which[0])], projection)
+    assert best is not None
+    log_evidence, count, width_a, width_b, projection = best
+    evidence = ForceEvidence(projection.information, np.repeat(unit, count), count)
     mean, covariance = evidence.posterior(projection.score, width_a, width_b)
     wide_a, wide_b = np.maximum((width_a, width_b), WIDTHS[1])  # a prior needs some width
-    final = learned(wide_a * scales.force, wide_b * scales.force / scales.speed)
-    p_value = float((1 + np.sum(null >= best)) / (1 + NULL_DRAWS))
-    return MissingForce(final, knots, low, spacing, mean, covariance, best, p_value, projection)
+    return MissingForce(
+        form.learned(count, wide_a * unit[0], wide_b * unit[1]),
+        count,
+        form.low,
+        form.length / (count - 3),
+        mean,
+        covariance,
+        log_evidence,
+        float((1 + np.sum(null >= log_evidence)) / (1 + NULL_DRAWS)),
+        projection,
+        form.reach,
+        form.touching,
+    )
+
+
+def refinement(count: int, factor: int) -> Array:
+    """Coefficients of `count` cubic B-splines in those on knots `factor` times as near (K, count).
+
+    The coarse splines lie in the space of the fine ones, so points enough give them exactly.
+    """
+    fine = (count - 3) * factor + 3
+    points = np.linspace(0.0, count - 3.0, 4 * fine)
+    values = spline_basis(points, 0.0, 1.0 / factor, fine)
+    return np.asarray(np.linalg.lstsq(values, spline_basis(points, 0.0, 1.0, count), rcond=None)[0])
 
 
 def motion_range(fit: Fit) -> tuple[float, float]:
@@ -208,9 +268,9 @@ def basis_responses(fit: Fit, effect: Effect, knots: int, scales: Scales) -> tup
 def whitened_one(fit: Fit, r: int, values: Array, sigma: Array) -> Array:
     """Filtered, whitened signals (k, n) of one recording in units of the noise."""
     oscillator, noise = fit.target.oscillator, fit.target.likelihood.noise
-    interval = oscillator.campaign.recordings[r].interval
-    filtered = smooth(values, oscillator.smoothing, interval)
-    return np.asarray(noise.whiten(filtered, interval) / sigma[r])
+    recording = oscillator.campaign.recordings[r]
+    filtered = smooth(values, oscillator.smoothing, recording.interval)
+    return np.asarray(noise.whiten(filtered, recording.interval, recording.used) / sigma[r])
 
 
 def _with_law(oscillator: Oscillator, effect: Effect) -> NDArray[np.int64]:

@@ -79,7 +79,8 @@ def line_blocks(fit: Fit, r: int, grid: Array) -> Blocks:
     oscillator = fit.target.oscillator
     interval, count = float(oscillator.intervals[r]), int(oscillator.counts[r])
     white = np.vstack([part.residual, part.jacobian.T]) / sigma
-    stacked, start = noise.in_time(white, count, interval)
+    used = oscillator.campaign.recordings[r].used
+    stacked, start = noise.in_time(white, count, interval, used)
     step = 2 * np.pi * interval * (grid[1] - grid[0])
     first = 2 * np.pi * interval * grid[0]
     sums = czt(stacked, grid.size, np.exp(-1j * step), np.exp(1j * first), axis=-1)

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 from bayesimpact.diagnosis.directions import sigma_of
 from bayesimpact.diagnosis.force import MissingForce, trajectory_points
+from bayesimpact.diagnosis.naming import Naming
+from bayesimpact.diagnosis.size import effect_numbers
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Regime
 from bayesimpact.model.parameters import SLOTS
@@ -58,10 +60,59 @@ class Location:
 
 
 def locate(base: Fit, better: Fit, force: MissingForce, effects: tuple[Effect, ...]) -> Location:
-    """Place of what `better` has and `base` lacks; `force` is what is missing from `base`."""
+    """Place of what `better` has and `base` lacks; `force` is what is missing from `base`.
+
+    The place of several effects is that of all their forces together, as far as these are forces
+    of displacement and velocity; else that of the missing force.
+    """
     points = trajectory_points(base)
     times = [r.times for r in base.target.oscillator.campaign.recordings]
+    own = [f for f in (own_force(e, better, points, times) for e in effects) if f is not None]
+    if own and len(own) == len(effects):
+        weights = [np.sum(parts, axis=0) ** 2 for parts in zip(*own, strict=True)]
+        return _place(base, better, weights, None, effects)
     weights = [force.force(y, v, t) ** 2 for (y, v), t in zip(points, times, strict=True)]
+    return _place(base, better, weights, force, effects)
+
+
+def locate_effect(naming: Naming, effect: Effect, better: Fit) -> Location:
+    """Place of one effect of `better`, from its own force, or from what the model without it
+    leaves unexplained.
+    """
+    ids = frozenset(e.id for e in better.target.oscillator.effects)
+    state = naming.states.get(ids - {effect.id}, naming.base)
+    return locate(state.candidate.fit, better, state.unknown, (effect,))
+
+
+def own_force(
+    effect: Effect, fit: Fit, points: Sequence[tuple[Array, Array]], times: Sequence[Array]
+) -> list[Array] | None:
+    """Force of an effect's law along the recorded motions, N; None for what is not a force of
+    displacement, velocity and time alone.
+    """
+    law = effect.law
+    if law is None or law.rate is not None:
+        return None
+    slots = fit.target.oscillator.layout.slots(fit.mode)
+    found = []
+    for r, ((y, v), t) in enumerate(zip(points, times, strict=True)):
+        q, p, d = slots[r], effect_numbers(effect, fit, r), y - slots[r][_GAP]
+        acts = (d > 0) | (law.where == "everywhere")
+        force = np.zeros(y.size)
+        for i in np.flatnonzero(acts).tolist():
+            force[i] = law.force(y[i], v[i], d[i], t[i], 0.0, float(d[i] > 0), p, q)
+        found.append(force)
+    return found
+
+
+def _place(
+    base: Fit,
+    better: Fit,
+    weights: list[Array],
+    force: MissingForce | None,
+    effects: tuple[Effect, ...],
+) -> Location:
+    points = trajectory_points(base)
     total = max(sum(float(w.sum()) for w in weights), 1e-300)
     gaps = base.target.oscillator.layout.slots(base.mode)[:, _GAP]
     beyond = [w[y >= g].sum() for w, (y, _), g in zip(weights, points, gaps, strict=True)]
@@ -74,7 +125,9 @@ def locate(base: Fit, better: Fit, force: MissingForce, effects: tuple[Effect, .
     inside = np.concatenate(chosen)
     place = _ranges(y, v, np.where(inside, w, 0.0))
     held = inside & _between(y, place[0]) & _between(v, place[1])
-    share = float(w[held].sum() / total) if force.reach else force.share_within(*place[0])
+    share = float(w[held].sum() / total)
+    if force is not None and not force.reach:
+        share = force.share_within(*place[0])
     rms = float(np.sqrt(np.mean(w[held]))) if held.any() else 0.0
     if regime == "measurement":
         share, rms = _positive_share(gain), 0.0

@@ -4,35 +4,41 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.diagnosis.decision import Decision, Verdict, decide
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.force import MissingForce
 from bayesimpact.diagnosis.heldout import HeldOut, held_out_cases, held_out_recordings
-from bayesimpact.diagnosis.honest import Widened, widened
+from bayesimpact.diagnosis.intervals import Intervals, intervals
 from bayesimpact.diagnosis.limits import Limit, limits
-from bayesimpact.diagnosis.locate import Location, locate
+from bayesimpact.diagnosis.locate import Location, locate, locate_effect
 from bayesimpact.diagnosis.name import name
-from bayesimpact.diagnosis.naming import Naming, is_gross
+from bayesimpact.diagnosis.naming import Naming, State, is_large
+from bayesimpact.diagnosis.recording_faults import Corrected, corrected_campaign
 from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.smoothing import SAVITZKY_GOLAY, proved_smoothing, whole_campaign
-from bayesimpact.diagnosis.unknown import learn_force
+from bayesimpact.diagnosis.unknown import with_force
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification, identify
 from bayesimpact.inference.spectrum import Fingerprint
-from bayesimpact.model.effects import EFFECTS
+from bayesimpact.model.effects import SEARCHED
 from bayesimpact.model.effects.effect import Effect, Scales
 from bayesimpact.model.threads import linear_algebra_alone
 
 Array = NDArray[np.float64]
-NEARLY_ALL = 0.9  # of the squared residual
-
-Verdict = Literal["adequate", "named", "ambiguous", "unknown"]
 Progress = Callable[[str], None]
+BESIDE: Mapping[Verdict, Verdict] = {
+    "adequate": "named",
+    "named": "named",
+    "partly": "partly",
+    "ambiguous": "ambiguous",
+    "unknown": "partly",
+}
+"""Verdicts where a fault of a recording or a filter has been named already."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,20 +47,23 @@ class Diagnosis:
 
     Attributes
     ----------
-    verdict : adequate, named, ambiguous or unknown
+    verdict : see `bayesimpact.diagnosis.decision`
     identification : of the base model
     naming : all models that were tried
-    before, after : base fit and the fit that the verdict stands for (the learned force when
-        unknown)
-    effects : that `after` adds, most important first; empty when adequate or unknown
-    alternatives : models that fit alike, when ambiguous
-    location : None when adequate
+    before, after : base fit and the fit that the verdict stands for (where unknown, the learned
+        force or the best of the catalogue)
+    effects : that are named, most important first; empty when adequate or unknown
+    alternatives : models that fit alike
+    location : of everything that is missing; None when adequate
+    locations : of every effect by itself
     force : the force that the base model leaves unexplained
     held_out, held_out_cases : predictive gains, or None where there is nothing to compare
     limits : of effects that were not found
-    honest : parameters of `after` with what stays unexplained carried into their intervals
+    intervals : of the parameters of `after`
+    remains : what is left beside the effects, examined; None where that is noise
     scales : physical sizes of the campaign
     filtered : the filter that the noise spectrum proves and campaign.toml does not declare
+    corrected : faults of the recordings, set aside or corrected before anything else
     """
 
     verdict: Verdict
@@ -65,18 +74,16 @@ class Diagnosis:
     effects: tuple[Effect, ...]
     alternatives: tuple[Candidate, ...]
     location: Location | None
+    locations: tuple[Location, ...]
     force: MissingForce
     held_out: HeldOut | None
     held_out_cases: HeldOut | None
     limits: tuple[Limit, ...]
-    honest: Widened
+    intervals: Intervals
+    remains: State | None
     scales: Scales
     filtered: Fingerprint | None = None
-
-    @property
-    def remains(self) -> bool:
-        """True when something small is left beside the effects that were named."""
-        return self.verdict in ("named", "ambiguous") and not self.naming.chosen.is_white
+    corrected: Corrected | None = None
 
 
 @linear_algebra_alone()
@@ -84,7 +91,7 @@ def diagnose(
     campaign: Campaign,
     *,
     rng: np.random.Generator,
-    effects: Sequence[Effect] = EFFECTS,
+    effects: Sequence[Effect] = SEARCHED,
     search: bool = True,
     progress: Progress | None = None,
 ) -> Diagnosis:
@@ -104,29 +111,36 @@ def diagnose(
     """
     say = progress or (lambda message: None)
     say("fitting the base model")
-    identification = identify(campaign, rng=rng, search=search)
+    corrected = corrected_campaign(campaign, rng=rng, search=search)
+    for fault in corrected.faults:
+        say(f"set aside or corrected: {fault.recording}: {fault.statement} ({fault.id})")
+    identification = corrected.identification
+    campaign = identification.fit.target.oscillator.campaign
     filtered = proved_smoothing(campaign)
     if filtered is None:
-        return diagnose_fit(identification, rng=rng, effects=effects, progress=say)
-    say("the noise spectrum proves a filter: fitting through it")
-    measurement = replace(campaign.measurement, smoothing=filtered.smoothing)
-    through = identify(replace(campaign, measurement=measurement), rng=rng, search=False)
-    found = diagnose_fit(through, rng=rng, effects=effects, progress=say)
-    return with_smoothing(found, identification, filtered)
+        found = diagnose_fit(identification, rng=rng, effects=effects, progress=say)
+    else:
+        say("the noise spectrum proves a filter: fitting through it")
+        measurement = replace(campaign.measurement, smoothing=filtered.smoothing)
+        through = identify(replace(campaign, measurement=measurement), rng=rng, search=False)
+        found = diagnose_fit(through, rng=rng, effects=effects, progress=say)
+        found = with_smoothing(found, identification, filtered)
+    if not corrected.faults:
+        return replace(found, corrected=corrected)
+    return replace(found, verdict=BESIDE[found.verdict], corrected=corrected)
 
 
 def with_smoothing(
     found: Diagnosis, identification: Identification, filtered: Fingerprint
 ) -> Diagnosis:
     """The diagnosis made through the filter, told from the fit that knew nothing of it."""
-    location = found.location or whole_campaign(identification)
     return replace(
         found,
-        verdict="named" if found.verdict == "adequate" else found.verdict,
+        verdict=BESIDE[found.verdict],
         identification=replace(found.identification, search=identification.search),
         before=identification.fit,
         effects=(SAVITZKY_GOLAY, *found.effects),
-        location=location,
+        location=found.location or whole_campaign(identification),
         filtered=filtered,
     )
 
@@ -136,7 +150,7 @@ def diagnose_fit(
     identification: Identification,
     *,
     rng: np.random.Generator,
-    effects: Sequence[Effect] = EFFECTS,
+    effects: Sequence[Effect] = SEARCHED,
     progress: Progress | None = None,
 ) -> Diagnosis:
     """The loop from a base fit on."""
@@ -146,77 +160,59 @@ def diagnose_fit(
         effects = [e for e in effects if e.id != SAVITZKY_GOLAY.id]
     scales = campaign_scales(base)
     naming = name(base, effects, scales, rng=rng, progress=say)
-    verdict = judge(naming)
-    chosen = naming.chosen
-    after = chosen.candidate.fit
-    if verdict == "unknown":
-        say("learning the force")
-        after = learn_force(base, naming.unknown, scales)
-    added = ordered(naming, chosen.candidate.effects) if verdict in ("named", "ambiguous") else ()
-    location = held = cases = None
-    if verdict != "adequate":
+    decision = decide(naming)
+    after, state = extension(naming, decision, scales, say)
+    location, held, cases = None, None, None
+    locations: tuple[Location, ...] = ()
+    if decision.verdict != "adequate":
         say("locating")
-        location = locate(base, after, naming.unknown, added)
-        if len(identification.fit.target.oscillator.campaign.recordings) > 1:
+        location = locate(base, after, naming.unknown, decision.effects)
+        locations = tuple(locate_effect(naming, e, after) for e in decision.effects)
+        if len(base.target.oscillator.campaign.recordings) > 1:
             say("predicting held-out recordings")
             held = held_out_recordings(base, after)
-        if len(identification.fit.target.oscillator.campaign.cases) > 1:
+        if len(base.target.oscillator.campaign.cases) > 1:
             cases = held_out_cases(base, after)
+    chosen = naming.chosen
     return Diagnosis(
-        verdict,
+        decision.verdict,
         identification,
         naming,
         base,
         after,
-        added,
-        naming.rivals() if verdict == "ambiguous" else (),
+        decision.effects,
+        decision.rivals,
         location,
+        locations,
         naming.base.force,
         held,
         cases,
         limits(chosen.candidate.fit, chosen.scan, scales),
-        widened(chosen if verdict != "unknown" else naming.base),
+        intervals(after, state),
+        state,
         scales,
     )
 
 
-def judge(naming: Naming) -> Verdict:
-    """The verdict that the evidence supports.
+def extension(
+    naming: Naming, decision: Decision, scales: Scales, say: Progress
+) -> tuple[Fit, State | None]:
+    """The fit that a verdict stands for, never worse than the base fit, and what it leaves.
 
-    What remains beside the chosen effects must be white. One exception: where the base model misses
-    by far more than the noise, effects that explain nearly all of it are named although something
-    small remains (which the summary says).
+    Where something remains, a residual force beside the effects, or in the place of all, is taken
+    when it makes the model likelier.
     """
-    chosen = naming.chosen
-    if not chosen.candidate.effects:
-        return "adequate" if chosen.is_white else "unknown"
-    if naming.prefers_learned_force():
-        return "unknown"
-    if not chosen.is_white and not explains_gross_misfit(naming):
-        return "unknown"
-    return "ambiguous" if naming.rivals() else "named"
-
-
-def explains_gross_misfit(naming: Naming) -> bool:
-    """True when the base residual dwarfs the noise and the chosen effects take nearly all of it
-    away.
-    """
-    base, chosen = naming.base.candidate.fit, naming.chosen.candidate.fit
-    return (
-        is_gross(base)
-        and (base.reduced_chi2 - chosen.reduced_chi2) > NEARLY_ALL * base.reduced_chi2
-    )
-
-
-def ordered(naming: Naming, effects: tuple[Effect, ...]) -> tuple[Effect, ...]:
-    """Effects by how much evidence the model loses without them."""
-    if len(effects) < 2:
-        return effects
-    chosen = set(naming.chosen.candidate.ids)
-    left: Mapping[frozenset[str], Candidate] = {frozenset(c.ids): c for c in naming.tried}
-
-    def loss(effect: Effect) -> float:
-        smaller = left.get(frozenset(chosen - {effect.id}))
-        return -np.inf if smaller is None else smaller.log_evidence
-
-    return tuple(sorted(effects, key=loss))
+    base, chosen = naming.base, naming.chosen
+    if decision.verdict in ("adequate", "named", "ambiguous"):
+        return chosen.candidate.fit, None
+    choices = [(chosen.candidate, chosen), (base.candidate, base)]
+    choices += [
+        (c, chosen) for ids, c in naming.residual.items() if ids == set(chosen.candidate.ids)
+    ]
+    if decision.verdict == "unknown" and not is_large(base.candidate.fit):
+        say("learning the force")
+        choices.append((with_force(base.candidate, naming.unknown, scales), base))
+    least = base.candidate.fit.reduced_chi2
+    choices = [(c, s) for c, s in choices if c.fit.reduced_chi2 <= least]
+    candidate, state = max(choices, key=lambda choice: naming.log_odds(choice[0]))
+    return candidate.fit, state

@@ -12,7 +12,7 @@ import numpy as np
 
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.force import missing_drift, missing_force
-from bayesimpact.diagnosis.naming import State, is_gross
+from bayesimpact.diagnosis.naming import State, is_large
 from bayesimpact.diagnosis.own_band import shakes_in_own_band
 from bayesimpact.diagnosis.refit import Candidate, refit, without
 from bayesimpact.diagnosis.scan import Scan, scan
@@ -44,11 +44,13 @@ class Models:
         self.begun: set[tuple[object, ...]] = set()
         self.dropped: set[tuple[frozenset[str], str]] = set()
         self.followed: set[frozenset[str]] = set()
+        self.refits = 0
+        self.repeated: tuple[Candidate, float] | None = None
 
     def keep(self, candidate: Candidate) -> Candidate:
         """The better end of all climbs to the candidate's model, this one among them."""
         key = frozenset(candidate.ids)
-        if shakes_in_own_band(candidate.fit, is_gross(candidate.fit)):
+        if shakes_in_own_band(candidate.fit, is_large(candidate.fit)):
             candidate = replace(candidate, log_evidence=-np.inf)
         held = self.tried.get(key)
         sooner = candidate.fit.converged and not (held and held.fit.converged)
@@ -110,6 +112,7 @@ class Models:
         begun = (candidate.ids, candidate.fit.log_posterior, shapes)
         if begun not in self.begun:
             self.begun.add(begun)
+            self.refits += 1
             self.progress("fitting " + " + ".join((*candidate.ids, *(s.effect.id for s in scores))))
             self.keep(refit(candidate.fit, scores, self.scales))
 
@@ -122,6 +125,7 @@ class Models:
         step = (frozenset(candidate.ids), effect.id)
         if step not in self.dropped:
             self.dropped.add(step)
+            self.refits += 1
             self.progress("without " + effect.id)
             self.keep(without(candidate, effect, self.scales))
         return self.tried[frozenset(i for i in candidate.ids if i != effect.id)]

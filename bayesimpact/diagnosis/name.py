@@ -15,21 +15,23 @@ import numpy as np
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.force import missing_contact
 from bayesimpact.diagnosis.models import SHORT, STARTS, Models, Progress
-from bayesimpact.diagnosis.naming import DECISIVE, Naming, State, is_gross
+from bayesimpact.diagnosis.naming import Naming, State, is_large
 from bayesimpact.diagnosis.pairs import promising_pairs
 from bayesimpact.diagnosis.refit import (
     Candidate,
     base_candidate,
-    correlation_spread,
+    residual_repetition,
     tempered_evidence,
 )
 from bayesimpact.diagnosis.scan import Scan
 from bayesimpact.diagnosis.scores import Score
-from bayesimpact.diagnosis.unknown import learn_force
+from bayesimpact.diagnosis.thresholds import DECISIVE
+from bayesimpact.diagnosis.unknown import learn_force, with_force
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
 
 MOST_EFFECTS = 3
+MOST_LARGE = 5  # where the base misfit is large: several strong effects act at once
 MANY = 3  # effects from which on they may imitate a single force
 WORTH_A_REFIT = 4.0  # expected gain in log likelihood, nats
 NEAR_BEST = 0.5  # of the best expected gain, less a margin: below that no refit makes a rival
@@ -38,10 +40,11 @@ FAR = 50.0  # nats; beyond four times that, the floor grows with the root of the
 LEAP = 8.0  # expected gain from which on effects that are on or off are always fitted, nats
 LOST = 30.0  # by how much an effect alone must fall behind the base model to be given up, nats
 RASH = 1.5  # by how much a score may underrate what a refit gains
-LEAST_STEP = 0.8  # an effect that takes less than this off a gross residual is not worth a name
-BEAM = 3  # models that are extended while the best one is not white: it, and single effects
+BEAM = 3  # models that are extended while the best one is not white
 PAIRS = 4  # refitted at the first step
+JOINT = 3  # effects of one family that are tried in one step
 EXCHANGES = 3  # rounds of leaving out and exchanging effects
+BUDGET = 150  # refits
 
 
 def name(
@@ -52,26 +55,29 @@ def name(
     rng: np.random.Generator,
     progress: Progress | None = None,
 ) -> Naming:
-    """Find the effects that the base model of `fit` leaves out."""
+    """Find the effects that the base model of `fit` leaves out.
+
+    Best first: the likeliest models so far are extended by every effect that scores promise
+    something of, by the best pairs at first, and where the misfit is large by several effects of
+    one family at once, because damping laws may help little alone and much together. While it
+    extends, the search takes any gain that the noise level allows, for what remains may yet be
+    explained; effects that the odds do not demand are left out afterwards, and each that stays is
+    exchanged for every other.
+    """
     search = _Search(effects, scales, rng, progress or (lambda message: None))
     state = base = search.examine(base_candidate(fit))
     beam = [base]
-    while not state.is_white and len(state.candidate.effects) < MOST_EFFECTS:
+    most = MOST_LARGE if is_large(fit) else MOST_EFFECTS
+    while not state.is_white and len(state.candidate.effects) < most and search.may_go_on():
         promising = [s for s in beam if not search.is_hopeless(s)]
         better = search.ranked([c for s in promising for c in search.extended(s)])
-        if not better or search.worth(better[0]) <= search.worth(state.candidate):
-            break
-        if (
-            is_gross(state.candidate.fit)
-            and better[0].fit.rms > LEAST_STEP * state.candidate.fit.rms
-        ):
+        if not better or search.promise(better[0]) <= search.promise(state.candidate):
             break
         state = search.examine(better[0])
         if not state.is_white:
             state = search.restarted(state)
         if not state.is_white:
-            singles = [c for c in better[1:] if len(c.effects) == 1 and c.log_evidence > -np.inf]
-            beam = [state, *(search.examine(c) for c in singles[: BEAM - 1])]
+            beam = [state, *(search.examine(c) for c in search.beside(state, better))]
     if search.may_be_named(state):
         state = search.settled(state)
     return search.naming(base, state)
@@ -99,14 +105,36 @@ class _Search(Models):
                 expected = state.candidate.log_evidence + pair.gain
                 if expected > best_single + self.cost:
                     found.append(self.fit_more(state.candidate, pair.scores))
+        if is_large(state.candidate.fit):
+            found += [self.fit_more(state.candidate, j) for j in families(state.scan)]
         return found
+
+    def with_residual(self, state: State) -> Candidate:
+        """A model with the likelier form of a residual force beside its effects."""
+        self.progress("fitting a residual force beside " + " + ".join(state.candidate.ids))
+        return with_force(state.candidate, state.unknown, self.scales)
+
+    def beside(self, state: State, found: Sequence[Candidate]) -> list[Candidate]:
+        """Models that are extended beside the best one.
+
+        Where a misfit is large, what comes next to it, since scores rank poorly there; else single
+        effects, each of which may be half of a pair.
+        """
+        large = is_large(state.candidate.fit)
+        rest = [c for c in found if set(c.ids) != set(state.candidate.ids)]
+        kept = [c for c in rest if c.log_evidence > -np.inf and (large or len(c.effects) == 1)]
+        return kept[: BEAM - 1]
+
+    def may_go_on(self) -> bool:
+        """Whether the budget allows for more refits."""
+        return self.refits < BUDGET
 
     def is_hopeless(self, state: State) -> bool:
         """Whether a free force will explain what the effects still to come cannot, say the scores.
 
         Either one beside the model's effects, or one in the place of all of them.
         """
-        if not state.candidate.effects or is_gross(state.candidate.fit):
+        if not state.candidate.effects or is_large(state.candidate.fit):
             return False
         most = RASH * max((s.gain for s in state.scan.best()), default=0.0) + NEAR_MARGIN
         more = MOST_EFFECTS - len(state.candidate.effects)
@@ -118,7 +146,7 @@ class _Search(Models):
 
         Not where a free force wins anyhow, nor where one beside it still explains a lot.
         """
-        if state.is_white or is_gross(self.states[frozenset()].candidate.fit):
+        if state.is_white or is_large(self.states[frozenset()].candidate.fit):
             return True
         return (
             self.worth(state.candidate) > self.force_worth() and state.unknown.log_evidence < SHORT
@@ -139,21 +167,28 @@ class _Search(Models):
         lost = self.worth(base.candidate) - self.worth(alone)
         return lost > max(LOST, base.unknown.log_evidence)
 
+    def promise(self, candidate: Candidate) -> float:
+        """What a model is worth on the way: every sample counts, for what remains may yet be
+        explained.
+        """
+        return candidate.log_evidence - self.cost * len(candidate.effects)
+
     def worth(self, candidate: Candidate) -> float:
-        return tempered_evidence(candidate, self.spread()) - self.cost * len(candidate.effects)
+        """Log posterior odds up to a constant, each independent sample counted once."""
+        evidence = tempered_evidence(candidate, self.repetition())
+        return evidence - self.cost * len(candidate.effects)
 
     def force_worth(self) -> float:
         """What a free force in place of all effects would be worth, as far as scores tell."""
         base = self.states[frozenset()]
         return self.worth(base.candidate) + base.unknown.log_evidence
 
-    def spread(self) -> float:
-        """Samples over which the best residual repeats itself; 1 without a gross misfit."""
-        base = self.tried[frozenset()]
-        if not is_gross(base.fit):
-            return 1.0
+    def repetition(self) -> float:
+        """Samples per independent one in the residual of the best model so far."""
         best = min(self.tried.values(), key=lambda c: c.fit.reduced_chi2)
-        return correlation_spread(best.fit)
+        if self.repeated is None or self.repeated[0] is not best:
+            self.repeated = best, residual_repetition(best.fit)
+        return self.repeated[1]
 
     def restarted(self, state: State) -> State:
         """The same model with the shapes of its effects sought anew beside all others.
@@ -184,7 +219,8 @@ class _Search(Models):
             smaller = [self.drop(state.candidate, e) for e in state.candidate.effects]
             best = max(smaller, key=self.worth)
             lost = self.worth(state.candidate) - self.worth(best)
-            if lost >= DECISIVE or (lost > 0 and not self.examine(best).is_white):
+            complete = state.is_white and not self.examine(best).is_white
+            if lost >= DECISIVE or (lost > 0 and complete):
                 return state
             state = self.examine(best)
         return state
@@ -245,13 +281,22 @@ class _Search(Models):
                 chosen = self.examine(best)
         contact = missing_contact(base.candidate.fit, self.scales, rng=self.rng)
         odds = -np.inf
-        many = len(chosen.candidate.effects) >= MANY and not is_gross(base.candidate.fit)
+        residual: dict[frozenset[str], Candidate] = {}
+        if not chosen.is_white and chosen.candidate.effects:
+            smaller = [self.drop(chosen.candidate, e) for e in chosen.candidate.effects]
+            for part in (chosen.candidate, *smaller):
+                residual[frozenset(part.ids)] = self.with_residual(self.examine(part))
+            tried = tuple(sorted(self.tried.values(), key=self.worth, reverse=True))
+        many = len(chosen.candidate.effects) >= MANY and not is_large(base.candidate.fit)
         if contact is not None and many:
             replaced = " + ".join(chosen.candidate.ids)
             self.progress(f"fitting a force in contact in place of {replaced}")
             fit = learn_force(base.candidate.fit, contact, self.scales)
             odds = model_evidence(fit) - base.candidate.log_evidence
-        return Naming(base, chosen, tried, self.cost, self.spread(), contact, odds)
+        return Naming(
+            base, chosen, tried, self.cost, self.repetition(), contact, odds,
+            dict(self.states), residual, self.may_go_on(),
+        )  # fmt: skip
 
 
 def worth_a_refit(scan: Scan, least: float = 0.0) -> list[Score]:
@@ -269,3 +314,16 @@ def worth_a_refit(scan: Scan, least: float = 0.0) -> list[Score]:
 
 def _is_a_leap(effect: Effect) -> bool:
     return not effect.parameters or effect.prefer is not None
+
+
+def families(scan: Scan) -> list[list[Score]]:
+    """Effects of one family that may act together, the strongest of each family first."""
+    by_family: dict[str, list[Score]] = {}
+    for score in scan.best():
+        effect = score.effect
+        held = by_family.setdefault(effect.family, [])
+        taken = {slot for s in held for slot in s.effect.binds}
+        shaped = any(p.circular for p in effect.parameters)
+        if score.gain > 0 and effect.parameters and not shaped and not taken & set(effect.binds):
+            held.append(score)
+    return [held[:JOINT] for held in by_family.values() if len(held) > 1]

@@ -1,22 +1,22 @@
 """What a search for names found: models, their odds, rivals, and whether anything is left.
 
-A name needs decisive odds over every rival; what remains beside it must be white.
+A hypothesis is a set of effects of the catalogue and at most one residual force. All are compared
+by the same log posterior odds: log evidence, less the price of multiplicity for every effect and
+for the residual force, likelihoods counted once per independent sample of the best residual.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from bayesimpact.diagnosis.force import MissingForce
 from bayesimpact.diagnosis.refit import Candidate, tempered_evidence
 from bayesimpact.diagnosis.scan import Scan
+from bayesimpact.diagnosis.thresholds import ALPHA, DECISIVE, LARGE, largest_log_odds
 from bayesimpact.inference.fit import Fit
-
-ALPHA = 0.004  # of each of the three tests that ask whether anything is missing
-DECISIVE = 5.5  # nats of log odds that a name needs over every rival (2 ln odds of 11)
-GROSS = 3.0  # residual over noise from which on a misfit is no longer concealed
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,13 +40,16 @@ class State:
     def is_white(self) -> bool:
         """True when neither the catalogue nor an unknown force explains anything more.
 
-        Beside effects, an unknown force needs decisive odds as they do: each model on the way is
-        tested anew, and one in a hundred has a small p-value by chance.
+        The base model is tested at a stated rate of false alarms. Beside effects, what remains
+        needs decisive odds as they do: each model on the way is tested anew, and one in a hundred
+        has a small p-value by chance.
         """
-        forces = [self.force, self.drift]
-        if self.candidate.effects:
-            forces = [f for f in forces if f.log_evidence >= DECISIVE]
-        return min([self.scan.p_value, *(f.p_value for f in forces)]) >= ALPHA
+        forces = (self.force, self.drift)
+        if not self.candidate.effects:
+            return min([self.scan.p_value, *(f.p_value for f in forces)]) >= ALPHA
+        if largest_log_odds(self.scan.p_value) >= DECISIVE:
+            return False
+        return not any(f.log_evidence >= DECISIVE and f.p_value < ALPHA for f in forces)
 
     @property
     def unknown(self) -> MissingForce:
@@ -61,33 +64,40 @@ class Naming:
     Attributes
     ----------
     base, chosen : first and last state
-    tried : every model that was fitted, best first
-    prior_cost : nats per added effect
-    spread : samples over which the best model's residual repeats itself, where the misfit is gross
+    tried : every model that was fitted, likeliest first
+    prior_cost : nats per added effect and per residual force
+    repetition : samples per independent one in the best model's residual
     contact : force in contact alone that the base model leaves unexplained, or None
     contact_odds : its log evidence over the base model when it is fitted with the parameters, where
         many chosen effects may imitate it
+    states : every model that was examined, by its ids
+    residual : models with a residual force beside their effects, fitted in full, by the ids of
+        these effects; where something remains beside the chosen model
+    finished : False when the budget ended the search
     """
 
     base: State
     chosen: State
     tried: tuple[Candidate, ...]
     prior_cost: float
-    spread: float = 1.0
+    repetition: float = 1.0
     contact: MissingForce | None = None
     contact_odds: float = -np.inf
+    states: Mapping[frozenset[str], State] = field(default_factory=dict)
+    residual: Mapping[frozenset[str], Candidate] = field(default_factory=dict)
+    finished: bool = True
 
     @property
     def unknown(self) -> MissingForce:
-        """The likeliest free force."""
+        """The likeliest free force that the base model leaves out."""
         forces = [self.base.unknown, *([self.contact] if self.contact else [])]
         return max(forces, key=lambda f: f.log_evidence)
 
     def log_odds(self, candidate: Candidate) -> float:
         """Log posterior odds of a model against the base model."""
         return (
-            tempered_evidence(candidate, self.spread)
-            - tempered_evidence(self.base.candidate, self.spread)
+            tempered_evidence(candidate, self.repetition)
+            - tempered_evidence(self.base.candidate, self.repetition)
             - self.prior_cost * len(candidate.effects)
         )
 
@@ -120,7 +130,7 @@ class Naming:
         if self.chosen.is_white:
             reached = chosen.fit.log_likelihood - self.base.candidate.fit.log_likelihood
             evidence -= max(0.0, force.gain - reached - DECISIVE)
-        return max(evidence / self.spread, self.contact_odds)
+        return max(evidence / self.repetition, self.contact_odds) - self.prior_cost
 
     def prefers_learned_force(self) -> bool:
         """True when one free force beats the chosen effects decisively.
@@ -128,6 +138,14 @@ class Naming:
         An effect that imitates a force outside the catalogue loses to that force.
         """
         return self.force_log_odds > self.log_odds(self.chosen.candidate) + DECISIVE
+
+    def with_residual_force(self, ids: frozenset[str]) -> float:
+        """Log odds of a model, with a residual force beside its effects where that is likelier."""
+        alone = [self.log_odds(c) for c in self.tried if frozenset(c.ids) == ids]
+        beside = self.residual.get(ids)
+        if beside is not None:  # the residual force counts as one of its effects
+            alone.append(self.log_odds(beside))
+        return max(alone, default=-np.inf)
 
     def probability(self, effect_id: str) -> float:
         """Probability that an effect is part of the model, over all models tried."""
@@ -137,9 +155,9 @@ class Naming:
         return float(weight[have].sum() / weight.sum())
 
 
-def is_gross(fit: Fit) -> bool:
+def is_large(fit: Fit) -> bool:
     """True when the residual dwarfs the noise."""
-    return fit.reduced_chi2 > GROSS**2
+    return fit.reduced_chi2 > LARGE**2
 
 
 def _is_elaboration(candidate: Candidate, chosen: Candidate) -> bool:

@@ -50,6 +50,17 @@ class Projection:
             self.score[i], self.information[np.ix_(i, i)], self.absorbed[:, i], self.kept[i]
         )
 
+    def combined(self, weights: Array) -> Projection:
+        """The same for combinations of the columns, weights (K, L); what is kept of each of these
+        is not known without the responses, NaN.
+        """
+        return Projection(
+            weights.T @ self.score,
+            weights.T @ self.information @ weights,
+            self.absorbed @ weights,
+            np.full(weights.shape[1], np.nan),
+        )
+
 
 def project(fit: Fit, parts: Sequence[Array]) -> Projection:
     """Project direction columns (per recording (n_r, K), whitened, noise = 1) off the model."""

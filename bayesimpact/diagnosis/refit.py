@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,8 @@ from bayesimpact.diagnosis.extend import (
     transfer,
 )
 from bayesimpact.diagnosis.scores import Score
-from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.climb import Climb
+from bayesimpact.inference.fit import Fit, Target, inverse, prior_information
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.model.effects.effect import Effect, Scales
 from bayesimpact.model.parameters import is_added
@@ -25,6 +27,9 @@ Array = NDArray[np.float64]
 
 TOLERANCE = 0.02  # last step of a refit, standard deviations
 ITERATIONS = 40
+SHARES = (0.5, 0.25, 0.125, 0.0625)  # of the predicted shift, where the whole of it goes too far
+GAINED = 1.0  # nats: what gains less than this over a model that it contains begins again
+WHITE_SD = 4.0  # one lag of 16,000 of white noise lies beyond: none in a recording
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,21 +59,49 @@ def base_candidate(fit: Fit) -> Candidate:
 
 
 def refit(fit: Fit, scores: Sequence[Score], scales: Scales) -> Candidate:
-    """Fit the model of `fit` with the effects of `scores` added."""
+    """Fit the model of `fit` with the effects of `scores` added.
+
+    The scores are linear predictions. Where the misfit is large they may point beyond the mode, so
+    the climb begins at the best point between the unshifted model and the predicted one; one that
+    gains nothing begins again at either end.
+    """
     effects = (*fit.target.oscillator.effects, *(s.effect for s in scores))
     shapes = {name: value for s in scores for name, value in s.shapes.items()}
     target = extend(fit, effects, scales)
-    start = transfer(fit, target.oscillator.layout, effects, scales, shapes)
-    _shift(fit, target.oscillator.layout.names, start, scores)
-    sizes = step_sizes(target.oscillator.layout.names, effects, scales, scores)
-    found = find_mode(
-        target,
-        start,
-        steps=difference_steps(fit, target, sizes),
-        tolerance=TOLERANCE,
-        max_iterations=ITERATIONS,
-    )
+    names = target.oscillator.layout.names
+    unshifted = transfer(fit, target.oscillator.layout, effects, scales, shapes)
+    predicted = unshifted.copy()
+    _shift(fit, names, predicted, scores)
+    steps = difference_steps(fit, target, step_sizes(names, effects, scales, scores))
+    start = best_start(target, unshifted, predicted, steps)
+    options: dict[str, Any] = {"steps": steps, "tolerance": TOLERANCE, "max_iterations": ITERATIONS}
+    found = find_mode(target, start, **options)
+    for other in (predicted, unshifted):
+        if found.log_likelihood > fit.log_likelihood + GAINED or np.array_equal(start, other):
+            continue
+        again = find_mode(target, other, **options)
+        found = max(found, again, key=lambda f: np.nan_to_num(f.log_posterior, nan=-np.inf))
     return Candidate(effects, found, model_evidence(found))
+
+
+def best_start(target: Target, unshifted: Array, predicted: Array, steps: Array) -> Array:
+    """The likeliest point on the line from one start to another (d,).
+
+    The predicted end is taken where it is no worse than the unshifted one.
+    """
+    climb = Climb(target, steps, None, ())
+    least = climb.evaluate(unshifted.copy()).value
+    shares = np.array([1.0, *SHARES])
+    values = []
+    for share in shares:
+        point = unshifted + share * (predicted - unshifted)
+        values.append(climb.evaluate(point).value)
+        if share == 1.0 and values[0] <= least:
+            break
+    best = int(np.argmin(np.nan_to_num(values, nan=np.inf)))
+    if not values[best] < least and values[0] > least:
+        return unshifted
+    return np.asarray(unshifted + shares[best] * (predicted - unshifted))
 
 
 def without(candidate: Candidate, effect: Effect, scales: Scales) -> Candidate:
@@ -111,29 +144,46 @@ def _shift(fit: Fit, names: Sequence[str], start: Array, scores: Sequence[Score]
                 start[position[name]] -= shift
 
 
-def tempered_evidence(candidate: Candidate, spread: float) -> float:
-    """Log evidence when only one sample in `spread` tells something new.
+def tempered_evidence(candidate: Candidate, repetition: float) -> float:
+    """Log evidence when only one sample in `repetition` tells something new.
 
-    Where a gross misfit stays, residuals repeat themselves over many samples and the ordinary
-    evidence counts every repetition. The likelihood to the power 1 / spread counts each once (a
-    power posterior, Friel and Pettitt 2008); its curvature is flatter by the same factor.
+    Where a misfit stays, residuals repeat themselves over many samples and the ordinary evidence
+    counts every repetition. The likelihood to the power 1 / repetition counts each once (coarsened
+    posterior, Miller and Dunson 2019; power posterior, Friel and Pettitt 2008); its curvature is
+    flatter by the same factor.
     """
     fit = candidate.fit
-    if spread <= 1.0 or not np.isfinite(candidate.log_evidence):
+    if repetition <= 1.0 or not np.isfinite(candidate.log_evidence):
         return candidate.log_evidence
-    lost = (1.0 - 1.0 / spread) * fit.log_likelihood
-    return candidate.log_evidence - lost + 0.5 * fit.mode.size * float(np.log(spread))
+    lost = (1.0 - 1.0 / repetition) * fit.log_likelihood
+    known = prior_information(fit.target.priors, fit.mode)
+    noise = fit.target.oscillator.layout.roles("noise")
+    moving = np.setdiff1d(np.arange(fit.mode.size), noise)
+    scale = fit.sd[moving]
+    precision = inverse(fit.covariance[np.ix_(moving, moving)]) * np.outer(scale, scale)
+    prior = np.diag(known[moving] * scale**2)
+    flatter = (precision - prior) / repetition + prior
+    gained = 0.5 * (np.linalg.slogdet(precision)[1] - np.linalg.slogdet(flatter)[1])
+    gained += 0.5 * noise.size * np.log(repetition)
+    return candidate.log_evidence - lost + float(gained)
 
 
-def correlation_spread(fit: Fit) -> float:
-    """Samples over which a residual repeats itself: 1 + 2 sum of its correlations, at least 1."""
-    values = []
+def residual_repetition(fit: Fit) -> float:
+    """Samples per independent one in a residual, as far as its variance is concerned; at least 1.
+
+    n / n_eff = 1 + 2 sum (1 - k/n) rho_k^2 for a stationary Gaussian series (Bayley and Hammersley
+    1946, for the variance): what a comparison of residual variances rests on. Correlations that
+    white noise would show, up to `WHITE_SD` standard errors 1 / sqrt(n), count nothing.
+    """
+    total = effective = 0.0
     for part in fit.linearisation:
         x = part.residual - part.residual.mean()
-        power = np.abs(np.fft.rfft(x, 2 * x.size)) ** 2
-        rho = np.fft.irfft(power)[: x.size]
-        rho = rho / rho[0]
-        below = np.flatnonzero(rho < 0.05)
-        last = int(below[0]) if below.size else x.size
-        values.append(1.0 + 2.0 * float(np.sum(rho[1:last])))
-    return max(1.0, float(np.mean(values)))
+        n = x.size
+        power = np.abs(np.fft.rfft(x, 2 * n)) ** 2
+        rho = np.fft.irfft(power)[:n]
+        rho = rho / max(rho[0], 1e-300)
+        seen = np.where(np.abs(rho) > WHITE_SD / np.sqrt(n), rho, 0.0)[1:]
+        weights = 1.0 - np.arange(1, n) / n
+        total += n
+        effective += n / (1.0 + 2.0 * float(np.sum(weights * seen**2)))
+    return max(1.0, total / effective)

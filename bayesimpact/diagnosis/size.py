@@ -29,11 +29,12 @@ def amount(value: float, unit: str) -> str:
     if unit == "m":
         for name, factor in _SMALLER:
             if value >= factor:
-                return f"{_two_digits(value / factor)} {name}"
-    return f"{_two_digits(value)} {unit}"
+                return f"{two_digits(value / factor)} {name}"
+    return f"{two_digits(value)} {unit}"
 
 
-def _two_digits(value: float) -> str:
+def two_digits(value: float) -> str:
+    """Two digits without an exponent."""
     return f"{float(f'{value:.2g}'):g}"  # 430, not 4.3e+02
 
 
@@ -63,7 +64,15 @@ def _values(fit: Fit) -> Mapping[str, float]:
     return dict(zip(fit.names, fit.mode, strict=True))
 
 
-def _numbers(effect: Effect, fit: Fit, r: int) -> list[float]:
+def yardstick(effect: Effect) -> str:
+    """What the share of an effect's size refers to, in words."""
+    if effect.law is None and effect.size is None:
+        return "the amplitude"
+    contact = effect.regime in IN_CONTACT
+    return f"the peak elastic force of the {'obstacle' if contact else 'suspension'}"
+
+
+def effect_numbers(effect: Effect, fit: Fit, r: int) -> list[float]:
     """The effect's parameters in its own order, as recording r has them."""
     known, recording = _values(fit), fit.target.oscillator.campaign.recordings[r]
     keys = {"campaign": None, "case": recording.case, "recording": recording.name}
@@ -82,7 +91,7 @@ def largest_change(effect: Effect, fit: Fit) -> float:
             np.arange(y.size, dtype=np.float64)
             * fit.target.oscillator.campaign.recordings[r].interval
         )
-        p = np.array([_numbers(effect, fit, r)])
+        p = np.array([effect_numbers(effect, fit, r)])
         largest = max(largest, float(np.abs(effect.observe(y[None], t, p) - y).max()))
     return largest
 
@@ -94,7 +103,7 @@ def peak_force(effect: Effect, fit: Fit, points: int = 2000) -> float:
     largest = 0.0
     for r, (y, v) in enumerate(trajectory_points(fit)):
         interval = fit.target.oscillator.campaign.recordings[r].interval
-        q, p = slots[r], _numbers(effect, fit, r)
+        q, p = slots[r], effect_numbers(effect, fit, r)
         for i in range(0, y.size, max(1, y.size * len(slots) // points)):
             d = y[i] - q[3]
             if effect.law.where == "everywhere" or d > 0:

@@ -28,7 +28,7 @@ SAVITZKY_GOLAY = replace(
 
 def proved_smoothing(campaign: Campaign) -> Fingerprint | None:
     """The filter that the recordings prove and campaign.toml does not declare, or None."""
-    if campaign.measurement.smoothing is not None:
+    if campaign.measurement.smoothing is not None or campaign.measurement.unfiltered:
         return None
     return find_smoothing(campaign.recordings)
 

@@ -9,7 +9,8 @@
 | v0 | uniform, +- 20 times the largest speed |
 | k2 | uniform, 0 to 1000 times the larger of the quick estimates of k1 and k2 |
 | sigma | log-uniform, eight decades about the estimate; log-normal, 10 %, about a stated noise |
-| added effects | half-normal (normal with both signs) of a physical scale, log-normal for shapes |
+| added effects | half-normal (normal with both signs) of a physical scale |
+| their shapes | log-normal, or log-uniform between two positive bounds |
 
 Campaign.toml's [priors] replace any of them.
 """
@@ -91,6 +92,8 @@ def effect_prior(effect: Effect, parameter: EffectParameter, scales: Scales) -> 
     scale = parameter.scale(scales)
     if parameter.circular:
         return Uniform(-2 * np.pi, 4 * np.pi)
+    if parameter.is_shape and parameter.lower > 0.0 and parameter.upper < np.inf:
+        return LogUniform(parameter.lower, parameter.upper)
     if parameter.is_shape:
         return LogNormal(scale, SHAPE_WIDTH)
     if parameter.lower == parameter.null == 0.0:

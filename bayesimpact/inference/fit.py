@@ -109,15 +109,19 @@ class Fit:
 
     @cached_property
     def residuals(self) -> tuple[Array, ...]:
-        """Recorded minus predicted, per recording (n,), m."""
+        """Recorded minus predicted, per recording (n,), m; 0 where a sample is set aside."""
         recordings = self.target.oscillator.campaign.recordings
         pairs = zip(recordings, self.predicted, strict=True)
-        return tuple(r.samples - p for r, p in pairs)
+        return tuple(
+            r.samples - p if r.used is None else np.where(r.used, r.samples - p, 0.0)
+            for r, p in pairs
+        )
 
     @property
     def rms(self) -> float:
-        """Root mean square residual over all samples, m."""
-        return float(np.sqrt(np.mean(np.concatenate(self.residuals) ** 2)))
+        """Root mean square residual over all samples that count, m."""
+        count = sum(r.count for r in self.target.oscillator.campaign.recordings)
+        return float(np.sqrt(sum(float(np.sum(r**2)) for r in self.residuals) / count))
 
 
 def grams(linearisation: Sequence[Linearisation]) -> tuple[Array, ...]:

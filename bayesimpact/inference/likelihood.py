@@ -66,18 +66,19 @@ class Likelihood:
     @cached_property
     def sizes(self) -> Array:
         """Independent numbers per recording, (R,)."""
-        o = self.oscillator
+        recordings = self.oscillator.campaign.recordings
         return np.array(
-            [self.noise.size(int(n), dt) for n, dt in zip(o.counts, o.intervals, strict=True)],
+            [self.noise.size(r.samples.size, r.interval, r.used) for r in recordings],
             dtype=np.float64,
         )
 
     @cached_property
     def log_volume(self) -> Array:
         """Log determinant of the whitening per recording, (R,)."""
-        o = self.oscillator
-        pairs = zip(o.counts, o.intervals, strict=True)
-        return np.array([self.noise.log_volume(int(n), dt) for n, dt in pairs])
+        recordings = self.oscillator.campaign.recordings
+        return np.array(
+            [self.noise.log_volume(r.samples.size, r.interval, r.used) for r in recordings]
+        )
 
     @cached_property
     def sigma_columns(self) -> Index:
@@ -89,7 +90,7 @@ class Likelihood:
         """Sums of squares of the whitened residuals, (B, R), m2; inf where inadmissible."""
         o = self.oscillator
         theta = np.ascontiguousarray(np.atleast_2d(theta))
-        if o.is_plain and self.noise.is_white:
+        if o.is_plain and self.noise.is_white and o.is_whole:
             base = slice(0, len(BASE_SLOTS))
             columns = np.ascontiguousarray(o.layout.columns[:, base])
             constants = np.ascontiguousarray(o.layout.constants[:, base])
@@ -117,7 +118,7 @@ class Likelihood:
         pairs = zip(
             self.oscillator.campaign.recordings, self.oscillator.predict(theta), strict=True
         )
-        return tuple(self.noise.whiten(r.samples - p, r.interval) for r, p in pairs)
+        return tuple(self.noise.whiten(r.samples - p, r.interval, r.used) for r, p in pairs)
 
     def per_recording(self, theta: Array) -> Array:
         """Log likelihood of every recording, (B, R); -inf where inadmissible."""
@@ -161,7 +162,7 @@ class Likelihood:
         """Linearisation from a prediction (n,) and derivatives (k, n)."""
         recording = self.oscillator.campaign.recordings[r]
         stacked = np.vstack([recording.samples - predicted, jacobian])
-        white = self.noise.whiten(stacked, recording.interval)
+        white = self.noise.whiten(stacked, recording.interval, recording.used)
         return Linearisation(white[0], white[1:].T, columns)
 
     def _exact(self, theta: Array) -> tuple[Linearisation, ...]:

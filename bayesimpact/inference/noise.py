@@ -9,6 +9,10 @@ stage (least squares, likelihood, scores) sees white noise. Three kinds:
   no information, and its covariance has no inverse; so only the Fourier coefficients below the
   filter's half-power frequency are used, each divided by what the filter left of the noise (Whittle
   1953).
+
+Samples that are set aside drop out. White and AR(1) noise whiten them to 0, so that shapes stay,
+and AR(1) noise takes its exact correlation over the gap. Behind a filter every stretch between
+gaps, less what the filter carried into it, is transformed on its own.
 """
 
 from __future__ import annotations
@@ -19,9 +23,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Smoothing
+from bayesimpact.data.gaps import runs
 from bayesimpact.model.measurement import edge, gain
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+LEAST_STRETCH = 16  # samples between two gaps: fewer say nothing of a filter's passband
 
 
 @dataclass(frozen=True)
@@ -58,10 +66,20 @@ class Noise:
         raw = "white" if self.correlation == 0.0 else f"AR(1), correlation {self.correlation:.2f}"
         return raw if self.smoothing is None else f"{raw}, smoothed ({self.smoothing.kind})"
 
-    def whiten(self, x: Array, interval: float) -> Array:
-        """Whitened x: (..., n) samples to (..., size(n)) numbers of variance sigma^2."""
+    def whiten(self, x: Array, interval: float, used: Mask | None = None) -> Array:
+        """Whitened x: (..., n) samples to (..., m) numbers of variance sigma^2.
+
+        `used` (n,) is False where samples are set aside. m is n, or size(n) behind a filter.
+        """
         if self.smoothing is not None:
-            return self._band(x, interval)
+            if used is None:
+                return self._band(x, interval)
+            parts = [
+                self._band(x[..., s], interval, False) for s in self._stretches(used, interval)
+            ]
+            return np.concatenate([x[..., :0], *parts], axis=-1)
+        if used is not None:
+            return self._with_gaps(x, used)
         if self.correlation == 0.0:
             return x
         white = np.empty_like(x)
@@ -70,28 +88,31 @@ class Noise:
         white[..., 1:] = innovation / np.sqrt(1.0 - self.correlation**2)
         return white
 
-    def size(self, n: int, interval: float) -> int:
+    def size(self, n: int, interval: float, used: Mask | None = None) -> int:
         """How many independent numbers `n` samples are worth."""
         if self.smoothing is None:
-            return n
-        return 2 * (self._band_size(n, interval) - 1) + 1
+            return n if used is None else int(used.sum())
+        if used is None:
+            return 2 * (self._band_size(n, interval) - 1) + 1
+        return sum(
+            2 * self._spectrum(s.stop - s.start, interval, False).size - 1
+            for s in self._stretches(used, interval)
+        )
 
-    def in_time(self, white: Array, n: int, interval: float) -> tuple[Array, float]:
+    def in_time(
+        self, white: Array, n: int, interval: float, used: Mask | None = None
+    ) -> tuple[Array, float]:
         """Whitened numbers (..., size(n)) as signals in time with the same products: (them, start).
 
         `start` is the time of their first sample after the recording's, s.
         """
         if self.smoothing is None:
             return white, 0.0
-        from scipy.fft import irfft
-
+        if used is not None:
+            return self._stretches_in_time(white, used, interval), 0.0
         inner = self._interior(n, interval)
-        count, m = inner.stop - inner.start, self._band_size(n, interval)
-        coefficients = np.zeros((*white.shape[:-1], count // 2 + 1), dtype=complex)
-        coefficients[..., 0] = np.sqrt(2.0) * white[..., 0]
-        coefficients[..., 1:m] = white[..., 1:m] + 1j * white[..., m:]
-        signal = irfft(coefficients * np.sqrt(0.5 * count), count, axis=-1)
-        return np.asarray(signal), inner.start * interval
+        signal = _signal(white, inner.stop - inner.start, self._band_size(n, interval))
+        return signal, inner.start * interval
 
     def highest(self, n: int, interval: float) -> float:
         """Highest frequency that the whitened numbers of n samples know, Hz."""
@@ -100,10 +121,13 @@ class Noise:
         inner = self._interior(n, interval)
         return float((self._band_size(n, interval) - 1) / ((inner.stop - inner.start) * interval))
 
-    def log_volume(self, n: int, interval: float) -> float:
+    def log_volume(self, n: int, interval: float, used: Mask | None = None) -> float:
         """Log determinant of the whitening operator (0 for the band: there it is a constant)."""
         if self.smoothing is not None:
             return 0.0
+        if used is not None:
+            steps = np.diff(np.flatnonzero(used))
+            return -0.5 * float(np.sum(np.log1p(-(self.correlation ** (2.0 * steps)))))
         return -0.5 * (n - 1) * float(np.log1p(-(self.correlation**2)))
 
     def coloured(self, rng: np.random.Generator, n: int, interval: float, sigma: float) -> Array:
@@ -120,13 +144,46 @@ class Noise:
         """The same raw noise behind another filter."""
         return replace(self, smoothing=smoothing)
 
+    def _with_gaps(self, x: Array, used: Mask) -> Array:
+        """White or AR(1) noise: each sample less what the one before it, however far, foretells."""
+        white = np.zeros_like(x)
+        good = np.flatnonzero(used)
+        if good.size == 0:
+            return white
+        share = self.correlation ** np.diff(good).astype(np.float64)
+        white[..., good[0]] = x[..., good[0]]
+        innovation = x[..., good[1:]] - share * x[..., good[:-1]]
+        white[..., good[1:]] = innovation / np.sqrt(1.0 - share**2)
+        return white
+
+    def _stretches(self, used: Mask, interval: float) -> list[slice]:
+        """Between gaps: what no set-aside sample and no end reaches through the filter."""
+        reach = edge(self.smoothing, interval)
+        lags = self.smoothing is not None and self.smoothing.kind == "lag"
+        found = []
+        for first, end in runs(used):
+            last = end if lags else end - reach
+            if last - (first + reach) >= max(2 * reach, LEAST_STRETCH):
+                found.append(slice(first + reach, last))
+        return [s for s in found if self._spectrum(s.stop - s.start, interval, False).size > 1]
+
+    def _stretches_in_time(self, white: Array, used: Mask, interval: float) -> Array:
+        signals = np.zeros((*white.shape[:-1], used.size))
+        begin = 0
+        for s in self._stretches(used, interval):
+            m = int(self._spectrum(s.stop - s.start, interval, False).size)
+            part = white[..., begin : begin + 2 * m - 1]
+            signals[..., s] = _signal(part, s.stop - s.start, m)
+            begin += 2 * m - 1
+        return signals
+
     def _interior(self, n: int, interval: float) -> slice:
         cut = min(edge(self.smoothing, interval), n // 4)
         lags = self.smoothing is not None and self.smoothing.kind == "lag"
         return slice(cut, n if lags else n - cut)  # a lag has no second end
 
-    def _spectrum(self, n: int, interval: float) -> Array:
-        inner = self._interior(n, interval)
+    def _spectrum(self, n: int, interval: float, ends: bool = True) -> Array:
+        inner = self._interior(n, interval) if ends else slice(0, n)
         frequency: Array = np.fft.rfftfreq(inner.stop - inner.start, interval).astype(np.float64)
         filtered = gain(self.smoothing, interval, frequency) ** 2
         beyond = np.flatnonzero(filtered < 0.5)
@@ -138,15 +195,26 @@ class Noise:
     def _band_size(self, n: int, interval: float) -> int:
         return int(self._spectrum(n, interval).size)
 
-    def _band(self, x: Array, interval: float) -> Array:
+    def _band(self, x: Array, interval: float, ends: bool = True) -> Array:
+        """Scaled Fourier coefficients; `ends`: the ends, where the filter differs, are cut off."""
         from scipy.fft import rfft
 
         n = x.shape[-1]
-        spectrum = self._spectrum(n, interval)
-        inner = x[..., self._interior(n, interval)]
+        spectrum = self._spectrum(n, interval, ends)
+        inner = x[..., self._interior(n, interval)] if ends else x
         coefficients = rfft(inner, axis=-1)[..., : spectrum.size]
         coefficients = coefficients / np.sqrt(0.5 * inner.shape[-1] * spectrum)
         head = coefficients[..., :1].real / np.sqrt(2.0)
         return np.concatenate(
             [head, coefficients[..., 1:].real, coefficients[..., 1:].imag], axis=-1
         )
+
+
+def _signal(white: Array, count: int, m: int) -> Array:
+    """`count` samples in time with the same products as whitened coefficients (..., 2 m - 1)."""
+    from scipy.fft import irfft
+
+    coefficients = np.zeros((*white.shape[:-1], count // 2 + 1), dtype=complex)
+    coefficients[..., 0] = np.sqrt(2.0) * white[..., 0]
+    coefficients[..., 1:m] = white[..., 1:m] + 1j * white[..., m:]
+    return np.asarray(irfft(coefficients * np.sqrt(0.5 * count), count, axis=-1))

@@ -10,7 +10,7 @@ kinks that no polynomial follows. Windows that something else disturbs stand out
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,8 @@ from scipy.linalg import null_space, toeplitz
 from scipy.optimize import minimize_scalar
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.faults.flat import reading_step
+from bayesimpact.data.gaps import runs
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 from bayesimpact.inference.noise import Noise
@@ -79,7 +81,19 @@ def raw_noise(recordings: Sequence[Recording]) -> Noise:
     if chosen is None:
         total = sum(r.samples.size for r in recordings)
         raise InputError("noise estimate", f"{total} samples in all", f"at least {5 * SMALLEST}")
-    return chosen
+    return _with_step(chosen, recordings)
+
+
+def _with_step(noise: Noise, recordings: Sequence[Recording]) -> Noise:
+    """No less than a twelfth of the squared step that readings come in (Sheppard 1898).
+
+    Where a step is coarser than the noise, slow motion stays on one reading for whole windows, and
+    their remainders hide it.
+    """
+    floor = float(np.sqrt(np.mean([reading_step(r.samples) ** 2 for r in recordings]) / 12))
+    if noise.level >= floor:
+        return noise
+    return replace(noise, level=floor, source="the step of the readings")
 
 
 def _rises(before: Noise, after: Noise) -> bool:
@@ -96,24 +110,26 @@ def _remainder(recordings: Sequence[Recording], per_period: float) -> _Remainder
     powers = np.vander(np.linspace(-1, 1, length), DEGREE + 1)
     basis = null_space(powers.T)
     side = any(r.case for r in recordings)
-    rows = [_windows(r.samples, length, side) @ basis for r in recordings]
+    rows = [_windows(r, length, side) @ basis for r in recordings]
     values = np.concatenate(rows)
     if (
         values.size < LEAST_NUMBERS and side
     ):  # hardly any free swing: take the windows at the stop too
-        values = np.concatenate([_windows(r.samples, length, False) @ basis for r in recordings])
+        values = np.concatenate([_windows(r, length, False) @ basis for r in recordings])
     return _Remainder(values, basis) if values.shape[0] >= 4 else None
 
 
-def _windows(samples: Array, length: int, side: bool) -> Array:
+def _windows(recording: Recording, length: int, side: bool) -> Array:
     """Windows (count, length) of a recording; with `side`, only those on a stop's free side."""
+    samples = recording.samples
     settled = float(np.median(samples[-max(samples.size // 5, 1) :]))
     centred = samples - settled
     free = centred < -MARGIN * np.abs(centred).max() if side else np.ones(samples.size, dtype=bool)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], free, [False]]).astype(np.int8)))
+    if recording.used is not None:
+        free = free & recording.used
     starts = [
         first + (end - first) % length // 2 + np.arange((end - first) // length) * length
-        for first, end in edges.reshape(-1, 2)
+        for first, end in runs(free)
     ]
     first = np.concatenate([np.zeros(0, dtype=np.int64), *starts])
     return np.asarray(centred[first[:, None] + np.arange(length)])

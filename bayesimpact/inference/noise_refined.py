@@ -113,18 +113,21 @@ def fastest_frequency(fit: Fit) -> float:
 def rounding_variance(fit: Fit) -> float:
     """Mean variance of what rounding adds, m2: a twelfth of the squared last digit."""
     recordings = fit.target.oscillator.campaign.recordings
-    digits = [np.diff(np.unique(r.samples)).min(initial=np.inf) for r in recordings]
+    read = [r.samples if r.used is None else r.samples[r.used] for r in recordings]
+    digits = [np.diff(np.unique(samples)).min(initial=np.inf) for samples in read]
     return float(np.mean(np.square(digits)) / 12) if np.isfinite(digits).all() else 0.0
 
 
 def _ordinates(fit: Fit, lowest: float) -> Ordinates:
     """Of all recordings above `lowest` Hz, but for lines and what a filter has suppressed."""
     found, smoothing = [], fit.target.oscillator.smoothing
-    for residual, interval in zip(fit.residuals, fit.target.oscillator.intervals, strict=True):
-        frequency = np.fft.rfftfreq(residual.size, interval)
+    recordings = fit.target.oscillator.campaign.recordings
+    for residual, recording in zip(fit.residuals, recordings, strict=True):
+        interval = recording.interval
+        frequency: Array = np.fft.rfftfreq(residual.size, interval).astype(np.float64)
         kept = (frequency > lowest) & (frequency < 0.5 / interval * (1 - 1e-9))
         kept &= gain(smoothing, interval, frequency) ** 2 > PASSED
-        power = np.abs(np.fft.rfft(residual)) ** 2 / residual.size
+        power = np.abs(np.fft.rfft(residual)) ** 2 / recording.count
         frequency, power, _ = without_lines(frequency[kept], power[kept], interval)
         passed = gain(smoothing, interval, frequency) ** 2
         found.append((2 * np.pi * frequency * interval, power, passed))

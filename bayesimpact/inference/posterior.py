@@ -148,6 +148,7 @@ def _fingerprint(fit: Fit) -> dict[str, str]:
     long = {
         "recordings": [(r.name, r.case, r.quantity, r.samples.size) for r in recordings],
         "samples": hashlib.sha256(oscillator.samples.tobytes()).hexdigest(),
+        "used": [None if r.used is None else r.used.tobytes().hex() for r in recordings],
         "intervals": oscillator.intervals.tolist(),
         "parameters": fit.names,
         "effects": [effect.id for effect in oscillator.effects],

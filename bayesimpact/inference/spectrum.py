@@ -155,7 +155,7 @@ def _half_swings(recording: Recording) -> Swings | None:
         return None
     half_period = float(np.median([s for s in spans if s > 0.5 * max(spans)]))
     length = int(half_period)
-    starts = _swings(recording.samples, length)
+    starts = _swings(recording, length)
     if length < 8 or not starts:
         return None
     steps = np.arange(length, dtype=np.float64) - 0.5 * (length - 1)
@@ -185,8 +185,9 @@ def _passed(
     return float(energy[kept].sum()), int(kept.sum()) * freedom
 
 
-def _swings(samples: Array, length: int) -> list[int]:
+def _swings(recording: Recording, length: int) -> list[int]:
     """Starts of windows centred on the turning points of the free (lower) side."""
+    samples, used = recording.samples, recording.used
     centred = samples - np.median(samples)
     deep = -centred > 0.2 * np.max(np.abs(centred))
     edges = np.flatnonzero(np.diff(deep.astype(int)))
@@ -194,7 +195,8 @@ def _swings(samples: Array, length: int) -> list[int]:
     for low, high in itertools.pairwise(edges):
         if deep[low + 1]:
             start = low + 1 + int(np.argmin(centred[low + 1 : high + 1])) - length // 2
-            if start >= 0 and start + length <= samples.size:
+            whole = used is None or bool(used[max(start, 0) : start + length].all())
+            if start >= 0 and start + length <= samples.size and whole:
                 starts.append(int(start))
     return starts
 

@@ -4,7 +4,8 @@ Between two events the motion runs in steps that span as many samples as the acc
 part of one. An event (touch, release, turning point, surface of a law) ends a step; it is located
 on the integrator's own trajectory, so that the state there is as accurate as anywhere. The parts:
 `added.world` (arrays, laws), `added.flows` (between events), `added.step` and `added.method` (how),
-`added.crossing` (when), `added.situation` (what then), `added.memory`, `added.rest`, `added.dense`.
+`added.crossing` (when), `added.situation` (what then), `added.memory`, `added.rest`, `added.dense`,
+`added.second`, `added.resonator`.
 """
 
 from __future__ import annotations
@@ -19,16 +20,20 @@ from bayesimpact.model.added.dense import LONGEST_STRIDE, fill_in
 from bayesimpact.model.added.flows import RENEWED, first_step, flow_from, next_step, stride_of
 from bayesimpact.model.added.memory import keep_memory, relax
 from bayesimpact.model.added.method import quarters
+from bayesimpact.model.added.resonator import ROWS
 from bayesimpact.model.added.rest import hold
+from bayesimpact.model.added.second import listens, respond
 from bayesimpact.model.added.situation import (
     HEADING,
     LEAVE,
     NONE,
+    SECOND_Q,
     SIDES,
     SLIDING,
     begin,
     heading,
     resolve,
+    set_directions,
     settle,
 )
 from bayesimpact.model.added.step import push, step
@@ -36,11 +41,16 @@ from bayesimpact.model.added.world import (
     C1,
     C2,
     CONTACT_MASS,
+    FRAME_DAMPING,
     FRICTION,
     K1,
     K2,
     LAW_COLUMNS,
     NOW,
+    OBSTACLE_MASS,
+    SECOND_DAMPING,
+    SECOND_FREQUENCY,
+    SECOND_GAIN,
     WORK_COLUMNS,
     G,
     World,
@@ -63,6 +73,11 @@ def admissible(q: Any, mass: Any) -> Any:
     if np.isnan(q[G]) or q[G] == -np.inf:
         return False
     positive = mass > 0.0 and q[K1] > 0.0 and q[K2] >= 0.0 and q[C1] >= 0.0 and q[C2] >= 0.0
+    if q[SECOND_GAIN] != 0.0 and not (q[SECOND_FREQUENCY] > 0.0 and q[SECOND_DAMPING] >= 0.0):
+        return False
+    for i in range(OBSTACLE_MASS, FRAME_DAMPING + 1):
+        if not q[i] >= 0.0:
+            return False
     return positive and q[CONTACT_MASS] >= 0.0 and q[FRICTION] >= 0.0
 
 
@@ -73,7 +88,7 @@ def cruise(y: Any, v: Any, n0: Any, j: Any, stride: Any, end: Any, flow: Any, w:
     Returns displacement, velocity, push and next sample; whether an event ended it, and then
     displacement, velocity and push at the end of the stride that contains it.
     """
-    h, event = stride * w.interval, False
+    h, event, second = stride * w.interval, False, listens(w)
     at = quarters(h, flow.b, flow.K, flow.inverse)
     y1, v1, n1 = y, v, n0
     while j + stride <= end:
@@ -84,8 +99,10 @@ def cruise(y: Any, v: Any, n0: Any, j: Any, stride: Any, end: Any, flow: Any, w:
         if event:
             break
         fill_in(j, j + stride - 1, t, True, at, flow, w, y, v, n0, h, y1, v1, n1)
+        w.out[j + stride - 1] = y1
+        if second:
+            respond(y, v, t, n0, y1, v1, n1, h, j, j + stride, flow, w)
         j += stride
-        w.out[j - 1] = y1
         y, v, n0 = y1, v1, n1
         if flow.memory:
             keep_memory(w)
@@ -96,8 +113,9 @@ def cruise(y: Any, v: Any, n0: Any, j: Any, stride: Any, end: Any, flow: Any, w:
 @inner()
 def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
     """Motion to the next event, or to where its flow is renewed: (y, v, t, next sample)."""
+    set_directions(y, v, t, w)
     flow, longest = flow_from(y, v, t, w)
-    start, event = t, typed(NONE)
+    start, event, second = t, typed(NONE), listens(w)
     ramp = first_step(y, v, t, longest, flow, w)
     n0 = 0.0 if flow.plain else push(y, v, t, NOW, flow, w)
     y1, v1, n1 = y, v, n0
@@ -106,16 +124,16 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
     end = min(w.n, j + max(1, int(min(RENEWED * longest / w.interval, 1.0 * w.n))))
     while j < end:
         aligned, expected = t == (j - 1) * w.interval, False
-        if aligned and stride > 0 and ramp >= longest and not flow.rough:
+        if aligned and stride > 0 and ramp >= longest and not (flow.rough or flow.rough_turn):
             y, v, n0, j, expected, y1, v1, n1 = cruise(y, v, n0, j, stride, end, flow, w)
             t = (j - 1) * w.interval
             if j == end:
                 break
         h, lands = stride * w.interval, True
         if not expected:
-            h, lands = next_step(y, v, t, j, aligned, min(longest, ramp), flow, w)
+            h, lands = next_step(y, v, t, n0, j, aligned, min(longest, ramp), flow, w)
             if not h > 0.0:  # an event on the sample itself
-                w.out[j] = y
+                w.out[j] = y + w.s[SECOND_Q]
                 t = j * w.interval
                 j += 1
                 continue
@@ -130,10 +148,11 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
         reached = min(int((t + length) / w.interval + 0.5 * lands) + 1, w.n)
         if reached > j + lands:
             fill_in(j, reached - lands, t, aligned, at, flow, w, y, v, n0, length, y1, v1, n1)
-        t += length
         if lands:
             w.out[reached - 1] = y1
-            t = (reached - 1) * w.interval
+        if second:
+            respond(y, v, t, n0, y1, v1, n1, length, j, reached, flow, w)
+        t = (reached - 1) * w.interval if lands else t + length
         y, v, n0, j = y1, v1, n1, reached
         ramp *= 2.0
         if flow.memory:
@@ -192,7 +211,7 @@ def room_for(size: Any) -> Any:
     return (
         np.empty(SIDES + size),
         np.empty(size, dtype=np.int64),
-        np.empty((size, WORK_COLUMNS)),
+        np.empty((size + ROWS, WORK_COLUMNS)),
         np.empty((2, LONGEST_STRIDE, 2)),
         np.empty((2, 2)),
     )

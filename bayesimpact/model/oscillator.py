@@ -60,6 +60,11 @@ class Oscillator:
         return np.concatenate([r.samples for r in self.campaign.recordings])
 
     @cached_property
+    def is_whole(self) -> bool:
+        """True when no sample of any recording is set aside."""
+        return all(r.used is None for r in self.campaign.recordings)
+
+    @cached_property
     def laws(self) -> NDArray[np.int64]:
         """Table of force laws for the general simulator, (L, 7)."""
         rows, first = [], len(SLOTS)

@@ -21,7 +21,12 @@ from bayesimpact.errors import InputError
 from bayesimpact.model.effects.effect import Effect, EffectParameter
 
 BASE_SLOTS = ("c1", "k1", "c2", "g", "k2", "y0", "v0", "A", "w", "phase", "offset")
-ADDED_SLOTS = ("friction", "contact_mass", "no_tension", "gap_step")
+ADDED_SLOTS = (
+    "friction", "contact_mass", "no_tension", "gap_step",
+    "second_frequency", "second_damping", "second_gain",
+    "obstacle_mass", "obstacle_frequency", "obstacle_damping",
+    "frame_ratio", "frame_frequency", "frame_damping",
+)  # fmt: skip
 SLOTS = BASE_SLOTS + ADDED_SLOTS
 
 Role = Literal["physical", "effect", "nuisance", "noise"]

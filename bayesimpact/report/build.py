@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from bayesimpact.data.campaign import Campaign, Smoothing
+from bayesimpact.data.gaps import runs
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification
 from bayesimpact.inference.noise import Noise as NoiseModel
@@ -158,6 +159,7 @@ def _results(
         before_backbone=before_backbone,
         diagnosis=diagnosis[0],
         diagnosis_arrays=diagnosis[1] or {},
+        notes=campaign.notes,
     )
     return checks.judged(summary)
 
@@ -177,6 +179,7 @@ def recording_results(fit: Fit) -> tuple[RecordingResult, ...]:
                 interval=recording.interval,
                 start=recording.start,
                 samples=np.asarray(recording.samples),
+                excluded=() if recording.used is None else tuple(runs(~recording.used)),
                 predicted=np.asarray(predicted),
                 sigma=float(fit.mode[likelihood.sigma_columns[r]]),
                 noise_rms=_noise_rms(likelihood.noise, recording.interval),

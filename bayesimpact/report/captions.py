@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bayesimpact.diagnosis.naming import GROSS
+from bayesimpact.diagnosis.thresholds import LARGE
 from bayesimpact.report.figures.corner import MOST as MOST_CORNER
 from bayesimpact.report.figures.traces import MOST as MOST_TRACES
 from bayesimpact.report.force_arrays import QUIET_WIDTH
@@ -94,7 +94,7 @@ def _more(stem: str, results: Results) -> str:
             f" Nothing is missing here: drawn is what the recordings allow of a force of about "
             f"{100 * QUIET_WIDTH:.0f} % of the peak elastic force (its prior)."
         )
-    elif misfit is not None and misfit > GROSS**2:
+    elif misfit is not None and misfit > LARGE**2:
         words += (
             " The base model misses by far more than the noise, and the force follows from a "
             "linearised problem: here it is a rough guide only."

@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.faults.fault import Fault
+from bayesimpact.data.gaps import runs
+from bayesimpact.data.recording import Recording
+from bayesimpact.errors import InputError
 from bayesimpact.report.figures.save import escaped
 from bayesimpact.report.figures.style import styled
 
@@ -13,8 +20,8 @@ MOST = 60
 
 
 @styled
-def campaign_figure(campaign: Campaign) -> Figure:
-    """One panel per recording, time against displacement in mm (or angle in rad)."""
+def campaign_figure(campaign: Campaign, faults: Sequence[Fault] = ()) -> Figure:
+    """One panel per recording, time against displacement in mm (or angle in rad); faults in red."""
     shown = campaign.recordings[:MOST]
     columns = min(3, len(shown))
     rows = -(-len(shown) // columns)
@@ -26,6 +33,11 @@ def campaign_figure(campaign: Campaign) -> Figure:
         angle = recording.quantity == "angle"
         scale, label = (1.0, "angle, rad") if angle else (1e3, "displacement, mm")
         axis.plot(recording.start + recording.times, recording.samples * scale, lw=0.6)
+        if recording.used is not None:
+            _mark(axis, recording, runs(~recording.used), "0.6")
+        for fault in faults:
+            if fault.recording == recording.name and fault.action != "notice":
+                _mark(axis, recording, fault.spans, "tab:red")
         case = f", case {recording.case}" if recording.case else ""
         axis.set_title(escaped(f"{recording.name}{case}"), fontsize="small")
         if panel >= len(shown) - columns:
@@ -37,3 +49,29 @@ def campaign_figure(campaign: Campaign) -> Figure:
     rest = len(campaign.recordings) - len(shown)
     figure.suptitle(escaped(campaign.name) + (f" (and {rest} more recordings)" if rest else ""))
     return figure
+
+
+def plot(what: Campaign | Recording | Iterable[Recording]) -> Figure:
+    """`campaign_figure` of a campaign, or of one or more recordings.
+
+    Raises
+    ------
+    InputError
+        when there is nothing to plot.
+    """
+    if isinstance(what, Campaign):
+        return campaign_figure(what)
+    recordings = (what,) if isinstance(what, Recording) else tuple(what)
+    if not recordings or not all(isinstance(r, Recording) for r in recordings):
+        found = ", ".join(type(r).__name__ for r in recordings) or "nothing"
+        raise InputError("plot", found, "a Campaign, a Recording, or several of them")
+    title = recordings[0].name if len(recordings) == 1 else f"{len(recordings)} recordings"
+    return campaign_figure(Campaign(title, 1.0, recordings, stop=False))
+
+
+def _mark(axis: Axes, recording: Recording, spans: Sequence[tuple[int, int]], colour: str) -> None:
+    """Shade spans of samples, at least two intervals wide so that a single one can be seen."""
+    for first, end in spans:
+        low = recording.start + (first - 1) * recording.interval
+        high = recording.start + max(end, first + 1) * recording.interval
+        axis.axvspan(low, high, color=colour, alpha=0.35, lw=0.8)

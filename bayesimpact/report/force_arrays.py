@@ -48,12 +48,14 @@ def force_arrays(d: Diagnosis) -> dict[str, Array]:
         return arrays | rest.gap | rest.parts("force", *_posterior(force, width))
     arrays |= rest.gap | rest.parts("force", force.mean, force.covariance)
     if d.naming.chosen is not d.naming.base:
+        left = d.naming.chosen.force
         width = np.repeat(
-            [force.effect.parameter(n).scale(d.scales) for n in ("a1", "b1")], force.knots
+            [force.effect.parameter(n).scale(d.scales) for n in ("a1", "b1")], left.knots
         )
-        arrays |= rest.parts("left", *_posterior(d.naming.chosen.force, width))
-    if d.verdict == "unknown" and d.naming.unknown is force:
-        values = dict(zip(d.after.names, d.after.mode, strict=True))
+        beside = _Rest(left, d.naming.chosen.candidate.fit, y)
+        arrays |= beside.parts("left", *_posterior(left, width))
+    values = dict(zip(d.after.names, d.after.mode, strict=True))
+    if d.naming.unknown is force and coefficient_names(force.knots)[0] in values:
         learned = np.array([values[n] for n in coefficient_names(force.knots)])
         arrays |= {f"learned_{part}": rest.maps[part] @ learned for part in "ab"}
     return arrays

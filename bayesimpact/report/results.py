@@ -31,6 +31,7 @@ class RecordingResult:
     noise_rms : root mean square that the independently estimated noise has in the recording, m
     reduced_chi2 : whitened misfit against the noise level estimated from the recordings alone
     whiteness_p : p-value that the whitened residual is white
+    excluded : first and last-plus-one sample of every span that is set aside
     """
 
     name: str
@@ -43,6 +44,7 @@ class RecordingResult:
     noise_rms: float
     reduced_chi2: float
     whiteness_p: float
+    excluded: tuple[tuple[int, int], ...] = ()
 
     @property
     def times(self) -> Array:
@@ -51,13 +53,21 @@ class RecordingResult:
 
     @property
     def residual(self) -> Array:
-        """Recorded minus predicted, (n,), m."""
-        return self.samples - self.predicted
+        """Recorded minus predicted, (n,), m; 0 where samples are set aside."""
+        residual = np.array(self.samples - self.predicted)
+        for first, end in self.excluded:
+            residual[first:end] = 0.0
+        return residual
+
+    @property
+    def count(self) -> int:
+        """Samples that count."""
+        return self.samples.size - sum(end - first for first, end in self.excluded)
 
     @property
     def rms(self) -> float:
         """Root mean square of the residual, m."""
-        return float(np.sqrt(np.mean(self.residual**2)))
+        return float(np.sqrt(np.sum(self.residual**2) / self.count))
 
     @property
     def share(self) -> float:
@@ -297,6 +307,7 @@ class Results:
     before, before_backbone : draws and backbone check of the model without the effects
     checks : the checklist
     diagnosis : content of diagnosis.json, and arrays for its figures
+    notes : what was set aside in the recordings, a sentence each
     """
 
     name: str
@@ -325,6 +336,7 @@ class Results:
     before_backbone: BackboneSummary | None = None
     diagnosis: Mapping[str, Any] | None = None
     diagnosis_arrays: Mapping[str, Array] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     @property
     def cases(self) -> tuple[str, ...]:
@@ -344,7 +356,8 @@ class Results:
     @property
     def rms(self) -> float:
         """Root mean square residual over all samples, m (or rad)."""
-        return float(np.sqrt(np.mean(np.concatenate([r.residual for r in self.recordings]) ** 2)))
+        count = sum(r.count for r in self.recordings)
+        return float(np.sqrt(sum(np.sum(r.residual**2) for r in self.recordings) / count))
 
     @property
     def share(self) -> float:

@@ -132,7 +132,7 @@ def recording_views(results: Results) -> list[dict[str, str]]:
             {
                 "name": r.name,
                 "case": r.case,
-                "samples": number(r.samples.size, 0),
+                "samples": number(r.count, 0),
                 "rate": significant(1 / r.interval, 4),
                 "duration": significant((r.samples.size - 1) * r.interval, 3),
                 "largest": significant(float(np.max(np.abs(r.samples))) * scale, 3),

@@ -122,6 +122,10 @@ def recordings_words(results: Results) -> str:
         f"({test}), for "
         "information."
     )
+    if any(r.excluded for r in results.recordings):
+        words += " Shaded samples are set aside: they count nowhere, and a stand-in is drawn."
+    if results.notes:
+        words += " Set aside: " + "; ".join(results.notes) + "."
     if len(results.recordings) > MOST_RECORDINGS:
         words += (
             f" Figures show {MOST_RECORDINGS} of {len(results.recordings)} recordings: those of "

@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bayesimpact.data.frozen import Picklable
 from bayesimpact.errors import InputError
 from bayesimpact.response.backbone import Backbone, Damping, Estimator, backbone
 
@@ -51,7 +52,7 @@ class Band:
 
 
 @dataclass(frozen=True, eq=False)
-class BackboneCheck:
+class BackboneCheck(Picklable):
     """Bands for every curve, and the verdict over all of them.
 
     Attributes

@@ -15,6 +15,7 @@ from types import MappingProxyType
 import numpy as np
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.frozen import Picklable
 from bayesimpact.errors import InputError
 from bayesimpact.response.contact import Contact, Free, fit_contact
 from bayesimpact.response.flight import Flight
@@ -31,7 +32,7 @@ from bayesimpact.response.release import Oscillator, release
 
 
 @dataclass(frozen=True, eq=False)
-class Estimates:
+class Estimates(Picklable):
     """Rough values of all parameters of a campaign, SI units.
 
     Attributes

@@ -14,11 +14,11 @@ import numpy as np
 
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.force import missing_drift, missing_force
-from bayesimpact.diagnosis.naming import ALPHA
 from bayesimpact.diagnosis.scan import scan
 from bayesimpact.diagnosis.smoothing import proved_smoothing
+from bayesimpact.diagnosis.thresholds import ALPHA
 from bayesimpact.inference.identify import identify
-from bayesimpact.model.effects import EFFECTS
+from bayesimpact.model.effects import SEARCHED
 from bayesimpact.trial.draw import draw
 from bayesimpact.trial.settings import Settings
 from bayesimpact.trial.summary import rate
@@ -34,7 +34,7 @@ def alarm(settings: Settings, seed: int) -> dict[str, Any]:
     rng = np.random.default_rng([seed, 1])
     fit = identify(drawn.campaign, rng=rng, search=False).fit
     scales = campaign_scales(fit)
-    scanned = scan(fit, EFFECTS, scales, rng=rng)
+    scanned = scan(fit, SEARCHED, scales, rng=rng)
     force = missing_force(fit, scales, rng=rng).p_value
     drift = missing_drift(fit, scales, rng=rng).p_value
     filtered = proved_smoothing(drawn.campaign) is not None

@@ -14,6 +14,7 @@ from types import MappingProxyType
 import numpy as np
 
 from bayesimpact.data.campaign import Measurement, Smoothing
+from bayesimpact.data.recording import Quantity
 from bayesimpact.trial.bundle import PAPER_RIG
 from bayesimpact.trial.rig import Release, Rig
 from bayesimpact.trial.rig_chain import Chain
@@ -39,6 +40,7 @@ class Bench:
     rate, cycles : sampling rate, Hz, and free periods in a recording
     noise : standard deviation of the probe's noise, of the largest release
     fixed : an oscillator that is not drawn
+    angle : it turns: kg m2, rad, N m in the place of kg, m, N
     """
 
     mass: Range
@@ -54,6 +56,7 @@ class Bench:
     cycles: Range
     noise: Range
     fixed: Rig | None = None
+    angle: bool = False
 
 
 _CONTACT_DAMPING = (0.01, 0.04)
@@ -94,6 +97,10 @@ BENCHES: Mapping[str, Bench] = {
         (0.2, 1.0), (3.0, 10.0), _DAMPING, (0.0, 0.0), _CONTACT_DAMPING, (3e-3, 1e-2),
         _GAP, 0, 4, 500.0, (30.0, 50.0), _NOISE,
     ),
+    "torsion": Bench(
+        (0.01, 0.1), (0.4, 2.0), _DAMPING, (0.0, 0.0), _CONTACT_DAMPING, (0.03, 0.5),
+        _GAP, 0, 4, 100.0, (25.0, 45.0), _NOISE, angle=True,
+    ),
     "small": Bench(
         (0.4, 0.6), (5.0, 7.0), _DAMPING, (4.0, 8.0), _CONTACT_DAMPING, (5e-3, 7e-3),
         _GAP, 2, 2, 500.0, (12.0, 16.0), _NOISE,
@@ -122,6 +129,11 @@ class Design:
     duration: float
     chain: Chain
     measurement: Measurement
+
+    @property
+    def quantity(self) -> Quantity:
+        """What the probe records."""
+        return "angle" if BENCHES[self.bench].angle else "displacement"
 
     @property
     def amplitude(self) -> float:
@@ -167,9 +179,11 @@ def log_uniform(rng: np.random.Generator, limits: Range) -> float:
     return exp(rng.uniform(log(limits[0]), log(limits[1])))
 
 
-def draw_bench(name: str, noise_kind: str, rng: np.random.Generator) -> Design:
-    """Draw a rig of the kind `name` with noise of the kind `noise_kind`."""
-    bench = BENCHES[name]
+def draw_bench(
+    name: str, noise_kind: str, rng: np.random.Generator, benches: Mapping[str, Bench] = BENCHES
+) -> Design:
+    """Draw a rig of the kind `name` of `benches` with noise of the kind `noise_kind`."""
+    bench = benches[name]
     amplitude = log_uniform(rng, bench.amplitude)
     rig = bench.fixed or _rig(bench, amplitude, rng)
     releases = _releases(bench, rig, amplitude, rng)

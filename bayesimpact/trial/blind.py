@@ -24,7 +24,9 @@ from bayesimpact.diagnosis.document import document
 from bayesimpact.diagnosis.loop import diagnose
 from bayesimpact.errors import InputError
 from bayesimpact.trial.rig_files import write_campaign
+from bayesimpact.workflow import DIAGNOSIS_FILE, diagnose_campaign
 
+REPORT_FILE = "report.html"
 LIBRARIES = ("bayesimpact", "numpy", "scipy", "numba")
 
 
@@ -59,16 +61,35 @@ def campaign_files(campaign: Campaign, rounding: float) -> dict[str, str]:
         return {f.name: f.read_text(encoding="utf-8") for f in sorted(Path(folder).iterdir())}
 
 
-def answer(files: Mapping[str, str], *, search: bool) -> dict[str, Any]:
+def answer(files: Mapping[str, str], *, search: bool, report: bool = False) -> dict[str, Any]:
     """Diagnose a campaign given as files -> the content of its diagnosis.json.
 
     The diagnosis' own random numbers are seeded by the files, for the trial's seed is not shown.
+    With `report` it goes the whole way of `bayesimpact diagnose`, with --quick unless `search`:
+    figures and report are written, and diagnosis.json is read from the folder.
     """
     with tempfile.TemporaryDirectory() as folder:
         for name, text in files.items():
             (Path(folder) / name).write_text(text, encoding="utf-8", newline="\n")
         campaign = load_campaign(Path(folder))
     seed = int(seal("".join(files[name] for name in sorted(files)))[:8], 16)
+    return _reported(campaign, seed, search) if report else _found(campaign, seed, search)
+
+
+def _reported(campaign: Campaign, seed: int, search: bool) -> dict[str, Any]:
+    """By the command's function, from the folder that it writes."""
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder)
+        diagnose_campaign(campaign, out, seed=seed, quick=not search, command="bayesimpact trial")
+        if not (out / REPORT_FILE).stat().st_size:
+            raise ValueError("the report is empty")
+        text = (out / DIAGNOSIS_FILE).read_text(encoding="utf-8")
+    result: dict[str, Any] = json.loads(text)
+    return result
+
+
+def _found(campaign: Campaign, seed: int, search: bool) -> dict[str, Any]:
+    """By the library, without figures or report."""
     began = time.perf_counter()
     found = diagnose(campaign, rng=np.random.default_rng(seed), search=search)
     seconds = time.perf_counter() - began

@@ -17,7 +17,12 @@ def _listed(text: str | None) -> tuple[str, ...] | None:
 OPTIONS: tuple[Callable[[Callable[..., None]], Callable[..., None]], ...] = (
     click.option("--number", type=click.IntRange(min=1), default=20, show_default=True,
                  help="How many trials; they have the seeds SEED, SEED + 1, ..."),
-    click.option("--kinds", metavar="A,B", help="control, single, pair, outside; in turn. [all]"),
+    click.option("--regime", type=click.Choice(["weak", "strong"]), default="weak",
+                 show_default=True, help="weak: effects near the detection limit. strong: several "
+                 "at once and a gross misfit, as real recordings have them."),
+    click.option("--kinds", metavar="A,B", help="control, single, pair, outside; in turn. [all] "
+                 "fault: a fault of a recording. "
+                 "strong: several, several_outside. [several twice]"),
     click.option("--effects", metavar="A,B", help="Effects of the catalogue to plant. [all]"),
     click.option("--outside", metavar="A,B", help="Forces outside the catalogue to plant. [all]"),
     click.option("--strength", nargs=2, type=float, metavar="LOW HIGH",
@@ -25,7 +30,15 @@ OPTIONS: tuple[Callable[[Callable[..., None]], Callable[..., None]], ...] = (
     click.option("--rig", metavar="A,B",
                  help="paper, soft, stiff, fast, slow, one, five, plain, small. [all but small]"),
     click.option("--noise", metavar="A,B", help="white, ar1, smoothed. [all]"),
-    click.option("--no-search", is_flag=True, help="Diagnose without the global search."),
+    click.option("--misfit", nargs=2, type=float, metavar="LOW HIGH",
+                 help="strong: range of the base misfit over the noise. [3 300]"),
+    click.option("--rest", type=click.FloatRange(0, 1), metavar="SHARE",
+                 help="strong: share of trials whose recordings begin before the release. [0.25]"),
+    click.option("--search/--no-search", default=None,
+                 help="Diagnose with the global search, and sample where a report is written; or "
+                 "without, as `diagnose --quick` does. [only with --no-report]"),
+    click.option("--no-report", is_flag=True,
+                 help="Leave out figures and report: faster, and blind for what fails there."),
     click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True,
                  help="Processes of a local Dask cluster; 1 stays in this process."),
     click.option("--scheduler", metavar="ADDRESS", help="A Dask scheduler to use instead."),
@@ -49,13 +62,17 @@ def _options(function: Callable[..., None]) -> Callable[..., None]:
 @_options
 def trial(
     number: int,
+    regime: str,
     kinds: str | None,
     effects: str | None,
     outside: str | None,
     strength: tuple[float, float] | None,
     rig: str | None,
     noise: str | None,
-    no_search: bool,
+    misfit: tuple[float, float] | None,
+    rest: float | None,
+    search: bool | None,
+    no_report: bool,
     workers: int,
     scheduler: str | None,
     out: Path,
@@ -70,7 +87,7 @@ def trial(
     """
     one_thread_each()
     from bayesimpact.trial.run import run_trials, write
-    from bayesimpact.trial.settings import Settings
+    from bayesimpact.trial.settings import Settings, strong_settings
     from bayesimpact.trial.stamp import stamped
     from bayesimpact.trial.table import summary_text
 
@@ -81,8 +98,13 @@ def trial(
         "strength": strength,
         "benches": _listed(rig),
         "noises": _listed(noise),
+        "misfit": misfit,
+        "rest": rest,
+        "search": no_report if search is None else search,
+        "report": not no_report,
     }
-    settings = Settings(**{k: v for k, v in given.items() if v is not None}, search=not no_search)
+    given = {k: v for k, v in given.items() if v is not None}
+    settings = strong_settings(**given) if regime == "strong" else Settings(**given)
     bars = _Bars(number, quiet)
     results = run_trials(
         settings,

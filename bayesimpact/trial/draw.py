@@ -8,32 +8,24 @@ the same seed.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
-
 import numpy as np
 
-from bayesimpact.data.campaign import Campaign
 from bayesimpact.errors import InputError
 from bayesimpact.trial.benches import BENCHES, Design, draw_bench, log_uniform
+from bayesimpact.trial.drawn import Drawn
+from bayesimpact.trial.faults import PLANTS, plant_fault
 from bayesimpact.trial.plants import CATALOGUE_PLANTS
 from bayesimpact.trial.rig import make_campaign
 from bayesimpact.trial.ruler import Ruler, clean_readings, true_parameters
 from bayesimpact.trial.settings import Settings
 from bayesimpact.trial.sizing import Sized, Unsuitable, outside, pair, plant_of, single
+from bayesimpact.trial.strong_draw import draw_strong
 
 Rng = np.random.Generator
 
 ATTEMPTS = 30
 
-
-@dataclass(frozen=True, eq=False)
-class Drawn:
-    """A campaign and the truth about it, as a JSON object."""
-
-    campaign: Campaign
-    truth: Mapping[str, Any]
+__all__ = ["Drawn", "draw"]
 
 
 def draw(settings: Settings, seed: int) -> Drawn:
@@ -44,6 +36,8 @@ def draw(settings: Settings, seed: int) -> Drawn:
     InputError : no rig of the settings can show the effect whose turn it is
     Unsuitable : no suitable draw in many attempts
     """
+    if settings.regime == "strong":
+        return draw_strong(settings, seed)
     kind = settings.kinds[seed % len(settings.kinds)]
     turn = seed // len(settings.kinds)
     reason = ""
@@ -70,11 +64,22 @@ def _attempt(settings: Settings, seed: int, kind: str, turn: int, rng: Rng) -> D
         found = pair(Ruler(design, rng), ids, strengths, settings.strength[0], rng)
     elif kind == "outside":
         found = (outside(Ruler(design, rng), ids[0], strengths[0], rng),)
-    return _recorded(settings, seed, kind, design, found, rng)
+    drawn = _recorded(settings, seed, kind, design, found, rng)
+    return _with_fault(drawn, turn, rng) if kind == "fault" else drawn
+
+
+def _with_fault(drawn: Drawn, turn: int, rng: Rng) -> Drawn:
+    """The same trial with the fault whose turn it is in one recording."""
+    kind = list(PLANTS)[turn % len(PLANTS)]
+    planted = plant_fault(drawn.campaign, kind, drawn.truth["noise_m"], rng)
+    if planted is None:
+        raise Unsuitable(f"a rig that cannot show the fault {kind}")
+    campaign, fault = planted
+    return Drawn(campaign, {**drawn.truth, "fault": fault})
 
 
 def _effects(settings: Settings, kind: str, turn: int, rng: Rng) -> tuple[str, ...]:
-    if kind == "control":
+    if kind in ("control", "fault"):
         return ()
     if kind == "outside":
         return (settings.outside[turn % len(settings.outside)],)
@@ -98,7 +103,7 @@ def _possible(settings: Settings, ids: tuple[str, ...]) -> list[str]:
     fits = [
         name
         for name, (cases, releases) in sizes.items()
-        if all(plant_of(e).fits(cases, releases * max(cases, 1)) for e in ids)
+        if all(plant_of(e).fits(cases, releases * max(cases, 1), BENCHES[name].angle) for e in ids)
     ]
     if not fits:
         raise InputError("trial, rig", ", ".join(settings.benches), f"a rig for {' + '.join(ids)}")
@@ -132,6 +137,7 @@ def _recorded(
         duration=design.duration,
         rng=rng,
         measurement=design.measurement,
+        quantity=design.quantity,
     )
     clean = clean_readings(design, effects)
     noise = [r.samples - c for r, c in zip(campaign.recordings, clean, strict=True)]

@@ -50,6 +50,7 @@ class Plant:
     obstacles, recordings : how many it needs at least
     slot : effects with the same slot exclude each other
     by_noise : its trace in the noise shows it, however small its response
+    angle : it means something for angles only
     """
 
     regimes: tuple[str, ...]
@@ -58,10 +59,15 @@ class Plant:
     recordings: int = 1
     slot: str = ""
     by_noise: bool = False
+    angle: bool = False
 
-    def fits(self, cases: int, recordings: int) -> bool:
-        """Whether a campaign with so many obstacles and recordings can show it."""
-        return cases >= self.obstacles and recordings >= self.recordings
+    def fits(self, cases: int, recordings: int, angle: bool = False) -> bool:
+        """Whether a campaign with so many obstacles and recordings can show it.
+
+        `angle` says that the recordings are of an angle.
+        """
+        enough = cases >= self.obstacles and recordings >= self.recordings
+        return enough and (angle or not self.angle)
 
 
 def _sign(rng: Rng) -> float:
@@ -130,6 +136,38 @@ def _obstacle_mass(design: Design, rng: Rng) -> Form:
     return Form(lambda size: {"mass": size}, 1e-5 * mass, reference, largest=0.3 * mass)
 
 
+def _second_mode(design: Design, rng: Rng) -> Form:
+    """Faster than a contact; what it adds stays below a third of the depth of contact."""
+    omega = design.contact_omega * log_uniform(rng, (1.5, 8.0))
+    damping, sign = log_uniform(rng, (0.005, 0.1)), _sign(rng)
+
+    def build(size: float) -> Parameters:
+        return {"frequency": omega / (2 * pi), "damping": damping, "gain": sign * size}
+
+    largest = 0.3 * omega**2 / design.contact_stiffness
+    return Form(build, 1e-5 * largest, largest=largest)
+
+
+def _obstacle_mode(design: Design, rng: Rng) -> Form:
+    frequency = design.contact_omega / (2 * pi) * log_uniform(rng, (1.5, 6.0))
+    damping, mass = log_uniform(rng, (0.005, 0.1)), design.rig.mass
+
+    def build(size: float) -> Parameters:
+        return {"mass": size, "frequency": frequency, "damping": damping}
+
+    return Form(build, 1e-5 * mass, largest=0.3 * mass)
+
+
+def _base_motion(design: Design, rng: Rng) -> Form:
+    frequency = design.omega / (2 * pi) * log_uniform(rng, (1.5, 8.0))
+    damping = log_uniform(rng, (0.005, 0.1))
+
+    def build(size: float) -> Parameters:
+        return {"frequency": frequency, "damping": damping, "mass_ratio": size}
+
+    return Form(build, 1e-5, largest=0.3)
+
+
 def _forcing(design: Design, rng: Rng) -> Form:
     side = (0.4, 0.85) if rng.random() < 0.5 else (1.2, 4.0)
     frequency = design.omega / (2 * pi) * log_uniform(rng, side)
@@ -146,6 +184,17 @@ def _opposite_stop(design: Design, rng: Rng) -> Form:
     gap = design.amplitude * rng.uniform(0.5, 0.85)
     k1 = design.rig.k1
     return Form(lambda size: {"stiffness": size, "gap": gap}, 1e-4 * k1, largest=5 * k1)
+
+
+def _power_damping(design: Design, rng: Rng) -> Form:
+    """An exponent that none of the simpler laws has."""
+    exponent = float(
+        rng.choice([rng.uniform(0.3, 0.7), rng.uniform(1.4, 1.65), rng.uniform(2.5, 4)])
+    )
+    unit = design.rig.c1 * design.speed / design.speed**exponent
+    return Form(
+        lambda size: {"coefficient": size, "exponent": exponent}, 1e-3 * unit, largest=10 * unit
+    )
 
 
 def _hum(design: Design, rng: Rng) -> Form:
@@ -187,6 +236,9 @@ CATALOGUE_PLANTS: Mapping[str, Plant] = {
     "contact_no_tension": Plant(("contact",), lambda d, r: Form(lambda s: {}, 0.0), 1, slot="end"),
     "contact_relaxation": Plant(("contact",), _relaxation, 1),
     "obstacle_mass": Plant(("contact",), _obstacle_mass, 1, slot="end"),
+    "obstacle_mode": Plant(("contact",), _obstacle_mode, 1),
+    "base_motion": Plant(("everywhere", "free", "contact"), _base_motion),
+    "second_mode": Plant(("contact",), _second_mode, 1),
     "gap_wear": Plant(("contact",), _one("step", lambda d: 0.1 * d.indentation), 1, slot="wear"),
     "gap_per_recording": Plant(("contact",), _gaps, 1, 2, slot="g"),
     "coulomb_friction": Plant(("free",), _one("force", lambda d: 0.1 * d.rig.k1 * d.amplitude)),
@@ -212,6 +264,13 @@ CATALOGUE_PLANTS: Mapping[str, Plant] = {
         ("measurement",), _one("gain", lambda d: 0.3 / d.amplitude**2, signed=True)
     ),
     "sensor_hum": Plant(("measurement",), _hum),
+    "pendulum_sine": Plant(("free",), lambda d, r: Form(lambda s: {}, 0.0), angle=True),
+    "pendulum_with_spring": Plant(("free",), _one("stiffness", lambda d: d.rig.k1), angle=True),
+    "spring_quintic": Plant(
+        ("free",), _one("stiffness", lambda d: 0.3 * d.rig.k1 / d.amplitude**4, signed=True)
+    ),
+    "power_damping": Plant(("free",), _power_damping),
+    "structural_damping": Plant(("free",), _one("loss", lambda d: 0.1), obstacles=1),
     "smoothing": Plant(("measurement",), _smoothing, slot="smoothing", by_noise=True),
 }
 """Every effect of the catalogue that may be planted, by its id."""
@@ -276,16 +335,6 @@ def _brake(design: Design, rng: Rng) -> Form:
     )
 
 
-def _resonator(design: Design, rng: Rng) -> Form:
-    frequency = design.omega / (2 * pi) * rng.uniform(1.5, 4.0)
-    ratio, mass = rng.uniform(0.01, 0.05), design.rig.mass
-    return Form(
-        lambda size: {"mass": size, "frequency": frequency, "damping_ratio": ratio},
-        1e-5 * mass,
-        largest=0.2 * mass,
-    )
-
-
 def _knock(design: Design, rng: Rng) -> Form:
     time, width = design.duration * rng.uniform(0.2, 0.6), 0.5 * pi / design.omega
     sign, scale = _sign(rng), design.rig.mass * design.speed
@@ -304,7 +353,6 @@ OUTSIDE_PLANTS: Mapping[str, Plant] = {
     "friction_pad": Plant(("free",), _friction_pad),
     "damping_bump": Plant(("free",), _bump),
     "eddy_brake": Plant(("free",), _brake),
-    "resonator": Plant(("free", "everywhere", "contact"), _resonator),
     "damping_drift": Plant(_ANYWHERE, _one("rate", lambda d: 3 / d.duration)),
     "contact_friction": Plant(
         ("contact",), _one("force", lambda d: 0.1 * d.contact_stiffness * d.indentation), 1
@@ -314,4 +362,4 @@ OUTSIDE_PLANTS: Mapping[str, Plant] = {
     ),
     "knock": Plant(_ANYWHERE, _knock),
 }
-"""Every force outside the catalogue that may be planted."""
+"""Every force outside the catalogue that may be planted; a resonator is base_motion."""

@@ -19,8 +19,8 @@ from scipy import stats
 
 from bayesimpact.data.campaign import Measurement
 from bayesimpact.diagnosis.extend import campaign_scales
-from bayesimpact.diagnosis.naming import ALPHA, DECISIVE
 from bayesimpact.diagnosis.scan import scan
+from bayesimpact.diagnosis.thresholds import ALPHA, DECISIVE
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.trial.benches import Design
 from bayesimpact.trial.bundle import PAPER_HEIGHTS, PAPER_RIG

@@ -26,13 +26,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Beam, Campaign, Measurement
-from bayesimpact.data.recording import Recording
+from bayesimpact.data.recording import Quantity, Recording
 from bayesimpact.errors import InputError
 from bayesimpact.trial.rig_catalogue import CATALOGUE, Planted
 from bayesimpact.trial.rig_chain import Chain, Probe, measure
 from bayesimpact.trial.rig_motion import Motion, move, sampling
 from bayesimpact.trial.rig_outside import OUTSIDE
 from bayesimpact.trial.rig_parts import Part, Site
+from bayesimpact.trial.rig_strong import STRONG
 
 Parameters = Mapping[str, float | Mapping[str, float]]
 """Parameter -> number (SI, frequencies in Hz); recording or case -> number where they differ."""
@@ -123,10 +124,13 @@ def record(
     rng: np.random.Generator,
     rtol: float = 1e-12,
     atol: float = 1e-14,
+    rest: float = 0.0,
 ) -> NDArray[np.float64]:
     """One recording, (round(rate * duration),), m; draws as many normal numbers from `rng`.
 
-    `rtol`, `atol` as for `motion`.
+    `rtol`, `atol` as for `motion`. With `rest` the recording begins so many seconds before the
+    release, in which the mass is held at y0; forces count their time from the release, the chain
+    from the first sample.
 
     Raises
     ------
@@ -144,7 +148,10 @@ def record(
             if effect == "smoothing" and chain.smoothing is not None:
                 raise InputError("effects, smoothing", "a chain that smooths", "only one of both")
             chain = planted.chain(chain, numbers)
-    return measure(truth.displacement, truth.times, probe, chain, release.name, rng)
+    held = np.full(round(rest * rate), release.y0)
+    displacement = np.concatenate([held, truth.displacement])
+    times = sampling(rate, displacement.size / rate)
+    return measure(displacement, times, probe, chain, release.name, rng)
 
 
 def make_campaign(
@@ -159,6 +166,7 @@ def make_campaign(
     rng: np.random.Generator,
     measurement: Measurement | None = None,
     beams: Mapping[str, Beam] | None = None,
+    quantity: Quantity = "displacement",
 ) -> Campaign:
     """Record a whole campaign, in the order of `releases`; the same `rng` state, the same bits.
 
@@ -166,6 +174,7 @@ def make_campaign(
     ----------
     measurement : what the campaign admits to know of its chain; nothing by default
     beams : case -> geometry of the obstacle, for the report
+    quantity : what is recorded; everything of an angle is per radian
     """
     recordings = tuple(
         Recording(
@@ -173,6 +182,7 @@ def make_campaign(
             case=release.case,
             samples=record(rig, release, effects, chain, rate=rate, duration=duration, rng=rng),
             interval=1 / rate,
+            quantity=quantity,
         )
         for release in releases
     )
@@ -187,9 +197,9 @@ def make_campaign(
 
 
 def _planted(effect: str) -> Planted:
-    planted = CATALOGUE.get(effect) or OUTSIDE.get(effect)
+    planted = CATALOGUE.get(effect) or OUTSIDE.get(effect) or STRONG.get(effect)
     if planted is None:
-        raise InputError("effects", effect, ", ".join([*CATALOGUE, *OUTSIDE]))
+        raise InputError("effects", effect, ", ".join([*CATALOGUE, *OUTSIDE, *STRONG]))
     return planted
 
 

@@ -43,7 +43,11 @@ def balance(site: Site, parts: tuple[Part, ...], piece: Piece) -> Balance:
     pushes = [law for inside, law in laws if law is not None and inside]
     levels = [p.friction(piece) for p in parts if p.friction is not None]
     dry = [level for level in levels if level is not None]
-    rates = [p.rates(piece) for p in parts if p.rates is not None]
+    rates = [
+        (p.rates(piece) if p.rates is not None else None, p.heard, p.felt)
+        for p in parts
+        if p.states
+    ]
 
     def push(t: float, y: float, v: float, state: State) -> float:
         total = c2 * v + k2 * (y - gap)
@@ -75,8 +79,13 @@ def balance(site: Site, parts: tuple[Part, ...], piece: Piece) -> Balance:
         state: State = array.tolist()
         y, v = state[0], state[1]
         slope = [v, acceleration(t, y, v, state)]
-        for rate in rates:
-            slope.extend(rate(t, y, v, state))
+        for rate, heard, felt in rates:
+            if rate is not None:
+                slope.extend(rate(t, y, v, state))
+            elif heard is not None:
+                slope.extend(heard(reaction(t, state) if contact else 0.0, state))
+            elif felt is not None:
+                slope.extend(felt(slope[1], y, v, state))
         return slope
 
     holds = max(STILL, sum(level(0.0) for level in dry))

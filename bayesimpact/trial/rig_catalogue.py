@@ -12,6 +12,7 @@ from math import pi, sin
 
 from bayesimpact.data.campaign import Smoothing
 from bayesimpact.trial.rig_chain import Chain, Probe
+from bayesimpact.trial.rig_modes import base_inertia, base_motion, obstacle_mode, second_mode
 from bayesimpact.trial.rig_parts import Law, Part, Piece, Rates, Site, State
 
 Numbers = Mapping[str, float]
@@ -175,6 +176,40 @@ def _opposite_stop(site: Site, p: Numbers, slot: int) -> Part:
     return Part(law, kinks=(place,))
 
 
+def _pendulum(site: Site, p: Numbers, slot: int) -> Part:
+    """What K sin y adds to K y; K is k1 for a plain pendulum."""
+    weight = p.get("stiffness", site.k1)
+    return Part(everywhere(lambda t, y, v, state: weight * (sin(y) - y)))
+
+
+def _spring_quintic(site: Site, p: Numbers, slot: int) -> Part:
+    k5 = p["stiffness"]
+    return Part(everywhere(lambda t, y, v, state: k5 * y**5))
+
+
+def _power_damping(site: Site, p: Numbers, slot: int) -> Part:
+    """C abs(v)^n sign(v)."""
+    c, exponent = p["coefficient"], p["exponent"]
+
+    def law(piece: Piece) -> Law:
+        sign = piece.sign
+        return lambda t, y, v, state: sign * c * max(sign * v, 0.0) ** exponent
+
+    return Part(law)
+
+
+def _structural_damping(site: Site, p: Numbers, slot: int) -> Part:
+    """H k1 abs(y) sign(v)."""
+    share = p["loss"] * site.k1
+
+    def law(piece: Piece) -> Law:
+        side = 1 if piece.above(0.0) else -1
+        signed = share * (piece.sign or -side) * side  # at rest it helps to hold against the spring
+        return lambda t, y, v, state: signed * y
+
+    return Part(law, kinks=(0.0,))
+
+
 def _smoothing(chain: Chain, p: Numbers) -> Chain:
     """Savitzky-Golay with window and order, or a first-order lag with time_constant."""
     if "time_constant" in p:
@@ -206,6 +241,11 @@ CATALOGUE: Mapping[str, Planted] = {
         site=lambda site, p: replace(site, unilateral=True, obstacle_mass=p["mass"]),
     ),
     "contact_relaxation": Planted(("stiffness", "time"), obstacle=True, part=_relaxation),
+    "obstacle_mode": Planted(("mass", "frequency", "damping"), obstacle=True, part=obstacle_mode),
+    "base_motion": Planted(
+        ("frequency", "damping", "mass_ratio"), part=base_motion, site=base_inertia
+    ),
+    "second_mode": Planted(("frequency", "damping", "gain"), obstacle=True, part=second_mode),
     "gap_wear": Planted(
         ("step",), obstacle=True, site=lambda site, p: replace(site, gap_step=p["step"])
     ),
@@ -227,6 +267,11 @@ CATALOGUE: Mapping[str, Planted] = {
     ),
     "sensor_cubic": Planted(("gain",), probe=lambda probe, p: replace(probe, cubic=p["gain"])),
     "sensor_hum": Planted(("amplitude", "frequency"), per_recording=("phase",), probe=_hum),
+    "pendulum_sine": Planted(optional=("stiffness",), part=_pendulum),
+    "pendulum_with_spring": Planted(("stiffness",), part=_pendulum),
+    "spring_quintic": Planted(("stiffness",), part=_spring_quintic),
+    "power_damping": Planted(("coefficient", "exponent"), part=_power_damping),
+    "structural_damping": Planted(("loss",), part=_structural_damping),
     "smoothing": Planted(optional=("window", "order", "time_constant"), chain=_smoothing),
     "noise_correlated": Planted(
         ("correlation",), chain=lambda chain, p: replace(chain, correlation=p["correlation"])

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from typing import Any
 
@@ -43,7 +43,8 @@ class Motion:
     Attributes
     ----------
     times : (n,), s
-    displacement, velocity : (n,), m and m/s
+    displacement, velocity : (n,), m and m/s; the displacement is that of the place at which the
+        probe looks, further modes included
     touches, leaves : instants at which contacts began and ended, s
     """
 
@@ -98,6 +99,7 @@ class _Run:
         self.end = float(times[-1])
         self.state: State = [site.y0, site.v0, *(s for part in parts for s in part.states)]
         self.samples = np.empty((2, times.size))
+        self.seen = [place for part in parts for place in part.seen]
         self.filled = 0
         self.gap = site.gap
         self.touches: list[float] = []
@@ -153,7 +155,8 @@ class _Run:
             return 1 if v > 0 else -1
         if self.slip:
             return self.slip
-        forces = balance(self.site, self.parts, self._piece_going(-self.last_sign))
+        at_rest = replace(self._piece_going(-self.last_sign), sign=0)
+        forces = balance(self.site, self.parts, at_rest)
         force = forces.drive(self.t, self.state[0], 0.0, self.state)
         if abs(force) <= forces.level:
             return 0
@@ -201,7 +204,10 @@ class _Run:
         """Fill in the samples before `until`; the one at the very end of a piece is the next's."""
         upto = int(np.searchsorted(self.times, until, side="left"))
         if upto > self.filled:
-            self.samples[:, self.filled : upto] = dense(self.times[self.filled : upto])[:2]
+            states = dense(self.times[self.filled : upto])
+            self.samples[:, self.filled : upto] = states[:2]
+            for place in self.seen:
+                self.samples[0, self.filled : upto] += states[place]
             self.filled = upto
 
     def _first_event(
@@ -277,7 +283,11 @@ class _Run:
     def _touch(self) -> None:
         self.touches.append(self.t)
         self.mode = _CONTACT
+        before = self.state[1]
         self.state[1] *= self.site.mass / (self.site.mass + self.site.obstacle_mass)
+        for part in self.parts:
+            if part.struck is not None:
+                part.struck(self.state, self.site.mass * (before - self.state[1]))
 
     def _leave(self) -> None:
         self.leaves.append(self.t)

@@ -22,6 +22,9 @@ Law = Callable[[float, float, float, State], float]
 Rates = Callable[[float, float, float, State], tuple[float, ...]]
 """(t, y, v, state) -> time derivatives of a part's own states."""
 
+Heard = Callable[[float, State], tuple[float, ...]]
+"""(force between obstacle and mass, state) -> time derivatives of a part's own states."""
+
 
 @dataclass(frozen=True, slots=True)
 class Piece:
@@ -59,6 +62,10 @@ class Part:
         is sign(v) * level(v), and at rest anything up to level(0)
     states : initial values of own states
     rates : Piece -> time derivatives of the own states
+    heard : in place of `rates`, where the states follow the force between obstacle and mass
+    felt : in place of `rates`, where the states follow the acceleration of the mass
+    struck : (state, impulse of the obstacle on the mass, N s) changes the own states at a touch
+    seen : positions in the state of what the probe sees beside the mass
     kinks : displacements at which the law is not smooth, m
     depths : the same, counted from the current gap, m
     times : instants at which the law is not smooth, s
@@ -70,6 +77,10 @@ class Part:
     friction: Callable[[Piece], Callable[[float], float] | None] | None = None
     states: tuple[float, ...] = ()
     rates: Callable[[Piece], Rates] | None = None
+    heard: Heard | None = None
+    felt: Callable[[float, float, float, State], tuple[float, ...]] | None = None
+    struck: Callable[[State, float], None] | None = None
+    seen: tuple[int, ...] = ()
     kinks: tuple[float, ...] = ()
     depths: tuple[float, ...] = ()
     times: tuple[float, ...] = ()

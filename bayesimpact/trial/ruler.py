@@ -155,7 +155,7 @@ def _noisy(design: Design, clean: Sequence[Array], rng: np.random.Generator) -> 
 def _fit(design: Design, readings: Sequence[Array]) -> Fit:
     """The base model fitted to readings, from the true parameters on."""
     recordings = tuple(
-        Recording(release.name, release.case, reading, 1 / design.rate)
+        Recording(release.name, release.case, reading, 1 / design.rate, quantity=design.quantity)
         for release, reading in zip(design.releases, readings, strict=True)
     )
     campaign = Campaign(

@@ -10,6 +10,7 @@ where it stopped.
     DIR/seals.txt            their SHA-256, in the format of sha256sum
     DIR/campaigns/17/        the campaign, until it has been scored
     DIR/trials/17.json       seal, answer and score
+    DIR/log.txt              a line for every trial as it ended
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from typing import Any
 from bayesimpact.errors import InputError
 from bayesimpact.trial.blind import answer, campaign_files, open_seal, seal, sealed_text
 from bayesimpact.trial.draw import draw
+from bayesimpact.trial.line import trial_line
 from bayesimpact.trial.score import score
 from bayesimpact.trial.settings import Settings, settings_from
 
@@ -47,10 +49,10 @@ def draw_job(settings: Settings, seed: int) -> dict[str, Any]:
         return {"failed": traceback.format_exc()}
 
 
-def answer_job(files: Mapping[str, str], search: bool) -> dict[str, Any]:
+def answer_job(files: Mapping[str, str], search: bool, report: bool) -> dict[str, Any]:
     """On a worker that sees only files: the diagnosis, or what went wrong."""
     try:
-        return {"answer": answer(files, search=search)}
+        return {"answer": answer(files, search=search, report=report)}
     except Exception:
         return {"failed": traceback.format_exc()}
 
@@ -93,7 +95,8 @@ def run_trials(
             sealed(digest)
         missing = [seed for seed in seeds if not store.is_finished(seed)]
         say("diagnosing", len(seeds) - len(missing))
-        jobs = ((seed, (store.files(seed), settings.search)) for seed in missing)
+        how = (settings.search, settings.report)
+        jobs = ((seed, (store.files(seed), *how)) for seed in missing)
         for seed, answered in spread(answer_job, jobs):
             store.finish(seed, answered, keep)
             say("diagnosing", 1)
@@ -181,6 +184,8 @@ class Store:
     def _finish(self, seed: int, result: Mapping[str, Any]) -> None:
         content = {"schema": "bayesimpact/trial/1", "seed": seed, **result}
         write(self._result(seed), json.dumps(content, indent=1, allow_nan=False) + "\n")
+        with (self.out / "log.txt").open("a", encoding="utf-8", newline="\n") as log:
+            log.write(trial_line(content) + "\n")
 
     def _truth(self, seed: int) -> Path:
         return self.out / "sealed" / f"{seed}.json"

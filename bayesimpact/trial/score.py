@@ -8,33 +8,40 @@ Verdicts against truths:
 | effects of the catalogue | named (all, and no other) | wrong name, missed |
 | a force outside it | unknown | wrong name, missed |
 
-Ambiguous, and unknown for effects of the catalogue, are abstentions: neither.
+Ambiguous, partly (with no wrong name), and unknown for effects of the catalogue, are abstentions:
+neither. Several effects at once: `score_strong`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from bayesimpact.trial.faults import judge_fault
+from bayesimpact.trial.score_strong import inconsistent, judge_several, quality
+
 NORMAL_90 = 1.6448536269514722
 QUIET = ("noise_correlated",)  # reported beside a verdict, never a name
 BASE = ("c1", "k1", "c2", "g", "k2")
+RIGHT = ("quiet", "named", "unknown outside", "partly outside")
 
 
 def score(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> dict[str, Any]:
     """Score an answer (the content of diagnosis.json) against the opened truth."""
     planted = [p["id"] for p in truth["planted"]]
     named = [e["id"] for e in answer["effects"] if e["id"] not in QUIET]
-    outcome = judge(truth["kind"], planted, answer["verdict"], named)
+    outcome = _outcome(truth, answer["verdict"], named, answer.get("faults", ()))
     sets = [set(named), *(set(a["id"].split(" + ")) for a in answer["alternatives"])]
     return {
-        "truth": " + ".join(sorted(planted)) or "control",
+        "truth": truth["fault"]["id"]
+        if "fault" in truth
+        else " + ".join(sorted(planted)) or "control",
         "verdict": answer["verdict"],
         "named": " + ".join(sorted(named)) or answer["verdict"],
         "outcome": outcome,
-        "right": outcome in ("quiet", "named", "unknown outside"),
+        "right": outcome in RIGHT,
         "confident_wrong": outcome == "wrong name",
         "truth_in_set": answer["verdict"] in ("named", "ambiguous") and set(planted) in sets,
         "strengths": [p["strength"] for p in truth["planted"]],
@@ -42,10 +49,29 @@ def score(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> dict[str, Any]
         "place": place(truth, answer),
         "sizes": sizes(truth, answer) if outcome == "named" else {},
         "coverage": coverage(truth, answer),
+        "quality": quality(answer),
+        "inconsistent": inconsistent(answer),
         "held_out_gain": answer["fit"]["held_out_gain"]["value"],
         "held_out_se": answer["fit"]["held_out_gain"]["se"],
         "seconds": answer["seconds"],
     }
+
+
+def _outcome(
+    truth: Mapping[str, Any], verdict: str, named: list[str], faults: Sequence[Mapping[str, Any]]
+) -> str:
+    """The outcome by the rules of its regime."""
+    if "fault" in truth:
+        outcome = judge_fault(truth["fault"], faults)
+        physics = verdict == "named" and outcome == "missed" and named
+        return "wrong name" if physics else outcome
+    if not truth["kind"].startswith("several"):
+        return judge(truth["kind"], [p["id"] for p in truth["planted"]], verdict, named)
+    there = [p["id"] for p in truth["planted"] if not p["outside"]]
+    outside = len(there) < len(truth["planted"])
+    if truth["rest_s"] and "recording_start" in named:  # there, and said to be there
+        there.append("recording_start")
+    return judge_several(there, outside, verdict, named)
 
 
 def judge(kind: str, planted: list[str], verdict: str, named: list[str]) -> str:
@@ -58,6 +84,8 @@ def judge(kind: str, planted: list[str], verdict: str, named: list[str]) -> str:
         return {"unknown": "unknown outside", "ambiguous": "ambiguous"}.get(verdict, "wrong name")
     if verdict == "named":
         return "named" if set(named) == set(planted) else "wrong name"
+    if verdict == "partly":
+        return "partly" if set(named) <= set(planted) else "wrong name"
     return "ambiguous" if verdict == "ambiguous" else "called unknown"
 
 

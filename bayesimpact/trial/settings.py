@@ -8,12 +8,28 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 from bayesimpact.errors import InputError
+from bayesimpact.model.effects import UNTRIED
 from bayesimpact.trial.benches import BENCHES, NOISES
 from bayesimpact.trial.plants import CATALOGUE_PLANTS, OUTSIDE_PLANTS
+from bayesimpact.trial.strong_plants import CATALOGUE_STRONG, STRONG_OUTSIDE
+from bayesimpact.trial.strong_rigs import STRONG_BENCHES
 
+REGIMES = ("weak", "strong")
 KINDS = ("control", "single", "pair", "outside")
 DEFAULT_STRENGTH = (1.5, 6.0)  # times the detection limit
 DEFAULT_BENCHES = tuple(name for name in BENCHES if name != "small")
+PLANTED = tuple(e for e in CATALOGUE_PLANTS if e not in UNTRIED)
+DEFAULT_MISFIT = (3.0, 300.0)  # base misfit over the noise, as real recordings have it
+STRONG_KINDS = ("several", "several_outside")
+STRONG_DEFAULTS: Mapping[str, Any] = {
+    "kinds": ("several", "several", "several_outside"),
+    "effects": tuple(CATALOGUE_STRONG),
+    "outside": tuple(STRONG_OUTSIDE),
+    "benches": tuple(STRONG_BENCHES),
+    "noises": ("white", "ar1"),
+    "rest": 0.25,
+}
+"""What the strong regime draws from where nothing is said."""
 
 
 @dataclass(frozen=True)
@@ -28,24 +44,35 @@ class Settings:
     strength : smallest and largest size, in detection limits (a limit is five standard errors)
     benches : rigs, drawn at random
     noises : kinds of noise, drawn at random
-    search : whether the diagnosis runs its global search
+    search : whether the diagnosis runs its global search (and samples, where it writes a report)
+    regime : weak (effects near the detection limit) or strong (several at once, a gross misfit)
+    misfit : strong only: range of the base misfit, in standard deviations of the noise
+    rest : strong only: share of trials whose recordings begin before the release
+    report : whether the diagnosis goes the whole way of the command, report and figures included
     """
 
     kinds: tuple[str, ...] = KINDS
-    effects: tuple[str, ...] = tuple(CATALOGUE_PLANTS)
+    effects: tuple[str, ...] = PLANTED
     outside: tuple[str, ...] = tuple(OUTSIDE_PLANTS)
     strength: tuple[float, float] = DEFAULT_STRENGTH
     benches: tuple[str, ...] = DEFAULT_BENCHES
     noises: tuple[str, ...] = NOISES
     search: bool = True
+    regime: str = "weak"
+    misfit: tuple[float, float] = DEFAULT_MISFIT
+    rest: float = 0.0
+    report: bool = False
 
     def __post_init__(self) -> None:
+        if self.regime not in REGIMES:
+            raise InputError("trial, regime", self.regime, ", ".join(REGIMES))
+        strong = self.regime == "strong"
         known = {
-            "kinds": KINDS,
-            "effects": tuple(CATALOGUE_PLANTS),
-            "outside": tuple(OUTSIDE_PLANTS),
-            "benches": tuple(BENCHES),
-            "noises": NOISES,
+            "kinds": STRONG_KINDS if strong else (*KINDS, "fault"),
+            "effects": tuple(CATALOGUE_STRONG if strong else CATALOGUE_PLANTS),
+            "outside": tuple(STRONG_OUTSIDE if strong else OUTSIDE_PLANTS),
+            "benches": tuple(STRONG_BENCHES if strong else BENCHES),
+            "noises": ("white", "ar1") if strong else NOISES,
         }
         for name, accepted in known.items():
             given = getattr(self, name)
@@ -56,6 +83,11 @@ class Settings:
         low, high = self.strength
         if not 0 < low <= high:
             raise InputError("trial, strength", f"{low} {high}", "0 < LOW <= HIGH")
+        low, high = self.misfit
+        if not 1 < low <= high:
+            raise InputError("trial, misfit", f"{low} {high}", "1 < LOW <= HIGH")
+        if not 0 <= self.rest <= 1:
+            raise InputError("trial, rest", f"{self.rest}", "a share from 0 to 1")
 
     def document(self) -> dict[str, Any]:
         """As a JSON object."""
@@ -68,6 +100,13 @@ def settings_from(content: Mapping[str, Any]) -> Settings:
     names = [f.name for f in fields(Settings)]
     values: dict[str, Any] = {}
     for name in names:
+        if name not in content:  # written before there was this setting
+            continue
         value = content[name]
         values[name] = tuple(value) if isinstance(value, list) else value
     return Settings(**values)
+
+
+def strong_settings(**given: Any) -> Settings:
+    """Settings of the strong regime; what is not given is as `STRONG_DEFAULTS` says."""
+    return Settings(**{**STRONG_DEFAULTS, "regime": "strong", **given})

@@ -7,46 +7,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
+from bayesimpact.trial.rates import rate, rate_in_groups
 from bayesimpact.trial.score import BASE
+from bayesimpact.trial.summary_strong import added
 
-CONFIDENCE = 0.95
+__all__ = ["confusion", "rate", "rate_in_groups", "summarise"]
 
 Result = Mapping[str, Any]
-
-
-def rate(hits: int, of: int) -> dict[str, Any]:
-    """A proportion with its exact interval (Clopper and Pearson 1934)."""
-    return {
-        "hits": hits,
-        "of": of,
-        "rate": hits / of if of else None,
-        "interval": _interval(hits, of),
-    }
-
-
-def rate_in_groups(groups: Sequence[Sequence[bool]]) -> dict[str, Any]:
-    """The same for numbers of which those of one trial err together, such as phases.
-
-    The interval is that of as many independent numbers as have the variance found between trials
-    (Korn and Graubard 1998, Survey Methodology 24:193), of one per trial where there is none.
-    """
-    groups = [g for g in groups if len(g)]
-    found = rate(sum(map(sum, groups)), sum(map(len, groups)))
-    if not groups:
-        return found
-    share = found["rate"]
-    variance = sum((sum(g) - share * len(g)) ** 2 for g in groups) / found["of"] ** 2
-    of = min(found["of"], share * (1 - share) / variance) if variance > 0 else len(groups)
-    return found | {"interval": _interval(share * of, of)}
-
-
-def _interval(hits: float, of: float) -> list[float]:
-    tail = (1 - CONFIDENCE) / 2
-    low = float(stats.beta.ppf(tail, hits, of - hits + 1)) if hits > 0 else 0.0
-    high = float(stats.beta.ppf(1 - tail, hits + 1, of - hits)) if hits < of else 1.0
-    return [low, high]
 
 
 def summarise(results: Sequence[Result]) -> dict[str, Any]:
@@ -85,6 +53,7 @@ def summarise(results: Sequence[Result]) -> dict[str, Any]:
         "by_effect": _by_effect(scored),
         "confusion": confusion(scored),
         "misses": [_miss(r) for r in scored if not r["score"]["right"]],
+        **added(results),
     }
 
 

@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from bayesimpact.trial.table_strong import added_text
+
 RIGHT = {
     "control": "controls called adequate",
     "single": "single effects named",
     "pair": "pairs named in full",
     "outside": "outside forces called unknown",
+    "several": "all named, all in catalogue",
+    "several_outside": "partly or unknown, one outside",
 }
 
 
@@ -28,6 +32,7 @@ def summary_text(summary: Mapping[str, Any]) -> str:
         *_spread("held-out gain when right, nats", summary["held_out_gain"], 1),
         *_spread("seconds per diagnosis", summary["seconds"], 1),
     ]
+    lines += added_text(summary, _rate)
     for group, table in summary["coverage"].items():
         lines += _coverage(group, table)
     lines += ["", *_by("rig", summary["by_bench"]), "", *_by("noise", summary["by_noise"])]

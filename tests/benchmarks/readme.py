@@ -17,6 +17,7 @@ from benchmarks.trial_tables import (
     blind_table,
     controls_table,
     single_table,
+    strong_table,
     trial_coverage_table,
 )
 
@@ -244,6 +245,7 @@ TABLES = {
     "controls": controls_table,
     "trial_coverage": trial_coverage_table,
     "singles": single_table,
+    "strong": strong_table,
     "power": power_table,
     "sbc": sbc_table,
     "kernel": kernel_table,

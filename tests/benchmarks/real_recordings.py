@@ -2,8 +2,8 @@
 
     python tests/benchmarks/real_recordings.py FOLDER
 
-FOLDER holds campaigns `pendulum` (free swing of an encoder pendulum: softening, k3/k1 = -1/6 per
-rad2, and dry friction in the bearing) and `ship_roll` (roll decay of a ship model: quadratic drag).
+FOLDER holds campaigns `pendulum` (free swing of an encoder pendulum: its sine, and dry friction in
+the bearing) and `ship_roll` (roll decay of a ship model: quadratic drag).
 They are not part of this project; what is absent is skipped.
 """
 
@@ -30,10 +30,9 @@ class Known:
 
 
 KNOWN: Mapping[str, Known] = {
-    "pendulum": Known(("spring_cubic", "coulomb_friction"), 0.83, "free_swing_3"),
+    "pendulum": Known(("pendulum_sine", "coulomb_friction"), 0.83, "free_swing_3"),
     "ship_roll": Known(("quadratic_drag",), 2.0, "roll_21338"),
 }
-SOFTENING = -1 / 6  # k3 / k1 of a pendulum, 1/rad2
 
 
 def residual_percent(found: Diagnosis, recording: str) -> float:
@@ -42,16 +41,6 @@ def residual_percent(found: Diagnosis, recording: str) -> float:
     r = [x.name for x in recordings].index(recording)
     left = np.sqrt(np.mean(found.after.residuals[r] ** 2))
     return float(100 * left / np.std(recordings[r].samples))
-
-
-def softening(found: Diagnosis) -> tuple[float, float]:
-    """k3 / k1 and its standard deviation, with what stays unexplained carried into it."""
-    fit = found.after
-    cubic, linear = fit.names.index("spring_cubic.stiffness"), fit.names.index("k1")
-    ratio = float(fit.mode[cubic] / fit.mode[linear])
-    slope = np.zeros(fit.mode.size)
-    slope[cubic], slope[linear] = 1 / fit.mode[linear], -ratio / fit.mode[linear]
-    return ratio, float(np.sqrt(slope @ found.honest.covariance @ slope))
 
 
 def main(argv: Sequence[str] | None = None) -> dict[str, Diagnosis]:
@@ -69,11 +58,8 @@ def main(argv: Sequence[str] | None = None) -> dict[str, Diagnosis]:
         print(f"  known: {' + '.join(known.effects)}")
         left = residual_percent(found, known.recording)
         print(f"  residual of {known.recording}: {left:.2f} % (published {known.residual} %)")
-        if found.remains:
-            print("  something smaller remains")
-        if "spring_cubic" in [e.id for e in found.effects] and name == "pendulum":
-            ratio, sd = softening(found)
-            print(f"  k3/k1 = {ratio:.4f} +- {sd:.4f} per rad2 (a pendulum has {SOFTENING:.4f})")
+        if found.remains is not None:
+            print("  something remains")
     return results
 
 

@@ -136,3 +136,40 @@ def controls_table() -> str:
         f"commit {t['commit'][:7]}, {t['date']}. In brackets: 95 % interval."
     )
     return grid(("nothing missing, noise", "called adequate"), rows, foot)
+
+
+def strong_table() -> str:
+    """Several strong effects at once: what was said, and what holds whatever was said."""
+    t = stored("strong")
+    low, high = t["settings"]["misfit"]
+    every = t["answers"]
+    rows = [
+        (words, share(t["right"][kind]))
+        for kind, words in (
+            ("several", "all in the catalogue: all named, and no other"),
+            ("several_outside", "a force outside it as well: `partly` or `unknown`"),
+        )
+        if kind in t["right"]
+    ]
+    rows += [
+        ("a wrong name, under `named` or `partly`", share(t["confident_wrong_names"])),
+        ("`named` where something is left out", share(t["overconfident"])),
+        ("fit worse after than before", share(t["worse"])),
+        ("crashes, report and figures included", share(t["crashes"])),
+    ]
+    rows += [
+        (f"90 % intervals of base parameters hold the truth, {verdict}", share(found))
+        for verdict, found in t["inside_by_verdict"].items()
+    ]
+    first, last = t["seeds"]
+    chosen = t["selection"]
+    thrown = "; ".join(f"{n} because {why}" for why, n in chosen["thrown_away"].items())
+    foot = (
+        f"{len(every)} trials, seeds {first} to {last}: two to four effects, base misfit "
+        f"{low:g} to {high:g} times the noise (median {chosen['misfit'][1]:.0f}), "
+        f"{len(t['by_bench'])} rigs; {chosen['resting']} begin before the release. "
+        f"{chosen['kept']} of {chosen['draws']} draws were kept; thrown away: "
+        f"{thrown or 'none'}. Median {t['seconds']['median']:.0f} s a diagnosis. In brackets: "
+        f"95 % interval. Commit {t['commit'][:7]}, {t['date']}."
+    )
+    return grid(("several effects at once", "trials or intervals"), rows, foot)

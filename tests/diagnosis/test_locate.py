@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import small_rig
-from effect_rigs import BY_ID
+from effect_rigs import BY_ID, with_effect
 
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.force import missing_force, trajectory_points
@@ -114,9 +114,9 @@ def test_a_force_everywhere(small, force):
 
 def test_the_named_effects_regime_counts_and_disagreement_shows(small, force):
     contact = made(force, lambda y: 0.03 * (y > GAP + 4e-4))
-    found = locate(small.fit, small.fit, contact, (BY_ID["contact_hardening"],))
+    found = locate(small.fit, small.fit, contact, (BY_ID["contact_damping_per_case"],))
     assert found.regime == "contact" and found.agrees
-    found = locate(small.fit, small.fit, contact, (BY_ID["quadratic_drag"],))
+    found = locate(small.fit, small.fit, contact, (BY_ID["coulomb_friction"],))
     assert found.regime == "free" and not found.agrees
     found = locate(small.fit, small.fit, contact, (BY_ID["contact_no_tension"],))
     assert found.regime == "exit" and found.agrees and found.displacement[0] >= GAP
@@ -156,3 +156,15 @@ def test_a_mismatch_of_the_chain_has_no_force(small, force):
     found = locate(small.fit, better, made(force, lambda y: 0.01), (BY_ID["sensor_cubic"],))
     assert found.regime == "measurement" and found.force_rms == 0.0
     assert found.share == pytest.approx(1.0) and found.agrees  # all bins gain
+
+
+def test_an_effect_lies_where_its_own_force_acts(small, force):
+    """Hardening k3 d^3: nine tenths of its square lie in the deepest quarter of the contact."""
+    fit = with_effect(small, "contact_hardening", stiffness=1e8)
+    elsewhere = made(force, lambda y: 0.02 * (y < -2e-3))  # what is missing says nothing here
+    found = locate(small.fit, fit, elsewhere, (BY_ID["contact_hardening"],))
+    deepest = max(p[0].max() for p in trajectory_points(small.fit))
+    assert found.regime == "contact" and found.contact_share == 1.0
+    assert GAP + 0.4 * (deepest - GAP) < found.displacement[0] < found.displacement[1] <= deepest
+    peak = 1e8 * (deepest - GAP) ** 3
+    assert 0.2 * peak < found.force_rms < peak

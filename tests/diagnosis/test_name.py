@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from effect_rigs import BY_ID
 
-from bayesimpact.diagnosis.loop import judge, ordered
+from bayesimpact.diagnosis.decision import decide, ordered
 from bayesimpact.diagnosis.name import worth_a_refit
-from bayesimpact.diagnosis.naming import ALPHA, DECISIVE, Naming, State
+from bayesimpact.diagnosis.naming import Naming, State
 from bayesimpact.diagnosis.refit import Candidate
+from bayesimpact.diagnosis.thresholds import ALPHA, DECISIVE, EXCESS, largest_log_odds
 
 COST = 3.8
 
@@ -50,6 +51,10 @@ def naming(
 
 
 FRICTION, DRAG = "coulomb_friction", "quadratic_drag"
+
+
+def judge(found: Naming) -> str:
+    return decide(found).verdict
 
 
 def test_nothing_missing_is_adequate_and_an_alarm_without_a_name_is_unknown():
@@ -97,36 +102,90 @@ def test_a_pair_is_compared_with_what_lacks_one_of_its_members():
     assert not naming(single, candidate("gap_wear gap_per_recording", 199.9 + COST)).rivals()
 
 
-@pytest.mark.parametrize("what", ["p_catalogue", "p_force"])
-def test_what_is_named_leaves_nothing(what):
-    left = {"force_evidence": DECISIVE}
-    chosen = state(candidate(FRICTION, 100.0), **{what: ALPHA / 2}, **left)
-    assert judge(naming(chosen)) == "unknown"
-    assert judge(naming(state(candidate(FRICTION, 100.0), **{what: ALPHA}, **left))) == "named"
+def remaining(
+    chosen: State, without: float, chi2: float, *others: Candidate, beside: float = 0.0,
+    instead: float = 0.0,
+) -> Naming:  # fmt: skip
+    """A chosen single effect beside which something remains.
+
+    `without`: misfit over the noise without it; `chi2`: with it; log evidences of a residual force
+    `beside` the effect and `instead` of it, where above zero.
+    """
+    found = naming(chosen, *others, base_chi2=without)
+    base = found.base
+    for model, misfit in ((chosen, chi2), (base, without)):
+        target = SimpleNamespace(
+            likelihood=SimpleNamespace(
+                noise=SimpleNamespace(level=1.0, level_error=0.01), sizes=np.array([1000.0])
+            )
+        )
+        vars(model.candidate.fit).update(
+            target=target, sums=np.array([1000.0 * misfit]), reduced_chi2=misfit
+        )
+    residual = {
+        frozenset(m.candidate.ids): replace(m.candidate, log_evidence=1000.0 + e)
+        for m, e in ((chosen, beside), (base, instead))
+        if e
+    }
+    states = {frozenset(m.candidate.ids): m for m in (chosen, base)}
+    return replace(found, states=states, residual=residual)
 
 
-def test_beside_a_name_an_unknown_force_needs_decisive_odds():
-    """The base model's alarm stays one of p-values alone, whose rate is known."""
-    for evidence, verdict in ((DECISIVE - 0.1, "named"), (DECISIVE + 0.1, "unknown")):
+def something_left() -> State:
+    return state(candidate(FRICTION, 100.0), p_force=ALPHA / 2, force_evidence=2 * DECISIVE)
+
+
+def test_an_effect_is_partly_the_answer_when_it_takes_most_of_the_misfit():
+    found = decide(remaining(something_left(), 100.0, 10.0))
+    assert found.verdict == "partly" and [e.id for e in found.effects] == [FRICTION]
+    enough = 1 + 9.0 * EXCESS
+    assert judge(remaining(something_left(), enough + 0.1, 10.0)) == "partly"
+    assert judge(remaining(something_left(), enough - 0.1, 10.0)) == "unknown"
+
+
+def test_an_effect_that_another_could_stand_for_is_not_needed():
+    near, far = (candidate(DRAG, 100.0 - DECISIVE + x) for x in (0.1, -0.1))
+    assert judge(remaining(something_left(), 100.0, 10.0, near)) == "unknown"
+    assert judge(remaining(something_left(), 100.0, 10.0, far)) == "partly"
+
+
+def test_an_effect_that_a_residual_force_replaces_is_not_needed():
+    """By the decisive odds, and with a residual force beside the effect as well."""
+    lead = 100.0 - COST
+    for beside, instead, verdict in (
+        (0.0, lead + DECISIVE + 0.1, "unknown"),
+        (0.0, lead + DECISIVE - 0.1, "partly"),
+        (110.0, lead + DECISIVE + 0.1, "partly"),
+        (110.0, lead + 10.0 + DECISIVE + 0.1, "unknown"),
+    ):
+        found = remaining(something_left(), 100.0, 10.0, beside=beside, instead=instead)
+        assert judge(found) == verdict, (beside, instead)
+
+
+def test_what_remains_beside_a_name_needs_decisive_odds():
+    """The base model's alarm is one of p-values alone, whose rate is known."""
+    for evidence, white in ((DECISIVE - 0.1, True), (DECISIVE + 0.1, False)):
         chosen = state(candidate(FRICTION, 100.0), p_force=ALPHA / 2, force_evidence=evidence)
-        assert judge(naming(chosen)) == verdict
+        assert chosen.is_white == white
+    by_chance = state(candidate(FRICTION, 2192.0), p_catalogue=0.0026)
+    assert by_chance.is_white and judge(naming(by_chance)) == "named"
+    assert not state(candidate(FRICTION, 2192.0), p_catalogue=1e-5).is_white
     base = state(candidate("", 0.0), p_force=ALPHA / 2, force_evidence=DECISIVE - 0.1)
     assert judge(naming(base)) == "unknown"
 
 
-def test_a_gross_misfit_nearly_explained_is_named_although_something_small_remains():
-    small_rest = state(candidate(FRICTION, 9000.0, chi2=1.5), p_force=1e-4, force_evidence=9.0)
-    large_rest = state(candidate(FRICTION, 9000.0, chi2=20.0), p_force=1e-4, force_evidence=9.0)
-    assert judge(naming(small_rest, base_chi2=100.0)) == "named"
-    assert judge(naming(large_rest, base_chi2=100.0)) == "unknown"
-    assert judge(naming(small_rest, base_chi2=4.0)) == "unknown"  # concealed: must be white
+def test_a_p_value_stands_for_odds_of_a_bound():
+    """Sellke, Bayarri and Berger 2001, Table 1: p = 0.05, 0.01, 0.001 -> 2.5, 8.0, 53 to one."""
+    for p, odds in ((0.05, 2.46), (0.01, 7.99), (0.001, 53.3)):
+        assert np.exp(largest_log_odds(p)) == pytest.approx(odds, rel=0.005)
+    assert largest_log_odds(0.5) == 0.0 and np.isfinite(largest_log_odds(0.0))
 
 
 @pytest.mark.parametrize("ids", [FRICTION, f"{FRICTION} spring_cubic"])
 def test_a_free_force_that_beats_the_chosen_effects_is_unknown_physics(ids):
     imitation = state(candidate(ids, 200.0))
     object.__setattr__(imitation.candidate.fit, "log_likelihood", 2300.0)  # a heavy prior volume
-    odds = 200.0 - COST * len(ids.split())
+    odds = 200.0 - COST * (len(ids.split()) - 1)  # a free force costs as much as an effect
     assert judge(naming(imitation, force_evidence=odds + DECISIVE + 0.1)) == "unknown"
     assert judge(naming(imitation, force_evidence=odds + DECISIVE - 0.1)) == "named"
 
@@ -134,8 +193,6 @@ def test_a_free_force_that_beats_the_chosen_effects_is_unknown_physics(ids):
 def test_no_force_can_gain_more_than_a_model_that_leaves_nothing():
     """The linearised problem promises too much where effects are large."""
     assert judge(naming(state(candidate(FRICTION, 200.0)), force_evidence=300.0)) == "named"
-    left = state(candidate(FRICTION, 200.0), p_force=ALPHA / 2, force_evidence=9.0)
-    assert judge(naming(left, force_evidence=300.0)) == "unknown"
 
 
 def test_probabilities_weigh_all_models():
@@ -184,8 +241,8 @@ def test_many_effects_that_imitate_one_force_in_contact_are_unknown():
     found = naming(state(candidate(three, 500.0)))
     assert judge(found) == "named"
     lead = found.log_odds(found.chosen.candidate)
-    assert judge(replace(found, contact_odds=lead + DECISIVE - 0.1)) == "named"
-    assert judge(replace(found, contact_odds=lead + DECISIVE + 0.1)) == "unknown"
+    assert judge(replace(found, contact_odds=lead + COST + DECISIVE - 0.1)) == "named"
+    assert judge(replace(found, contact_odds=lead + COST + DECISIVE + 0.1)) == "unknown"
 
 
 def test_the_unknown_force_is_the_likeliest_of_its_forms():

@@ -117,13 +117,15 @@ def run(monkeypatch):
             monkeypatch.setattr(module, "model_evidence", lambda fit: fit.gain)
         monkeypatch.setattr(search, "missing_contact", table.contact)
         monkeypatch.setattr(search, "learn_force", lambda fit, force, scales: force.fit)
+        monkeypatch.setattr(search, "with_force", lambda candidate, force, scales: candidate)
+        monkeypatch.setattr(search, "residual_repetition", lambda fit: 1.0)
         monkeypatch.setattr(search, "promising_pairs", lambda scan, count: ())
         for force in ("missing_force", "missing_drift"):
             monkeypatch.setattr(models, force, table.missing)
         monkeypatch.setattr(
             search, "base_candidate", lambda fit: table.candidate((), table.gain(()))
         )
-        fit = SimpleNamespace()
+        fit = SimpleNamespace(reduced_chi2=1.0)
         return search.name(fit, effects, None, rng=np.random.default_rng(0))
 
     return go

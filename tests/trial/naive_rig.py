@@ -41,6 +41,9 @@ def contact_forces(e, rig, k2, d, v, s):
         total += s["maxwell"]
     if "contact_preload" in e:
         total += e["contact_preload"]["force"]
+    if "contact_bump" in e:
+        p = e["contact_bump"]
+        total += p["force"] * exp(-(((d - p["depth"]) / p["width"]) ** 2))
     return total
 
 
@@ -60,6 +63,17 @@ def free_forces(e, rig, t, y, v, s):
     if "opposite_stop" in e:
         p = e["opposite_stop"]
         total += p["stiffness"] * min(y + p["gap"], 0.0)
+    if "pendulum_sine" in e:
+        total += e["pendulum_sine"].get("stiffness", rig.k1) * (sin(y) - y)
+    if "pendulum_with_spring" in e:
+        total += e["pendulum_with_spring"]["stiffness"] * (sin(y) - y)
+    if "spring_quintic" in e:
+        total += e["spring_quintic"]["stiffness"] * y**5
+    if "power_damping" in e:
+        p = e["power_damping"]
+        total += p["coefficient"] * abs(v) ** p["exponent"] * sign(v)
+    if "structural_damping" in e:
+        total += e["structural_damping"]["loss"] * rig.k1 * abs(y) * s["going"]
     if "detent" in e:
         p = e["detent"]
         x = y - p["place"]
@@ -89,6 +103,16 @@ def resonator_pull(p, y, v, s):
     return p["mass"] * (w * w * (y - s["x"]) + 2 * p["damping_ratio"] * w * (v - s["u"]))
 
 
+def obstacle_pull(p, place, speed, s):
+    w = 2 * pi * p["frequency"]
+    return w * w * (place - s["b"]) + 2 * p["damping"] * w * (speed - s["b_rate"])
+
+
+def frame_hold(p, s):
+    w = 2 * pi * p["frequency"]
+    return w * w * s["X"] + 2 * p["damping"] * w * s["X_rate"]
+
+
 def dry_level(e, y, v, touching):  # y: where the step began
     level = e.get("coulomb_friction", {}).get("force", 0.0)
     if "friction_pad" in e and e["friction_pad"]["low"] < y <= e["friction_pad"]["high"]:
@@ -112,12 +136,16 @@ class NaiveRig:
         self.one_sided = "obstacle_mass" in effects or "contact_no_tension" in effects
         self.touching = release.y0 > self.gap
         self.stuck = self.released = False
-        self.names = ("maxwell", "bouc", "x", "u")
-        self.state = [release.y0, release.v0, 0.0, 0.0, release.y0, release.v0]
+        self.names = ("maxwell", "bouc", "x", "u", "q", "q_rate", "b", "b_rate", "X", "X_rate")
+        self.state = [release.y0, release.v0, 0.0, 0.0, release.y0, release.v0, *[0.0] * 6]
 
     def named(self, state):
         """Own states, and where the step began: it decides what is switched on."""
-        return {**dict(zip(self.names, state[2:], strict=True)), "from": self.state[0]}
+        return {
+            **dict(zip(self.names, state[2:], strict=True)),
+            "from": self.state[0],
+            "going": sign(self.state[1]),
+        }
 
     def sums(self, t, state):
         """(all forces but dry friction, obstacle's force on the mass without inertia)."""
@@ -126,6 +154,9 @@ class NaiveRig:
         push = 0.0
         if self.touching:
             push = contact_forces(self.e, self.rig, self.k2, y - self.gap, v, s)
+            if "obstacle_mode" in self.e:
+                p = self.e["obstacle_mode"]
+                push += p["mass"] * obstacle_pull(p, y - self.gap, v, s)
         return free_forces(self.e, self.rig, t, y, v, s) + push, push
 
     def slope(self, t, state):
@@ -138,8 +169,11 @@ class NaiveRig:
             level = dry_level(self.e, begun[0], v, self.touching)
             force = self.sums(t, state)[0]
             force += level * (sign(begun[1]) or -sign(force))
-            acceleration = -force / (self.rig.mass + self.m2 * self.touching)
-        out = [v, acceleration, 0.0, 0.0, 0.0, 0.0]
+            ratio = 1.0 + self.e.get("base_motion", {}).get("mass_ratio", 0.0)
+            if ratio > 1.0:
+                force -= self.rig.mass / ratio * frame_hold(self.e["base_motion"], s)
+            acceleration = -force / (self.rig.mass / ratio + self.m2 * self.touching)
+        out = [v, acceleration, *[0.0] * 10]
         if "contact_relaxation" in self.e:
             p = self.e["contact_relaxation"]
             out[2] = p["stiffness"] * v * self.touching - s["maxwell"] / p["time"]
@@ -147,8 +181,24 @@ class NaiveRig:
             out[3] = v - abs(v) * s["bouc"] / self.e["hysteresis"]["width"]
         if "resonator" in self.e:
             p = self.e["resonator"]
-            out[4:] = [s["u"], resonator_pull(p, y, v, s) / p["mass"]]
+            out[4:6] = [s["u"], resonator_pull(p, y, v, s) / p["mass"]]
+        if "second_mode" in self.e:
+            p = self.e["second_mode"]
+            w = 2 * pi * p["frequency"]
+            push = self.sums(t, state)[1] + self.m2 * acceleration * self.touching
+            pull = 2 * p["damping"] * w * s["q_rate"] + w**2 * s["q"]
+            out[6:8] = [s["q_rate"], p["gain"] * push - pull]
+        if "obstacle_mode" in self.e:
+            out[8:10] = [s["b_rate"], obstacle_pull(self.e["obstacle_mode"], *self.place(y, v), s)]
+        if "base_motion" in self.e:
+            ratio = self.e["base_motion"]["mass_ratio"]
+            shaken = -frame_hold(self.e["base_motion"], s) - ratio * acceleration
+            out[10:] = [s["X_rate"], shaken / (1 + ratio)]
         return out
+
+    def place(self, y, v):
+        """Displacement and velocity of the obstacle at the place of contact."""
+        return (y - self.gap, v) if self.touching else (0.0, 0.0)
 
     def rk4(self, t, h):
         def ahead(slope, by):
@@ -165,6 +215,8 @@ class NaiveRig:
         """Everything that switches a force on or off."""
         y, v = state[:2]
         out = [y >= self.gap, v > 0]
+        if "structural_damping" in self.e:
+            out.append(y > 0)
         for effect, key, place in KINKS:
             if effect in self.e:
                 gap = self.gap if key == "depth" else 0.0
@@ -204,7 +256,12 @@ class NaiveRig:
             self.released = False
         elif not self.touching and not self.released and y >= self.gap:
             self.touching = True
-            self.state[1] *= self.rig.mass / (self.rig.mass + self.m2)
+            ratio = self.e.get("base_motion", {}).get("mass_ratio", 0.0)
+            mass = self.rig.mass / (1 + ratio)
+            self.state[1] *= mass / (mass + self.m2)
+            lost = mass * (v - self.state[1])
+            self.state[11] += ratio * lost / self.rig.mass
+            self.state[7] += self.e.get("second_mode", {}).get("gain", 0.0) * lost
         level = dry_level(self.e, y, 0.0, self.touching)
         if self.stuck:
             self.stuck = abs(self.sums(t, self.state)[0]) <= level
@@ -220,6 +277,6 @@ class NaiveRig:
         count = round(duration / h)
         out = np.empty(count)
         for i in range(count):
-            out[i] = self.state[0]
+            out[i] = self.state[0] + self.state[6]
             self.advance(i * h, h)
         return out

@@ -28,7 +28,7 @@ def quick_draw(settings: Settings, seed: int) -> dict:
     return {"truth": sealed_text(truth), "files": files}
 
 
-def quiet_answer(files: Mapping[str, str], search: bool) -> dict:
+def quiet_answer(files: Mapping[str, str], search: bool, report: bool = False) -> dict:
     """What a diagnosis that finds nothing would say; it is shown a campaign and no truth."""
     assert set(files) == {"campaign.toml", "a.csv"} and not search
     nothing = {"value": None, "se": None}
@@ -63,7 +63,7 @@ def test_truths_are_sealed_before_the_first_diagnosis(
 ) -> None:
     order: list[str] = []
 
-    def answer(files: Mapping[str, str], search: bool) -> dict:
+    def answer(files: Mapping[str, str], search: bool, report: bool) -> dict:
         order.append("diagnosed")
         return quiet_answer(files, search)
 
@@ -87,7 +87,7 @@ def test_a_killed_run_goes_on(
     run_trials(quick, SEEDS, whole)
     shown = []
 
-    def interrupted(files: Mapping[str, str], search: bool) -> dict:
+    def interrupted(files: Mapping[str, str], search: bool, report: bool) -> dict:
         shown.append(files["campaign.toml"])
         if len(shown) == 2:
             raise KeyboardInterrupt
@@ -117,7 +117,7 @@ def test_what_goes_wrong_in_one_trial_is_recorded(
 
     monkeypatch.setattr(run, "draw_job", drawn)
     answers = iter([{"failed": "Traceback: no mode"}, {"answer": {}}])
-    monkeypatch.setattr(run, "answer_job", lambda files, search: next(answers))
+    monkeypatch.setattr(run, "answer_job", lambda files, *how: next(answers))
     results = run_trials(quick, SEEDS, tmp_path)
     assert [r["stage"] for r in results] == ["drawing", "diagnosing", "scoring"]
     assert "KeyError" in results[2]["failed"] and not any("score" in r for r in results)
@@ -129,7 +129,7 @@ def test_jobs_catch_their_own_errors(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(run, "draw", broken)
     monkeypatch.setattr(run, "answer", broken)
-    for found in (run.draw_job(CONTROLS, 1), run.answer_job({}, False)):
+    for found in (run.draw_job(CONTROLS, 1), run.answer_job({}, False, True)):
         assert "ZeroDivisionError: on purpose" in found["failed"] and "Traceback" in found["failed"]
 
 

@@ -8,6 +8,15 @@ import numpy as np
 
 from bayesimpact.model.added.dense import LONGEST_STRIDE
 from bayesimpact.model.added.memory import split_memory
+from bayesimpact.model.added.resonator import (
+    BODIES,
+    OBSTACLE,
+    acts,
+    body,
+    fastest_body,
+    share_of_frame,
+)
+from bayesimpact.model.added.second import listens
 from bayesimpact.model.added.situation import GAP, MODE, SIDES, SLIDING, TOUCHING, surface_value
 from bayesimpact.model.added.world import (
     C1,
@@ -16,6 +25,7 @@ from bayesimpact.model.added.world import (
     CONTACT_ONLY,
     FORCE,
     FRICTION,
+    JUMP_AT_TURN,
     K1,
     K2,
     KINK_AT_TURN,
@@ -31,6 +41,7 @@ from bayesimpact.model.added.world import (
     PLACED,
     POLYNOMIAL,
     ROUGH_AT_TOUCH,
+    ROUGH_AT_TURN,
     V0,
     WORK_COLUMNS,
     Y0,
@@ -42,11 +53,13 @@ from bayesimpact.model.compiled import inner
 MAX_ANGLE = 0.125  # longest step times natural frequency, rad
 MAX_ANGLE_PLAIN = 0.6  # the same where nothing is added: exact, but one turning point at most
 MAX_ANGLE_PACE = 0.32  # the same for an explicit dependence on time
+FINER = 2.4  # of a body on a spring of its own: it is not small, as other added forces are
 LONGER = 1.28  # where no force depends on the velocity: the method for these is the more accurate
 GRAINS = 1.1  # that a step may pass at the swing's highest speed
 ROUND_UP = 0.3  # of a sample: steps end on samples, and may be that much longer for it
 RENEWED = 64  # longest steps after which a flow is chosen anew: the swing may have grown
 MOST_CUTS = 4096  # steps per sample at most
+MOST_HOPS = 64  # per sample, of an exact flow with a body too fast to be seen
 FOLDED = 0.1  # a law's stiffness above this share of the linear one is counted into the flow
 LEAST = 0.25  # of the linear stiffness, which the flow keeps
 REACH = np.sqrt(0.75)  # where a cubic spring's secant has its mean stiffness, over the swing
@@ -54,6 +67,9 @@ RAMP = 0.3  # first step of a contact over the time constant of a law's state
 # where a force is not smooth at the touch: shortest step over the longest; then, for times in units
 # of the longest step, step over the 3/4th power of the time since the touch, or to the release
 FIRST, SINCE, UNTIL = 1.0 / 80.0, 0.46, 0.27
+# the same where it is not smooth at a turning point: there the step is a share of the time itself
+FIRST_AT_TURN, SINCE_TURN, UNTIL_TURN = 1e-4, 0.5, 0.3
+ENDS_ON_TURNS = KINK_AT_TURN | ROUGH_AT_TURN | JUMP_AT_TURN
 # a force without features admits longer steps the weaker it is: share of the linear force at which
 # they are the usual ones, and by how much they are shortened and lengthened at most
 SLIGHT, LEAST_GAIN, MOST_GAIN = 0.07, 0.4, 3.2
@@ -67,13 +83,16 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
     q, s, laws = w.q, w.s, w.laws
     touching = s[MODE] == TOUCHING
     count, memory, turns, rough, tame, placed = 0, False, q[FRICTION] > 0.0, False, True, True
+    rough_turn = False
     for law in range(w.size):
         flags = laws[LAW_COLUMNS * law + LAW_FLAGS]
         if touching or flags & CONTACT_ONLY == 0:
             memory = memory or laws[LAW_COLUMNS * law + LAW_RATE] != 0
             w.acting[count] = law
             count += 1
-            turns = turns or flags & KINK_AT_TURN != 0 or laws[LAW_COLUMNS * law + LAW_SURFACE] != 0
+            bounded = laws[LAW_COLUMNS * law + LAW_SURFACE] != 0
+            turns = turns or flags & ENDS_ON_TURNS != 0 or bounded
+            rough_turn = rough_turn or flags & ROUGH_AT_TURN != 0
             rough = rough or (touching and flags & ROUGH_AT_TOUCH != 0)
             tame = tame and flags & POLYNOMIAL != 0
             placed = placed and flags & PLACED != 0
@@ -83,8 +102,17 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
         damping += q[C2]
         stiffness += q[K2]
         force += q[K2] * s[GAP]
+    bodies = fastest_body(touching, w)
+    if bodies > 0.0:
+        memory, tame = True, False
+        mass -= share_of_frame(w) * w.mass
+        for which in range(BODIES):
+            if acts(which, touching, w):
+                m2, W, drag = body(which, w)
+                damping, stiffness = damping + m2 * drag, stiffness + m2 * W
+                force += m2 * W * s[GAP] if which == OBSTACLE else 0.0
     slope, level, pace = 0.0, 0.0, abs(q[OMEGA]) if q[FORCE] != 0.0 else 0.0
-    grain = np.inf
+    pace, grain = max(pace, FINER * bodies), np.inf
     if count > 0:
         slope, level = fold(y, v, t, mass, damping, stiffness, force, count, w)
         for k in range(count):
@@ -104,9 +132,17 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
     placed = placed and not memory
     if placed and not plain:
         longest *= LONGER
+    joint = bodies > 0.0 and count == 0 and not forced
+    if joint:
+        longest = MAX_ANGLE_PLAIN / (np.sqrt(K) + bodies)
+        if listens(w):
+            longest = min(longest, MAX_ANGLE_PACE / pace)
+        longest = max(longest, w.interval / MOST_HOPS)
+        longest = w.interval / np.ceil(w.interval / longest)
     flow = Flow(
         1.0 / mass, b, K, (force - level) / stiffness, slope, level, s[GAP],
-        1.0 if touching else 0.0, count, memory, plain, placed, forced, turns, rough,
+        1.0 if touching else 0.0, count, memory, plain, placed, forced, turns, rough, rough_turn,
+        bodies > 0.0, joint, longest,
     )  # fmt: skip
     if tame and not plain:
         longest *= gain(y, v, t, pace, longest, flow, w)
@@ -243,8 +279,10 @@ def stride_of(longest: Any, w: Any) -> Any:
 
 
 @inner(forceinline=True)
-def next_step(y: Any, v: Any, t: Any, j: Any, aligned: Any, longest: Any, flow: Any, w: Any) -> Any:
-    """Length of the next step, and whether it ends on a sample.
+def next_step(
+    y: Any, v: Any, t: Any, n0: Any, j: Any, aligned: Any, longest: Any, flow: Any, w: Any
+) -> Any:
+    """Length of the next step, and whether it ends on a sample; n0 is `push` at its start.
 
     Near a touch that is not smooth the steps follow from the motion alone, not from the samples, so
     that they change smoothly with the parameters.
@@ -256,6 +294,12 @@ def next_step(y: Any, v: Any, t: Any, j: Any, aligned: Any, longest: Any, flow: 
             root = np.sqrt(abs(away) / longest)
             share = (SINCE if away >= 0.0 else UNTIL) * (LONGER if flow.placed else 1.0)
             longest *= min(1.0, max(FIRST, share * root * np.sqrt(root)))
+        return max(longest, least), False
+    if flow.rough_turn:
+        pull = 2.0 * flow.b * v + flow.K * (y - flow.rest) - flow.inverse * n0
+        if pull != 0.0:  # v / pull is the time since the turning point, or minus that to the next
+            share = -SINCE_TURN if v * pull < 0.0 else UNTIL_TURN
+            longest *= min(1.0, max(FIRST_AT_TURN, share * v / (pull * longest)))
         return max(longest, least), False
     longest = max(longest, least)
     stride = stride_of(longest, w)

@@ -12,6 +12,13 @@ from typing import Any
 import numpy as np
 
 from bayesimpact.model.added.method import stage
+from bayesimpact.model.added.resonator import (
+    begin_step,
+    keep_bodies,
+    kick_bodies,
+    relax_bodies,
+    remember_bodies,
+)
 from bayesimpact.model.added.world import (
     AHEAD,
     ALPHA,
@@ -59,6 +66,7 @@ def begin_memory(y: Any, v: Any, t: Any, n: Any, h: Any, flow: Any, w: Any) -> A
     for law in range(w.size):
         at = WORK_COLUMNS * law
         w.work[at + FADE] = np.exp(-0.25 * h * w.work[at + LAMBDA])
+    begin_step(h, w)
     kick(0, y, v, t, NOW, n, flow, w)
 
 
@@ -73,6 +81,7 @@ def kick(number: Any, y: Any, v: Any, t: Any, column: Any, n: Any, flow: Any, w:
             rate = law_value(law, LAW_RATE, y, v, t, z, flow.gap, flow.touching, w)
             linear = work[at + ALPHA] * v - work[at + LAMBDA] * z
             work[at + KICK + number] = rate - linear - work[at + X_V] * n * flow.inverse
+    kick_bodies(number, y, v, flow, w)
 
 
 @inner()
@@ -94,6 +103,7 @@ def remember(
                 h, h * e1, h * e2, h * e3, h * e4,
                 work[k], work[k + 1], work[k + 2], work[k + 3], work[k + 4], work[k + 5],
             )  # fmt: skip
+    remember_bodies(number, column, h, w)
 
 
 @inner(forceinline=True)
@@ -102,6 +112,7 @@ def keep_memory(w: Any) -> Any:
     for law in range(w.size):
         if w.laws[LAW_COLUMNS * law + LAW_RATE] != 0:
             w.work[WORK_COLUMNS * law + NOW] = w.work[WORK_COLUMNS * law + AHEAD]
+    keep_bodies(w)
 
 
 @inner()
@@ -109,6 +120,7 @@ def relax(y: Any, v: Any, t: Any, dt: Any, flow: Any, w: Any) -> Any:
     """The laws' states after a flight of dt in which none of them acts."""
     for law in range(w.size):
         relax_one(law, NOW, y, v, t, dt, flow, w)
+    relax_bodies(NOW, y, dt, flow.touching == 1.0, flow.gap, w)
 
 
 @inner(forceinline=True)

@@ -8,40 +8,51 @@ import numpy as np
 
 from bayesimpact.model.added.flows import flow_from
 from bayesimpact.model.added.memory import keep_memory, relax_one
-from bayesimpact.model.added.situation import SLIDING, static_force
-from bayesimpact.model.added.world import AHEAD, FORCE, FRICTION
+from bayesimpact.model.added.resonator import fastest_body, relax_bodies
+from bayesimpact.model.added.second import listens, respond_at_rest
+from bayesimpact.model.added.situation import SECOND_Q, SLIDING, holding_force, static_force
+from bayesimpact.model.added.world import AHEAD, FORCE, NOW
 from bayesimpact.model.compiled import inner
 
 
 @inner()
 def hold(y: Any, t: Any, j: Any, w: Any) -> Any:
     """Rest under dry friction until the other forces exceed it: (t, next sample)."""
-    if w.size == 0 and w.q[FORCE] == 0.0:
+    second = listens(w)
+    if w.size == 0 and w.q[FORCE] == 0.0 and fastest_body(True, w) == 0.0:
         for i in range(j, w.n):
-            w.out[i] = y
+            if second:
+                respond_at_rest(y, t, i * w.interval - t, NOW, w)
+                t = i * w.interval
+            w.out[i] = y + w.s[SECOND_Q]
         return t, w.n
     flow, longest = flow_from(y, 0.0, t, w)
+    most = holding_force(y, t, w)
     while j < w.n:
         h = j * w.interval - t
         cuts = max(int(np.ceil(h / longest)), 1)
         h /= cuts
         force = pull_at(y, t, h, flow, w)
-        if abs(force) > w.q[FRICTION]:
+        if abs(force) > most:
             low, high = 0.0, h
             for _ in range(60):
                 middle = 0.5 * (low + high)
                 force = pull_at(y, t, middle, flow, w)
-                if abs(force) > w.q[FRICTION]:
+                if abs(force) > most:
                     high = middle
                 else:
                     low = middle
             w.s[SLIDING] = np.sign(pull_at(y, t, high, flow, w))
+            if second:
+                respond_at_rest(y, t, high, AHEAD, w)
             keep_memory(w)
             return t + high, j
+        if second:
+            respond_at_rest(y, t, h, AHEAD, w)
         keep_memory(w)
         t += h
         if cuts == 1:
-            w.out[j] = y
+            w.out[j] = y + w.s[SECOND_Q]
             t = j * w.interval
             j += 1
     return t, j
@@ -52,4 +63,5 @@ def pull_at(y: Any, t: Any, dt: Any, flow: Any, w: Any) -> Any:
     """Force on the mass after a rest of dt, N, dry friction apart."""
     for law in range(w.size):
         relax_one(law, AHEAD, y, 0.0, t, dt, flow, w)
+    relax_bodies(AHEAD, y, dt, flow.touching == 1.0, flow.gap, w)
     return static_force(y, t + dt, AHEAD, w)

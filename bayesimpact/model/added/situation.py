@@ -12,13 +12,22 @@ from typing import Any
 
 import numpy as np
 
+from bayesimpact.model.added.resonator import (
+    FRAME,
+    OBSTACLE,
+    begin_bodies,
+    body_force,
+    share_of_frame,
+)
 from bayesimpact.model.added.world import (
+    AHEAD,
     C1,
     C2,
     CONTACT_MASS,
     CONTACT_ONLY,
     FRICTION,
     GAP_STEP,
+    JUMP_AT_TURN,
     K1,
     K2,
     LAW_COLUMNS,
@@ -27,6 +36,8 @@ from bayesimpact.model.added.world import (
     LAW_SURFACE,
     NO_TENSION,
     NOW,
+    SECOND_GAIN,
+    STAGE,
     V0,
     WORK_COLUMNS,
     Y0,
@@ -37,8 +48,11 @@ from bayesimpact.model.added.world import (
 from bayesimpact.model.compiled import inner
 
 # what holds between events: gap, kind of motion, direction of sliding (0: held), direction of
-# motion, whether the obstacle has pushed in this contact, then the side of every law's surface
-GAP, MODE, SLIDING, HEADING, PUSHED, SIDES = range(6)
+# motion, whether the obstacle has pushed in this contact; displacement and velocity of a second
+# mode, and what it keeps for a sampling interval; then the side of every law's surface
+GAP, MODE, SLIDING, HEADING, PUSHED, SECOND_Q, SECOND_P, HOP = range(8)
+JOINT = HOP + 8  # matrices of `joint`, in flight and in contact
+SIDES = JOINT + 2 * (3 + 36)
 FREE, TOUCHING, SEPARATED = 0.0, 1.0, 2.0
 NEVER, SOON, ONCE = 0.0, 0.5, 1.0  # the obstacle has pushed in this contact; SOON: in this step
 NONE, TOUCH, LEAVE, TURN, SURFACE = range(-1, 4)  # SURFACE + i: surface of law i
@@ -66,11 +80,13 @@ def reaction(y: Any, v: Any, t: Any, column: Any, w: Any) -> Any:
     """Force with which the obstacle pushes the mass back, N (negative: it would have to pull)."""
     q = w.q
     obstacle = q[C2] * v + q[K2] * (y - w.s[GAP]) + laws_force(y, v, t, column, True, w)
+    obstacle += body_force(OBSTACLE, y, v, w.s[GAP], column, w)
     if q[CONTACT_MASS] == 0.0:
         return obstacle
     other = q[C1] * v + q[K1] * y + q[FRICTION] * w.s[SLIDING] - forcing(t, q)
-    other += laws_force(y, v, t, column, False, w)
-    return (w.mass * obstacle - q[CONTACT_MASS] * other) / (w.mass + q[CONTACT_MASS])
+    other += laws_force(y, v, t, column, False, w) + body_force(FRAME, y, v, 0.0, column, w)
+    mass = w.mass * (1.0 - share_of_frame(w))
+    return (mass * obstacle - q[CONTACT_MASS] * other) / (mass + q[CONTACT_MASS])
 
 
 @inner(forceinline=True)
@@ -120,6 +136,7 @@ def begin(w: Any) -> Any:
     """Motion and situation at t = 0 from the slots: (y, v)."""
     q, s = w.q, w.s
     y, v = q[Y0], q[V0]
+    begin_bodies(y, v, w)
     s[GAP] = q[G]
     s[SLIDING] = np.sign(v)
     if y > s[GAP]:
@@ -141,16 +158,51 @@ def static_force(y: Any, t: Any, column: Any, w: Any) -> Any:
     """What pulls at the mass at rest, dry friction apart, N; the laws' states stand in `column`."""
     q, s = w.q, w.s
     force = forcing(t, q) - q[K1] * y - laws_force(y, 0.0, t, column, False, w)
+    force -= body_force(FRAME, y, 0.0, 0.0, column, w)
     if s[MODE] == TOUCHING:
         force -= q[K2] * (y - s[GAP]) + laws_force(y, 0.0, t, column, True, w)
+        force -= body_force(OBSTACLE, y, 0.0, s[GAP], column, w)
     return force
+
+
+@inner()
+def point_laws(direction: Any, w: Any) -> Any:
+    """Tell the laws whose force jumps at a turning point which way the motion goes."""
+    for law in range(w.size):
+        if w.laws[LAW_COLUMNS * law + LAW_FLAGS] & JUMP_AT_TURN != 0:
+            at = WORK_COLUMNS * law
+            w.work[at + NOW] = w.work[at + STAGE] = w.work[at + AHEAD] = direction
+
+
+@inner()
+def set_directions(y: Any, v: Any, t: Any, w: Any) -> Any:
+    """The same for the motion that begins here; from rest, where everything else pulls."""
+    direction = np.sign(v)
+    if v == 0.0:
+        point_laws(0.0, w)
+        direction = w.s[SLIDING] if w.q[FRICTION] > 0.0 else np.sign(static_force(y, t, NOW, w))
+    point_laws(direction, w)
+
+
+@inner()
+def holding_force(y: Any, t: Any, w: Any) -> Any:
+    """Force up to which the mass is held at rest, N: dry friction, and laws that jump there."""
+    if w.q[FRICTION] == 0.0:
+        return 0.0
+    point_laws(0.0, w)
+    free = static_force(y, t, NOW, w)
+    point_laws(1.0, w)
+    jump = abs(free - static_force(y, t, NOW, w))
+    point_laws(0.0, w)
+    return w.q[FRICTION] + jump
 
 
 @inner()
 def set_sliding(y: Any, t: Any, w: Any) -> Any:
     """Direction of sliding from a standstill: 0 where dry friction holds the mass."""
+    most = holding_force(y, t, w)
     force = static_force(y, t, NOW, w)
-    w.s[SLIDING] = np.sign(force) if abs(force) > w.q[FRICTION] else 0.0
+    w.s[SLIDING] = np.sign(force) if abs(force) > most else 0.0
 
 
 @inner()
@@ -168,8 +220,10 @@ def resolve(event: Any, y: Any, v: Any, t: Any, w: Any) -> Any:
     q, s = w.q, w.s
     if event == TOUCH:
         if s[MODE] == FREE:
-            y = s[GAP]
-            v *= w.mass / (w.mass + q[CONTACT_MASS])
+            y, before = s[GAP], v
+            mass = w.mass * (1.0 - share_of_frame(w))
+            v *= mass / (mass + q[CONTACT_MASS])
+            s[SECOND_P] += q[SECOND_GAIN] * mass * (before - v)
         s[MODE] = TOUCHING
         s[PUSHED] = ONCE if reaction(y, v, t, NOW, w) > 0.0 else NEVER
         set_sides(y, v, t, w)

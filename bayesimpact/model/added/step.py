@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from bayesimpact.model.added.joint import joint_step
 from bayesimpact.model.added.memory import begin_memory, kick, remember
 from bayesimpact.model.added.method import place_stage, stage
+from bayesimpact.model.added.resonator import bodies_push
 from bayesimpact.model.added.world import (
     AHEAD,
     LAW_FORCE,
@@ -35,6 +37,8 @@ def push(y: Any, v: Any, t: Any, column: Any, flow: Any, w: Any) -> Any:
             law = w.acting[k]
             z = w.work[WORK_COLUMNS * law + column]
             force -= law_value(law, LAW_FORCE, y, v, t, z, flow.gap, flow.touching, w)
+    if flow.bodies:
+        force += bodies_push(column, flow.touching == 1.0, w)
     return force + forcing(t, w.q) if flow.forced else force
 
 
@@ -44,6 +48,9 @@ def step(y: Any, v: Any, t: Any, n0: Any, at: Any, flow: Any, w: Any) -> Any:
 
     n0 is `push` at the start; `at` are the `Quarters` of the step.
     """
+    if flow.joint:
+        y_end, v_end = joint_step(y, v, at.h, flow, w)
+        return y_end, v_end, push(y_end, v_end, t + at.h, AHEAD, flow, w)
     u, rest, h = y - flow.rest, flow.rest, at.h
     m, Ku = v + 2.0 * flow.b * u, flow.K * u
     y_end, v_end = rest + at.D4 * u + at.S4 * m, at.D4 * v - at.S4 * Ku

@@ -12,12 +12,17 @@ from bayesimpact.model.compiled import inner
 # slots of q: bayesimpact.model.parameters.SLOTS
 C1, K1, C2, G, K2, Y0, V0, FORCE, OMEGA, PHASE, OFFSET = range(11)
 FRICTION, CONTACT_MASS, NO_TENSION, GAP_STEP = range(11, 15)
+SECOND_FREQUENCY, SECOND_DAMPING, SECOND_GAIN = range(15, 18)
+OBSTACLE_MASS, OBSTACLE_FREQUENCY, OBSTACLE_DAMPING = range(18, 21)
+FRAME_RATIO, FRAME_FREQUENCY, FRAME_DAMPING = range(21, 24)
 # columns of the table of laws, and its flags: bayesimpact.model.effects.effect.law_row
 LAW_FORCE, LAW_RATE, LAW_SURFACE, LAW_FLAGS = range(4)
 LAW_FIRST, LAW_PACE, LAW_GRAIN, LAW_COLUMNS = range(4, 8)
 CONTACT_ONLY, KINK_AT_TURN, ROUGH_AT_TOUCH, POLYNOMIAL, PLACED = 1, 2, 4, 8, 16
-# columns of the work array, one row per law: the law's state at the start of a step, at a stage and
-# at the end; the kicks of six stages; exp(-lambda h / 4), lambda, alpha, x_u, x_v
+ROUGH_AT_TURN, JUMP_AT_TURN = 32, 64
+# columns of the work array, one row per law and two per body of `resonator`: a law's state at the
+# start of a step, at a stage and at the end; the kicks of six stages; exp(-lambda h / 4), lambda,
+# alpha, x_u, x_v
 NOW, STAGE, AHEAD, KICK = 0, 1, 2, 3
 FADE, LAMBDA, ALPHA, X_U, X_V, WORK_COLUMNS = range(9, 15)
 
@@ -36,7 +41,7 @@ class World(NamedTuple):
     base: Any  # address of q
     laws: Any  # (L, LAW_COLUMNS)
     acting: Any  # (L,) the laws that act in the present kind of motion come first
-    work: Any  # (L, WORK_COLUMNS)
+    work: Any  # (L + resonator.ROWS, WORK_COLUMNS)
     s: Any  # what holds between events, see `situation`
 
 
@@ -58,6 +63,10 @@ class Flow(NamedTuple):
     forced: Any  # True when the slots' harmonic force acts
     turns: Any  # True when a force has a kink or jump at v = 0
     rough: Any  # True when a force is not smooth at the touch
+    rough_turn: Any  # True when a force is not smooth where the motion turns
+    bodies: Any  # True when a body of `resonator` acts
+    joint: Any  # True when nothing else is added, so that `joint` is exact
+    hop: Any  # usual length of its steps, s
 
 
 @inner(forceinline=True)

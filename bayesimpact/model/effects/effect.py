@@ -6,11 +6,15 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
+from importlib import import_module
+from importlib.util import find_spec
 from types import MappingProxyType
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from bayesimpact.data.frozen import Picklable
 
 Scope = Literal["campaign", "case", "recording"]
 Where = Literal["everywhere", "contact"]
@@ -32,6 +36,7 @@ class Scales:
     impacts : largest number of impacts in a recording
     gap : g (0 without a stop)
     cases, recordings : how many there are
+    angle : the recordings are of an angle, rad
     """
 
     mass: float
@@ -49,6 +54,7 @@ class Scales:
     gap: float = 0.0
     cases: int = 1
     recordings: int = 1
+    angle: bool = False
 
     @property
     def force(self) -> float:
@@ -85,7 +91,7 @@ class EffectParameter:
     name, unit : unit for displacements; `bayesimpact.model.parameters.angular` translates
     scale : size that would be plausible, from the campaign's scales: the prior is half-normal
         (normal when both signs are admissible) about `null` with this scale; for a shape parameter
-        the prior is log-normal about it
+        the prior is log-normal about it, or log-uniform between two positive bounds
     lower, upper : physical bounds
     null : value at which the effect vanishes; None for a shape parameter (a depth, a time constant,
         a frequency), which means nothing while the amplitude is at its null
@@ -140,6 +146,10 @@ class Law:
     pace : fastest rate at which the force depends on time explicitly, rad/s; steps resolve it
     kink_at_turn : the force has a kink at v = 0; steps end on turning points
     rough_at_touch : the force is continuous but not smooth at d = 0; steps begin small there
+    rough_at_turn : the force is continuous but not smooth at v = 0 (a root of the speed): steps end
+        on turning points, and are small around them
+    jump_at_turn : the force jumps at v = 0; steps end on turning points, and z, of which the
+        law then has no use of its own, is the direction of the motion: -1, 1, or 0 at rest
     polynomial : between its kinks the force is a polynomial of low degree of y and v, and of sines
         of time no faster than `pace`: it has no features that a look at four points of a swing
         misses, so steps may be longer where it is weak
@@ -159,6 +169,8 @@ class Law:
     grain: Callable[..., float] | None = None
     kink_at_turn: bool = False
     rough_at_touch: bool = False
+    rough_at_turn: bool = False
+    jump_at_turn: bool = False
     polynomial: bool = False
     ignores_speed: bool = False
 
@@ -172,7 +184,7 @@ Observe = Callable[
 
 
 @dataclass(frozen=True)
-class Effect:
+class Effect(Picklable):
     """One physical effect that the base model leaves out.
 
     It acts in one or more of four ways: `law` adds a force; `binds` feeds its parameters into slots
@@ -211,6 +223,12 @@ class Effect:
     condition: Callable[[Scales], bool] | None = None
     size: Callable[[Numbers, Scales], Size] | None = None
 
+    def __reduce_ex__(self, protocol: Any) -> Any:
+        """Pickle an effect of the catalogue by its id: its functions cannot be pickled."""
+        if _catalogued(self.id) is self:
+            return _catalogued, (self.id,)
+        return super().__reduce_ex__(protocol)
+
     def admissible(self, scales: Scales) -> bool:
         """True when a campaign of these scales could show the effect at all."""
         if self.needs_stop and scales.impacts == 0:
@@ -225,11 +243,21 @@ class Effect:
         raise KeyError(f"{self.id} has no parameter {name!r}")
 
 
+def _catalogued(id: str) -> Effect | None:
+    """The catalogue's effect of that id; None when there is none."""
+    name = f"{__package__}.{id}"
+    if not id.isidentifier() or find_spec(name) is None:
+        return None
+    effect: Effect | None = getattr(import_module(name), "EFFECT", None)
+    return effect
+
+
 def law_row(law: Law, first: int) -> list[int]:
     """A law's row in the general simulator's table; its parameters begin at slot `first`."""
     functions = (law.force, law.rate, law.surface)
     flags = (law.where == "contact") + 2 * law.kink_at_turn + 4 * law.rough_at_touch
     flags += 8 * law.polynomial + 16 * law.ignores_speed
+    flags += 32 * law.rough_at_turn + 64 * law.jump_at_turn
     extents = (law.pace, law.grain)
     force, rate, surface, pace, grain = (address(f) if f else 0 for f in (*functions, *extents))
     return [force, rate, surface, flags, first, pace, grain]

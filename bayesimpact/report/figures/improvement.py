@@ -74,7 +74,7 @@ def _spectrum(axis: Axes, spectrum: Array) -> None:
     axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
     axis.xaxis.set_major_formatter("{x:g}")
     axis.xaxis.set_minor_formatter(NullFormatter())
-    if spectrum[:, 1:3].max() > 5:
+    if spectrum[:, 1:3].max(initial=0.0) > 5:
         axis.set_yscale("log")
     axis.set_xlabel("frequency (Hz)")
     axis.set_ylabel("power over that of the noise")

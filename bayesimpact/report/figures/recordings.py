@@ -84,6 +84,10 @@ def _page(results: Results, recordings: Sequence[RecordingResult]) -> Figure:
         _motion(near, results, recording, dots=True)
         _residual(below, results, recording, limit)
         _residual(near_below, results, recording, limit)
+        for first, past in recording.excluded:
+            for axis in (whole, below, near, near_below):
+                span = ((first - 1) * recording.interval, past * recording.interval)
+                axis.axvspan(*span, color=GREY, alpha=0.3, lw=0.8)
         start, end, words = close_up(results, recording)
         whole.set_xlim(0, recording.times[-1])
         near.set_xlim(start, end)
@@ -177,6 +181,6 @@ def _residual(axis: Axes, results: Results, recording: RecordingResult, limit: f
     band = 2 * recording.noise_rms * shown.scale
     for level in (-band, band):
         axis.axhline(level, color=ORANGE, lw=0.9, label="± 2 standard deviations of the noise")
-    if limit > 0:
+    if 0 < limit < np.inf:
         axis.set_ylim(-limit * shown.scale, limit * shown.scale)
     axis.set_ylabel(label("residual\n", shown.unit).replace("\n ", "\n"))

@@ -28,6 +28,9 @@ CONTRACT = {
     "contact_no_tension": [],
     "contact_relaxation": ["stiffness", "time"],
     "obstacle_mass": ["mass"],
+    "obstacle_mode": ["mass", "frequency", "damping"],
+    "base_motion": ["frequency", "damping", "mass_ratio"],
+    "second_mode": ["frequency", "damping", "gain"],
     "gap_wear": ["step"],
     "gap_per_recording": ["g[recording]"],
     "coulomb_friction": ["force"],
@@ -42,16 +45,24 @@ CONTRACT = {
     "sensor_cubic": ["gain"],
     "sensor_hum": ["amplitude", "frequency", "phase[recording]"],
     "smoothing": ["time_constant"],
+    "pendulum_sine": [],
+    "pendulum_with_spring": ["stiffness"],
+    "spring_quintic": ["stiffness"],
+    "power_damping": ["coefficient", "exponent"],
+    "structural_damping": ["loss"],
 }
 DISSIPATIVE = {
     "contact_damping_indentation.coefficient", "contact_damping_speed.coefficient",
     "contact_relaxation.stiffness", "contact_second_stage.stiffness", "obstacle_mass.mass",
     "gap_wear.step", "coulomb_friction.force", "quadratic_drag.coefficient",
-    "opposite_stop.stiffness",
+    "opposite_stop.stiffness", "power_damping.coefficient", "structural_damping.loss",
+    "obstacle_mode.mass", "base_motion.mass_ratio",
 }  # fmt: skip
+OF_ANGLES = {"pendulum_sine", "pendulum_with_spring"}
 SIGNED = {
     "contact_hardening.stiffness", "spring_quadratic.stiffness", "spring_cubic.stiffness",
     "stiffness_drift.rate", "sensor_drift.rate", "sensor_quadratic.gain", "sensor_cubic.gain",
+    "spring_quintic.stiffness", "second_mode.gain",
 }  # fmt: skip
 
 
@@ -120,10 +131,12 @@ def test_priors_scale_with_the_rig(effect):
     }
     theirs = Scales(**scaled, impacts=ours.impacts, cases=ours.cases, recordings=ours.recordings)
     units = {"N": (1, 1, -2), "s": (0, 0, 1), "s2": (0, 0, 2), "m": (1, 0, 0), "kg": (0, 1, 0),
-             "m2": (2, 0, 0), "m3": (3, 0, 0), "1": (0, 0, 0), "-": (0, 0, 0), "rad": (0, 0, 0),
-             "Hz": (0, 0, -1)}  # fmt: skip
+             "m2": (2, 0, 0), "m3": (3, 0, 0), "m5": (5, 0, 0), "1": (0, 0, 0), "-": (0, 0, 0),
+             "rad": (0, 0, 0), "Hz": (0, 0, -1), "s1.5": (0, 0, 1.5),
+             "m1.5": (1.5, 0, 0)}  # fmt: skip
     for parameter in effect.parameters:
-        above, _, below = parameter.unit.partition("/")
+        unit = parameter.unit.replace("N (s/m)^n", "N s1.5/m1.5")  # at the middle of the exponents
+        above, _, below = unit.partition("/")
         power = np.zeros(3)
         for part, sign in ((above, 1), (below, -1)):
             for word in part.split():
@@ -140,16 +153,19 @@ def test_priors_scale_with_the_rig(effect):
 def test_shapes_have_grids_within_their_bounds():
     scales = TestRig().scales()
     for effect in EFFECTS:
-        for parameter in effect.parameters:
-            assert parameter.is_shape == (parameter.grid is not None)
-            if parameter.grid is not None:
-                values = parameter.grid(scales)
-                assert values.size >= 4
-                assert np.all((values >= parameter.lower) & (values <= parameter.upper))
+        shapes = [p for p in effect.parameters if p.is_shape]
+        assert shapes == [p for p in effect.parameters if p.grid is not None]
+        grids = [p.grid(scales) for p in shapes if p.grid is not None]
+        assert not shapes or max(values.size for values in grids) >= 4
+        for parameter, values in zip(shapes, grids, strict=True):
+            assert values.size >= 2
+            assert np.all((values >= parameter.lower) & (values <= parameter.upper))
 
 
 def test_admissible_only_where_it_could_show():
     scales = TestRig().scales()
+    assert {e.id for e in EFFECTS if not e.admissible(scales)} == OF_ANGLES
+    scales = replace(scales, angle=True)
     assert all(effect.admissible(scales) for effect in EFFECTS)
     silent = replace(scales, impacts=0)
     assert {e.id for e in EFFECTS if e.admissible(silent)} == {
@@ -172,6 +188,10 @@ def test_families_hold_the_near_neighbours():
         ("spring_cubic", "opposite_stop"),
         ("obstacle_mass", "contact_relaxation"),
         ("coulomb_friction", "quadratic_drag"),
+        ("quadratic_drag", "power_damping"),
+        ("power_damping", "structural_damping"),
+        ("spring_cubic", "pendulum_sine"),
+        ("spring_cubic", "spring_quintic"),
     ):
         assert any(set(pair) <= family for family in families.values())
 

@@ -35,6 +35,16 @@ COMBINATIONS = (
     ("stiffness_drift", "contact_hardening", "gap_per_recording"),
     ("obstacle_mass", "contact_damping_indentation", "gap_wear", "spring_quadratic"),
     ("contact_relaxation", "contact_damping_per_case", "spring_cubic", "quadratic_drag"),
+    ("structural_damping", "obstacle_mass", "contact_relaxation"),
+    ("power_damping", "spring_quintic", "contact_power_law"),
+    ("structural_damping", "coulomb_friction", "harmonic_forcing"),
+    ("second_mode", "contact_power_law"),
+    ("second_mode", "coulomb_friction"),
+    ("obstacle_mode", "base_motion", "contact_no_tension", "quadratic_drag"),
+    ("second_mode", "obstacle_mode", "coulomb_friction", "gap_wear"),
+    ("base_motion", "obstacle_mass", "second_mode", "spring_cubic"),
+    ("second_mode", "obstacle_mass", "contact_relaxation", "coulomb_friction"),
+    ("second_mode", "contact_second_stage", "harmonic_forcing", "gap_wear"),
 )
 
 
@@ -51,7 +61,8 @@ def test_naive_twin(effect):
     values = typical(effect, PAPER)
     ours, theirs = moved([effect], values, PAPER), by_hand([effect], values, PAPER)
     assert np.abs(ours - theirs).max() < TOLERANCE
-    if effect.id != "contact_damping_per_case":  # of which this is the first case
+    # but of the first, of which this is the first case, and of pendulums, which hardly swing here
+    if effect.id not in ("contact_damping_per_case", "pendulum_sine", "pendulum_with_spring"):
         assert np.abs(ours - moved([], {}, PAPER)).max() > 1e3 * TOLERANCE
 
 
@@ -73,7 +84,7 @@ def test_combinations(names):
         assert np.abs(difference).max() < TOLERANCE
 
 
-@pytest.mark.parametrize("names", COMBINATIONS[:4], ids="+".join)
+@pytest.mark.parametrize("names", COMBINATIONS[:4] + COMBINATIONS[9:15], ids="+".join)
 def test_combinations_by_hand(names):
     effects, values = combined(names, PAPER)
     difference = moved(effects, values, PAPER) - by_hand(effects, values, PAPER)

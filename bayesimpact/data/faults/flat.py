@@ -1,0 +1,96 @@
+"""Runs of equal readings, the step of the readings, and how long a run may naturally be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayesimpact.data.faults.fault import Array
+from bayesimpact.data.gaps import runs
+
+NEIGHBOURS = 4  # samples on either side of a run from which its slope there is taken
+
+
+@dataclass(frozen=True)
+class Flat:
+    """A run of equal readings.
+
+    Attributes
+    ----------
+    first, end : first and last-plus-one sample
+    value : the reading
+    slope : the gentler of the mean slopes on either side, per sample, absolute
+    jump : the larger of the steps into the run and out of it, absolute
+    """
+
+    first: int
+    end: int
+    value: float
+    slope: float
+    jump: float
+
+    @property
+    def size(self) -> int:
+        """Samples in the run."""
+        return self.end - self.first
+
+    @property
+    def missed(self) -> float:
+        """How far a motion with this slope at its ends gets within the run and back, at least.
+
+        A parabola that enters with slope s turns within r samples at a height of s r / 4.
+        """
+        return 0.25 * self.slope * self.size
+
+
+def flats(samples: Array, least: int) -> list[Flat]:
+    """Runs of `least` or more equal readings of samples (n,)."""
+    equal = np.diff(samples) == 0.0
+    found = []
+    for first, last in runs(equal):
+        end = last + 1
+        if end - first < least:
+            continue
+        slopes, jumps = [], []
+        if first > 0:
+            k = min(NEIGHBOURS, first)
+            slopes.append(abs(samples[first] - samples[first - k]) / k)
+            jumps.append(abs(samples[first] - samples[first - 1]))
+        if end < samples.size:
+            k = min(NEIGHBOURS, samples.size - end)
+            slopes.append(abs(samples[end - 1 + k] - samples[end - 1]) / k)
+            jumps.append(abs(samples[end] - samples[end - 1]))
+        slope, jump = float(min(slopes, default=0.0)), float(max(jumps, default=0.0))
+        found.append(Flat(first, end, float(samples[first]), slope, jump))
+    return found
+
+
+def reading_step(samples: Array) -> float:
+    """The step that the readings are multiples of: the usual smallest distance of two readings.
+
+    The median of the distances between neighbours among the values that occur, less what rounding
+    in the file adds; 0 for readings that are all different.
+    """
+    values = np.unique(samples)
+    if values.size < 3 or values.size > 0.5 * samples.size:
+        return 0.0
+    return float(np.median(np.diff(values)))
+
+
+def last_digit(samples: Array) -> float:
+    """The smallest distance of two readings but for rounding errors: a step, or a file's digit."""
+    values = np.diff(np.unique(samples))
+    real = values[values > 1e-9 * float(np.ptp(samples))]
+    return float(np.percentile(real, 1.0)) if real.size else 0.0
+
+
+def equal_share(samples: Array) -> float:
+    """How often two neighbours are equal, but for the longest runs (a half per cent of samples)."""
+    equal = np.diff(samples) == 0.0
+    if not equal.any():
+        return 0.0
+    lengths = np.sort([end - first for first, end in runs(equal)])[::-1]
+    spare = 0.005 * samples.size
+    ordinary = lengths[np.cumsum(lengths) > spare] if lengths[0] < 4 else lengths[lengths < 4]
+    return float(ordinary.sum() / max(equal.size, 1))

@@ -1,0 +1,81 @@
+"""`recording_held`: a reading repeated while the motion went on, zeros, a dead tail."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bayesimpact.data.faults.fault import (
+    FALSE_ALARM,
+    Fault,
+    amount,
+    excluded,
+    file_time,
+    times_of,
+)
+from bayesimpact.data.faults.flat import Flat, equal_share, flats, last_digit
+from bayesimpact.data.recording import Recording
+
+LEAST = 5  # equal readings in a row
+MISSED = 4.0  # reading steps that a motion would have made within the run, or at once after
+COARSE = 0.02  # of neighbours equal: from here on a decayed motion ends in equal readings
+
+
+def find_held(recording: Recording) -> list[Fault]:
+    """Runs of equal readings that neither noise nor rounding explains.
+
+    Two equal neighbours have a probability p, taken from the recording; a run of r has n p^(r - 1).
+    A run must also hide a motion of four steps of the readings, or end in such a jump, or
+    reach to the end.
+    """
+    x = recording.samples
+    share = equal_share(x)
+    step = last_digit(x)
+    level = float(np.ptp(x))
+    chosen: list[Flat] = []
+    for run in flats(x, LEAST):
+        chance = x.size * max(share, 1.0 / x.size) ** (run.size - 1)
+        if chance > FALSE_ALARM:
+            continue
+        if max(run.missed, run.jump) < MISSED * step and not (run.end == x.size and share < COARSE):
+            continue
+        if _at_extreme(x, run, level):
+            continue
+        chosen.append(run)
+    if not chosen:
+        return []
+    spans = tuple((run.first, run.end) for run in chosen)
+    longest = max(chosen, key=lambda run: run.size)
+    count = sum(run.size for run in chosen)
+    dead = chosen[-1].end == x.size
+    log_chance = np.log10(x.size) + (longest.size - 1) * np.log10(max(share, 1.0 / x.size))
+    what = (
+        "zeros"
+        if longest.value == 0.0
+        else f"readings held at {amount(longest.value, recording.unit)}"
+    )
+    place = "until the end" if dead and len(chosen) == 1 else f"in {len(chosen)} place(s)"
+    tail = chosen[-1]
+    alone = dead and len(chosen) == 1
+    return [
+        Fault(
+            id="recording_held",
+            recording=recording.name,
+            spans=spans,
+            start_s=file_time(recording, spans[0][0]),
+            end_s=file_time(recording, spans[-1][1] - 1),
+            size=float(count),
+            unit="samples",
+            statement=f"{count} {what} {place}, at {times_of(recording, spans)}",
+            remedy=f"end_s = {file_time(recording, tail.first - 0.6):.9g}"
+            if alone
+            else excluded(recording, spans),
+            strength=float(-log_chance),
+            threshold=float(-np.log10(FALSE_ALARM)),
+            action="cut" if alone else "exclude",
+        )
+    ]
+
+
+def _at_extreme(x: np.ndarray, run: Flat, level: float) -> bool:
+    """Whether a run lies at the largest or smallest reading, where clipping is the better word."""
+    return level > 0 and (run.value == x.max() or run.value == x.min())

@@ -1,0 +1,143 @@
+"""`recording_slip`: samples lost or written twice, so that the motion jumps in phase."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from bayesimpact.data.faults.fault import (
+    FALSE_ALARM,
+    Array,
+    Fault,
+    amount,
+    file_time,
+    gaussian_threshold,
+)
+from bayesimpact.data.faults.flat import equal_share
+from bayesimpact.data.faults.local import best_form, foretell, robust_sd
+from bayesimpact.data.gaps import runs
+from bayesimpact.data.period import rough_period
+from bayesimpact.data.recording import Recording
+
+USUAL = 99.0  # percentile of the statistic that the motion alone may reach
+BEYOND = 3.0  # times that percentile
+BENDS = 3.0  # samples: how far a corner of the motion within a few samples may displace both sides
+MOST = 3  # slips: more jumps than this are the signal
+REPEATED = 3  # samples of a block written twice, at least
+LONGEST = 200  # samples of such a block
+COARSE = 0.02  # of neighbours equal: from here on equal blocks are the step's
+
+
+def find_slips(recording: Recording) -> list[Fault]:
+    """Places where both sides are smooth and do not meet.
+
+    The statistic is the distance of the two extrapolations half way between two samples, over the
+    bulk of such distances. A corner keeps the displacement and may only shift it by its change of
+    slope times a few samples; besides, three times the 99th percentile over the recording has to be
+    passed, which is what corners of the motion reach. The remedy keeps the longest part without a
+    slip: how many samples are missing need then not be known.
+    """
+    x = recording.samples
+    form = best_form(x, rough_period(x, 1.0))
+    sides = foretell(x, form, 0, -0.5)
+    jump = np.abs(sides.after - sides.before)
+    jump = np.where(np.isfinite(jump), jump, 0.0)
+    if recording.used is not None:
+        touched = np.convolve(~recording.used, np.ones(2 * form[1] + 1), mode="same") > 0.5
+        jump[touched] = 0.0
+    level = robust_sd(jump[jump > 0.0])
+    if level == 0.0:
+        return []
+    least = gaussian_threshold(x.size)
+    bend = np.abs(sides.slope_after - sides.slope_before)
+    usual = float(np.percentile(jump, USUAL))
+    strong = (jump > max(least * level, BEYOND * usual)) & (jump > BENDS * np.nan_to_num(bend))
+    places = [
+        p for p in _peaks(jump, strong, form[1]) if _both_sides_hold(x, p, form, level, least)
+    ]
+    places = _apart([*places, *_written_twice(x)], form[1])
+    if not places or len(places) > MOST:
+        return []
+    return [_fault(recording, places, jump, level, least)]
+
+
+def _written_twice(x: Array) -> list[int]:
+    """First sample of every block that repeats the readings just before it, digit by digit."""
+    share = equal_share(x)
+    if share > COARSE:
+        return []
+    chance = np.log(FALSE_ALARM / (x.size * LONGEST))
+    least = max(REPEATED, int(np.ceil(chance / np.log(share + 1 / x.size))))
+    places = []
+    for lag in range(2, min(LONGEST, x.size // 4)):
+        for first, end in runs(x[lag:] == x[:-lag]):
+            if end - first >= max(least, lag) and np.unique(x[first:end]).size > 1:
+                places.append(first + lag)
+    return places
+
+
+def _apart(places: list[int], reach: int) -> list[int]:
+    """Places further apart than a reach, the first of every group."""
+    kept: list[int] = []
+    for place in sorted(places):
+        if not kept or place - kept[-1] > reach:
+            kept.append(place)
+    return kept
+
+
+def _peaks(jump: Array, strong: np.ndarray, reach: int) -> list[int]:
+    """The largest of every group of strong jumps closer than twice the reach."""
+    places: list[int] = []
+    for i in np.flatnonzero(strong):
+        if places and i - places[-1] <= 2 * reach:
+            if jump[i] > jump[places[-1]]:
+                places[-1] = int(i)
+        else:
+            places.append(int(i))
+    return places
+
+
+def _both_sides_hold(
+    x: Array, place: int, form: tuple[int, int], level: float, least: float
+) -> bool:
+    """Whether the samples next to the jump follow from their own side."""
+    ahead = foretell(x, form, 1, 0.0)
+    near = range(2)
+    left = [x[place - 1 - k] - ahead.before[place - 1 - k] for k in near]
+    right = [x[place + k] - ahead.after[place + k] for k in near]
+    sides = foretell(x, form, 0, -0.5)
+    size = abs(float(sides.after[place] - sides.before[place]))
+    return bool(np.nanmax(np.abs([*left, *right])) < max(2 * least * level, 0.25 * size))
+
+
+def _fault(
+    recording: Recording, places: list[int], jump: Array, level: float, least: float
+) -> Fault:
+    size = recording.samples.size
+    edges = [0, *places, size]
+    parts = list(itertools.pairwise(edges))
+    first, end = max(parts, key=lambda part: part[1] - part[0])
+    spans = tuple(span for span in ((0, first), (end, size)) if span[1] > span[0])
+    keys = []
+    if first > 0:
+        keys.append(f"start_s = {file_time(recording, first - 0.4):.9g}")
+    if end < size:
+        keys.append(f"end_s = {file_time(recording, end - 0.6):.9g}")
+    worst = max(places, key=lambda p: jump[p])
+    named = ", ".join(f"{file_time(recording, p - 0.5):.6g} s (sample {p})" for p in places)
+    return Fault(
+        id="recording_slip",
+        recording=recording.name,
+        spans=spans,
+        start_s=file_time(recording, places[0] - 1),
+        end_s=file_time(recording, places[-1]),
+        size=float(jump[worst]),
+        unit=recording.unit,
+        statement=f"the motion jumps by {amount(float(jump[worst]), recording.unit)} at {named}: "
+        "samples lost or written twice",
+        remedy="\n".join(keys),
+        strength=float(jump[worst] / level),
+        threshold=least,
+        action="cut",
+    )

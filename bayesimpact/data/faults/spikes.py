@@ -1,0 +1,104 @@
+"""`recording_spikes`: readings that neither their past nor their future foretells."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bayesimpact.data.faults.fault import (
+    Array,
+    Fault,
+    Span,
+    amount,
+    excluded,
+    file_time,
+    gaussian_threshold,
+    times_of,
+)
+from bayesimpact.data.faults.local import best_form, foretell, robust_sd
+from bayesimpact.data.period import rough_period
+from bayesimpact.data.recording import Recording
+
+LONGEST = 5  # samples of one spike
+AGREE = 0.5  # of the deviation: how far both sides may differ where neither knows of a corner
+USUAL = 97.0  # percentile of a statistic that the motion alone may reach
+BEYOND = 4.0  # times that percentile
+MOST = 0.01  # of the samples: more deviations than this are the signal
+
+
+def find_spikes(recording: Recording) -> list[Fault]:
+    """Up to five samples in a row far off what both sides foretell alike; impacts are none.
+
+    The statistic is the smaller of the deviations from either side over the bulk of such
+    deviations. It has to pass the Gaussian threshold and four times the 97th percentile over the
+    recording, which is what the corners of the motion itself reach.
+    """
+    x = recording.samples
+    period = rough_period(x, 1.0)
+    form = best_form(x, period)
+    least = gaussian_threshold(x.size * LONGEST)
+    found: list[tuple[float, float, Span]] = []
+    for width in range(1, LONGEST + 1):
+        for strength, size, span in _of_width(x, form, width, least):
+            found.append((strength, size, span))
+    spans: list[tuple[float, float, Span]] = []
+    for strength, size, (first, end) in sorted(found, reverse=True):
+        if all(end + 1 < a or first > b + 1 for _, _, (a, b) in spans):
+            spans.append((strength, size, (first, end)))
+    count = sum(end - first for _, _, (first, end) in spans)
+    if not spans or count > max(MOST * x.size, LONGEST):
+        return []
+    spans.sort(key=lambda one: one[2])
+    places = tuple(span for _, _, span in spans)
+    largest = max(abs(size) for _, size, _ in spans)
+    noun = "spike" if len(places) == 1 else f"{len(places)} spikes"
+    return [
+        Fault(
+            id="recording_spikes",
+            recording=recording.name,
+            spans=places,
+            start_s=file_time(recording, places[0][0]),
+            end_s=file_time(recording, places[-1][1] - 1),
+            size=largest,
+            unit=recording.unit,
+            statement=f"{noun} of up to {amount(largest, recording.unit)} at "
+            f"{times_of(recording, places)}",
+            remedy=excluded(recording, places),
+            strength=max(strength for strength, _, _ in spans),
+            threshold=least,
+        )
+    ]
+
+
+def _of_width(
+    x: Array, form: tuple[int, int], width: int, least: float
+) -> list[tuple[float, float, Span]]:
+    """Strength, size and span of spikes of exactly `width` samples."""
+    deviation = np.full((width, x.size), np.nan)
+    differ = np.zeros(x.size)
+    for k in range(width):
+        sides = foretell(x, form, width, float(k))
+        here = np.full(x.size, np.nan)
+        here[: x.size - k] = x[k:]
+        left, right = here - sides.before, here - sides.after
+        same = np.sign(left) == np.sign(right)
+        smaller = np.where(np.abs(left) < np.abs(right), left, right)
+        deviation[k] = np.where(np.isfinite(left + right), np.where(same, smaller, 0.0), np.nan)
+        differ = np.maximum(differ, np.abs(left - right))
+        if k == 0:
+            bend = sides.slope_after - sides.slope_before
+            outside = left * bend > 0
+    weakest = np.min(np.abs(deviation), axis=0)
+    one_sign = np.abs(np.sign(deviation).sum(axis=0)) == width
+    statistic = np.where(one_sign, weakest, 0.0)
+    statistic[~np.isfinite(weakest)] = 0.0
+    level = robust_sd(left)  # of the sample furthest ahead
+    usual = np.percentile(statistic, USUAL)
+    if level == 0.0:
+        return []
+    # where the motion is bent within few samples it lies inside both extrapolations
+    bent = outside & (statistic < np.abs(bend) * (width + 1))
+    strong = (statistic > max(least * level, BEYOND * usual)) & (differ < AGREE * statistic) & ~bent
+    return [
+        (float(statistic[i] / level), float(deviation[0, i]), (int(i), int(i + width)))
+        for i in np.flatnonzero(strong)
+    ]

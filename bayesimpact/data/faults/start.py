@@ -1,0 +1,90 @@
+"""`recording_start`: rest before the release, or a hand that still moves the mass."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from bayesimpact.data.faults.fault import Array, Fault, amount, file_time
+from bayesimpact.data.faults.flat import reading_step
+from bayesimpact.data.period import noise_level, rough_period
+from bayesimpact.data.recording import Recording
+
+BAND = 5.0  # standard deviations of the noise, or two steps, about the first reading
+NATURAL = 3.0  # times as long as a free motion stays in that band at a turning point
+SHORTEST = 0.08  # of a period
+LATE = 1.1  # of a period: a free decay is largest before
+WIDE = 11  # samples of a running median: spikes of five do not show in it
+UNCROSSED = 0.75  # of a period: a free motion passes its rest within half a period
+GROWTH = 1.3  # largest excursion over what came before it on the same side
+
+
+def find_start(recording: Recording) -> list[Fault]:
+    """The sample from which on the motion can be a free decay, where that is not the first one.
+
+    Rest: the readings keep to the first one for longer than a free motion can about a turning
+    point, sqrt(2 b / A) of a radian for a band b and an amplitude A. Hand: the largest excursion
+    comes late and exceeds what came before on its side; the free decay begins where it is left.
+    """
+    x = median_filter(recording.samples, WIDE, mode="nearest")  # blind to spikes
+    if recording.used is not None and not recording.used[:3].all():
+        return []
+    period = rough_period(x, 1.0)
+    if period is None:
+        return []
+    noise, step = noise_level(recording.samples), reading_step(recording.samples)
+    band = max(BAND * noise, 2.0 * step, 1e-9 * float(np.ptp(x)))
+    settled = float(np.median(x[x.size // 2 :]))
+    peak = int(np.argmax(np.abs(x - settled)))
+    height = abs(float(x[peak] - settled))
+    natural = np.sqrt(2.0 * band / max(height, band)) * period / (2 * np.pi)
+    least = max(NATURAL * natural, SHORTEST * period)
+    hand = _grown(x - settled, peak, period)
+    rest = _leaves(x, peak if hand else 0, band)
+    if not hand and rest <= least:
+        return []
+    first = rest if not hand else max(rest, peak)
+    if first > 0.7 * x.size:
+        return []
+    kind = "the motion is not yet free" if hand else "at rest"
+    return [
+        Fault(
+            id="recording_start",
+            recording=recording.name,
+            spans=((0, first),),
+            start_s=file_time(recording, 0),
+            end_s=file_time(recording, first - 1),
+            size=first * recording.interval,
+            unit="s",
+            statement=f"{kind} for the first {first * recording.interval:.3g} s ({first} samples); "
+            f"released from {amount(float(x[first]), recording.unit)}",
+            remedy=f"start_s = {file_time(recording, first - 0.4):.9g}",
+            strength=first / max(least, 1.0),
+            threshold=1.0,
+            action="cut",
+        )
+    ]
+
+
+def _leaves(x: Array, first: int, band: float) -> int:
+    """First sample from `first` on that leaves a band about the reading there, for good."""
+    about = float(np.median(x[first : first + 3]))
+    outside = np.abs(x[first:] - about) > band
+    twice = outside[:-1] & outside[1:]
+    return first + (int(np.argmax(twice)) if twice.any() else x.size - first)
+
+
+def _grown(centred: Array, peak: int, period: float) -> bool:
+    """Whether the largest excursion was reached by a pull, or exceeds all that came before it.
+
+    A pull: longer than a free motion takes, the rest was not passed on the way.
+    """
+    if peak < LATE * period:
+        return False
+    side = np.sign(centred[peak])
+    height = abs(centred[peak])
+    way = side * centred[int(peak - UNCROSSED * period) : peak]
+    if way.min() > -0.02 * height:
+        return True
+    before = side * centred[: max(int(peak - 0.5 * period), 1)]
+    return bool(height > GROWTH * max(float(before.max()), 0.0))

@@ -1,0 +1,185 @@
+"""Samples that are set aside: which they are, and what stands in their place.
+
+What needs a whole recording to start from (a period, turning points, start values) finds a smooth
+stand-in there; what weighs evidence asks `Recording.used`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.data.period import rough_period
+from bayesimpact.data.recording import Recording
+from bayesimpact.errors import InputError
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+SHORT = 0.3  # of a period: up to here a cubic bridges a gap
+NEAR = 6  # samples on either side that tell its ends
+LEAST = 0.2  # of a recording's samples that have to be left
+GAP = 2.5  # typical intervals between two stamps: more is a gap
+
+
+@dataclass(frozen=True, eq=False)
+class Even:
+    """Readings on an even clock: samples (n,), interval s, used (n,) or None."""
+
+    samples: Array
+    interval: float
+    used: Mask | None
+
+
+def runs(mask: Mask) -> list[tuple[int, int]]:
+    """First and last-plus-one position of every run of True in a mask (n,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    return [(int(first), int(end)) for first, end in edges.reshape(-1, 2)]
+
+
+def without(recording: Recording, spans: Iterable[tuple[int, int]]) -> Recording:
+    """The recording with samples first..end-1 of every span set aside, and bridged.
+
+    Raises `ValueError` when less than a fifth of the recording would be left.
+    """
+    used = np.ones(recording.samples.size, bool) if recording.used is None else recording.used
+    used = used.copy()
+    for first, end in spans:
+        used[max(first, 0) : max(end, 0)] = False
+    if used.sum() < max(LEAST * used.size, 2):
+        raise ValueError(f"{int(used.sum())} of {used.size} samples left")
+    return replace(recording, samples=bridged(recording.samples, used), used=used)
+
+
+def excluded_spans(where: str, recording: Recording, spans: Sequence[Sequence[float]]) -> Recording:
+    """The recording without the samples in spans of time, s on the file's own clock.
+
+    Raises
+    ------
+    InputError
+        when a span holds no sample, or hardly any sample is left; `where` names the key.
+    """
+    chosen = []
+    for start, end in spans:
+        margin = 1e-6  # a sample at the very end of a span counts in, however its time was rounded
+        first = int(np.ceil((start - recording.start) / recording.interval - margin))
+        last = int(np.floor((end - recording.start) / recording.interval + margin))
+        if last < max(first, 0) or first >= recording.samples.size:
+            span = f"{recording.start:.6g} to {recording.start + recording.duration:.6g} s"
+            raise InputError(
+                where, f"no sample from {start:g} to {end:g} s", f"times within {span}"
+            )
+        chosen.append((first, last + 1))
+    if not chosen:
+        return recording
+    try:
+        return without(recording, chosen)
+    except ValueError as error:
+        raise InputError(where, str(error), f"spans that leave {LEAST:.0%} or more") from None
+
+
+def bridged(samples: Array, used: Mask) -> Array:
+    """Samples (n,) with a smooth stand-in where they are set aside.
+
+    Up to 0.3 of a period, a cubic from the neighbours; beyond, what the signal did whole
+    periods before and after, the nearer the more; at the ends, the value of the neighbour.
+    """
+    good = np.flatnonzero(used)
+    place = np.arange(samples.size)
+    filled = np.where(used, samples, np.interp(place, good, samples[good]))
+    longest = max(runs(used), key=lambda run: run[1] - run[0], default=(0, 0))
+    period = rough_period(samples[slice(*longest)], 1.0)
+    for first, end in runs(~used):
+        if first == 0 or end == samples.size:
+            continue
+        if period is None or end - first <= max(SHORT * period, 2.0):
+            filled[first:end] = _cubic(samples, good, first, end)
+        else:
+            filled[first:end] = _repeated(filled, first, end, period)
+    return filled
+
+
+def _cubic(samples: Array, good: NDArray[np.int64], first: int, end: int) -> Array:
+    """The cubic that leaves and meets the parabolas through six neighbours on either side."""
+    at = int(np.searchsorted(good, first))
+    left, right = good[max(at - NEAR, 0) : at], good[at : at + NEAR]
+    if min(left.size, right.size) < 3:
+        return np.asarray(np.interp(np.arange(first, end), good, samples[good]))
+    ends = []
+    for places, origin in ((left, first - 1), (right, end)):
+        fit = np.polynomial.Polynomial.fit(places - origin, samples[places], 2).convert().coef
+        ends.append(np.append(fit, np.zeros(3))[:2])
+    (y0, v0), (y1, v1) = ends
+    span = end - first + 1
+    t = np.arange(1, span) / span
+    h = [2 * t**3 - 3 * t**2 + 1, t**3 - 2 * t**2 + t, -2 * t**3 + 3 * t**2, t**3 - t**2]
+    return np.asarray(h[0] * y0 + h[1] * span * v0 + h[2] * y1 + h[3] * span * v1)
+
+
+def _repeated(samples: Array, first: int, end: int, period: float) -> Array:
+    """Whole periods earlier and later, weighted by nearness, made to meet both neighbours."""
+    shift = round(np.ceil((end - first + 1) / period) * period)
+    copies, weights = [], []
+    near = np.linspace(1.0, 0.0, end - first + 2)
+    for offset, weight in ((-shift, near), (shift, near[::-1])):
+        low, high = first - 1 + offset, end + 1 + offset
+        if low >= 0 and high <= samples.size:
+            copies.append(samples[low:high])
+            weights.append(weight)
+    line = np.linspace(samples[first - 1], samples[end], end - first + 2)
+    if not copies:
+        return line[1:-1]
+    shape = np.sum([c * w for c, w in zip(copies, weights, strict=True)], axis=0)
+    shape = shape / np.maximum(np.sum(weights, axis=0), 1e-12)
+    shape[0], shape[-1] = copies[0][0], copies[-1][-1]
+    ends = np.linspace(shape[0], shape[-1], shape.size)
+    return np.asarray((shape + line - ends)[1:-1], dtype=np.float64)
+
+
+def on_even_clock(path: Path, times: Array, samples: Array, rows: NDArray[np.int64]) -> Even:
+    """Readings at uneven times (n,), s, taken over to an even clock by a cubic spline.
+
+    Stamps that are an even clock's, written to a coarse unit, keep their readings. Elsewhere the
+    interval is the mean of the file's, stretched to end on the last stamp; where the file leaves a
+    gap, samples are marked as not used.
+
+    Raises
+    ------
+    InputError
+        where time stands still or runs backwards; `path` and `rows` (n,) are for the message.
+    """
+    from scipy.interpolate import CubicSpline
+
+    steps = np.diff(times)
+    wrong = np.flatnonzero(steps <= 0.0)
+    if wrong.size:
+        i = int(wrong[0])
+        found = f"time that does not increase ({times[i + 1]:.9g} s after {times[i]:.9g} s)"
+        raise InputError(f"{path}, line {rows[i + 1]}", found, "times that increase")
+    typical = float(np.mean(steps[steps <= GAP * np.median(steps)]))
+    interval = _rounded_interval(times, steps)
+    if interval is not None:
+        return Even(samples, interval, None)
+    count = max(1, round(float(times[-1] - times[0]) / typical))
+    even = np.linspace(times[0], times[-1], count + 1)
+    before = np.clip(np.searchsorted(times, even, side="right") - 1, 0, times.size - 2)
+    distance = np.minimum(np.abs(even - times[before]), np.abs(even - times[before + 1]))
+    used = (steps[before] <= GAP * typical) | (distance < 0.1 * typical)
+    values = np.asarray(CubicSpline(times, samples)(even), dtype=np.float64)
+    if used.all():
+        return Even(values, float(even[1] - even[0]), None)
+    return Even(bridged(values, used), float(even[1] - even[0]), used)
+
+
+def _rounded_interval(times: Array, steps: Array) -> float | None:
+    """Interval of an even clock whose stamps were rounded to a coarse unit; None for any other."""
+    count = np.arange(times.size)
+    slope, first = np.polyfit(count, times - times[0], 1)
+    late = float(np.max(np.abs(times - times[0] - first - slope * count)))
+    unit = float(np.diff(np.unique(np.round(steps, 9))).min(initial=np.inf))
+    whole = np.abs(steps / unit - np.round(steps / unit)).max() < 1e-3
+    return float(slope) if whole and late <= unit and np.ptp(steps) <= 1.5 * unit else None

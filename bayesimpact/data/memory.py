@@ -1,0 +1,249 @@
+"""Campaigns from samples in memory: arrays, DataFrames, xarray; checked as files are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.clock import even_interval
+from bayesimpact.data.period import rough_period
+from bayesimpact.data.read import build_campaign
+from bayesimpact.data.recording import Recording
+from bayesimpact.data.schema import RecordingTable, parse_campaign
+from bayesimpact.data.table import RESPONSE_COLUMNS, TIME_COLUMNS, UNITS, Table
+from bayesimpact.errors import InputError
+
+Floats = NDArray[np.float64]
+FASTEST = 100.0
+"""Largest peak speed of an oscillator that is believed, m/s.
+
+The stress in a vibrating spring grows with its speed, strain = speed / wave speed (F. V. Hunt,
+"Stress and strain limits on the attainable velocity in mechanical vibration", J. Acoust. Soc. Am.
+32, 1960): 5 km/s and a strain of 1 % give 50 m/s, beyond which a metal spring yields. Millimetres
+taken for metres exceed twice that above 2.5 Hz and 6.5 mm.
+"""
+_OWN = ("samples", "times_s")
+_OF_FILES = frozenset(
+    ("file", "column", "channel", "block", "skip_rows", "encoding", "time_column")
+)
+
+
+def campaign_from_arrays(
+    recordings: Iterable[Recording | Mapping[str, Any]],
+    name: str,
+    mass: float,
+    tables: Mapping[str, Any],
+    door: str = "Campaign.from_arrays",
+) -> Campaign:
+    """`Campaign.from_arrays`; `door` is what messages call the caller."""
+    if isinstance(recordings, Mapping | str) or not isinstance(recordings, Iterable):
+        accepted = "a list of recordings, each a Recording or a mapping with name, samples, unit"
+        raise InputError(f"{door}, recordings", f"a {type(recordings).__name__}", accepted)
+    given = [_entry(f"{door}, recording {i}", r) for i, r in enumerate(recordings, 1)]
+    plain = [{k: _plain(v) for k, v in entry.items() if k not in _OWN} for entry in given]
+    document = {"name": name, "mass_kg": mass, **tables}
+    document = {key: _plain(value) for key, value in document.items()} | {"recording": plain}
+    table = parse_campaign(document, door)
+    by_name = {entry["name"]: entry for entry in given}
+
+    def read(entry: RecordingTable, where: str) -> tuple[str, Table]:
+        samples = _samples(where, entry, by_name[str(entry.name)])
+        _check_speed(where, samples)
+        return where, samples
+
+    return build_campaign(door, table, read)
+
+
+def campaign_from_dataframe(
+    frame: Any,
+    name: str,
+    mass: float,
+    recordings: Sequence[Mapping[str, Any]],
+    tables: Mapping[str, Any],
+) -> Campaign:
+    """`Campaign.from_dataframe`."""
+    door = "Campaign.from_dataframe"
+    if not hasattr(frame, "columns"):
+        raise InputError(door, f"a {type(frame).__name__}", "a pandas DataFrame")
+    frame = frame.reset_index() if frame.index.name in TIME_COLUMNS else frame
+    columns = [str(column) for column in frame.columns]
+    if recordings:
+        entries = [_column_entry(door, frame, columns, entry) for entry in recordings]
+        return campaign_from_arrays(entries, name, mass, tables, door)
+    responses = [column for column in columns if column in RESPONSE_COLUMNS]
+    if len(responses) != 1:
+        found = f"the columns {', '.join(columns)}"
+        accepted = f"one of {', '.join(RESPONSE_COLUMNS)}, or recordings = [...] with column, unit"
+        raise InputError(door, found, accepted)
+    entries = []
+    groups = frame.groupby("recording", sort=False) if "recording" in columns else [("a", frame)]
+    for key, rows in groups:
+        entry: dict[str, Any] = {"name": str(key), "column": responses[0]}
+        if "case" in columns:
+            cases = list(dict.fromkeys(rows["case"].tolist()))
+            if len(cases) != 1:
+                found = f"the cases {', '.join(map(str, cases))}"
+                raise InputError(f"{door}, recording {key}", found, "one case per recording")
+            entry["case"] = str(cases[0])
+        entry["unit"] = RESPONSE_COLUMNS[responses[0]]
+        entries.append(_column_entry(door, rows, columns, entry))
+    return campaign_from_arrays(entries, name, mass, tables, door)
+
+
+def campaign_from_xarray(data: Any, name: str, mass: float, tables: Mapping[str, Any]) -> Campaign:
+    """`Campaign.from_xarray`."""
+    door = "Campaign.from_xarray"
+    if hasattr(data, "data_vars"):
+        entries = [_array_entry(door, str(key), data[key]) for key in data.data_vars]
+    elif not hasattr(data, "coords"):
+        raise InputError(door, f"a {type(data).__name__}", "an xarray Dataset or DataArray")
+    elif "recording" in data.dims:
+        rows = (data.isel(recording=i) for i in range(data.sizes["recording"]))
+        entries = [_array_entry(door, str(r.coords["recording"].item()), r, True) for r in rows]
+    else:
+        entries = [_array_entry(door, str(data.name or "a"), data)]
+    return campaign_from_arrays(entries, name, mass, tables, door)
+
+
+def _entry(where: str, given: object) -> dict[str, Any]:
+    """The keys of one recording, with `file` as the schema wants it."""
+    if isinstance(given, Recording):
+        entry: dict[str, Any] = {"name": given.name, "unit": given.unit, "samples": given.samples}
+        if given.case:
+            entry["case"] = given.case
+        entry["times_s"] = given.start + given.times
+    elif isinstance(given, Mapping):
+        entry = {str(key): value for key, value in given.items()}
+    else:
+        accepted = "a Recording, or a mapping with name, samples, unit"
+        raise InputError(where, f"a {type(given).__name__}", accepted)
+    if not isinstance(entry.get("name"), str):
+        found = "nothing" if "name" not in entry else repr(entry["name"])
+        raise InputError(f"{where}, key name", found, "a name for the parameters, in quotes")
+    where = f"{where} ({entry['name']})"
+    for key in _OF_FILES.intersection(entry):
+        raise InputError(f"{where}, key {key}", "a key of recordings in files", "name and samples")
+    if entry.get("samples") is None:
+        raise InputError(f"{where}, key samples", "nothing", "numbers, (n,)")
+    if entry.get("unit") is None:
+        raise InputError(f"{where}, key unit", "nothing", f"{', '.join(UNITS)}, in quotes")
+    return {**entry, "file": entry["name"]}
+
+
+def _samples(where: str, entry: RecordingTable, given: Mapping[str, Any]) -> Table:
+    samples = _floats(f"{where}, key samples", given["samples"])
+    interval, start = None, 0.0
+    if given.get("times_s") is not None:
+        times = _floats(f"{where}, key times_s", given["times_s"])
+        if times.size != samples.size:
+            found = f"{times.size} times of {samples.size} samples"
+            raise InputError(f"{where}, key times_s", found, "a time for every sample")
+        rows = np.arange(times.size, dtype=np.int64)
+        interval, start = even_interval(where, times, rows, "sample"), float(times[0])
+    if entry.sample_rate_hz is not None:
+        if interval is not None and abs(entry.sample_rate_hz * interval - 1.0) > 1e-3:
+            found = f"sample_rate_hz = {entry.sample_rate_hz:g}, and times at {1 / interval:g} Hz"
+            raise InputError(where, found, "times_s, or sample_rate_hz, or both agreeing")
+        interval = interval or 1.0 / entry.sample_rate_hz
+    if interval is None:
+        raise InputError(where, "no clock", "times_s (n,), or sample_rate_hz")
+    quantity, factor = UNITS[entry.unit or ""]
+    return Table(samples * factor, interval, start, quantity)
+
+
+def _floats(where: str, values: Any) -> Floats:
+    """Two or more finite numbers, (n,)."""
+    accepted = "finite numbers, (n,), two or more"
+    if isinstance(values, np.ma.MaskedArray):
+        values = np.ma.filled(values.astype(np.float64), np.nan)
+    array = np.asarray(values)
+    if array.dtype.kind not in "fiu":
+        raise InputError(where, f"an array of {array.dtype}", accepted)
+    if array.ndim != 1 or array.size < 2:
+        raise InputError(where, f"an array of shape {array.shape}", accepted)
+    floats = array.astype(np.float64)
+    wrong = np.flatnonzero(~np.isfinite(floats))
+    if wrong.size:
+        raise InputError(f"{where}, sample {wrong[0]}", f"{floats[wrong[0]]}", accepted)
+    return floats
+
+
+def _check_speed(where: str, table: Table) -> None:
+    period = rough_period(table.samples, table.interval)
+    if period is None or table.quantity != "displacement":
+        return
+    swing = float(np.max(np.abs(table.samples - np.median(table.samples))))
+    speed = 2.0 * np.pi * swing / period
+    if speed > FASTEST:
+        found = f"{swing:.3g} m at {1 / period:.3g} Hz, a speed of {speed:.3g} m/s"
+        accepted = f"the unit of the samples ({', '.join(UNITS)}), and speeds below {FASTEST:g} m/s"
+        raise InputError(f"{where}, key unit", found, accepted)
+
+
+def _column_entry(
+    door: str, frame: Any, columns: Sequence[str], entry: Mapping[str, Any]
+) -> dict[str, Any]:
+    """An entry of `from_arrays` from a column of a frame."""
+    column = entry.get("column")
+    if column not in columns:
+        accepted = f"one of the frame's columns: {', '.join(columns)}"
+        raise InputError(
+            f"{door}, recording {entry.get('name')}, key column", repr(column), accepted
+        )
+    filled = {key: value for key, value in entry.items() if key != "column"}
+    filled.setdefault("name", column)
+    filled["samples"] = _numeric(frame[column])
+    times = [name for name in TIME_COLUMNS if name in columns]
+    if times and "times_s" not in filled:
+        filled["times_s"] = _numeric(frame[times[0]]) * TIME_COLUMNS[times[0]]
+    return filled
+
+
+def _numeric(column: Any) -> NDArray[Any]:
+    """A column as an array; pandas' own missing values become NaN."""
+    if column.dtype.kind in "fiu":
+        return np.asarray(column.to_numpy(dtype=np.float64, na_value=np.nan))
+    return np.asarray(column)
+
+
+def _array_entry(door: str, name: str, array: Any, filled: bool = False) -> dict[str, Any]:
+    """An entry of `from_arrays` from a DataArray along time."""
+    where = f"{door}, recording {name}"
+    if array.dims != ("time",):
+        raise InputError(where, f"the dimensions {', '.join(map(str, array.dims))}", "time")
+    samples = np.asarray(array.values)
+    if filled and samples.dtype.kind == "f":
+        there = np.flatnonzero(~np.isnan(samples))
+        samples = samples[: there[-1] + 1 if there.size else 0]
+    entry: dict[str, Any] = {"name": name, "samples": samples, "unit": array.attrs.get("units")}
+    case = array.coords["case"].item() if "case" in array.coords else array.attrs.get("case")
+    if case is not None:
+        entry["case"] = str(case)
+    if "time" in array.coords:
+        entry["times_s"] = _seconds(where, array.coords["time"])[: samples.size]
+    return entry
+
+
+def _seconds(where: str, time: Any) -> NDArray[Any]:
+    values = np.asarray(time.values)
+    if values.dtype.kind == "M":
+        values = values - values[0]
+    if values.dtype.kind == "m":
+        return np.asarray(values / np.timedelta64(1, "ns")) * 1e-9
+    unit = str(time.attrs.get("units", "s"))
+    if unit not in ("s", "ms"):
+        raise InputError(f"{where}, coordinate time", f'units "{unit}"', "s, ms, or datetimes")
+    return values * (1e-3 if unit == "ms" else 1.0)
+
+
+def _plain(value: Any) -> Any:
+    """The same with NumPy's scalars and read-only mappings as Python's own, however deep."""
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return value.item() if isinstance(value, np.generic) else value

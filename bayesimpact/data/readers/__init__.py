@@ -1,0 +1,1 @@
+"""Readers of instrument files: one format, one file; each gives channels."""

@@ -1,0 +1,231 @@
+"""From the channels of a file to the one that a recording asks for, in SI units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.data.clock import even_interval
+from bayesimpact.data.readers.channel import TIME_UNITS, Channel
+from bayesimpact.data.table import UNITS, Table
+from bayesimpact.errors import InputError
+
+Floats = NDArray[np.float64]
+OTHER_MOTIONS = {
+    "m/s": "a velocity", "mm/s": "a velocity", "um/s": "a velocity", "m/s2": "an acceleration",
+    "mm/s2": "an acceleration", "g": "an acceleration", "rad/s": "an angular velocity",
+    "deg/s": "an angular velocity",
+}  # fmt: skip
+SHOWN = 12
+"""Channels that a message lists."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What a [[recording]] says of the channel it means.
+
+    `column` and `time_column` are names, or numbers counted from 1 in the file's (or block's) own
+    order; `start` and `end` in s.
+    """
+
+    column: str | int | None = None
+    time_column: str | int | None = None
+    block: str | int | None = None
+    unit: str | None = None
+    sample_rate: float | None = None
+    start: float | None = None
+    end: float | None = None
+
+
+def choose(path: Path, channels: Sequence[Channel], wanted: Wanted) -> Table:
+    """Samples and clock of the channel that is wanted.
+
+    Raises
+    ------
+    InputError
+        when no channel, or more than one, or no clock, or no unit fits; and for samples between
+        start and end that are no numbers.
+    """
+    inside = _of_block(path, channels, wanted.block)
+    channel = _response(path, inside, wanted)
+    unit = _unit(path, channel, wanted.unit)
+    times = _times(path, channels, channel, wanted)
+    quantity, factor = UNITS[unit]
+    first, last = _window(times, channel, wanted)
+    samples = channel.samples[first:last]
+    _check_finite(path, channel, samples, first)
+    if isinstance(times, tuple):
+        interval, start = times
+        return Table(samples * factor, interval, start + first * interval, quantity)
+    stamps = times[first:last]
+    rows = np.arange(first + 1, last + 1) if channel.rows is None else channel.rows[first:last]
+    place = "sample" if channel.rows is None else "line"
+    bad = np.flatnonzero(~np.isfinite(stamps))
+    if bad.size:
+        where = f"{path}, {place} {rows[bad[0]]}, time column"
+        raise InputError(where, "no number", "a finite number")
+    interval = even_interval(path, stamps, rows.astype(np.int64), place)
+    _check_rate(path, interval, wanted.sample_rate)
+    return Table(samples * factor, interval, float(stamps[0]), quantity)
+
+
+def listed(channels: Sequence[Channel]) -> str:
+    """Channels as a message lists them."""
+    several = len({c.block for c in channels}) > 1
+    names = [f"{c.label} (block {c.block})" if several else c.label for c in channels]
+    rest = f", and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
+    return ", ".join(names[:SHOWN]) + rest
+
+
+def guessed_response(channels: Sequence[Channel]) -> list[Channel]:
+    """The channels that may be the response: those with a unit of displacement or angle."""
+    return [c for c in channels if not c.is_time and c.unit in UNITS]
+
+
+def clock_of(channels: Sequence[Channel], channel: Channel) -> Channel | None:
+    """The column of time stamps beside a channel; None when there is none, or several."""
+    beside = [c for c in channels if c.is_time and c.block == channel.block]
+    beside = [c for c in beside if c.samples.size == channel.samples.size and c is not channel]
+    return beside[0] if len(beside) == 1 else None
+
+
+def _of_block(
+    path: Path, channels: Sequence[Channel], block: str | int | None
+) -> Sequence[Channel]:
+    if block is None:
+        return channels
+    blocks = list(dict.fromkeys(c.block for c in channels))
+    name = block if block in blocks else None
+    if name is None and str(block).isdigit() and 1 <= int(block) <= len(blocks):
+        name = blocks[int(block) - 1]
+    if name is None:
+        known = ", ".join(b or "(the file itself)" for b in blocks[:SHOWN])
+        raise InputError(f"{path}, key block", f'"{block}"', f"one of the file's blocks: {known}")
+    return [c for c in channels if c.block == name]
+
+
+def _named(path: Path, channels: Sequence[Channel], key: str, asked: str | int) -> Channel:
+    fitting = [c for c in channels if asked in (c.name, c.label, f"{c.name} ({c.unit})")]
+    if not fitting and str(asked).isdigit() and 1 <= int(asked) <= len(channels):
+        fitting = [channels[int(asked) - 1]]
+    if len(fitting) == 1:
+        return fitting[0]
+    shown = asked if isinstance(asked, int) else f'"{asked}"'
+    found = f"{key} = {shown}, which is there {len(fitting)} times"
+    accepted = f"one of this file's channels: {listed(channels)}"
+    accepted += ", and their block" if len(fitting) > 1 else ""
+    raise InputError(str(path), found, accepted)
+
+
+def _response(path: Path, channels: Sequence[Channel], wanted: Wanted) -> Channel:
+    if wanted.column is not None:
+        return _named(path, channels, "column", wanted.column)
+    fitting = guessed_response(channels)
+    if not fitting:
+        times = (
+            ()
+            if wanted.time_column is None
+            else (_named(path, channels, "time_column", wanted.time_column),)
+        )
+        fitting = [c for c in channels if not c.is_time and c not in times]
+    if len(fitting) == 1:
+        return fitting[0]
+    found = f"{'several' if fitting else 'no'} channels that may be the response"
+    raise InputError(str(path), found, f'column = "...", one of {listed(channels)}')
+
+
+def _unit(path: Path, channel: Channel, asked: str | None) -> str:
+    where = f"{path}, channel {channel.name}"
+    if channel.unit in OTHER_MOTIONS:
+        found = f"{OTHER_MOTIONS[channel.unit]} ({channel.unit})"
+        raise InputError(where, found, f"a displacement or an angle ({', '.join(UNITS)})")
+    if channel.unit in UNITS:
+        if asked is not None and asked != channel.unit:
+            found = f'unit = "{asked}" in campaign.toml'
+            raise InputError(where, found, f'unit = "{channel.unit}", or no unit')
+        return channel.unit
+    if asked is None:
+        found = f"the unit {channel.unit}" if channel.unit else "no unit for it"
+        raise InputError(where, found, f"unit = ... in campaign.toml ({', '.join(UNITS)})")
+    return asked
+
+
+def _times(
+    path: Path, channels: Sequence[Channel], channel: Channel, wanted: Wanted
+) -> tuple[float, float] | Floats:
+    """An even clock (interval, start), or the written time stamps, s."""
+    if wanted.time_column is not None:
+        beside = [c for c in channels if c.block == channel.block]
+        stamps = _named(path, beside, "time_column", wanted.time_column)
+        if stamps.samples.size != channel.samples.size or stamps is channel:
+            found = f"{stamps.samples.size} times of {channel.samples.size} samples"
+            found = "the response itself" if stamps is channel else found
+            raise InputError(f"{path}, key time_column", found, "a time for every sample")
+        if stamps.unit not in ("", *TIME_UNITS):
+            accepted = f"a time ({', '.join(TIME_UNITS)})"
+            raise InputError(f"{path}, key time_column", f"the unit {stamps.unit}", accepted)
+        return stamps.seconds
+    if channel.times is not None:
+        return channel.times
+    stated = clock_of(channels, channel)
+    if stated is not None:
+        return stated.seconds
+    if channel.interval is not None:
+        _check_rate(path, channel.interval, wanted.sample_rate)
+        return channel.interval, channel.start
+    if wanted.sample_rate is not None:
+        return 1.0 / wanted.sample_rate, channel.start
+    found = f"no clock for channel {channel.name} among {listed(channels)}"
+    raise InputError(str(path), found, "time_column, or sample_rate_hz in campaign.toml")
+
+
+def _check_rate(path: Path, interval: float, rate: float | None) -> None:
+    if rate is not None and abs(rate * interval - 1.0) > 1e-3:
+        found = f"sample_rate_hz = {rate:g}, and a clock at {1 / interval:g} Hz"
+        raise InputError(str(path), found, "the file's clock, or sample_rate_hz, or both agreeing")
+
+
+def _window(
+    times: tuple[float, float] | Floats, channel: Channel, wanted: Wanted
+) -> tuple[int, int]:
+    """Samples between start and end; all of them where the window holds fewer than two.
+
+    What lies outside may hold no numbers: cells left empty by shorter channels.
+    """
+    size, margin = channel.samples.size, 1e-6
+    if isinstance(times, tuple):
+        interval, start = times
+        low = 0 if wanted.start is None else math.ceil((wanted.start - start) / interval - margin)
+        high = (
+            size
+            if wanted.end is None
+            else (math.floor((wanted.end - start) / interval + margin) + 1)
+        )
+    else:
+        spacing = float(np.nanmedian(np.diff(times))) if size > 1 else 0.0
+        slack = margin * abs(spacing)
+        inside = np.ones(size, dtype=bool)
+        if wanted.start is not None:
+            inside &= times >= wanted.start - slack
+        if wanted.end is not None:
+            inside &= times <= wanted.end + slack
+        kept = np.flatnonzero(inside)
+        low, high = (int(kept[0]), int(kept[-1]) + 1) if kept.size else (0, 0)
+    low, high = max(0, low), min(size, high)
+    return (low, high) if high - low >= 2 else (0, size)
+
+
+def _check_finite(path: Path, channel: Channel, samples: Floats, first: int) -> None:
+    wrong = np.flatnonzero(~np.isfinite(samples))
+    if samples.size < 2:
+        raise InputError(str(path), f"{samples.size} samples", "two or more")
+    if wrong.size:
+        i = first + int(wrong[0])
+        row = f"sample {i + 1}" if channel.rows is None else f"line {channel.rows[i]}"
+        where = f"{path}, {row}, channel {channel.name}"
+        raise InputError(where, "no finite number", "a finite number between start_s and end_s")

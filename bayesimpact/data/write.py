@@ -1,0 +1,119 @@
+"""Writes a campaign as the folder that `load_campaign` reads: campaign.toml and one CSV each."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from bayesimpact.data.campaign import Beam, Campaign, Measurement, Smoothing
+from bayesimpact.data.recording import Recording
+from bayesimpact.errors import InputError
+
+
+def write_campaign(
+    folder: Path, campaign: Campaign, *, decimals: int | None = 6, comment: str = ""
+) -> None:
+    """Write `campaign` into `folder`, which is made when missing; files of the same names go.
+
+    Parameters
+    ----------
+    decimals : of a millimetre (or of a milliradian) in the recordings; None: every digit, in m
+    comment : first lines of campaign.toml, without the #
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    lines = [f"# {line}".rstrip() for line in comment.splitlines()]
+    lines += [f"name = {_toml(campaign.name)}", f"mass_kg = {campaign.mass!r}"]
+    if campaign.measurement.mass_sd:
+        lines.append(f"mass_uncertainty_kg = {campaign.measurement.mass_sd * campaign.mass!r}")
+    lines.append(f"stop = {_toml(campaign.stop)}")
+    for recording in campaign.recordings:
+        lines += ["", "[[recording]]", f"file = {_toml(recording.name + '.csv')}"]
+        if campaign.stop:
+            lines.append(f"case = {_toml(recording.case)}")
+        (folder / f"{recording.name}.csv").write_text(
+            _csv(recording, decimals), encoding="utf-8", newline="\n"
+        )
+    lines += _measurement(campaign.measurement, campaign.recordings[0].quantity)
+    if campaign.priors:
+        lines += ["", "[priors]"]
+        lines += [f"{_toml(k)} = {_toml(table)}" for k, table in campaign.priors.items()]
+    for case, beam in campaign.beams.items():
+        lines += ["", f"[beam.{_toml(case)}]", *_beam(beam)]
+    text = "\n".join(lines) + "\n"
+    (folder / "campaign.toml").write_text(text, encoding="utf-8", newline="\n")
+
+
+def _csv(recording: Recording, decimals: int | None) -> str:
+    angle = recording.quantity == "angle"
+    times = recording.start + recording.times
+    pairs = zip(times.tolist(), recording.samples.tolist(), strict=True)
+    if decimals is None:
+        rows = [f"time_s,{recording.quantity}_{recording.unit}"]
+        rows += [f"{t!r},{sample!r}" for t, sample in pairs]
+    else:
+        scale, places = (1.0, decimals + 3) if angle else (1e3, decimals)
+        rows = ["time_s,angle_rad" if angle else "time_s,displacement_mm"]
+        rows += [f"{t:.12g},{sample * scale:.{places}f}" for t, sample in pairs]
+    return "\n".join(rows) + "\n"
+
+
+def _measurement(known: Measurement, quantity: str) -> list[str]:
+    lines = []
+    if known.noise is not None:
+        unit = "um" if quantity == "displacement" else "mrad"
+        scale = 1e6 if quantity == "displacement" else 1e3
+        lines.append(f"noise_{unit} = {_short(known.noise * scale)}")
+    if known.smoothing is not None:
+        lines.append(f"smoothing = {_toml(_smoothing(known.smoothing))}")
+    if known.clock_sd:
+        lines.append(f"clock_uncertainty_ppm = {_short(known.clock_sd * 1e6)}")
+    if known.gain_sd:
+        lines.append(f"gain_uncertainty_percent = {_short(known.gain_sd * 100)}")
+    return ["", "[measurement]", *lines] if lines else []
+
+
+def _smoothing(smoothing: Smoothing) -> dict[str, Any]:
+    if smoothing.kind == "lag":
+        return {"kind": "lag", "time_constant_s": smoothing.time_constant}
+    return {
+        "kind": "savgol",
+        "window": smoothing.declared_window or smoothing.window,
+        "polyorder": smoothing.polyorder,
+    }
+
+
+def save_campaign(campaign: Campaign, folder: Path, *, overwrite: bool) -> Path:
+    """`Campaign.save`."""
+    file = folder / "campaign.toml"
+    if file.exists() and not overwrite:
+        raise InputError(str(file), "a campaign already", "a new folder, or overwrite=True")
+    try:
+        write_campaign(folder, campaign, decimals=None)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise InputError(str(folder), reason, "a folder that can be written") from None
+    return file
+
+
+def _beam(beam: Beam) -> list[str]:
+    return [
+        f"length_mm = {_short(beam.length * 1e3)}",
+        f"width_mm = {_short(beam.width * 1e3)}",
+        f"thickness_mm = {_short(beam.thickness * 1e3)}",
+        f"youngs_modulus_mpa = {_short(beam.youngs_modulus * 1e-6)}",
+    ]
+
+
+def _short(value: float) -> str:
+    """A number without the rounding dirt of a change of units."""
+    return repr(float(f"{value:.14g}"))
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + " }"
+    if isinstance(value, float):
+        return repr(value)
+    return json.dumps(value, ensure_ascii=False)  # strings, integers and truth values agree

@@ -1,0 +1,127 @@
+"""The verdict that follows from the odds of all hypotheses.
+
+Let S be the likeliest set of effects that the search reached.
+
+1. S leaves nothing that stands out from the noise (`State.is_white`):
+   `adequate` when S is empty; `unknown` when one free force in the place of all effects beats S by
+   the decisive odds; `ambiguous` when another set comes within these odds; else `named`.
+2. Something remains beside S. An effect of S is needed when
+   - every set of effects without it trails S by the decisive odds,
+   - no set without it, with a residual force of whichever form is likeliest, beats S with its own
+     residual force by these odds (as in 1), and
+   - the misfit above the noise is `EXCESS` times larger without it than with it, other effects
+     refitted: an effect that merely imitates what the catalogue lacks leaves a large part of it.
+   With needed effects the verdict is `partly`, without any it is `unknown`. Other effects of S stay
+   in the fitted model, but are not named.
+
+A name never rests on one p-value, and nothing is compared by a rule of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from bayesimpact.diagnosis.naming import Naming, State
+from bayesimpact.diagnosis.refit import Candidate
+from bayesimpact.diagnosis.thresholds import DECISIVE, EXCESS
+from bayesimpact.model.effects.effect import Effect
+
+Verdict = Literal["adequate", "named", "partly", "ambiguous", "unknown"]
+
+
+@dataclass(frozen=True, eq=False)
+class Decision:
+    """A verdict and what it stands on.
+
+    Attributes
+    ----------
+    verdict : see `bayesimpact.diagnosis.decision`
+    effects : that are named, most important first
+    rivals : sets of effects that come within the decisive odds
+    """
+
+    verdict: Verdict
+    effects: tuple[Effect, ...]
+    rivals: tuple[Candidate, ...] = ()
+
+
+def decide(naming: Naming) -> Decision:
+    """The verdict on a finished search.
+
+    Where something remains, `naming.states` and `naming.residual` must hold the chosen model and
+    what it is without each of its effects.
+    """
+    chosen = naming.chosen
+    effects = ordered(naming, chosen.candidate.effects)
+    if chosen.is_white:
+        if not effects:
+            return Decision("adequate", ())
+        if naming.prefers_learned_force():
+            return Decision("unknown", ())
+        rivals = naming.rivals()
+        return Decision("ambiguous" if rivals else "named", effects, rivals)
+    needed = tuple(e for e in effects if is_needed(naming, e))
+    if not needed:
+        return Decision("unknown", ())
+    return Decision("partly", needed, naming.rivals())
+
+
+def is_needed(naming: Naming, effect: Effect) -> bool:
+    """Whether every likely hypothesis has an effect of the chosen model, although more remains."""
+    chosen = naming.chosen
+    if any(
+        naming.log_odds(c) > naming.log_odds(chosen.candidate) - DECISIVE
+        for c in naming.tried
+        if not holds(c.effects, effect)
+    ):
+        return False
+    reached = naming.with_residual_force(frozenset(chosen.candidate.ids)) + DECISIVE
+    lacking = [ids for ids in naming.residual if effect.id not in ids]
+    if any(naming.with_residual_force(ids) > reached for ids in lacking):
+        return False
+    without = naming.states[frozenset(chosen.candidate.ids) - {effect.id}]
+    return misfit_above_noise(naming, without) > EXCESS * misfit_above_noise(naming, naming.chosen)
+
+
+def holds(effects: Sequence[Effect], effect: Effect) -> bool:
+    """Whether a model has an effect, or one that reduces to it (`Effect.prefer`)."""
+    return any(effect.id in (e.id, e.prefer) for e in effects)
+
+
+def misfit_above_noise(naming: Naming, state: State) -> float:
+    """Sum of squares beyond that of the noise, in units of its variance.
+
+    The noise's own sum is what the recordings' noise estimate says, as far as that is certain;
+    within its uncertainty it is what the best hypothesis of all leaves.
+    """
+    chosen = naming.chosen.candidate.fit
+    noise = chosen.target.likelihood.noise
+    level = noise.level**2
+    own = float(chosen.target.likelihood.sizes.sum())
+    error = noise.level_error if np.isfinite(noise.level_error) else 0.0
+    doubtful = 2 * DOUBT * error * own
+    left = float(chosen.sums.sum()) / level
+    if left - own < doubtful:  # as small as the estimate of the noise is uncertain
+        own = left - 2 * max(naming.chosen.unknown.gain, 0.0) * chosen.reduced_chi2
+    return max(float(state.candidate.fit.sums.sum()) / level - own, 1.0)
+
+
+DOUBT = 3.0  # standard errors of the noise level
+
+
+def ordered(naming: Naming, effects: tuple[Effect, ...]) -> tuple[Effect, ...]:
+    """Effects by how much evidence the model loses without them."""
+    if len(effects) < 2:
+        return effects
+    chosen = set(naming.chosen.candidate.ids)
+    left = {frozenset(c.ids): c for c in naming.tried}
+
+    def loss(effect: Effect) -> float:
+        smaller = left.get(frozenset(chosen - {effect.id}))
+        return float("-inf") if smaller is None else smaller.log_evidence
+
+    return tuple(sorted(effects, key=loss))

@@ -1,0 +1,75 @@
+"""Every recording identified on its own: what a faulty one says cannot spoil the others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.recording import Recording
+from bayesimpact.errors import BayesimpactError
+from bayesimpact.inference.identify import identify
+from bayesimpact.inference.noise import Noise
+
+Array = NDArray[np.float64]
+
+NAMES = ("c1", "k1", "c2", "g", "k2")
+UNKNOWN = 3.0  # standard error of a logarithm from which on a parameter was not measured
+
+
+@dataclass(frozen=True, eq=False)
+class Alone:
+    """One recording's own parameters, in logarithms.
+
+    Attributes
+    ----------
+    recording : its name
+    log : (p,) logarithms of c1, k1 and, with a stop, c2, g, k2
+    covariance : (p, p) of these
+    reduced_chi2 : of the fit to this recording alone
+    """
+
+    recording: str
+    log: Array
+    covariance: Array
+    reduced_chi2: float
+
+
+def inverted(recording: Recording) -> Recording:
+    """The recording with the other sign."""
+    return replace(recording, samples=-recording.samples)
+
+
+def fit_alone(campaign: Campaign, recording: Recording, noise: Noise) -> Alone | None:
+    """The parameters that one recording shows; None where it allows no fit.
+
+    A gap that is not positive has no logarithm: it counts as not measured.
+    """
+    one = replace(campaign, recordings=(recording,))
+    try:
+        fit = identify(one, rng=np.random.default_rng(0), noise=noise, search=False).fit
+    except (BayesimpactError, ValueError, np.linalg.LinAlgError):
+        return None
+    chi2 = fit.reduced_chi2
+    if not np.isfinite(chi2):
+        return None
+    names = NAMES if campaign.stop else NAMES[:2]
+    at = [fit.target.oscillator.layout.index(_name(n, recording.case)) for n in names]
+    values = fit.mode[at]
+    inflated = fit.covariance[np.ix_(at, at)] * max(chi2, 1.0)
+    if not np.isfinite(inflated).all():
+        return None
+    positive = values > 0.0
+    scale = np.where(positive, values, 1.0)
+    covariance = inflated / np.outer(scale, scale)
+    lost = ~positive | (np.diag(covariance) > UNKNOWN**2)
+    covariance[lost, :] = 0.0
+    covariance[:, lost] = 0.0
+    covariance[lost, lost] = 1e6
+    return Alone(recording.name, np.log(scale), covariance, chi2)
+
+
+def _name(name: str, case: str) -> str:
+    return f"k2[{case}]" if name == "k2" else name

@@ -1,0 +1,190 @@
+"""Which recording disagrees with the others, and what is wrong with it.
+
+1. Every recording is identified alone, and where that leaves much, once more with the other sign.
+2. The recordings' own parameters are compared (see `together`); the likeliest fault is corrected if
+   its log odds against no fault, all faults being equally likely beforehand, pass the threshold.
+3. The campaign is fitted before and after; a correction that does not improve it is not believed.
+4. Again, until nothing is found, or a third of the recordings has been corrected.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.faults.fault import Fault
+from bayesimpact.diagnosis.faults.alone import Alone, fit_alone, inverted
+from bayesimpact.diagnosis.faults.correct import as_fault, corrected
+from bayesimpact.diagnosis.faults.together import (
+    Hypothesis,
+    Weighed,
+    weigh_all,
+)
+from bayesimpact.errors import BayesimpactError
+from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.identify import Identification, identify
+from bayesimpact.inference.noise import Noise
+
+THRESHOLD = 12.0
+"""Log odds of a fault over none: its scatter is estimated from few recordings, whose tails are
+heavier than Gaussian; 12 nats are 4.9 standard deviations beyond the price of one unknown."""
+MISFIT = 4.0  # reduced chi-squared of a recording alone from which on the other sign is tried
+REVERSED = 0.25  # of that misfit, at most, for the other sign to be believed
+SIGNIFICANT = 4.0  # standard errors of a reduced chi-squared that call for a comparison
+SHARE = 1 / 3  # of the recordings, at most, that may be faulty: the others are the majority
+LEAST = 3  # recordings: of two that differ neither is the faulty one
+FAILED = 0.5  # of the signal's root mean square left: no fit at all
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """A fault found by comparison.
+
+    Attributes
+    ----------
+    fault : what it is
+    campaign : with this fault, and those found before it, corrected
+    before, after : reduced chi-squared of the base model without and with this correction
+    alternatives : other explanations with their probabilities, the likeliest first
+    """
+
+    fault: Fault
+    campaign: Campaign
+    before: float
+    after: float
+    alternatives: tuple[tuple[str, float], ...] = ()
+
+
+def base_failed(fit: Fit) -> bool:
+    """True when a fit leaves more than half of the signal: no effect is worth a search then."""
+    samples = [r.samples - r.samples.mean() for r in fit.target.oscillator.campaign.recordings]
+    signal = float(np.sqrt(np.mean(np.concatenate(samples) ** 2)))
+    return bool(not np.isfinite(fit.rms) or fit.rms > FAILED * signal)
+
+
+def misfits(fit: Fit) -> bool:
+    """Whether the base fit misses any recording by more than chance, so that comparing is due."""
+    likelihood = fit.target.likelihood
+    chi2 = fit.sums / likelihood.noise.level**2 / likelihood.sizes
+    error = likelihood.noise.level_error
+    relative = 2.0 * (error if np.isfinite(error) else 0.0)
+    # against the noise level, and against each other, where the level's error cancels
+    usual = min(float(np.median(chi2)), 1.0 + SIGNIFICANT * relative)
+    return bool(
+        np.any(chi2 / max(usual, 1e-300) - 1.0 > SIGNIFICANT * np.sqrt(2 / likelihood.sizes))
+    )
+
+
+def compare_recordings(identification: Identification) -> tuple[Compared, ...]:
+    """Faults by comparison of a campaign's recordings, the most certain first; () when all agree.
+
+    Nothing is compared where the base fit is adequate in every recording.
+    """
+    fit = identification.fit
+    if not misfits(fit):
+        return ()
+    campaign, noise = fit.target.oscillator.campaign, identification.noise
+    alone = {r.name: fit_alone(campaign, r, noise) for r in campaign.recordings}
+    found, campaign, chi2 = _signs(campaign, alone, noise, fit.reduced_chi2)
+    allowed = int(SHARE * len(campaign.recordings))
+    while len(found) < allowed or (found and found[-1].fault.id == "recording_reversed"):
+        step = _next(campaign, alone, noise, chi2)
+        if step is None or sum(f.fault.id != "recording_reversed" for f in found) >= allowed:
+            break
+        found.append(step)
+        name, campaign, chi2 = step.fault.recording, step.campaign, step.after
+        changed = [r for r in campaign.recordings if r.name == name]
+        alone[name] = fit_alone(campaign, changed[0], noise) if changed else None
+    return tuple(found)
+
+
+def _signs(
+    campaign: Campaign, alone: dict[str, Alone | None], noise: Noise, chi2: float
+) -> tuple[list[Compared], Campaign, float]:
+    """Recordings that only fit with the other sign, corrected; `alone` is brought up to date."""
+    found: list[Compared] = []
+    if not campaign.stop:
+        return found, campaign, chi2
+    turned: list[tuple[int, float]] = []
+    for i, recording in enumerate(campaign.recordings):
+        own = alone[recording.name]
+        misfit = np.inf if own is None else own.reduced_chi2
+        if misfit < MISFIT:
+            continue
+        other = fit_alone(campaign, inverted(recording), noise)
+        if other is not None and other.reduced_chi2 < REVERSED * misfit:
+            alone[recording.name] = other
+            size = recording.samples.size
+            nats = size * np.log(misfit / other.reduced_chi2) / 2 if own else float(size)
+            turned.append((i, float(nats)))
+    for i, nats in turned:
+        recording = campaign.recordings[i]
+        guess = Weighed(Hypothesis("recording_reversed", i), nats)
+        campaign = corrected(campaign, i, guess)
+        fault = as_fault(recording, guess, nats, THRESHOLD)
+        if len(turned) == len(campaign.recordings):
+            words = "the stop lies on the negative side in every recording"
+            fault = replace(fault, statement=words)
+        found.append(Compared(fault, campaign, chi2, chi2))
+    if found:
+        after = _chi2(campaign, noise)
+        found = [replace(f, after=after) for f in found]
+        chi2 = after
+    return found, campaign, chi2
+
+
+def _next(
+    campaign: Campaign, alone: dict[str, Alone | None], noise: Noise, chi2: float
+) -> Compared | None:
+    """The likeliest fault of what is left, corrected; None when there is none to believe."""
+    known = [(i, a) for i, r in enumerate(campaign.recordings) if (a := alone[r.name]) is not None]
+    if len(known) < LEAST:
+        return None
+    own = [a for _, a in known]
+    cases = [campaign.recordings[i].case for i, _ in known]
+    none, ranked = weigh_all(own, cases, campaign.stop)
+    prior = -np.log(len(ranked))
+    best = ranked[0]
+    odds = best.log_evidence - none.log_evidence + prior
+    if odds < THRESHOLD:
+        return None
+    number = known[best.hypothesis.recording][0]
+    after = corrected(campaign, number, best)
+    value = _chi2(after, noise)
+    if not _improves(chi2, value, campaign):
+        return None
+    fault = as_fault(campaign.recordings[number], best, odds, THRESHOLD)
+    return Compared(fault, after, chi2, value, _alternatives(ranked, own))
+
+
+def _alternatives(ranked: Sequence[Weighed], own: Sequence[Alone]) -> tuple[tuple[str, float], ...]:
+    """The next explanations with their probabilities among all faults."""
+    evidence = np.array([w.log_evidence for w in ranked])
+    share = np.exp(evidence - evidence[0])
+    share /= share.sum()
+    names = []
+    for weighed, p in list(zip(ranked, share, strict=True))[1:4]:
+        if p > 1e-3:
+            what = f" ({weighed.hypothesis.what})" if weighed.hypothesis.what else ""
+            name = own[weighed.hypothesis.recording].recording
+            names.append((f"{weighed.hypothesis.id}{what}, {name}", float(p)))
+    return tuple(names)
+
+
+def _chi2(campaign: Campaign, noise: Noise) -> float:
+    """Reduced chi-squared of the base model's mode for a campaign; infinite where it has none."""
+    try:
+        fit = identify(campaign, rng=np.random.default_rng(0), noise=noise, search=False).fit
+    except (BayesimpactError, ValueError, np.linalg.LinAlgError):
+        return float("inf")
+    return fit.reduced_chi2
+
+
+def _improves(before: float, after: float, campaign: Campaign) -> bool:
+    """Whether a correction gains more than `THRESHOLD` nats, at the noise that remains."""
+    samples = sum(r.count for r in campaign.recordings)
+    gain = 0.5 * samples * (before - after) / max(after, 1.0)
+    return bool(np.isfinite(after) and gain > THRESHOLD)

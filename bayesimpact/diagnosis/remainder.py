@@ -1,0 +1,63 @@
+"""What stays unexplained beside the verdict: how large, where, and the best next guess."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayesimpact.diagnosis.locate import locate
+from bayesimpact.diagnosis.naming import Naming, State
+from bayesimpact.inference.fit import Fit
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What a fit leaves beyond the noise.
+
+    Attributes
+    ----------
+    rms : of the residual less the noise, m
+    share : the same over the rms of the signal about its mean
+    over_noise : rms residual over the noise
+    regime, displacement, recordings : where, from the force that would explain it
+    guess : ids that the likeliest larger model adds, or a form of force; "" for none
+    """
+
+    rms: float
+    share: float
+    over_noise: float
+    regime: str
+    displacement: tuple[float, float]
+    recordings: tuple[str, ...]
+    guess: str
+
+
+def remainder(naming: Naming, after: Fit, left: State | None) -> Remainder | None:
+    """What `after` leaves; `left` is the model whose remainder was examined, None for noise."""
+    if left is None:
+        return None
+    over = float(np.sqrt(after.reduced_chi2))
+    rms = after.rms * float(np.sqrt(max(1.0 - 1.0 / max(over, 1.0) ** 2, 0.0)))
+    recordings = after.target.oscillator.campaign.recordings
+    centred = np.concatenate([r.samples - r.samples.mean() for r in recordings])
+    signal = float(np.sqrt(np.mean(centred**2)))
+    best = max(naming.tried, key=naming.log_odds).fit
+    place = locate(left.candidate.fit, best, left.unknown, ())
+    return Remainder(
+        rms, rms / signal, over, place.regime, place.displacement, place.recordings,
+        next_guess(naming, left),
+    )  # fmt: skip
+
+
+def next_guess(naming: Naming, left: State) -> str:
+    """What the likeliest model tried has beyond `left`; else the likelier form of a free force."""
+    have = set(left.candidate.ids)
+    larger = [c for c in naming.tried if have < set(c.ids)]
+    if larger and naming.log_odds(larger[0]) > naming.log_odds(left.candidate):
+        return " + ".join(i for i in larger[0].ids if i not in have)
+    return (
+        "a stiffness or damping that changes with time"
+        if left.unknown.reach
+        else "a force of displacement and velocity"
+    )

@@ -1,0 +1,226 @@
+"""Every fault is found where it was put, and nothing is found where there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bayesimpact.data.bundled import bundled_campaign
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.faults.fault import Fault
+from bayesimpact.data.faults.find import find_faults, set_aside
+from bayesimpact.data.faults.flat import reading_step
+from bayesimpact.data.read import load_campaign
+from bayesimpact.data.recording import Recording
+
+NOISE = 5e-6
+Change = Callable[[np.ndarray], np.ndarray]
+
+
+@pytest.fixture(scope="module")
+def paper() -> Campaign:
+    return load_campaign(bundled_campaign("paper"))
+
+
+def spoiled(campaign: Campaign, change: Change, number: int = 4) -> Campaign:
+    recordings = list(campaign.recordings)
+    samples = change(recordings[number].samples.copy())
+    recordings[number] = replace(recordings[number], samples=samples)
+    return replace(campaign, recordings=tuple(recordings))
+
+
+def only(campaign: Campaign, number: int = 4) -> Fault:
+    faults = [f for f in find_faults(campaign) if f.action != "notice"]
+    assert [(f.recording, len(faults)) for f in faults] == [(campaign.recordings[number].name, 1)]
+    return faults[0]
+
+
+def covered(fault: Fault) -> set[int]:
+    return {i for a, b in fault.spans for i in range(a, b)}
+
+
+@pytest.mark.parametrize("name", ["paper", "concealed"])
+def test_good_recordings_have_none(name: str) -> None:
+    campaign = load_campaign(bundled_campaign(name))
+    assert find_faults(campaign) == ()
+    assert set_aside(campaign)[0] is campaign
+
+
+@pytest.mark.parametrize("width", [1, 3])
+@pytest.mark.parametrize("size", [2e-3, 2e-4])
+def test_spikes(paper: Campaign, size: float, width: int) -> None:
+    places = [812, 1500, 2222, 3340, 5001]
+
+    def change(x: np.ndarray) -> np.ndarray:
+        for k, i in enumerate(places):
+            x[i : i + width] += size * (-1) ** k
+        return x
+
+    fault = only(spoiled(paper, change))
+    assert fault.id == "recording_spikes"
+    assert covered(fault) == {i + k for i in places for k in range(width)}
+    assert fault.size == pytest.approx(size, rel=0.2)
+    assert fault.remedy.startswith("exclude_s = [[0.8116, ")
+
+
+def test_an_impact_is_no_spike_however_short() -> None:
+    """A mass thrown back within three samples, at every period: corners, always at one place."""
+    rng = np.random.default_rng(1)
+    t = np.arange(4000) * 1e-3
+    phase = (2 * np.pi * 6.4 * t) % np.pi
+    x = -6e-3 * np.exp(-0.1 * t) * np.sin(phase) + NOISE * rng.standard_normal(t.size)
+    recording = Recording("r", "1", x, 1e-3)
+    assert find_faults(Campaign("c", 0.5, (recording,))) == ()
+
+
+@pytest.mark.parametrize("count", [20, 200])
+def test_held_readings(paper: Campaign, count: int) -> None:
+    def change(x: np.ndarray) -> np.ndarray:
+        x[2500 : 2500 + count] = x[2499]
+        return x
+
+    fault = only(spoiled(paper, change))
+    assert fault.id == "recording_held" and fault.spans == ((2499, 2500 + count),)
+
+
+def test_zeros(paper: Campaign) -> None:
+    def change(x: np.ndarray) -> np.ndarray:
+        x[2500:2530] = 0.0
+        return x
+
+    fault = only(spoiled(paper, change))
+    assert fault.id == "recording_held" and fault.spans == ((2500, 2530),)
+    assert "zeros" in fault.statement
+
+
+def test_a_dead_tail_is_cut(paper: Campaign) -> None:
+    def change(x: np.ndarray) -> np.ndarray:
+        x[4000:] = x[3999]
+        return x
+
+    campaign = spoiled(paper, change)
+    fault = only(campaign)
+    assert (fault.id, fault.action) == ("recording_held", "cut")
+    assert set_aside(campaign)[0].recordings[4].samples.size == 3999
+    assert fault.remedy == "end_s = 3.9984"
+
+
+@pytest.mark.parametrize("low", [True, False])
+def test_clipping(paper: Campaign, low: bool) -> None:
+    x = paper.recordings[4].samples
+    limit = 0.8 * (x.min() if low else x.max())
+    cut: Change = (lambda x: np.maximum(x, limit)) if low else (lambda x: np.minimum(x, limit))
+    fault = only(spoiled(paper, cut))
+    assert fault.id == "recording_clipped" and fault.size == limit
+    assert covered(fault) == set(np.flatnonzero((x <= limit) if low else (x >= limit)))
+
+
+@pytest.mark.parametrize("count", [15, 3])
+def test_lost_samples(paper: Campaign, count: int) -> None:
+    at = 2036
+    fault = only(spoiled(paper, lambda x: np.delete(x, np.arange(at, at + count))))
+    assert fault.id == "recording_slip"
+    assert fault.start_s <= at * 1e-3 <= fault.end_s + 1e-9
+    assert fault.remedy == "start_s = 2.0356"  # the longer part stays
+
+
+def test_samples_written_twice(paper: Campaign) -> None:
+    at = 2036
+    fault = only(spoiled(paper, lambda x: np.concatenate([x[:at], x[at - 10 :]])))
+    assert fault.id == "recording_slip" and fault.start_s <= at * 1e-3 <= fault.end_s
+
+
+def test_rest_and_pull_before_the_release(paper: Campaign) -> None:
+    rng = np.random.default_rng(2)
+
+    def rest(x: np.ndarray) -> np.ndarray:
+        return np.concatenate([x[0] + NOISE * rng.standard_normal(500), x])
+
+    def pull(x: np.ndarray) -> np.ndarray:
+        way = x[0] * np.clip((np.arange(1300) - 300) / 800, 0, 1)
+        return np.concatenate([way + NOISE * rng.standard_normal(1300), x])
+
+    for change, length in ((rest, 500), (pull, 1300)):
+        campaign = spoiled(paper, change)
+        fault = only(campaign)
+        assert (fault.id, fault.action) == ("recording_start", "cut")
+        assert length <= fault.spans[0][1] <= length + 12
+        kept = set_aside(campaign)[0].recordings[4]
+        assert kept.start == pytest.approx(fault.spans[0][1] * 1e-3)
+
+
+def test_noise_that_rises_for_a_while(paper: Campaign) -> None:
+    rng = np.random.default_rng(3)
+
+    def change(x: np.ndarray) -> np.ndarray:
+        x[3000:4000] += 4 * NOISE * rng.standard_normal(1000)
+        return x
+
+    fault = only(spoiled(paper, change))
+    assert fault.id == "recording_noise"
+    assert set(range(3000, 4000)) <= covered(fault) <= set(range(2600, 4400))
+
+
+@pytest.mark.parametrize("first", [0, 777])
+def test_one_recording_given_twice(paper: Campaign, first: int) -> None:
+    one = paper.recordings[2]
+    again = replace(one, name="again", samples=one.samples[first:])
+    campaign = replace(paper, recordings=(*paper.recordings, again))
+    fault = only(campaign, -1)
+    assert (fault.id, fault.action) == ("recording_duplicate", "skip")
+    assert one.name in fault.statement
+    cleaned = set_aside(campaign)[0]
+    assert [r.name for r in cleaned.recordings] == [r.name for r in paper.recordings]
+    assert "again" in cleaned.skipped
+
+
+def test_the_readings_step_is_told_and_enters_nothing_else(paper: Campaign) -> None:
+    coarse = spoiled(paper, lambda x: np.round(x / 2e-4) * 2e-4)
+    faults = find_faults(coarse)
+    assert [(f.id, f.action) for f in faults] == [("recording_quantised", "notice")]
+    assert faults[0].size == pytest.approx(2e-4)
+    assert reading_step(paper.recordings[0].samples) == 0.0
+    assert set_aside(coarse)[0] is coarse
+
+
+def test_two_faults_at_once_keep_the_samples_numbers_of_the_file(paper: Campaign) -> None:
+    rng = np.random.default_rng(4)
+
+    def change(x: np.ndarray) -> np.ndarray:
+        x = np.concatenate([x[0] + NOISE * rng.standard_normal(500), x])
+        x[3000] += 1e-3
+        x[4000:4030] = 0.0
+        return x
+
+    campaign = spoiled(paper, change)
+    found = {f.id: f.spans for f in find_faults(campaign)}
+    assert set(found) == {"recording_held", "recording_spikes", "recording_start"}
+    assert found["recording_spikes"] == ((3000, 3001),)
+    assert found["recording_held"] == ((4000, 4030),)
+    cleaned = set_aside(campaign)[0].recordings[4]
+    start = found["recording_start"][0][1]
+    assert cleaned.used is not None
+    gone = set(np.flatnonzero(~cleaned.used) + start)
+    assert gone == {3000, *range(4000, 4030)}
+
+
+def test_what_campaign_toml_set_aside_is_not_found_again(paper: Campaign) -> None:
+    def change(x: np.ndarray) -> np.ndarray:
+        x[2500] += 1e-3
+        return x
+
+    cleaned, faults = set_aside(spoiled(paper, change))
+    assert len(faults) == 1 and find_faults(cleaned) == ()
+
+
+def test_faults_are_kept_where_campaign_toml_says_so(paper: Campaign) -> None:
+    def change(x: np.ndarray) -> np.ndarray:
+        x[2500] += 1e-3
+        return x
+
+    campaign = replace(spoiled(paper, change), keep_faults=True)
+    same, faults = set_aside(campaign)
+    assert same is campaign and len(faults) == 1

@@ -1,0 +1,101 @@
+"""`bayesimpact new`: a campaign.toml from instrument files, never over another."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import instrument_files as made
+import numpy as np
+import pytest
+from campaigns import csv, decay
+from click.testing import CliRunner, Result
+
+from bayesimpact.cli import main
+from bayesimpact.data.read import load_campaign
+from bayesimpact.errors import InputError
+
+
+def _new(folder: Path, *arguments: object) -> Result:
+    return CliRunner().invoke(main, ["new", str(folder), *map(str, arguments)])
+
+
+COMPLETE = [
+    *("MATLAB structure", "HDF5", "UFF58", "TDMS", "LVM", "Excel", "NetCDF 3", "NetCDF 4", "Zarr"),
+    *("Parquet", "npz", "units in the header", "units in a second row", "NI", "Polytec", "LMS"),
+    *("Keyence", "Latin-1", "UTF-16", "decimal commas, blanks", "trailing separators"),
+]
+
+
+@pytest.mark.parametrize("kind", COMPLETE)
+def test_files_that_say_all(tmp_path: Path, kind: str) -> None:
+    name, writer, _ = made.FILES[kind]
+    writer(tmp_path / name)
+    result = _new(tmp_path / "new rig", tmp_path / name, "--plot")
+    assert result.exit_code == 0, result.output
+    assert "ready for: bayesimpact check" in result.output
+    assert (tmp_path / "new rig" / "channels.png").stat().st_size > 1000
+    campaign = load_campaign(tmp_path / "new rig")
+    assert (campaign.name, campaign.mass, campaign.cases) == ("new rig", 1.0, ("1",))
+    np.testing.assert_allclose(campaign.recordings[0].samples, decay(), rtol=1e-9, atol=1e-13)
+    assert campaign.recordings[0].interval == pytest.approx(2e-3, rel=1e-6)
+
+
+def test_what_is_said_is_not_assumed(tmp_path: Path) -> None:
+    made.tdms(tmp_path / "a.tdms")
+    (tmp_path / "a.csv").write_text(csv())
+    files = (tmp_path / "a.tdms", tmp_path / "a.csv")
+    result = _new(tmp_path, *files, "--mass", 0.5, "--stop", "--case", "soft")
+    assert result.exit_code == 0, result.output
+    text = (tmp_path / "campaign.toml").read_text()
+    assert "ASSUMED: " not in text.partition("\n")[2]
+    campaign = load_campaign(tmp_path)
+    assert (campaign.mass, campaign.cases) == (0.5, ("soft",))
+    assert [r.name for r in campaign.recordings] == ["a", "a-2"]
+
+
+def test_what_is_missing_is_said(tmp_path: Path) -> None:
+    made.bare_lvm(tmp_path / "a.lvm")
+    made.npy(tmp_path / "b.npy")
+    result = _new(tmp_path, tmp_path / "a.lvm", tmp_path / "b.npy", "--no-stop")
+    assert result.exit_code == 0, result.output
+    text = (tmp_path / "campaign.toml").read_text()
+    assert "time_column = 1  # ASSUMED: it rises evenly, in s" in text
+    assert "column = 2" in text
+    assert text.count('# unit = "mm"  # NEEDED') == 2
+    assert "# sample_rate_hz = 1000.0  # NEEDED" in text
+    assert "not yet complete" in result.output and "no unit for it" in result.output
+    filled = text.replace('# unit = "mm"', 'unit = "mm"').replace("# sample_rate_hz = 1000.0",
+                                                               "sample_rate_hz = 500")  # fmt: skip
+    (tmp_path / "campaign.toml").write_text(filled)
+    for recording in load_campaign(tmp_path).recordings:
+        np.testing.assert_allclose(recording.samples, decay(), rtol=1e-9)
+
+
+def test_a_campaign_is_never_replaced(tmp_path: Path) -> None:
+    made.tdms(tmp_path / "a.tdms")
+    (tmp_path / "campaign.toml").write_text("mine")
+    result = _new(tmp_path, tmp_path / "a.tdms")
+    assert result.exit_code == 2
+    assert "a campaign already" in result.stderr
+    assert (tmp_path / "campaign.toml").read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", ["nothing.mat", "cut.mat"])
+def test_nothing_is_written_for_a_bad_file(tmp_path: Path, name: str) -> None:
+    (tmp_path / "cut.mat").write_bytes(b"MATLAB 5.0")
+    made.tdms(tmp_path / "a.tdms")
+    result = _new(tmp_path / "new", tmp_path / "a.tdms", tmp_path / name)
+    assert result.exit_code == 2
+    assert name in result.stderr and "Traceback" not in result.stderr
+    assert not (tmp_path / "new").exists()
+
+
+def test_acceleration_is_read_and_said_unusable(tmp_path: Path) -> None:
+    rows = [f"{t:.6g},{x:.9g}" for t, x in zip(made.TIMES, made.MM, strict=True)]
+    (tmp_path / "a.csv").write_text("Time [s],Accel [g]\n" + "\n".join(rows))
+    result = _new(tmp_path, tmp_path / "a.csv")
+    assert result.exit_code == 0
+    assert "Accel [g], 600 samples" in result.output
+    assert "NEEDED: a displacement or an angle" in result.output
+    with pytest.raises(InputError, match=r"an acceleration \(g\)"):
+        load_campaign(tmp_path)

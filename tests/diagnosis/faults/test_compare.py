@@ -1,0 +1,122 @@
+"""One recording that disagrees with the others: which it is, and what is wrong with it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bayesimpact.data.bundled import bundled_campaign
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.read import load_campaign
+from bayesimpact.data.recording import Recording
+from bayesimpact.diagnosis.faults.compare import Compared, base_failed, compare_recordings
+from bayesimpact.inference.identify import identify
+from bayesimpact.trial.bundle import PAPER_RIG, paper_releases
+from bayesimpact.trial.rig import record
+from bayesimpact.trial.rig_chain import Chain
+
+SECONDS = 2.0
+ODD = 3  # case2_a among case1_a, 1_b, 1_c, 2_a, 2_b, 3_a
+Change = Callable[[Recording], Recording]
+
+
+@pytest.fixture(scope="module")
+def paper() -> Campaign:
+    campaign = load_campaign(bundled_campaign("paper")).truncated(SECONDS)
+    chosen = tuple(campaign.recordings[i] for i in (0, 1, 2, 3, 4, 6))
+    return replace(campaign, recordings=chosen)
+
+
+def changed(campaign: Campaign, change: Change, *numbers: int) -> Campaign:
+    recordings = list(campaign.recordings)
+    for number in numbers or (ODD,):
+        recordings[number] = change(recordings[number])
+    return replace(campaign, recordings=tuple(recordings))
+
+
+def compared(campaign: Campaign) -> tuple[Compared, ...]:
+    return compare_recordings(identify(campaign, rng=np.random.default_rng(0), search=False))
+
+
+def only(campaign: Campaign) -> Compared:
+    found = compared(campaign)
+    assert [f.fault.recording for f in found] == ["case2_a"]
+    assert found[0].after < 1.05 < found[0].before
+    return found[0]
+
+
+def scaled(by: float) -> Change:
+    return lambda r: replace(r, samples=r.samples * by)
+
+
+def test_recordings_that_agree_have_no_fault(paper: Campaign) -> None:
+    assert compared(paper) == ()
+
+
+def test_a_gain(paper: Campaign) -> None:
+    found = only(changed(paper, scaled(1.05)))
+    assert found.fault.id == "recording_gain"
+    assert found.fault.size == pytest.approx(5.0, abs=0.1)
+    factor = float(found.fault.remedy.removeprefix("scale = "))
+    assert factor == pytest.approx(1 / 1.05, rel=1e-3)
+    assert "gap of its own" in found.fault.statement
+    samples = found.campaign.recordings[ODD].samples
+    np.testing.assert_allclose(samples, paper.recordings[ODD].samples, rtol=1e-3)
+
+
+def test_a_unit(paper: Campaign) -> None:
+    found = only(changed(paper, scaled(1e3)))
+    assert (found.fault.id, found.fault.remedy) == ("recording_gain", "scale = 0.001")
+
+
+def test_a_clock(paper: Campaign) -> None:
+    found = only(changed(paper, lambda r: replace(r, interval=r.interval * 1.005)))
+    assert found.fault.id == "recording_clock"
+    ratio = float(found.fault.remedy.removeprefix("clock_ratio = "))
+    assert ratio == pytest.approx(1 / 1.005, abs=3e-4)
+
+
+def test_a_wrong_label(paper: Campaign) -> None:
+    found = only(changed(paper, lambda r: replace(r, case="3")))
+    assert (found.fault.id, found.fault.remedy) == ("recording_case", 'case = "2"')
+    assert found.campaign.recordings[ODD].case == "2"
+
+
+@pytest.mark.parametrize("numbers", [(0, ODD)])
+def test_reversed_signs(paper: Campaign, numbers: tuple[int, ...]) -> None:
+    found = compared(changed(paper, scaled(-1.0), *numbers))
+    names = [paper.recordings[i].name for i in numbers]
+    assert [(f.fault.id, f.fault.recording) for f in found] == [
+        ("recording_reversed", n) for n in names
+    ]
+    assert found[-1].after < 1.05
+    assert {f.fault.remedy for f in found} == {"invert = true"}
+
+
+def test_a_stop_on_the_other_side_of_all(paper: Campaign) -> None:
+    campaign = changed(paper, scaled(-1.0), *range(6))
+    identification = identify(campaign, rng=np.random.default_rng(0), search=False)
+    assert base_failed(identification.fit)
+    found = compare_recordings(identification)
+    assert len(found) == 6
+    assert all("stop lies on the negative side" in f.fault.statement for f in found)
+    right = identify(found[-1].campaign, rng=np.random.default_rng(0), search=False)
+    assert not base_failed(right.fit)
+
+
+@pytest.mark.parametrize(("what", "by"), [("k1", 1.008), ("k2", 1.05)])
+def test_another_rig(paper: Campaign, what: str, by: float) -> None:
+    values = {"k1": PAPER_RIG.k1, "c1": PAPER_RIG.c1, "k2": PAPER_RIG.k2["2"]}
+    other = {"k2": {**PAPER_RIG.k2, "2": by * values["k2"]}} if what == "k2" else {}
+    rig = replace(PAPER_RIG, **(other or {what: by * values[what]}))
+    rng = np.random.default_rng(7)
+    release = paper_releases(rng)[3]
+    samples = record(rig, release, {}, Chain(5e-6), rate=1000.0, duration=SECONDS, rng=rng)
+    found = only(changed(paper, lambda r: replace(r, samples=samples)))
+    assert found.fault.id == "recording_other_rig"
+    assert f"its {what} is" in found.fault.statement
+    assert found.fault.size == pytest.approx(100 * (by - 1), rel=0.05)
+    assert "case2_a" not in [r.name for r in found.campaign.recordings]

@@ -1,0 +1,86 @@
+"""Damping by a power of the speed, and structural damping: closed forms, and where they are hard.
+
+A root of the speed is not smooth where the motion turns, and a structural force jumps there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from effect_rigs import BY_ID, TestRig, by_rig, moved
+from scipy.special import gamma
+
+FREE = TestRig(mass=0.5, c1=0.0, k1=0.5 * (10 * np.pi) ** 2, k2=(), y0=(-6e-3,), v0=(0.0,))
+POWER, STRUCTURAL = BY_ID["power_damping"], BY_ID["structural_damping"]
+
+
+def power_law(c: float, n: float, rig: TestRig, r: int = 0) -> np.ndarray:
+    return moved([POWER], {"power_damping.coefficient": c, "power_damping.exponent": n}, rig, r)
+
+
+@pytest.mark.parametrize("n", [0.5, 1.5, 3.0])
+def test_equivalent_damping(n):
+    """a' = -c_eq a / (2 m), c_eq = c (w a)^(n-1) 2 Gamma(n/2+1) / (sqrt(pi) Gamma(n/2+3/2))."""
+    w, a = 10 * np.pi, FREE.y0[0]
+    c = 0.05 * (w * abs(a)) ** (1 - n)
+    amplitudes = np.abs(power_law(c, n, FREE)[::200])
+    factor = 2 * gamma(n / 2 + 1) / (np.sqrt(np.pi) * gamma(n / 2 + 1.5))
+    rate = c * w ** (n - 1) * factor / (2 * FREE.mass)  # a' = -rate a^n
+    t = 0.2 * np.arange(amplitudes.size)
+    expected = (abs(a) ** (1 - n) - (1 - n) * rate * t) ** (1 / (1 - n))
+    np.testing.assert_allclose(amplitudes, expected, rtol=1e-4)
+    assert amplitudes[-1] < 0.9 * abs(a)
+
+
+@pytest.mark.parametrize("n", [0.25, 0.5, 0.75, 1.5, 2.5, 4.0])
+def test_roots_of_the_speed(n):
+    """Half the damping force of the paper's rig, at every exponent of the grid, for 3 s."""
+    rig = TestRig(duration=3.0)
+    c = 0.5 * rig.scales().damping_force / rig.scales().speed ** n
+    values = {"power_damping.coefficient": c, "power_damping.exponent": n}
+    for r in (0, 1):
+        difference = moved([POWER], values, rig, r) - by_rig([POWER], values, rig, r)
+        assert np.abs(difference).max() < 1e-9
+
+
+def test_one_and_two_are_the_simpler_laws():
+    rig = TestRig(duration=1.0)
+    viscous = TestRig(duration=1.0, c1=rig.c1 + 0.1)
+    assert np.abs(power_law(0.1, 1.0, rig) - moved([], {}, viscous)).max() < 1e-10
+    drag = moved([BY_ID["quadratic_drag"]], {"quadratic_drag.coefficient": 0.5}, rig)
+    assert np.abs(power_law(0.5, 2.0, rig) - drag).max() < 1e-10
+    assert POWER.prefer == "quadratic_drag"
+
+
+def test_ratio_of_swings_under_structural_damping():
+    """Between turning points the motion is a free one of k1 (1 +- h), every swing the same share.
+
+    From rest at -a to y = 0 the spring is k1 (1 - h), from there on k1 (1 + h): the next turning
+    point is a sqrt((1 - h) / (1 + h)), and half a period lasts the mean of both.
+    """
+    h = 0.02
+    rig = TestRig(**{**FREE.__dict__, "rate": 2000.0})
+    y = moved([STRUCTURAL], {"structural_damping.loss": h}, rig)
+    half = 0.05 * (1 / np.sqrt(1 - h) + 1 / np.sqrt(1 + h))
+    times = np.arange(rig.count) / rig.rate
+    swing = np.floor(times / half)
+    ratio = np.sqrt((1 - h) / (1 + h))
+    quarter = 0.05 / np.sqrt(1 - h)
+    inside = times - swing * half
+    start = rig.y0[0] * (-ratio) ** swing
+    w = 10 * np.pi
+    first = start * np.cos(w * np.sqrt(1 - h) * inside)
+    second = -start * ratio * np.sin(w * np.sqrt(1 + h) * (inside - quarter))
+    np.testing.assert_allclose(y, np.where(inside < quarter, first, second), rtol=0, atol=5e-11)
+
+
+def test_structural_damping_adds_to_the_hold_of_dry_friction():
+    """At rest at y the mass holds while k1 |y| (1 - h) is below the friction."""
+    values = {"coulomb_friction.force": 1.0, "structural_damping.loss": 0.2}
+    effects = [BY_ID["coulomb_friction"], STRUCTURAL]
+    for share, held in ((0.99, True), (1.01, False)):
+        place = share / (0.8 * FREE.k1)
+        rig = TestRig(**{**FREE.__dict__, "y0": (place,), "duration": 0.5})
+        y = moved(effects, values, rig)
+        assert np.all(y == place) == held
+        assert np.abs(y - by_rig(effects, values, rig)).max() < 1e-12

@@ -1,0 +1,62 @@
+"""Faults of trials: put where the truth says, and scored by id, recording and time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bayesimpact.data.faults.fault import fault_document
+from bayesimpact.data.faults.find import find_faults
+from bayesimpact.trial.draw import draw
+from bayesimpact.trial.faults import PLANTS, judge_fault, plant_fault
+from bayesimpact.trial.settings import Settings
+
+SETTINGS = Settings(kinds=("fault",), benches=("small",), noises=("white",))
+
+
+@pytest.fixture(scope="module")
+def control():
+    return draw(Settings(kinds=("control",), benches=("small",), noises=("white",)), 1)
+
+
+@pytest.mark.parametrize("kind", PLANTS)
+def test_a_fault_is_in_one_recording_and_nowhere_else(control, kind: str) -> None:
+    rng = np.random.default_rng(3)
+    planted = plant_fault(control.campaign, kind, control.truth["noise_m"], rng)
+    assert planted is not None
+    campaign, truth = planted
+    before = {
+        r.name: (r.case, r.interval, r.samples.tobytes()) for r in control.campaign.recordings
+    }
+    after = {r.name: (r.case, r.interval, r.samples.tobytes()) for r in campaign.recordings}
+    assert [n for n in after if before.get(n) != after[n]] == [truth["recording"]]
+    assert truth["id"] == PLANTS[kind].id
+
+
+@pytest.mark.parametrize("kind", ["spikes", "held", "start", "duplicate"])
+def test_what_was_put_in_is_found(control, kind: str) -> None:
+    planted = plant_fault(
+        control.campaign, kind, control.truth["noise_m"], np.random.default_rng(5)
+    )
+    assert planted is not None
+    found = [f for f in find_faults(planted[0]) if f.action != "notice"]
+    assert judge_fault(planted[1], [fault_document(f) for f in found]) == "named"
+
+
+def test_scores() -> None:
+    truth = {"id": "recording_held", "recording": "a", "start_s": 1.0, "end_s": 1.2, "timed": True}
+    right = {"id": "recording_held", "recording": "a", "start_s": 1.1, "end_s": 1.3}
+    assert judge_fault(truth, [right]) == "named"
+    assert judge_fault(truth, []) == "missed"
+    assert judge_fault(truth, [right | {"recording": "b"}]) == "elsewhere"
+    assert judge_fault(truth, [right | {"start_s": 1.3, "end_s": 1.4}]) == "elsewhere"
+    assert judge_fault(truth, [right | {"id": "recording_spikes"}]) == "wrong name"
+    assert judge_fault(truth, [right, right | {"id": "recording_spikes"}]) == "wrong name"
+
+
+def test_a_trial_says_in_its_truth_what_was_put_in_and_is_the_same_again() -> None:
+    one, again = draw(SETTINGS, 1), draw(SETTINGS, 1)
+    assert one.truth["fault"] == again.truth["fault"]
+    assert one.truth["fault"]["id"] == "recording_held"
+    for a, b in zip(one.campaign.recordings, again.campaign.recordings, strict=True):
+        np.testing.assert_array_equal(a.samples, b.samples)
