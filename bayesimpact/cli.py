@@ -317,15 +317,8 @@ def sample(
 
     command = f"bayesimpact sample {campaign} --out {out} --seed {seed}"
     folder = made_folder(out, f"{command} --resume")
-    outcome = sample_campaign(
-        loaded,
-        folder,
-        seed=seed,
-        resume=resume,
-        command=command,
-        say=telling(quiet),
-        bar=False if quiet else None,
-    )
+    told: dict[str, Any] = {"say": telling(quiet), "bar": False if quiet else None}
+    outcome = sample_campaign(loaded, folder, seed=seed, resume=resume, command=command, **told)
     announce(outcome, out, quiet)
     finish(ctx, outcome)
 
@@ -384,21 +377,13 @@ def report(
     ctx: click.Context, folder: Path, pdf: bool, latex: bool, seed: int, quiet: bool
 ) -> None:
     """Write the report of whatever DIR holds, from its files alone."""
-    from bayesimpact.report.write import rewrite_report, write_latex
+    from bayesimpact.report.write import more_files, rewrite_report
 
     if folder.is_dir() and (folder / "results.nc").exists():
         made_folder(folder, f"bayesimpact report {folder}")
     written = rewrite_report(folder)
-    files = [written.page]
-    if latex:
-        files.append(write_latex(folder))
-    if pdf:
-        from bayesimpact.report.pdf import print_page
-
-        files.append(files[0].with_suffix(".pdf"))
-        print_page(files[0], files[-1])
-    if not quiet:
-        for file in files:
+    for file in (written.page, *more_files(folder, pdf=pdf, latex=latex)):
+        if not quiet:
             click.echo(f"report: {file}")
     if written.failed:
         click.echo(f"bayesimpact: {unmade_words(list(written.failed))}", err=True)

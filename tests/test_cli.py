@@ -176,7 +176,7 @@ def test_interrupted_sampling_says_how_to_go_on(
     def stop(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("bayesimpact.data.read.load_campaign", lambda path: None)
+    monkeypatch.setattr("bayesimpact.data.read.load_campaign", lambda *_: None)
     monkeypatch.setattr("bayesimpact.workflow.sample_campaign", stop)
     out = tmp_path / "out"
     got, _, err = run("sample", tmp_path, "--out", out, "--seed", "3")

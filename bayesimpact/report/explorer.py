@@ -1,8 +1,8 @@
-"""The interactive part of report.html: its data, compactly, and its one script.
+"""The interactive part of report.html: its data, compactly, and its scripts.
 
 Everything is inside the page: recordings as base64 of 32-bit floats, residuals and forces as 16-bit
-integers with a scale, the plotting library and the page's own script as one inline block that is
-the same in every report (so that its hash can be named in a content security policy).
+integers with a scale, the plotting library and the page's own script word for word as in their
+files, which the page's policy allows by their hashes (see `policy`).
 """
 
 from __future__ import annotations
@@ -27,25 +27,22 @@ from bayesimpact.report.units import display, typeset
 FOLDER = Path(__file__).parent / "template"
 LIBRARY = FOLDER / "vendor" / "uPlot-1.6.32.iife.min.js"
 LIBRARY_STYLE = FOLDER / "vendor" / "uPlot-1.6.32.min.css"
-LICENCE = FOLDER / "vendor" / "uPlot-LICENSE.txt"
 MOST_SAMPLES = 120_000
 """Samples in the page, 16 bytes each as base64: 1.9 MB of the 6 MB that a report may have."""
 _INTEGERS = 32767
 
 
 @cache
-def script() -> str:
-    """The one inline script: library with its licence, then the explorer. The same in all pages."""
-    library = LIBRARY.read_text(encoding="utf-8").partition("\n")[2]  # the first line is an address
-    licence = LICENCE.read_text(encoding="utf-8").strip()
-    own = (FOLDER / "explorer.js").read_text(encoding="utf-8")
-    return f"/* uPlot 1.6.32\n{licence}\n*/\n{library}\n{own}"
+def scripts() -> tuple[str, str]:
+    """The plotting library with its licence, and the explorer: the same in all pages."""
+    own = FOLDER / "explorer.js"
+    return LIBRARY.read_text(encoding="utf-8"), own.read_text(encoding="utf-8")
 
 
 @cache
 def style() -> str:
     """Style of the plotting library."""
-    return LIBRARY_STYLE.read_text(encoding="utf-8").strip()
+    return LIBRARY_STYLE.read_text(encoding="utf-8")
 
 
 def explorer_words(results: Results) -> str:

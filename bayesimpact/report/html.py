@@ -96,7 +96,7 @@ def _context(results: Results, pictures: Mapping[str, bytes]) -> dict[str, Any]:
         "r": results,
         "css": Markup((TEMPLATES / "style.css").read_text(encoding="utf-8")),
         "library_css": Markup(explorer.style()),
-        "script": Markup(explorer.script()),
+        "scripts": [Markup(script) for script in explorer.scripts()],
         "explorer_data": Markup(explorer.explorer_data(results)),
         "explorer_words": explorer.explorer_words(results),
         "d": told,

@@ -16,11 +16,14 @@ from bayesimpact.report.figures.save import reason
 from bayesimpact.report.figures.shares import save_all
 from bayesimpact.report.groups import inference_groups
 from bayesimpact.report.html import render, unfinished
+from bayesimpact.report.latex import latex_tables
+from bayesimpact.report.pdf import print_page
 from bayesimpact.report.results import Array, Results
 
 REPORT_FILE = "report.html"
 POSTERIOR_FILE = "posterior.nc"
 LATEX_FILE = "tables.tex"
+PDF_FILE = "report.pdf"
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,13 +77,16 @@ def rewrite_report(folder: Path) -> Written:
     return write_report(load_results(folder), folder)
 
 
-def write_latex(folder: Path) -> Path:
-    """The tables of the results that a folder holds, for LaTeX; path of the file."""
-    from bayesimpact.report.latex import latex_tables
-
-    path = folder / LATEX_FILE
-    write_text(path, latex_tables(load_results(folder)))
-    return path
+def more_files(folder: Path, *, pdf: bool, latex: bool) -> list[Path]:
+    """The report of a folder as PDF, its tables for LaTeX; paths of what was asked for."""
+    files = []
+    if latex:
+        files.append(folder / LATEX_FILE)
+        write_text(files[-1], latex_tables(load_results(folder)))
+    if pdf:
+        files.append(folder / PDF_FILE)
+        print_page(folder / REPORT_FILE, files[-1])
+    return files
 
 
 def write_fit(

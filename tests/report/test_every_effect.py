@@ -20,27 +20,25 @@ from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification
 from bayesimpact.report.archive import load_results
 from bayesimpact.report.figures import gaussian, save, shares
-from bayesimpact.report.figures.corner import corner_figure
+from bayesimpact.report.figures.corner import Normal, corner_figure
 from bayesimpact.report.figures.gaussian import gaussian_figures
 from bayesimpact.report.figures.improvement import improvement_figures
-from bayesimpact.report.results import Draws
 from bayesimpact.report.write import Written, write_fit
 
 VERDICTS = ("named", "ambiguous", "unknown")
 
 
-def few_pairs(after: Draws, *, before: Draws) -> Figure:
+def few_pairs(after: Normal, *, before: Normal, **told: Any) -> Figure:
     """The corner plot of two parameters: the first of the base model and the last added one."""
-    assert len(after.names) == after.values.shape[1]
+    assert len(after.names) == after.mean.size
 
-    def some(draws: Draws) -> Draws:
-        ends = [0, len(draws.names) - 1]
-        names, units = ([text[i] for i in ends] for text in (draws.names, draws.units))
-        return replace(
-            draws, names=tuple(names), units=tuple(units), values=draws.values[:300, ends]
-        )
+    def some(law: Normal) -> Normal:
+        ends = [0, len(law.names) - 1]
+        names, units = (tuple(text[i] for i in ends) for text in (law.names, law.units))
+        return replace(law, names=names, units=units, mean=law.mean[ends],
+                       covariance=law.covariance[np.ix_(ends, ends)])  # fmt: skip
 
-    return corner_figure(some(after), before=some(before))
+    return corner_figure(some(after), before=some(before), **told)
 
 
 @pytest.fixture(autouse=True)

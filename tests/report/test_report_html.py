@@ -85,7 +85,7 @@ def test_self_contained() -> None:
     for link in parsed.links:
         assert link.startswith(("data:image/png;base64,", "#")), link
     rest, scripts = re.subn(r"<script[ >].*?</script>", "", source, flags=re.DOTALL)
-    assert scripts == 2  # data of the explorer, and the one script: see test_explorer
+    assert scripts == 3  # data of the explorer, and its two scripts: see test_explorer
     assert not re.search(r"https?:|//[a-z]|@import|url\(|<script|<link|<iframe", rest)
     anchors = {link[1:] for link in parsed.links if link.startswith("#")}
     assert anchors <= set(parsed.ids) and len(set(parsed.ids)) == len(parsed.ids)

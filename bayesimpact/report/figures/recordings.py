@@ -174,7 +174,8 @@ def _motion(axis: Axes, results: Results, recording: RecordingResult, *, dots: b
 
 
 def _residual(axis: Axes, results: Results, recording: RecordingResult, limit: float) -> None:
-    shown = display(results.unit, max(results.rms, results.noise.level))
+    sizes = [x for x in (results.rms, results.noise.level) if np.isfinite(x)]
+    shown = display(results.unit, max(sizes, default=0.0))
     r = recording.residual * shown.scale
     axis.plot(*polyline(recording.times, r), color="#555555", lw=0.45, rasterized=True)
     band = 2 * recording.noise_rms * shown.scale

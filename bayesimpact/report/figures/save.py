@@ -27,6 +27,7 @@ from bayesimpact.report.published import PUBLISHED
 from bayesimpact.report.results import Results
 
 DPI = 150
+_COLOURS = 256  # in a picture: a third of the bytes, no difference to be seen
 LONGEST_NAME = 40
 """Characters of a file's name: with its ending and a temporary name's below 255 bytes."""
 
@@ -37,9 +38,6 @@ class Drawn:
 
     pictures: Mapping[str, bytes] = field(default_factory=dict)
     failed: Mapping[str, str] = field(default_factory=dict)
-
-
-_COLOURS = 256  # in a picture: a third of the bytes, no difference to be seen
 
 
 def all_figures(results: Results) -> dict[str, Figure]:
