@@ -24,6 +24,7 @@ LAYERS = (
     "workflow",
     "api",
     "trial",
+    "console",
     "cli",
     "__main__",
 )
@@ -106,7 +107,7 @@ def test_only_the_command_line_prints() -> None:
             if isinstance(node, ast.Name) and module != "bayesimpact.cli":
                 assert node.id != "print", f"{module}, line {node.lineno}"
     printers = [m for m in MODULES if any(n.split(".")[0] == "click" for n in imported(m))]
-    assert printers == ["bayesimpact.cli", "bayesimpact.trial.command"]
+    assert printers == ["bayesimpact.cli", "bayesimpact.console", "bayesimpact.trial.command"]
 
 
 def test_importing_the_package_is_light() -> None:
