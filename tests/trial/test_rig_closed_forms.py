@@ -1,4 +1,4 @@
-"""Closed forms of the rig's effects: wear of the gap, relaxation, drift, knocks, detents, bodies."""
+"""Closed forms of the rig's effects: wear of the gap, relaxation, drift, knocks, loose bodies."""
 
 from __future__ import annotations
 
