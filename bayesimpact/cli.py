@@ -118,9 +118,11 @@ def new(
     click.echo(f"written: {file}" + (f", {folder / 'channels.png'}" if plot else ""))
     for line in (*made.assumed, *made.needed):
         click.echo(f"  {line}")
+    beside = sorted({f.resolve().parent for f in files} - {folder.resolve()})
     try:
-        load_campaign(folder)
-        click.echo(f"ready for: bayesimpact check {folder}")
+        load_campaign(folder, beside)
+        elsewhere = "".join(f" --data {place}" for place in beside)
+        click.echo(f"ready for: bayesimpact check {folder}{elsewhere}")
     except InputError as error:
         click.echo(f"not yet complete: {error}")
 

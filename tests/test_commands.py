@@ -89,7 +89,7 @@ def test_report_of_an_empty_folder_is_refused(run: Run, tmp_path: Path) -> None:
 def test_diagnose_finds_nothing_where_nothing_is(run: Run, campaign: Path, tmp_path: Path) -> None:
     code, out, _ = run("diagnose", campaign, "--out", tmp_path, "--quick")
     content = json.loads((tmp_path / "diagnosis.json").read_text())
-    assert code == 0 and content["schema"] == "bayesimpact/diagnosis/1"
+    assert code == 0 and content["schema"] == "bayesimpact/diagnosis/2"
     assert content["verdict"] == "adequate" and content["effects"] == []
     assert content["location"] is None and out.startswith("adequate")
     assert {row["id"] for row in content["limits"]} >= {"coulomb_friction", "spring_cubic"}

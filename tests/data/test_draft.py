@@ -34,7 +34,8 @@ def test_files_that_say_all(tmp_path: Path, kind: str) -> None:
     assert result.exit_code == 0, result.output
     assert "ready for: bayesimpact check" in result.output
     assert (tmp_path / "new rig" / "channels.png").stat().st_size > 1000
-    campaign = load_campaign(tmp_path / "new rig")
+    assert f"--data {tmp_path.resolve()}" in result.output
+    campaign = load_campaign(tmp_path / "new rig", [tmp_path])
     assert (campaign.name, campaign.mass, campaign.cases) == ("new rig", 1.0, ("1",))
     np.testing.assert_allclose(campaign.recordings[0].samples, decay(), rtol=1e-9, atol=1e-13)
     assert campaign.recordings[0].interval == pytest.approx(2e-3, rel=1e-6)

@@ -123,6 +123,6 @@ def test_real_instrument_files(tmp_path: Path) -> None:
     assert (first.samples[0], second.samples[0]) == (146.646210, 86.173867)
     box = _real_recordings() / "silverbox" / "SNLS80mV.csv"
     keys = 'column = "V2"\nunit = "m"\nsample_rate_hz = 610.3515625\n'
-    (recording,) = load_campaign(_folder(tmp_path, box.as_posix(), keys)).recordings
+    (recording,) = load_campaign(_folder(tmp_path, box.as_posix(), keys), [box.parent]).recordings
     assert recording.samples.size == 131_072
     assert recording.samples[1] == 0.012971

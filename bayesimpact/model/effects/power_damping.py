@@ -47,7 +47,7 @@ EFFECT = Effect(
     parameters=(
         EffectParameter(
             "coefficient",
-            "N (s/m)^n",
+            "N",
             # between the linear law's and the quadratic one's: the unit hangs on the exponent
             scale=lambda s: 0.5 * s.damping_force / s.speed**1.5,
             lower=0.0,
