@@ -14,7 +14,7 @@ from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.force import missing_drift, missing_force
 from bayesimpact.diagnosis.naming import State, is_large
 from bayesimpact.diagnosis.own_band import shakes_in_own_band
-from bayesimpact.diagnosis.refit import Candidate, refit, without
+from bayesimpact.diagnosis.refit import Candidate, exchanged, refit, without
 from bayesimpact.diagnosis.scan import Scan, scan
 from bayesimpact.diagnosis.scores import Score
 from bayesimpact.diagnosis.valley import followed
@@ -129,6 +129,15 @@ class Models:
             self.progress("without " + effect.id)
             self.keep(without(candidate, effect, self.scales))
         return self.tried[frozenset(i for i in candidate.ids if i != effect.id)]
+
+    def exchange_on_off(self, candidate: Candidate, old: Effect, new: Effect) -> None:
+        """An effect without a size in the place of another, from where that one stands, once."""
+        begun = (candidate.ids, candidate.fit.log_posterior, old.id, new.id)
+        if begun not in self.begun:
+            self.begun.add(begun)
+            self.refits += 1
+            self.progress(f"{new.id} in place of {old.id} in " + " + ".join(candidate.ids))
+            self.keep(exchanged(candidate, old, new, self.scales))
 
     def finished(self, candidate: Candidate) -> Candidate:
         """A model whose climb gave up, at the lowest point of its valley."""

@@ -272,6 +272,8 @@ class _Search(Models):
             for score in self.worth_a_refit(found):
                 if score.effect.id != effect.id:
                     self.fit_one(rest, found, score)
+                    if not score.effect.parameters:
+                        self.exchange_on_off(chosen, effect, score.effect)
 
     def naming(self, base: State, chosen: State) -> Naming:
         tried = tuple(sorted(self.tried.values(), key=self.worth, reverse=True))

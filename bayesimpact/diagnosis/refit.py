@@ -120,6 +120,21 @@ def without(candidate: Candidate, effect: Effect, scales: Scales) -> Candidate:
     return Candidate(effects, found, model_evidence(found))
 
 
+def exchanged(candidate: Candidate, old: Effect, new: Effect, scales: Scales) -> Candidate:
+    """The candidate's model with an effect that has no size in the place of one of its own.
+
+    Such an effect cannot grow from nothing, so the climb begins where the imitated one stands.
+    """
+    effects = (*(e for e in candidate.effects if e.id != old.id), new)
+    target = extend(candidate.fit, effects, scales)
+    layout = target.oscillator.layout
+    start = transfer(candidate.fit, layout, effects, scales, {})
+    sizes = step_sizes(layout.names, effects, scales, ())
+    steps = difference_steps(candidate.fit, target, sizes)
+    found = find_mode(target, start, steps=steps, tolerance=TOLERANCE, max_iterations=ITERATIONS)
+    return Candidate(effects, found, model_evidence(found))
+
+
 def step_sizes(
     names: Sequence[str], effects: Sequence[Effect], scales: Scales, scores: Sequence[Score]
 ) -> dict[str, float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from benchmarks.tables import grid, stored
+from benchmarks.tables import HERE, grid, stored
 
 from bayesimpact.trial.summary import rate, rate_in_groups
 
@@ -140,6 +140,8 @@ def controls_table() -> str:
 
 def strong_table() -> str:
     """Several strong effects at once: what was said, and what holds whatever was said."""
+    if not (HERE / "strong.json").exists():
+        return "No run is stored yet."
     t = stored("strong")
     low, high = t["settings"]["misfit"]
     every = t["answers"]
