@@ -75,6 +75,10 @@ class Table:
         ids = [i for i in candidate.ids if i != effect.id]
         return self.candidate(ids, self.gain(ids))
 
+    def exchanged(self, candidate, old, new, scales) -> Candidate:
+        ids = [i for i in candidate.ids if i != old.id] + [new.id]
+        return self.candidate(ids, self.gain(ids))
+
     def followed(self, fit):
         self.finished.append(frozenset(fit.ids))
         return SimpleNamespace(
@@ -110,6 +114,7 @@ def run(monkeypatch):
     def go(table: Table, effects=EFFECTS):
         monkeypatch.setattr(models, "refit", table.refit)
         monkeypatch.setattr(models, "without", table.without)
+        monkeypatch.setattr(models, "exchanged", table.exchanged)
         monkeypatch.setattr(models, "shakes_in_own_band", lambda fit, gross: False)
         monkeypatch.setattr(models, "scan", table.scan)
         monkeypatch.setattr(models, "followed", table.followed)
