@@ -110,14 +110,7 @@ def best_start(target: Target, unshifted: Array, predicted: Array, steps: Array)
 
 def without(candidate: Candidate, effect: Effect, scales: Scales) -> Candidate:
     """The candidate's model without one of its effects, refitted."""
-    effects = tuple(e for e in candidate.effects if e.id != effect.id)
-    target = extend(candidate.fit, effects, scales)
-    layout = target.oscillator.layout
-    start = transfer(candidate.fit, layout, effects, scales, {})
-    sizes = step_sizes(layout.names, effects, scales, ())
-    steps = difference_steps(candidate.fit, target, sizes)
-    found = find_mode(target, start, steps=steps, tolerance=TOLERANCE, max_iterations=ITERATIONS)
-    return Candidate(effects, found, model_evidence(found))
+    return _refitted(candidate, tuple(e for e in candidate.effects if e.id != effect.id), scales)
 
 
 def exchanged(candidate: Candidate, old: Effect, new: Effect, scales: Scales) -> Candidate:
@@ -126,6 +119,11 @@ def exchanged(candidate: Candidate, old: Effect, new: Effect, scales: Scales) ->
     Such an effect cannot grow from nothing, so the climb begins where the imitated one stands.
     """
     effects = (*(e for e in candidate.effects if e.id != old.id), new)
+    return _refitted(candidate, effects, scales)
+
+
+def _refitted(candidate: Candidate, effects: tuple[Effect, ...], scales: Scales) -> Candidate:
+    """A model fitted from the candidate's mode, effects that it lacks at their null."""
     target = extend(candidate.fit, effects, scales)
     layout = target.oscillator.layout
     start = transfer(candidate.fit, layout, effects, scales, {})
