@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.diagnosis.decision import Decision, Verdict, decide
 from bayesimpact.diagnosis.extend import campaign_scales
+from bayesimpact.diagnosis.faults.compare import base_failed
 from bayesimpact.diagnosis.force import MissingForce
 from bayesimpact.diagnosis.heldout import HeldOut, held_out_cases, held_out_recordings
 from bayesimpact.diagnosis.intervals import Intervals, intervals
@@ -18,7 +20,7 @@ from bayesimpact.diagnosis.limits import Limit, limits
 from bayesimpact.diagnosis.locate import Location, locate, locate_effect
 from bayesimpact.diagnosis.name import name
 from bayesimpact.diagnosis.naming import Naming, State, is_large
-from bayesimpact.diagnosis.recording_faults import Corrected, corrected_campaign
+from bayesimpact.diagnosis.recording_faults import Corrected, cleaned_campaign, compared_campaign
 from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.smoothing import SAVITZKY_GOLAY, proved_smoothing, whole_campaign
 from bayesimpact.diagnosis.unknown import with_force
@@ -111,19 +113,55 @@ def diagnose(
     """
     say = progress or (lambda message: None)
     say("fitting the base model")
-    corrected = corrected_campaign(campaign, rng=rng, search=search)
+    corrected = cleaned_campaign(campaign, rng=rng, search=search)
+    options: dict[str, Any] = {"rng": rng, "effects": effects, "progress": say}
+    if base_failed(corrected.identification.fit):  # no physics is worth a search yet
+        say("comparing the recordings")
+        corrected = compared_campaign(corrected, rng=rng, search=search)
+        return _of_corrected(corrected, **options)
+    found = _of_corrected(corrected, **options)
+    if not is_doubtful(found):
+        return found
+    say("comparing the recordings")
+    compared = compared_campaign(corrected, rng=rng, search=search)
+    if compared is corrected:
+        return found
+    again = _of_corrected(compared, **options)
+    simpler = len(again.effects) + len(compared.compared) <= len(found.effects)
+    settled = again.verdict in ("adequate", "named")
+    return again if settled and (simpler or found.verdict != "named") else found
+
+
+def is_doubtful(found: Diagnosis) -> bool:
+    """Whether what was found may be a fault of a recording: nothing that holds for all recordings
+    alike explains them.
+
+    Physics shows differently in recordings of different amplitude, so it is searched first.
+    """
+    own = any(p.scope != "campaign" for e in found.effects for p in e.parameters if not p.circular)
+    return own or found.verdict in ("partly", "ambiguous", "unknown")
+
+
+def _of_corrected(
+    corrected: Corrected,
+    *,
+    rng: np.random.Generator,
+    effects: Sequence[Effect],
+    progress: Progress,
+) -> Diagnosis:
+    """The diagnosis of a campaign whose faults are set aside or corrected."""
     for fault in corrected.faults:
-        say(f"set aside or corrected: {fault.recording}: {fault.statement} ({fault.id})")
+        progress(f"set aside or corrected: {fault.recording}: {fault.statement} ({fault.id})")
     identification = corrected.identification
     campaign = identification.fit.target.oscillator.campaign
     filtered = proved_smoothing(campaign)
     if filtered is None:
-        found = diagnose_fit(identification, rng=rng, effects=effects, progress=say)
+        found = diagnose_fit(identification, rng=rng, effects=effects, progress=progress)
     else:
-        say("the noise spectrum proves a filter: fitting through it")
+        progress("the noise spectrum proves a filter: fitting through it")
         measurement = replace(campaign.measurement, smoothing=filtered.smoothing)
         through = identify(replace(campaign, measurement=measurement), rng=rng, search=False)
-        found = diagnose_fit(through, rng=rng, effects=effects, progress=say)
+        found = diagnose_fit(through, rng=rng, effects=effects, progress=progress)
         found = with_smoothing(found, identification, filtered)
     if not corrected.faults:
         return replace(found, corrected=corrected)

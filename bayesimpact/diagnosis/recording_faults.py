@@ -38,23 +38,26 @@ class Corrected:
         return (*own, *(c.fault for c in self.compared))
 
 
-def corrected_campaign(campaign: Campaign, *, rng: np.random.Generator, search: bool) -> Corrected:
-    """Set aside what the recordings show of themselves, fit the base model, and compare them.
+def cleaned_campaign(campaign: Campaign, *, rng: np.random.Generator, search: bool) -> Corrected:
+    """Set aside what the recordings show of themselves, and fit the base model.
 
-    With `faults = "keep"` in campaign.toml nothing is changed and nothing compared.
+    With `faults = "keep"` in campaign.toml nothing is changed.
 
     Raises
     ------
     InputError : a recording shows no oscillation
     """
     cleaned, own = set_aside(campaign)
-    identification = identify(cleaned, rng=rng, search=search)
-    if campaign.keep_faults:
-        return Corrected(identification, own)
-    compared = compare_recordings(identification)
-    if compared:
-        identification = identify(compared[-1].campaign, rng=rng, search=search)
-    return Corrected(identification, own, compared)
+    return Corrected(identify(cleaned, rng=rng, search=search), own)
+
+
+def compared_campaign(before: Corrected, *, rng: np.random.Generator, search: bool) -> Corrected:
+    """The same with faults corrected that comparing the recordings shows; as it was without any."""
+    campaign = before.identification.fit.target.oscillator.campaign
+    compared = () if campaign.keep_faults else compare_recordings(before.identification)
+    if not compared:
+        return before
+    return Corrected(identify(compared[-1].campaign, rng=rng, search=search), before.own, compared)
 
 
 def as_effects(corrected: Corrected) -> list[dict[str, Any]]:

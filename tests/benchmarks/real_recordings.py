@@ -46,9 +46,13 @@ def residual_percent(found: Diagnosis, recording: str) -> float:
 def main(argv: Sequence[str] | None = None) -> dict[str, Diagnosis]:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
-    folder = parser.parse_args(argv).folder
+    parser.add_argument("--only", choices=sorted(KNOWN), action="append")
+    given = parser.parse_args(argv)
+    folder, only = given.folder, given.only or list(KNOWN)
     results = {}
     for name, known in KNOWN.items():
+        if name not in only:
+            continue
         if not (folder / name / "campaign.toml").exists():
             print(f"{name}: not here, skipped")
             continue

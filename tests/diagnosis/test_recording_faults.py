@@ -1,0 +1,64 @@
+"""Faults of recordings in a whole diagnosis: named, corrected, and not taken for physics."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import small_rig
+from effect_rigs import BY_ID
+
+from bayesimpact.diagnosis.document import document
+from bayesimpact.diagnosis.loop import Diagnosis, diagnose
+from bayesimpact.workflow import _strict
+
+CATALOGUE = tuple(BY_ID[i] for i in ("coulomb_friction", "gap_per_recording", "sensor_drift"))
+
+
+def faulty(change, number: int = 1) -> Diagnosis:
+    campaign = small_rig.record(61, duration=1.5)
+    recordings = list(campaign.recordings)
+    samples = recordings[number].samples.copy()
+    recordings[number] = replace(recordings[number], samples=change(samples))
+    campaign = replace(campaign, recordings=tuple(recordings))
+    return diagnose(campaign, rng=np.random.default_rng(0), effects=CATALOGUE, search=False)
+
+
+def spiked(samples: np.ndarray) -> np.ndarray:
+    samples[[300, 517, 888]] += 1e-3
+    return samples
+
+
+def written(found: Diagnosis) -> dict:
+    content = document(found, seed=0, seconds=1.0, versions={})
+    return json.loads(json.dumps(_strict(content), allow_nan=False))
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [(spiked, "recording_spikes"), (lambda samples: 1.05 * samples, "recording_gain")],
+)
+def test_a_fault_is_named_with_its_recording(change, fault: str) -> None:
+    found = faulty(change)
+    assert found.verdict == "named" and found.effects == ()
+    content = written(found)
+    (effect,) = content["effects"]
+    assert effect["id"] == fault and effect["family"] == "recording"
+    assert effect["location"]["recordings"] == ["b"] == content["location"]["recordings"]
+    assert any(f["id"] == fault and f["recording"] == "b" for f in content["faults"])
+    assert "Recording b" in content["summary"]
+    truth, low_high = small_rig.true_values(), content["parameters"]["after"]
+    for name in ("k1", "k2[1]"):
+        low, high = low_high[name]["ci90"]
+        assert abs(truth[name] - low_high[name]["median"]) < 2.5 * (high - low) / 2 * 1.645
+
+
+def test_what_is_to_be_kept_is_kept() -> None:
+    campaign = small_rig.record(61, duration=1.5)
+    first = replace(campaign.recordings[0], samples=spiked(campaign.recordings[0].samples.copy()))
+    campaign = replace(campaign, recordings=(first, *campaign.recordings[1:]), keep_faults=True)
+    found = diagnose(campaign, rng=np.random.default_rng(0), effects=CATALOGUE[:1], search=False)
+    assert found.corrected is not None and found.corrected.faults == ()
+    assert written(found)["faults"][0]["id"] == "recording_spikes"  # told all the same
