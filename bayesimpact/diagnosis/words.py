@@ -107,7 +107,7 @@ def summary(
     if location is None:
         return f"Nothing is missing beside faults of the recordings:{faults} {detectable}".strip()
     place, cost = _REGIMES[location.regime], _moved(shifts)
-    if verdict == "unknown":
+    if verdict == "unknown" or (verdict == "partly" and not effects):
         scale, length, force = (1.0, "rad", "N m") if angle else (1e3, "mm", "N")
         low, high = (scale * x for x in location.displacement)
         slowly = " It is a stiffness or damping that changes with time." if drifts else ""

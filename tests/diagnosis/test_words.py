@@ -57,6 +57,8 @@ def test_the_paragraph():
     said = summary("partly", friction, ("It rubs.",), place("free"), (), {}, "", " More.")
     assert said.startswith("Dry friction is needed by every likely model")
     assert "It rubs." in said and said.endswith(" More.")
+    said = summary("partly", (), (), place("contact"), (), {}, "", faults=" A spike.")
+    assert said.startswith("Something is missing") and said.endswith(" A spike.")
     wide = SimpleNamespace(regime="free", displacement=(-0.3, 0.31), force_rms=0.012)
     said = summary("unknown", (), (), wide, (), {}, "", angle=True)
     assert "-0.30 and 0.31 rad" in said and "0.012 N m rms" in said

@@ -62,7 +62,7 @@ def test_simulated_recordings_make_a_campaign(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"effects": {"friction": {}}}, ("'friction'", "coulomb_friction")),
+        ({"effects": {"friction": {}}}, ("'friction'", "contact_damping_speed")),
         ({"effects": {"quadratic_drag": {}}}, ("quadratic_drag", "nothing", "coefficient")),
         ({"effects": {"quadratic_drag": {"coefficient": np.nan}}}, ("coefficient", "nan")),
         ({"A": 1.0, "effects": {}}, ("A", "harmonic_forcing")),

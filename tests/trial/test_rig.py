@@ -181,7 +181,7 @@ def test_rig_without_obstacle_makes_a_campaign_without_stop():
 @pytest.mark.parametrize(
     ("effects", "message"),
     [
-        ({"spring_qubic": {"stiffness": 1.0}}, "spring_cubic"),
+        ({"spring_qubic": {"stiffness": 1.0}}, "spring_qubic"),
         ({"spring_cubic": {"stifness": 1.0}}, "stiffness"),
         ({"spring_cubic": {}}, "no parameters"),
         ({"spring_cubic": {"stiffness": float("nan")}}, "finite"),

@@ -123,7 +123,7 @@ def run_demo(
     folders = {"paper": concealed, "concealed": hiding}
     monkeypatch.setattr("bayesimpact.data.bundled.bundled_campaign", folders.__getitem__)
     results = SimpleNamespace(headline="It fits.", verdict="adequate")
-    first = SimpleNamespace(results=results, converged=True, diagnosis=None)
+    first = SimpleNamespace(results=results, converged=True, diagnosis=None, failed=())
     monkeypatch.setattr(workflow, "sample_campaign", lambda *a, **k: first)
     quick = partial(workflow.diagnose_campaign, quick=True)
     monkeypatch.setattr(workflow, "diagnose_campaign", quick)
@@ -157,7 +157,7 @@ def test_the_demo_opens_the_truth_last(
 def test_a_quiet_demo_does_not_open_it(
     run_demo: Callable[..., int], opened: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    second = SimpleNamespace(converged=False, diagnosis={})
+    second = SimpleNamespace(converged=False, diagnosis={}, failed=())
     monkeypatch.setattr(workflow, "diagnose_campaign", lambda *a, **k: second)
     assert run_demo("--quiet") == 3  # the second part did not converge
     assert not any(name.endswith(TRUTH_FILE) for name in opened)
