@@ -148,10 +148,12 @@ class Naming:
         return max(alone, default=-np.inf)
 
     def probability(self, effect_id: str) -> float:
-        """Probability that an effect is part of the model, over all models tried."""
+        """Probability that an effect, or one that reduces to it, is part of the model, over all
+        models tried.
+        """
         odds = np.array([self.log_odds(c) for c in self.tried])
         weight = np.exp(odds - odds.max())
-        have = np.array([effect_id in c.ids for c in self.tried])
+        have = np.array([any(effect_id in (e.id, e.prefer) for e in c.effects) for c in self.tried])
         return float(weight[have].sum() / weight.sum())
 
 
