@@ -77,10 +77,12 @@ def headline(results: Results) -> str:
             f"{model} does not fit these recordings. It leaves "
             f"{significant(100 * results.share, 2)} % of the signal unexplained: {rms} rms, about "
             f"{significant(excess, 2)} times what noise of {noise} would leave. The values below "
-            "describe the closest such oscillator, and their intervals are too narrow to be "
-            "believed. "
+            "describe the closest such oscillator, "
         ) + (
-            "Something else remains." if diagnosed else "bayesimpact diagnose asks what is missing."
+            "and their intervals carry what remains. Something else remains."
+            if diagnosed
+            else "and their intervals are too narrow to be believed. bayesimpact diagnose asks "
+            "what is missing."
         )
     elif results.verdict == "slight":
         text = (
