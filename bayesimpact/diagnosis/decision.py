@@ -14,7 +14,7 @@ Let S be the likeliest set of effects that the search reached.
    With needed effects the verdict is `partly`, without any it is `unknown`. Other effects of S stay
    in the fitted model, but are not named.
 
-A name never rests on one p-value, and nothing is compared by a rule of its own.
+A name never rests on one p-value.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ import numpy as np
 
 from bayesimpact.diagnosis.naming import Naming, State
 from bayesimpact.diagnosis.refit import Candidate
-from bayesimpact.diagnosis.thresholds import DECISIVE, EXCESS
+from bayesimpact.diagnosis.thresholds import DECISIVE, DOUBT, EXCESS
 from bayesimpact.model.effects.effect import Effect
 
 Verdict = Literal["adequate", "named", "partly", "ambiguous", "unknown"]
@@ -108,9 +108,6 @@ def misfit_above_noise(naming: Naming, state: State) -> float:
     if left - own < doubtful:  # as small as the estimate of the noise is uncertain
         own = left - 2 * max(naming.chosen.unknown.gain, 0.0) * chosen.reduced_chi2
     return max(float(state.candidate.fit.sums.sum()) / level - own, 1.0)
-
-
-DOUBT = 3.0  # standard errors of the noise level
 
 
 def ordered(naming: Naming, effects: tuple[Effect, ...]) -> tuple[Effect, ...]:

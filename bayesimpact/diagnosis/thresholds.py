@@ -8,7 +8,8 @@ import math
 
 ALPHA = 0.004
 """Of each of the three tests that ask whether the base model lacks anything (catalogue, force,
-drift): one in a hundred controls is then called incomplete. Measured: 297 of 300 controls adequate.
+drift): one in a hundred controls is then called incomplete. Measured with the search before version
+0.2: 297 of 300 controls adequate.
 """
 
 DECISIVE = 5.5
@@ -25,8 +26,11 @@ what could be added, but their sizes and odds are not believed.
 EXCESS = 4.0
 """How many times larger the misfit above the noise must be without an effect than with it, where
 something remains. An effect that only imitates physics outside the catalogue, with responses at a
-cosine of 0.87 or less, leaves more than a quarter of it.
+cosine of 0.87 or less, leaves more than a quarter of it. Not calibrated on trials yet.
 """
+
+DOUBT = 3.0
+"""Standard errors of the noise level: a misfit below is within what the level is uncertain by."""
 
 
 def largest_log_odds(p_value: float) -> float:

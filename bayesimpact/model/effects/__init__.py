@@ -71,7 +71,7 @@ EFFECTS: tuple[Effect, ...] = (
 
 UNTRIED = ("obstacle_mode", "base_motion")
 """Simulated and fitted like any, but not looked for unless asked: trials have not shown yet that
-they are named rightly (a frame's frequency was found in one of four trials).
+they are named rightly.
 """
 
 SEARCHED: tuple[Effect, ...] = tuple(e for e in EFFECTS if e.id not in UNTRIED)
