@@ -116,7 +116,7 @@ def _place(
     total = max(sum(float(w.sum()) for w in weights), 1e-300)
     gaps = base.target.oscillator.layout.slots(base.mode)[:, _GAP]
     beyond = [w[y >= g].sum() for w, (y, _), g in zip(weights, points, gaps, strict=True)]
-    contact_share = float(sum(beyond) / total)
+    contact_share = min(1.0, float(sum(beyond) / total))  # sums of parts may round above 1
     seen = regime_seen(contact_share)
     regime = effects[0].regime if effects else seen
     gain = gain_by_time(base, better)

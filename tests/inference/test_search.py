@@ -53,7 +53,8 @@ def test_every_seed_finds_the_minimum(
 ) -> None:
     for seed in range(4):
         result = run(objective, lower, upper, d, seed, metropolis=metropolis, tolerance=1e-6)
-        assert result.value < 1e-5
+        # 40 seeds on the ellipsoid end at up to 8e-6; another machine's rounding is another seed.
+        assert result.value < 1e-4
         assert np.abs(result.best - minimum).max() < 0.02
         assert result.value == pytest.approx(objective(result.best[None])[0], rel=1e-9)
         assert result.stopped == "converged"
