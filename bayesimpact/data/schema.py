@@ -155,6 +155,21 @@ class HalfNormalTable(_Table):
     scale: Positive = Field(description=f"{POSITIVE}, SI")
 
 
+class CauchyTable(_Table):
+    """Bell-shaped, with heavy tails."""
+
+    distribution: Literal["cauchy"]
+    median: Number = Field(description=f"{NUMBER}, SI (within +-1e30)")
+    scale: Positive = Field(description=f"{POSITIVE}, SI")
+
+
+class HalfCauchyTable(_Table):
+    """The positive half of a Cauchy density about 0."""
+
+    distribution: Literal["halfcauchy"]
+    scale: Positive = Field(description=f"{POSITIVE}, SI")
+
+
 class LogNormalTable(_Table):
     """Gaussian in the logarithm."""
 
@@ -174,7 +189,13 @@ class LogUniformTable(_Table):
 
 
 PriorTable = Annotated[
-    UniformTable | NormalTable | HalfNormalTable | LogNormalTable | LogUniformTable,
+    UniformTable
+    | NormalTable
+    | HalfNormalTable
+    | CauchyTable
+    | HalfCauchyTable
+    | LogNormalTable
+    | LogUniformTable,
     Field(discriminator="distribution"),
 ]
 
@@ -211,6 +232,8 @@ _TAGGED: dict[str, dict[str, type[_Table]]] = {
         "uniform": UniformTable,
         "normal": NormalTable,
         "halfnormal": HalfNormalTable,
+        "cauchy": CauchyTable,
+        "halfcauchy": HalfCauchyTable,
         "lognormal": LogNormalTable,
         "loguniform": LogUniformTable,
     },

@@ -59,18 +59,18 @@ def name(
 
     Best first: the likeliest models so far are extended by every effect that scores promise
     something of, by the best pairs at first, and where the misfit is large by several effects of
-    one family at once, because damping laws may help little alone and much together. While it
-    extends, the search takes any gain that the noise level allows, for what remains may yet be
-    explained; effects that the odds do not demand are left out afterwards, and each that stays is
-    exchanged for every other.
+    one family at once, because damping laws may help little alone and much together; what gains
+    most per effect is then the next model. While it extends, the search takes any gain that the
+    noise level allows, for what remains may yet be explained; effects that the odds do not demand
+    are left out afterwards, and each that stays is exchanged for every other that might do what it
+    does.
     """
     search = _Search(effects, scales, rng, progress or (lambda message: None))
     state = base = search.examine(base_candidate(fit))
     beam = [base]
-    most = MOST_LARGE if is_large(fit) else MOST_EFFECTS
-    while not state.is_white and len(state.candidate.effects) < most and search.may_go_on():
+    while not state.is_white and len(state.candidate.effects) < search.most and search.may_go_on():
         promising = [s for s in beam if not search.is_hopeless(s)]
-        better = search.ranked([c for s in promising for c in search.extended(s)])
+        better = search.best_first(state, [c for s in promising for c in search.extended(s)])
         if not better or search.promise(better[0]) <= search.promise(state.candidate):
             break
         state = search.examine(better[0])
@@ -90,6 +90,28 @@ class _Search(Models):
     def cost(self) -> float:
         """Nats per added effect, for multiplicity."""
         return float(np.log(2 * len(self.effects)))
+
+    @property
+    def is_large(self) -> bool:
+        """Whether the base model's misfit is large."""
+        return is_large(self.states[frozenset()].candidate.fit)
+
+    @property
+    def most(self) -> int:
+        """Effects of a model."""
+        return MOST_LARGE if self.is_large else MOST_EFFECTS
+
+    def best_first(self, state: State, found: Sequence[Candidate]) -> list[Candidate]:
+        """Extensions of a model, the next one to examine first."""
+        ranked = self.ranked(found)
+        if not is_large(state.candidate.fit):
+            return ranked
+        before, size = self.promise(state.candidate), len(state.candidate.effects)
+
+        def gain_per_effect(candidate: Candidate) -> float:
+            return (self.promise(candidate) - before) / (len(candidate.effects) - size)
+
+        return sorted(ranked, key=gain_per_effect, reverse=True)
 
     def extended(self, state: State) -> list[Candidate]:
         """Models with one more effect; from the base model on also the most promising pairs.
@@ -115,14 +137,15 @@ class _Search(Models):
         return with_force(state.candidate, state.unknown, self.scales)
 
     def beside(self, state: State, found: Sequence[Candidate]) -> list[Candidate]:
-        """Models that are extended beside the best one.
+        """Single effects that are extended beside the best model: each may be half of a pair.
 
-        Where a misfit is large, what comes next to it, since scores rank poorly there; else single
-        effects, each of which may be half of a pair.
+        Where the misfit is large every step gains much and the last ones repair the first, by
+        exchanges: one model at a time is extended there.
         """
-        large = is_large(state.candidate.fit)
+        if self.is_large:
+            return []
         rest = [c for c in found if set(c.ids) != set(state.candidate.ids)]
-        kept = [c for c in rest if c.log_evidence > -np.inf and (large or len(c.effects) == 1)]
+        kept = [c for c in rest if c.log_evidence > -np.inf and len(c.effects) == 1]
         return kept[: BEAM - 1]
 
     def may_go_on(self) -> bool:
@@ -134,7 +157,7 @@ class _Search(Models):
 
         Either one beside the model's effects, or one in the place of all of them.
         """
-        if not state.candidate.effects or is_large(state.candidate.fit):
+        if not state.candidate.effects or self.is_large:
             return False
         most = RASH * max((s.gain for s in state.scan.best()), default=0.0) + NEAR_MARGIN
         more = MOST_EFFECTS - len(state.candidate.effects)
@@ -146,7 +169,7 @@ class _Search(Models):
 
         Not where a free force wins anyhow, nor where one beside it still explains a lot.
         """
-        if state.is_white or is_large(self.states[frozenset()].candidate.fit):
+        if state.is_white or self.is_large:
             return True
         return (
             self.worth(state.candidate) > self.force_worth() and state.unknown.log_evidence < SHORT
@@ -269,11 +292,26 @@ class _Search(Models):
         for effect in chosen.effects:
             rest = self.drop(chosen, effect)
             found = self.scanned(rest, self.effects)
-            for score in self.worth_a_refit(found):
+            for score in self.in_place_of(effect, found):
                 if score.effect.id != effect.id:
                     self.fit_one(rest, found, score)
                     if not score.effect.parameters:
                         self.exchange_on_off(chosen, effect, score.effect)
+
+    def in_place_of(self, effect: Effect, found: Scan) -> list[Score]:
+        """Effects that might do what one does on a model without it.
+
+        What explains less than half of its signal to first order cannot come near it; a law of the
+        contact alone cannot stand for anything in free flight.
+        """
+        scores = self.worth_a_refit(found)
+        own = max((s.gain for s in scores if s.effect.id == effect.id), default=0.0)
+        least = NEAR_BEST * own - NEAR_MARGIN
+        return [
+            s
+            for s in scores
+            if (effect.regime == "contact" if _is_a_leap(s.effect) else s.gain > least)
+        ]
 
     def naming(self, base: State, chosen: State) -> Naming:
         tried = tuple(sorted(self.tried.values(), key=self.worth, reverse=True))
@@ -289,7 +327,7 @@ class _Search(Models):
             for part in (chosen.candidate, *smaller):
                 residual[frozenset(part.ids)] = self.with_residual(self.examine(part))
             tried = tuple(sorted(self.tried.values(), key=self.worth, reverse=True))
-        many = len(chosen.candidate.effects) >= MANY and not is_large(base.candidate.fit)
+        many = len(chosen.candidate.effects) >= MANY and not self.is_large
         if contact is not None and many:
             replaced = " + ".join(chosen.candidate.ids)
             self.progress(f"fitting a force in contact in place of {replaced}")

@@ -21,7 +21,15 @@ import numpy as np
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.inference.noise import Noise
-from bayesimpact.inference.prior import HalfNormal, LogNormal, LogUniform, Normal, Prior, Uniform
+from bayesimpact.inference.prior import (
+    Cauchy,
+    HalfCauchy,
+    LogNormal,
+    LogUniform,
+    Normal,
+    Prior,
+    Uniform,
+)
 from bayesimpact.inference.priors import Priors, prior_from_table
 from bayesimpact.model.effects.effect import Effect, EffectParameter, Scales
 from bayesimpact.model.oscillator import Oscillator
@@ -88,7 +96,11 @@ def _owner(oscillator: Oscillator, name: str) -> tuple[Effect, EffectParameter]:
 
 
 def effect_prior(effect: Effect, parameter: EffectParameter, scales: Scales) -> Prior:
-    """Prior of an effect's parameter at its physical scale."""
+    """Prior of an effect's parameter at its physical scale.
+
+    Sizes have heavy tails, for on real rigs an effect may be many times what is usual. Values of
+    one kind that replace a base parameter are normal about their common mean.
+    """
     scale = parameter.scale(scales)
     if parameter.circular:
         return Uniform(-2 * np.pi, 4 * np.pi)
@@ -97,7 +109,12 @@ def effect_prior(effect: Effect, parameter: EffectParameter, scales: Scales) -> 
     if parameter.is_shape:
         return LogNormal(scale, SHAPE_WIDTH)
     if parameter.lower == parameter.null == 0.0:
-        return HalfNormal(scale)
-    if parameter.centre is not None:
-        return Normal(parameter.centre(scales), scale)
-    return Normal(parameter.null or 0.0, scale)
+        return HalfCauchy(scale)
+    if parameter.replaces:
+        return Normal(centre_of(parameter, scales), scale)
+    return Cauchy(centre_of(parameter, scales), scale)
+
+
+def centre_of(parameter: EffectParameter, scales: Scales) -> float:
+    """Value about which a parameter is expected."""
+    return parameter.null or 0.0 if parameter.centre is None else parameter.centre(scales)

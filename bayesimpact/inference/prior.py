@@ -1,4 +1,4 @@
-"""Prior densities of the parameters: five kinds, closed forms, one frozen record per parameter.
+"""Prior densities of the parameters: seven kinds, closed forms, one frozen record per parameter.
 
 Every record knows its log density with two derivatives (for the Laplace approximation), its
 quantile function and its support, all vectorised over x and in the parameter's SI unit. The forms
@@ -198,6 +198,81 @@ class HalfNormal(Prior):
     def _ppf(self, q: Array) -> Array:
         # erfinv and not ndtri((1 + q) / 2), which loses the digits of a small q.
         return np.asarray(self.scale * math.sqrt(2) * erfinv(q))
+
+
+@dataclass(frozen=True)
+class Cauchy(Prior):
+    """Bell-shaped about a median, its tails so heavy that a value far beyond the scale costs
+    little; half of it lies within `scale` of the median.
+    """
+
+    median: float
+    scale: float
+    kind: ClassVar[str] = "cauchy"
+
+    @property
+    def support(self) -> tuple[float, float]:
+        """The whole line."""
+        return -math.inf, math.inf
+
+    def _check(self) -> None:
+        require(self.scale > 0, "cauchy prior, scale", repr(self.scale), "a number above 0")
+
+    def _log_density(self, x: Array) -> Array:
+        z = (x - self.median) / self.scale
+        return np.asarray(-np.log1p(z**2) - math.log(math.pi * self.scale))
+
+    def _gradient(self, x: Array) -> Array:
+        z = (x - self.median) / self.scale
+        return np.asarray(-2 * z / (1 + z**2) / self.scale)
+
+    def _curvature(self, x: Array) -> Array:
+        z = (x - self.median) / self.scale
+        return np.asarray(2 * (z**2 - 1) / (1 + z**2) ** 2 / self.scale**2)
+
+    def _ppf(self, q: Array) -> Array:
+        # Each tail by its own probability: the tangent near a right angle loses the digits.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            far = np.where(q < 0.5, -1 / np.tan(np.pi * q), 1 / np.tan(np.pi * (1 - q)))
+        z = np.where(np.abs(q - 0.5) < 0.25, np.tan(np.pi * (q - 0.5)), far)
+        return np.asarray(self.median + self.scale * np.where(q == 1.0, np.inf, z))
+
+
+@dataclass(frozen=True)
+class HalfCauchy(Prior):
+    """The positive half of a Cauchy density around 0; half of it lies below `scale`.
+
+    The usual prior of a size of which only the order is known (Gelman 2006, Bayesian Analysis
+    1:515): next to flat below the scale, and a size ten times as large costs 4.6 nats, not 50.
+    """
+
+    scale: float
+    kind: ClassVar[str] = "halfcauchy"
+
+    @property
+    def support(self) -> tuple[float, float]:
+        """[0, inf)."""
+        return 0.0, math.inf
+
+    def _check(self) -> None:
+        require(self.scale > 0, "halfcauchy prior, scale", repr(self.scale), "a number above 0")
+
+    def _log_density(self, x: Array) -> Array:
+        return np.asarray(-np.log1p((x / self.scale) ** 2) + math.log(2 / math.pi / self.scale))
+
+    def _gradient(self, x: Array) -> Array:
+        z = x / self.scale
+        return np.asarray(-2 * z / (1 + z**2) / self.scale)
+
+    def _curvature(self, x: Array) -> Array:
+        z = x / self.scale
+        return np.asarray(2 * (z**2 - 1) / (1 + z**2) ** 2 / self.scale**2)
+
+    def _ppf(self, q: Array) -> Array:
+        with np.errstate(divide="ignore"):
+            far = 1 / np.tan(0.5 * np.pi * (1 - q))
+        z = np.where(q < 0.5, np.tan(0.5 * np.pi * q), far)
+        return np.asarray(self.scale * np.where(q == 1.0, np.inf, z))
 
 
 @dataclass(frozen=True)

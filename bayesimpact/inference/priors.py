@@ -11,6 +11,8 @@ import numpy.typing as npt
 
 from bayesimpact.errors import InputError
 from bayesimpact.inference.prior import (
+    Cauchy,
+    HalfCauchy,
     HalfNormal,
     LogNormal,
     LogUniform,
@@ -23,7 +25,8 @@ from bayesimpact.inference.prior import (
 Array = npt.NDArray[np.float64]
 
 KINDS: Mapping[str, type[Prior]] = {
-    prior.kind: prior for prior in (Uniform, Normal, HalfNormal, LogNormal, LogUniform)
+    prior.kind: prior
+    for prior in (Uniform, Normal, HalfNormal, Cauchy, HalfCauchy, LogNormal, LogUniform)
 }
 
 
@@ -31,8 +34,8 @@ def prior_from_table(name: str, table: Mapping[str, Any]) -> Prior:
     """Prior of parameter `name` from its table in campaign.toml's [priors], SI units.
 
     `{distribution = "uniform", lower =, upper =}` · `{"normal", mean =, sd =}` ·
-    `{"halfnormal", scale =}` · `{"lognormal", median =, sigma =}` ·
-    `{"loguniform", lower =, upper =}`.
+    `{"halfnormal", scale =}` · `{"cauchy", median =, scale =}` · `{"halfcauchy", scale =}` ·
+    `{"lognormal", median =, sigma =}` · `{"loguniform", lower =, upper =}`.
 
     Raises
     ------

@@ -2,9 +2,9 @@
 
 A Savitzky-Golay filter leaves its signature in the noise: nulls at frequencies that depend on
 window and order only. Above the frequencies of the motion the periodogram is noise, so filters are
-compared by the Whittle likelihood of its ordinates (Whittle 1953), against AR(1) noise and a power
-law. The level is estimated where the information is, in the passband, from swings on the free side:
-a half swing is a sinusoid whatever the obstacle.
+compared by the Whittle likelihood of its ordinates (Whittle 1953), against every spectrum without
+side lobes. The level is estimated where the information is, in the passband, from swings on the
+free side: a half swing is a sinusoid whatever the obstacle.
 """
 
 from __future__ import annotations
@@ -26,14 +26,15 @@ from bayesimpact.model.measurement import gain
 from bayesimpact.response.swings import rough_period
 
 Array = NDArray[np.float64]
+isotonic_regression: Any = optimize.isotonic_regression
 _minimize: Any = optimize.minimize  # stubs of SciPy differ between releases
 _minimize_scalar: Any = optimize.minimize_scalar
 _periodogram_of: Any = signal.periodogram
 
 WINDOWS = range(5, 62, 2)
-ORDERS = (2, 4)
+ORDERS = (0, 2, 4, 6)
 ABOVE = 10.0  # times the lowest frequency of the motion: noise only
-DECISIVE = 20.0  # nats that a filter needs over white and AR(1) noise
+DECISIVE = 20.0  # nats that a filter needs over any spectrum without side lobes
 LEAST_SHAPE = 5.0  # nats over white noise, for a filter worth comparing with anything else
 LEAST_ORDINATES = 40
 LINE_REACH = 17  # ordinates over which the noise has one level
@@ -53,7 +54,7 @@ class Fingerprint:
     Attributes
     ----------
     smoothing : window and order
-    log_ratio : log likelihood over the better of white and AR(1) noise
+    log_ratio : log likelihood over the best spectrum that falls or rises throughout
     nulls : the filter's first nulls, Hz
     """
 
@@ -66,7 +67,8 @@ def find_smoothing(recordings: Sequence[Recording]) -> Fingerprint | None:
     """The Savitzky-Golay filter that the recordings passed, or None when the spectrum proves none.
 
     Each filter is judged from just below its first null on: no motion can pass for a passband. The
-    likeliest one for white noise must then stand, for white or AR(1) noise, against no filter.
+    likeliest one for white noise must then stand, for white or AR(1) noise, against every spectrum
+    that falls or rises throughout.
     """
     spectra = [without_lines(*_periodogram(r)) for r in recordings]
     shortest = min(r.samples.size for r in recordings)
@@ -83,7 +85,7 @@ def find_smoothing(recordings: Sequence[Recording]) -> Fingerprint | None:
             filtered = _filtered(stopband, smoothing)
             if filtered - _white(stopband) < LEAST_SHAPE:
                 continue
-            unfiltered = max(_ar1(stopband), _falling(stopband))
+            unfiltered = _monotone(stopband)
             ratio = filtered - unfiltered
             if ratio > most:
                 best, most = (smoothing, found, stopband, unfiltered), ratio
@@ -116,6 +118,7 @@ def nulls(smoothing: Smoothing, interval: float, count: int = 3) -> tuple[float,
     frequency = np.linspace(0, 0.5 / interval, 4000)
     response = gain(smoothing, interval, frequency)
     inner = (response[1:-1] < response[:-2]) & (response[1:-1] <= response[2:])
+    inner &= response[1:-1] < 0.5  # not what rounding leaves in the flat passband
     return tuple(float(f) for f in frequency[1:-1][inner][:count])
 
 
@@ -224,29 +227,19 @@ def _log_likelihood(power: Array, expected: Array) -> float:
     return -float(np.sum(np.log(expected) + power / expected))
 
 
-def _falling(spectra: Spectra) -> float:
-    """Best log likelihood of a power law on a white floor: what the motion itself may leave up
-    here.
+def _monotone(spectra: Spectra) -> float:
+    """Largest log likelihood of any spectrum that only falls, or only rises, with frequency.
+
+    Independent exponential ordinates: the isotonic regression of their means (Robertson, Wright and
+    Dykstra 1988, Order Restricted Statistical Inference, theorem 1.5.2). A power law, a lag, AR(1)
+    noise and a white floor are all of this kind; side lobes are not.
     """
     frequency = np.concatenate([f for f, _, _ in spectra])
-    power = np.concatenate([p for _, p, _ in spectra])
-    relative = np.log(frequency / frequency.min())
-
-    def negative(x: Array) -> float:
-        return -_log_likelihood(power, np.exp(x[0] - x[2] * relative) + np.exp(x[1]))
-
-    level = float(np.log(power.mean()))
-    start = np.array([level, level - 1.0, 4.0])
-    return -float(_minimize(negative, start, method="Nelder-Mead", options={"maxiter": 200}).fun)
-
-
-def _ar1(spectra: Spectra) -> float:
-    def negative(rho: float) -> float:
-        shapes = [1 / (1 - 2 * rho * np.cos(2 * np.pi * f * dt) + rho**2) for f, _, dt in spectra]
-        shape, power = np.concatenate(shapes), np.concatenate([p for _, p, _ in spectra])
-        return -_log_likelihood(power, shape * np.mean(power / shape))
-
-    return -float(_minimize_scalar(negative, bounds=(-0.9, 0.999), method="bounded").fun)
+    power = _power(spectra)[np.argsort(frequency, kind="stable")]
+    return max(
+        _log_likelihood(power, isotonic_regression(power, increasing=rises).x)
+        for rises in (False, True)
+    )
 
 
 def _white(spectra: Spectra) -> float:

@@ -61,7 +61,7 @@ from bayesimpact.model.threads import in_shares
 
 OK, BAD_PARAMETERS, TOO_MANY_EVENTS, NOT_FINITE = 0, 1, 2, 3
 THREADING_PAYS = 4  # trajectories from which on
-EVENTS_AT_LEAST, EVENTS_PER_SAMPLE = 1000, 50
+EVENTS_AT_LEAST, EVENTS_PER_SAMPLE = 1000, 2  # of sections, most of which end without one
 
 
 @inner()
@@ -141,6 +141,9 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
             if h != at.h:
                 at = quarters(h, flow.b, flow.K, flow.inverse)
             y1, v1, n1 = step(y, v, t, n0, at, flow, w)
+            if not np.isfinite(y1 + v1):  # no step would be short enough any more
+                w.out[j] = np.nan
+                return y1, v1, t, w.n
         length = h
         if expected or suspicious(y, v, n0, y1, v1, n1, t + h, h, flow, w):
             event, length, y1, v1, n1 = first_event(y, v, t, n0, h, y1, v1, n1, flow, w)

@@ -12,7 +12,16 @@ from effect_rigs import BY_ID, TestRig
 from bayesimpact.data.campaign import Measurement
 from bayesimpact.inference.defaults import default_priors, effect_prior
 from bayesimpact.inference.noise import Noise
-from bayesimpact.inference.prior import HalfNormal, LogNormal, LogUniform, Normal, Prior, Uniform
+from bayesimpact.inference.prior import (
+    Cauchy,
+    HalfCauchy,
+    HalfNormal,
+    LogNormal,
+    LogUniform,
+    Normal,
+    Prior,
+    Uniform,
+)
 from bayesimpact.model.oscillator import build_oscillator
 from bayesimpact.response.estimates import Estimates, estimate
 
@@ -108,11 +117,11 @@ def prior_of(effect_id: str, parameter: str) -> Prior:
 
 def test_priors_of_effects():
     friction = BY_ID["coulomb_friction"].parameter("force").scale(SCALES)
-    assert prior_of("coulomb_friction", "force") == HalfNormal(friction)
+    assert prior_of("coulomb_friction", "force") == HalfCauchy(friction)
     cubic = BY_ID["spring_cubic"].parameters[0]
-    assert prior_of("spring_cubic", cubic.name) == Normal(0.0, cubic.scale(SCALES))
+    assert prior_of("spring_cubic", cubic.name) == Cauchy(0.0, cubic.scale(SCALES))
     exponent = BY_ID["contact_power_law"].parameter("exponent")
-    assert prior_of("contact_power_law", "exponent") == Normal(1.0, exponent.scale(SCALES))
+    assert prior_of("contact_power_law", "exponent") == Cauchy(1.0, exponent.scale(SCALES))
     time = BY_ID["contact_relaxation"].parameter("time")
     assert prior_of("contact_relaxation", "time") == LogNormal(time.scale(SCALES), 1.5)
     phase = prior_of("harmonic_forcing", "phase")

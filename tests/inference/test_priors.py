@@ -9,7 +9,16 @@ import pytest
 from scipy import stats
 
 from bayesimpact.errors import InputError
-from bayesimpact.inference.prior import HalfNormal, LogNormal, LogUniform, Normal, Prior, Uniform
+from bayesimpact.inference.prior import (
+    Cauchy,
+    HalfCauchy,
+    HalfNormal,
+    LogNormal,
+    LogUniform,
+    Normal,
+    Prior,
+    Uniform,
+)
 from bayesimpact.inference.priors import Priors, prior_from_table
 
 # (ours, the same in scipy.stats); scales as in a campaign, some far from 1.
@@ -19,6 +28,9 @@ TWINS = [
     (Normal(808.0, 12.0), stats.norm(808.0, 12.0)),
     (Normal(-2e-6, 5e-6), stats.norm(-2e-6, 5e-6)),
     (HalfNormal(0.3), stats.halfnorm(scale=0.3)),
+    (Cauchy(1.5, 0.2), stats.cauchy(1.5, 0.2)),
+    (Cauchy(-2e-6, 5e-6), stats.cauchy(-2e-6, 5e-6)),
+    (HalfCauchy(3e-3), stats.halfcauchy(scale=3e-3)),
     (LogNormal(5e3, 0.4), stats.lognorm(0.4, scale=5e3)),
     (LogNormal(0.15, 2.0), stats.lognorm(2.0, scale=0.15)),
     (LogUniform(1e-7, 1e-4), stats.loguniform(1e-7, 1e-4)),
@@ -117,6 +129,8 @@ TABLES = [
     ({"distribution": "uniform", "lower": 0, "upper": 2.0}, Uniform(0, 2.0)),
     ({"distribution": "normal", "mean": 0.0, "sd": 1e-3}, Normal(0.0, 1e-3)),
     ({"distribution": "halfnormal", "scale": 3.0}, HalfNormal(3.0)),
+    ({"distribution": "cauchy", "median": 1, "scale": 2.0}, Cauchy(1.0, 2.0)),
+    ({"distribution": "halfcauchy", "scale": 3.0}, HalfCauchy(3.0)),
     ({"distribution": "lognormal", "median": 800.0, "sigma": 0.2}, LogNormal(800.0, 0.2)),
     ({"distribution": "loguniform", "lower": 1.0, "upper": 9.0}, LogUniform(1.0, 9.0)),
 ]
@@ -131,7 +145,7 @@ def test_tables_become_priors(table: dict[str, object], expected: Prior) -> None
 
 BAD = [
     ({}, "None", "uniform | normal"),
-    ({"distribution": "cauchy", "scale": 1.0}, "'cauchy'", "lognormal | loguniform"),
+    ({"distribution": "laplace", "scale": 1.0}, "'laplace'", "lognormal | loguniform"),
     ({"distribution": ["uniform"]}, "['uniform']", "uniform | normal"),
     ({"distribution": "uniform", "lower": 0.0}, "the keys lower", "the keys lower, upper"),
     ({"distribution": "halfnormal"}, "the keys (none)", "the keys scale"),

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import small_rig
-from scipy.signal import savgol_filter
+from scipy.signal import butter, lfilter, savgol_filter
 
 from bayesimpact.data.campaign import Smoothing
 from bayesimpact.data.recording import Recording
@@ -16,7 +16,7 @@ from bayesimpact.inference.spectrum import find_smoothing, nulls
 from bayesimpact.trial.rig import Release
 from bayesimpact.trial.rig_chain import Chain
 
-FILTERS = [(7, 2), (11, 2), (15, 4), (21, 2), (31, 4)]
+FILTERS = [(9, 0), (7, 2), (11, 2), (15, 4), (21, 2), (31, 4), (25, 6)]
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +59,24 @@ def test_rounding_and_a_lag_are_no_such_filter(silent):
     lag = Smoothing("lag", time_constant=2e-3)
     chain = Chain(noise=small_rig.NOISE, smoothing=lag, offsets=small_rig.OFFSETS)
     assert find_smoothing(small_rig.record(chain=chain).recordings) is None
+
+
+@pytest.mark.parametrize("order", [1, 2, 4])
+def test_a_spectrum_without_side_lobes_is_no_filter(silent, order):
+    """Electronics before the sampling: noise that falls, however steeply, but has no nulls."""
+    low_pass = butter(order, 60.0, fs=1000.0)
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        recordings = [
+            replace(
+                r,
+                samples=r.samples
+                + 3 * small_rig.NOISE * lfilter(*low_pass, rng.standard_normal(r.samples.size))
+                + 0.02 * small_rig.NOISE * rng.standard_normal(r.samples.size),
+            )
+            for r in silent.recordings
+        ]
+        assert find_smoothing(recordings) is None
 
 
 @pytest.mark.parametrize(("frequency", "seed"), [(70.0, 0), (75.0, 1), (80.0, 0)])
