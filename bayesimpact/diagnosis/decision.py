@@ -7,10 +7,12 @@ Let S be the likeliest set of effects that the search reached.
    the decisive odds; `ambiguous` when another set comes within these odds; else `named`.
 2. Something remains beside S. An effect of S is needed when
    - every set of effects without it trails S by the decisive odds,
+   - the misfit above the noise is `EXCESS` times larger without it than with it, other effects
+     refitted: an effect that merely imitates what the catalogue lacks leaves a large part of it,
    - no set without it, with a residual force of whichever form is likeliest, beats S with its own
      residual force by these odds (as in 1), and
-   - the misfit above the noise is `EXCESS` times larger without it than with it, other effects
-     refitted: an effect that merely imitates what the catalogue lacks leaves a large part of it.
+   - no other effect in its place, with such a force beside, comes within these odds of that: what
+     remains may be what tells two laws apart.
    With needed effects the verdict is `partly`, without any it is `unknown`. Other effects of S stay
    in the fitted model, but are not named.
 
@@ -52,8 +54,9 @@ class Decision:
 def decide(naming: Naming) -> Decision:
     """The verdict on a finished search.
 
-    Where something remains, `naming.states` and `naming.residual` must hold the chosen model and
-    what it is without each of its effects.
+    Where something remains, `naming.states` must hold the chosen model and what it is without each
+    of its effects, and `naming.residual` the chosen model and, for each effect that
+    `may_be_needed`, the models without it and with others in its place, and the base model.
     """
     chosen = naming.chosen
     effects = ordered(naming, chosen.candidate.effects)
@@ -72,6 +75,19 @@ def decide(naming: Naming) -> Decision:
 
 def is_needed(naming: Naming, effect: Effect) -> bool:
     """Whether every likely hypothesis has an effect of the chosen model, although more remains."""
+    if not may_be_needed(naming, effect):
+        return False
+    size = len(naming.chosen.candidate.effects)
+    reached = naming.with_residual_force(frozenset(naming.chosen.candidate.ids))
+    return not any(
+        naming.with_residual_force(ids) > reached + DECISIVE * (1 if len(ids) < size else -1)
+        for ids, candidate in naming.residual.items()
+        if not holds(candidate.effects, effect)
+    )
+
+
+def may_be_needed(naming: Naming, effect: Effect) -> bool:
+    """`is_needed` as far as models without a residual force tell."""
     chosen = naming.chosen
     if any(
         naming.log_odds(c) > naming.log_odds(chosen.candidate) - DECISIVE
@@ -79,12 +95,20 @@ def is_needed(naming: Naming, effect: Effect) -> bool:
         if not holds(c.effects, effect)
     ):
         return False
-    reached = naming.with_residual_force(frozenset(chosen.candidate.ids)) + DECISIVE
-    lacking = [ids for ids in naming.residual if effect.id not in ids]
-    if any(naming.with_residual_force(ids) > reached for ids in lacking):
-        return False
     without = naming.states[frozenset(chosen.candidate.ids) - {effect.id}]
     return misfit_above_noise(naming, without) > EXCESS * misfit_above_noise(naming, naming.chosen)
+
+
+def in_its_place(naming: Naming, effect: Effect) -> Candidate | None:
+    """The likeliest model with another effect in the place of one of the chosen model's."""
+    chosen = frozenset(naming.chosen.candidate.ids)
+    rest = chosen - {effect.id}
+    others = [
+        c
+        for c in naming.tried
+        if len(c.ids) == len(chosen) and rest < frozenset(c.ids) and not holds(c.effects, effect)
+    ]
+    return max(others, key=naming.log_odds, default=None)
 
 
 def holds(effects: Sequence[Effect], effect: Effect) -> bool:

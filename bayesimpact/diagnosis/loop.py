@@ -248,8 +248,11 @@ def extension(
         (c, chosen) for ids, c in naming.residual.items() if ids == set(chosen.candidate.ids)
     ]
     if decision.verdict == "unknown" and not is_large(base.candidate.fit):
-        say("learning the force")
-        choices.append((with_force(base.candidate, naming.unknown, scales), base))
+        learned = naming.residual.get(frozenset())
+        if learned is None:
+            say("learning the force")
+            learned = with_force(base.candidate, naming.unknown, scales)
+        choices.append((learned, base))
     least = base.candidate.fit.reduced_chi2
     choices = [(c, s) for c, s in choices if c.fit.reduced_chi2 <= least]
     candidate, state = max(choices, key=lambda choice: naming.log_odds(choice[0]))

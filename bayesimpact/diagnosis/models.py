@@ -95,7 +95,8 @@ class Models:
         key = frozenset((*candidate.ids, score.effect.id))
         promised = candidate.fit.log_likelihood + score.gain
         if not self.is_known(key) or promised > self.tried[key].fit.log_likelihood + MORE:
-            for start in found.starts(score, STARTS):
+            count = 1 if is_large(candidate.fit) else STARTS  # grids do not tell much there
+            for start in found.starts(score, count):
                 self.start(candidate, [start])
         return self.tried[key]
 

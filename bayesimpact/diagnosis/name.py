@@ -9,9 +9,11 @@ physics and decide between near-opposites that scores cannot tell apart.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from bayesimpact.diagnosis.decision import in_its_place, may_be_needed
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.force import missing_contact
 from bayesimpact.diagnosis.models import SHORT, STARTS, Models, Progress
@@ -120,7 +122,11 @@ class _Search(Models):
         """
         behind = max(map(self.worth, self.tried.values())) - self.worth(state.candidate)
         scores = self.worth_a_refit(state.scan, behind / RASH)
-        found = [self.fit_one(state.candidate, state.scan, score) for score in scores]
+        found = [
+            self.fit_one(state.candidate, state.scan, score)
+            for score in scores
+            if not _is_redundant(state.candidate, score.effect)
+        ]
         if not state.candidate.effects:
             best_single = max((c.log_evidence for c in found), default=-np.inf)
             for pair in promising_pairs(state.scan, count=PAIRS):
@@ -286,14 +292,23 @@ class _Search(Models):
         ]
 
     def exchange(self, chosen: Candidate) -> None:
-        """Put every other effect in the place of each chosen one (for pairs and triples)."""
+        """Put every other effect in the place of each chosen one (for pairs and triples).
+
+        Where the misfit was large, several of its own family together too: two damping laws make a
+        third one.
+        """
         if len(chosen.effects) < 2:
             return
         for effect in chosen.effects:
             rest = self.drop(chosen, effect)
             found = self.scanned(rest, self.effects)
+            if self.is_large:
+                others = [[s for s in j if s.effect.id != effect.id] for j in families(found)]
+                for joint in others:
+                    if len(joint) > 1 and joint[0].effect.family == effect.family:
+                        self.fit_more(rest, joint)
             for score in self.in_place_of(effect, found):
-                if score.effect.id != effect.id:
+                if score.effect.id != effect.id and not _is_redundant(rest, score.effect):
                     self.fit_one(rest, found, score)
                     if not score.effect.parameters:
                         self.exchange_on_off(chosen, effect, score.effect)
@@ -301,8 +316,9 @@ class _Search(Models):
     def in_place_of(self, effect: Effect, found: Scan) -> list[Score]:
         """Effects that might do what one does on a model without it.
 
-        What explains less than half of its signal to first order cannot come near it; a law of the
-        contact alone cannot stand for anything in free flight.
+        What explains less than half of its signal to first order cannot come near it. Effects that
+        do not begin at the base model have no first order; they stand for one of their own family,
+        or of the contact.
         """
         scores = self.worth_a_refit(found)
         own = max((s.gain for s in scores if s.effect.id == effect.id), default=0.0)
@@ -310,7 +326,7 @@ class _Search(Models):
         return [
             s
             for s in scores
-            if (effect.regime == "contact" if _is_a_leap(s.effect) else s.gain > least)
+            if s.gain > least or (_is_a_leap(s.effect) and _are_alike(s.effect, effect))
         ]
 
     def naming(self, base: State, chosen: State) -> Naming:
@@ -321,22 +337,35 @@ class _Search(Models):
                 chosen = self.examine(best)
         contact = missing_contact(base.candidate.fit, self.scales, rng=self.rng)
         odds = -np.inf
-        residual: dict[frozenset[str], Candidate] = {}
-        if not chosen.is_white and chosen.candidate.effects:
-            smaller = [self.drop(chosen.candidate, e) for e in chosen.candidate.effects]
-            for part in (chosen.candidate, *smaller):
-                residual[frozenset(part.ids)] = self.with_residual(self.examine(part))
-            tried = tuple(sorted(self.tried.values(), key=self.worth, reverse=True))
         many = len(chosen.candidate.effects) >= MANY and not self.is_large
         if contact is not None and many:
             replaced = " + ".join(chosen.candidate.ids)
             self.progress(f"fitting a force in contact in place of {replaced}")
             fit = learn_force(base.candidate.fit, contact, self.scales)
             odds = model_evidence(fit) - base.candidate.log_evidence
-        return Naming(
+        found = Naming(
             base, chosen, tried, self.cost, self.repetition(), contact, odds,
-            dict(self.states), residual, self.may_go_on(),
+            dict(self.states), {}, self.may_go_on(),
         )  # fmt: skip
+        return found if chosen.is_white else self.with_residuals(found)
+
+    def with_residuals(self, found: Naming) -> Naming:
+        """What `decide` compares where something remains: models with a residual force."""
+        chosen = found.chosen.candidate
+        smaller = {e.id: self.drop(chosen, e) for e in chosen.effects}
+        for part in smaller.values():
+            self.examine(part)
+        tried = tuple(sorted(self.tried.values(), key=self.worth, reverse=True))
+        found = replace(found, tried=tried, states=dict(self.states))
+        parts = [chosen]
+        for effect in chosen.effects:
+            if may_be_needed(found, effect):
+                other = in_its_place(found, effect)
+                parts += [smaller[effect.id], *([other] if other else [])]
+        if len(parts) > 1:  # a force in the place of all of them too
+            parts.append(found.base.candidate)
+        residual = {frozenset(p.ids): self.with_residual(self.examine(p)) for p in parts}
+        return replace(found, states=dict(self.states), residual=residual)
 
 
 def worth_a_refit(scan: Scan, least: float = 0.0) -> list[Score]:
@@ -354,6 +383,22 @@ def worth_a_refit(scan: Scan, least: float = 0.0) -> list[Score]:
 
 def _is_a_leap(effect: Effect) -> bool:
     return not effect.parameters or effect.prefer is not None
+
+
+def _is_redundant(candidate: Candidate, effect: Effect) -> bool:
+    """Whether a model has the whole of an effect already, or the effect the whole of one of its.
+
+    An effect without parameters is contained in the one that refines it.
+    """
+    return any(
+        (e.prefer == effect.id and not effect.parameters)
+        or (effect.prefer == e.id and not e.parameters)
+        for e in candidate.effects
+    )
+
+
+def _are_alike(one: Effect, other: Effect) -> bool:
+    return one.family == other.family or "free" not in (one.regime, other.regime)
 
 
 def families(scan: Scan) -> list[list[Score]]:

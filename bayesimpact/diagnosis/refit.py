@@ -20,6 +20,7 @@ from bayesimpact.diagnosis.scores import Score
 from bayesimpact.diagnosis.thresholds import LARGE
 from bayesimpact.inference.climb import Climb
 from bayesimpact.inference.fit import Fit, Target, inverse, prior_information
+from bayesimpact.inference.horizon import growing_horizon
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.model.effects.effect import Effect, Scales
 from bayesimpact.model.parameters import is_added
@@ -62,9 +63,10 @@ def base_candidate(fit: Fit) -> Candidate:
 def refit(fit: Fit, scores: Sequence[Score], scales: Scales) -> Candidate:
     """Fit the model of `fit` with the effects of `scores` added.
 
-    The scores are linear predictions. Where the misfit is large they may point beyond the mode, so
-    the climb begins at the best point between the unshifted model and the predicted one; one that
-    gains nothing begins again at either end, and where the misfit is large both starts are taken.
+    The scores are linear predictions. The climb begins at the best point between the unshifted
+    model and the predicted one; one that gains nothing begins again at either end. Where the misfit
+    is large, predictions point beyond the mode and side minima lie close: there a climb over
+    growing stretches of the recordings is taken too.
     """
     effects = (*fit.target.oscillator.effects, *(s.effect for s in scores))
     shapes = {name: value for s in scores for name, value in s.shapes.items()}
@@ -77,15 +79,28 @@ def refit(fit: Fit, scores: Sequence[Score], scales: Scales) -> Candidate:
     start = best_start(target, unshifted, predicted, steps)
     options: dict[str, Any] = {"steps": steps, "tolerance": TOLERANCE, "max_iterations": ITERATIONS}
     found = find_mode(target, start, **options)
-    large = fit.reduced_chi2 > LARGE**2
+    if fit.reduced_chi2 > LARGE**2:
+        found = better(found, by_growing_horizon(target, unshifted, steps))
     for other in (predicted, unshifted):
         gained = found.log_likelihood > fit.log_likelihood + GAINED
-        both = large and other is predicted  # side minima lie close where much is missing
-        if np.array_equal(start, other) or (gained and not both):
-            continue
-        again = find_mode(target, other, **options)
-        found = max(found, again, key=lambda f: np.nan_to_num(f.log_posterior, nan=-np.inf))
+        if not (np.array_equal(start, other) or gained):
+            found = better(found, find_mode(target, other, **options))
     return Candidate(effects, found, model_evidence(found))
+
+
+def by_growing_horizon(target: Target, start: Array, steps: Array) -> Fit:
+    """The mode that ever longer stretches lead to, shapes of effects held at first."""
+    o = target.oscillator
+    added = [(i, owner(o.effects, n)[1]) for i, n in enumerate(o.layout.names) if is_added(n)]
+    held = [i for i, parameter in added if parameter.is_shape]
+    return growing_horizon(
+        target, start, steps=steps, held=held, tolerance=TOLERANCE, max_iterations=ITERATIONS
+    )
+
+
+def better(one: Fit, other: Fit) -> Fit:
+    """The likelier one of two ends of climbs."""
+    return max(one, other, key=lambda f: np.nan_to_num(f.log_posterior, nan=-np.inf))
 
 
 def best_start(target: Target, unshifted: Array, predicted: Array, steps: Array) -> Array:
@@ -130,6 +145,8 @@ def _refitted(candidate: Candidate, effects: tuple[Effect, ...], scales: Scales)
     sizes = step_sizes(layout.names, effects, scales, ())
     steps = difference_steps(candidate.fit, target, sizes)
     found = find_mode(target, start, steps=steps, tolerance=TOLERANCE, max_iterations=ITERATIONS)
+    if found.reduced_chi2 > LARGE**2:  # or not a number
+        found = better(found, by_growing_horizon(target, start, steps))
     return Candidate(effects, found, model_evidence(found))
 
 

@@ -124,7 +124,8 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
     end = min(w.n, j + max(1, int(min(RENEWED * longest / w.interval, 1.0 * w.n))))
     while j < end:
         aligned, expected = t == (j - 1) * w.interval, False
-        if aligned and stride > 0 and ramp >= longest and not (flow.rough or flow.rough_turn):
+        even = not flow.rough and flow.first_at_turn >= 1.0
+        if aligned and stride > 0 and ramp >= longest and even:
             y, v, n0, j, expected, y1, v1, n1 = cruise(y, v, n0, j, stride, end, flow, w)
             t = (j - 1) * w.interval
             if j == end:
@@ -246,7 +247,7 @@ def integrate_many(
     q : (K, Q) slots, then the parameters of the laws, SI units
     mass : kg
     intervals, counts : (K,) sampling intervals, s, and numbers of samples
-    laws : (L, 5 to 7) table of laws, see `bayesimpact.model.effects.effect.law_row`
+    laws : (L, 5 to 8) table of laws, see `bayesimpact.model.effects.effect.law_row`
     out : (K, n) receives displacements, m, without the sensor's offset
     threads : share the work among threads; the numbers do not depend on it. None: where it pays
 

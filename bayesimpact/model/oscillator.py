@@ -66,13 +66,13 @@ class Oscillator:
 
     @cached_property
     def laws(self) -> NDArray[np.int64]:
-        """Table of force laws for the general simulator, (L, 7)."""
+        """Table of force laws for the general simulator, (L, 8)."""
         rows, first = [], len(SLOTS)
         for effect in self.effects:
             if effect.law is not None:
                 rows.append(law_row(effect.law, first))
                 first += len(effect.parameters)
-        return np.array(rows, dtype=np.int64).reshape(-1, 7)
+        return np.array(rows, dtype=np.int64).reshape(-1, 8)
 
     @cached_property
     def is_base(self) -> bool:

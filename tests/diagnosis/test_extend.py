@@ -19,7 +19,7 @@ from bayesimpact.diagnosis.extend import (
     transfer,
 )
 from bayesimpact.inference.fit import Fit
-from bayesimpact.inference.prior import HalfNormal, Normal, Uniform
+from bayesimpact.inference.prior import HalfCauchy, Normal, Uniform
 
 
 def effects(*ids: str):
@@ -74,7 +74,7 @@ def test_shared_parameters_keep_their_values_and_priors(small):
         "contact_relaxation.time": 0.02,
     }
     friction = target.priors.parameters[layout.index("coulomb_friction.force")]
-    assert friction == HalfNormal(BY_ID["coulomb_friction"].parameters[0].scale(scales))
+    assert friction == HalfCauchy(BY_ID["coulomb_friction"].parameters[0].scale(scales))
     time = BY_ID["contact_relaxation"].parameter("time").scale(scales)
     without = transfer(small.fit, layout, chosen, scales, {})
     assert without[layout.index("contact_relaxation.time")] == time

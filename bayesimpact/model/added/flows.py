@@ -36,12 +36,12 @@ from bayesimpact.model.added.world import (
     LAW_PACE,
     LAW_RATE,
     LAW_SURFACE,
+    LAW_TURN,
     NOW,
     OMEGA,
     PLACED,
     POLYNOMIAL,
     ROUGH_AT_TOUCH,
-    ROUGH_AT_TURN,
     V0,
     WORK_COLUMNS,
     Y0,
@@ -68,8 +68,8 @@ RAMP = 0.3  # first step of a contact over the time constant of a law's state
 # of the longest step, step over the 3/4th power of the time since the touch, or to the release
 FIRST, SINCE, UNTIL = 1.0 / 80.0, 0.46, 0.27
 # the same where it is not smooth at a turning point: there the step is a share of the time itself
-FIRST_AT_TURN, SINCE_TURN, UNTIL_TURN = 1e-4, 0.5, 0.3
-ENDS_ON_TURNS = KINK_AT_TURN | ROUGH_AT_TURN | JUMP_AT_TURN
+SINCE_TURN, UNTIL_TURN = 0.5, 0.3
+ENDS_ON_TURNS = KINK_AT_TURN | JUMP_AT_TURN
 # a force without features admits longer steps the weaker it is: share of the linear force at which
 # they are the usual ones, and by how much they are shortened and lengthened at most
 SLIGHT, LEAST_GAIN, MOST_GAIN = 0.07, 0.4, 3.2
@@ -83,7 +83,7 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
     q, s, laws = w.q, w.s, w.laws
     touching = s[MODE] == TOUCHING
     count, memory, turns, rough, tame, placed = 0, False, q[FRICTION] > 0.0, False, True, True
-    rough_turn = False
+    first_at_turn = 1.0
     for law in range(w.size):
         flags = laws[LAW_COLUMNS * law + LAW_FLAGS]
         if touching or flags & CONTACT_ONLY == 0:
@@ -91,8 +91,8 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
             w.acting[count] = law
             count += 1
             bounded = laws[LAW_COLUMNS * law + LAW_SURFACE] != 0
-            turns = turns or flags & ENDS_ON_TURNS != 0 or bounded
-            rough_turn = rough_turn or flags & ROUGH_AT_TURN != 0
+            rooted = laws[LAW_COLUMNS * law + LAW_TURN] != 0
+            turns = turns or flags & ENDS_ON_TURNS != 0 or bounded or rooted
             rough = rough or (touching and flags & ROUGH_AT_TOUCH != 0)
             tame = tame and flags & POLYNOMIAL != 0
             placed = placed and flags & PLACED != 0
@@ -122,6 +122,9 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
                 pace = max(pace, law_value(law, LAW_PACE, y, v, t, z, s[GAP], contact, w))
             if laws[LAW_COLUMNS * law + LAW_GRAIN] != 0:
                 grain = min(grain, law_value(law, LAW_GRAIN, y, v, t, z, s[GAP], contact, w))
+            if laws[LAW_COLUMNS * law + LAW_TURN] != 0:
+                share = law_value(law, LAW_TURN, y, v, t, z, s[GAP], contact, w)
+                first_at_turn = min(first_at_turn, share)
     stiffness += slope
     b, K = 0.5 * damping / mass, stiffness / mass
     forced = q[FORCE] != 0.0
@@ -141,7 +144,7 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
         longest = w.interval / np.ceil(w.interval / longest)
     flow = Flow(
         1.0 / mass, b, K, (force - level) / stiffness, slope, level, s[GAP],
-        1.0 if touching else 0.0, count, memory, plain, placed, forced, turns, rough, rough_turn,
+        1.0 if touching else 0.0, count, memory, plain, placed, forced, turns, rough, first_at_turn,
         bodies > 0.0, joint, longest,
     )  # fmt: skip
     if tame and not plain:
@@ -295,11 +298,11 @@ def next_step(
             share = (SINCE if away >= 0.0 else UNTIL) * (LONGER if flow.placed else 1.0)
             longest *= min(1.0, max(FIRST, share * root * np.sqrt(root)))
         return max(longest, least), False
-    if flow.rough_turn:
+    if flow.first_at_turn < 1.0:
         pull = 2.0 * flow.b * v + flow.K * (y - flow.rest) - flow.inverse * n0
         if pull != 0.0:  # v / pull is the time since the turning point, or minus that to the next
             share = -SINCE_TURN if v * pull < 0.0 else UNTIL_TURN
-            longest *= min(1.0, max(FIRST_AT_TURN, share * v / (pull * longest)))
+            longest *= min(1.0, max(flow.first_at_turn, share * v / (pull * longest)))
         return max(longest, least), False
     longest = max(longest, least)
     stride = stride_of(longest, w)

@@ -17,9 +17,9 @@ OBSTACLE_MASS, OBSTACLE_FREQUENCY, OBSTACLE_DAMPING = range(18, 21)
 FRAME_RATIO, FRAME_FREQUENCY, FRAME_DAMPING = range(21, 24)
 # columns of the table of laws, and its flags: bayesimpact.model.effects.effect.law_row
 LAW_FORCE, LAW_RATE, LAW_SURFACE, LAW_FLAGS = range(4)
-LAW_FIRST, LAW_PACE, LAW_GRAIN, LAW_COLUMNS = range(4, 8)
+LAW_FIRST, LAW_PACE, LAW_GRAIN, LAW_TURN, LAW_COLUMNS = range(4, 9)
 CONTACT_ONLY, KINK_AT_TURN, ROUGH_AT_TOUCH, POLYNOMIAL, PLACED = 1, 2, 4, 8, 16
-ROUGH_AT_TURN, JUMP_AT_TURN = 32, 64
+JUMP_AT_TURN = 32
 # columns of the work array, one row per law and two per body of `resonator`: a law's state at the
 # start of a step, at a stage and at the end; the kicks of six stages; exp(-lambda h / 4), lambda,
 # alpha, x_u, x_v
@@ -63,7 +63,7 @@ class Flow(NamedTuple):
     forced: Any  # True when the slots' harmonic force acts
     turns: Any  # True when a force has a kink or jump at v = 0
     rough: Any  # True when a force is not smooth at the touch
-    rough_turn: Any  # True when a force is not smooth where the motion turns
+    first_at_turn: Any  # shortest step where the motion turns, over the usual one
     bodies: Any  # True when a body of `resonator` acts
     joint: Any  # True when nothing else is added, so that `joint` is exact
     hop: Any  # usual length of its steps, s

@@ -146,8 +146,8 @@ class Law:
     pace : fastest rate at which the force depends on time explicitly, rad/s; steps resolve it
     kink_at_turn : the force has a kink at v = 0; steps end on turning points
     rough_at_touch : the force is continuous but not smooth at d = 0; steps begin small there
-    rough_at_turn : the force is continuous but not smooth at v = 0 (a root of the speed): steps end
-        on turning points, and are small around them
+    first_at_turn : shortest step at a turning point over the usual one, 1 or less, where the force
+        is continuous but not smooth at v = 0 (a root of the speed); steps end there
     jump_at_turn : the force jumps at v = 0; steps end on turning points, and z, of which the
         law then has no use of its own, is the direction of the motion: -1, 1, or 0 at rest
     polynomial : between its kinks the force is a polynomial of low degree of y and v, and of sines
@@ -167,9 +167,9 @@ class Law:
     surface: Callable[..., float] | None = None
     pace: Callable[..., float] | None = None
     grain: Callable[..., float] | None = None
+    first_at_turn: Callable[..., float] | None = None
     kink_at_turn: bool = False
     rough_at_touch: bool = False
-    rough_at_turn: bool = False
     jump_at_turn: bool = False
     polynomial: bool = False
     ignores_speed: bool = False
@@ -257,10 +257,10 @@ def law_row(law: Law, first: int) -> list[int]:
     functions = (law.force, law.rate, law.surface)
     flags = (law.where == "contact") + 2 * law.kink_at_turn + 4 * law.rough_at_touch
     flags += 8 * law.polynomial + 16 * law.ignores_speed
-    flags += 32 * law.rough_at_turn + 64 * law.jump_at_turn
-    extents = (law.pace, law.grain)
-    force, rate, surface, pace, grain = (address(f) if f else 0 for f in (*functions, *extents))
-    return [force, rate, surface, flags, first, pace, grain]
+    flags += 32 * law.jump_at_turn
+    force, rate, surface = (address(f) if f else 0 for f in functions)
+    extents = (law.pace, law.grain, law.first_at_turn)
+    return [force, rate, surface, flags, first, *(address(f) if f else 0 for f in extents)]
 
 
 @cache

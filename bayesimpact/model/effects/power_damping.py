@@ -33,6 +33,13 @@ def force(
     return float(p[0] * power(v * v + SLOW * SLOW, 0.5 * (p[1] - 1.0)) * v)
 
 
+def first_at_turn(
+    y: float, v: float, d: float, t: float, z: float, touching: float, p: Numbers, q: Numbers
+) -> float:
+    """Shortest step at a turning point over the usual one: 1 from a square on, 1e-4 to a line."""
+    return float(min(1.0, power(1e-4, min(1.0, 2.0 - p[1]))))
+
+
 EFFECT = Effect(
     id="power_damping",
     family="free damping",
@@ -63,6 +70,6 @@ EFFECT = Effect(
             grid=lambda s: np.array([0.3, 0.5, 0.7, 1.5, 2.5, 3.0, 4.0]),
         ),
     ),
-    law=Law(force, kink_at_turn=True, rough_at_turn=True),
+    law=Law(force, kink_at_turn=True, first_at_turn=first_at_turn),
     prefer="quadratic_drag",
 )
