@@ -19,6 +19,9 @@ from bayesimpact.model.parameters import Layout, is_added
 Array = NDArray[np.float64]
 
 
+SOFTEST = 0.01  # of k1: a base fit that found no obstacle at all still leaves a scale for one
+
+
 def campaign_scales(fit: Fit) -> Scales:
     """Physical sizes of a campaign from the fit of its base model."""
     o = fit.target.oscillator
@@ -38,7 +41,7 @@ def campaign_scales(fit: Fit) -> Scales:
         mass=o.campaign.mass,
         stiffness=float(k1.mean()),
         damping=float(c1.mean()),
-        contact_stiffness=float(k2.mean()),
+        contact_stiffness=float(max(k2.mean(), SOFTEST * k1.mean())),
         contact_damping=float(c2.mean()),
         amplitude=float(reach.max()),
         speed=float(speed.max()),

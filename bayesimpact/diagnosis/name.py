@@ -19,6 +19,13 @@ from bayesimpact.diagnosis.force import missing_contact
 from bayesimpact.diagnosis.models import SHORT, STARTS, Models, Progress
 from bayesimpact.diagnosis.naming import Naming, State, is_large
 from bayesimpact.diagnosis.pairs import promising_pairs
+from bayesimpact.diagnosis.promising import (
+    NEAR_MARGIN,
+    families,
+    in_place_of,
+    is_redundant,
+    worth_a_refit,
+)
 from bayesimpact.diagnosis.refit import (
     Candidate,
     base_candidate,
@@ -35,16 +42,10 @@ from bayesimpact.model.effects.effect import Effect, Scales
 MOST_EFFECTS = 3
 MOST_LARGE = 5  # where the base misfit is large: several strong effects act at once
 MANY = 3  # effects from which on they may imitate a single force
-WORTH_A_REFIT = 4.0  # expected gain in log likelihood, nats
-NEAR_BEST = 0.5  # of the best expected gain, less a margin: below that no refit makes a rival
-NEAR_MARGIN = 10.0  # nats
-FAR = 50.0  # nats; beyond four times that, the floor grows with the root of the best gain only
-LEAP = 8.0  # expected gain from which on effects that are on or off are always fitted, nats
 LOST = 30.0  # by how much an effect alone must fall behind the base model to be given up, nats
 RASH = 1.5  # by how much a score may underrate what a refit gains
 BEAM = 3  # models that are extended while the best one is not white
 PAIRS = 4  # refitted at the first step
-JOINT = 3  # effects of one family that are tried in one step
 EXCHANGES = 3  # rounds of leaving out and exchanging effects
 BUDGET = 150  # refits
 
@@ -125,7 +126,7 @@ class _Search(Models):
         found = [
             self.fit_one(state.candidate, state.scan, score)
             for score in scores
-            if not _is_redundant(state.candidate, score.effect)
+            if not is_redundant(state.candidate, score.effect)
         ]
         if not state.candidate.effects:
             best_single = max((c.log_evidence for c in found), default=-np.inf)
@@ -161,14 +162,16 @@ class _Search(Models):
     def is_hopeless(self, state: State) -> bool:
         """Whether a free force will explain what the effects still to come cannot, say the scores.
 
-        Either one beside the model's effects, or one in the place of all of them.
+        Either one beside the model's effects, or one in the place of all of them. Problems
+        linearised about a fit with a large misfit do not tell.
         """
-        if not state.candidate.effects or self.is_large:
+        if not state.candidate.effects or is_large(state.candidate.fit):
             return False
         most = RASH * max((s.gain for s in state.scan.best()), default=0.0) + NEAR_MARGIN
-        more = MOST_EFFECTS - len(state.candidate.effects)
-        instead = self.force_worth() - self.worth(state.candidate)
-        return state.unknown.log_evidence > more * most or instead > most
+        more = self.most - len(state.candidate.effects)
+        if state.unknown.log_evidence > more * most:
+            return True
+        return not self.is_large and self.force_worth() - self.worth(state.candidate) > most
 
     def may_be_named(self, state: State) -> bool:
         """Whether a search around a model may end with a name, white or not.
@@ -223,10 +226,12 @@ class _Search(Models):
         """The same model with the shapes of its effects sought anew beside all others.
 
         A frequency or a depth that was found while something else was missing may be a side
-        minimum that no climb leaves.
+        minimum that no climb leaves; where the misfit is large, growing stretches avoid those.
         """
         chosen = state.candidate
-        if len(chosen.effects) < 2 or self.force_worth() > self.worth(chosen) + SHORT:
+        if self.is_large or len(chosen.effects) < 2:
+            return state
+        if self.force_worth() > self.worth(chosen) + SHORT:
             return state
         for effect in chosen.effects:
             if any(p.is_shape and not p.circular for p in effect.parameters):
@@ -271,11 +276,14 @@ class _Search(Models):
         return self.ranked([c for c in self.tried.values() if len(c.effects) <= size])[0]
 
     def ranked(self, candidates: Sequence[Candidate]) -> list[Candidate]:
-        """Models, likeliest first. A climb that gave up decides nothing near the best one."""
+        """Models, likeliest first. A climb that gave up decides nothing near the best one.
+
+        Unless a free force wins anyhow, or the misfit is large: then the next step repairs it.
+        """
         best = max((self.worth(c) for c in candidates), default=0.0)
         models = {frozenset(c.ids): c for c in candidates}
-        if self.force_worth() > best + SHORT:
-            best = np.inf  # a free force wins anyhow
+        if self.is_large or self.force_worth() > best + SHORT:
+            best = np.inf
         near = [key for key, c in models.items() if self.worth(c) > best - SHORT]
         for key in near:
             if len(near) > 1 and not models[key].fit.converged:
@@ -307,27 +315,11 @@ class _Search(Models):
                 for joint in others:
                     if len(joint) > 1 and joint[0].effect.family == effect.family:
                         self.fit_more(rest, joint)
-            for score in self.in_place_of(effect, found):
-                if score.effect.id != effect.id and not _is_redundant(rest, score.effect):
+            for score in in_place_of(effect, self.worth_a_refit(found)):
+                if not is_redundant(rest, score.effect):
                     self.fit_one(rest, found, score)
                     if not score.effect.parameters:
                         self.exchange_on_off(chosen, effect, score.effect)
-
-    def in_place_of(self, effect: Effect, found: Scan) -> list[Score]:
-        """Effects that might do what one does on a model without it.
-
-        What explains less than half of its signal to first order cannot come near it. Effects that
-        do not begin at the base model have no first order; they stand for one of their own family,
-        or of the contact.
-        """
-        scores = self.worth_a_refit(found)
-        own = max((s.gain for s in scores if s.effect.id == effect.id), default=0.0)
-        least = NEAR_BEST * own - NEAR_MARGIN
-        return [
-            s
-            for s in scores
-            if s.gain > least or (_is_a_leap(s.effect) and _are_alike(s.effect, effect))
-        ]
 
     def naming(self, base: State, chosen: State) -> Naming:
         tried = tuple(sorted(self.tried.values(), key=self.worth, reverse=True))
@@ -366,49 +358,3 @@ class _Search(Models):
             parts.append(found.base.candidate)
         residual = {frozenset(p.ids): self.with_residual(self.examine(p)) for p in parts}
         return replace(found, states=dict(self.states), residual=residual)
-
-
-def worth_a_refit(scan: Scan, least: float = 0.0) -> list[Score]:
-    """Effects whose score promises something (`least`, nats), and not far less than the best one.
-
-    The larger the misfit, the less a score tells. Where something can be gained at all, effects
-    that do not begin at the base model (a contact without tension) are always fitted.
-    """
-    scores = scan.best()
-    most = max((s.gain for s in scores), default=0.0)
-    floor = max(least, WORTH_A_REFIT, min(NEAR_BEST * most, np.sqrt(FAR * most)) - NEAR_MARGIN)
-    leaps = most > LEAP
-    return [s for s in scores if s.gain > floor or (leaps and _is_a_leap(s.effect))]
-
-
-def _is_a_leap(effect: Effect) -> bool:
-    return not effect.parameters or effect.prefer is not None
-
-
-def _is_redundant(candidate: Candidate, effect: Effect) -> bool:
-    """Whether a model has the whole of an effect already, or the effect the whole of one of its.
-
-    An effect without parameters is contained in the one that refines it.
-    """
-    return any(
-        (e.prefer == effect.id and not effect.parameters)
-        or (effect.prefer == e.id and not e.parameters)
-        for e in candidate.effects
-    )
-
-
-def _are_alike(one: Effect, other: Effect) -> bool:
-    return one.family == other.family or "free" not in (one.regime, other.regime)
-
-
-def families(scan: Scan) -> list[list[Score]]:
-    """Effects of one family that may act together, the strongest of each family first."""
-    by_family: dict[str, list[Score]] = {}
-    for score in scan.best():
-        effect = score.effect
-        held = by_family.setdefault(effect.family, [])
-        taken = {slot for s in held for slot in s.effect.binds}
-        shaped = any(p.circular for p in effect.parameters)
-        if score.gain > 0 and effect.parameters and not shaped and not taken & set(effect.binds):
-            held.append(score)
-    return [held[:JOINT] for held in by_family.values() if len(held) > 1]

@@ -15,18 +15,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.data.recording import Recording
+from bayesimpact.data.campaign import Campaign
 from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
-from bayesimpact.model.oscillator import build_oscillator
-from bayesimpact.response.swings import rough_period
+from bayesimpact.model.oscillator import Oscillator
 
 Array = NDArray[np.float64]
 
-SHORTEST = 2.0  # periods of the first stretch
-FEWEST = 40  # samples of it
-GROWTH = 2.0  # of a stretch over the one before
+CYCLES = 3.0  # of free vibration in the first stretch
 ROUGHLY = 0.3  # standard deviations: last step of a climb that only leads to the next one
 SOON = 12  # iterations of such a climb
 
@@ -46,37 +43,29 @@ def growing_horizon(
     does not tell, it should not move. Other arguments as for `find_mode`.
     """
     theta = start
-    for share in stretches(target):
+    k1 = float(start[target.oscillator.layout.index("k1")])
+    for duration in stretches(target.oscillator.campaign, k1):
         there = find_mode(
-            shortened(target, share), theta,
+            shortened(target, duration), theta,
             steps=steps, held=held, tolerance=ROUGHLY, max_iterations=SOON,
         )  # fmt: skip
         theta = there.mode if np.isfinite(there.log_posterior) else theta
     return find_mode(target, theta, steps=steps, tolerance=tolerance, max_iterations=max_iterations)
 
 
-def stretches(target: Target) -> list[float]:
-    """Shares of the recordings that the climbs before the last one take, growing."""
-    recordings = target.oscillator.campaign.recordings
-    shortest = max(
-        max(SHORTEST * rough_period(r.samples), FEWEST) / r.samples.size for r in recordings
-    )
-    count = max(0, int(np.log(1.0 / shortest) / np.log(GROWTH)))
-    return [GROWTH**-k for k in range(count, 0, -1)]
+def stretches(campaign: Campaign, k1: float) -> list[float]:
+    """Durations, s: a few cycles, doubled up to three quarters of the longest recording."""
+    longest = max(r.duration for r in campaign.recordings)
+    duration = CYCLES * 2 * np.pi / np.sqrt(k1 / campaign.mass)
+    result = []
+    while duration < 0.75 * longest:
+        result.append(float(duration))
+        duration *= 2
+    return result
 
 
-def shortened(target: Target, share: float) -> Target:
-    """The posterior that the first part of every recording leads to."""
+def shortened(target: Target, duration: float) -> Target:
+    """The posterior that the first part of the recordings, s, leads to."""
     o = target.oscillator
-    recordings = tuple(_beginning(r, share) for r in o.campaign.recordings)
-    oscillator = build_oscillator(
-        replace(o.campaign, recordings=recordings),
-        o.effects,
-        smoothing=o.smoothing,
-        sigma_per_recording=o.layout.roles("noise").size > 1,
-    )
+    oscillator = Oscillator(o.campaign.truncated(duration), o.effects, o.layout, o.smoothing)
     return replace(target, likelihood=Likelihood(oscillator, target.likelihood.noise))
-
-
-def _beginning(recording: Recording, share: float) -> Recording:
-    return replace(recording, samples=recording.samples[: int(share * recording.samples.size)])

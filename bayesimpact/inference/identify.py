@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.inference.defaults import default_priors
 from bayesimpact.inference.fit import Fit, Target
+from bayesimpact.inference.horizon import growing_horizon
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.inference.noise import Noise
@@ -95,13 +96,14 @@ def identify(
     oscillator = build_oscillator(campaign, sigma_per_recording=sigma_per_recording)
     priors = default_priors(oscillator, estimates, noise)
     guess = initial_theta(oscillator, estimates, noise)
-    from_guess = climb(oscillator, priors, noise, guess)
+    target = Target(Likelihood(oscillator, noise), priors)
+    from_guess = growing_horizon(target, guess)
     result = from_search = None
     if search:
         result, start = global_search(
             oscillator, priors, guess, rng=rng, evaluations=evaluations, callback=callback
         )
-        from_search = climb(oscillator, priors, noise, start)
+        from_search = growing_horizon(target, start)
     ends = [fit for fit in (from_guess, from_search) if fit is not None]
     best = max(ends, key=lambda fit: fit.log_posterior)
     refined = noise if given else refined_noise(best)
@@ -116,38 +118,6 @@ def initial_theta(oscillator: Oscillator, estimates: Estimates, noise: Noise) ->
     values = estimates.values
     known = [values.get(name, noise.level) for name in oscillator.layout.names]
     return np.array(known)
-
-
-def windows(campaign: Campaign, k1: float) -> list[float]:
-    """Durations of the growing windows, s: a few cycles, doubled up to the longest recording."""
-    longest = max(r.duration for r in campaign.recordings)
-    duration = SEARCH_CYCLES * 2 * np.pi / np.sqrt(k1 / campaign.mass)
-    result = []
-    while duration < 0.75 * longest:
-        result.append(float(duration))
-        duration *= 2
-    return [*result, np.inf]
-
-
-def climb(oscillator: Oscillator, priors: Priors, noise: Noise, start: Array) -> Fit:
-    """Polish over growing windows, from `start` (d,) to the mode of the full recordings."""
-    theta = start
-    k1 = float(start[oscillator.layout.index("k1")])
-    for duration in windows(oscillator.campaign, k1):
-        target = _windowed(oscillator, priors, noise, duration)
-        fit = find_mode(target, theta)
-        if np.isfinite(fit.log_posterior):
-            theta = fit.mode
-    return fit
-
-
-def _windowed(oscillator: Oscillator, priors: Priors, noise: Noise, duration: float) -> Target:
-    if np.isfinite(duration):
-        campaign = oscillator.campaign.truncated(duration)
-        oscillator = Oscillator(
-            campaign, oscillator.effects, oscillator.layout, oscillator.smoothing
-        )
-    return Target(Likelihood(oscillator, noise), priors)
 
 
 def global_search(

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from effect_rigs import BY_ID
 
-from bayesimpact.diagnosis.decision import decide, ordered
-from bayesimpact.diagnosis.name import worth_a_refit
+from bayesimpact.diagnosis.decision import decide, in_its_place, ordered
 from bayesimpact.diagnosis.naming import Naming, State
+from bayesimpact.diagnosis.promising import worth_a_refit
 from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.thresholds import ALPHA, DECISIVE, EXCESS, largest_log_odds
 
@@ -160,6 +160,19 @@ def test_an_effect_that_a_residual_force_replaces_is_not_needed():
     ):
         found = remaining(something_left(), 100.0, 10.0, beside=beside, instead=instead)
         assert judge(found) == verdict, (beside, instead)
+
+
+def test_an_effect_whose_place_another_can_take_beside_a_residual_force_is_not_needed():
+    """What remains may be what tells two laws apart."""
+    other = candidate(DRAG, 50.0)
+    for beside, verdict in (
+        (100.0 - DECISIVE + 0.1, "unknown"),
+        (100.0 - DECISIVE - 0.1, "partly"),
+    ):
+        found = remaining(something_left(), 100.0, 10.0, other)
+        residual = {frozenset([DRAG]): replace(other, log_evidence=1000.0 + beside)}
+        assert in_its_place(found, BY_ID[FRICTION]) is other
+        assert judge(replace(found, residual=residual)) == verdict
 
 
 def test_what_remains_beside_a_name_needs_decisive_odds():

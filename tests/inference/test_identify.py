@@ -16,14 +16,13 @@ from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 from bayesimpact.inference.defaults import default_priors
 from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.horizon import growing_horizon
 from bayesimpact.inference.identify import (
     Identification,
     _Profile,
-    climb,
     global_search,
     identify,
     initial_theta,
-    windows,
 )
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.noise_estimate import estimate_noise
@@ -76,7 +75,7 @@ def search_again(found: Identification, seed: int) -> Fit:
     _, start = global_search(
         target.oscillator, target.priors, guess, rng=np.random.default_rng(seed)
     )
-    return climb(target.oscillator, target.priors, found.noise, start)
+    return growing_horizon(target, start)
 
 
 def assert_same(fit: Fit, other: Fit) -> None:
@@ -108,7 +107,7 @@ def test_a_guess_far_off_is_mended_by_the_search(paper):
         guess[layout.index(name)] *= factor
     guess[layout.index("g")] *= 0.7
     _, start = global_search(target.oscillator, target.priors, guess, rng=np.random.default_rng(0))
-    assert_same(climb(target.oscillator, target.priors, paper.noise, start), paper.fit)
+    assert_same(growing_horizon(target, start), paper.fit)
 
 
 CHAIN = {"noise": small_rig.NOISE, "offsets": small_rig.OFFSETS}
@@ -202,16 +201,6 @@ def test_disagreement_shows():
     assert result.agree
     elsewhere = replace(result.fit, mode=result.fit.mode + 0.2 * result.fit.sd)
     assert not replace(result, from_search=elsewhere).agree
-
-
-def test_windows_grow_to_the_whole():
-    campaign = small_rig.record(1, duration=2.0)
-    found = windows(campaign, small_rig.RIG.k1)
-    period = 2 * np.pi / np.sqrt(small_rig.RIG.k1 / small_rig.RIG.mass)
-    np.testing.assert_allclose(found, [6 * period, np.inf])
-    longer = Recording("d", "1", np.zeros(7000), 1e-3)  # 7 s: the longest recording decides
-    found = windows(replace(campaign, recordings=(*campaign.recordings, longer)), small_rig.RIG.k1)
-    np.testing.assert_allclose(found, [6 * period, 12 * period, 24 * period, np.inf])
 
 
 def test_nuisances_are_at_their_best_for_any_candidate():

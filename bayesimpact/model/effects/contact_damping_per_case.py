@@ -13,7 +13,14 @@ from __future__ import annotations
 
 from types import MappingProxyType
 
-from bayesimpact.model.effects.effect import Effect, EffectParameter
+from bayesimpact.model.effects.effect import Effect, EffectParameter, Numbers, Scales, Size
+
+
+def size(p: Numbers, scales: Scales) -> Size:
+    """Spread of the obstacles' c2, and its share of their mean."""
+    spread, total = max(p) - min(p), sum(p)
+    return spread, "N s/m", spread * len(p) / total if total > 0 else 0.0
+
 
 EFFECT = Effect(
     id="contact_damping_per_case",
@@ -40,5 +47,5 @@ EFFECT = Effect(
     binds=MappingProxyType({"c2": "c2"}),
     needs_stop=True,
     condition=lambda s: s.cases > 1,
-    size=lambda p, s: (max(p) - min(p), "N s/m", (max(p) - min(p)) / s.contact_damping),
+    size=size,
 )

@@ -1,0 +1,86 @@
+"""Which effects are worth a refit, by what their scores promise.
+
+The larger the misfit, the less a score tells; a refit decides, and these floors only say which
+refits cannot matter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from bayesimpact.diagnosis.refit import Candidate
+from bayesimpact.diagnosis.scan import Scan
+from bayesimpact.diagnosis.scores import Score
+from bayesimpact.model.effects.effect import Effect
+
+WORTH_A_REFIT = 4.0  # expected gain in log likelihood, nats
+NEAR_BEST = 0.5  # of the best expected gain, less a margin: below that no refit makes a rival
+NEAR_MARGIN = 10.0  # nats
+FAR = 50.0  # nats; beyond four times that, the floor grows with the root of the best gain only
+LEAP = 8.0  # expected gain from which on effects that are on or off are always fitted, nats
+JOINT = 3  # effects of one family that are tried in one step
+
+
+def worth_a_refit(scan: Scan, least: float = 0.0) -> list[Score]:
+    """Effects whose score promises something (`least`, nats), and not far less than the best one.
+
+    The larger the misfit, the less a score tells. Where something can be gained at all, effects
+    that do not begin at the base model (a contact without tension) are always fitted.
+    """
+    scores = scan.best()
+    most = max((s.gain for s in scores), default=0.0)
+    floor = max(least, WORTH_A_REFIT, min(NEAR_BEST * most, np.sqrt(FAR * most)) - NEAR_MARGIN)
+    leaps = most > LEAP
+    return [s for s in scores if s.gain > floor or (leaps and _is_a_leap(s.effect))]
+
+
+def _is_a_leap(effect: Effect) -> bool:
+    return not effect.parameters or effect.prefer is not None
+
+
+def is_redundant(candidate: Candidate, effect: Effect) -> bool:
+    """Whether a model has the whole of an effect already, or the effect the whole of one of its.
+
+    An effect without parameters is contained in the one that refines it.
+    """
+    return any(
+        (e.prefer == effect.id and not effect.parameters)
+        or (effect.prefer == e.id and not e.parameters)
+        for e in candidate.effects
+    )
+
+
+def _are_alike(one: Effect, other: Effect) -> bool:
+    return one.family == other.family or "free" not in (one.regime, other.regime)
+
+
+def families(scan: Scan) -> list[list[Score]]:
+    """Effects of one family that may act together, the strongest of each family first."""
+    by_family: dict[str, list[Score]] = {}
+    for score in scan.best():
+        effect = score.effect
+        held = by_family.setdefault(effect.family, [])
+        taken = {slot for s in held for slot in s.effect.binds}
+        shaped = any(p.circular for p in effect.parameters)
+        if score.gain > 0 and effect.parameters and not shaped and not taken & set(effect.binds):
+            held.append(score)
+    return [held[:JOINT] for held in by_family.values() if len(held) > 1]
+
+
+def in_place_of(effect: Effect, scores: Sequence[Score]) -> list[Score]:
+    """Effects that might do what one does, by their `scores` on a model without it.
+
+    What explains less than half of its signal to first order cannot come near it. Effects that do
+    not begin at the base model have no first order; they stand for one of their own family, or of
+    the contact.
+    """
+    own = max((s.gain for s in scores if s.effect.id == effect.id), default=0.0)
+    least = NEAR_BEST * own - NEAR_MARGIN
+    return [
+        s
+        for s in scores
+        if s.effect.id != effect.id
+        and (s.gain > least or (_is_a_leap(s.effect) and _are_alike(s.effect, effect)))
+    ]
