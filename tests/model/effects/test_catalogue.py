@@ -226,3 +226,11 @@ def test_laws_that_are_said_to_ignore_the_speed_do():
             changes = max(changes, abs(one - other))
         remembers = effect.law.rate is not None
         assert effect.law.ignores_speed == (changes == 0.0 and not remembers), effect.id
+
+
+def test_the_spread_of_contact_damping_is_told_as_a_share_of_its_mean():
+    """A base fit with c2 = 0 has no yardstick of its own."""
+    size = BY_ID["contact_damping_per_case"].size
+    assert size is not None
+    assert size((1.0, 3.0), None) == (2.0, "N s/m", 1.0)
+    assert size((0.0, 0.0), None) == (0.0, "N s/m", 0.0)
