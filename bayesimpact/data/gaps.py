@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.data.clock import even_interval
 from bayesimpact.data.period import rough_period
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
@@ -140,7 +141,30 @@ def _repeated(samples: Array, first: int, end: int, period: float) -> Array:
     return np.asarray((shape + line - ends)[1:-1], dtype=np.float64)
 
 
-def on_even_clock(path: Path, times: Array, samples: Array, rows: NDArray[np.int64]) -> Even:
+def on_clock(
+    path: Path | str,
+    times: Array,
+    samples: Array,
+    rows: NDArray[np.int64],
+    place: str = "line",
+    *,
+    resample: bool,
+) -> Even:
+    """Readings with written time stamps (n,), s, whatever they were read from.
+
+    Raises
+    ------
+    InputError
+        for an uneven clock, unless `resample` allows it: see `even_interval`, `on_even_clock`.
+    """
+    if resample:
+        return on_even_clock(path, times, samples, rows, place)
+    return Even(samples, even_interval(path, times, rows, place), None)
+
+
+def on_even_clock(
+    path: Path | str, times: Array, samples: Array, rows: NDArray[np.int64], place: str = "line"
+) -> Even:
     """Readings at uneven times (n,), s, taken over to an even clock by a cubic spline.
 
     Stamps that are an even clock's, written to a coarse unit, keep their readings. Elsewhere the
@@ -150,7 +174,8 @@ def on_even_clock(path: Path, times: Array, samples: Array, rows: NDArray[np.int
     Raises
     ------
     InputError
-        where time stands still or runs backwards; `path` and `rows` (n,) are for the message.
+        where time stands still or runs backwards; `path`, `rows` (n,) and `place`, what a row is
+        called, are for the message.
     """
     from scipy.interpolate import CubicSpline
 
@@ -159,7 +184,7 @@ def on_even_clock(path: Path, times: Array, samples: Array, rows: NDArray[np.int
     if wrong.size:
         i = int(wrong[0])
         found = f"time that does not increase ({times[i + 1]:.9g} s after {times[i]:.9g} s)"
-        raise InputError(f"{path}, line {rows[i + 1]}", found, "times that increase")
+        raise InputError(f"{path}, {place} {rows[i + 1]}", found, "times that increase")
     typical = float(np.mean(steps[steps <= GAP * np.median(steps)]))
     interval = _rounded_interval(times, steps)
     if interval is not None:

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
-from bayesimpact.data.clock import even_interval
+from bayesimpact.data.clock import check_rate
+from bayesimpact.data.gaps import on_clock
 from bayesimpact.data.period import rough_period
 from bayesimpact.data.read import build_campaign
 from bayesimpact.data.recording import Recording
@@ -136,23 +137,19 @@ def _entry(where: str, given: object) -> dict[str, Any]:
 
 def _samples(where: str, entry: RecordingTable, given: Mapping[str, Any]) -> Table:
     samples = _floats(f"{where}, key samples", given["samples"])
-    interval, start = None, 0.0
+    quantity, factor = UNITS[entry.unit or ""]
     if given.get("times_s") is not None:
         times = _floats(f"{where}, key times_s", given["times_s"])
         if times.size != samples.size:
             found = f"{times.size} times of {samples.size} samples"
             raise InputError(f"{where}, key times_s", found, "a time for every sample")
         rows = np.arange(times.size, dtype=np.int64)
-        interval, start = even_interval(where, times, rows, "sample"), float(times[0])
-    if entry.sample_rate_hz is not None:
-        if interval is not None and abs(entry.sample_rate_hz * interval - 1.0) > 1e-3:
-            found = f"sample_rate_hz = {entry.sample_rate_hz:g}, and times at {1 / interval:g} Hz"
-            raise InputError(where, found, "times_s, or sample_rate_hz, or both agreeing")
-        interval = interval or 1.0 / entry.sample_rate_hz
-    if interval is None:
+        even = on_clock(where, times, samples * factor, rows, "sample", resample=entry.resample)
+        check_rate(where, even.interval, entry.sample_rate_hz)
+        return Table(even.samples, even.interval, float(times[0]), quantity, even.used)
+    if entry.sample_rate_hz is None:
         raise InputError(where, "no clock", "times_s (n,), or sample_rate_hz")
-    quantity, factor = UNITS[entry.unit or ""]
-    return Table(samples * factor, interval, start, quantity)
+    return Table(samples * factor, 1.0 / entry.sample_rate_hz, 0.0, quantity)
 
 
 def _floats(where: str, values: Any) -> Floats:
