@@ -6,6 +6,7 @@ stand-in there; what weighs evidence asks `Recording.used`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -59,6 +60,9 @@ def without(recording: Recording, spans: Iterable[tuple[int, int]]) -> Recording
 def excluded_spans(where: str, recording: Recording, spans: Sequence[Sequence[float]]) -> Recording:
     """The recording without the samples in spans of time, s on the file's own clock.
 
+    All stand-ins are made anew, so that they follow from the samples that count, and a recording
+    that was saved is read as it was.
+
     Raises
     ------
     InputError
@@ -75,12 +79,26 @@ def excluded_spans(where: str, recording: Recording, spans: Sequence[Sequence[fl
                 where, f"no sample from {start:g} to {end:g} s", f"times within {span}"
             )
         chosen.append((first, last + 1))
-    if not chosen:
+    if not chosen and recording.used is None:
         return recording
     try:
         return without(recording, chosen)
     except ValueError as error:
-        raise InputError(where, str(error), f"spans that leave {LEAST:.0%} or more") from None
+        raise InputError(where, str(error), f"{LEAST:.0%} or more that count") from None
+
+
+def excluded(recording: Recording, spans: Iterable[tuple[int, int]]) -> str:
+    """The line `exclude_s = ...` for samples first..end-1 of every span.
+
+    The times lie nearly half an interval outside, written to a tenth of one.
+    """
+    places = max(0, math.ceil(1.0 - math.log10(recording.interval)))
+
+    def time(sample: float) -> str:
+        return f"{recording.start + sample * recording.interval:.{places}f}"
+
+    pairs = (f"[{time(first - 0.4)}, {time(end - 0.6)}]" for first, end in spans)
+    return f"exclude_s = [{', '.join(pairs)}]"
 
 
 def bridged(samples: Array, used: Mask) -> Array:

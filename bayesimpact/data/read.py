@@ -240,7 +240,8 @@ def _recording(
         quantity=table.quantity,
         used=None if table.used is None else table.used[first:stop_at],
     )
-    recording = excluded_spans(f"{where}, key exclude_s", recording, entry.exclude_s or ())
+    key = "exclude_s" if entry.exclude_s else "resample"
+    recording = excluded_spans(f"{where}, key {key}", recording, entry.exclude_s or ())
     _check_motion(source, recording)
     if entry.clock_ratio is None:
         return recording
