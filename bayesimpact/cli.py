@@ -22,6 +22,8 @@ from bayesimpact.console import (
     loaded_campaign,
     made_folder,
     out_option,
+    results_folder,
+    results_option,
     telling,
     unmade_words,
 )
@@ -46,7 +48,7 @@ def main() -> None:
 
 @main.command()
 @campaign_argument
-@out_option(required=False)
+@out_option
 @common
 def check(campaign: Path, out: Path | None, seed: int, quiet: bool) -> None:
     """Read and check CAMPAIGN, plot it, and say what will be estimated.
@@ -84,27 +86,38 @@ def check(campaign: Path, out: Path | None, seed: int, quiet: bool) -> None:
 @click.option("--mass", type=click.FloatRange(min=0, min_open=True), help="Moving mass, kg.")
 @click.option("--stop/--no-stop", default=None, help="Is there an obstacle?")
 @click.option("--case", metavar="NAME", help="The obstacle's name.")
+@click.option("--unit", metavar="UNIT", help="Of readings for which the files give none: mm, ...")
+@click.option(
+    "--rate",
+    type=click.FloatRange(min=0, min_open=True),
+    metavar="HZ",
+    help="Sampling rate of files without a clock.",
+)
 @click.option("--plot", is_flag=True, help="Draw all channels into FOLDER/channels.png.")
 @common
 def new(
     folder: Path, files: tuple[Path, ...], mass: float | None, stop: bool | None, case: str | None,
-    plot: bool, seed: int, quiet: bool,
+    unit: str | None, rate: float | None, plot: bool, seed: int, quiet: bool,
 ) -> None:  # fmt: skip
     """Look at instrument files FILE... and write FOLDER/campaign.toml with comments.
 
-    Says which channels the files hold and what it assumed. A campaign.toml that is there already
-    is never replaced. Nothing is drawn at random: --seed is taken for the sake of scripts.
+    Says which channels the files hold and what it assumed. Files from elsewhere are copied into
+    FOLDER; what is there already is never replaced. Nothing is asked, and nothing is drawn at
+    random: --seed is taken for the sake of scripts.
     """
     from bayesimpact.data import draft
     from bayesimpact.data.read import load_campaign
+    from bayesimpact.data.table import UNITS
 
+    if unit not in (None, *UNITS):
+        raise InputError("--unit", f'"{unit}"', ", ".join(UNITS))
     if (folder / "campaign.toml").exists():
         accepted = "a folder without one; it is never replaced"
         raise InputError(str(folder / "campaign.toml"), "a campaign already", accepted)
-    looks = [draft.look(folder, file) for file in files]
+    looks = draft.looks_at(folder, files)
     title = folder.resolve().name or "campaign"
-    made = draft.draft(title, looks, draft.Rig(mass, stop, case))
-    file = draft.write(folder, made)
+    made = draft.draft(title, looks, draft.Rig(mass, stop, case, unit, rate))
+    file = draft.write(folder, looks, made)
     if plot:
         from bayesimpact.report.channel_figure import channel_figure
 
@@ -118,23 +131,21 @@ def new(
     click.echo(f"written: {file}" + (f", {folder / 'channels.png'}" if plot else ""))
     for line in (*made.assumed, *made.needed):
         click.echo(f"  {line}")
-    beside = sorted({f.resolve().parent for f in files} - {folder.resolve()})
     try:
-        load_campaign(folder, beside)
-        elsewhere = "".join(f" --data {place}" for place in beside)
-        click.echo(f"ready for: bayesimpact check {folder}{elsewhere}")
+        load_campaign(folder)
+        click.echo(f"ready for: bayesimpact check {folder}, bayesimpact diagnose {folder}")
     except InputError as error:
         click.echo(f"not yet complete: {error}")
 
 
 @main.command()
 @campaign_argument
-@out_option(required=True)
+@results_option
 @common
 @click.pass_context
-def fit(ctx: click.Context, campaign: Path, out: Path, seed: int, quiet: bool) -> None:
+def fit(ctx: click.Context, campaign: Path, out: Path | None, seed: int, quiet: bool) -> None:
     """Find the mode: differential evolution with the Metropolis criterion, then a polish."""
-    loaded = loaded_campaign(campaign)
+    loaded, out = loaded_campaign(campaign), results_folder(campaign, out)
     from bayesimpact.workflow import fit_campaign
 
     command = f"bayesimpact fit {campaign} --out {out} --seed {seed}"
@@ -146,15 +157,15 @@ def fit(ctx: click.Context, campaign: Path, out: Path, seed: int, quiet: bool) -
 
 @main.command()
 @campaign_argument
-@out_option(required=True)
+@results_option
 @click.option("--resume", is_flag=True, help="Go on with the chain that DIR holds.")
 @common
 @click.pass_context
 def sample(
-    ctx: click.Context, campaign: Path, out: Path, resume: bool, seed: int, quiet: bool
+    ctx: click.Context, campaign: Path, out: Path | None, resume: bool, seed: int, quiet: bool
 ) -> None:
     """Sample the posterior by emcee; the backbone is the posterior-predictive check."""
-    loaded = loaded_campaign(campaign)
+    loaded, out = loaded_campaign(campaign), results_folder(campaign, out)
     from bayesimpact.workflow import sample_campaign
 
     command = f"bayesimpact sample {campaign} --out {out} --seed {seed}"
@@ -167,7 +178,7 @@ def sample(
 
 @main.command()
 @campaign_argument
-@out_option(required=True)
+@results_option
 @click.option("--quick", is_flag=True, help="No sampling: intervals from the mode's curvature.")
 @click.option(
     "--certify",
@@ -182,7 +193,7 @@ def sample(
 def diagnose(
     ctx: click.Context,
     campaign: Path,
-    out: Path,
+    out: Path | None,
     quick: bool,
     certify: int,
     resume: bool,
@@ -190,7 +201,7 @@ def diagnose(
     quiet: bool,
 ) -> None:
     """Locate, name, model and show what the base model leaves out of CAMPAIGN."""
-    loaded = loaded_campaign(campaign)
+    loaded, out = loaded_campaign(campaign), results_folder(campaign, out)
     from bayesimpact.workflow import diagnose_campaign
 
     command = f"bayesimpact diagnose {campaign} --out {out} --seed {seed}"

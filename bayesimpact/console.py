@@ -109,15 +109,25 @@ def loaded_campaign(campaign: Path) -> Campaign:
     return load_campaign(campaign, click.get_current_context().meta[_DATA])
 
 
-def out_option(required: bool) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """`--out DIR`."""
+def _out(words: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     return click.option(
         "--out",
         type=click.Path(file_okay=False, path_type=Path),
-        required=required,
         metavar="DIR",
-        help="Folder for the results; made if absent.",
+        help=f"Folder for the results; made if absent.{words}",
     )
+
+
+out_option = _out("")
+results_option = _out("  [default: a folder in CAMPAIGN's, called as this command]")
+
+
+def results_folder(campaign: Path, out: Path | None) -> Path:
+    """The folder of `--out`, or the one beside campaign.toml that is called as the command."""
+    if out is not None:
+        return out
+    home = campaign if campaign.is_dir() else campaign.parent
+    return home / str(click.get_current_context().info_name)
 
 
 def made_folder(out: Path, go_on: str = "") -> Path:

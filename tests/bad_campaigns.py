@@ -183,6 +183,32 @@ BAD_TOML = [
         '[priors]\nk1 = { distribution = "loguniform", lower = -1, upper = 8 }\n',
         *("[priors] k1", "key lower", "-1", "above 0"),
     ),
+    _more(
+        "prior of another world",
+        '[priors]\nk1 = { distribution = "normal", mean = 1e29, sd = 1e-29 }\n',
+        *("[priors] k1", "key sd", "a width of 1e-29", "1e+17 or more"),
+    ),
+    _more(
+        "prior far beyond the recordings",
+        '[priors]\nk1 = { distribution = "normal", mean = 1e10, sd = 1 }\n',
+        *("[priors] k1", "key mean", "1e+10", "k1 from 1e+10 to 1e+10 SI", "8.13e+04 SI"),
+    ),
+    _more(
+        "prior far below the recordings",
+        '[priors]\nk1 = { distribution = "halfnormal", scale = 1e-20 }\n',
+        *("[priors] k1", "key scale", "4.9e-20 SI", "0.000813 to"),
+    ),
+    _more(
+        "prior in millimetres",
+        '[priors]\n"y0[b]" = { distribution = "uniform", lower = 50, upper = 70 }\n',
+        *("[priors] y0[b]", "key lower", "y0[b] from 50 to 70", "1.19 SI"),
+    ),
+    _more(
+        "prior without room",
+        "[priors]\n"
+        '"gap_wear.step" = { distribution = "uniform", lower = 1, upper = 1.0000000000001 }\n',
+        *("[priors] gap_wear.step", "key upper", "a width of 9.99e-14", "1e-12 or more"),
+    ),
     Bad(
         "obstacle's prior without a stop",
         ("key g", "no parameter", "c1, k1, y0"),

@@ -125,7 +125,8 @@ class Campaign(Picklable):
         ----------
         recordings : one or more, each a `Recording` (SI units) or a mapping with the keys of a
             [[recording]]: `name`, `case`, `samples` (n,) and their `unit` (m, mm, um, rad, deg),
-            and either `times_s` (n,), evenly spaced, or `sample_rate_hz`; `start_s`, `end_s`
+            and either `times_s` (n,), evenly spaced unless `resample` is true, or
+            `sample_rate_hz`; `start_s`, `end_s`; `used` (n,), False where a sample is set aside
         name, mass_kg, tables : any other key of campaign.toml, as there: `stop = False`,
             `measurement = {"noise_um": 5.0}`, `priors = {"k1": {...}}`, `beam`, ...
 

@@ -72,3 +72,11 @@ def even_interval(
         )
         raise InputError(f"{path}, {place} {rows[worst]}", found, accepted)
     return interval
+
+
+def check_rate(path: Path | str, interval: float, rate: float | None) -> None:
+    """Refuse a sample_rate_hz that contradicts the recording's own clock, interval in s."""
+    if rate is not None and abs(rate * interval - 1.0) > 1e-3:
+        found = f"sample_rate_hz = {rate:g}, and a clock at {1 / interval:g} Hz"
+        accepted = "the recording's clock, or sample_rate_hz, or both agreeing"
+        raise InputError(str(path), found, accepted)

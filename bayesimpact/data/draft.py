@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import filecmp
 import json
-import os
+import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,18 +27,27 @@ SHOWN = 20
 
 @dataclass(frozen=True)
 class Rig:
-    """What the user says of the rig; None where nothing is said."""
+    """What the user says of the rig and its recordings; None where nothing is said.
+
+    `unit` is of readings, and `rate` in Hz of clocks, of which the files say nothing.
+    """
 
     mass: float | None = None
     stop: bool | None = None
     case: str | None = None
+    unit: str | None = None
+    rate: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Look:
-    """One file: how campaign.toml is to name it, its channels, and its encoding if it is text."""
+    """One file: how campaign.toml is to name it, its channels, and its encoding if it is text.
+
+    `source` is where a file lies that is outside the campaign's folder, and is to be copied there.
+    """
 
     file: str
+    source: Path | None
     channels: tuple[Channel, ...]
     encoding: str | None
     own_kind: bool
@@ -52,7 +62,23 @@ class Draft:
     needed: tuple[str, ...]
 
 
-def look(folder: Path, path: Path) -> Look:
+def looks_at(folder: Path, paths: Sequence[Path]) -> list[Look]:
+    """A look at every file; those outside `folder` get a name of their own in it."""
+    home = folder.resolve()
+    there = [path.resolve() for path in paths]
+    names = {p: p.relative_to(home).as_posix() for p in there if p.is_relative_to(home)}
+    for path in there:
+        if path not in names:
+            numbered = (f"{path.stem}-{i}{path.suffix}" for i in range(2, len(there) + 2))
+            free = (name for name in (path.name, *numbered) if name not in names.values())
+            names[path] = next(free)
+    return [
+        _look(path, names[end], home / names[end] != end)
+        for path, end in zip(paths, there, strict=True)
+    ]
+
+
+def _look(path: Path, file: str, outside: bool) -> Look:
     """Read all channels of a file; `InputError` when that cannot be done."""
     where = str(path)
     if not path.exists():
@@ -72,9 +98,9 @@ def look(folder: Path, path: Path) -> Look:
     names = {channel.name for channel in channels}
     own = not is_instrument_file(path) and encoding == "utf-8" and not text.is_labelled(content)
     own = own and bool(names & set(TIME_COLUMNS)) and len(names & set(RESPONSE_COLUMNS)) == 1
-    file = Path(os.path.relpath(path, folder)).as_posix()
     plain = encoding in (None, "utf-8") or headed
-    return Look(file, tuple(channels), None if plain else encoding, own)
+    source = path if outside else None
+    return Look(file, source, tuple(channels), None if plain else encoding, own)
 
 
 def draft(title: str, looks: Sequence[Look], rig: Rig) -> Draft:
@@ -105,7 +131,7 @@ def draft(title: str, looks: Sequence[Look], rig: Rig) -> Draft:
         if rig.stop is not False:
             note = "" if rig.case else f"  # {ASSUMED}: recordings of one obstacle share a case"
             lines.append(f"case = {_toml(rig.case or '1')}{note}")
-        lines += [] if one.own_kind else _keys(one)
+        lines += [] if one.own_kind else _keys(one, rig)
     bare = [line.strip() for line in lines[1:]]
     return Draft(
         "\n".join(lines) + "\n",
@@ -127,11 +153,17 @@ def listing(channel: Channel) -> str:
     return _one_line(", ".join(parts))
 
 
-def write(folder: Path, made: Draft) -> Path:
-    """Write campaign.toml; one that is there already is never replaced."""
+def write(folder: Path, looks: Sequence[Look], made: Draft) -> Path:
+    """Copy the files that lie elsewhere and write campaign.toml; nothing there is ever replaced.
+
+    A campaign is one folder: it can be moved, and names no file outside.
+    """
     file = folder / "campaign.toml"
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        for one in looks:
+            if one.source is not None:
+                _copy(one.source, folder / one.file)
         with file.open("x", encoding="utf-8", newline="\n") as stream:
             stream.write(made.toml)
     except FileExistsError:
@@ -143,8 +175,20 @@ def write(folder: Path, made: Draft) -> Path:
     return file
 
 
+def _copy(source: Path, target: Path) -> None:
+    if not target.exists():
+        if source.is_dir():
+            shutil.copytree(source, target)
+        else:
+            shutil.copyfile(source, target)
+    elif source.is_dir() or not target.is_file() or not filecmp.cmp(source, target, shallow=False):
+        accepted = "a folder without it; it is never replaced"
+        raise InputError(str(target), f"something else of the name of {source}", accepted)
+
+
 def _listing(one: Look) -> list[str]:
-    lines = [f"# {_one_line(one.file)} holds"]
+    origin = "" if one.source is None else f", copied from {one.source},"
+    lines = [f"# {_one_line(one.file + origin)} holds"]
     for number, channel in enumerate(one.channels[:SHOWN], 1):
         lines.append(f"#   {number}: {listing(channel)}")
     if len(one.channels) > SHOWN:
@@ -152,7 +196,7 @@ def _listing(one: Look) -> list[str]:
     return lines
 
 
-def _keys(one: Look) -> list[str]:
+def _keys(one: Look, rig: Rig) -> list[str]:
     """The lines that choose the channel and its clock."""
     lines = [f"encoding = {_toml(one.encoding)}"] if one.encoding else []
     candidates = guessed_response(one.channels)
@@ -174,13 +218,19 @@ def _keys(one: Look) -> list[str]:
         block = response.block or str(blocks.index(response.block) + 1)
         lines.append(f"block = {_toml(block)}")
     lines.append(f"column = {_chosen(inside, response)}{note}")
-    if response.unit not in UNITS:
+    if response.unit not in UNITS and rig.unit is not None:
+        lines.append(f"unit = {_toml(rig.unit)}")
+    elif response.unit not in UNITS:
         lines.append(f'# unit = "mm"  # {NEEDED}: the file gives no unit; {", ".join(UNITS)}')
-    return lines + _clock_lines(one, inside, response, first_is_time)
+    return lines + _clock_lines(one, inside, response, first_is_time, rig.rate)
 
 
 def _clock_lines(
-    one: Look, inside: Sequence[Channel], response: Channel, first_is_time: bool
+    one: Look,
+    inside: Sequence[Channel],
+    response: Channel,
+    first_is_time: bool,
+    rate: float | None,
 ) -> list[str]:
     if response.times is not None:
         return []
@@ -190,6 +240,8 @@ def _clock_lines(
         return []
     if stated is None and first_is_time and one.channels[0] is not response:
         stated, guessed = one.channels[0], True
+    if stated is None and rate is not None:
+        return [f"sample_rate_hz = {rate!r}"]
     if stated is None:
         return [f"# sample_rate_hz = 1000.0  # {NEEDED}: the file has no clock"]
     note = f"  # {ASSUMED}: it rises evenly" if guessed else ""

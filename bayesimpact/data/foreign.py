@@ -48,6 +48,7 @@ def read_foreign(source: Path, entry: RecordingTable, data: bytes) -> Table:
         sample_rate=entry.sample_rate_hz,
         start=entry.start_s,
         end=entry.end_s,
+        resample=entry.resample,
     )
     return choose(source, channels, wanted)
 

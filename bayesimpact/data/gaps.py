@@ -6,6 +6,7 @@ stand-in there; what weighs evidence asks `Recording.used`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.data.clock import even_interval
 from bayesimpact.data.period import rough_period
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
@@ -58,6 +60,9 @@ def without(recording: Recording, spans: Iterable[tuple[int, int]]) -> Recording
 def excluded_spans(where: str, recording: Recording, spans: Sequence[Sequence[float]]) -> Recording:
     """The recording without the samples in spans of time, s on the file's own clock.
 
+    All stand-ins are made anew, so that they follow from the samples that count, and a recording
+    that was saved is read as it was.
+
     Raises
     ------
     InputError
@@ -74,12 +79,26 @@ def excluded_spans(where: str, recording: Recording, spans: Sequence[Sequence[fl
                 where, f"no sample from {start:g} to {end:g} s", f"times within {span}"
             )
         chosen.append((first, last + 1))
-    if not chosen:
+    if not chosen and recording.used is None:
         return recording
     try:
         return without(recording, chosen)
     except ValueError as error:
-        raise InputError(where, str(error), f"spans that leave {LEAST:.0%} or more") from None
+        raise InputError(where, str(error), f"{LEAST:.0%} or more that count") from None
+
+
+def excluded(recording: Recording, spans: Iterable[tuple[int, int]]) -> str:
+    """The line `exclude_s = ...` for samples first..end-1 of every span.
+
+    The times lie nearly half an interval outside, written to a tenth of one.
+    """
+    places = max(0, math.ceil(1.0 - math.log10(recording.interval)))
+
+    def time(sample: float) -> str:
+        return f"{recording.start + sample * recording.interval:.{places}f}"
+
+    pairs = (f"[{time(first - 0.4)}, {time(end - 0.6)}]" for first, end in spans)
+    return f"exclude_s = [{', '.join(pairs)}]"
 
 
 def bridged(samples: Array, used: Mask) -> Array:
@@ -140,7 +159,30 @@ def _repeated(samples: Array, first: int, end: int, period: float) -> Array:
     return np.asarray((shape + line - ends)[1:-1], dtype=np.float64)
 
 
-def on_even_clock(path: Path, times: Array, samples: Array, rows: NDArray[np.int64]) -> Even:
+def on_clock(
+    path: Path | str,
+    times: Array,
+    samples: Array,
+    rows: NDArray[np.int64],
+    place: str = "line",
+    *,
+    resample: bool,
+) -> Even:
+    """Readings with written time stamps (n,), s, whatever they were read from.
+
+    Raises
+    ------
+    InputError
+        for an uneven clock, unless `resample` allows it: see `even_interval`, `on_even_clock`.
+    """
+    if resample:
+        return on_even_clock(path, times, samples, rows, place)
+    return Even(samples, even_interval(path, times, rows, place), None)
+
+
+def on_even_clock(
+    path: Path | str, times: Array, samples: Array, rows: NDArray[np.int64], place: str = "line"
+) -> Even:
     """Readings at uneven times (n,), s, taken over to an even clock by a cubic spline.
 
     Stamps that are an even clock's, written to a coarse unit, keep their readings. Elsewhere the
@@ -150,7 +192,8 @@ def on_even_clock(path: Path, times: Array, samples: Array, rows: NDArray[np.int
     Raises
     ------
     InputError
-        where time stands still or runs backwards; `path` and `rows` (n,) are for the message.
+        where time stands still or runs backwards; `path`, `rows` (n,) and `place`, what a row is
+        called, are for the message.
     """
     from scipy.interpolate import CubicSpline
 
@@ -159,7 +202,7 @@ def on_even_clock(path: Path, times: Array, samples: Array, rows: NDArray[np.int
     if wrong.size:
         i = int(wrong[0])
         found = f"time that does not increase ({times[i + 1]:.9g} s after {times[i]:.9g} s)"
-        raise InputError(f"{path}, line {rows[i + 1]}", found, "times that increase")
+        raise InputError(f"{path}, {place} {rows[i + 1]}", found, "times that increase")
     typical = float(np.mean(steps[steps <= GAP * np.median(steps)]))
     interval = _rounded_interval(times, steps)
     if interval is not None:

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
-from bayesimpact.data.clock import even_interval
+from bayesimpact.data.clock import check_rate
+from bayesimpact.data.gaps import on_clock
 from bayesimpact.data.period import rough_period
 from bayesimpact.data.read import build_campaign
 from bayesimpact.data.recording import Recording
@@ -26,7 +27,7 @@ The stress in a vibrating spring grows with its speed, strain = speed / wave spe
 32, 1960): 5 km/s and a strain of 1 % give 50 m/s, beyond which a metal spring yields. Millimetres
 taken for metres exceed twice that above 2.5 Hz and 6.5 mm.
 """
-_OWN = ("samples", "times_s")
+_OWN = ("samples", "times_s", "used")
 _OF_FILES = frozenset(
     ("file", "column", "channel", "block", "skip_rows", "encoding", "time_column")
 )
@@ -116,6 +117,7 @@ def _entry(where: str, given: object) -> dict[str, Any]:
         if given.case:
             entry["case"] = given.case
         entry["times_s"] = given.start + given.times
+        entry["used"] = given.used
     elif isinstance(given, Mapping):
         entry = {str(key): value for key, value in given.items()}
     else:
@@ -136,23 +138,36 @@ def _entry(where: str, given: object) -> dict[str, Any]:
 
 def _samples(where: str, entry: RecordingTable, given: Mapping[str, Any]) -> Table:
     samples = _floats(f"{where}, key samples", given["samples"])
-    interval, start = None, 0.0
+    quantity, factor = UNITS[entry.unit or ""]
+    used = _mask(f"{where}, key used", given.get("used"), samples.size)
     if given.get("times_s") is not None:
         times = _floats(f"{where}, key times_s", given["times_s"])
         if times.size != samples.size:
             found = f"{times.size} times of {samples.size} samples"
             raise InputError(f"{where}, key times_s", found, "a time for every sample")
         rows = np.arange(times.size, dtype=np.int64)
-        interval, start = even_interval(where, times, rows, "sample"), float(times[0])
-    if entry.sample_rate_hz is not None:
-        if interval is not None and abs(entry.sample_rate_hz * interval - 1.0) > 1e-3:
-            found = f"sample_rate_hz = {entry.sample_rate_hz:g}, and times at {1 / interval:g} Hz"
-            raise InputError(where, found, "times_s, or sample_rate_hz, or both agreeing")
-        interval = interval or 1.0 / entry.sample_rate_hz
-    if interval is None:
+        if entry.resample and used is not None:  # what does not count is a gap in the clock
+            times, samples, rows, used = times[used], samples[used], rows[used], None
+        even = on_clock(where, times, samples * factor, rows, "sample", resample=entry.resample)
+        check_rate(where, even.interval, entry.sample_rate_hz)
+        used = even.used if used is None else used
+        return Table(even.samples, even.interval, float(times[0]), quantity, used)
+    if entry.sample_rate_hz is None:
         raise InputError(where, "no clock", "times_s (n,), or sample_rate_hz")
-    quantity, factor = UNITS[entry.unit or ""]
-    return Table(samples * factor, interval, start, quantity)
+    return Table(samples * factor, 1.0 / entry.sample_rate_hz, 0.0, quantity, used)
+
+
+def _mask(where: str, given: Any, size: int) -> NDArray[np.bool_] | None:
+    """Which samples count, (n,); None where all do."""
+    if given is None:
+        return None
+    mask = np.asarray(given)
+    if mask.dtype.kind != "b" or mask.shape != (size,):
+        found = f"an array of {mask.dtype}, shape {mask.shape}"
+        raise InputError(where, found, f"true or false for every sample, ({size},)")
+    if int(mask.sum()) < 2:
+        raise InputError(where, f"{int(mask.sum())} samples that count", "two or more")
+    return mask
 
 
 def _floats(where: str, values: Any) -> Floats:

@@ -19,6 +19,7 @@ from bayesimpact.data.entries import filled_in
 from bayesimpact.data.foreign import file_bytes, is_foreign, read_foreign
 from bayesimpact.data.gaps import excluded_spans
 from bayesimpact.data.period import rough_period
+from bayesimpact.data.prior_bounds import check_prior, parameter_ranges
 from bayesimpact.data.recording import Quantity, Recording
 from bayesimpact.data.schema import (
     CampaignTable,
@@ -240,7 +241,8 @@ def _recording(
         quantity=table.quantity,
         used=None if table.used is None else table.used[first:stop_at],
     )
-    recording = excluded_spans(f"{where}, key exclude_s", recording, entry.exclude_s or ())
+    key = "exclude_s" if entry.exclude_s else "resample"
+    recording = excluded_spans(f"{where}, key {key}", recording, entry.exclude_s or ())
     _check_motion(source, recording)
     if entry.clock_ratio is None:
         return recording
@@ -353,6 +355,7 @@ def _priors(
     where: str, table: CampaignTable, recordings: list[Recording]
 ) -> dict[str, MappingProxyType[str, Any]]:
     names = _prior_names(table.stop, recordings)
+    ranges = parameter_ranges(table.mass_kg, recordings)
     for name, prior in table.priors.items():
         if name not in names and not _EFFECT_PARAMETER.fullmatch(name):
             near = get_close_matches(name[:100], names[:200], 1, 0.4)
@@ -368,6 +371,7 @@ def _priors(
                 f"{prior.upper:g}",
                 f"more than lower = {prior.lower:g}",
             )
+        check_prior(f"{where}, [priors] {name}", name, prior.model_dump(), ranges)
     return {name: MappingProxyType(prior.model_dump()) for name, prior in table.priors.items()}
 
 

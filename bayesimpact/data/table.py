@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.data.clock import even_interval
-from bayesimpact.data.gaps import on_even_clock
+from bayesimpact.data.clock import check_rate
+from bayesimpact.data.gaps import on_clock
 from bayesimpact.data.recording import Quantity
 from bayesimpact.errors import InputError
 
@@ -92,12 +92,17 @@ def read_table(
     layout = _layout(path, header + 1, lines[header], column, unit)
     numbers, rows = _numbers(path, lines, header + 1, layout)
     quantity, factor = UNITS[layout.unit]
-    if resample and layout.time is not None:
-        times = numbers[:, 0] * TIME_COLUMNS[layout.names[layout.time]]
-        even = on_even_clock(path, times, numbers[:, -1] * factor, rows)
-        return Table(even.samples, even.interval, float(times[0]), quantity, even.used)
-    interval, start = _clock(path, numbers, rows, layout, sample_rate)
-    return Table(numbers[:, -1] * factor, interval, start, quantity)
+    samples = numbers[:, -1] * factor
+    if layout.time is None:
+        if sample_rate is None:
+            accepted = f"a column {' or '.join(TIME_COLUMNS)}, or sample_rate_hz in campaign.toml"
+            found = f"no time column among {', '.join(layout.names)}"
+            raise InputError(f"{path}, header row", found, accepted)
+        return Table(samples, 1.0 / sample_rate, 0.0, quantity)
+    times = numbers[:, 0] * TIME_COLUMNS[layout.names[layout.time]]
+    even = on_clock(path, times, samples, rows, resample=resample)
+    check_rate(path, even.interval, sample_rate)
+    return Table(even.samples, even.interval, float(times[0]), quantity, even.used)
 
 
 def _is_content(line: str) -> bool:
@@ -254,25 +259,3 @@ def _row(path: Path, line: int, text: str, layout: _Layout, columns: list[int]) 
             raise InputError(f"{where}, column {layout.names[column]}", found, "a finite number")
         numbers.append(number)
     return numbers
-
-
-def _clock(
-    path: Path,
-    numbers: NDArray[np.float64],
-    rows: NDArray[np.int64],
-    layout: _Layout,
-    sample_rate: float | None,
-) -> tuple[float, float]:
-    """Sampling interval and time of the first sample, s."""
-    if layout.time is None:
-        if sample_rate is None:
-            accepted = f"a column {' or '.join(TIME_COLUMNS)}, or sample_rate_hz in campaign.toml"
-            found = f"no time column among {', '.join(layout.names)}"
-            raise InputError(f"{path}, header row", found, accepted)
-        return 1.0 / sample_rate, 0.0
-    times = numbers[:, 0] * TIME_COLUMNS[layout.names[layout.time]]
-    interval = even_interval(path, times, rows)
-    if sample_rate is not None and abs(sample_rate * interval - 1.0) > 1e-3:
-        found = f"sample_rate_hz = {sample_rate:g}, and a time column at {1 / interval:g} Hz"
-        raise InputError(str(path), found, "a time column, or sample_rate_hz, or both agreeing")
-    return interval, float(times[0])

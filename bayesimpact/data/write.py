@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from bayesimpact.data.campaign import Beam, Campaign, Measurement, Smoothing
+from bayesimpact.data.gaps import excluded, runs
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
+
+LONGEST = 200  # bytes of a recording's name that becomes a file's; file systems allow 255 in all
+_UNUSABLE = re.compile(r'[*?:<>|"\\]')  # patterns, and what some file systems refuse
 
 
 def write_campaign(
@@ -24,17 +29,25 @@ def write_campaign(
     """
     folder.mkdir(parents=True, exist_ok=True)
     lines = [f"# {line}".rstrip() for line in comment.splitlines()]
-    lines += [f"name = {_toml(campaign.name)}", f"mass_kg = {campaign.mass!r}"]
+    lines += [f"# {_one_line(note)}" for note in campaign.notes]
+    lines += [f"name = {_toml(campaign.name)}", f"mass_kg = {_toml(float(campaign.mass))}"]
     if campaign.measurement.mass_sd:
-        lines.append(f"mass_uncertainty_kg = {campaign.measurement.mass_sd * campaign.mass!r}")
+        sd = float(campaign.measurement.mass_sd * campaign.mass)
+        lines.append(f"mass_uncertainty_kg = {_toml(sd)}")
     lines.append(f"stop = {_toml(campaign.stop)}")
-    for recording in campaign.recordings:
-        lines += ["", "[[recording]]", f"file = {_toml(recording.name + '.csv')}"]
+    if campaign.keep_faults:
+        lines.append('faults = "keep"')
+    for number, recording in enumerate(campaign.recordings, 1):
+        file = _file_name(recording.name, number)
+        lines += ["", "[[recording]]", *_named(recording.name, file)]
         if campaign.stop:
             lines.append(f"case = {_toml(recording.case)}")
-        (folder / f"{recording.name}.csv").write_text(
-            _csv(recording, decimals), encoding="utf-8", newline="\n"
-        )
+        if recording.used is not None:
+            lines.append(excluded(recording, runs(~recording.used)))
+        (folder / file).write_text(_csv(recording, decimals), encoding="utf-8", newline="\n")
+    for number, (name, reason) in enumerate(campaign.skipped.items(), len(campaign.recordings) + 1):
+        lines += ["", "[[recording]]", *_named(name, _file_name(name, number))]
+        lines.append(f"skip = {_toml(reason)}")
     lines += _measurement(campaign.measurement, campaign.recordings[0].quantity)
     if campaign.priors:
         lines += ["", "[priors]"]
@@ -43,6 +56,17 @@ def write_campaign(
         lines += ["", f"[beam.{_toml(case)}]", *_beam(beam)]
     text = "\n".join(lines) + "\n"
     (folder / "campaign.toml").write_text(text, encoding="utf-8", newline="\n")
+
+
+def _file_name(name: str, number: int) -> str:
+    """The recording's name as a file's, or a number where no file may be called so."""
+    plain = name.isprintable() and not _UNUSABLE.search(name) and len(name.encode()) <= LONGEST
+    return f"{name}.csv" if plain else f"recording-{number}.csv"
+
+
+def _named(name: str, file: str) -> list[str]:
+    own = [] if Path(file).stem == name else [f"name = {_toml(name)}"]
+    return [f"file = {_toml(file)}", *own]
 
 
 def _csv(recording: Recording, decimals: int | None) -> str:
@@ -65,6 +89,8 @@ def _measurement(known: Measurement, quantity: str) -> list[str]:
         unit = "um" if quantity == "displacement" else "mrad"
         scale = 1e6 if quantity == "displacement" else 1e3
         lines.append(f"noise_{unit} = {_short(known.noise * scale)}")
+    if known.unfiltered:
+        lines.append('smoothing = "none"')
     if known.smoothing is not None:
         lines.append(f"smoothing = {_toml(_smoothing(known.smoothing))}")
     if known.clock_sd:
@@ -115,5 +141,10 @@ def _toml(value: Any) -> str:
     if isinstance(value, Mapping):
         return "{ " + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + " }"
     if isinstance(value, float):
-        return repr(value)
-    return json.dumps(value, ensure_ascii=False)  # strings, integers and truth values agree
+        return repr(float(value))  # NumPy's own would say its type
+    # strings, integers and truth values agree, but for a character that JSON leaves as it is
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _one_line(words: str) -> str:
+    return "".join(c if c.isprintable() else " " for c in words)

@@ -6,13 +6,15 @@ Let S be the likeliest set of effects that the search reached.
    `adequate` when S is empty; `unknown` when one free force in the place of all effects beats S by
    the decisive odds; `ambiguous` when another set comes within these odds; else `named`.
 2. Something remains beside S. An effect of S is needed when
-   - every set of effects without it trails S by the decisive odds,
+   - every set of effects without it trails S by the decisive odds, or trails it at all where it has
+     more effects or parameters than S: what remains makes odds small, and more to fit with makes
+     imitation easy,
    - the misfit above the noise is `EXCESS` times larger without it than with it, other effects
      refitted: an effect that merely imitates what the catalogue lacks leaves a large part of it,
    - no set without it, with a residual force of whichever form is likeliest, beats S with its own
      residual force by these odds (as in 1), and
-   - no other effect in its place, with such a force beside, comes within these odds of that: what
-     remains may be what tells two laws apart.
+   - no other effect in its place, with such a force beside, comes within these odds of that, or
+     above it where it has more parameters: what remains may be what tells two laws apart.
    With needed effects the verdict is `partly`, without any it is `unknown`. Other effects of S stay
    in the fitted model, but are not named.
 
@@ -77,20 +79,41 @@ def is_needed(naming: Naming, effect: Effect) -> bool:
     """Whether every likely hypothesis has an effect of the chosen model, although more remains."""
     if not may_be_needed(naming, effect):
         return False
-    size = len(naming.chosen.candidate.effects)
-    reached = naming.with_residual_force(frozenset(naming.chosen.candidate.ids))
+    chosen = frozenset(naming.chosen.candidate.ids)
+    reached = naming.with_residual_force(chosen)
     return not any(
-        naming.with_residual_force(ids) > reached + DECISIVE * (1 if len(ids) < size else -1)
+        naming.with_residual_force(ids) > reached + lead(naming, ids)
         for ids, candidate in naming.residual.items()
         if not holds(candidate.effects, effect)
     )
 
 
+def lead(naming: Naming, ids: frozenset[str]) -> float:
+    """Odds by which a model with a residual force must lead the chosen one to unseat an effect.
+
+    One with fewer effects decisively, for the force may imitate them; one with another effect in a
+    place may trail as much, unless it has more parameters to fit with.
+    """
+    if len(ids) < len(naming.chosen.candidate.effects):
+        return DECISIVE
+    found = tuple(e for e in naming.residual[ids].effects if e.id in ids)
+    return 0.0 if is_larger(found, naming.chosen) else -DECISIVE
+
+
+def is_larger(effects: Sequence[Effect], chosen: State) -> bool:
+    """Whether a set of effects is larger than the chosen one, or as large with more parameters."""
+    own = chosen.candidate.effects
+    if len(effects) != len(own):
+        return len(effects) > len(own)
+    return sum(len(e.parameters) for e in effects) > sum(len(e.parameters) for e in own)
+
+
 def may_be_needed(naming: Naming, effect: Effect) -> bool:
     """`is_needed` as far as models without a residual force tell."""
     chosen = naming.chosen
+    reached = naming.log_odds(chosen.candidate)
     if any(
-        naming.log_odds(c) > naming.log_odds(chosen.candidate) - DECISIVE
+        naming.log_odds(c) > reached - (0.0 if is_larger(c.effects, chosen) else DECISIVE)
         for c in naming.tried
         if not holds(c.effects, effect)
     ):

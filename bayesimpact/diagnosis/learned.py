@@ -8,12 +8,12 @@ about one knot spacing.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.model.effects.effect import Effect, EffectParameter, Law
+from bayesimpact.model.effects.effect import Effect, EffectParameter, Law, Scales
 
 Array = NDArray[np.float64]
 
@@ -93,11 +93,22 @@ def learned_contact(
     )
 
 
+@dataclass(frozen=True)
+class Constant:
+    """A prior's width whatever the campaign; a record, for lambdas cannot be pickled."""
+
+    value: float
+
+    def __call__(self, scales: Scales) -> float:
+        """The width."""
+        return self.value
+
+
 def _learned(
     low: float, high: float, reach: float, conservative: float, dissipative: float, knots: int
 ) -> Effect:
     def fixed(name: str, unit: str, value: float) -> EffectParameter:
-        return EffectParameter(name, unit, scale=lambda s: 1.0, fixed=value)
+        return EffectParameter(name, unit, scale=Constant(1.0), fixed=value)
 
     head = (
         fixed("knots", "1", float(knots)),
@@ -105,9 +116,9 @@ def _learned(
         fixed("spacing", "m", (high - low) / (knots - 3)),
         fixed("reach", "m", reach),
     )
-    a = tuple(EffectParameter(f"a{i + 1}", "N", scale=lambda s: conservative) for i in range(knots))
+    a = tuple(EffectParameter(f"a{i + 1}", "N", scale=Constant(conservative)) for i in range(knots))
     b = tuple(
-        EffectParameter(f"b{i + 1}", "N s/m", scale=lambda s: dissipative) for i in range(knots)
+        EffectParameter(f"b{i + 1}", "N s/m", scale=Constant(dissipative)) for i in range(knots)
     )
     return Effect(
         id="learned_force",

@@ -87,6 +87,12 @@ class Diagnosis:
     filtered: Fingerprint | None = None
     corrected: Corrected | None = None
 
+    def __repr__(self) -> str:
+        """One line."""
+        names = ", ".join(effect.id for effect in self.effects) or "no effect"
+        change = f"{self.before.reduced_chi2:.4g} to {self.after.reduced_chi2:.4g}"
+        return f"<Diagnosis {self.verdict}: {names}, reduced chi2 {change}>"
+
 
 @linear_algebra_alone()
 def diagnose(

@@ -9,7 +9,7 @@
 | v0 | uniform, +- 20 times the largest speed |
 | k2 | uniform, 0 to 1000 times the larger of the quick estimates of k1 and k2 |
 | sigma | log-uniform, eight decades about the estimate; log-normal, 10 %, about a stated noise |
-| added effects | half-normal (normal with both signs) of a physical scale |
+| added effects | half-Cauchy (Cauchy with both signs) of a physical scale |
 | their shapes | log-normal, or log-uniform between two positive bounds |
 
 Campaign.toml's [priors] replace any of them.

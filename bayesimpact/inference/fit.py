@@ -125,8 +125,9 @@ class Fit:
 
 
 def grams(linearisation: Sequence[Linearisation]) -> tuple[Array, ...]:
-    """J'J (k, k) of every recording."""
-    return tuple(part.jacobian.T @ part.jacobian for part in linearisation)
+    """J'J (k, k) of every recording; not finite where a motion runs away."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return tuple(part.jacobian.T @ part.jacobian for part in linearisation)
 
 
 def likelihood_information(

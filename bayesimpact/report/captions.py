@@ -50,7 +50,7 @@ DIAGNOSIS = {
     ),
     "shifts": (
         "How far the added physics moves the parameters, in standard deviations of the base model: "
-        "medians and 90 % intervals. The honest interval carries what stays unexplained."
+        "medians and 90 % intervals."
     ),
 }
 """Captions of a diagnosis' figures."""

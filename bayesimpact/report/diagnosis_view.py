@@ -180,10 +180,8 @@ def _effect(effect: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def estimate(
-    content: Mapping[str, Any], *, median: bool = True, like: Mapping[str, Any] | None = None
-) -> str:
-    """Median with its 90 % interval and unit, or the interval alone.
+def estimate(content: Mapping[str, Any], *, like: Mapping[str, Any] | None = None) -> str:
+    """Median with its 90 % interval and unit.
 
     `like`: another estimate of the same parameter, told with the same digits.
     """
@@ -193,8 +191,6 @@ def estimate(
     wider = half if like is None else max(half, 0.5 * (like["ci90"][1] - like["ci90"][0]))
     places = decimals(wider * shown.scale)
     ends = span(low, high, shown.scale, places)
-    if not median:
-        return f"{ends} {typeset(shown.unit)}".rstrip()
     value = number(content["median"] * shown.scale, places)
     return f"{value} ({ends}) {typeset(shown.unit)}".rstrip()
 
@@ -277,9 +273,6 @@ def _shift(
         "change": percent((after["median"] - old) / abs(old)) if old else "–",
         "before": estimate(before, like=after),
         "after": estimate(after, like=before),
-        "honest": estimate({**after, "ci90": after["ci90_honest"]}, median=False, like=before)
-        if after.get("ci90_honest")
-        else "",
         "shift": signed(moved, 1) if abs(moved) < 1000 else f"{significant(moved, 2)}",
     }
 

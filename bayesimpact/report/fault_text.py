@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from bayesimpact.data.campaign import Campaign
-from bayesimpact.data.faults.fault import Fault, excluded
+from bayesimpact.data.faults.fault import Fault
+from bayesimpact.data.gaps import excluded
 from bayesimpact.data.recording import Recording
 
 SHOWN = 6  # places of one fault whose samples are listed

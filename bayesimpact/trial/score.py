@@ -138,19 +138,15 @@ def sizes(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> dict[str, bool
 
 
 def coverage(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Base parameter -> inside its 90 % interval, and error in standard deviations, three ways."""
+    """Base parameter -> inside its 90 % interval, and error in deviations, of both models."""
     result: dict[str, dict[str, Any]] = {}
     before, after = answer["parameters"]["before"], answer["parameters"]["after"]
     for name, true in truth["parameters"].items():
         if name.split("[")[0] not in BASE:
             continue
         row: dict[str, Any] = {}
-        for label, table, key in (
-            ("before", before, "ci90"),
-            ("after", after, "ci90"),
-            ("honest", after, "ci90_honest"),
-        ):
-            interval = table.get(name, {}).get(key)
+        for label, table in (("before", before), ("after", after)):
+            interval = table.get(name, {}).get("ci90")
             if interval is not None:
                 low, high = interval
                 sd = max((high - low) / (2 * NORMAL_90), 1e-300)

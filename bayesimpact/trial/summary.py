@@ -93,7 +93,7 @@ def _groups(scored: Sequence[Result]) -> dict[str, list[Result]]:
 
 
 def _coverage(rows: Sequence[Result]) -> dict[str, Any]:
-    """Per kind of base parameter: coverage and median error in standard deviations, three ways."""
+    """Per kind of base parameter: coverage and median error in deviations, of both models."""
     result: dict[str, Any] = {}
     for base in BASE:
         trials = [
@@ -101,7 +101,7 @@ def _coverage(rows: Sequence[Result]) -> dict[str, Any]:
             for r in rows
         ]
         entry: dict[str, Any] = {}
-        for label in ("before", "after", "honest"):
+        for label in ("before", "after"):
             inside = [[bool(row[label]) for row in found if label in row] for found in trials]
             errors = [abs(row[f"{label}_error"]) for t in trials for row in t if label in row]
             if errors:

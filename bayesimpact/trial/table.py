@@ -67,7 +67,7 @@ def _coverage(group: str, table: Mapping[str, Any]) -> list[str]:
     for name, row in table.items():
         cells = [
             f"{label} {100 * row[label]['rate']:5.1f} % ({row[label]['median_error_sd']:.2f})"
-            for label in ("before", "after", "honest")
+            for label in ("before", "after")
             if label in row
         ]
         lines.append(f"  {name:4s} " + "   ".join(cells))

@@ -34,8 +34,7 @@ def test_files_that_say_all(tmp_path: Path, kind: str) -> None:
     assert result.exit_code == 0, result.output
     assert "ready for: bayesimpact check" in result.output
     assert (tmp_path / "new rig" / "channels.png").stat().st_size > 1000
-    assert f"--data {tmp_path.resolve()}" in result.output
-    campaign = load_campaign(tmp_path / "new rig", [tmp_path])
+    campaign = load_campaign(tmp_path / "new rig")  # on its own: the file was copied there
     assert (campaign.name, campaign.mass, campaign.cases) == ("new rig", 1.0, ("1",))
     np.testing.assert_allclose(campaign.recordings[0].samples, decay(), rtol=1e-9, atol=1e-13)
     assert campaign.recordings[0].interval == pytest.approx(2e-3, rel=1e-6)
@@ -70,6 +69,40 @@ def test_what_is_missing_is_said(tmp_path: Path) -> None:
     (tmp_path / "campaign.toml").write_text(filled)
     for recording in load_campaign(tmp_path).recordings:
         np.testing.assert_allclose(recording.samples, decay(), rtol=1e-9)
+
+
+def test_units_and_rates_can_be_said(tmp_path: Path) -> None:
+    made.npy(tmp_path / "b.npy")
+    result = _new(tmp_path, tmp_path / "b.npy", "--no-stop", "--unit", "mm", "--rate", 500)
+    assert result.exit_code == 0 and "ready for" in result.output
+    np.testing.assert_allclose(load_campaign(tmp_path).recordings[0].samples, decay(), rtol=1e-9)
+    wrong = _new(tmp_path / "other", tmp_path / "b.npy", "--unit", "inch")
+    assert wrong.exit_code == 2 and "--unit" in wrong.stderr and "mm" in wrong.stderr
+
+
+def test_files_of_one_name_are_copied_apart(tmp_path: Path) -> None:
+    for folder in ("one", "two", "home"):
+        (tmp_path / folder).mkdir()
+        made.tdms(tmp_path / folder / "a.tdms")
+    files = [tmp_path / folder / "a.tdms" for folder in ("one", "home", "two")]
+    result = _new(tmp_path / "home", *files)
+    assert result.exit_code == 0, result.output
+    assert sorted(p.name for p in (tmp_path / "home").iterdir()) == [
+        "a-2.tdms", "a-3.tdms", "a.tdms", "campaign.toml"
+    ]  # fmt: skip
+    assert len(load_campaign(tmp_path / "home").recordings) == 3
+
+
+def test_a_file_that_is_there_is_never_replaced(tmp_path: Path) -> None:
+    made.tdms(tmp_path / "a.tdms")
+    (tmp_path / "home").mkdir()
+    (tmp_path / "home" / "a.tdms").write_text("mine")
+    result = _new(tmp_path / "home", tmp_path / "a.tdms")
+    assert result.exit_code == 2 and "something else of the name" in result.stderr
+    assert (tmp_path / "home" / "a.tdms").read_text() == "mine"
+    assert not (tmp_path / "home" / "campaign.toml").exists()
+    (tmp_path / "home" / "a.tdms").write_bytes((tmp_path / "a.tdms").read_bytes())
+    assert _new(tmp_path / "home", tmp_path / "a.tdms").exit_code == 0  # the same already
 
 
 def test_a_campaign_is_never_replaced(tmp_path: Path) -> None:

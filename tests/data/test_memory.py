@@ -62,9 +62,26 @@ def test_recordings_in_si() -> None:
     _same(_made(*made.recordings), made)
 
 
+def test_samples_that_are_set_aside_stay_so() -> None:
+    used = np.ones(600, dtype=bool)
+    used[100:103] = False
+    spoiled = np.where(used, A["samples"], 1e3)
+    (made,) = _made({**A, "samples": spoiled, "used": used}).recordings
+    (again,) = _made(made).recordings
+    (even,) = _made({**A, "samples": spoiled, "used": used, "resample": True}).recordings
+    for recording in (made, again, even):
+        assert recording.used is not None
+        np.testing.assert_array_equal(recording.used, used)
+        np.testing.assert_allclose(recording.samples, decay(), atol=1e-5)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
+        ({"used": [True]}, ("key used", "shape (1,)", "(600,)")),
+        ({"used": np.arange(600)}, ("key used", "int64")),
+        ({"used": np.arange(600) == 3}, ("key used", "1 samples")),
+        ({"used": np.arange(600) < 60}, ("60 of 600", "20% or more")),
         ({"samples": decay()[:, None]}, ("key samples", "shape (600, 1)")),
         ({"samples": np.where(TIMES[7] == TIMES, np.nan, 1.0)}, ("sample 7", "nan", "finite")),
         ({"samples": np.ma.masked_equal(np.arange(600.0), 9)}, ("sample 9", "nan", "finite")),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import pickle
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from bayesimpact.diagnosis.learned import (
     DEPTHS,
     force,
     learned_contact,
+    learned_drift,
     learned_force,
     spline_basis,
 )
@@ -145,3 +147,18 @@ def test_a_constant_force_in_contact_is_the_independent_rigs_preload():
         other, release, preload, rate=rig.rate, duration=rig.duration, rtol=1e-12, atol=1e-15
     ).displacement
     np.testing.assert_allclose(found, expected, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [learned_force(LOW, HIGH, 0.3, 0.02), learned_drift(2.0, 6e-3, 0.3, 0.02),
+     learned_contact(1e-3, 0.3, 0.02)],
+)  # fmt: skip
+def test_a_learned_force_can_be_pickled(effect):
+    again = pickle.loads(pickle.dumps(effect))
+    assert [(p.name, p.fixed, p.scale) for p in again.parameters] == [
+        (p.name, p.fixed, p.scale) for p in effect.parameters
+    ]
+    assert (again.law, again.equation) == (effect.law, effect.equation)
+    widths = {p.unit: p.scale(None) for p in again.parameters if p.fixed is None}
+    assert widths == {"N": 0.3, "N s/m": 0.02}

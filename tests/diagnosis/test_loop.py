@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -59,6 +60,20 @@ def physical_z(fit, mean=None, sd=None) -> dict[str, float]:
     truth = small_rig.true_values()
     roles = fit.target.oscillator.layout.roles("physical")
     return {fit.names[i]: (mean[i] - truth[fit.names[i]]) / sd[i] for i in roles}
+
+
+@pytest.mark.parametrize("kind", ["control", "named", "unknown"])
+def test_a_diagnosis_is_one_line_and_can_be_pickled(kind, request):
+    """As it must for other processes and notebooks: the same document comes out of it."""
+    diagnosis = request.getfixturevalue(kind)
+    line = repr(diagnosis)
+    assert "\n" not in line and len(line) < 200
+    words = [e.id for e in diagnosis.effects] or ["no effect"]
+    chi2 = f"{diagnosis.before.reduced_chi2:.4g} to {diagnosis.after.reduced_chi2:.4g}"
+    assert [w for w in (diagnosis.verdict, *words, chi2) if w not in line] == []
+    again = pickle.loads(pickle.dumps(diagnosis))
+    assert repr(again) == line
+    assert written(again) == written(diagnosis)
 
 
 def test_nothing_missing(control):

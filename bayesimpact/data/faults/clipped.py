@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from bayesimpact.data.faults.fault import Fault, amount, excluded, file_time, times_of
+from bayesimpact.data.faults.fault import Fault, amount, file_time, times_of
 from bayesimpact.data.faults.flat import Flat, flats, reading_step
+from bayesimpact.data.gaps import excluded
 from bayesimpact.data.period import noise_level
 from bayesimpact.data.recording import Recording
 

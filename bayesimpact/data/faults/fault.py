@@ -93,14 +93,6 @@ def times_of(recording: Recording, spans: Sequence[Span]) -> str:
     return ", ".join(named) + more
 
 
-def excluded(recording: Recording, spans: Sequence[Span]) -> str:
-    """The value of `exclude_s` that covers spans and half an interval on either side."""
-    pairs = (
-        (file_time(recording, first - 0.4), file_time(recording, end - 0.6)) for first, end in spans
-    )
-    return "exclude_s = [" + ", ".join(f"[{a:.9g}, {b:.9g}]" for a, b in pairs) + "]"
-
-
 def amount(value: float, unit: str) -> str:
     """A displacement in um or mm, an angle in degrees."""
     if unit == "rad":

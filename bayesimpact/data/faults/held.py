@@ -8,11 +8,11 @@ from bayesimpact.data.faults.fault import (
     FALSE_ALARM,
     Fault,
     amount,
-    excluded,
     file_time,
     times_of,
 )
 from bayesimpact.data.faults.flat import Flat, equal_share, flats, last_digit
+from bayesimpact.data.gaps import excluded
 from bayesimpact.data.recording import Recording
 
 LEAST = 5  # equal readings in a row

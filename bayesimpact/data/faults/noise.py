@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bayesimpact.data.faults.fault import Fault, amount, excluded, file_time, gaussian_threshold
+from bayesimpact.data.faults.fault import Fault, amount, file_time, gaussian_threshold
 from bayesimpact.data.faults.flat import reading_step
-from bayesimpact.data.gaps import runs
+from bayesimpact.data.gaps import excluded, runs
 from bayesimpact.data.period import noise_level
 from bayesimpact.data.recording import Recording
 

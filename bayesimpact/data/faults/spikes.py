@@ -9,12 +9,12 @@ from bayesimpact.data.faults.fault import (
     Fault,
     Span,
     amount,
-    excluded,
     file_time,
     gaussian_threshold,
     times_of,
 )
 from bayesimpact.data.faults.local import best_form, foretell, robust_sd
+from bayesimpact.data.gaps import excluded
 from bayesimpact.data.period import rough_period
 from bayesimpact.data.recording import Recording
 

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.data.clock import even_interval
+from bayesimpact.data.clock import check_rate
+from bayesimpact.data.gaps import on_clock
 from bayesimpact.data.readers.channel import TIME_UNITS, Channel
 from bayesimpact.data.table import UNITS, Table
 from bayesimpact.errors import InputError
@@ -40,6 +41,7 @@ class Wanted:
     sample_rate: float | None = None
     start: float | None = None
     end: float | None = None
+    resample: bool = False
 
 
 def choose(path: Path, channels: Sequence[Channel], wanted: Wanted) -> Table:
@@ -57,6 +59,8 @@ def choose(path: Path, channels: Sequence[Channel], wanted: Wanted) -> Table:
     times = _times(path, channels, channel, wanted)
     quantity, factor = UNITS[unit]
     first, last = _window(times, channel, wanted)
+    if wanted.resample and not isinstance(times, tuple):
+        first, last = _unbroken(times, channel.samples, first, last)
     samples = channel.samples[first:last]
     _check_finite(path, channel, samples, first)
     if isinstance(times, tuple):
@@ -69,9 +73,11 @@ def choose(path: Path, channels: Sequence[Channel], wanted: Wanted) -> Table:
     if bad.size:
         where = f"{path}, {place} {rows[bad[0]]}, time column"
         raise InputError(where, "no number", "a finite number")
-    interval = even_interval(path, stamps, rows.astype(np.int64), place)
-    _check_rate(path, interval, wanted.sample_rate)
-    return Table(samples * factor, interval, float(stamps[0]), quantity)
+    even = on_clock(
+        path, stamps, samples * factor, rows.astype(np.int64), place, resample=wanted.resample
+    )
+    check_rate(path, even.interval, wanted.sample_rate)
+    return Table(even.samples, even.interval, float(stamps[0]), quantity, even.used)
 
 
 def listed(channels: Sequence[Channel]) -> str:
@@ -176,18 +182,12 @@ def _times(
     if stated is not None:
         return stated.seconds
     if channel.interval is not None:
-        _check_rate(path, channel.interval, wanted.sample_rate)
+        check_rate(path, channel.interval, wanted.sample_rate)
         return channel.interval, channel.start
     if wanted.sample_rate is not None:
         return 1.0 / wanted.sample_rate, channel.start
     found = f"no clock for channel {channel.name} among {listed(channels)}"
     raise InputError(str(path), found, "time_column, or sample_rate_hz in campaign.toml")
-
-
-def _check_rate(path: Path, interval: float, rate: float | None) -> None:
-    if rate is not None and abs(rate * interval - 1.0) > 1e-3:
-        found = f"sample_rate_hz = {rate:g}, and a clock at {1 / interval:g} Hz"
-        raise InputError(str(path), found, "the file's clock, or sample_rate_hz, or both agreeing")
 
 
 def _window(
@@ -218,6 +218,17 @@ def _window(
         low, high = (int(kept[0]), int(kept[-1]) + 1) if kept.size else (0, 0)
     low, high = max(0, low), min(size, high)
     return (low, high) if high - low >= 2 else (0, size)
+
+
+def _unbroken(times: Floats, samples: Floats, first: int, last: int) -> tuple[int, int]:
+    """The window first..last-1 and all numbers that follow on either side without a break.
+
+    The even clock is the whole file's, as for a text, whatever part of it start and end keep.
+    """
+    broken = np.flatnonzero(~(np.isfinite(times) & np.isfinite(samples)))
+    before, after = broken[broken < first], broken[broken >= last]
+    low = int(before[-1]) + 1 if before.size else 0
+    return low, int(after[0]) if after.size else samples.size
 
 
 def _check_finite(path: Path, channel: Channel, samples: Floats, first: int) -> None:

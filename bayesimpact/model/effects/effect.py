@@ -89,8 +89,8 @@ class EffectParameter:
     Attributes
     ----------
     name, unit : unit for displacements; `bayesimpact.model.parameters.angular` translates
-    scale : size that would be plausible, from the campaign's scales: the prior is half-normal
-        (normal when both signs are admissible) about `null` with this scale; for a shape parameter
+    scale : size that would be plausible, from the campaign's scales: the prior is half-Cauchy
+        (Cauchy when both signs are admissible) about `null` with this scale; for a shape parameter
         the prior is log-normal about it, or log-uniform between two positive bounds
     lower, upper : physical bounds
     null : value at which the effect vanishes; None for a shape parameter (a depth, a time constant,

@@ -113,8 +113,8 @@ def _total(gain: Mapping[str, Any]) -> str:
     return f"{words} in all" if words else "by recording"
 
 
-def shifts(parameters: Mapping[str, Any]) -> list[tuple[str, Array, Array, Array | None]]:
-    """Parameters that both models have: name, and (low, median, high) before, after and honest.
+def shifts(parameters: Mapping[str, Any]) -> list[tuple[str, Array, Array]]:
+    """Parameters that both models have: name, and (low, median, high) before and after.
 
     In standard deviations of the base model, from its median; most moved ones in the table's order.
     """
@@ -126,9 +126,7 @@ def shifts(parameters: Mapping[str, Any]) -> list[tuple[str, Array, Array, Array
             continue
         new = after[name]
         ends = [_scaled(x, old["median"], sd) for x in (old, new)]
-        honest = new.get("ci90_honest")
-        wide = None if honest is None else _scaled({**new, "ci90": honest}, old["median"], sd)
-        found.append((name, ends[0], ends[1], wide))
+        found.append((name, ends[0], ends[1]))
     kept = sorted(found, key=lambda row: -abs(row[2][1]))[:MOST]
     return [row for row in found if row in kept] if len(found) > MOST else found
 
@@ -139,30 +137,20 @@ def _scaled(estimate: Mapping[str, Any], centre: float, sd: float) -> Array:
 
 
 @styled
-def _shifts(moved: list[tuple[str, Array, Array, Array | None]]) -> Figure:
+def _shifts(moved: list[tuple[str, Array, Array]]) -> Figure:
     figure = new_figure(0.42 * len(moved) + 1.2)
     axis = figure.subplots()
-    for i, (_, before, after, honest) in enumerate(moved):
-        for values, colour, offset, width in (
-            (before, BEFORE, -0.2, 3.0),
-            (after, AFTER, 0.05, 3.0),
-            (honest, BLACK, 0.27, 1.2),
-        ):
-            if values is not None:
-                axis.plot(values[[0, 2]], [i + offset] * 2, color=colour, lw=width)
-        axis.plot(before[1], i - 0.2, "o", color=BEFORE, ms=5)
-        axis.plot(after[1], i + 0.05, "o", color=AFTER, ms=5)
+    for i, (_, before, after) in enumerate(moved):
+        for values, colour, offset in ((before, BEFORE, -0.13), (after, AFTER, 0.13)):
+            axis.plot(values[[0, 2]], [i + offset] * 2, color=colour, lw=3.0)
+            axis.plot(values[1], i + offset, "o", color=colour, ms=5)
     axis.axvline(0.0, color=GREY, lw=0.7)
     rows_axis(axis, [symbol(name) for name, *_ in moved])
     axis.set_xlabel("shift from the base model (its standard deviations)")
     axis.set_title("parameters and 90 % intervals", loc="left")
     handles = [
-        Line2D([], [], color=colour, lw=width, label=words)
-        for colour, width, words in (
-            (BEFORE, 3.0, "base model"),
-            (AFTER, 3.0, "with what was added"),
-            (BLACK, 1.2, "honest: with what stays unexplained"),
-        )
+        Line2D([], [], color=colour, lw=3.0, label=words)
+        for colour, words in ((BEFORE, "base model"), (AFTER, "with what was added"))
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    figure.legend(handles=handles, loc="outside lower center", ncols=2)
     return figure

@@ -1,0 +1,145 @@
+"""An uneven clock is refused, or resampled, alike whatever the file's format."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import openpyxl
+import pandas as pd
+import pytest
+import pyuff
+import xarray as xr
+from campaigns import write
+from nptdms import ChannelObject, TdmsWriter
+from scipy.io import savemat
+
+import bayesimpact as bi
+from bayesimpact.data.recording import Recording
+from bayesimpact.errors import InputError
+
+HEAD = 'name = "rig"\nmass_kg = 0.5\nstop = false\n[[recording]]\nfile = "{}"\n'
+
+
+def _stamps() -> np.ndarray:
+    """About 2 ms apart, with a gap of 25 intervals; five digits, so that every format holds all."""
+    times = np.arange(600) * 2e-3 + np.random.default_rng(0).uniform(-4e-4, 4e-4, 600)
+    times[300:] += 0.05
+    return np.round(times + 0.001, 4)
+
+
+TIMES = _stamps()
+MM = np.round(-6.0 * np.exp(-0.15 * TIMES) * np.cos(2 * np.pi * 6.4 * TIMES), 6)
+
+
+def _text(head: str) -> Callable[[Path], None]:
+    rows = [f"{t!r},{x!r}" for t, x in zip(TIMES.tolist(), MM.tolist(), strict=True)]
+    return lambda path: path.write_text("\n".join([head, *rows]) + "\n") and None
+
+
+def _hdf5(path: Path) -> None:
+    with h5py.File(path, "w") as file:
+        file["time"], file["x_mm"] = TIMES, MM
+
+
+def _uff(path: Path) -> None:
+    said = pyuff.prepare_58(
+        func_type=1, rsp_node=4, rsp_dir=3, ref_node=1, ref_dir=0, data=MM, x=TIMES,
+        abscissa_spacing=0, abscissa_inc=0.0, abscissa_min=0.0, num_pts=MM.size,
+        abscissa_spec_data_type=17, abscissa_axis_units_lab="s", ordinate_spec_data_type=8,
+        ordinate_axis_units_lab="mm", id1="laser", ord_data_type=4, binary=0,
+        orddenom_spec_data_type=0, z_axis_spec_data_type=0,
+    )  # fmt: skip
+    pyuff.UFF(str(path)).write_sets(said, "add")
+
+
+def _tdms(path: Path) -> None:
+    with TdmsWriter(str(path)) as writer:
+        units = ({"unit_string": "s"}, {"unit_string": "mm"})
+        pairs = zip(("time", "laser"), (TIMES, MM), units, strict=True)
+        writer.write_segment([ChannelObject("log", *pair) for pair in pairs])
+
+
+def _excel(path: Path) -> None:
+    book = openpyxl.Workbook()
+    for row in [("Time [s]", "x [mm]"), *zip(TIMES.tolist(), MM.tolist(), strict=True)]:
+        book.active.append(row)
+    book.save(path)
+
+
+def _netcdf(path: Path) -> None:
+    time = ("time", TIMES, {"units": "s"})
+    data = xr.Dataset({"x": ("time", MM, {"units": "mm"})}, coords={"time": time})
+    data.to_netcdf(path, engine="scipy", format="NETCDF3_64BIT")
+
+
+def _parquet(path: Path) -> None:
+    pd.DataFrame({"Time [s]": TIMES, "x [mm]": MM}).to_parquet(path)
+
+
+FILES: dict[str, Callable[[Path], None]] = {
+    "a.mat": lambda path: savemat(path, {"time": TIMES, "x_mm": MM}),
+    "a.h5": _hdf5,
+    "a.uff": _uff,
+    "a.tdms": _tdms,
+    "a.lvm": _text("time_s,x_mm"),
+    "a.xlsx": _excel,
+    "a.nc": _netcdf,
+    "a.parquet": _parquet,
+    "a.npz": lambda path: np.savez(path, time=TIMES, x_mm=MM),
+    "a.txt": _text("Time [s],x [mm]"),
+}
+
+
+def _read(folder: Path, name: str, keys: str = "resample = true\n") -> Recording:
+    return bi.load(write(folder, HEAD.format(name) + keys, a=None, b=None)).recordings[0]
+
+
+def _assert_alike(mine: Recording, other: Recording) -> None:
+    assert mine.interval == pytest.approx(other.interval, rel=1e-12)
+    assert mine.start == pytest.approx(other.start, abs=1e-12)
+    np.testing.assert_allclose(mine.samples, other.samples, rtol=0, atol=1e-12)
+    assert other.used is not None and mine.used is not None
+    np.testing.assert_array_equal(mine.used, other.used)
+
+
+@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("keys", ["", "start_s = 0.3\nend_s = 1.1\ninvert = true\n"])
+def test_every_format_is_resampled_as_a_csv(tmp_path: Path, name: str, keys: str) -> None:
+    _text("time_s,displacement_mm")(tmp_path / "a.csv")
+    FILES[name](tmp_path / name)
+    keys += "resample = true\n"
+    _assert_alike(_read(tmp_path, name, keys), _read(tmp_path, "a.csv", keys))
+    with pytest.raises(InputError, match="resample = true"):
+        _read(tmp_path, name, "")
+
+
+def test_samples_in_memory_are_resampled_as_a_csv(tmp_path: Path) -> None:
+    _text("time_s,displacement_mm")(tmp_path / "a.csv")
+    entry = {"name": "a", "samples": MM, "unit": "mm", "times_s": TIMES, "resample": True}
+    made = bi.Campaign.from_arrays([entry], name="rig", mass_kg=0.5, stop=False)
+    _assert_alike(made.recordings[0], _read(tmp_path, "a.csv"))
+
+
+def test_empty_cells_outside_the_window_end_the_even_clock(tmp_path: Path) -> None:
+    rows = [f"{t!r},{x!r}" for t, x in zip(TIMES.tolist(), MM.tolist(), strict=True)]
+    rows[550:] = [row.split(",")[0] + "," for row in rows[550:]]
+    (tmp_path / "a.csv").write_text("Time [s],x [mm]\n" + "\n".join(rows) + "\n")
+    recording = _read(tmp_path, "a.csv", "resample = true\nend_s = 1.1\n")
+    assert recording.used is not None and 20 <= (~recording.used).sum() <= 26
+
+
+@pytest.mark.parametrize("name", ["a.mat", "a.txt"])
+def test_time_that_runs_backwards_names_its_place(tmp_path: Path, name: str) -> None:
+    times = TIMES.copy()
+    times[7] = times[5]
+    if name == "a.mat":
+        savemat(tmp_path / name, {"time": times, "x_mm": MM})
+    else:
+        rows = [f"{t!r},{x!r}" for t, x in zip(times.tolist(), MM.tolist(), strict=True)]
+        (tmp_path / name).write_text("\n".join(["Time [s],x [mm]", *rows]))
+    place = "sample 8" if name == "a.mat" else "line 9"
+    with pytest.raises(InputError, match=f"{name}, {place}: found time that does not increase"):
+        _read(tmp_path, name)
