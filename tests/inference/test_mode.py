@@ -13,13 +13,11 @@ from scipy.optimize import least_squares, minimize_scalar
 
 from bayesimpact.data.campaign import Smoothing
 from bayesimpact.inference.climb import best_sigma
-from bayesimpact.inference.fit import Fit, Target, inverse, prior_information
+from bayesimpact.inference.fit import Fit, Target, inverse
 from bayesimpact.inference.likelihood import Likelihood, Linearisation
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.prior import (
-    Cauchy,
-    HalfCauchy,
     HalfNormal,
     LogNormal,
     LogUniform,
@@ -394,16 +392,3 @@ def test_inverse_of_matrices_of_mixed_scales():
     kept = np.ix_(*[[0, 1, 3, 4, 5]] * 2)
     expected = np.linalg.inv((matrix / scale)[kept])
     np.testing.assert_allclose((inverse(matrix) * scale)[kept], expected, rtol=1e-9)
-
-
-@pytest.mark.parametrize("prior", [Cauchy(1.0, 0.3), HalfCauchy(0.3)])
-def test_a_heavy_tail_counts_as_the_parabola_below_its_log_density(prior):
-    """Which touches at theta: a step on it never overshoots, and the information stays positive."""
-    priors = Priors((prior,))
-    x = np.linspace(0.0, 8.0, 400)
-    for at in (0.0, 0.2, 1.0, 1.7, 6.0):
-        information = prior_information(priors, np.array([at]))[0]
-        assert information > 0
-        parabola = prior.log_density(at) + prior.gradient(at) * (x - at)
-        parabola = parabola - 0.5 * information * (x - at) ** 2
-        assert np.all(parabola <= prior.log_density(x) + 1e-9)

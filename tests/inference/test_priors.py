@@ -9,6 +9,7 @@ import pytest
 from scipy import stats
 
 from bayesimpact.errors import InputError
+from bayesimpact.inference.fit import prior_information
 from bayesimpact.inference.prior import (
     Cauchy,
     HalfCauchy,
@@ -204,3 +205,16 @@ def test_wrong_lengths_and_no_priors_are_refused() -> None:
             priors.log_density(theta)
     with pytest.raises(InputError, match="one prior per parameter"):
         Priors(())
+
+
+@pytest.mark.parametrize("prior", [Cauchy(1.0, 0.3), HalfCauchy(0.3)])
+def test_a_heavy_tail_counts_as_the_parabola_below_its_log_density(prior):
+    """Which touches at theta: a step on it never overshoots, and the information stays positive."""
+    priors = Priors((prior,))
+    x = np.linspace(0.0, 8.0, 400)
+    for at in (0.0, 0.2, 1.0, 1.7, 6.0):
+        information = prior_information(priors, np.array([at]))[0]
+        assert information > 0
+        parabola = prior.log_density(at) + prior.gradient(at) * (x - at)
+        parabola = parabola - 0.5 * information * (x - at) ** 2
+        assert np.all(parabola <= prior.log_density(x) + 1e-9)
