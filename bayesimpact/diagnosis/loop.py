@@ -255,7 +255,7 @@ def extension(
     ]
     if decision.verdict == "unknown" and not is_large(base.candidate.fit):
         learned = naming.residual.get(frozenset())
-        if learned is None:
+        if learned is None or naming.unknown is not base.unknown:  # a force in contact alone
             say("learning the force")
             learned = with_force(base.candidate, naming.unknown, scales)
         choices.append((learned, base))
