@@ -20,7 +20,6 @@ from bayesimpact.inference.fit import (
     grams,
     inverse,
     likelihood_information,
-    prior_information,
 )
 from bayesimpact.model.effects.effect import Scales
 from bayesimpact.model.parameters import SLOTS
@@ -124,7 +123,7 @@ def projected(fit: Fit, blocks: Sequence[Blocks]) -> tuple[Array, Array]:
     count, own = blocks[0].score.shape
     width = own * len(blocks)
     sigma = sigma_of(fit)
-    matrix = np.diag(prior_information(fit.target.priors, fit.mode))
+    matrix = np.diag(fit.target.priors.information(fit.mode))
     noise = fit.target.oscillator.layout.roles("noise")
     matrix[noise, noise] = 0.0
     parts = fit.linearisation

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.diagnosis.directions import sigma_of
-from bayesimpact.inference.fit import Fit, inverse, prior_information
+from bayesimpact.inference.fit import Fit, inverse
 
 Array = NDArray[np.float64]
 
@@ -70,7 +70,7 @@ def project(fit: Fit, parts: Sequence[Array]) -> Projection:
         (lin.jacobian / s, lin.residual / s, lin.columns, part)
         for lin, s, part in zip(fit.linearisation, sigma, parts, strict=True)
     ]
-    curvature = prior_information(fit.target.priors, fit.mode)
+    curvature = fit.target.priors.information(fit.mode)
     noise = fit.target.oscillator.layout.roles("noise")
     curvature[noise] = 0.0
     matrix = np.diag(curvature)

@@ -19,7 +19,7 @@ from bayesimpact.diagnosis.extend import (
 from bayesimpact.diagnosis.scores import Score
 from bayesimpact.diagnosis.thresholds import LARGE
 from bayesimpact.inference.climb import Climb
-from bayesimpact.inference.fit import Fit, Target, inverse, prior_information
+from bayesimpact.inference.fit import Fit, Target, inverse
 from bayesimpact.inference.horizon import growing_horizon
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.model.effects.effect import Effect, Scales
@@ -190,7 +190,7 @@ def tempered_evidence(candidate: Candidate, repetition: float) -> float:
     if repetition <= 1.0 or not np.isfinite(candidate.log_evidence):
         return candidate.log_evidence
     lost = (1.0 - 1.0 / repetition) * fit.log_likelihood
-    known = prior_information(fit.target.priors, fit.mode)
+    known = fit.target.priors.information(fit.mode)
     noise = fit.target.oscillator.layout.roles("noise")
     moving = np.setdiff1d(np.arange(fit.mode.size), noise)
     scale = fit.sd[moving]

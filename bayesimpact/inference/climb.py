@@ -16,7 +16,6 @@ from bayesimpact.inference.fit import (
     likelihood_gradient,
     likelihood_information,
     marginal_sd,
-    prior_information,
 )
 from bayesimpact.inference.likelihood import Linearisation
 
@@ -108,7 +107,7 @@ class Climb:
         sigma = theta[likelihood.sigma_columns]
         matrix = likelihood_information(parts, self.products, sigma, theta.size)
         vector = likelihood_gradient(parts, sigma, theta.size) + priors.gradient(theta)
-        known = prior_information(priors, theta)
+        known = priors.information(theta)
         known[self.noise] = 0.0
         matrix += np.diag(known)
         if self.steps is not None and not self.stale and np.isfinite(matrix).all():

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.inference.likelihood import Likelihood, Linearisation
-from bayesimpact.inference.prior import Cauchy, HalfCauchy, LogNormal, Prior
+from bayesimpact.inference.prior import Prior
 from bayesimpact.inference.priors import Priors
 from bayesimpact.model.oscillator import Oscillator
 
@@ -146,28 +146,6 @@ def likelihood_gradient(linearisation: Sequence[Linearisation], sigma: Array, si
     for part, level in zip(linearisation, sigma, strict=True):
         vector[part.columns] += part.jacobian.T @ part.residual / level**2
     return vector
-
-
-def prior_information(priors: Priors, theta: Array) -> Array:
-    """What the priors add to the information at theta (d,): inverse variances (d,), never negative.
-
-    Minus the curvature of the log density, but for three kinds. A flat prior counts with its
-    variance: next to what the recordings say it is nothing, and where they say nothing (an obstacle
-    that was never touched) it keeps steps and covariances finite. A log-normal one, whose density
-    is convex in its tail, counts as what it is in log x, a normal; a Cauchy one as the parabola
-    that touches it at theta and lies below it everywhere (de Leeuw and Lange 2009).
-    """
-    with np.errstate(divide="ignore"):
-        flat = 12.0 / (priors.upper - priors.lower) ** 2
-    information = np.maximum(np.nan_to_num(-priors.hessian(theta)), flat)
-    for i, prior in enumerate(priors.parameters):
-        if isinstance(prior, LogNormal):
-            with np.errstate(divide="ignore", over="ignore"):  # at 0, where its density is 0
-                information[i] = 1.0 / (prior.sigma * theta[i]) ** 2
-        elif isinstance(prior, Cauchy | HalfCauchy):
-            away = theta[i] - (prior.median if isinstance(prior, Cauchy) else 0.0)
-            information[i] = 2.0 / (prior.scale**2 + away**2)
-    return np.asarray(information)
 
 
 def inverse(matrix: Array) -> Array:

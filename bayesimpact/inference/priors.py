@@ -97,6 +97,15 @@ class Priors:
         columns = [p.curvature(theta[..., i]) for i, p in enumerate(self.parameters)]
         return np.stack(columns, axis=-1)
 
+    def information(self, theta: npt.ArrayLike) -> Array:
+        """What the priors add to the information at theta (d,): inverse variances, never negative.
+
+        See `Prior.information`; any leading shape as well.
+        """
+        theta = self._checked(theta)
+        columns = [p.information(theta[..., i]) for i, p in enumerate(self.parameters)]
+        return np.stack(columns, axis=-1)
+
     def ppf(self, q: npt.ArrayLike) -> Array:
         """Quantiles (B, d) at probabilities q (B, d), parameter by parameter."""
         q = self._checked(q)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign, Smoothing
 from bayesimpact.model import measurement
-from bayesimpact.model.effects.effect import Effect, law_row
+from bayesimpact.model.effects.effect import LAW_ROW, Effect, law_row
 from bayesimpact.model.motions import general_motions, motions
 from bayesimpact.model.parameters import BASE_SLOTS, SLOTS, Layout, build_layout, instance_name
 
@@ -66,13 +66,13 @@ class Oscillator:
 
     @cached_property
     def laws(self) -> NDArray[np.int64]:
-        """Table of force laws for the general simulator, (L, 8)."""
+        """Table of force laws for the general simulator, (L, LAW_ROW)."""
         rows, first = [], len(SLOTS)
         for effect in self.effects:
             if effect.law is not None:
                 rows.append(law_row(effect.law, first))
                 first += len(effect.parameters)
-        return np.array(rows, dtype=np.int64).reshape(-1, 8)
+        return np.array(rows, dtype=np.int64).reshape(-1, LAW_ROW)
 
     @cached_property
     def is_base(self) -> bool:

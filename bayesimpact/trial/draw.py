@@ -86,7 +86,11 @@ def _effects(settings: Settings, kind: str, turn: int, rng: Rng) -> tuple[str, .
     first = settings.effects[turn % len(settings.effects)]
     if kind == "single":
         return (first,)
-    partners = [e for e in settings.effects if e != first and _compatible(first, e)]
+    partners = [
+        e
+        for e in settings.effects
+        if e != first and _compatible(first, e) and _showing(settings, (first, e))
+    ]
     if not partners:
         raise InputError("trial, effects", first, "at least two effects that can stand together")
     return first, str(rng.choice(partners))
@@ -98,16 +102,20 @@ def _compatible(first: str, second: str) -> bool:
 
 
 def _possible(settings: Settings, ids: tuple[str, ...]) -> list[str]:
-    """Benches of the settings that can show all of these effects."""
+    """Benches of the settings that can show all of these effects; there must be one."""
+    fits = _showing(settings, ids)
+    if not fits:
+        raise InputError("trial, rig", ", ".join(settings.benches), f"a rig for {' + '.join(ids)}")
+    return fits
+
+
+def _showing(settings: Settings, ids: tuple[str, ...]) -> list[str]:
     sizes = {n: (BENCHES[n].cases, BENCHES[n].releases) for n in settings.benches}
-    fits = [
+    return [
         name
         for name, (cases, releases) in sizes.items()
         if all(plant_of(e).fits(cases, releases * max(cases, 1), BENCHES[name].angle) for e in ids)
     ]
-    if not fits:
-        raise InputError("trial, rig", ", ".join(settings.benches), f"a rig for {' + '.join(ids)}")
-    return fits
 
 
 def _noises(settings: Settings, ids: tuple[str, ...]) -> list[str]:

@@ -175,6 +175,17 @@ def test_an_effect_whose_place_another_can_take_beside_a_residual_force_is_not_n
         assert judge(replace(found, residual=residual)) == verdict
 
 
+def test_what_has_more_to_fit_with_must_be_likelier_to_unseat_an_effect():
+    """power_damping has two parameters where friction has one: with and without a force beside."""
+    for gain, verdict in ((100.1, "unknown"), (99.9, "partly")):
+        larger = candidate("power_damping", gain)
+        assert judge(remaining(something_left(), 100.0, 10.0, larger)) == verdict
+        behind = candidate("power_damping", 50.0)
+        found = remaining(something_left(), 100.0, 10.0, behind)
+        residual = {frozenset(["power_damping"]): replace(behind, log_evidence=1000.0 + gain)}
+        assert judge(replace(found, residual=residual)) == verdict
+
+
 def test_what_remains_beside_a_name_needs_decisive_odds():
     """The base model's alarm is one of p-values alone, whose rate is known."""
     for evidence, white in ((DECISIVE - 0.1, True), (DECISIVE + 0.1, False)):

@@ -29,7 +29,8 @@ class Table:
     `forward` has what a fit reaches from a smaller model, where that ends in a worse place than
     one from a larger model. `unfinished` has what is gained beyond where a climb gave up,
     `once` where a model's first fit ends. `force` is the evidence of a free force in place of all
-    effects, to which `beside` adds where there are effects that it may stand beside.
+    effects, to which `beside` adds where there are effects that it may stand beside. `chi2` is
+    that of every fit.
     """
 
     def __init__(
@@ -41,8 +42,9 @@ class Table:
         in_contact: float = 0.0,
         once: dict[str, float] | None = None,
         beside: float = 0.0,
+        chi2: float = 1.0,
     ) -> None:
-        self.beside = beside
+        self.beside, self.chi2 = beside, chi2
         self.once = {frozenset(k.split()): v for k, v in (once or {}).items()}
         self.in_contact = in_contact
         self.gains = {frozenset(): 0.0} | {frozenset(k.split()): v for k, v in gains.items()}
@@ -59,7 +61,7 @@ class Table:
 
     def candidate(self, ids, gain: float) -> Candidate:
         fit = SimpleNamespace(
-            reduced_chi2=1.0, log_likelihood=gain + 10, log_posterior=gain, rms=1.0,
+            reduced_chi2=self.chi2, log_likelihood=gain + 10, log_posterior=gain, rms=1.0,
             ids=tuple(ids), gain=gain,
             converged=frozenset(ids) not in self.unfinished,
         )  # fmt: skip
@@ -144,6 +146,15 @@ def chosen(naming) -> set[str]:
 def test_nothing_is_fitted_where_nothing_is_missing(run):
     table = Table({"": ENOUGH})
     assert chosen(run(table)) == set() and table.fitted == []
+
+
+def test_where_the_misfit_is_large_what_gains_most_per_effect_comes_first(run):
+    """Two damping laws gain more than the cubic spring, but less than twice as much."""
+    gains = {A: 10.0, B: 10.0, f"{A} {B}": 400.0, C: 390.0, f"{A} {C}": 440.0, f"{B} {C}": 440.0}
+    table = Table({**gains, f"{A} {B} {C}": ENOUGH}, chi2=100.0)
+    assert chosen(run(table)) == {A, B, C}
+    first_step = [{A, B}, *({e} for e in (A, B, C, D, S))]
+    assert next(ids for ids in table.fitted if ids not in first_step) in ({A, C}, {B, C})
 
 
 def test_the_best_single_effect_ends_the_search(run):

@@ -252,6 +252,9 @@ def _catalogued(id: str) -> Effect | None:
     return effect
 
 
+LAW_ROW = 8  # numbers in a law's row
+
+
 def law_row(law: Law, first: int) -> list[int]:
     """A law's row in the general simulator's table; its parameters begin at slot `first`."""
     functions = (law.force, law.rate, law.surface)
