@@ -175,7 +175,8 @@ class _Profile:
         self.guess = guess
         self.physical = layout.roles("physical")
         self.positive = np.array([layout.parameters[i].lower == 0.0 for i in self.physical])
-        motion = max(float(np.ptp(r.samples)) for r in oscillator.campaign.recordings)
+        rate = np.sqrt(guess[layout.index("k1")] / oscillator.campaign.mass)
+        motion = max(r.motion(rate) for r in oscillator.campaign.recordings)
         self.reach = np.maximum(np.abs(guess[self.physical]), 0.1 * motion)
         self.columns = np.ascontiguousarray(layout.columns[:, : len(BASE_SLOTS)])
         self.constants = np.ascontiguousarray(layout.constants[:, : len(BASE_SLOTS)])
@@ -226,7 +227,7 @@ class _Profile:
         s = self.short
         sums, _ = sums_of_squares(
             np.ascontiguousarray(theta), self.columns, self.constants, s.campaign.mass, s.samples,
-            s.starts, s.counts, s.intervals,
+            s.starts, s.counts, s.intervals, s.orders,
         )  # fmt: skip
         return np.asarray(sums.sum(axis=1))
 
@@ -234,7 +235,7 @@ class _Profile:
         s = self.short
         matrices, codes = grams(
             np.ascontiguousarray(theta), self.columns, self.constants, s.campaign.mass, s.samples,
-            s.starts, s.counts, s.intervals,
+            s.starts, s.counts, s.intervals, s.orders,
         )  # fmt: skip
         failed = (codes != 0) | ~np.isfinite(matrices).all(axis=(2, 3))
         matrices[failed] = np.eye(matrices.shape[-1]) * 1e300

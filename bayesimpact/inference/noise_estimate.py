@@ -24,6 +24,7 @@ from bayesimpact.data.gaps import runs
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 from bayesimpact.inference.noise import Noise
+from bayesimpact.response.displacement import displacement_of
 from bayesimpact.response.swings import rough_period
 
 Array = NDArray[np.float64]
@@ -104,7 +105,8 @@ def _rises(before: Noise, after: Noise) -> bool:
 
 def _remainder(recordings: Sequence[Recording], per_period: float) -> _Remainder | None:
     lengths = [
-        int(np.clip(rough_period(r.samples) / per_period, SMALLEST, LARGEST)) for r in recordings
+        int(np.clip(rough_period(r.samples, r.order) / per_period, SMALLEST, LARGEST))
+        for r in recordings
     ]
     length = min(lengths)
     powers = np.vander(np.linspace(-1, 1, length), DEGREE + 1)
@@ -121,10 +123,11 @@ def _remainder(recordings: Sequence[Recording], per_period: float) -> _Remainder
 
 def _windows(recording: Recording, length: int, side: bool) -> Array:
     """Windows (count, length) of a recording; with `side`, only those on a stop's free side."""
-    samples = recording.samples
-    settled = float(np.median(samples[-max(samples.size // 5, 1) :]))
-    centred = samples - settled
-    free = centred < -MARGIN * np.abs(centred).max() if side else np.ones(samples.size, dtype=bool)
+    centred = _centred(recording.samples)
+    free = np.ones(centred.size, dtype=bool)
+    if side:
+        moved = centred if recording.order == 0 else _centred(displacement_of(recording).samples)
+        free = moved < -MARGIN * np.abs(moved).max()
     if recording.used is not None:
         free = free & recording.used
     starts = [
@@ -133,6 +136,10 @@ def _windows(recording: Recording, length: int, side: bool) -> Array:
     ]
     first = np.concatenate([np.zeros(0, dtype=np.int64), *starts])
     return np.asarray(centred[first[:, None] + np.arange(length)])
+
+
+def _centred(samples: Array) -> Array:
+    return samples - float(np.median(samples[-max(samples.size // 5, 1) :]))
 
 
 def _restricted_ml(remainder: _Remainder) -> Noise:

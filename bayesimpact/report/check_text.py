@@ -25,7 +25,7 @@ def campaign_text(campaign: Campaign, noise: Noise | None) -> str:
 
     `noise` is what `measured_noise` found.
     """
-    angle = campaign.recordings[0].quantity == "angle"
+    angle = campaign.angular
     stop = f"stop, cases {', '.join(campaign.cases)}" if campaign.stop else "no stop"
     blocks = [
         f"{campaign.name}\n"
@@ -82,7 +82,7 @@ def _recording_warnings(recording: Recording) -> list[str]:
 
 
 def _recordings_block(campaign: Campaign) -> str:
-    angle = campaign.recordings[0].quantity == "angle"
+    angle = campaign.angular
     scale, unit = (180 / np.pi, "deg") if angle else (1e3, "mm")
     head = ["recording", "case", "samples", "Hz", "start s", "length s", "period s"]
     rows = [[*head, f"first {unit}", f"largest {unit}", "decay"]]
