@@ -10,7 +10,7 @@ search that failed shows.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from bayesimpact.inference.mode import find_mode
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.noise_estimate import estimate_noise
 from bayesimpact.inference.noise_refined import refined_noise
+from bayesimpact.inference.onsets import without_onsets
 from bayesimpact.inference.priors import Priors
 from bayesimpact.inference.search import Generation, SearchResult, metropolis_differential_evolution
 from bayesimpact.model.derivatives import grams
@@ -106,6 +107,12 @@ def identify(
         from_search = growing_horizon(target, start)
     ends = [fit for fit in (from_guess, from_search) if fit is not None]
     best = max(ends, key=lambda fit: fit.log_posterior)
+    if (smooth := without_onsets(best)) is not campaign:
+        oscillator = replace(oscillator, campaign=smooth)
+        target = Target(Likelihood(oscillator, noise), priors)
+        ends = [find_mode(target, fit.mode) for fit in ends]
+        from_guess, from_search = ends[0], ends[1] if search else None
+        best = max(ends, key=lambda fit: fit.log_posterior)
     refined = noise if given else refined_noise(best)
     if refined != noise:
         noise = refined

@@ -24,7 +24,7 @@ from bayesimpact.response.swings import HalfSwings, half_swings, rough_period
 
 Floats = NDArray[np.float64]
 
-AVERAGED = 9  # extremes of a velocity, flat as they are, over which one integral's drift is averaged
+AVERAGED = 9  # extremes of a velocity, flat as they are, that share one straight drift
 
 
 @dataclass(frozen=True, eq=False)
