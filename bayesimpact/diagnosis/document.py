@@ -51,7 +51,8 @@ def document(
     """
     d = diagnosis
     noise = d.identification.noise
-    angle = d.before.target.oscillator.campaign.angular
+    campaign = d.before.target.oscillator.campaign
+    angle, reading = campaign.angular, campaign.recordings[0]
     left = remainder(d.naming, d.after, d.remains)
     before = _parameters(d.before, intervals(d.before), draws_before)
     after = _parameters(d.after, d.intervals, draws_after if d.remains is None else None)
@@ -70,7 +71,7 @@ def document(
             alternatives,
             parameter_shifts(before, after) if d.verdict != "adequate" else {},
             _detectable(d),
-            remaining(left, angle=angle),
+            remaining(left, reading.unit),
             faults=in_words(faulty),
             angle=angle,
             drifts=d.naming.unknown.reach > 0,
@@ -100,6 +101,7 @@ def document(
         ],
         "evidence": _evidence(d),
         "certificate": None if certified is None else asdict(certified),
+        "reading": {"quantity": reading.quantity, "unit": reading.unit},
         "noise": {
             "sigma_m": noise.level,
             "correlation": "white" if noise.correlation == 0 else "ar1",

@@ -181,6 +181,8 @@ def recording_results(fit: Fit) -> tuple[RecordingResult, ...]:
                 samples=np.asarray(recording.samples),
                 excluded=() if recording.used is None else tuple(runs(~recording.used)),
                 predicted=np.asarray(predicted),
+                quantity=recording.quantity,
+                displacement=fit.displacements[r] if recording.order > 0 else np.zeros(0),
                 sigma=float(fit.mode[likelihood.sigma_columns[r]]),
                 noise_rms=_noise_rms(likelihood.noise, recording.interval),
                 reduced_chi2=float(fit.sums[r]) / likelihood.noise.level**2 / freedom,

@@ -15,10 +15,16 @@ from typing import Any
 
 import numpy as np
 
-from bayesimpact.report.cycles import before_predicted, stop_level, telling_cycle, touches
+from bayesimpact.report.cycles import (
+    before_predicted,
+    contacts,
+    stop_level,
+    telling_cycle,
+    touches,
+)
 from bayesimpact.report.figures.force_map import force_unit
 from bayesimpact.report.figures.recordings import shown_recordings
-from bayesimpact.report.figures.style import response
+from bayesimpact.report.figures.style import response, response_word
 from bayesimpact.report.force_in_time import force_in_time
 from bayesimpact.report.results import Array, Results
 from bayesimpact.report.rows import Z90
@@ -67,7 +73,7 @@ def explorer_data(results: Results) -> str:
     force = force_unit(results, results.diagnosis_arrays) if _has_force(results) else None
     residual = display(results.unit, max(results.rms, results.noise.level))
     content: dict[str, Any] = {
-        "word": "angle" if results.quantity == "angle" else "displacement",
+        "word": response_word(results),
         "unit": typeset(response(results).unit),
         "residualUnit": typeset(residual.unit),
         "forceUnit": "" if force is None else typeset(force.unit),
@@ -78,6 +84,7 @@ def explorer_data(results: Results) -> str:
     for r in shown:
         recording, size = results.recordings[r], min(results.recordings[r].samples.size, most)
         level = stop_level(results, recording)
+        motion, touched = contacts(results, recording)
         old = None if before is None else before[r]
         item: dict[str, Any] = {
             "name": recording.name,
@@ -85,7 +92,7 @@ def explorer_data(results: Results) -> str:
             "interval": recording.interval,
             "level": None if level is None else level * response(results).scale,
             "noise": _number(recording.noise_rms * residual.scale),
-            "impacts": [] if level is None else touches(recording, level).tolist(),
+            "impacts": [] if touched is None else touches(motion, touched).tolist(),
             "best": best.first if best is not None and best.recording == r else None,
             "samples": _floats(recording.samples[:size] * response(results).scale),
             "residuals": [

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
+
+from bayesimpact.data.quantity import Quantity, is_angular, unit_of
 
 Array = NDArray[np.float64]
 
@@ -32,6 +34,8 @@ class RecordingResult:
     reduced_chi2 : whitened misfit against the noise level estimated from the recordings alone
     whiteness_p : p-value that the whitened residual is white
     excluded : first and last-plus-one sample of every span that is set aside
+    quantity : what the probe reads
+    displacement : (n,) of the model from the true rest, m; empty where the readings tell it
     """
 
     name: str
@@ -45,6 +49,15 @@ class RecordingResult:
     reduced_chi2: float
     whiteness_p: float
     excluded: tuple[tuple[int, int], ...] = ()
+    quantity: str = "displacement"
+    displacement: Array = field(default_factory=lambda: np.zeros(0))
+
+    def motion(self, predicted: Array, offset: float) -> Array:
+        """Displacement (n,), m, of a model that reads `predicted` (n,), from the true rest.
+
+        Where the readings do not tell it that of the model at the mode.
+        """
+        return self.displacement if self.displacement.size else predicted - offset
 
     @property
     def times(self) -> Array:
@@ -292,7 +305,8 @@ class Results:
 
     Attributes
     ----------
-    name, mass, stop, quantity : of the campaign; mass in kg (kg m2 for angles)
+    name, mass, stop, quantity : of the campaign; mass in kg (kg m2 for angles), the first
+        recording's quantity
     recordings, rows : what was measured; what was found
     effects : added to the base oscillator
     noise, chain : of the measurement
@@ -350,8 +364,18 @@ class Results:
 
     @property
     def unit(self) -> str:
-        """SI unit of the recordings."""
-        return "m" if self.quantity == "displacement" else "rad"
+        """SI unit of the recordings (of the first, where they differ)."""
+        return unit_of(cast(Quantity, self.quantity))
+
+    @property
+    def length(self) -> str:
+        """SI unit of the displacement: "m", or "rad" for angles."""
+        return "rad" if self.angular else "m"
+
+    @property
+    def angular(self) -> bool:
+        """True when the motion is about an axis."""
+        return is_angular(cast(Quantity, self.quantity))
 
     @property
     def rms(self) -> float:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 
 from bayesimpact.data.period import rough_period
-from bayesimpact.report.cycles import stop_level
+from bayesimpact.report.cycles import contacts, stop_level
 from bayesimpact.report.figures.style import (
     GREY,
     MODEL,
@@ -135,12 +135,12 @@ def _release(recording: RecordingResult) -> float:
 
 def close_up(results: Results, recording: RecordingResult) -> tuple[float, float, str]:
     """Start and end of the close-up, s, and what it shows: the deepest impact, or first cycles."""
-    level, t = stop_level(results, recording), recording.times
-    deepest = int(np.argmax(recording.predicted))
-    if level is None or not recording.predicted[deepest] >= level:
+    (y, level), t = contacts(results, recording), recording.times
+    deepest = int(np.argmax(y))
+    if level is None or not y[deepest] >= level:
         close = min(float(t[-1]), _release(recording) + CLOSE_UP_CYCLES * _period(results))
         return max(0.0, close - CLOSE_UP_CYCLES * _period(results)), close, "first cycles"
-    free = np.flatnonzero(recording.predicted < level)
+    free = np.flatnonzero(y < level)
     first = int(np.max(free[free < deepest], initial=0))
     last = int(np.min(free[free > deepest], initial=t.size - 1))
     margin = max(CLOSE_UP_SAMPLES, round(CLOSE_UP_MARGIN * (last - first)))

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from bayesimpact.report.results import Results
-from bayesimpact.report.units import Display, decimals, display, number, readable, typeset
+from bayesimpact.report.units import Display, decimals, display, number, readable, reading, typeset
 
 Array = NDArray[np.float64]
 P = ParamSpec("P")
@@ -85,13 +85,23 @@ def new_figure(height: float, width: float = WIDTH) -> Figure:
 
 
 def response(results: Results) -> Display:
-    """How displacements (or angles) are shown: mm (or rad)."""
-    return Display(1.0, "rad") if results.quantity == "angle" else Display(1e3, "mm")
+    """How readings are shown: mm, mm/s, m/s2, or what belongs to an angle in rad."""
+    return reading(results.quantity, results.unit)
+
+
+def position(results: Results) -> Display:
+    """How displacements (or angles) are shown, whatever the probe reads: mm (or rad)."""
+    return Display(1.0, "rad") if results.angular else Display(1e3, "mm")
 
 
 def response_word(results: Results) -> str:
     """What was recorded, for an axis."""
-    return "angle" if results.quantity == "angle" else "displacement"
+    return results.quantity.replace("_", " ")
+
+
+def position_word(results: Results) -> str:
+    """Where the mass is, for an axis."""
+    return "angle" if results.angular else "displacement"
 
 
 def label(words: str, unit: str) -> str:
