@@ -14,6 +14,8 @@ from bayesimpact.response import local
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
+ALIKE = 0.2  # of the power of the strongest line
+
 
 @dataclass(frozen=True, eq=False)
 class HalfSwings:
@@ -57,9 +59,15 @@ def rough_period(samples: Floats, order: int = 0) -> float:
     # but white noise would count more than the motion, so its floor goes first.
     floor = float(np.median(power[power.size // 2 :]))
     power = np.maximum(power - 30 * floor, 0.0)
-    power[1:] *= np.arange(1, power.size) ** (2.0 - 2.0 * order)
     lowest = max(1, int(1.2 * points / active.size))
-    peak = lowest + int(np.argmax(power[lowest:]))
+    if order < 2:
+        power[1:] *= np.arange(1, power.size) ** (2.0 - 2.0 * order)
+        peak = lowest + int(np.argmax(power[lowest:]))
+        return points / peak
+    # Short contacts give an acceleration's harmonics the size of its first line, and to weigh them
+    # less would weigh the drift of the probe more: so the lowest line of those alike.
+    strong = lowest + int(np.argmax(power[lowest:] >= ALIKE * power[lowest:].max()))
+    peak = strong + int(np.argmax(power[strong : int(1.3 * strong) + 2]))
     return points / peak
 
 
