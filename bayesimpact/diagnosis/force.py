@@ -267,7 +267,8 @@ def whitened_one(fit: Fit, r: int, values: Array, sigma: Array) -> Array:
     oscillator, noise = fit.target.oscillator, fit.target.likelihood.noise
     recording = oscillator.campaign.recordings[r]
     filtered = smooth(values, oscillator.smoothing, recording.interval)
-    return np.asarray(noise.whiten(filtered, recording.interval, recording.used) / sigma[r])
+    white = noise.whiten(filtered, recording.interval, recording.used, recording.order)
+    return np.asarray(white / sigma[r])
 
 
 def _with_law(oscillator: Oscillator, effect: Effect) -> NDArray[np.int64]:

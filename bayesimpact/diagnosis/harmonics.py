@@ -83,7 +83,7 @@ def line_blocks(fit: Fit, r: int, grid: Array) -> Blocks:
     step = 2 * np.pi * interval * (grid[1] - grid[0])
     first = 2 * np.pi * interval * grid[0]
     sums = czt(stacked, grid.size, np.exp(-1j * step), np.exp(1j * first), axis=-1)
-    lift = _whitening_gain(fit, grid, interval) / sigma
+    lift = _whitening_gain(fit, grid, interval) / (sigma * fit.target.likelihood.scales[r])
     sums = sums * np.exp(-2j * np.pi * grid * start)
     pairs = np.stack([-sums.imag, sums.real], axis=-1) * lift[:, None]  # (1 + k, F, 2)
     n = stacked.shape[-1]
@@ -110,7 +110,8 @@ def force_responses(fit: Fit, r: int, grid: Array, scales: Scales) -> Array:
     oscillator, sigma = fit.target.oscillator, sigma_of(fit)
     slots = oscillator.layout.slots(fit.mode)[r]
     rate = np.sqrt(scales.stiffness / scales.mass)
-    size = 1e-3 * float(sigma[r] / rate ** oscillator.orders[r]) * scales.stiffness
+    level = float(sigma[r] * fit.target.likelihood.scales[r])
+    size = float(1e-3 * level / rate ** int(oscillator.orders[r]) * scales.stiffness)
     q = np.tile(slots, (2 * grid.size + 1, 1))
     q[1:, _FORCE] = size
     q[1:, _OMEGA] = np.repeat(2 * np.pi * grid, 2)

@@ -139,9 +139,21 @@ class Fit:
 
     @property
     def rms(self) -> float:
-        """Root mean square residual over all samples that count, in the recordings' SI unit."""
+        """Root mean square residual over all samples that count, in the first recording's unit.
+
+        Residuals of other quantities count by their noise, as in the likelihood.
+        """
         count = sum(r.count for r in self.target.oscillator.campaign.recordings)
-        return float(np.sqrt(sum(float(np.sum(r**2)) for r in self.residuals) / count))
+        pairs = zip(self.residuals, self.target.likelihood.scales, strict=True)
+        return float(np.sqrt(sum(float(np.sum((r / s) ** 2)) for r, s in pairs) / count))
+
+    @property
+    def signal(self) -> float:
+        """The same of the readings about their means."""
+        recordings = self.target.oscillator.campaign.recordings
+        pairs = zip(recordings, self.target.likelihood.scales, strict=True)
+        centred = np.concatenate([(r.samples - r.samples.mean()) / s for r, s in pairs])
+        return float(np.sqrt(np.mean(centred**2)))
 
 
 def grams(linearisation: Sequence[Linearisation]) -> tuple[Array, ...]:

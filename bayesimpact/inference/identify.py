@@ -102,8 +102,9 @@ def identify(
     result = from_search = None
     if search:
         result, start = global_search(
-            oscillator, priors, guess, rng=rng, evaluations=evaluations, callback=callback
-        )
+            oscillator, priors, guess, rng=rng, evaluations=evaluations, callback=callback,
+            scales=target.likelihood.scales,
+        )  # fmt: skip
         from_search = growing_horizon(target, start)
     ends = [fit for fit in (from_guess, from_search) if fit is not None]
     best = max(ends, key=lambda fit: fit.log_posterior)
@@ -136,17 +137,19 @@ def global_search(
     factor: float = BOUND_FACTOR,
     evaluations: int | None = None,
     callback: Callable[[Generation], None] | None = None,
+    scales: Array | None = None,
 ) -> tuple[SearchResult, Array]:
     """Differential evolution on the physical parameters over the first cycles.
 
     Bounds are the guess divided and multiplied by `factor` (for the gap: the guess plus and minus
     `factor` times its size, at least a tenth of the motion), cut to the priors. Initial conditions
     and rest readings are not searched: for every candidate they take the values of two Gauss-Newton
-    steps. Returns the search and the full parameter vector (d,) of its winner.
+    steps. `scales` (R,) are the recordings' noise levels over that of the first one's quantity.
+    Returns the search and the full parameter vector (d,) of its winner.
     """
     k1 = float(guess[oscillator.layout.index("k1")])
     duration = SEARCH_CYCLES * 2 * np.pi / np.sqrt(k1 / oscillator.campaign.mass)
-    profile = _Profile(oscillator, guess, duration)
+    profile = _Profile(oscillator, guess, duration, scales)
     lower, upper = _within(priors, profile, guess, *profile.bounds(factor))
     result = metropolis_differential_evolution(
         profile,
@@ -175,8 +178,11 @@ def _within(
 class _Profile:
     """Profiled objective (N / 2) log S of the physical parameters, nuisances eliminated."""
 
-    def __init__(self, oscillator: Oscillator, guess: Array, duration: float) -> None:
+    def __init__(
+        self, oscillator: Oscillator, guess: Array, duration: float, scales: Array | None = None
+    ) -> None:
         layout = oscillator.layout
+        self.weights = 1.0 / (np.ones(oscillator.counts.size) if scales is None else scales) ** 2
         short = oscillator.campaign.truncated(duration).thinned(duration / SEARCH_SAMPLES)
         self.short = Oscillator(short, (), layout, None)
         self.guess = guess
@@ -236,7 +242,7 @@ class _Profile:
             np.ascontiguousarray(theta), self.columns, self.constants, s.campaign.mass, s.samples,
             s.starts, s.counts, s.intervals, s.orders,
         )  # fmt: skip
-        return np.asarray(sums.sum(axis=1))
+        return np.asarray((sums * self.weights).sum(axis=1))
 
     def _grams(self, theta: Array) -> Array:
         s = self.short
@@ -245,6 +251,7 @@ class _Profile:
             s.starts, s.counts, s.intervals, s.orders,
         )  # fmt: skip
         failed = (codes != 0) | ~np.isfinite(matrices).all(axis=(2, 3))
+        matrices *= self.weights[:, None, None]
         matrices[failed] = np.eye(matrices.shape[-1]) * 1e300
         return np.asarray(matrices)
 

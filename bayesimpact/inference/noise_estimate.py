@@ -18,7 +18,7 @@ from scipy import stats
 from scipy.linalg import null_space, toeplitz
 from scipy.optimize import minimize_scalar
 
-from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.campaign import Campaign, Smoothing
 from bayesimpact.data.faults.flat import reading_step
 from bayesimpact.data.gaps import runs
 from bayesimpact.data.recording import Recording
@@ -48,21 +48,35 @@ class _Remainder:
 
 
 def estimate_noise(campaign: Campaign) -> Noise:
-    """Level and AR(1) correlation of the raw noise, pooled over recordings.
+    """Level and AR(1) correlation of the raw noise, pooled over recordings of one quantity.
+
+    Where there are several quantities, the correlation is that of the first recording's.
 
     For recordings that were smoothed the remainders say what the filter left; the raw level is
     scaled up by the filter's power (see `smoothed_level`).
     """
     known, smoothing = campaign.measurement.noise, campaign.measurement.smoothing
-    if smoothing is not None:
-        from bayesimpact.inference.spectrum import smoothed_noise
-
-        noise = smoothed_noise(campaign.recordings, smoothing)
-    else:
-        noise = raw_noise(campaign.recordings)
+    orders = list(dict.fromkeys(r.order for r in campaign.recordings))
+    found = {
+        order: _of_one([r for r in campaign.recordings if r.order == order], smoothing)
+        for order in orders
+    }
+    noise = found[orders[0]]
+    if len(found) > 1:
+        first, second, third = (found.get(o, noise).level / noise.level for o in range(3))
+        return replace(noise, scales=(first, second, third))
     if known is None:
         return noise
     return Noise(noise.correlation, smoothing, known, 0.0, noise.correlation_error, "campaign.toml")
+
+
+def _of_one(recordings: Sequence[Recording], smoothing: Smoothing | None) -> Noise:
+    """Of recordings of one quantity, behind a filter or none."""
+    if smoothing is None:
+        return raw_noise(recordings)
+    from bayesimpact.inference.spectrum import smoothed_noise
+
+    return smoothed_noise(recordings, smoothing)
 
 
 def raw_noise(recordings: Sequence[Recording]) -> Noise:

@@ -84,7 +84,8 @@ def simulated(posterior: Posterior, r: int, count: int, rng: np.random.Generator
     likelihood = posterior.fit.target.likelihood
     noise, interval = likelihood.noise, float(likelihood.oscillator.intervals[r])
     motion = likelihood.oscillator.predict_recording(r, posterior.thinned(count, rng))
-    raw = [noise.coloured(rng, motion.shape[1], interval, noise.level) for _ in motion]
+    order = int(likelihood.oscillator.orders[r])
+    raw = [noise.coloured(rng, motion.shape[1], interval, noise.level, order) for _ in motion]
     return np.asarray(motion + smooth(np.array(raw), noise.smoothing, interval))
 
 

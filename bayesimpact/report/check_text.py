@@ -17,7 +17,10 @@ COLUMNS = 40
 
 def measured_noise(campaign: Campaign) -> Noise | None:
     """Noise as the recordings alone show it, whatever is stated; None where a filter hides it."""
-    return raw_noise(campaign.recordings) if campaign.measurement.smoothing is None else None
+    if campaign.measurement.smoothing is not None:
+        return None
+    first = campaign.recordings[0].quantity
+    return raw_noise([r for r in campaign.recordings if r.quantity == first])
 
 
 def campaign_text(campaign: Campaign, noise: Noise | None) -> str:

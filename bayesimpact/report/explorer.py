@@ -85,21 +85,28 @@ def explorer_data(results: Results) -> str:
         recording, size = results.recordings[r], min(results.recordings[r].samples.size, most)
         level = stop_level(results, recording)
         motion, touched = contacts(results, recording)
+        size_of = max(results.rms, results.noise.level) * recording.scale
+        unit = display(recording.unit, size_of)
         old = None if before is None else before[r]
         item: dict[str, Any] = {
             "name": recording.name,
             "case": recording.case,
             "interval": recording.interval,
-            "level": None if level is None else level * response(results).scale,
-            "noise": _number(recording.noise_rms * residual.scale),
+            "level": None if level is None else level * response(results, recording).scale,
+            "noise": _number(recording.noise_rms * unit.scale),
+            "words": [
+                response_word(results, recording),
+                typeset(response(results, recording).unit),
+                typeset(unit.unit),
+            ],
             "impacts": [] if touched is None else touches(motion, touched).tolist(),
             "best": best.first if best is not None and best.recording == r else None,
-            "samples": _floats(recording.samples[:size] * response(results).scale),
+            "samples": _floats(recording.samples[:size] * response(results, recording).scale),
             "residuals": [
-                _integers((recording.samples - model)[:size] * residual.scale)
+                _integers((recording.samples - model)[:size] * unit.scale)
                 for model in ([recording.predicted] if old is None else [old, recording.predicted])
             ],
-            "toUnit": response(results).scale / residual.scale,
+            "toUnit": response(results, recording).scale / unit.scale,
         }
         found = force_in_time(results, r, recording.predicted if old is None else old)
         if found is not None and force is not None:

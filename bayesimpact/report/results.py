@@ -36,6 +36,7 @@ class RecordingResult:
     excluded : first and last-plus-one sample of every span that is set aside
     quantity : what the probe reads
     displacement : (n,) of the model from the true rest, m; empty where the readings tell it
+    scale : of its noise, over that of the first recording's quantity
     """
 
     name: str
@@ -51,6 +52,7 @@ class RecordingResult:
     excluded: tuple[tuple[int, int], ...] = ()
     quantity: str = "displacement"
     displacement: Array = field(default_factory=lambda: np.zeros(0))
+    scale: float = 1.0
 
     def motion(self, predicted: Array, offset: float) -> Array:
         """Displacement (n,), m, of a model that reads `predicted` (n,), from the true rest.
@@ -58,6 +60,11 @@ class RecordingResult:
         Where the readings do not tell it that of the model at the mode.
         """
         return self.displacement if self.displacement.size else predicted - offset
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the readings."""
+        return unit_of(cast(Quantity, self.quantity))
 
     @property
     def times(self) -> Array:
@@ -379,14 +386,15 @@ class Results:
 
     @property
     def rms(self) -> float:
-        """Root mean square residual over all samples, m (or rad)."""
+        """Root mean square residual over all samples, in `unit`; others count by their noise."""
         count = sum(r.count for r in self.recordings)
-        return float(np.sqrt(sum(np.sum(r.residual**2) for r in self.recordings) / count))
+        left = sum(np.sum((r.residual / r.scale) ** 2) for r in self.recordings)
+        return float(np.sqrt(left / count))
 
     @property
     def share(self) -> float:
         """Root mean square residual over that of the signals about their means."""
-        signal = np.concatenate([r.samples - r.samples.mean() for r in self.recordings])
+        signal = np.concatenate([(r.samples - r.samples.mean()) / r.scale for r in self.recordings])
         return self.rms / float(np.sqrt(np.mean(signal**2)))
 
     @property

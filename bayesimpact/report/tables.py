@@ -125,10 +125,10 @@ def deviation(row: Row, value: float) -> str:
 
 def recording_views(results: Results) -> list[dict[str, str]]:
     """Rows of the table of recordings."""
-    scale = reading(results.quantity, results.unit).scale
     rows = []
     for r in results.recordings:
-        shown = display(results.unit, max(results.rms, results.noise.level))
+        shown = display(r.unit, max(results.rms, results.noise.level) * r.scale)
+        scale = reading(r.quantity, r.unit).scale
         rows.append(
             {
                 "name": r.name,

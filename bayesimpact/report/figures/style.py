@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from bayesimpact.report.results import Results
+from bayesimpact.report.results import RecordingResult, Results
 from bayesimpact.report.units import Display, decimals, display, number, readable, reading, typeset
 
 Array = NDArray[np.float64]
@@ -84,9 +84,10 @@ def new_figure(height: float, width: float = WIDTH) -> Figure:
     return Figure(figsize=(width, height), layout="constrained", dpi=150)
 
 
-def response(results: Results) -> Display:
-    """How readings are shown: mm, mm/s, m/s2, or what belongs to an angle in rad."""
-    return reading(results.quantity, results.unit)
+def response(results: Results, recording: RecordingResult | None = None) -> Display:
+    """How the readings of a recording, or of the first, are shown: mm, mm/s, else in SI."""
+    one = recording or results.recordings[0]
+    return reading(one.quantity, one.unit)
 
 
 def position(results: Results) -> Display:
@@ -94,9 +95,9 @@ def position(results: Results) -> Display:
     return Display(1.0, "rad") if results.angular else Display(1e3, "mm")
 
 
-def response_word(results: Results) -> str:
+def response_word(results: Results, recording: RecordingResult | None = None) -> str:
     """What was recorded, for an axis."""
-    return results.quantity.replace("_", " ")
+    return (recording or results.recordings[0]).quantity.replace("_", " ")
 
 
 def position_word(results: Results) -> str:
