@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.data.hum import find_hum
 from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.directions import is_periodic
 from bayesimpact.inference.fit import Fit
@@ -39,8 +40,15 @@ def _lines(fit: Fit) -> list[tuple[Effect, float]]:
 
 
 def _spectrum(recording: Recording) -> Array:
-    """Amplitudes at multiples of the reciprocal of the duration, but for the mean."""
-    return np.abs(np.fft.rfft(recording.samples - recording.samples.mean()))
+    """Amplitudes at multiples of the reciprocal of the duration, but for the mean.
+
+    Without a steady line above the motion's band: that is no motion.
+    """
+    samples = recording.samples
+    hum = find_hum(samples, recording.interval)
+    if hum is not None:
+        samples = samples - hum.readings(recording.times)
+    return np.abs(np.fft.rfft(samples - samples.mean()))
 
 
 def _swings(recording: Recording, frequency: float) -> bool:
