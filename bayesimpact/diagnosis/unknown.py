@@ -9,8 +9,8 @@ from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.extend import difference_steps, extend, transfer
 from bayesimpact.diagnosis.force import MissingForce, refinement
 from bayesimpact.diagnosis.learned import LEARNED, knots_of, refined_force
+from bayesimpact.diagnosis.naming import leaves_something
 from bayesimpact.diagnosis.refit import ITERATIONS, TOLERANCE, Candidate, best_start
-from bayesimpact.diagnosis.thresholds import DOUBT
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.model.effects.effect import Effect, Scales
@@ -65,12 +65,6 @@ def finer_factors(effect: Effect) -> list[int]:
     knots = knots_of(effect)
     own = knots.count - 3
     return [n // own for n in INTERVALS if knots.reach == 0.0 and n > own and n % own == 0]
-
-
-def leaves_something(fit: Fit) -> bool:
-    """Whether a residual is above the noise by more than the estimate of the noise is uncertain."""
-    error = fit.target.likelihood.noise.level_error
-    return fit.reduced_chi2 > 1.0 + 2 * DOUBT * (error if np.isfinite(error) else 0.0)
 
 
 def _refined(before: Fit, found: Fit, factor: int, scales: Scales) -> Fit:

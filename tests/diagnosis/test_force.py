@@ -31,14 +31,13 @@ from bayesimpact.diagnosis.learned import (
     refined_force,
     spline_basis,
 )
-from bayesimpact.diagnosis.naming import State
+from bayesimpact.diagnosis.naming import State, leaves_something
 from bayesimpact.diagnosis.refit import base_candidate
 from bayesimpact.diagnosis.scan import scan
 from bayesimpact.diagnosis.unknown import (
     coefficient_names,
     finer_factors,
     learn_force,
-    leaves_something,
     with_force,
 )
 from bayesimpact.inference.fit import Fit, Target
