@@ -109,14 +109,15 @@ def diagnose(
     ----------
     campaign : of `bi.load`
     seed, rng : randomness; see the module
-    effects : the catalogue to choose from; None takes all of `bi.EFFECTS`
+    effects : the catalogue to choose from; None: what the command searches, `bi.EFFECTS` but for
+        those that have to be asked for
     search : False leaves the global search for the base model's mode out
     progress : called with every step in words
     """
     from bayesimpact.diagnosis import loop
-    from bayesimpact.model.effects import EFFECTS
+    from bayesimpact.model.effects import SEARCHED
 
-    chosen = EFFECTS if effects is None else tuple(effects)
+    chosen = SEARCHED if effects is None else tuple(effects)
     return loop.diagnose(
         campaign, rng=generator(seed, rng), effects=chosen, search=search, progress=progress
     )
