@@ -45,6 +45,15 @@ def fleet(
     between sessions or go with a condition, the population that the campaigns come from, and those
     whose physics is not that of the others. A run that was interrupted goes on; a campaign that
     fails never stops the rest.
+
+    \b
+    name = "rig over the summer"
+    command = "diagnose"             # or "fit", "sample"
+    quick = true                     # diagnose without sampling
+    [[campaign]]                     # one or more
+    folder = "may_1"                 # relative to this file
+    date = 2026-05-01
+    temperature_c = 21.5             # any further number or text is a condition
     """
     one_thread_each()
     from bayesimpact.fleet.plan import load_plan

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -69,5 +70,8 @@ def series_figure(panels: Sequence[Panel]) -> Figure:
         axis.set_ylabel(shown.label)
         axis.set_xlabel("" if panel.is_date else label(panel.along.replace("_", " "), ""))
         axis.grid(axis="y")
-        axis.tick_params(axis="x", rotation=20 if panel.is_date else 0)
+        if panel.is_date:
+            ticks = AutoDateLocator(minticks=3, maxticks=6)
+            axis.xaxis.set_major_locator(ticks)
+            axis.xaxis.set_major_formatter(ConciseDateFormatter(ticks))
     return figure
