@@ -59,7 +59,9 @@ def test_data_are_those_of_the_recordings() -> None:
             assert np.max(np.abs(integers(packed) - 1e6 * (r.samples - model))) < 40 / 32767
         assert item["level"] == pytest.approx(1.1095)
         assert item["impacts"] == touches(r.predicted, 1.1095e-3).tolist()
-    assert content["recordings"][0]["best"] == touches(results.recordings[0].predicted, 1.1095e-3)[2]
+    assert (
+        content["recordings"][0]["best"] == touches(results.recordings[0].predicted, 1.1095e-3)[2]
+    )
     assert content["first"] == 0 and "<" not in explorer_data(results)
 
 
