@@ -36,6 +36,7 @@ class Naive:
         self.one_sided = bool({"contact_no_tension", "obstacle_mass"} & set(self.effects))
         self.friction = self.number("coulomb_friction", "force")
         self.t, self.slide = 0.0, np.sign(self.v0)
+        self.beyond = self.y0 < -self.number("spring_piecewise", "gap", np.inf)
         # y, v, relaxation, then displacement and velocity of second mode, obstacle, frame
         self.state = [self.y0, self.v0, *[0.0] * 7]
         self.ratio = self.number("base_motion", "mass_ratio")
@@ -78,6 +79,9 @@ class Naive:
         force += p("structural_damping", "loss") * self.k1 * abs(y) * self.slide
         if y < -p("opposite_stop", "gap", np.inf):
             force += p("opposite_stop", "stiffness") * (y + p("opposite_stop", "gap"))
+        if self.beyond:
+            force += p("spring_piecewise", "stiffness") * (y + p("spring_piecewise", "gap"))
+            force += p("spring_piecewise", "damping") * v
         return force
 
     def mode_of(self, effect: str) -> tuple[float, float]:
@@ -145,6 +149,7 @@ class Naive:
             found["release"] = (self.reaction, -1.0)
         for effect, name, scale in (
             ("opposite_stop", "gap", -1.0),
+            ("spring_piecewise", "gap", -1.0),
             ("contact_second_stage", "depth", 1.0),
             ("structural_damping", "", -1.0),
         ):
@@ -218,6 +223,8 @@ class Naive:
             lost = mass * (before - self.state[1])
             self.state[4] += self.number("second_mode", "gain") * lost
             self.state[8] += self.ratio * lost / self.mass
+        elif name == "spring_piecewise":
+            self.beyond = not self.beyond
         elif name == "gap" and self.mode == RELEASED:
             self.mode = FREE
         elif name in ("gap", "release"):

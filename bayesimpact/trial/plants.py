@@ -186,6 +186,18 @@ def _opposite_stop(design: Design, rng: Rng) -> Form:
     return Form(lambda size: {"stiffness": size, "gap": gap}, 1e-4 * k1, largest=5 * k1)
 
 
+def _spring_piecewise(design: Design, rng: Rng) -> Form:
+    """The damper takes a good share of what the spring stores."""
+    gap = design.amplitude * rng.uniform(0.4, 0.8)
+    time = log_uniform(rng, (0.1, 0.5)) / design.omega
+    k1 = design.rig.k1
+
+    def build(size: float) -> Parameters:
+        return {"stiffness": size, "gap": gap, "damping": time * size}
+
+    return Form(build, 1e-4 * k1, largest=5 * k1)
+
+
 def _power_damping(design: Design, rng: Rng) -> Form:
     """An exponent that none of the simpler laws has."""
     exponent = float(
@@ -254,6 +266,7 @@ CATALOGUE_PLANTS: Mapping[str, Plant] = {
     ),
     "harmonic_forcing": Plant(("everywhere", "free"), _forcing),
     "opposite_stop": Plant(("free",), _opposite_stop, obstacles=1),
+    "spring_piecewise": Plant(("free",), _spring_piecewise, obstacles=1),
     "sensor_drift": Plant(
         ("measurement",), _one("rate", lambda d: 0.3 * d.amplitude / d.duration, signed=True)
     ),

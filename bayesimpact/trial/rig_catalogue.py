@@ -176,6 +176,18 @@ def _opposite_stop(site: Site, p: Numbers, slot: int) -> Part:
     return Part(law, kinks=(place,))
 
 
+def _spring_piecewise(site: Site, p: Numbers, slot: int) -> Part:
+    """Kp (y + gp) + cp v when y < -gp."""
+    kp, place, cp = p["stiffness"], -p["gap"], p["damping"]
+
+    def law(piece: Piece) -> Law | None:
+        if piece.above(place):
+            return None
+        return lambda t, y, v, state: kp * (y - place) + cp * v
+
+    return Part(law, kinks=(place,))
+
+
 def _pendulum(site: Site, p: Numbers, slot: int) -> Part:
     """What K sin y adds to K y; K is k1 for a plain pendulum."""
     weight = p.get("stiffness", site.k1)
@@ -261,6 +273,7 @@ CATALOGUE: Mapping[str, Planted] = {
         ("amplitude", "frequency"), per_recording=("phase",), part=_forcing
     ),
     "opposite_stop": Planted(("stiffness", "gap"), part=_opposite_stop),
+    "spring_piecewise": Planted(("stiffness", "gap", "damping"), part=_spring_piecewise),
     "sensor_drift": Planted(("rate",), probe=lambda probe, p: replace(probe, drift=p["rate"])),
     "sensor_quadratic": Planted(
         ("gain",), probe=lambda probe, p: replace(probe, quadratic=p["gain"])

@@ -12,6 +12,7 @@ import numpy as np
 KINKS = (
     ("contact_second_stage", "depth", 1),
     ("opposite_stop", "gap", -1),
+    ("spring_piecewise", "gap", -1),
     ("friction_pad", "low", 1),
     ("friction_pad", "high", 1),
     ("eddy_brake", "low", 1),
@@ -63,6 +64,9 @@ def free_forces(e, rig, t, y, v, s):
     if "opposite_stop" in e:
         p = e["opposite_stop"]
         total += p["stiffness"] * min(y + p["gap"], 0.0)
+    if "spring_piecewise" in e and s["from"] <= -e["spring_piecewise"]["gap"]:
+        p = e["spring_piecewise"]
+        total += p["stiffness"] * (y + p["gap"]) + p["damping"] * v
     if "pendulum_sine" in e:
         total += e["pendulum_sine"].get("stiffness", rig.k1) * (sin(y) - y)
     if "pendulum_with_spring" in e:

@@ -27,6 +27,7 @@ from bayesimpact.model.added.world import (
     CONTACT_ONLY,
     FRICTION,
     GAP_STEP,
+    JUMP_AT_SURFACE,
     JUMP_AT_TURN,
     K1,
     K2,
@@ -170,8 +171,22 @@ def point_laws(direction: Any, w: Any) -> Any:
     """Tell the laws whose force jumps at a turning point which way the motion goes."""
     for law in range(w.size):
         if w.laws[LAW_COLUMNS * law + LAW_FLAGS] & JUMP_AT_TURN != 0:
-            at = WORK_COLUMNS * law
-            w.work[at + NOW] = w.work[at + STAGE] = w.work[at + AHEAD] = direction
+            tell(law, direction, w)
+
+
+@inner()
+def tell(law: Any, branch: Any, w: Any) -> Any:
+    """Set the state of a law that has no rate: the branch of its force that holds now."""
+    at = WORK_COLUMNS * law
+    w.work[at + NOW] = w.work[at + STAGE] = w.work[at + AHEAD] = branch
+
+
+@inner()
+def set_side(law: Any, side: Any, w: Any) -> Any:
+    """Side of a law's surface; a law whose force jumps there is told."""
+    w.s[SIDES + law] = side
+    if w.laws[LAW_COLUMNS * law + LAW_FLAGS] & JUMP_AT_SURFACE != 0:
+        tell(law, side, w)
 
 
 @inner()
@@ -211,7 +226,7 @@ def set_sides(y: Any, v: Any, t: Any, w: Any) -> Any:
     for law in range(w.size):
         if w.laws[LAW_COLUMNS * law + LAW_SURFACE] != 0:
             side = np.sign(surface_value(law, y, v, t, NOW, w))
-            w.s[SIDES + law] = side if side != 0.0 else 1.0
+            set_side(law, side if side != 0.0 else 1.0, w)
 
 
 @inner()
@@ -238,7 +253,7 @@ def resolve(event: Any, y: Any, v: Any, t: Any, w: Any) -> Any:
         if q[FRICTION] > 0.0:
             set_sliding(y, t, w)
     else:
-        s[SIDES + event - SURFACE] *= -1.0
+        set_side(event - SURFACE, -s[SIDES + event - SURFACE], w)
     return y, v
 
 

@@ -19,7 +19,7 @@ FRAME_RATIO, FRAME_FREQUENCY, FRAME_DAMPING = range(21, 24)
 LAW_FORCE, LAW_RATE, LAW_SURFACE, LAW_FLAGS = range(4)
 LAW_FIRST, LAW_PACE, LAW_GRAIN, LAW_TURN, LAW_COLUMNS = range(4, 9)
 CONTACT_ONLY, KINK_AT_TURN, ROUGH_AT_TOUCH, POLYNOMIAL, PLACED = 1, 2, 4, 8, 16
-JUMP_AT_TURN = 32
+JUMP_AT_TURN, JUMP_AT_SURFACE = 32, 64
 # columns of the work array, one row per law and two per body of `resonator`: a law's state at the
 # start of a step, at a stage and at the end; the kicks of six stages; exp(-lambda h / 4), lambda,
 # alpha, x_u, x_v

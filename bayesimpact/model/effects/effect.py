@@ -142,7 +142,8 @@ class Law:
     where : evaluated everywhere or in contact only
     rate : time derivative of the state z (a law with memory), or None
     surface : a smooth function of y or d whose zero is a kink of the force; steps end on it. (A
-        force may jump at the touch, being evaluated in contact only; other jumps cost accuracy.)
+        force may jump at the touch, being evaluated in contact only, and where a flag below says
+        so; other jumps cost accuracy.)
     pace : fastest rate at which the force depends on time explicitly, rad/s; steps resolve it
     kink_at_turn : the force has a kink at v = 0; steps end on turning points
     rough_at_touch : the force is continuous but not smooth at d = 0; steps begin small there
@@ -150,6 +151,7 @@ class Law:
         is continuous but not smooth at v = 0 (a root of the speed); steps end there
     jump_at_turn : the force jumps at v = 0; steps end on turning points, and z, of which the
         law then has no use of its own, is the direction of the motion: -1, 1, or 0 at rest
+    jump_at_surface : the force jumps at its surface; z is the side: the sign of `surface`
     polynomial : between its kinks the force is a polynomial of low degree of y and v, and of sines
         of time no faster than `pace`: it has no features that a look at four points of a swing
         misses, so steps may be longer where it is weak
@@ -171,6 +173,7 @@ class Law:
     kink_at_turn: bool = False
     rough_at_touch: bool = False
     jump_at_turn: bool = False
+    jump_at_surface: bool = False
     polynomial: bool = False
     ignores_speed: bool = False
 
@@ -260,7 +263,7 @@ def law_row(law: Law, first: int) -> list[int]:
     functions = (law.force, law.rate, law.surface)
     flags = (law.where == "contact") + 2 * law.kink_at_turn + 4 * law.rough_at_touch
     flags += 8 * law.polynomial + 16 * law.ignores_speed
-    flags += 32 * law.jump_at_turn
+    flags += 32 * law.jump_at_turn + 64 * law.jump_at_surface
     force, rate, surface = (address(f) if f else 0 for f in functions)
     extents = (law.pace, law.grain, law.first_at_turn)
     return [force, rate, surface, flags, first, *(address(f) if f else 0 for f in extents)]

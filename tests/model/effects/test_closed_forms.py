@@ -225,3 +225,24 @@ def test_gap_wear_is_a_new_gap_after_every_contact():
     second = contacts[3] - start
     assert np.abs(y[start : start + second] - base[start : start + second]).max() > 1e-5
     np.testing.assert_allclose(y[start : start + second], again[:second], rtol=0, atol=1e-12)
+
+
+def test_beyond_the_clearance_both_springs_and_dampers_act():
+    """Released there, the mass is a linear oscillator until the clearance ends: its matrix."""
+    rig = changed(FREE, c1=0.2, rate=20000.0, duration=0.06)
+    kp, gp, cp = 600.0, 2.5e-3, 3.0
+    y = one("spring_piecewise", rig, stiffness=kp, gap=gp, damping=cp)
+    rest = -kp * gp / (rig.k1 + kp)
+    A = np.array([[0.0, 1.0], [-(rig.k1 + kp) / rig.mass, -(rig.c1 + cp) / rig.mass]])
+    times = np.arange(rig.count) / rig.rate
+    start = np.array([rig.y0[0] - rest, 0.0])
+    inside = np.array([rest + (expm(A * t) @ start)[0] for t in times])
+    leaves = int(np.argmax(inside > -gp))
+    assert 100 < leaves < rig.count - 100
+    np.testing.assert_allclose(y[:leaves], inside[:leaves], rtol=0, atol=1e-12)
+    # in the clearance only the suspension is left, from the speed that the damper left over
+    at = brentq(lambda t: rest + (expm(A * t) @ start)[0] + gp, times[leaves - 1], times[leaves])
+    B = np.array([[0.0, 1.0], [-rig.k1 / rig.mass, -rig.c1 / rig.mass]])
+    speed = (expm(A * at) @ start)[1]
+    after = [(expm(B * (t - at)) @ [-gp, speed])[0] for t in times[leaves:]]
+    np.testing.assert_allclose(y[leaves:], after, rtol=0, atol=1e-12)
