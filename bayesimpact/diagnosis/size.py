@@ -103,12 +103,10 @@ def peak_force(effect: Effect, fit: Fit, points: int = 2000) -> float:
     slots = fit.target.oscillator.layout.slots(fit.mode)
     largest = 0.0
     for r, (y, v) in enumerate(trajectory_points(fit)):
-        interval = fit.target.oscillator.campaign.recordings[r].interval
+        times = np.asarray(fit.target.oscillator.campaign.recordings[r].times)
         few = slice(0, y.size, max(1, y.size * len(slots) // points))
         numbers = effect_numbers(effect, fit, r), slots[r]
-        force = force_along(
-            effect.law, y[few], v[few], (np.arange(y.size) * interval)[few], *numbers
-        )
+        force = force_along(effect.law, y[few], v[few], times[few], *numbers)
         largest = max(largest, float(np.abs(force).max()))
     return largest
 

@@ -56,7 +56,8 @@ DISSIPATIVE = {
     "contact_damping_indentation.coefficient", "contact_damping_speed.coefficient",
     "contact_relaxation.stiffness", "contact_second_stage.stiffness", "obstacle_mass.mass",
     "gap_wear.step", "coulomb_friction.force", "quadratic_drag.coefficient",
-    "opposite_stop.stiffness", "spring_piecewise.stiffness", "spring_piecewise.damping", "power_damping.coefficient", "structural_damping.loss",
+    "opposite_stop.stiffness", "spring_piecewise.stiffness", "spring_piecewise.damping",
+    "power_damping.coefficient", "structural_damping.loss",
     "obstacle_mode.mass", "base_motion.mass_ratio",
 }  # fmt: skip
 OF_ANGLES = {"pendulum_sine", "pendulum_with_spring"}
