@@ -54,6 +54,10 @@ class Naive:
         force += p("contact_hardening", "stiffness") * d**3
         n = p("contact_power_law", "exponent", 1.0)
         force += self.k2 * d * ((abs(d) / 1e-3) ** (n - 1) - 1) if d != 0 else 0.0
+        if "hunt_crossley" in self.effects:
+            n, chi = p("hunt_crossley", "exponent"), p("hunt_crossley", "damping")
+            force -= self.c2 * v + self.k2 * d
+            force += self.k2 * 1e-3 * np.sign(d) * abs(d / 1e-3) ** n * (1 + chi * v)
         if d > p("contact_second_stage", "depth", np.inf):
             force += p("contact_second_stage", "stiffness") * (
                 d - p("contact_second_stage", "depth")

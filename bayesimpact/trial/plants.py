@@ -124,6 +124,17 @@ def _second_stage(design: Design, rng: Rng) -> Form:
     return Form(lambda size: {"stiffness": size, "depth": at}, 1e-4 * k2, largest=2 * k2)
 
 
+def _hunt_crossley(design: Design, rng: Rng) -> Form:
+    """Between a dashpot that grows with the depth, at size zero, and a stiffer or softer power."""
+    chi = log_uniform(rng, (0.03, 0.3)) / design.speed
+    sign = 1.0 if rng.random() < 0.8 else -1.0
+
+    def build(size: float) -> Parameters:
+        return {"exponent": 1 + sign * size, "damping": chi}
+
+    return Form(build, 1e-4, {"hunt_crossley": build(0.0)}, largest=1.0 if sign > 0 else 0.3)
+
+
 def _relaxation(design: Design, rng: Rng) -> Form:
     time = log_uniform(rng, (0.1, 1.0)) / design.contact_omega
     k2 = design.contact_stiffness
@@ -245,6 +256,7 @@ CATALOGUE_PLANTS: Mapping[str, Plant] = {
     ),
     "contact_power_law": Plant(("contact",), _exponent, 1),
     "contact_second_stage": Plant(("contact",), _second_stage, 1),
+    "hunt_crossley": Plant(("contact",), _hunt_crossley, 1, slot="c2"),
     "contact_no_tension": Plant(("contact",), lambda d, r: Form(lambda s: {}, 0.0), 1, slot="end"),
     "contact_relaxation": Plant(("contact",), _relaxation, 1),
     "obstacle_mass": Plant(("contact",), _obstacle_mass, 1, slot="end"),

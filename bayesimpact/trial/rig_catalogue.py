@@ -95,6 +95,16 @@ def _power_law(site: Site, p: Numbers, slot: int) -> Part:
     return in_contact(lambda d, v: k2 * d * ((abs(d) / MILLIMETRE) ** power - 1) if d else 0.0)
 
 
+def _hunt_crossley(site: Site, p: Numbers, slot: int) -> Part:
+    """K2 d^n (1 + chi v), d in mm, less the k2 d that the site has; its c2 is put to zero."""
+    k2, power, chi = site.k2, p["exponent"] - 1, p["damping"]
+
+    def force(d: float, v: float) -> float:
+        return k2 * d * ((abs(d) / MILLIMETRE) ** power * (1 + chi * v) - 1) if d else 0.0
+
+    return in_contact(force)
+
+
 def _second_stage(site: Site, p: Numbers, slot: int) -> Part:
     """Ks (d - ds) when d > ds."""
     ks, depth = p["stiffness"], p["depth"]
@@ -244,6 +254,12 @@ CATALOGUE: Mapping[str, Planted] = {
     "contact_hardening": Planted(("stiffness",), obstacle=True, part=_hardening),
     "contact_power_law": Planted(("exponent",), obstacle=True, part=_power_law),
     "contact_second_stage": Planted(("stiffness", "depth"), obstacle=True, part=_second_stage),
+    "hunt_crossley": Planted(
+        ("exponent", "damping"),
+        obstacle=True,
+        part=_hunt_crossley,
+        site=lambda site, p: replace(site, c2=0.0),
+    ),
     "contact_no_tension": Planted(
         obstacle=True, site=lambda site, p: replace(site, unilateral=True)
     ),

@@ -29,6 +29,10 @@ def contact_forces(e, rig, k2, d, v, s):
     total = rig.c2 * v
     n = e.get("contact_power_law", {}).get("exponent", 1.0)
     total += k2 * d if n == 1 else k2 * d * (abs(d) / 1e-3) ** (n - 1)
+    if "hunt_crossley" in e:
+        p = e["hunt_crossley"]
+        n, chi = p["exponent"], p["damping"]
+        total = k2 * 1e-3 * sign(d) * (abs(d) / 1e-3) ** n * (1 + chi * v)
     if "contact_damping_indentation" in e:
         total += e["contact_damping_indentation"]["coefficient"] * d * v
     if "contact_damping_speed" in e:

@@ -21,6 +21,7 @@ STRONG = {
     "contact_hardening": {"stiffness": 3e8},
     "contact_power_law": {"exponent": 1.2},
     "contact_second_stage": {"stiffness": 2000.0, "depth": 0.5e-3},
+    "hunt_crossley": {"exponent": 1.4, "damping": 0.9},
     "contact_no_tension": {},
     "obstacle_mass": {"mass": 0.01},
     "contact_relaxation": {"stiffness": 600.0, "time": 5e-3},
@@ -77,7 +78,7 @@ def against_naive(effects, release, *, duration, step, tolerance):
 @pytest.mark.parametrize("effect", STRONG)
 def test_equation_against_the_naive_twin(effect):
     # the naive twin loses its order at the root of d^n
-    rooted = effect in ("contact_power_law", "power_damping")
+    rooted = effect in ("contact_power_law", "power_damping", "hunt_crossley")
     tolerance = 5e-10 if rooted else 1e-10 if effect in MODES else 1e-11
     effects = {effect: STRONG[effect]}
     run = against_naive(effects, RELEASE, duration=0.35, step=1e-4, tolerance=tolerance)

@@ -192,7 +192,8 @@ class Effect(Picklable):
 
     It acts in one or more of four ways: `law` adds a force; `binds` feeds its parameters into slots
     of the oscillator (dry friction, mass of the obstacle, a gap of its own per recording, ...);
-    `sets` fixes slots; `observe(y (K, n), t (n,), p (K, n_p)) -> (K, n)` changes what the probe
+    `sets` fixes slots (c2 or g among them: the model then has no such unknown);
+    `observe(y (K, n), t (n,), p (K, n_p)) -> (K, n)` changes what the probe
     reads.
 
     Attributes
@@ -237,6 +238,17 @@ class Effect(Picklable):
         if self.needs_stop and scales.impacts == 0:
             return False
         return self.condition is None or self.condition(scales)
+
+    @property
+    def has_size(self) -> bool:
+        """False for an effect that is on or off: it has no parameters, or only shapes."""
+        return not all(p.is_shape or p.fixed is not None for p in self.parameters)
+
+    def excludes(self, other: Effect) -> frozenset[str]:
+        """Slots that both claim: each feeds one, or one feeds what the other fixes."""
+        fixed = {s for s in self.sets if s in other.sets and self.sets[s] != other.sets[s]}
+        crossed = (set(self.binds) & set(other.sets)) | (set(self.sets) & set(other.binds))
+        return frozenset(fixed | crossed | (set(self.binds) & set(other.binds)))
 
     def parameter(self, name: str) -> EffectParameter:
         """The parameter called `name`; KeyError when there is none."""

@@ -9,6 +9,10 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 from scipy.special import airy, ellipk, gamma
 
+from bayesimpact.errors import InputError
+from bayesimpact.model.experiment import simulate as simulate_one
+from bayesimpact.model.oscillator import build_oscillator
+from bayesimpact.model.parameters import SLOTS
 from bayesimpact.model.simulate import simulate
 
 FREE = TestRig(mass=0.5, c1=0.0, k1=0.5 * (10 * np.pi) ** 2, k2=(), y0=(-6e-3,), v0=(0.0,))
@@ -246,3 +250,35 @@ def test_beyond_the_clearance_both_springs_and_dampers_act():
     speed = (expm(A * at) @ start)[1]
     after = [(expm(B * (t - at)) @ [-gp, speed])[0] for t in times[leaves:]]
     np.testing.assert_allclose(y[leaves:], after, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(("exponent", "chi"), [(1.0, 0.5), (1.5, 0.5), (2.5, 3.0), (0.7, 2.0)])
+def test_hunt_and_crossley_leave_a_speed_that_hangs_on_chi_alone(exponent, chi):
+    """From v dv / (1 + chi v) = -k d^n dd / m: v / chi - ln(1 + chi v) / chi^2 is the same before
+    and after an impact, whatever k and n.
+    """
+    rig = changed(WALL, duration=0.3)
+    y = one("hunt_crossley", rig, exponent=exponent, damping=chi)
+    speed = (y[-1] - y[-2]) * rig.rate
+    invariant = lambda v: v / chi - np.log1p(chi * v) / chi**2  # noqa: E731
+    before = invariant(rig.v0[0])
+    expected = brentq(lambda v: invariant(v) - before, -1 / chi + 1e-9, -1e-9)
+    assert y[-1] < -1e-3 and speed == pytest.approx(expected, rel=1e-7)
+
+
+def test_the_dashpot_is_gone_beside_hunt_and_crossley():
+    """c2 is no unknown of the model, and no effect that needs it can stand beside."""
+    rig = TestRig()
+    oscillator = build_oscillator(rig.campaign(), [BY_ID["hunt_crossley"]])
+    assert "c2" not in oscillator.layout.names and "g" in oscillator.layout.names
+    slots = oscillator.layout.slots(np.ones(oscillator.layout.size))
+    assert np.all(slots[:, SLOTS.index("c2")] == 0.0)
+    with pytest.raises(InputError, match="slot c2 taken by hunt_crossley"):
+        build_oscillator(
+            rig.campaign(), [BY_ID["hunt_crossley"], BY_ID["contact_damping_per_case"]]
+        )
+    with pytest.raises(InputError, match="c2: found 2 beside hunt_crossley"):
+        simulate_one(
+            effects={"hunt_crossley": {"exponent": 1.5, "damping": 0.1}}, mass=0.5, c1=0.1,
+            k1=800.0, c2=2.0, k2=5000.0, g=1e-3, y0=-6e-3, v0=0.0, interval=1e-3, n=100,
+        )  # fmt: skip

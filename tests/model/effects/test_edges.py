@@ -203,3 +203,13 @@ def test_touches_too_slow_for_the_obstacle_to_push(speed):
     effects, values = [BY_ID["obstacle_mass"]], {"obstacle_mass.mass": 0.08}
     difference = moved(effects, values, rig) - by_rig(effects, values, rig)
     assert np.abs(difference).max() < 1e-12
+
+
+def test_surfaces_at_one_place():
+    """Two springs that begin together, beside a law that makes steps short: each is passed once."""
+    names = ("opposite_stop", "spring_piecewise", "power_damping", "structural_damping")
+    effects, rig, values = [BY_ID[n] for n in names], TestRig(duration=1.5), {}
+    for effect in effects:
+        values |= typical(effect, rig)
+    assert values["opposite_stop.gap"] == values["spring_piecewise.gap"]
+    assert np.abs(moved(effects, values, rig) - by_rig(effects, values, rig)).max() < 1e-9

@@ -12,10 +12,9 @@ from bayesimpact.model.oscillator import build_oscillator
 RIG = TestRig(duration=3.0)
 PLAIN = TestRig(k2=(), duration=3.0)
 EXACT = {"contact_damping_per_case", "gap_per_recording"}
-# contact_no_tension and pendulum_sine have no parameter, and obstacle_mass reduces to the former
-OTHERS = [
-    e for e in EFFECTS if e.id not in {"contact_no_tension", "obstacle_mass", "pendulum_sine"}
-]
+# some have no size, and obstacle_mass reduces to contact_no_tension
+OTHERS = [e for e in EFFECTS if e.has_size and e.id != "obstacle_mass"]
+ALONE = {"contact_no_tension", "pendulum_sine", "hunt_crossley"}
 
 
 @pytest.mark.parametrize("effect", OTHERS, ids=lambda e: e.id)
@@ -37,6 +36,10 @@ def test_null_without_a_stop(effect):
     added = PLAIN.readings([effect], null_values(effect, PLAIN))
     for a, b in zip(added, base, strict=True):
         np.testing.assert_allclose(a, b, rtol=0, atol=5e-13)
+
+
+def test_what_has_no_null_has_no_size():
+    assert {e.id for e in EFFECTS if not e.has_size} == ALONE
 
 
 def test_no_effect_runs_in_the_exact_simulator():
