@@ -37,8 +37,8 @@ class Naive:
         self.friction = self.number("coulomb_friction", "force")
         self.t, self.slide = 0.0, np.sign(self.v0)
         self.beyond = self.y0 < -self.number("spring_piecewise", "gap", np.inf)
-        # y, v, relaxation, then displacement and velocity of second mode, obstacle, frame
-        self.state = [self.y0, self.v0, *[0.0] * 7]
+        # y, v, relaxation, displacement and velocity of second mode, obstacle, frame; loops
+        self.state = [self.y0, self.v0, *[0.0] * 9]
         self.ratio = self.number("base_motion", "mass_ratio")
         self.mode = FREE
 
@@ -111,7 +111,7 @@ class Naive:
 
     def acceleration(self, t: float, state: list[float]) -> float:
         """y'' from m (y'' + X'') + N = 0, X'' = pull + r N / m; N contains m2 y''."""
-        force = self.everywhere(t, *state[:2]) + self.friction * self.slide
+        force = self.everywhere(t, *state[:2]) + self.friction * self.slide + self.slipping(state)
         touching, rest = self.mode == CONTACT, 1 + self.ratio
         if touching:
             force += self.obstacle(state)
@@ -132,7 +132,20 @@ class Naive:
         slope = [0.0 if held else v, a, rate]
         slope += [*self.second_mode(t, state, held), state[6], self.ringing(state)]
         shaken = -(self.ratio * a - self.frame_pull(state)) / (1 + self.ratio)
-        return [*slope, state[8], shaken]
+        return [*slope, state[8], shaken, *self.loops(slope[0], *state[9:])]
+
+    def loops(self, v: float, z: float, friction: float) -> list[float]:
+        """Rates of Bouc and Wen's z and of Dahl's friction force."""
+        p, F = self.number, self.number("presliding_friction", "force")
+        bouc_wen = v - p("hysteresis_bouc_wen", "decay") * v * self.slide * z
+        if F == 0:
+            return [bouc_wen, 0.0]
+        s = F / p("presliding_friction", "displacement")
+        return [bouc_wen, s * v * (1 - friction / F * self.slide)]
+
+    def slipping(self, state: list[float]) -> float:
+        """Forces of the two, N."""
+        return self.number("hysteresis_bouc_wen", "stiffness") * state[9] + state[10]
 
     def second_mode(self, t: float, state: list[float], held: bool) -> list[float]:
         """Rates of the mode that the contact force excites."""

@@ -91,7 +91,7 @@ def own_force(
     displacement, velocity and time alone.
     """
     law = effect.law
-    if law is None or law.rate is not None:
+    if law is None or law.rate is not None or law.travel is not None:
         return None
     slots = fit.target.oscillator.layout.slots(fit.mode)
     found = []

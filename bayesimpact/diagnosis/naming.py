@@ -17,6 +17,7 @@ from bayesimpact.diagnosis.refit import Candidate, tempered_evidence
 from bayesimpact.diagnosis.scan import Scan
 from bayesimpact.diagnosis.thresholds import ALPHA, DECISIVE, LARGE, largest_log_odds
 from bayesimpact.inference.fit import Fit
+from bayesimpact.model.effects.effect import Effect
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,6 +164,10 @@ def is_large(fit: Fit) -> bool:
 
 
 def _is_elaboration(candidate: Candidate, chosen: Candidate) -> bool:
-    """True when the candidate only refines the chosen model (`Effect.prefer`)."""
+    """True when the candidate only refines the chosen model (`Effect.prefer`), or restates it."""
     extra = [e for e in candidate.effects if e.id not in chosen.ids]
-    return bool(extra) and all(e.prefer in chosen.ids for e in extra)
+
+    def is_nothing_new(effect: Effect) -> bool:
+        return effect.prefer in chosen.ids or any(map(effect.is_same_law, chosen.effects))
+
+    return bool(extra) and all(map(is_nothing_new, extra))

@@ -43,10 +43,11 @@ def _is_a_leap(effect: Effect) -> bool:
 def is_redundant(candidate: Candidate, effect: Effect) -> bool:
     """Whether a model has the whole of an effect already, or the effect the whole of one of its.
 
-    An effect without parameters is contained in the one that refines it.
+    An effect without parameters is contained in the one that refines it, a law in its restatement.
     """
     return any(
-        (e.prefer == effect.id and not effect.parameters)
+        effect.is_same_law(e)
+        or (e.prefer == effect.id and not effect.parameters)
         or (effect.prefer == e.id and not e.parameters)
         for e in candidate.effects
     )

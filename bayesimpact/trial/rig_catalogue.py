@@ -232,6 +232,30 @@ def _structural_damping(site: Site, p: Numbers, slot: int) -> Part:
     return Part(law, kinks=(0.0,))
 
 
+def _bouc_wen(site: Site, p: Numbers, slot: int) -> Part:
+    """Force a z, z' = v - b abs(v) z."""
+    stiffness, decay = p["stiffness"], p["decay"]
+
+    def rates(piece: Piece) -> Rates:
+        signed = piece.sign * decay
+        return lambda t, y, v, state: (v * (1 - signed * state[slot]),)
+
+    law = everywhere(lambda t, y, v, state: stiffness * state[slot])
+    return Part(law, states=(0.0,), rates=rates)
+
+
+def _presliding(site: Site, p: Numbers, slot: int) -> Part:
+    """Dahl's friction: force F u, u' = v (1 - u sign(v)) / x."""
+    force, way = p["force"], p["displacement"]
+
+    def rates(piece: Piece) -> Rates:
+        sign = piece.sign
+        return lambda t, y, v, state: (v * (1 - sign * state[slot]) / way,)
+
+    law = everywhere(lambda t, y, v, state: force * state[slot])
+    return Part(law, states=(0.0,), rates=rates)
+
+
 def _smoothing(chain: Chain, p: Numbers) -> Chain:
     """Savitzky-Golay with window and order, or a first-order lag with time_constant."""
     if "time_constant" in p:
@@ -301,6 +325,8 @@ CATALOGUE: Mapping[str, Planted] = {
     "spring_quintic": Planted(("stiffness",), part=_spring_quintic),
     "power_damping": Planted(("coefficient", "exponent"), part=_power_damping),
     "structural_damping": Planted(("loss",), part=_structural_damping),
+    "hysteresis_bouc_wen": Planted(("stiffness", "decay"), part=_bouc_wen),
+    "presliding_friction": Planted(("force", "displacement"), part=_presliding),
     "smoothing": Planted(optional=("window", "order", "time_constant"), chain=_smoothing),
     "noise_correlated": Planted(
         ("correlation",), chain=lambda chain, p: replace(chain, correlation=p["correlation"])

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesimpact.trial.benches import Design, Range, log_uniform
-from bayesimpact.trial.plants import CATALOGUE_PLANTS, OUTSIDE_PLANTS, Form, Plant
+from bayesimpact.trial.plants import CATALOGUE_PLANTS, Form, Plant
+from bayesimpact.trial.plants_outside import OUTSIDE_PLANTS
 from bayesimpact.trial.rig_catalogue import CATALOGUE
 
 Rng = np.random.Generator

@@ -86,8 +86,10 @@ def free_forces(e, rig, t, y, v, s):
         p = e["detent"]
         x = y - p["place"]
         total += p["stiffness"] * x * exp(-((x / p["width"]) ** 2))
-    if "hysteresis" in e:
-        total += e["hysteresis"]["stiffness"] * s["bouc"]
+    if "hysteresis_bouc_wen" in e:
+        total += e["hysteresis_bouc_wen"]["stiffness"] * s["bouc"]
+    if "presliding_friction" in e:
+        total += s["dahl"]
     if "damping_bump" in e:
         p = e["damping_bump"]
         total += p["coefficient"] * exp(-(((y - p["place"]) / p["width"]) ** 2)) * v
@@ -144,8 +146,20 @@ class NaiveRig:
         self.one_sided = "obstacle_mass" in effects or "contact_no_tension" in effects
         self.touching = release.y0 > self.gap
         self.stuck = self.released = False
-        self.names = ("maxwell", "bouc", "x", "u", "q", "q_rate", "b", "b_rate", "X", "X_rate")
-        self.state = [release.y0, release.v0, 0.0, 0.0, release.y0, release.v0, *[0.0] * 6]
+        self.names = (
+            "maxwell",
+            "bouc",
+            "x",
+            "u",
+            "q",
+            "q_rate",
+            "b",
+            "b_rate",
+            "X",
+            "X_rate",
+            "dahl",
+        )
+        self.state = [release.y0, release.v0, 0.0, 0.0, release.y0, release.v0, *[0.0] * 7]
 
     def named(self, state):
         """Own states, and where the step began: it decides what is switched on."""
@@ -181,12 +195,15 @@ class NaiveRig:
             if ratio > 1.0:
                 force -= self.rig.mass / ratio * frame_hold(self.e["base_motion"], s)
             acceleration = -force / (self.rig.mass / ratio + self.m2 * self.touching)
-        out = [v, acceleration, *[0.0] * 10]
+        out = [v, acceleration, *[0.0] * 11]
         if "contact_relaxation" in self.e:
             p = self.e["contact_relaxation"]
             out[2] = p["stiffness"] * v * self.touching - s["maxwell"] / p["time"]
-        if "hysteresis" in self.e:
-            out[3] = v - abs(v) * s["bouc"] / self.e["hysteresis"]["width"]
+        if "hysteresis_bouc_wen" in self.e:
+            out[3] = v - abs(v) * s["bouc"] * self.e["hysteresis_bouc_wen"]["decay"]
+        if "presliding_friction" in self.e:
+            p = self.e["presliding_friction"]
+            out[12] = p["force"] / p["displacement"] * v * (1 - s["dahl"] / p["force"] * sign(v))
         if "resonator" in self.e:
             p = self.e["resonator"]
             out[4:6] = [s["u"], resonator_pull(p, y, v, s) / p["mass"]]
@@ -201,7 +218,7 @@ class NaiveRig:
         if "base_motion" in self.e:
             ratio = self.e["base_motion"]["mass_ratio"]
             shaken = -frame_hold(self.e["base_motion"], s) - ratio * acceleration
-            out[10:] = [s["X_rate"], shaken / (1 + ratio)]
+            out[10:12] = [s["X_rate"], shaken / (1 + ratio)]
         return out
 
     def place(self, y, v):

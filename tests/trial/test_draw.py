@@ -14,7 +14,8 @@ from bayesimpact.model.effects import EFFECTS
 from bayesimpact.trial.benches import BENCHES, NOISES, depth, draw_bench
 from bayesimpact.trial.blind import campaign_files, sealed_text
 from bayesimpact.trial.draw import draw
-from bayesimpact.trial.plants import CATALOGUE_PLANTS, OUTSIDE_PLANTS, Form
+from bayesimpact.trial.plants import CATALOGUE_PLANTS, Form
+from bayesimpact.trial.plants_outside import OUTSIDE_PLANTS
 from bayesimpact.trial.rig import Release, motion, record
 from bayesimpact.trial.rig_catalogue import CATALOGUE
 from bayesimpact.trial.rig_outside import OUTSIDE

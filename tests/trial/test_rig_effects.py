@@ -42,8 +42,9 @@ STRONG = {
     "spring_quintic": {"stiffness": 5e10},
     "power_damping": {"coefficient": 0.5, "exponent": 1.5},
     "structural_damping": {"loss": 0.05},
+    "hysteresis_bouc_wen": {"stiffness": 150.0, "decay": 1e3},
+    "presliding_friction": {"force": 0.3, "displacement": 2e-4},
     "detent": {"stiffness": 400.0, "place": -1e-3, "width": 1e-3},
-    "hysteresis": {"stiffness": 150.0, "width": 1e-3},
     "friction_pad": {"force": 0.3, "extra": 0.2, "speed": 0.05, "low": -2e-3, "high": 0.5e-3},
     "damping_bump": {"coefficient": 2.0, "place": -2e-3, "width": 1e-3},
     "eddy_brake": {"coefficient": 2.0, "low": -2e-3, "high": -1e-3},
@@ -92,7 +93,13 @@ def test_equation_against_the_naive_twin(effect):
         ("contact_damping_indentation", "contact_no_tension", "gap_wear", "quadratic_drag"),
         ("obstacle_mass", "contact_relaxation", "coulomb_friction", "spring_cubic"),
         ("contact_second_stage", "contact_damping_speed", "opposite_stop", "stiffness_drift"),
-        ("contact_no_tension", "contact_relaxation", "resonator", "hysteresis", "friction_pad"),
+        (
+            "contact_no_tension",
+            "contact_relaxation",
+            "resonator",
+            "hysteresis_bouc_wen",
+            "friction_pad",
+        ),
         ("obstacle_mass", "contact_preload", "contact_friction", "knock", "eddy_brake"),
         ("contact_second_stage", "gap_wear"),
         ("second_mode", "obstacle_mass", "contact_relaxation", "coulomb_friction"),
@@ -145,6 +152,8 @@ NULL = {
     "spring_quintic": {"stiffness": 0.0},
     "power_damping": {"coefficient": 0.0, "exponent": 0.5},
     "structural_damping": {"loss": 0.0},
+    "hysteresis_bouc_wen": {"stiffness": 0.0, "decay": 1e3},
+    "presliding_friction": {"force": 0.0, "displacement": 1e-4},
 }
 
 

@@ -36,6 +36,7 @@ from bayesimpact.model.added.world import (
     LAW_PACE,
     LAW_RATE,
     LAW_SURFACE,
+    LAW_TRAVEL,
     LAW_TURN,
     NOW,
     OMEGA,
@@ -94,6 +95,7 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
             bounded = laws[LAW_COLUMNS * law + LAW_SURFACE] != 0
             rooted = laws[LAW_COLUMNS * law + LAW_TURN] != 0
             turns = turns or flags & ENDS_ON_TURNS != 0 or bounded or rooted
+            turns = turns or laws[LAW_COLUMNS * law + LAW_TRAVEL] != 0
             rough = rough or (touching and flags & ROUGH_AT_TOUCH != 0)
             tame = tame and flags & POLYNOMIAL != 0
             placed = placed and flags & PLACED != 0

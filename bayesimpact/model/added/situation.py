@@ -32,20 +32,25 @@ from bayesimpact.model.added.world import (
     K1,
     K2,
     LAW_COLUMNS,
+    LAW_FIRST,
     LAW_FLAGS,
     LAW_FORCE,
     LAW_SURFACE,
+    LAW_TRAVEL,
     NO_TENSION,
     NOW,
     SECOND_GAIN,
     STAGE,
+    TURNED,
     V0,
+    WAY,
     WORK_COLUMNS,
     Y0,
     G,
     forcing,
     law_value,
 )
+from bayesimpact.model.callback import call_law
 from bayesimpact.model.compiled import inner
 
 # what holds between events: gap, kind of motion, direction of sliding (0: held), direction of
@@ -138,6 +143,8 @@ def begin(w: Any) -> Any:
     q, s = w.q, w.s
     y, v = q[Y0], q[V0]
     begin_bodies(y, v, w)
+    for law in range(w.size):
+        w.work[WORK_COLUMNS * law + TURNED] = y
     s[GAP] = q[G]
     s[SLIDING] = np.sign(v)
     if y > s[GAP]:
@@ -175,6 +182,20 @@ def point_laws(direction: Any, w: Any) -> Any:
 
 
 @inner()
+def turn_paths(direction: Any, y: Any, w: Any) -> Any:
+    """States that follow the path go on from here in another direction; at rest they stay."""
+    for law in range(w.size):
+        travel, at = w.laws[LAW_COLUMNS * law + LAW_TRAVEL], WORK_COLUMNS * law
+        if travel != 0 and direction != 0.0 and w.work[at + WAY] != direction:
+            p, gone = w.base + 8 * w.laws[LAW_COLUMNS * law + LAW_FIRST], y - w.work[at + TURNED]
+            way, z = w.work[at + WAY], w.work[at + NOW]
+            touching = 1.0 if w.s[MODE] == TOUCHING else 0.0
+            z = call_law(travel, gone, way, y - w.s[GAP], 0.0, z, touching, p, w.base)
+            tell(law, z, w)
+            w.work[at + TURNED], w.work[at + WAY] = y, direction
+
+
+@inner()
 def tell(law: Any, branch: Any, w: Any) -> Any:
     """Set the state of a law that has no rate: the branch of its force that holds now."""
     at = WORK_COLUMNS * law
@@ -197,6 +218,7 @@ def set_directions(y: Any, v: Any, t: Any, w: Any) -> Any:
         point_laws(0.0, w)
         direction = w.s[SLIDING] if w.q[FRICTION] > 0.0 else np.sign(static_force(y, t, NOW, w))
     point_laws(direction, w)
+    turn_paths(direction, y, w)
 
 
 @inner()

@@ -15,12 +15,14 @@ from bayesimpact.model.effects import (
     gap_wear,
     harmonic_forcing,
     hunt_crossley,
+    hysteresis_bouc_wen,
     obstacle_mass,
     obstacle_mode,
     opposite_stop,
     pendulum_sine,
     pendulum_with_spring,
     power_damping,
+    presliding_friction,
     quadratic_drag,
     second_mode,
     sensor_cubic,
@@ -71,6 +73,8 @@ EFFECTS: tuple[Effect, ...] = (
     spring_quintic.EFFECT,
     power_damping.EFFECT,
     structural_damping.EFFECT,
+    hysteresis_bouc_wen.EFFECT,
+    presliding_friction.EFFECT,
 )
 
 UNTRIED = ("obstacle_mode", "base_motion")

@@ -141,6 +141,10 @@ class Law:
     force : N
     where : evaluated everywhere or in contact only
     rate : time derivative of the state z (a law with memory), or None
+    travel : for a state that follows the path and not the time (rate-independent hysteresis): its
+        value where the motion has gone by `y` (m, signed) since it last turned, in the direction
+        `v` (-1, 1; 0 before it first moves), from `z`, the state where it turned. Zero at a
+        recording's first sample; steps end on turning points
     surface : a smooth function of y or d whose zero is a kink of the force; steps end on it. (A
         force may jump at the touch, being evaluated in contact only, and where a flag below says
         so; other jumps cost accuracy.)
@@ -166,6 +170,7 @@ class Law:
     force: Callable[..., float]
     where: Where = "everywhere"
     rate: Callable[..., float] | None = None
+    travel: Callable[..., float] | None = None
     surface: Callable[..., float] | None = None
     pace: Callable[..., float] | None = None
     grain: Callable[..., float] | None = None
@@ -205,6 +210,8 @@ class Effect(Picklable):
     statement : sentence for the report with `{size}` and `{share}` filled in
     needs_stop : True when it makes no sense without an obstacle
     prefer : id of the simpler effect that this one reduces to at its null
+    restates : id of an effect that is the same law in other numbers, for another range of them: the
+        likelier of the two names the law, and the other is no rival
     condition : what else a campaign must offer (two obstacles, two impacts, ...); None for nothing
     size : how large it is for given parameters, where the peak of its force along the motion or of
         its change of the readings does not say so
@@ -224,6 +231,7 @@ class Effect(Picklable):
     observe: Observe | None = None
     needs_stop: bool = False
     prefer: str | None = None
+    restates: str | None = None
     condition: Callable[[Scales], bool] | None = None
     size: Callable[[Numbers, Scales], Size] | None = None
 
@@ -250,6 +258,10 @@ class Effect(Picklable):
         crossed = (set(self.binds) & set(other.sets)) | (set(self.sets) & set(other.binds))
         return frozenset(fixed | crossed | (set(self.binds) & set(other.binds)))
 
+    def is_same_law(self, other: Effect) -> bool:
+        """True for two effects that differ in the names and ranges of their numbers only."""
+        return self.restates == other.id or other.restates == self.id
+
     def parameter(self, name: str) -> EffectParameter:
         """The parameter called `name`; KeyError when there is none."""
         for parameter in self.parameters:
@@ -267,7 +279,7 @@ def _catalogued(id: str) -> Effect | None:
     return effect
 
 
-LAW_ROW = 8  # numbers in a law's row
+LAW_ROW = 9  # numbers in a law's row
 
 
 def law_row(law: Law, first: int) -> list[int]:
@@ -277,7 +289,7 @@ def law_row(law: Law, first: int) -> list[int]:
     flags += 8 * law.polynomial + 16 * law.ignores_speed
     flags += 32 * law.jump_at_turn + 64 * law.jump_at_surface
     force, rate, surface = (address(f) if f else 0 for f in functions)
-    extents = (law.pace, law.grain, law.first_at_turn)
+    extents = (law.pace, law.grain, law.first_at_turn, law.travel)
     return [force, rate, surface, flags, first, *(address(f) if f else 0 for f in extents)]
 
 

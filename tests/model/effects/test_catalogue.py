@@ -52,6 +52,8 @@ CONTRACT = {
     "spring_quintic": ["stiffness"],
     "power_damping": ["coefficient", "exponent"],
     "structural_damping": ["loss"],
+    "hysteresis_bouc_wen": ["stiffness", "decay"],
+    "presliding_friction": ["force", "displacement"],
 }
 DISSIPATIVE = {
     "contact_damping_indentation.coefficient", "contact_damping_speed.coefficient",
@@ -59,7 +61,8 @@ DISSIPATIVE = {
     "gap_wear.step", "coulomb_friction.force", "quadratic_drag.coefficient",
     "opposite_stop.stiffness", "spring_piecewise.stiffness", "spring_piecewise.damping",
     "power_damping.coefficient", "structural_damping.loss",
-    "obstacle_mode.mass", "base_motion.mass_ratio",
+    "obstacle_mode.mass", "base_motion.mass_ratio", "hysteresis_bouc_wen.stiffness",
+    "presliding_friction.force",
 }  # fmt: skip
 OF_ANGLES = {"pendulum_sine", "pendulum_with_spring"}
 SIGNED = {
@@ -198,6 +201,8 @@ def test_families_hold_the_near_neighbours():
         ("coulomb_friction", "quadratic_drag"),
         ("quadratic_drag", "power_damping"),
         ("power_damping", "structural_damping"),
+        ("coulomb_friction", "presliding_friction"),
+        ("presliding_friction", "hysteresis_bouc_wen"),
         ("spring_cubic", "pendulum_sine"),
         ("spring_cubic", "spring_quintic"),
     ):

@@ -282,3 +282,55 @@ def test_the_dashpot_is_gone_beside_hunt_and_crossley():
             effects={"hunt_crossley": {"exponent": 1.5, "damping": 0.1}}, mass=0.5, c1=0.1,
             k1=800.0, c2=2.0, k2=5000.0, g=1e-3, y0=-6e-3, v0=0.0, interval=1e-3, n=100,
         )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "numbers"),
+    [
+        ("hysteresis_bouc_wen", {"stiffness": 60.0, "decay": 400.0}),
+        ("presliding_friction", {"force": 0.15, "displacement": 1 / 400.0}),
+    ],
+)
+def test_a_loop_takes_the_same_energy_however_slowly_it_is_gone_through(name, numbers):
+    """What a swing loses is what the path integral of the loop says, with the mass out of it.
+
+    From the first turning point to the second, z = tanh-like rises in closed form:
+    z = (1 - exp(-b u)) / b from z = 0, u being the way since the release.
+    """
+    b, peak = 400.0, 0.15
+    losses = []
+    for mass in (0.5, 5.0):
+        rig = changed(FREE, mass=mass, k1=500.0, rate=2000.0, duration=0.6 * np.sqrt(mass / 0.5))
+        y = one(name, rig, **numbers)
+        top = int(np.argmax(y[: rig.count // 2 + 1]))
+        left, here, right = y[top - 1 : top + 2]
+        losses.append(here - (right - left) ** 2 / (8 * (left - 2 * here + right)))
+    # k1 y0^2 / 2 - k1 y1^2 / 2 = work of the loop on the way u = y1 - y0
+    y0 = FREE.y0[0]
+
+    def balance(y1: float) -> float:
+        way = y1 - y0
+        work = peak * (way - (1 - np.exp(-b * way)) / b)
+        return 250.0 * (y0**2 - y1**2) - work
+
+    expected = brentq(balance, 1e-3, 6e-3)
+    np.testing.assert_allclose(losses, expected, rtol=0, atol=2e-9)
+
+
+def test_dahls_friction_and_bouc_and_wens_loop_are_one_law():
+    rig = TestRig(duration=1.0)
+    dahl = one("presliding_friction", rig, force=0.1, displacement=5e-4)
+    loop = one("hysteresis_bouc_wen", rig, stiffness=0.1 / 5e-4, decay=1 / 5e-4)
+    np.testing.assert_allclose(dahl, loop, rtol=0, atol=1e-12)
+    assert BY_ID["presliding_friction"].is_same_law(BY_ID["hysteresis_bouc_wen"])
+
+
+def test_short_presliding_is_dry_friction():
+    """What is left goes with the time to build the friction up, the root of the way."""
+    rig = TestRig(duration=1.0)
+    sliding = one("coulomb_friction", rig, force=0.05)
+    left = [
+        np.abs(one("presliding_friction", rig, force=0.05, displacement=way) - sliding).max()
+        for way in (1e-5, 1e-6)
+    ]
+    assert left[0] < 1e-4 and left[0] / left[1] == pytest.approx(10**0.5, rel=0.1)
