@@ -33,7 +33,10 @@ class Naive:
         self.c2 = self.number("contact_damping_per_case", "c2", self.c2)
         self.g = self.number("gap_per_recording", "g", self.g)
         self.gap, self.m2 = self.g, self.number("obstacle_mass", "mass")
-        self.one_sided = bool({"contact_no_tension", "obstacle_mass"} & set(self.effects))
+        self.one_sided = bool(
+            {"contact_no_tension", "obstacle_mass", "adhesion"} & set(self.effects)
+        )
+        self.pull = self.number("adhesion", "force")
         self.friction = self.number("coulomb_friction", "force")
         self.t, self.slide = 0.0, np.sign(self.v0)
         self.beyond = self.y0 < -self.number("spring_piecewise", "gap", np.inf)
@@ -163,7 +166,7 @@ class Naive:
         elif self.mode == RELEASED or not self.one_sided:
             found["gap"] = (lambda t, s: s[0] - self.gap, -1.0)
         else:
-            found["release"] = (self.reaction, -1.0)
+            found["release"] = (lambda t, s: self.reaction(t, s) + self.pull, -1.0)
         for effect, name, scale in (
             ("opposite_stop", "gap", -1.0),
             ("spring_piecewise", "gap", -1.0),
@@ -183,7 +186,7 @@ class Naive:
         out, filled = np.empty(times.size), 0
         if self.y0 > self.gap:
             self.mode = CONTACT
-            if self.one_sided and self.reaction(0.0, self.state) <= 0:
+            if self.one_sided and self.reaction(0.0, self.state) <= -self.pull:
                 self.mode = RELEASED
         while filled < times.size:
             sign = self.start()
@@ -237,6 +240,7 @@ class Naive:
             before = self.state[1]
             mass = self.mass / (1 + self.ratio)
             self.state[1] *= mass / (mass + self.m2)
+            self.state[1] *= self.number("obstacle_restitution", "coefficient", 1.0)
             lost = mass * (before - self.state[1])
             self.state[4] += self.number("second_mode", "gain") * lost
             self.state[8] += self.ratio * lost / self.mass

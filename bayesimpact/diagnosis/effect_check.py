@@ -87,7 +87,10 @@ def _values(effect: Effect, choose: Callable[[EffectParameter], float]) -> dict[
 
 
 def _typical(p: EffectParameter) -> float:
-    return (p.null or 0.0) + p.scale(USUAL) if not p.circular else 0.3
+    if p.circular:
+        return 0.3
+    null, scale = p.null or 0.0, p.scale(USUAL)
+    return null - scale if null + scale > p.upper else null + scale
 
 
 def _played(effect: Effect, values: Mapping[str, float], rate: float = RATE) -> Array:

@@ -17,7 +17,6 @@ from bayesimpact.diagnosis.refit import Candidate, tempered_evidence
 from bayesimpact.diagnosis.scan import Scan
 from bayesimpact.diagnosis.thresholds import ALPHA, DECISIVE, LARGE, largest_log_odds
 from bayesimpact.inference.fit import Fit
-from bayesimpact.model.effects.effect import Effect
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,10 +163,6 @@ def is_large(fit: Fit) -> bool:
 
 
 def _is_elaboration(candidate: Candidate, chosen: Candidate) -> bool:
-    """True when the candidate only refines the chosen model (`Effect.prefer`), or restates it."""
+    """True when the candidate only refines the chosen model (`Effect.prefer`)."""
     extra = [e for e in candidate.effects if e.id not in chosen.ids]
-
-    def is_nothing_new(effect: Effect) -> bool:
-        return effect.prefer in chosen.ids or any(map(effect.is_same_law, chosen.effects))
-
-    return bool(extra) and all(map(is_nothing_new, extra))
+    return bool(extra) and all(e.prefer in chosen.ids for e in extra)

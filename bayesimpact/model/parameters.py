@@ -25,9 +25,11 @@ ADDED_SLOTS = (
     "friction", "contact_mass", "no_tension", "gap_step",
     "second_frequency", "second_damping", "second_gain",
     "obstacle_mass", "obstacle_frequency", "obstacle_damping",
-    "frame_ratio", "frame_frequency", "frame_damping",
+    "frame_ratio", "frame_frequency", "frame_damping", "adhesion", "restitution",
 )  # fmt: skip
 SLOTS = BASE_SLOTS + ADDED_SLOTS
+WITHOUT = {"restitution": 1.0}
+"""Values of added slots that nothing feeds, where that is not 0."""
 
 Role = Literal["physical", "effect", "nuisance", "noise"]
 _SHARED_UNITS = {"c1": "N s/m", "k1": "N/m", "c2": "N s/m", "g": "m"}
@@ -206,6 +208,8 @@ def _maps(
     shape = (len(campaign.recordings), len(SLOTS) + len(law_parameters))
     columns = np.full(shape, -1, dtype=np.int64)
     constants = np.zeros(shape)
+    for slot, value in WITHOUT.items():
+        constants[:, SLOTS.index(slot)] = value
     if not campaign.stop:
         constants[:, SLOTS.index("g")] = np.inf
     for effect in effects:

@@ -150,6 +150,16 @@ def _obstacle_mass(design: Design, rng: Rng) -> Form:
     return Form(lambda size: {"mass": size}, 1e-5 * mass, reference, largest=0.3 * mass)
 
 
+def _adhesion(design: Design, rng: Rng) -> Form:
+    force = design.contact_stiffness * design.indentation
+    reference: Effects = {"contact_no_tension": {}}
+    return Form(lambda size: {"force": size}, 1e-4 * force, reference, largest=0.3 * force)
+
+
+def _restitution(design: Design, rng: Rng) -> Form:
+    return Form(lambda size: {"coefficient": 1.0 - size}, 1e-5, largest=0.5)
+
+
 def _second_mode(design: Design, rng: Rng) -> Form:
     """Faster than a contact; what it adds stays below a third of the depth of contact."""
     omega = design.contact_omega * log_uniform(rng, (1.5, 8.0))
@@ -280,6 +290,8 @@ CATALOGUE_PLANTS: Mapping[str, Plant] = {
     "contact_no_tension": Plant(("contact",), lambda d, r: Form(lambda s: {}, 0.0), 1, slot="end"),
     "contact_relaxation": Plant(("contact",), _relaxation, 1),
     "obstacle_mass": Plant(("contact",), _obstacle_mass, 1, slot="end"),
+    "adhesion": Plant(("contact",), _adhesion, 1, slot="end"),
+    "obstacle_restitution": Plant(("contact",), _restitution, 1),
     "obstacle_mode": Plant(("contact",), _obstacle_mode, 1),
     "base_motion": Plant(("everywhere", "free", "contact"), _base_motion),
     "second_mode": Plant(("contact",), _second_mode, 1),

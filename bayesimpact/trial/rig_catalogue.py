@@ -292,6 +292,16 @@ CATALOGUE: Mapping[str, Planted] = {
         obstacle=True,
         site=lambda site, p: replace(site, unilateral=True, obstacle_mass=p["mass"]),
     ),
+    "adhesion": Planted(
+        ("force",),
+        obstacle=True,
+        site=lambda site, p: replace(site, unilateral=True, adhesion=p["force"]),
+    ),
+    "obstacle_restitution": Planted(
+        ("coefficient",),
+        obstacle=True,
+        site=lambda site, p: replace(site, restitution=p["coefficient"]),
+    ),
     "contact_relaxation": Planted(("stiffness", "time"), obstacle=True, part=_relaxation),
     "obstacle_mode": Planted(("mass", "frequency", "damping"), obstacle=True, part=obstacle_mode),
     "base_motion": Planted(

@@ -143,7 +143,8 @@ class NaiveRig:
             c2 = effects["contact_damping_per_case"]["c2"][release.case]
             self.rig = type(rig)(rig.mass, rig.c1, rig.k1, c2, rig.g, rig.k2)
         self.m2 = effects.get("obstacle_mass", {}).get("mass", 0.0)
-        self.one_sided = "obstacle_mass" in effects or "contact_no_tension" in effects
+        self.one_sided = bool({"obstacle_mass", "contact_no_tension", "adhesion"} & set(effects))
+        self.pull = effects.get("adhesion", {}).get("force", 0.0)
         self.touching = release.y0 > self.gap
         self.stuck = self.released = False
         self.names = (
@@ -252,7 +253,7 @@ class NaiveRig:
         if self.stuck:
             out.append(abs(self.sums(t, state)[0]) <= dry_level(self.e, y, 0.0, self.touching))
         elif self.one_sided and self.touching:
-            out.append(self.reaction(t, state) <= 0)
+            out.append(self.reaction(t, state) <= -self.pull)
         return out
 
     def advance(self, t, h):
@@ -273,7 +274,7 @@ class NaiveRig:
     def events(self, t, old):
         y, v = self.state[:2]
         if self.touching:
-            self.released = self.one_sided and v < 0 and self.reaction(t, self.state) <= 0
+            self.released = self.one_sided and v < 0 and self.reaction(t, self.state) <= -self.pull
             if self.released or (not self.one_sided and y < self.gap):
                 self.touching = False
                 self.gap += self.step
@@ -284,6 +285,7 @@ class NaiveRig:
             ratio = self.e.get("base_motion", {}).get("mass_ratio", 0.0)
             mass = self.rig.mass / (1 + ratio)
             self.state[1] *= mass / (mass + self.m2)
+            self.state[1] *= self.e.get("obstacle_restitution", {}).get("coefficient", 1.0)
             lost = mass * (v - self.state[1])
             self.state[11] += ratio * lost / self.rig.mass
             self.state[7] += self.e.get("second_mode", {}).get("gain", 0.0) * lost

@@ -24,6 +24,8 @@ STRONG = {
     "hunt_crossley": {"exponent": 1.4, "damping": 0.9},
     "contact_no_tension": {},
     "obstacle_mass": {"mass": 0.01},
+    "adhesion": {"force": 1.0},
+    "obstacle_restitution": {"coefficient": 0.9},
     "contact_relaxation": {"stiffness": 600.0, "time": 5e-3},
     "second_mode": {"frequency": 25.0, "damping": 0.03, "gain": 1.5},
     "obstacle_mode": {"mass": 0.03, "frequency": 40.0, "damping": 0.03},
@@ -138,6 +140,7 @@ NULL = {
     "second_mode": {"frequency": 70.0, "damping": 0.03, "gain": 0.0},
     "obstacle_mode": {"mass": 0.0, "frequency": 70.0, "damping": 0.03},
     "base_motion": {"frequency": 15.0, "damping": 0.03, "mass_ratio": 0.0},
+    "obstacle_restitution": {"coefficient": 1.0},
     "gap_wear": {"step": 0.0},
     "gap_per_recording": {"g": {"r": 1.1e-3}},
     "coulomb_friction": {"force": 0.0},
@@ -174,6 +177,12 @@ def test_a_plain_pendulum_is_one_whose_weight_is_all_of_k1():
     assert (
         np.abs(one.displacement - motion(rig, release, rate=50, duration=9).displacement).max() > 1
     )
+
+
+def test_an_obstacle_that_does_not_stick_is_one_that_cannot_pull():
+    dry = motion(PAPER_RIG, RELEASE, {"adhesion": {"force": 0.0}}, rate=1000, duration=1)
+    none = motion(PAPER_RIG, RELEASE, {"contact_no_tension": {}}, rate=1000, duration=1)
+    assert np.array_equal(dry.displacement, none.displacement)
 
 
 def test_massless_obstacle_is_one_that_cannot_pull():

@@ -2,8 +2,9 @@
 
 The mass is free, touches the obstacle, or is separated: beyond the gap though the obstacle, which
 cannot pull, has let go. A contact that cannot pull ends when its reaction, once positive, falls
-through zero, or at the gap if it never was positive. While separated, contact resumes as soon as
-the obstacle would push again (for a gap below zero; else the mass falls back below the gap first).
+through zero (with adhesion: through what that holds), or at the gap if it never was positive. While
+separated, contact resumes as soon as the obstacle would push again (for a gap below zero; else the
+mass falls back below the gap first).
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from bayesimpact.model.added.resonator import (
     share_of_frame,
 )
 from bayesimpact.model.added.world import (
+    ADHESION,
     AHEAD,
     C1,
     C2,
@@ -39,6 +41,7 @@ from bayesimpact.model.added.world import (
     LAW_TRAVEL,
     NO_TENSION,
     NOW,
+    RESTITUTION,
     SECOND_GAIN,
     STAGE,
     TURNED,
@@ -103,7 +106,7 @@ def event_value(event: Any, y: Any, v: Any, t: Any, column: Any, w: Any) -> Any:
         return s[GAP] - y if s[MODE] == FREE else -reaction(y, v, t, column, w)
     if event == LEAVE:
         pushed = one_sided(w.q) and s[PUSHED] != NEVER
-        return reaction(y, v, t, column, w) if pushed else y - s[GAP]
+        return reaction(y, v, t, column, w) + w.q[ADHESION] if pushed else y - s[GAP]
     if event == TURN:
         return v * s[HEADING]
     return s[SIDES + event - SURFACE] * surface_value(event - SURFACE, y, v, t, column, w)
@@ -151,7 +154,7 @@ def begin(w: Any) -> Any:
         s[MODE] = TOUCHING
         push = reaction(y, v, 0.0, NOW, w)
         s[PUSHED] = ONCE if push > 0.0 else NEVER
-        if one_sided(q) and push <= 0.0:
+        if one_sided(q) and push <= -q[ADHESION]:
             s[MODE] = SEPARATED
     set_sides(y, v, 0.0, w)
     if v == 0.0:
@@ -259,7 +262,7 @@ def resolve(event: Any, y: Any, v: Any, t: Any, w: Any) -> Any:
         if s[MODE] == FREE:
             y, before = s[GAP], v
             mass = w.mass * (1.0 - share_of_frame(w))
-            v *= mass / (mass + q[CONTACT_MASS])
+            v *= q[RESTITUTION] * mass / (mass + q[CONTACT_MASS])
             s[SECOND_P] += q[SECOND_GAIN] * mass * (before - v)
         s[MODE] = TOUCHING
         s[PUSHED] = ONCE if reaction(y, v, t, NOW, w) > 0.0 else NEVER

@@ -1,6 +1,7 @@
 """The catalogue: one effect, one file; `EFFECTS` is the only registration."""
 
 from bayesimpact.model.effects import (
+    adhesion,
     base_motion,
     contact_damping_indentation,
     contact_damping_per_case,
@@ -18,6 +19,7 @@ from bayesimpact.model.effects import (
     hysteresis_bouc_wen,
     obstacle_mass,
     obstacle_mode,
+    obstacle_restitution,
     opposite_stop,
     pendulum_sine,
     pendulum_with_spring,
@@ -49,6 +51,8 @@ EFFECTS: tuple[Effect, ...] = (
     hunt_crossley.EFFECT,
     contact_no_tension.EFFECT,
     contact_relaxation.EFFECT,
+    adhesion.EFFECT,
+    obstacle_restitution.EFFECT,
     obstacle_mass.EFFECT,
     obstacle_mode.EFFECT,
     second_mode.EFFECT,
@@ -77,7 +81,7 @@ EFFECTS: tuple[Effect, ...] = (
     presliding_friction.EFFECT,
 )
 
-UNTRIED = ("obstacle_mode", "base_motion")
+UNTRIED = ("obstacle_mode", "base_motion", "adhesion", "obstacle_restitution")
 """Simulated and fitted like any, but not looked for unless asked: trials have not shown yet that
 they are named rightly.
 """

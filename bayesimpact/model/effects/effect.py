@@ -210,8 +210,8 @@ class Effect(Picklable):
     statement : sentence for the report with `{size}` and `{share}` filled in
     needs_stop : True when it makes no sense without an obstacle
     prefer : id of the simpler effect that this one reduces to at its null
-    restates : id of an effect that is the same law in other numbers, for another range of them: the
-        likelier of the two names the law, and the other is no rival
+    restates : id of an effect that is the same law in other numbers, for another range of them: no
+        model holds both, and only their priors tell them apart
     condition : what else a campaign must offer (two obstacles, two impacts, ...); None for nothing
     size : how large it is for given parameters, where the peak of its force along the motion or of
         its change of the readings does not say so

@@ -28,6 +28,8 @@ CONTRACT = {
     "hunt_crossley": ["exponent", "damping"],
     "contact_no_tension": [],
     "contact_relaxation": ["stiffness", "time"],
+    "adhesion": ["force"],
+    "obstacle_restitution": ["coefficient"],
     "obstacle_mass": ["mass"],
     "obstacle_mode": ["mass", "frequency", "damping"],
     "base_motion": ["frequency", "damping", "mass_ratio"],
@@ -62,7 +64,7 @@ DISSIPATIVE = {
     "opposite_stop.stiffness", "spring_piecewise.stiffness", "spring_piecewise.damping",
     "power_damping.coefficient", "structural_damping.loss",
     "obstacle_mode.mass", "base_motion.mass_ratio", "hysteresis_bouc_wen.stiffness",
-    "presliding_friction.force",
+    "presliding_friction.force", "adhesion.force",
 }  # fmt: skip
 OF_ANGLES = {"pendulum_sine", "pendulum_with_spring"}
 SIGNED = {
@@ -198,6 +200,8 @@ def test_families_hold_the_near_neighbours():
         ("spring_cubic", "opposite_stop"),
         ("opposite_stop", "spring_piecewise"),
         ("obstacle_mass", "contact_relaxation"),
+        ("obstacle_mass", "obstacle_restitution"),
+        ("adhesion", "obstacle_mass"),
         ("coulomb_friction", "quadratic_drag"),
         ("quadratic_drag", "power_damping"),
         ("power_damping", "structural_damping"),

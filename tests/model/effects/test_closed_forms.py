@@ -334,3 +334,25 @@ def test_short_presliding_is_dry_friction():
         for way in (1e-5, 1e-6)
     ]
     assert left[0] < 1e-4 and left[0] / left[1] == pytest.approx(10**0.5, rel=0.1)
+
+
+def test_adhesion_keeps_the_energy_of_the_stretched_obstacle():
+    """Without any damping an impact loses F^2 / (2 k2): what the spring holds when it lets go."""
+    rig, force = changed(WALL, duration=0.12), 2.0
+    y = one("adhesion", rig, force=force)
+    speed = (y[-1] - y[-2]) * rig.rate
+    kept = rig.v0[0] ** 2 - force**2 / (rig.k2[0] * rig.mass)
+    assert y[-1] < -force / rig.k2[0] and speed == pytest.approx(-np.sqrt(kept), rel=1e-8)
+    # a pull that is too strong to overcome: the mass stays and swings about the gap
+    held = one("adhesion", rig, force=1.1 * rig.v0[0] * np.sqrt(rig.k2[0] * rig.mass))
+    w = np.sqrt(rig.k2[0] / rig.mass)
+    t = np.arange(rig.count) / rig.rate - 1e-3 / rig.v0[0]
+    expected = np.where(t < 0, rig.v0[0] * t, rig.v0[0] / w * np.sin(w * t))
+    np.testing.assert_allclose(held, expected, rtol=0, atol=1e-11)
+
+
+def test_a_loss_in_the_instant_of_the_touch():
+    rig = changed(WALL, duration=0.12)
+    y = one("obstacle_restitution", rig, coefficient=0.8)
+    assert (y[-1] - y[-2]) * rig.rate == pytest.approx(-0.8 * rig.v0[0], rel=1e-9)
+    assert y.max() == pytest.approx(0.8 * rig.v0[0] * np.sqrt(rig.mass / rig.k2[0]), rel=1e-3)

@@ -41,6 +41,9 @@ COMBINATIONS = (
     ("hysteresis_bouc_wen", "contact_relaxation", "structural_damping"),
     ("presliding_friction", "hunt_crossley", "spring_piecewise", "gap_wear"),
     ("hysteresis_bouc_wen", "coulomb_friction", "harmonic_forcing"),
+    ("adhesion", "obstacle_restitution", "contact_relaxation", "gap_wear"),
+    ("adhesion", "obstacle_mass", "second_mode"),
+    ("obstacle_restitution", "base_motion", "second_mode", "obstacle_mass"),
     ("second_mode", "contact_power_law"),
     ("second_mode", "coulomb_friction"),
     ("obstacle_mode", "base_motion", "contact_no_tension", "quadratic_drag"),
@@ -87,7 +90,7 @@ def test_combinations(names):
         assert np.abs(difference).max() < TOLERANCE
 
 
-@pytest.mark.parametrize("names", COMBINATIONS[:4] + COMBINATIONS[9:18], ids="+".join)
+@pytest.mark.parametrize("names", COMBINATIONS[:4] + COMBINATIONS[9:21], ids="+".join)
 def test_combinations_by_hand(names):
     effects, values = combined(names, PAPER)
     difference = moved(effects, values, PAPER) - by_hand(effects, values, PAPER)

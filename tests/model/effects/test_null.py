@@ -13,7 +13,7 @@ RIG = TestRig(duration=3.0)
 PLAIN = TestRig(k2=(), duration=3.0)
 EXACT = {"contact_damping_per_case", "gap_per_recording"}
 # some have no size, and obstacle_mass reduces to contact_no_tension
-OTHERS = [e for e in EFFECTS if e.has_size and e.id != "obstacle_mass"]
+OTHERS = [e for e in EFFECTS if e.has_size and e.id not in ("obstacle_mass", "adhesion")]
 ALONE = {"contact_no_tension", "pendulum_sine", "hunt_crossley"}
 
 
@@ -50,9 +50,11 @@ def test_no_effect_runs_in_the_exact_simulator():
 def test_a_massless_obstacle_is_one_that_cannot_pull():
     mass, none = BY_ID["obstacle_mass"], BY_ID["contact_no_tension"]
     massless = RIG.readings([mass], {"obstacle_mass.mass": 0.0})
-    for a, b in zip(massless, RIG.readings([none], {}), strict=True):
+    dry = RIG.readings([BY_ID["adhesion"]], {"adhesion.force": 0.0})
+    for a, b, c in zip(massless, RIG.readings([none], {}), dry, strict=True):
         np.testing.assert_array_equal(a, b)
-    assert mass.prefer == none.id
+        np.testing.assert_array_equal(c, b)
+    assert mass.prefer == BY_ID["adhesion"].prefer == none.id
 
 
 def test_all_effects_at_once_at_their_nulls():
