@@ -59,7 +59,7 @@ def directions(fit: Fit, effects: Iterable[Effect], scales: Scales) -> tuple[Dir
     for effect in effects:
         if effect.id in have or is_periodic(effect):
             continue
-        if any(effect.excludes(e) for e in fit.target.oscillator.effects):
+        if not all(map(effect.stands_beside, fit.target.oscillator.effects)):
             continue
         if not effect.admissible(scales):
             continue

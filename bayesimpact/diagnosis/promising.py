@@ -43,11 +43,10 @@ def _is_a_leap(effect: Effect) -> bool:
 def is_redundant(candidate: Candidate, effect: Effect) -> bool:
     """Whether a model has the whole of an effect already, or the effect the whole of one of its.
 
-    An effect without parameters is contained in the one that refines it, a law in its restatement.
+    An effect without parameters is contained in the one that refines it.
     """
     return any(
-        effect.is_same_law(e)
-        or (e.prefer == effect.id and not effect.parameters)
+        (e.prefer == effect.id and not effect.parameters)
         or (effect.prefer == e.id and not e.parameters)
         for e in candidate.effects
     )
@@ -63,9 +62,9 @@ def families(scan: Scan) -> list[list[Score]]:
     for score in scan.best():
         effect = score.effect
         held = by_family.setdefault(effect.family, [])
-        alone = any(effect.excludes(s.effect) for s in held)
+        beside = all(effect.stands_beside(s.effect) for s in held)
         shaped = any(p.circular for p in effect.parameters)
-        if score.gain > 0 and effect.has_size and not shaped and not alone:
+        if score.gain > 0 and effect.has_size and not shaped and beside:
             held.append(score)
     return [held[:JOINT] for held in by_family.values() if len(held) > 1]
 

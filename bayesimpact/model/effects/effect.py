@@ -258,6 +258,10 @@ class Effect(Picklable):
         crossed = (set(self.binds) & set(other.sets)) | (set(self.sets) & set(other.binds))
         return frozenset(fixed | crossed | (set(self.binds) & set(other.binds)))
 
+    def stands_beside(self, other: Effect) -> bool:
+        """True when one model may hold both."""
+        return not (self.excludes(other) or self.is_same_law(other))
+
     def is_same_law(self, other: Effect) -> bool:
         """True for two effects that differ in the names and ranges of their numbers only."""
         return self.restates == other.id or other.restates == self.id
