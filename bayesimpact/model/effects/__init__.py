@@ -81,7 +81,13 @@ EFFECTS: tuple[Effect, ...] = (
     presliding_friction.EFFECT,
 )
 
-UNTRIED = ("obstacle_mode", "base_motion", "adhesion", "obstacle_restitution")
+UNTRIED = (
+    "obstacle_mode",
+    "base_motion",
+    "adhesion",
+    "obstacle_restitution",
+    "presliding_friction",
+)
 """Simulated and fitted like any, but not looked for unless asked: trials have not shown yet that
 they are named rightly.
 """

@@ -3,8 +3,9 @@
 Equation: force a z, z' = v - b |v| z (A = 1: only the product of a and A means something); a in
 N/m, b in 1/m (for angles N m/rad, 1/rad). z depends on the path alone: |z| rises to 1 / b. z = 0 at
 a recording's first sample.
-At its null: a = 0 is the base model; b then means nothing. b -> 0 is a spring, a part of k1; for b
-far above one over the amplitude it is presliding_friction, the same law in other numbers.
+At its null: a = 0 is the base model; b then means nothing. b -> 0 is a spring, a part of k1; b -> inf
+with F = a / b is coulomb_friction, which is simpler and preferred; between them, for b well above
+one over the amplitude, it is presliding_friction, the same law in other numbers.
 Energy: dissipates; a (2 A b - 2 tanh(A b)) 2 / b^2 in a cycle of amplitude A.
 Valid: joints, wire ropes and elastomers whose loop does not depend on the speed; n = 1, loading
 and unloading alike (beta = b, gamma = 0).
@@ -79,5 +80,6 @@ EFFECT = Effect(
         ),
     ),
     law=Law(force, travel=travel, first_at_turn=first_at_turn, ignores_speed=True),
+    prefer="coulomb_friction",
     size=size,
 )
