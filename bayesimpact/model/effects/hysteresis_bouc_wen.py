@@ -3,17 +3,17 @@
 Equation: force a z, z' = v - b |v| z (A = 1: only the product of a and A means something); a in
 N/m, b in 1/m (for angles N m/rad, 1/rad). z depends on the path alone: |z| rises to 1 / b. z = 0 at
 a recording's first sample.
-At its null: a = 0 is the base model; b then means nothing. b -> 0 is a spring, a part of k1; b -> inf
-with F = a / b is coulomb_friction, which is simpler and preferred; between them, for b well above
+At its null: a = 0 is the base model; b then means nothing. b -> 0 is a spring, part of k1; a large
+b with F = a / b is coulomb_friction, which is simpler and preferred; between them, for b well above
 one over the amplitude, it is presliding_friction, the same law in other numbers.
-Energy: dissipates; a (2 A b - 2 tanh(A b)) 2 / b^2 in a cycle of amplitude A.
+Energy: dissipates; 4 a (A b - tanh(A b)) / b^2 in a cycle of amplitude A.
 Valid: joints, wire ropes and elastomers whose loop does not depend on the speed; n = 1, loading
 and unloading alike (beta = b, gamma = 0).
 Its absence shows as a frequency that falls, and a damping that changes, with amplitude, on both
 sides alike, with a loss per cycle that does not depend on the stiffness.
 Source: Bouc 1967, Proc. 4th Conf. Nonlinear Oscillations, Prague; Wen 1976, J. Eng. Mech. Div. ASCE
 102:249.
-Status: the closed form of the path and the loss of a cycle checked; compiled law against two
+Status: the path and its work checked in closed form; compiled law against two
 independent integrators of its rate.
 """
 

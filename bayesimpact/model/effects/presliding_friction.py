@@ -13,7 +13,7 @@ Its absence shows as dry friction at large amplitude, and as a spring s beside k
 goes on once the swing is not larger than x.
 Source: Dahl 1968, Aerospace Corporation report TOR-0158(3107-18)-1; Dahl 1976, AIAA Journal
 14:1675.
-Status: the closed form of the path and the loss of a cycle checked; compiled law against two
+Status: the path and its work checked in closed form; compiled law against two
 independent integrators of its rate. Simulated and fitted, not looked for unless asked:
 hysteresis_bouc_wen finds the law, and beside it dry friction alone was often called ambiguous.
 """
