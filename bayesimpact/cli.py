@@ -29,6 +29,7 @@ from bayesimpact.console import (
     unmade_words,
 )
 from bayesimpact.errors import InputError
+from bayesimpact.fleet.command import fleet
 from bayesimpact.trial.command import trial
 
 
@@ -107,8 +108,8 @@ def new(
     random: --seed is taken for the sake of scripts.
     """
     from bayesimpact.data import draft
+    from bayesimpact.data.quantity import UNITS
     from bayesimpact.data.read import load_campaign
-    from bayesimpact.data.table import UNITS
 
     if unit not in (None, *UNITS):
         raise InputError("--unit", f'"{unit}"', ", ".join(UNITS))
@@ -336,4 +337,5 @@ def effects(ctx: click.Context, own: Path | None, seed: int, quiet: bool) -> Non
             click.echo(f"    {parameter.name} ({parameter.unit}{null}{scope})")
 
 
+main.add_command(fleet)
 main.add_command(trial)

@@ -24,7 +24,8 @@ def write_campaign(
 
     Parameters
     ----------
-    decimals : of a millimetre (or of a milliradian) in the recordings; None: every digit, in m
+    decimals : of a millimetre (or of a milliradian) in the recordings; None: every digit, in SI, as
+        always for velocities and accelerations
     comment : first lines of campaign.toml, without the #
     """
     folder.mkdir(parents=True, exist_ok=True)
@@ -70,15 +71,14 @@ def _named(name: str, file: str) -> list[str]:
 
 
 def _csv(recording: Recording, decimals: int | None) -> str:
-    angle = recording.quantity == "angle"
     times = recording.start + recording.times
     pairs = zip(times.tolist(), recording.samples.tolist(), strict=True)
-    if decimals is None:
-        rows = [f"time_s,{recording.quantity}_{recording.unit}"]
+    if decimals is None or recording.order > 0:
+        rows = [f"time_s,{recording.quantity}_{recording.unit.replace('/', '_')}"]
         rows += [f"{t!r},{sample!r}" for t, sample in pairs]
     else:
-        scale, places = (1.0, decimals + 3) if angle else (1e3, decimals)
-        rows = ["time_s,angle_rad" if angle else "time_s,displacement_mm"]
+        scale, places = (1.0, decimals + 3) if recording.angular else (1e3, decimals)
+        rows = ["time_s,angle_rad" if recording.angular else "time_s,displacement_mm"]
         rows += [f"{t:.12g},{sample * scale:.{places}f}" for t, sample in pairs]
     return "\n".join(rows) + "\n"
 

@@ -19,13 +19,14 @@ from scipy import stats
 from scipy.linalg import null_space, toeplitz
 from scipy.optimize import minimize_scalar
 
-from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.campaign import Campaign, Smoothing
 from bayesimpact.data.faults.flat import reading_step
 from bayesimpact.data.gaps import runs
 from bayesimpact.data.hum import Hum, find_hum
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 from bayesimpact.inference.noise import Noise
+from bayesimpact.response.displacement import displacement_of
 from bayesimpact.response.swings import rough_period
 
 Array = NDArray[np.float64]
@@ -51,21 +52,35 @@ class _Remainder:
 
 
 def estimate_noise(campaign: Campaign) -> Noise:
-    """Level and AR(1) correlation of the raw noise, pooled over recordings.
+    """Level and AR(1) correlation of the raw noise, pooled over recordings of one quantity.
+
+    Where there are several quantities, the correlation is that of the first recording's.
 
     For recordings that were smoothed the remainders say what the filter left; the raw level is
     scaled up by the filter's power (see `smoothed_level`).
     """
     known, smoothing = campaign.measurement.noise, campaign.measurement.smoothing
-    if smoothing is not None:
-        from bayesimpact.inference.spectrum import smoothed_noise
-
-        noise = smoothed_noise(campaign.recordings, smoothing)
-    else:
-        noise = raw_noise(campaign.recordings)
+    orders = list(dict.fromkeys(r.order for r in campaign.recordings))
+    found = {
+        order: _of_one([r for r in campaign.recordings if r.order == order], smoothing)
+        for order in orders
+    }
+    noise = found[orders[0]]
+    if len(found) > 1:
+        first, second, third = (found.get(o, noise).level / noise.level for o in range(3))
+        return replace(noise, scales=(first, second, third))
     if known is None:
         return noise
     return Noise(noise.correlation, smoothing, known, 0.0, noise.correlation_error, "campaign.toml")
+
+
+def _of_one(recordings: Sequence[Recording], smoothing: Smoothing | None) -> Noise:
+    """Of recordings of one quantity, behind a filter or none."""
+    if smoothing is None:
+        return raw_noise(recordings)
+    from bayesimpact.inference.spectrum import smoothed_noise
+
+    return smoothed_noise(recordings, smoothing)
 
 
 def raw_noise(recordings: Sequence[Recording]) -> Noise:
@@ -111,7 +126,8 @@ def _remainder(
     recordings: Sequence[Recording], hums: Sequence[Hum | None], per_period: float
 ) -> _Remainder | None:
     lengths = [
-        int(np.clip(rough_period(r.samples) / per_period, SMALLEST, LARGEST)) for r in recordings
+        int(np.clip(rough_period(r.samples, r.order) / per_period, SMALLEST, LARGEST))
+        for r in recordings
     ]
     length = min(lengths)
     powers = np.vander(np.linspace(-1, 1, length), DEGREE + 1)
@@ -137,7 +153,7 @@ def _without_hum(recording: Recording, hum: Hum | None, windows: Windows, basis:
     Amplitude and phase may drift by a line through the recording: an error of the frequency, to
     first order.
     """
-    values = _centred(recording)[windows] @ basis
+    values = _centred(recording.samples)[windows] @ basis
     if hum is None or values.size < 8 * HUM_COLUMNS:
         return np.asarray(values)
     times = recording.times
@@ -149,18 +165,18 @@ def _without_hum(recording: Recording, hum: Hum | None, windows: Windows, basis:
     return np.asarray(values - (columns @ found).reshape(values.shape))
 
 
-def _centred(recording: Recording) -> Array:
-    """Readings (n,) from where they settle."""
-    samples = recording.samples
+def _centred(samples: Array) -> Array:
+    """Samples (n,) from where they settle."""
     return samples - float(np.median(samples[-max(samples.size // 5, 1) :]))
 
 
 def _windows(recording: Recording, length: int, side: bool) -> Windows:
     """Samples of windows (count, length); with `side`, only of those on a stop's free side."""
-    centred = _centred(recording)
-    free = np.ones(centred.size, dtype=bool)
+    free = np.ones(recording.samples.size, dtype=bool)
     if side:
-        free = centred < -MARGIN * np.abs(centred).max()
+        derived = recording.order > 0
+        moved = _centred(displacement_of(recording).samples if derived else recording.samples)
+        free = moved < -MARGIN * np.abs(moved).max()
     if recording.used is not None:
         free = free & recording.used
     starts = [

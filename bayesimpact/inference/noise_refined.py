@@ -82,7 +82,8 @@ def refined_noise(fit: Fit) -> Noise:
     motion.
     """
     noise = fit.target.likelihood.noise
-    if (noise.correlation == 0.0 and noise.smoothing is None) or fit.reduced_chi2 > GROSS:
+    plain = noise.correlation == 0.0 and noise.smoothing is None
+    if plain or fit.reduced_chi2 > GROSS or fit.target.oscillator.campaign.mixed:
         return noise
     found = _ordinates(fit, lowest := ABOVE * fastest_frequency(fit))
     if found.power.size < LEAST_ORDINATES:

@@ -49,17 +49,19 @@ def find_events(
 ) -> tuple[Floats, int]:
     """Return (events, code): all events of one recording, in `events` if there is room."""
     nothing = np.empty(0)
-    _, count, code = run(q, mass, interval, n, Sink(no_data, nothing, nothing, events), mine)
+    _, count, code = run(
+        q, mass, interval, n, Sink(no_data, nothing, nothing, events, 0, 1.0), mine
+    )
     if count > events.shape[0] and code == OK:
         events = np.empty((count, 2))
-        run(q, mass, interval, n, Sink(no_data, nothing, nothing, events), mine)
+        run(q, mass, interval, n, Sink(no_data, nothing, nothing, events, 0, 1.0), mine)
     return events[:count], code
 
 
 @compiled(nogil=True)
 def work(
     theta: Floats, columns: Ints, constants: Floats, mass: float, samples: Floats, starts: Ints,
-    counts: Ints, intervals: Floats, size: int, rows: Span, items: Span, out: Floats,
+    counts: Ints, intervals: Floats, orders: Ints, size: int, rows: Span, items: Span, out: Floats,
     values: Floats, jacobian: Floats, codes: Ints,
 ) -> None:  # fmt: skip
     """Fill one share of `codes` (B, R), and of the Gram matrices `out` (B, R, 12, 12).
@@ -87,7 +89,7 @@ def work(
             events, code = find_events(q, mass, intervals[r], n, samples[:0], first_events, mine)
             if code == OK:
                 sweep(
-                    q, mass, intervals[r], n, events,
+                    q, mass, intervals[r], n, orders[r], events,
                     wanted(active, columns[r], size > PLAIN), data, own, slopes, gram, room,
                 )  # fmt: skip
                 if not math.isfinite(gram.sum() + own.sum() + slopes.sum()):
@@ -107,6 +109,7 @@ def trajectories_and_derivatives(
     counts: ArrayLike,
     intervals: ArrayLike,
     n_total: int,
+    orders: ArrayLike | None = None,
 ) -> tuple[Floats, Floats, Ints]:
     """Predict all recordings, offset included, with the derivatives of every sample.
 
@@ -117,7 +120,8 @@ def trajectories_and_derivatives(
     (n_total,) values, m; (n_total, 11) derivatives with respect to the q of the recording, SI
     units, 0 for the q that are constants; (R,) codes. Failed recordings are nan.
     """
-    model = check_model(np.atleast_2d(np.asarray(theta)), columns, constants, intervals, counts)
+    thetas = np.atleast_2d(np.asarray(theta))
+    model = check_model(thetas, columns, constants, intervals, counts, orders)
     if len(model.theta) != 1:
         raise InputError("theta", f"shape {model.theta.shape}", "one parameter vector")
     if int(model.counts.sum()) != n_total:
@@ -136,6 +140,7 @@ def grams(
     starts: ArrayLike,
     counts: ArrayLike,
     intervals: ArrayLike,
+    orders: ArrayLike | None = None,
 ) -> tuple[Floats, Ints]:
     """Gram matrices of [J | residual] of every recording, without storing J.
 
@@ -148,7 +153,7 @@ def grams(
     codes; without the leading B for a theta (d,).
     """
     thetas = np.atleast_2d(np.asarray(theta, dtype=np.float64))
-    model = check_model(thetas, columns, constants, intervals, counts)
+    model = check_model(thetas, columns, constants, intervals, counts, orders)
     data, first = check_samples(samples, starts, model)
     out = np.empty((len(model.theta), len(model.columns), 12, 12))
     codes = _work(model, mass, data, first, out, np.empty(0), np.empty((0, 11)))
@@ -167,7 +172,7 @@ def _work(
     forced = np.any(model.columns[:, A] >= 0) or np.any(model.constants[:, A] != 0.0)
     before = (
         model.theta, model.columns, model.constants, float(mass), data, first, model.counts,
-        model.intervals, FORCED if forced else PLAIN,
+        model.intervals, model.orders, FORCED if forced else PLAIN,
     )  # fmt: skip
 
     by_rows = batch >= recordings

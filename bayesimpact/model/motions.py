@@ -1,4 +1,7 @@
-"""Many trajectories in one compiled call: one row per slot vector, whatever its recording."""
+"""Many trajectories in one compiled call: one row per slot vector, whatever its recording.
+
+`orders` (K,) says which time derivative of the displacement a row is to hold: 0, 1 or 2.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +18,8 @@ Counts = NDArray[np.int64]
 _OFFSET = BASE_SLOTS.index("offset")
 
 
-def motions(q: Array, mass: float, counts: Counts, intervals: Array) -> Array:
-    """True displacements (K, max counts), m, of base oscillators with slots (K, 11).
+def motions(q: Array, mass: float, counts: Counts, intervals: Array, orders: Counts) -> Array:
+    """True displacements (K, max counts), m (or derivatives), of base oscillators, slots (K, 11).
 
     Rows are NaN where the parameters are inadmissible, and beyond their own count.
     """
@@ -25,7 +28,7 @@ def motions(q: Array, mass: float, counts: Counts, intervals: Array) -> Array:
     columns = np.arange(base.size, dtype=np.int64).reshape(base.shape)
     total = int(counts.sum())
     flat, codes = predictions(
-        base.reshape(1, -1), columns, np.zeros(base.shape), mass, counts, intervals, total
+        base.reshape(1, -1), columns, np.zeros(base.shape), mass, counts, intervals, total, orders
     )
     shape = (q.shape[0], int(counts.max()))
     if total == shape[0] * shape[1]:
@@ -38,11 +41,11 @@ def motions(q: Array, mass: float, counts: Counts, intervals: Array) -> Array:
 
 
 def general_motions(
-    q: Array, mass: float, counts: Counts, intervals: Array, laws: NDArray[np.int64]
+    q: Array, mass: float, counts: Counts, intervals: Array, laws: NDArray[np.int64], orders: Counts
 ) -> Array:
     """The same for oscillators with added effects: slots (K, Q), table of laws (L, 7)."""
     out = np.empty((q.shape[0], int(counts.max())))
-    codes = integrate_many(q, mass, intervals, counts, laws, out)
+    codes = integrate_many(q, mass, intervals, counts, laws, out, orders=orders)
     out[np.arange(out.shape[1]) >= counts[:, None]] = np.nan
     out[codes != 0] = np.nan
     return out

@@ -78,6 +78,8 @@ def loud_recordings(recordings: Sequence[Recording]) -> list[Fault]:
     """Notices of recordings whose noise is three times the usual one of the campaign, or more."""
     levels = np.array([noise_level(r.samples) for r in recordings])
     usual = float(np.median(levels))
+    if len({r.quantity for r in recordings}) > 1:
+        return []
     if len(recordings) < 3 or usual == 0.0:
         return []
     return [
