@@ -87,6 +87,7 @@ UNTRIED = (
     "adhesion",
     "obstacle_restitution",
     "presliding_friction",
+    "spring_piecewise",
 )
 """Simulated and fitted like any, but not looked for unless asked: trials have not shown yet that
 they are named rightly.
