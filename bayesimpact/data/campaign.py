@@ -126,7 +126,8 @@ class Campaign(Picklable):
         recordings : one or more, each a `Recording` (SI units) or a mapping with the keys of a
             [[recording]]: `name`, `case`, `samples` (n,) and their `unit` (m, mm, um, rad, deg),
             and either `times_s` (n,), evenly spaced unless `resample` is true, or
-            `sample_rate_hz`; `start_s`, `end_s`; `used` (n,), False where a sample is set aside
+            `sample_rate_hz`; `start_s`, `end_s`; `used` (n,), False where a sample is set aside;
+            `input` with its own `samples` (n,), SI units, and `kind`, `gain` as in campaign.toml
         name, mass_kg, tables : any other key of campaign.toml, as there: `stop = False`,
             `measurement = {"noise_um": 5.0}`, `priors = {"k1": {...}}`, `beam`, ...
 
@@ -206,13 +207,16 @@ class Campaign(Picklable):
         return replace(self, recordings=kept)
 
     def thinned(self, interval: float) -> Campaign:
-        """The same campaign, thinned to samples about `interval` seconds apart."""
+        """The same campaign, thinned to samples about `interval` seconds apart.
+
+        Recordings with an input stay as they are: between samples it has to be known.
+        """
         kept = []
         for r in self.recordings:
-            step = max(1, int(interval / r.interval))
+            step = 1 if r.input is not None else max(1, int(interval / r.interval))
             used = None if r.used is None else r.used[::step]
-            samples, interval = r.samples[::step], r.interval * step
-            kept.append(replace(r, samples=samples, interval=interval, used=used))
+            samples, spacing = r.samples[::step], r.interval * step
+            kept.append(replace(r, samples=samples, interval=spacing, used=used))
         return replace(self, recordings=tuple(kept))
 
 

@@ -82,9 +82,7 @@ def applied(recording: Recording, faults: Sequence[Fault]) -> tuple[Recording, i
         raise ValueError(f"{end - first} of {recording.samples.size} samples left")
     if (first, end) == (0, recording.samples.size):
         return rest, 0
-    used = None if rest.used is None else rest.used[first:end]
-    start = recording.start + first * recording.interval
-    return replace(rest, samples=rest.samples[first:end], used=used, start=start), first
+    return rest.part(first, end), first
 
 
 def set_aside(campaign: Campaign) -> tuple[Campaign, tuple[Fault, ...]]:
