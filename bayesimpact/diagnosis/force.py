@@ -294,7 +294,10 @@ def _change(
     points[1 + np.arange(2 * knots), columns] += steps
     intervals = np.full(points.shape[0], oscillator.intervals[r])
     counts = np.full(points.shape[0], n, dtype=np.int64)
-    out = general_motions(points, oscillator.campaign.mass, counts, intervals, laws)
+    inputs = oscillator.inputs
+    if inputs is not None:
+        inputs = inputs.of(np.full(points.shape[0], r))
+    out = general_motions(points, oscillator.campaign.mass, counts, intervals, laws, inputs)
     return np.asarray(out[1:] - out[0])
 
 

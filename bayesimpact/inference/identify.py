@@ -226,7 +226,7 @@ class _Profile:
         s = self.short
         sums, _ = sums_of_squares(
             np.ascontiguousarray(theta), self.columns, self.constants, s.campaign.mass, s.samples,
-            s.starts, s.counts, s.intervals,
+            s.starts, s.counts, s.intervals, s.inputs,
         )  # fmt: skip
         return np.asarray(sums.sum(axis=1))
 
@@ -234,7 +234,7 @@ class _Profile:
         s = self.short
         matrices, codes = grams(
             np.ascontiguousarray(theta), self.columns, self.constants, s.campaign.mass, s.samples,
-            s.starts, s.counts, s.intervals,
+            s.starts, s.counts, s.intervals, s.inputs,
         )  # fmt: skip
         failed = (codes != 0) | ~np.isfinite(matrices).all(axis=(2, 3))
         matrices[failed] = np.eye(matrices.shape[-1]) * 1e300

@@ -103,6 +103,7 @@ class Likelihood:
                 o.starts,
                 o.counts,
                 o.intervals,
+                o.inputs,
             )
             return np.asarray(sums)
         sums = np.empty((theta.shape[0], o.counts.size))
@@ -172,7 +173,7 @@ class Likelihood:
         constants = np.ascontiguousarray(o.layout.constants[:, base])
         values, slopes, codes = trajectories_and_derivatives(
             np.ascontiguousarray(theta), columns, constants, o.campaign.mass, o.counts, o.intervals,
-            int(o.counts.sum()),
+            int(o.counts.sum()), o.inputs,
         )  # fmt: skip
         result = []
         for r, (start, n) in enumerate(zip(o.starts, o.counts, strict=True)):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.model.arguments import Inputs
 from bayesimpact.model.general import integrate_many
 from bayesimpact.model.parameters import BASE_SLOTS
 from bayesimpact.model.simulate import predictions
@@ -15,17 +16,20 @@ Counts = NDArray[np.int64]
 _OFFSET = BASE_SLOTS.index("offset")
 
 
-def motions(q: Array, mass: float, counts: Counts, intervals: Array) -> Array:
+def motions(
+    q: Array, mass: float, counts: Counts, intervals: Array, inputs: Inputs | None = None
+) -> Array:
     """True displacements (K, max counts), m, of base oscillators with slots (K, 11).
 
-    Rows are NaN where the parameters are inadmissible, and beyond their own count.
+    `inputs` are the rows' measured forces, where they have any. Rows are NaN where the parameters
+    are inadmissible, and beyond their own count.
     """
     base = q.copy()
     base[:, _OFFSET] = 0.0
     columns = np.arange(base.size, dtype=np.int64).reshape(base.shape)
     total = int(counts.sum())
     flat, codes = predictions(
-        base.reshape(1, -1), columns, np.zeros(base.shape), mass, counts, intervals, total
+        base.reshape(1, -1), columns, np.zeros(base.shape), mass, counts, intervals, total, inputs
     )
     shape = (q.shape[0], int(counts.max()))
     if total == shape[0] * shape[1]:
@@ -38,11 +42,16 @@ def motions(q: Array, mass: float, counts: Counts, intervals: Array) -> Array:
 
 
 def general_motions(
-    q: Array, mass: float, counts: Counts, intervals: Array, laws: NDArray[np.int64]
+    q: Array,
+    mass: float,
+    counts: Counts,
+    intervals: Array,
+    laws: NDArray[np.int64],
+    inputs: Inputs | None = None,
 ) -> Array:
     """The same for oscillators with added effects: slots (K, Q), table of laws (L, 7)."""
     out = np.empty((q.shape[0], int(counts.max())))
-    codes = integrate_many(q, mass, intervals, counts, laws, out)
+    codes = integrate_many(q, mass, intervals, counts, laws, out, inputs)
     out[np.arange(out.shape[1]) >= counts[:, None]] = np.nan
     out[codes != 0] = np.nan
     return out
