@@ -9,6 +9,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
 
+import numpy as np
+
 from bayesimpact.data.frozen import Picklable
 from bayesimpact.data.recording import Recording
 
@@ -205,6 +207,22 @@ class Campaign(Picklable):
             for r in self.recordings
         )
         return replace(self, recordings=kept)
+
+    def excerpt(self, duration: float) -> Campaign:
+        """The first `duration` seconds of every recording; of driven ones, the largest motion.
+
+        An input may begin with rest.
+        """
+        kept = []
+        for r in self.truncated(duration).recordings:
+            whole = next(other for other in self.recordings if other.name == r.name)
+            if r.input is None:
+                kept.append(r)
+                continue
+            power = np.cumsum(np.concatenate([[0.0], (whole.samples - whole.samples.mean()) ** 2]))
+            first = int(np.argmax(power[r.samples.size :] - power[: -r.samples.size]))
+            kept.append(whole.part(first, first + r.samples.size))
+        return replace(self, recordings=tuple(kept))
 
     def thinned(self, interval: float) -> Campaign:
         """The same campaign, thinned to samples about `interval` seconds apart.

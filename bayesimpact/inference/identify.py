@@ -97,20 +97,31 @@ def identify(
     priors = default_priors(oscillator, estimates, noise)
     guess = initial_theta(oscillator, estimates, noise)
     target = Target(Likelihood(oscillator, noise), priors)
-    from_guess = growing_horizon(target, guess)
+    from_guess = _climbed(target, guess)
     result = from_search = None
     if search:
         result, start = global_search(
             oscillator, priors, guess, rng=rng, evaluations=evaluations, callback=callback
         )
-        from_search = growing_horizon(target, start)
+        from_search = _climbed(target, start)
     ends = [fit for fit in (from_guess, from_search) if fit is not None]
     best = max(ends, key=lambda fit: fit.log_posterior)
     refined = noise if given else refined_noise(best)
-    if refined != noise:
+    if refined is not noise:
         noise = refined
         best = find_mode(Target(Likelihood(oscillator, noise), priors), best.mode)
     return Identification(best, estimates, noise, result, from_guess, from_search)
+
+
+def _climbed(target: Target, start: Array) -> Fit:
+    """The mode over growing horizons or, where an input drives a recording, at once if better.
+
+    The first stretch of an input may tell nothing, and a driven motion forgets how it began.
+    """
+    grown = growing_horizon(target, start)
+    if target.oscillator.inputs is None:
+        return grown
+    return max(find_mode(target, start), grown, key=lambda fit: fit.log_posterior)
 
 
 def initial_theta(oscillator: Oscillator, estimates: Estimates, noise: Noise) -> Array:
@@ -149,7 +160,11 @@ def global_search(
         evaluations=evaluations or 1000 * lower.size,
         callback=callback,
     )
-    return result, profile.complete(result.best[None])[0]
+    winner = profile.complete(result.best[None])[0]
+    driven = [r.input is not None for r in oscillator.campaign.recordings]
+    own = profile.columns[driven][:, NUISANCE_SLOTS]
+    winner[own] = guess[own]  # the excerpt of a driven recording begins somewhere
+    return result, winner
 
 
 def _within(
@@ -170,7 +185,7 @@ class _Profile:
 
     def __init__(self, oscillator: Oscillator, guess: Array, duration: float) -> None:
         layout = oscillator.layout
-        short = oscillator.campaign.truncated(duration).thinned(duration / SEARCH_SAMPLES)
+        short = oscillator.campaign.excerpt(duration).thinned(duration / SEARCH_SAMPLES)
         self.short = Oscillator(short, (), layout, None)
         self.guess = guess
         self.physical = layout.roles("physical")

@@ -46,6 +46,7 @@ class Noise:
     level_error : relative standard error of `level`
     correlation_error : standard error of `correlation`
     source : how it was estimated, in words
+    is_bound : the level is known to be no more than this; it may be less
     """
 
     correlation: float = 0.0
@@ -54,6 +55,7 @@ class Noise:
     level_error: float = field(default=float("nan"), compare=False)
     correlation_error: float = field(default=float("nan"), compare=False)
     source: str = "assumed"
+    is_bound: bool = field(default=False, compare=False)
 
     @property
     def is_white(self) -> bool:

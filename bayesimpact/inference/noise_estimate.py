@@ -24,6 +24,7 @@ from bayesimpact.data.gaps import runs
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise_driven import driven_noise
 from bayesimpact.response.swings import rough_period
 
 Array = NDArray[np.float64]
@@ -49,8 +50,9 @@ class _Remainder:
 def estimate_noise(campaign: Campaign) -> Noise:
     """Level and AR(1) correlation of the raw noise, pooled over recordings.
 
-    For recordings that were smoothed the remainders say what the filter left; the raw level is
-    scaled up by the filter's power (see `smoothed_level`).
+    Free decays tell it best: recordings with a measured input only where there is none (see
+    `driven_noise`). For recordings that were smoothed the remainders say what the filter left; the
+    raw level is scaled up by the filter's power (see `smoothed_level`).
     """
     known, smoothing = campaign.measurement.noise, campaign.measurement.smoothing
     if smoothing is not None:
@@ -58,7 +60,10 @@ def estimate_noise(campaign: Campaign) -> Noise:
 
         noise = smoothed_noise(campaign.recordings, smoothing)
     else:
-        noise = raw_noise(campaign.recordings)
+        free = [r for r in campaign.recordings if r.input is None]
+        noise = raw_noise(free or campaign.recordings)
+        if not free:
+            noise = driven_noise(campaign.recordings, noise)
     if known is None:
         return noise
     return Noise(noise.correlation, smoothing, known, 0.0, noise.correlation_error, "campaign.toml")

@@ -209,17 +209,20 @@ def test_the_gain_is_an_unknown_only_where_it_is_free() -> None:
 @pytest.mark.parametrize(("beta", "K"), [(1e-4, 1e-5), (0.02, 0.2), (0.4, 3.0), (5.0, 0.7)])
 @pytest.mark.parametrize("t", [1e-3, 0.4, 1.0, 3.0])
 def test_responses_are_what_they_say(beta: float, K: float, t: float) -> None:
-    with mpmath.workdps(60):
+    # y' = v, v' = -K y - beta v + input, for the inputs 0 (S), 1 (B) and t (R), S (G), their
+    # integrals (P, Q), as one linear system
+    with mpmath.workdps(40):
+        A = mpmath.zeros(10)
         b, k = mpmath.mpf(beta), mpmath.mpf(K)
-        root = mpmath.sqrt(mpmath.mpc(k - b * b / 4))
-
-        def S(s: object) -> object:
-            return mpmath.exp(-b * s / 2) * mpmath.sin(root * s) / root
-
-        step = mpmath.quad(S, [0, t])
-        ramp = mpmath.quad(lambda s: (t - s) * S(s), [0, t])
-        G = mpmath.quad(lambda s: S(s) * S(t - s), [0, t])
-        P = mpmath.quad(lambda s: S(s) * mpmath.quad(S, [0, t - s]), [0, t])
-        exact = [float(mpmath.re(x)) for x in (S(t), step, ramp, G, P)]
+        A[0, 1], A[1, 0], A[1, 1] = 1, -k, -b  # S, S'
+        A[2, 0] = 1  # B is the integral of S
+        A[3, 2] = 1  # R of B
+        A[4, 5], A[5, 4], A[5, 5], A[5, 0] = 1, -k, -b, 1  # G, G'
+        A[6, 4] = 1
+        A[7, 6] = 1
+        state = mpmath.expm(A * mpmath.mpf(t), method="taylor")[:, 1]
+        exact = [float(state[i]) for i in (0, 1, 2, 3, 4, 5, 6, 7)]
     found = responses(beta, K, t)
-    np.testing.assert_allclose([found.S, found.B, found.R, found.G, found.P], exact, rtol=1e-10)
+    names = ("S", "D", "B", "R", "G", "H", "P", "Q")
+    values = [getattr(found, name) for name in names]
+    np.testing.assert_allclose(values, exact, rtol=1e-9)

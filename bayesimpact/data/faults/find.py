@@ -30,11 +30,16 @@ DETECTORS: tuple[Callable[[Recording], list[Fault]], ...] = (
 """In this order, each on the recording without what the earlier ones found."""
 
 
+FREE: tuple[Callable[[Recording], list[Fault]], ...] = (find_start, find_noise)
+"""Those that know a free decay only: under an input, rest and loud parts are what it makes them."""
+DRIVEN = tuple(detector for detector in DETECTORS if detector not in FREE)
+
+
 def find_faults(campaign: Campaign) -> tuple[Fault, ...]:
     """Everything found in the recordings themselves, in their order; sample numbers as read."""
     found = [fault for r in campaign.recordings for fault in recording_faults(r)]
     found += find_duplicates(campaign.recordings)
-    found += loud_recordings(campaign.recordings)
+    found += loud_recordings([r for r in campaign.recordings if r.input is None])
     order = [r.name for r in campaign.recordings]
     return tuple(sorted(found, key=lambda fault: order.index(fault.recording)))
 
@@ -43,7 +48,7 @@ def recording_faults(recording: Recording) -> list[Fault]:
     """What is wrong with one recording, from itself alone."""
     found: list[Fault] = []
     rest, offset = recording, 0
-    for detector in DETECTORS:
+    for detector in DETECTORS if recording.input is None else DRIVEN:
         new = [_shifted(fault, offset) for fault in detector(rest)]
         new = [fault for fault in new if _fresh(recording, fault)]
         found += new
