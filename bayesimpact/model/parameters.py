@@ -197,7 +197,7 @@ def _add_physical(campaign: Campaign, binds: object, add: object) -> None:
     for case in campaign.cases:
         add(f"k2[{case}]", "N/m", "physical", 0.0)
     if any(r.input is not None and r.input.free for r in campaign.recordings):
-        add(INPUT_GAIN, "1", "physical")
+        add(INPUT_GAIN, "-", "physical")
 
 
 def _maps(

@@ -180,6 +180,7 @@ def recording_results(fit: Fit) -> tuple[RecordingResult, ...]:
                 start=recording.start,
                 samples=np.asarray(recording.samples),
                 excluded=() if recording.used is None else tuple(runs(~recording.used)),
+                input="" if recording.input is None else recording.input.kind,
                 predicted=np.asarray(predicted),
                 sigma=float(fit.mode[likelihood.sigma_columns[r]]),
                 noise_rms=_noise_rms(likelihood.noise, recording.interval),

@@ -32,6 +32,7 @@ class RecordingResult:
     reduced_chi2 : whitened misfit against the noise level estimated from the recordings alone
     whiteness_p : p-value that the whitened residual is white
     excluded : first and last-plus-one sample of every span that is set aside
+    input : kind of the measured input, "" for a free decay
     """
 
     name: str
@@ -45,6 +46,7 @@ class RecordingResult:
     reduced_chi2: float
     whiteness_p: float
     excluded: tuple[tuple[int, int], ...] = ()
+    input: str = ""
 
     @property
     def times(self) -> Array:
