@@ -7,7 +7,8 @@ Trans. ASME 79:1579):
     int m phi'' y - c1 phi' y + k1 phi y + k2 phi w - c2 phi' w = int phi u,     w = max(y - g, 0)
 
 for (y - g)' = w' in contact. So no reading is differentiated, initial conditions do not enter, and
-all unknowns but the gap are found by linear least squares over many stretches; the gap is scanned.
+all unknowns but the gap are found by linear least squares over many stretches; the reading at which
+a recording touches the stop is scanned, for each by itself.
 """
 
 from __future__ import annotations
@@ -28,9 +29,10 @@ POWER = 6  # of the bump (1 - x^2)^POWER: smooth enough for sums over samples to
 FREE, STOPPED = 0.6, 0.2  # half width of the bump, natural periods, without and with a stop
 LEAST_HALF = 4  # samples
 ROUNDS = 3
-GAPS = 41  # gaps that are tried at once, between these quantiles of the motion
+PLACES = 41  # of the stop that are tried at once, between these quantiles of the readings
 LOW, HIGH = 0.02, 0.98
-FINER = 3  # rounds in which the spacing of the gaps shrinks
+FINER = 3  # rounds in which their spacing shrinks
+SEEN = 1.5  # times less is left, in squares, where a stop is seen
 LEAST_DAMPING = 1e-3  # damping ratio
 STARTING = 1 / 6  # of a natural period: readings that tell the initial motion
 
@@ -73,20 +75,16 @@ class _Rows:
 def estimate_driven(campaign: Campaign) -> Driven:
     """Estimates from all recordings of a campaign, free decays among them."""
     recordings = campaign.recordings
-    periods = [rough_period(r.samples) * r.interval for r in recordings]
-    natural = float(np.median(periods))
-    found, offsets = None, np.array([float(np.median(r.samples)) for r in recordings])
-    for _ in range(ROUNDS):
+    natural = float(np.median([rough_period(r.samples) * r.interval for r in recordings]))
+    touch = np.full(len(recordings), np.inf)
+    for _ in range(ROUNDS):  # the width of the bumps follows the natural period
         width = (STOPPED if campaign.stop else FREE) * natural
         rows = [_rows(r, campaign.mass, width) for r in recordings]
-        gap = np.inf
         if campaign.stop:
-            gap = _best_gap(campaign, rows, offsets)
-        found = _solve(campaign, rows, offsets, gap)
+            touch = np.array([_touch(campaign, r, own) for r, own in enumerate(rows)])
+        found = _solve(campaign, rows, touch)
         stiffness = found.k1 if found.k1 > 0.0 else campaign.mass * (2 * np.pi / natural) ** 2
         natural = 2 * np.pi * float(np.sqrt(campaign.mass / stiffness))
-        offsets = found.offset
-    assert found is not None
     return _made_usable(campaign, found, stiffness)
 
 
@@ -128,16 +126,18 @@ def _products(x: Floats, hop: int, *weights: Floats) -> Floats:
 
 
 def _system(
-    campaign: Campaign, rows: Sequence[_Rows], offsets: Floats, gap: float
+    campaign: Campaign, chosen: Sequence[int], rows: Sequence[_Rows], touch: Floats
 ) -> tuple[Floats, Floats]:
-    """Matrix and right-hand side; unknowns k1, c1, gain, [c2, k2 of every case], k1 times offsets.
+    """Matrix and right-hand side of the recordings `chosen`, whose rows and readings at the touch
+    these are; unknowns k1, c1, gain, [c2, k2 of every case], k1 times offsets.
 
     Where no gain is free, its column is 0.
     """
     cases = campaign.cases
     first = 3 + (1 + len(cases) if campaign.stop else 0)
     blocks, right = [], []
-    for r, (recording, own) in enumerate(zip(campaign.recordings, rows, strict=True)):
+    for i, (r, own) in enumerate(zip(chosen, rows, strict=True)):
+        recording = campaign.recordings[r]
         block = np.zeros((own.target.size, first + len(rows)))
         block[:, :2] = own.base[:, :2]
         target = own.target
@@ -145,13 +145,13 @@ def _system(
             block[:, 2] = -own.base[:, 2]
         else:
             target = target + own.base[:, 2]
-        if campaign.stop:
-            inside = np.maximum(recording.samples - offsets[r] - gap, 0.0)
+        if np.isfinite(touch[i]):
+            inside = np.maximum(recording.samples - touch[i], 0.0)
             touched = _products(inside, own.hop, own.phi, own.slope)
             touched[own.base[:, 3] == 0.0] = 0.0
             block[:, 3] = touched[:, 1]
             block[:, 4 + cases.index(recording.case)] = touched[:, 0]
-        block[:, first + r] = -own.base[:, 3]
+        block[:, first + i] = -own.base[:, 3]
         blocks.append(block)
         right.append(target)
     return np.concatenate(blocks), np.concatenate(right)
@@ -167,31 +167,41 @@ def _least_squares(matrix: Floats, right: Floats) -> tuple[Floats, float]:
     return np.where(size > 0.0, solution / np.where(size > 0.0, size, 1.0), 0.0), float(left @ left)
 
 
-def _best_gap(campaign: Campaign, rows: Sequence[_Rows], offsets: Floats) -> float:
-    moved = np.concatenate(
-        [r.samples - o for r, o in zip(campaign.recordings, offsets, strict=True)]
-    )
-    low, high = np.quantile(moved, [LOW, HIGH])
-    best = float(high)
+def _touch(campaign: Campaign, r: int, own: _Rows) -> float:
+    """Reading at which a recording, by itself, touches the stop; inf where none is seen."""
+
+    def left(touch: float) -> float:
+        return _least_squares(*_system(campaign, [r], [own], np.array([touch])))[1]
+
+    low, high = np.quantile(campaign.recordings[r].samples, [LOW, HIGH])
+    best, least = np.inf, left(np.inf) / SEEN
     for _ in range(FINER):
-        gaps = np.linspace(low, high, GAPS)
-        lefts = [_least_squares(*_system(campaign, rows, offsets, g))[1] for g in gaps]
+        places = np.linspace(low, high, PLACES)
+        lefts = [left(place) for place in places]
         at = int(np.argmin(lefts))
-        best, spacing = float(gaps[at]), float(gaps[1] - gaps[0])
-        low, high = best - 2 * spacing, best + 2 * spacing
+        if lefts[at] < least:
+            best, least = float(places[at]), lefts[at]
+        spacing = float(places[1] - places[0])
+        low, high = places[at] - 2 * spacing, places[at] + 2 * spacing
     return best
 
 
-def _solve(campaign: Campaign, rows: Sequence[_Rows], offsets: Floats, gap: float) -> Driven:
-    solution, _ = _least_squares(*_system(campaign, rows, offsets, gap))
+def _solve(campaign: Campaign, rows: Sequence[_Rows], touch: Floats) -> Driven:
+    """Estimates without the initial motion."""
+    solution, _ = _least_squares(*_system(campaign, range(len(rows)), rows, touch))
     k1, c1, gain = (float(x) for x in solution[:3])
     c2, k2 = 0.0, np.zeros(0)
     if campaign.stop:
         c2, k2 = float(solution[3]), solution[4 : 4 + len(campaign.cases)]
-    constant = solution[-len(rows) :]
+    readings = [r.samples for r in campaign.recordings]
+    offset = solution[-len(rows) :] / k1 if k1 > 0.0 else np.array([x.mean() for x in readings])
     free = any(r.input is not None and r.input.free for r in campaign.recordings)
+    seen = np.isfinite(touch)
+    gap = np.inf
+    if campaign.stop:  # never touched: no less than what was reached
+        reached = [float(x.max()) for x in readings]
+        gap = float(np.median((touch - offset)[seen]) if seen.any() else max(reached - offset))
     none = np.zeros(len(rows))
-    offset = constant / k1 if k1 > 0.0 else offsets
     return Driven(k1, c1, gap, c2, k2, gain if free else 1.0, offset, none, none)
 
 
