@@ -221,7 +221,8 @@ class _Profile:
 
     def _solve(self, x: Array) -> tuple[Array, Array]:
         theta = np.repeat(self.guess[None], x.shape[0], axis=0)
-        theta[:, self.physical] = np.where(self.positive, np.exp(x), x)
+        coded = np.where(self.positive, x, 0.0)
+        theta[:, self.physical] = np.where(self.positive, np.exp(coded), x)
         best, lowest = theta, np.full(x.shape[0], np.inf)
         for last in (False, False, True):
             matrices = None if last else self._grams(theta)
