@@ -7,6 +7,7 @@ neither is given, so that the same call gives the same result.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -108,34 +109,41 @@ def diagnose(
     ----------
     campaign : of `bi.load`
     seed, rng : randomness; see the module
-    effects : the catalogue to choose from; None takes all of `bi.EFFECTS`
+    effects : the catalogue to choose from; None: what the command searches, `bi.EFFECTS` but for
+        those that have to be asked for
     search : False leaves the global search for the base model's mode out
     progress : called with every step in words
     """
     from bayesimpact.diagnosis import loop
-    from bayesimpact.model.effects import EFFECTS
+    from bayesimpact.model.effects import SEARCHED
 
-    chosen = EFFECTS if effects is None else tuple(effects)
+    chosen = SEARCHED if effects is None else tuple(effects)
     return loop.diagnose(
         campaign, rng=generator(seed, rng), effects=chosen, search=search, progress=progress
     )
 
 
-def summary(found: Identification | Posterior | Results) -> DataFrame:
+def summary(found: Identification | Posterior | Results | Diagnosis) -> DataFrame:
     """Estimates of every parameter in lab units, as a DataFrame indexed by name.
 
-    Columns: estimate (median; mode of a fit), low and high (90 %), unit, meaning.
+    Columns: estimate (median; mode of a fit), low and high (90 %), unit, meaning. Of a diagnosis:
+    of the extended model, with the intervals of its report.
     """
     import pandas
 
     from bayesimpact.report.results import Results
     from bayesimpact.report.units import readable
 
+    wider = found.intervals if isinstance(found, Diagnosis) else None
+    if isinstance(found, Diagnosis):
+        found = replace(found.identification, fit=found.after)
     results = found if isinstance(found, Results) else _results(found)
     rows = {}
     for row in results.rows:
         shown = readable(row.unit, abs(row.median))
-        values = (shown.scale * x for x in (row.median, *row.ci90))
+        known = wider.quantiles(row.name) if wider and row.name in wider.names else None
+        low, median, high = known or (row.ci90[0], row.median, row.ci90[1])
+        values = (shown.scale * x for x in (median, low, high))
         rows[row.name] = (*values, shown.unit, row.meaning)
     columns = ["estimate", "low", "high", "unit", "meaning"]
     return pandas.DataFrame.from_dict(rows, orient="index", columns=columns)

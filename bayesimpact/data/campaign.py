@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from bayesimpact.data.frozen import Picklable
+from bayesimpact.data.html import html_table
 from bayesimpact.data.recording import Recording
 
 
@@ -106,6 +107,15 @@ class Campaign(Picklable):
         """One line."""
         stop = f"cases {', '.join(self.cases)}" if self.stop else "no stop"
         return f"<Campaign {self.name!r}: {len(self.recordings)} recordings, {stop}>"
+
+    def _repr_html_(self) -> str:
+        """Its recordings, for a notebook."""
+        columns = ("recording", "case", "samples", "rate, Hz", "duration, s", "quantity")
+        rows = [
+            (r.name, r.case, r.samples.size, 1.0 / r.interval, r.duration, r.quantity)
+            for r in self.recordings
+        ]
+        return html_table(f"{self.name}: {self.mass:g} kg", columns, rows)
 
     @property
     def cases(self) -> tuple[str, ...]:

@@ -10,7 +10,8 @@ Let S be the likeliest set of effects that the search reached.
      more effects or parameters than S: what remains makes odds small, and more to fit with makes
      imitation easy,
    - the misfit above the noise is `EXCESS` times larger without it than with it, other effects
-     refitted: an effect that merely imitates what the catalogue lacks leaves a large part of it,
+     refitted, either as it is or with a residual force beside both: an effect that merely imitates
+     what the catalogue lacks leaves a large part of it, and a force beside takes its place,
    - no set without it, with a residual force of whichever form is likeliest, beats S with its own
      residual force by these odds (as in 1), and
    - no other effect in its place, with such a force beside, comes within these odds of that, or
@@ -32,6 +33,7 @@ import numpy as np
 from bayesimpact.diagnosis.naming import Naming, State
 from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.thresholds import DECISIVE, DOUBT, EXCESS
+from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect
 
 Verdict = Literal["adequate", "named", "partly", "ambiguous", "unknown"]
@@ -77,7 +79,7 @@ def decide(naming: Naming) -> Decision:
 
 def is_needed(naming: Naming, effect: Effect) -> bool:
     """Whether every likely hypothesis has an effect of the chosen model, although more remains."""
-    if not may_be_needed(naming, effect):
+    if not (may_be_needed(naming, effect) and stands_out(naming, effect)):
         return False
     chosen = frozenset(naming.chosen.candidate.ids)
     reached = naming.with_residual_force(chosen)
@@ -112,14 +114,28 @@ def may_be_needed(naming: Naming, effect: Effect) -> bool:
     """`is_needed` as far as models without a residual force tell."""
     chosen = naming.chosen
     reached = naming.log_odds(chosen.candidate)
-    if any(
+    return not any(
         naming.log_odds(c) > reached - (0.0 if is_larger(c.effects, chosen) else DECISIVE)
         for c in naming.tried
         if not holds(c.effects, effect)
-    ):
+    )
+
+
+def stands_out(naming: Naming, effect: Effect) -> bool:
+    """Whether the misfit above the noise is `EXCESS` times larger without an effect.
+
+    Either of the models as they are, or of both with a residual force beside; as such a force may
+    leave nothing, what the noise level is uncertain by is the least that counts there.
+    """
+    ids = frozenset(naming.chosen.candidate.ids)
+    smaller = ids - {effect.id}
+    left = misfit_above_noise(naming, naming.states[ids].candidate.fit)
+    if misfit_above_noise(naming, naming.states[smaller].candidate.fit) > EXCESS * left:
+        return True
+    if not {ids, smaller} <= naming.residual.keys():
         return False
-    without = naming.states[frozenset(chosen.candidate.ids) - {effect.id}]
-    return misfit_above_noise(naming, without) > EXCESS * misfit_above_noise(naming, naming.chosen)
+    least = max(misfit_above_noise(naming, naming.residual[ids].fit), doubtful_misfit(naming))
+    return misfit_above_noise(naming, naming.residual[smaller].fit) > EXCESS * least
 
 
 def in_its_place(naming: Naming, effect: Effect) -> Candidate | None:
@@ -139,22 +155,26 @@ def holds(effects: Sequence[Effect], effect: Effect) -> bool:
     return any(effect.id in (e.id, e.prefer) for e in effects)
 
 
-def misfit_above_noise(naming: Naming, state: State) -> float:
+def misfit_above_noise(naming: Naming, fit: Fit) -> float:
     """Sum of squares beyond that of the noise, in units of its variance.
 
     The noise's own sum is what the recordings' noise estimate says, as far as that is certain;
     within its uncertainty it is what the best hypothesis of all leaves.
     """
     chosen = naming.chosen.candidate.fit
-    noise = chosen.target.likelihood.noise
-    level = noise.level**2
+    level = chosen.target.likelihood.noise.level**2
     own = float(chosen.target.likelihood.sizes.sum())
-    error = noise.level_error if np.isfinite(noise.level_error) else 0.0
-    doubtful = 2 * DOUBT * error * own
     left = float(chosen.sums.sum()) / level
-    if left - own < doubtful:  # as small as the estimate of the noise is uncertain
+    if left - own < doubtful_misfit(naming):  # as small as the estimate of the noise is uncertain
         own = left - 2 * max(naming.chosen.unknown.gain, 0.0) * chosen.reduced_chi2
-    return max(float(state.candidate.fit.sums.sum()) / level - own, 1.0)
+    return max(float(fit.sums.sum()) / level - own, 1.0)
+
+
+def doubtful_misfit(naming: Naming) -> float:
+    """A sum of squares, in units of the noise's variance, that its estimate may be wrong by."""
+    likelihood = naming.chosen.candidate.fit.target.likelihood
+    error = likelihood.noise.level_error
+    return 2 * DOUBT * (error if np.isfinite(error) else 0.0) * float(likelihood.sizes.sum())
 
 
 def ordered(naming: Naming, effects: tuple[Effect, ...]) -> tuple[Effect, ...]:

@@ -18,6 +18,7 @@ from bayesimpact.model.effects.effect import Effect, EffectParameter, Law, Scale
 Array = NDArray[np.float64]
 
 EQUATIONS = {0: "a(y) + b(y) v", 1: "a(t) y / reach + b(t) v", -1: "a(d) + b(d) v in contact"}
+LEARNED = "learned_force"
 KNOTS = 24
 TIMES = 8  # knots over time: what changes does so slowly
 DEPTHS = 6  # knots over the indentation
@@ -94,6 +95,45 @@ def learned_contact(
 
 
 @dataclass(frozen=True)
+class Knots:
+    """Where the splines of a learned force stand.
+
+    Attributes
+    ----------
+    low, spacing : first displacement and distance, m (times in s, for a change with time)
+    count : of the coefficients of a, and of b
+    reach : 0 for a(y) + b(y) v; above for a change with time, below for a force in contact
+    """
+
+    low: float
+    spacing: float
+    count: int
+    reach: float
+
+    def basis(self, along: Array) -> Array:
+        """Values (n, count) of the splines at displacements (or times) (n,)."""
+        return spline_basis(along, self.low, self.spacing, self.count)
+
+
+def knots_of(effect: Effect) -> Knots:
+    """The knots of a learned force."""
+    low, spacing, count, reach = (
+        float(effect.parameter(n).fixed or 0.0) for n in ("lowest", "spacing", "knots", "reach")
+    )
+    return Knots(low, spacing, int(count), reach)
+
+
+def refined_force(effect: Effect, factor: int) -> Effect:
+    """A learned force of the displacement with its knots `factor` times as near."""
+    knots = knots_of(effect)
+    a, b = (effect.parameter(n).scale for n in ("a1", "b1"))
+    intervals = knots.count - 3
+    high = knots.low + intervals * knots.spacing
+    assert isinstance(a, Constant) and isinstance(b, Constant)
+    return learned_force(knots.low, high, a.value, b.value, intervals * factor + 3)
+
+
+@dataclass(frozen=True)
 class Constant:
     """A prior's width whatever the campaign; a record, for lambdas cannot be pickled."""
 
@@ -121,7 +161,7 @@ def _learned(
         EffectParameter(f"b{i + 1}", "N s/m", scale=Constant(dissipative)) for i in range(knots)
     )
     return Effect(
-        id="learned_force",
+        id=LEARNED,
         family="unknown",
         title="learned force",
         equation=EQUATIONS[int(np.sign(reach))],

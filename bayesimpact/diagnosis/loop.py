@@ -10,12 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.html import html_table
 from bayesimpact.diagnosis.decision import Decision, Verdict, decide
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.faults.compare import base_failed
 from bayesimpact.diagnosis.force import MissingForce
 from bayesimpact.diagnosis.heldout import HeldOut, held_out_cases, held_out_recordings
 from bayesimpact.diagnosis.intervals import Intervals, intervals
+from bayesimpact.diagnosis.learned import LEARNED
 from bayesimpact.diagnosis.limits import Limit, limits
 from bayesimpact.diagnosis.locate import Location, locate, locate_effect
 from bayesimpact.diagnosis.name import name
@@ -92,6 +94,19 @@ class Diagnosis:
         names = ", ".join(effect.id for effect in self.effects) or "no effect"
         change = f"{self.before.reduced_chi2:.4g} to {self.after.reduced_chi2:.4g}"
         return f"<Diagnosis {self.verdict}: {names}, reduced chi2 {change}>"
+
+    def _repr_html_(self) -> str:
+        """Effects with their probabilities, and parameters before and after, for a notebook."""
+        found = [
+            (e.title, f"probability {self.naming.probability(e.id):.3g}") for e in self.effects
+        ]
+        layout = self.after.target.oscillator.layout
+        for i in layout.roles("physical", "effect"):
+            name, unit = layout.names[i], layout.parameters[i].unit
+            if not name.startswith(LEARNED):
+                low, middle, high = self.intervals.quantiles(name)
+                found.append((name, f"{middle:.4g} ({low:.4g} to {high:.4g}) {unit}"))
+        return html_table(repr(self), ("", "median (90 %)"), found)
 
 
 @linear_algebra_alone()

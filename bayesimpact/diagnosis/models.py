@@ -12,7 +12,7 @@ import numpy as np
 
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.force import missing_drift, missing_force
-from bayesimpact.diagnosis.naming import State, is_large
+from bayesimpact.diagnosis.naming import State, is_large, leaves_something
 from bayesimpact.diagnosis.own_band import shakes_in_own_band
 from bayesimpact.diagnosis.refit import Candidate, exchanged, refit, without
 from bayesimpact.diagnosis.scan import Scan, scan
@@ -50,7 +50,7 @@ class Models:
     def keep(self, candidate: Candidate) -> Candidate:
         """The better end of all climbs to the candidate's model, this one among them."""
         key = frozenset(candidate.ids)
-        if shakes_in_own_band(candidate.fit, is_large(candidate.fit)):
+        if shakes_in_own_band(candidate.fit, leaves_something(candidate.fit)):
             candidate = replace(candidate, log_evidence=-np.inf)
         held = self.tried.get(key)
         sooner = candidate.fit.converged and not (held and held.fit.converged)

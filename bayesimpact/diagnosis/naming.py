@@ -15,7 +15,7 @@ import numpy as np
 from bayesimpact.diagnosis.force import MissingForce
 from bayesimpact.diagnosis.refit import Candidate, tempered_evidence
 from bayesimpact.diagnosis.scan import Scan
-from bayesimpact.diagnosis.thresholds import ALPHA, DECISIVE, LARGE, largest_log_odds
+from bayesimpact.diagnosis.thresholds import ALPHA, DECISIVE, DOUBT, LARGE, largest_log_odds
 from bayesimpact.inference.fit import Fit
 
 
@@ -160,6 +160,12 @@ class Naming:
 def is_large(fit: Fit) -> bool:
     """True when the residual dwarfs the noise."""
     return fit.reduced_chi2 > LARGE**2
+
+
+def leaves_something(fit: Fit) -> bool:
+    """Whether a residual is above the noise by more than the estimate of the noise is uncertain."""
+    error = fit.target.likelihood.noise.level_error
+    return fit.reduced_chi2 > 1.0 + 2 * DOUBT * (error if np.isfinite(error) else 0.0)
 
 
 def _is_elaboration(candidate: Candidate, chosen: Candidate) -> bool:

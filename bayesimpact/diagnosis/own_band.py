@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.data.hum import find_hum
 from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.directions import is_periodic
 from bayesimpact.inference.fit import Fit
@@ -15,17 +16,17 @@ Array = NDArray[np.float64]
 OWN_BAND = 0.1  # of the spectrum's peak
 
 
-def shakes_in_own_band(fit: Fit, gross: bool) -> bool:
+def shakes_in_own_band(fit: Fit, remains: bool) -> bool:
     """True when the model has a harmonic force or a hum where the motion swings anyway.
 
     There a decaying motion and a steady one differ only by phase, and the steady one passes for any
-    slow change of frequency or damping: over the whole band where the misfit is `gross`. A force,
+    slow change of frequency or damping: over the whole band where something `remains`. A force,
     which has a motion of its own to begin with, passes for one always where the recordings are too
     short to tell both frequencies apart.
     """
     return any(
         _swings(recording, frequency)
-        if gross
+        if remains
         else effect.observe is None and _is_unresolved(recording, frequency)
         for effect, frequency in _lines(fit)
         for recording in fit.target.oscillator.campaign.recordings
@@ -39,8 +40,15 @@ def _lines(fit: Fit) -> list[tuple[Effect, float]]:
 
 
 def _spectrum(recording: Recording) -> Array:
-    """Amplitudes at multiples of the reciprocal of the duration, but for the mean."""
-    return np.abs(np.fft.rfft(recording.samples - recording.samples.mean()))
+    """Amplitudes at multiples of the reciprocal of the duration, but for the mean.
+
+    Without a steady line above the motion's band: that is no motion.
+    """
+    samples = recording.samples
+    hum = find_hum(samples, recording.interval)
+    if hum is not None:
+        samples = samples - hum.readings(recording.times)
+    return np.abs(np.fft.rfft(samples - samples.mean()))
 
 
 def _swings(recording: Recording, frequency: float) -> bool:

@@ -145,9 +145,26 @@ def _refitted(candidate: Candidate, effects: tuple[Effect, ...], scales: Scales)
     sizes = step_sizes(layout.names, effects, scales, ())
     steps = difference_steps(candidate.fit, target, sizes)
     found = find_mode(target, start, steps=steps, tolerance=TOLERANCE, max_iterations=ITERATIONS)
-    if found.reduced_chi2 > LARGE**2:  # or not a number
+    if not np.isfinite(found.log_posterior):  # an effect that is gone had kept the motion bounded
+        start = at_null(target, start)
+        found = find_mode(
+            target, start, steps=steps, tolerance=TOLERANCE, max_iterations=ITERATIONS
+        )
+    if found.reduced_chi2 > LARGE**2:
         found = better(found, by_growing_horizon(target, start, steps))
     return Candidate(effects, found, model_evidence(found))
+
+
+def at_null(target: Target, theta: Array) -> Array:
+    """Parameters (d,) with the sizes of all effects at their null."""
+    o = target.oscillator
+    null = theta.copy()
+    for i, name in enumerate(o.layout.names):
+        if is_added(name):
+            parameter = owner(o.effects, name)[1]
+            if parameter.null is not None and not parameter.is_shape:
+                null[i] = parameter.null
+    return null
 
 
 def step_sizes(

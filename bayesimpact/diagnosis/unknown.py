@@ -7,13 +7,17 @@ from numpy.typing import NDArray
 
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.extend import difference_steps, extend, transfer
-from bayesimpact.diagnosis.force import MissingForce
+from bayesimpact.diagnosis.force import MissingForce, refinement
+from bayesimpact.diagnosis.learned import LEARNED, knots_of, refined_force
+from bayesimpact.diagnosis.naming import leaves_something
 from bayesimpact.diagnosis.refit import ITERATIONS, TOLERANCE, Candidate, best_start
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.mode import find_mode
-from bayesimpact.model.effects.effect import Scales
+from bayesimpact.model.effects.effect import Effect, Scales
 
 Array = NDArray[np.float64]
+
+INTERVALS = (3, 7, 21, 42)  # between the knots; each divides a finer one
 
 
 def learn_force(fit: Fit, force: MissingForce, scales: Scales) -> Fit:
@@ -27,25 +31,62 @@ def learn_force(fit: Fit, force: MissingForce, scales: Scales) -> Fit:
     names = target.oscillator.layout.names
     unshifted = transfer(fit, target.oscillator.layout, effects, scales, {})
     start = unshifted.copy()
-    coefficients = coefficient_names(force.knots)
-    sd = np.sqrt(np.maximum(np.diag(force.covariance), 0.0))
-    for coefficient, mean in zip(coefficients, force.mean, strict=True):
+    for coefficient, mean in zip(coefficient_names(force.knots), force.mean, strict=True):
         start[names.index(coefficient)] = mean
     for name, shift in zip(fit.names, force.projection.absorbed @ force.mean, strict=True):
         start[names.index(name)] -= shift
+    sd = np.sqrt(np.maximum(np.diag(force.covariance), 0.0))
     floor = 1e-9 * np.repeat([scales.force, scales.force / scales.speed], force.knots)
-    sizes = dict(zip(coefficients, np.maximum(sd, floor), strict=True))
+    sizes = dict(zip(coefficient_names(force.knots), np.maximum(sd, floor), strict=True))
     steps = difference_steps(fit, target, sizes)
     start = best_start(target, unshifted, start, steps)
     return find_mode(target, start, steps=steps, tolerance=TOLERANCE, max_iterations=ITERATIONS)
 
 
 def with_force(candidate: Candidate, force: MissingForce, scales: Scales) -> Candidate:
-    """A model with a residual force beside its effects, fitted in full."""
+    """A model with a residual force beside its effects, fitted in full.
+
+    The linearised problem chooses how fine the force is; where something remains beside the force,
+    a finer one is fitted from there, as long as that is likelier.
+    """
     fit = learn_force(candidate.fit, force, scales)
-    return Candidate(fit.target.oscillator.effects, fit, model_evidence(fit))
+    best = Candidate(fit.target.oscillator.effects, fit, model_evidence(fit))
+    while leaves_something(best.fit) and (factors := finer_factors(best.effects[-1])):
+        fit = _refined(candidate.fit, best.fit, factors[0], scales)
+        finer = Candidate(fit.target.oscillator.effects, fit, model_evidence(fit))
+        if not finer.log_evidence > best.log_evidence:
+            break
+        best = finer
+    return best
+
+
+def finer_factors(effect: Effect) -> list[int]:
+    """How many times finer than those of a learned force nested knots may be."""
+    knots = knots_of(effect)
+    own = knots.count - 3
+    return [n // own for n in INTERVALS if knots.reach == 0.0 and n > own and n % own == 0]
+
+
+def _refined(before: Fit, found: Fit, factor: int, scales: Scales) -> Fit:
+    """A model with its learned force on finer knots, fitted from where it stands.
+
+    Cubic splines on nested knots: the finer one begins as exactly the same force.
+    """
+    *others, coarse = found.target.oscillator.effects
+    finer = refined_force(coarse, factor)
+    effects = (*others, finer)
+    target = extend(before, effects, scales)
+    count, more = knots_of(coarse).count, knots_of(finer).count
+    known = dict(zip(found.names, zip(found.mode, found.sd, strict=True), strict=True))
+    own = np.array([known[name] for name in coefficient_names(count)]).reshape(2, count, 2)
+    values = np.einsum("kc,pcs->pks", refinement(count, factor), own).reshape(-1, 2)
+    values[:, 1] = np.repeat(np.median(own[:, :, 1], axis=1), more)
+    known |= dict(zip(coefficient_names(more), values, strict=True))
+    start, sd = np.array([known[name] for name in target.oscillator.layout.names]).T
+    steps = 0.05 * np.maximum(sd, 1e-12 * np.abs(start))
+    return find_mode(target, start, steps=steps, tolerance=TOLERANCE, max_iterations=ITERATIONS)
 
 
 def coefficient_names(knots: int) -> tuple[str, ...]:
     """Names of the coefficients in theta, conservative ones first."""
-    return tuple(f"learned_force.{part}{i + 1}" for part in "ab" for i in range(knots))
+    return tuple(f"{LEARNED}.{part}{i + 1}" for part in "ab" for i in range(knots))

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.data.html import html_table
 from bayesimpact.inference.likelihood import Likelihood, Linearisation
 from bayesimpact.inference.prior import Prior
 from bayesimpact.inference.priors import Priors
@@ -75,6 +76,17 @@ class Fit:
         state = "at rest" if self.converged else "not converged"
         campaign = self.target.oscillator.campaign.name
         return f"<Fit of {campaign!r}: {self.mode.size} parameters, {state}>"
+
+    def _repr_html_(self) -> str:
+        """Parameters that all recordings share, SI, for a notebook."""
+        layout = self.target.oscillator.layout
+        shared = layout.roles("physical", "effect")
+        rows = [
+            (layout.names[i], float(self.mode[i]), float(self.sd[i]), layout.parameters[i].unit)
+            for i in shared
+        ]
+        caption = f"{self!r}, reduced chi2 {self.reduced_chi2:.4g}"
+        return html_table(caption, ("parameter", "mode", "sd", "unit"), rows)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -67,6 +67,10 @@ class Identification:
         ends = "guess and search agree" if self.agree else "guess and search differ"
         return f"<Identification: {self.fit!r}, {ends}>"
 
+    def _repr_html_(self) -> str:
+        """Its fit, for a notebook."""
+        return self.fit._repr_html_()
+
     @property
     def agree(self) -> bool:
         """True when guess and search ended within 0.1 standard deviations of each other."""

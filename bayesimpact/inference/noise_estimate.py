@@ -5,6 +5,7 @@ them; what the polynomials leave is noise. Level and correlation maximise the li
 these remainders (restricted maximum likelihood, Patterson and Thompson 1971), so no degrees of
 freedom are counted twice. Where there is a stop, only swings on its free side count: impacts are
 kinks that no polynomial follows. Windows that something else disturbs stand out and are left aside.
+A steady hum is no noise: its sine is fitted to the remainders of all windows and taken off.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from scipy.optimize import minimize_scalar
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.faults.flat import reading_step
 from bayesimpact.data.gaps import runs
+from bayesimpact.data.hum import Hum, find_hum
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 from bayesimpact.inference.noise import Noise
@@ -28,12 +30,14 @@ from bayesimpact.inference.noise_driven import driven_noise
 from bayesimpact.response.swings import rough_period
 
 Array = NDArray[np.float64]
+Windows = NDArray[np.int64]
 
 DEGREE = 5
 WINDOWS_PER_PERIOD = (12.0, 9.0, 7.0, 5.5, 4.5, 3.6, 3.0)
 SMALLEST, LARGEST = 12, 64
 KEPT = 0.999  # fraction of undisturbed windows that the outlier test keeps
 MARGIN = 0.05  # of the largest displacement, below rest: the free side, where no impact is
+HUM_COLUMNS = 4  # cosine and sine, and both growing by a line
 LEAST_NUMBERS = 60  # remainders that the free side must give
 LEAST_CORRELATION = 0.03  # a weaker AR(1) changes no interval by more than 3 %
 LEAST_GAIN = 4.0  # in log likelihood, to call the noise coloured: 1 false call in 200
@@ -75,8 +79,9 @@ def raw_noise(recordings: Sequence[Recording]) -> Noise:
     Raises `InputError` when the recordings are too short.
     """
     chosen = None
+    hums = [find_hum(r.samples, r.interval) for r in recordings]
     for per_period in WINDOWS_PER_PERIOD:
-        remainder = _remainder(recordings, per_period)
+        remainder = _remainder(recordings, hums, per_period)
         if remainder is None:
             continue
         found = _restricted_ml(remainder)
@@ -107,7 +112,9 @@ def _rises(before: Noise, after: Noise) -> bool:
     return bool(after.level > before.level * (1.02 + error))
 
 
-def _remainder(recordings: Sequence[Recording], per_period: float) -> _Remainder | None:
+def _remainder(
+    recordings: Sequence[Recording], hums: Sequence[Hum | None], per_period: float
+) -> _Remainder | None:
     lengths = [
         int(np.clip(rough_period(r.samples) / per_period, SMALLEST, LARGEST)) for r in recordings
     ]
@@ -115,21 +122,50 @@ def _remainder(recordings: Sequence[Recording], per_period: float) -> _Remainder
     powers = np.vander(np.linspace(-1, 1, length), DEGREE + 1)
     basis = null_space(powers.T)
     side = any(r.case for r in recordings)
-    rows = [_windows(r, length, side) @ basis for r in recordings]
-    values = np.concatenate(rows)
-    if (
-        values.size < LEAST_NUMBERS and side
-    ):  # hardly any free swing: take the windows at the stop too
-        values = np.concatenate([_windows(r, length, False) @ basis for r in recordings])
+
+    def left(free_side: bool) -> Array:
+        rows = [
+            _without_hum(r, hum, _windows(r, length, free_side), basis)
+            for r, hum in zip(recordings, hums, strict=True)
+        ]
+        return np.concatenate(rows)
+
+    values = left(side)
+    if side and values.size < LEAST_NUMBERS:  # hardly any free swing: windows at the stop too
+        values = left(False)
     return _Remainder(values, basis) if values.shape[0] >= 4 else None
 
 
-def _windows(recording: Recording, length: int, side: bool) -> Array:
-    """Windows (count, length) of a recording; with `side`, only those on a stop's free side."""
+def _without_hum(recording: Recording, hum: Hum | None, windows: Windows, basis: Array) -> Array:
+    """What polynomials leave of windows (count, length) of a recording, less a steady hum there.
+
+    Amplitude and phase may drift by a line through the recording: an error of the frequency, to
+    first order.
+    """
+    values = _centred(recording)[windows] @ basis
+    if hum is None or values.size < 8 * HUM_COLUMNS:
+        return np.asarray(values)
+    times = recording.times
+    angle = 2 * np.pi * hum.frequency * times
+    place = times / times[-1]
+    shapes = [f * p for f in (np.cos(angle), np.sin(angle)) for p in (np.ones(place.size), place)]
+    columns = np.stack([(shape[windows] @ basis).ravel() for shape in shapes], axis=1)
+    found = np.linalg.lstsq(columns, values.ravel(), rcond=None)[0]
+    return np.asarray(values - (columns @ found).reshape(values.shape))
+
+
+def _centred(recording: Recording) -> Array:
+    """Readings (n,) from where they settle."""
     samples = recording.samples
-    settled = float(np.median(samples[-max(samples.size // 5, 1) :]))
-    centred = samples - settled
-    free = centred < -MARGIN * np.abs(centred).max() if side else np.ones(samples.size, dtype=bool)
+    return samples - float(np.median(samples[-max(samples.size // 5, 1) :]))
+
+
+def _windows(recording: Recording, length: int, side: bool) -> Windows:
+    """Samples of windows (count, length); with `side`, only of those on a stop's free side."""
+    centred = _centred(recording)
+    free = np.ones(centred.size, dtype=bool)
+    if side:
+        free = centred < -MARGIN * np.abs(centred).max()
     if recording.used is not None:
         free = free & recording.used
     starts = [
@@ -137,7 +173,7 @@ def _windows(recording: Recording, length: int, side: bool) -> Array:
         for first, end in runs(free)
     ]
     first = np.concatenate([np.zeros(0, dtype=np.int64), *starts])
-    return np.asarray(centred[first[:, None] + np.arange(length)])
+    return np.asarray(first[:, None] + np.arange(length))
 
 
 def _restricted_ml(remainder: _Remainder) -> Noise:

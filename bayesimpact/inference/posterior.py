@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.data.html import html_table
 from bayesimpact.errors import InputError
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.sample import Chains, sample_posterior
@@ -74,6 +75,16 @@ class Posterior:
         state = "converged" if self.chains.converged else "not converged"
         campaign = self.fit.target.oscillator.campaign.name
         return f"<Posterior of {campaign!r}: {self.draws.shape[0]} draws, {state}>"
+
+    def _repr_html_(self) -> str:
+        """Medians and 90 % intervals of shared parameters, SI, for a notebook."""
+        layout = self.fit.target.oscillator.layout
+        rows = []
+        for i in layout.roles("physical", "effect"):
+            low, middle, high = np.percentile(self.draws[:, i], [5, 50, 95])
+            name, unit = layout.names[i], layout.parameters[i].unit
+            rows.append((name, float(middle), float(low), float(high), unit))
+        return html_table(repr(self), ("parameter", "median", "5 %", "95 %", "unit"), rows)
 
     def thinned(self, count: int, rng: np.random.Generator) -> Array:
         """`count` draws (count, d), without replacement where there are enough."""

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from bayesimpact.diagnosis.force import MissingForce, trajectory_points
-from bayesimpact.diagnosis.learned import spline_basis
+from bayesimpact.diagnosis.learned import LEARNED, Knots, knots_of
 from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.diagnosis.unknown import coefficient_names
 from bayesimpact.inference.fit import Fit
@@ -40,7 +40,7 @@ def force_arrays(d: Diagnosis) -> dict[str, Array]:
     force, fit = d.force, d.naming.base.candidate.fit
     y = np.linspace(force.low, force.low + force.spacing * (force.knots - 3), POINTS)
     slow, fast = _velocities(fit, y)
-    rest = _Rest(force, fit, y)
+    rest = _Rest(knots_of(force.effect), fit, y)
     arrays = {"force_y": y, "force_v_low": slow, "force_v_high": fast}
     if d.verdict == "adequate":
         unit = d.scales.force, d.scales.force / d.scales.speed
@@ -52,12 +52,14 @@ def force_arrays(d: Diagnosis) -> dict[str, Array]:
         width = np.repeat(
             [force.effect.parameter(n).scale(d.scales) for n in ("a1", "b1")], left.knots
         )
-        beside = _Rest(left, d.naming.chosen.candidate.fit, y)
+        beside = _Rest(knots_of(left.effect), d.naming.chosen.candidate.fit, y)
         arrays |= beside.parts("left", *_posterior(left, width))
-    values = dict(zip(d.after.names, d.after.mode, strict=True))
-    if d.naming.unknown is force and coefficient_names(force.knots)[0] in values:
-        learned = np.array([values[n] for n in coefficient_names(force.knots)])
-        arrays |= {f"learned_{part}": rest.maps[part] @ learned for part in "ab"}
+    learned = [e for e in d.after.target.oscillator.effects if e.id == LEARNED]
+    if learned and (knots := knots_of(learned[0])).reach == 0.0:
+        values = dict(zip(d.after.names, d.after.mode, strict=True))
+        own = np.array([values[n] for n in coefficient_names(knots.count)])
+        maps = _Rest(knots, fit, y).maps
+        arrays |= {f"learned_{part}": maps[part] @ own for part in "ab"}
     return arrays
 
 
@@ -82,20 +84,20 @@ class _Rest:
     maps: dict[str, Array]
     gap: dict[str, Array]
 
-    def __init__(self, force: MissingForce, fit: Fit, y: Array) -> None:
+    def __init__(self, knots: Knots, fit: Fit, y: Array) -> None:
         oscillator = fit.target.oscillator
         gap = None
         if oscillator.campaign.stop:
             gap = float(np.mean(oscillator.layout.slots(fit.mode)[:, _GAP]))
         points = trajectory_points(fit)
         along, v = (np.concatenate([p[k] for p in points]) for k in (0, 1))
-        splines = spline_basis(along, force.low, force.spacing, force.knots)
+        splines = knots.basis(along)
         functions = np.hstack([splines, splines * v[:, None]])
         still, moving = _imitable(along, gap)
         imitated = np.linalg.lstsq(np.hstack([still, moving * v[:, None]]), functions, rcond=None)[
             0
         ]
-        here = spline_basis(y, force.low, force.spacing, force.knots)
+        here = knots.basis(y)
         nothing = np.zeros_like(here)
         still, moving = _imitable(y, gap)
         count = still.shape[1]

@@ -11,6 +11,7 @@ from effect_rigs import BY_ID
 from scipy import stats
 
 from bayesimpact.diagnosis.directions import sigma_of
+from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.extend import campaign_scales, extend, transfer
 from bayesimpact.diagnosis.force import (
     MissingForce,
@@ -19,14 +20,26 @@ from bayesimpact.diagnosis.force import (
     missing_drift,
     missing_force,
     motion_range,
+    refinement,
     trajectory_points,
 )
 from bayesimpact.diagnosis.force_evidence import WIDTHS, ForceEvidence
-from bayesimpact.diagnosis.learned import learned_force, spline_basis
-from bayesimpact.diagnosis.naming import State
+from bayesimpact.diagnosis.learned import (
+    knots_of,
+    learned_drift,
+    learned_force,
+    refined_force,
+    spline_basis,
+)
+from bayesimpact.diagnosis.naming import State, leaves_something
 from bayesimpact.diagnosis.refit import base_candidate
 from bayesimpact.diagnosis.scan import scan
-from bayesimpact.diagnosis.unknown import coefficient_names, learn_force
+from bayesimpact.diagnosis.unknown import (
+    coefficient_names,
+    finer_factors,
+    learn_force,
+    with_force,
+)
 from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.likelihood import Likelihood
@@ -231,6 +244,32 @@ def test_the_learned_force_goes_back_into_the_simulator(detent):
     for name in ("k2[1]", "k2[2]", "c2"):
         i = learned.names.index(name)
         assert abs(learned.mode[i] - small_rig.true_values()[name]) < 4 * learned.sd[i]
+
+
+def test_a_force_on_knots_too_coarse_is_refined_where_something_remains(detent):
+    """Four knots cannot hold a narrow detent; nested ones begin as the same force and learn it."""
+    fit, _ = detent
+    scales = campaign_scales(fit)
+    coarse = missing_force(fit, scales, rng=np.random.default_rng(0), knots=6)
+    first = learn_force(fit, coarse, scales)
+    assert coarse.knots == 6 and leaves_something(first)
+    found = with_force(base_candidate(fit), coarse, scales)
+    assert knots_of(found.effects[-1]).count in (24, 45)
+    assert found.log_evidence > model_evidence(first) + 20
+    assert not leaves_something(found.fit)
+
+
+def test_a_finer_force_begins_as_the_same_force():
+    coarse = learned_force(-3e-3, 2e-3, 1e-3, 1e-2, 6)
+    finer = refined_force(coarse, 7)
+    assert knots_of(finer).count == 24 and finer.parameter("b24").scale(None) == 1e-2
+    own = np.random.default_rng(0).standard_normal(6)
+    y = np.linspace(-3e-3, 2e-3, 101)
+    same = knots_of(finer).basis(y) @ (refinement(6, 7) @ own)
+    np.testing.assert_allclose(same, knots_of(coarse).basis(y) @ own, atol=1e-12)
+    assert (
+        finer_factors(coarse) == [7, 14] and finer_factors(learned_drift(1.0, 1.0, 1.0, 1.0)) == []
+    )
 
 
 def test_a_purely_conservative_force_can_be_learned(detent):

@@ -14,8 +14,8 @@ from scipy.special import logsumexp
 
 from bayesimpact.diagnosis.directions import directions
 from bayesimpact.diagnosis.evidence import SPREADS, common_spread, log_evidence
-from bayesimpact.diagnosis.extend import campaign_scales
-from bayesimpact.diagnosis.refit import base_candidate, refit, without
+from bayesimpact.diagnosis.extend import campaign_scales, extend, transfer
+from bayesimpact.diagnosis.refit import Candidate, base_candidate, refit, without
 from bayesimpact.diagnosis.scan import score_directions
 from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.identify import identify
@@ -214,6 +214,25 @@ def test_leaving_an_effect_out_returns_to_the_base_model(planted):
     assert back.ids == ()
     assert back.log_evidence == pytest.approx(base_candidate(fit).log_evidence, abs=0.02)
     np.testing.assert_array_less(np.abs(back.fit.mode - fit.mode) / fit.sd, 0.1)
+
+
+def test_an_effect_that_kept_the_motion_bounded_may_be_left_out(planted):
+    """A softening spring that a hardening one outweighs: alone it lets the mass run away."""
+    fit, scales = planted
+    effects = (BY_ID["spring_cubic"], BY_ID["spring_quintic"])
+    target = extend(fit, effects, scales)
+    theta = transfer(fit, target.oscillator.layout, effects, scales, {})
+    names = target.oscillator.layout.names
+    k1, reach = fit.value("k1"), scales.amplitude
+    theta[names.index("spring_cubic.stiffness")] = 3.0 * k1 / reach**2
+    theta[names.index("spring_quintic.stiffness")] = -3.0 * k1 / reach**4
+    steps = 1e-6 * np.maximum(np.abs(theta), 1e-6)
+    there = find_mode(target, theta, steps=steps, max_iterations=0)
+    both = Candidate(effects, there, 0.0)
+    assert np.isfinite(both.fit.log_posterior)
+    alone = without(both, effects[0], scales)
+    assert np.isfinite(alone.log_evidence)
+    assert alone.fit.log_likelihood > fit.log_likelihood - 1
 
 
 def test_what_was_not_fitted_has_no_evidence(small):

@@ -117,7 +117,8 @@ def run(monkeypatch):
         monkeypatch.setattr(models, "refit", table.refit)
         monkeypatch.setattr(models, "without", table.without)
         monkeypatch.setattr(models, "exchanged", table.exchanged)
-        monkeypatch.setattr(models, "shakes_in_own_band", lambda fit, gross: False)
+        monkeypatch.setattr(models, "shakes_in_own_band", lambda fit, remains: False)
+        monkeypatch.setattr(models, "leaves_something", lambda fit: False)
         monkeypatch.setattr(models, "scan", table.scan)
         monkeypatch.setattr(models, "followed", table.followed)
         for module in (search, models):
@@ -330,7 +331,8 @@ def test_an_examined_model_is_not_scored_again_for_a_restart(run, monkeypatch):
 @pytest.mark.parametrize(("second", "kept"), [(-0.04, True), (-0.06, False), (0.04, True)])
 def test_of_two_equal_ends_the_one_that_came_to_rest_is_kept(monkeypatch, second, kept):
     """Climbs to one mode differ by less than 0.05 nats."""
-    monkeypatch.setattr(models, "shakes_in_own_band", lambda fit, gross: False)
+    monkeypatch.setattr(models, "shakes_in_own_band", lambda fit, remains: False)
+    monkeypatch.setattr(models, "leaves_something", lambda fit: False)
     table = Table({A: 100.0}, unfinished={A: 0.0})
     known = models.Models(EFFECTS, None, np.random.default_rng(0), lambda message: None)
     first = known.keep(table.candidate((A,), 100.0))

@@ -19,6 +19,7 @@ from bayesimpact.diagnosis.harmonics import (
     line_blocks,
     projected,
 )
+from bayesimpact.diagnosis.models import Models
 from bayesimpact.diagnosis.own_band import shakes_in_own_band
 from bayesimpact.diagnosis.periodic import (
     LEAST_GAIN,
@@ -28,7 +29,7 @@ from bayesimpact.diagnosis.periodic import (
     leaking,
     periodic_scores,
 )
-from bayesimpact.diagnosis.refit import refit
+from bayesimpact.diagnosis.refit import Candidate, refit
 from bayesimpact.diagnosis.steady import steadiness
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
@@ -226,6 +227,21 @@ def test_the_band_ends_where_the_recordings_can_separate_two_lines(side, apart, 
     spectrum = np.abs(np.fft.rfft(recording.samples - recording.samples.mean()))
     line = (np.argmax(spectrum) + side * apart) / (recording.samples.size * recording.interval)
     assert shakes_in_own_band(with_line(fit, line), False) is own
+
+
+@pytest.mark.parametrize(("chi2", "kept"), [(1.01, True), (4.0, False)])
+def test_a_hum_where_the_motion_swings_is_taken_only_where_nothing_remains(chi2, kept):
+    """Long before the misfit is large: a steady line takes what is left of a slow change."""
+    fit, rig = plain_fit(), small_rig.PLAIN
+    scales = campaign_scales(fit)
+    held = with_line(fit, np.sqrt(rig.k1 / rig.mass) / (2 * np.pi), "sensor_hum")
+    likelihood = held.target.likelihood
+    level = likelihood.noise.level * np.sqrt(held.reduced_chi2 / chi2)
+    noise = replace(likelihood.noise, level=level, level_error=0.01)
+    target = replace(held.target, likelihood=replace(likelihood, noise=noise))
+    model = Candidate(target.oscillator.effects, replace(held, target=target), 100.0)
+    models = Models((), scales, np.random.default_rng(0), lambda message: None)
+    assert np.isfinite(models.keep(model).log_evidence) == kept
 
 
 def plain_fit() -> Fit:

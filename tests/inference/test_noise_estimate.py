@@ -71,6 +71,22 @@ def test_level_and_correlation_of_coloured_noise(rho):
     assert max(f.correlation_error for f in found) < 0.06
 
 
+@pytest.mark.parametrize("name", ["rig", "no stop"])
+def test_a_steady_hum_is_no_noise(name):
+    """Of 180 Hz, forty times the noise: level and colour are those without it, within its error."""
+    campaign, z = silent(name), []
+    for seed in range(8):
+        clean = noisy(campaign, 0.0, 5e-6, seed)
+        humming = [
+            replace(r, samples=r.samples + 2e-4 * np.sin(2 * np.pi * 180.07 * r.times + seed))
+            for r in clean
+        ]
+        found = raw_noise(humming)
+        z.append((found.level / 5e-6 - 1) / found.level_error)
+        assert found.correlation == 0.0
+    assert np.sum(np.square(z)) < chi2_limits(8)[1] and abs(np.mean(z)) < 4 / np.sqrt(8)
+
+
 def test_a_few_disturbed_windows_do_not_count():
     """Glitches of thirty deviations in two of a hundred windows."""
     campaign, rng = silent("no stop"), np.random.default_rng(0)

@@ -10,6 +10,7 @@ from bayesimpact.data.faults.clipped import find_clipped
 from bayesimpact.data.faults.duplicate import find_duplicates
 from bayesimpact.data.faults.fault import Fault, Span
 from bayesimpact.data.faults.held import find_held
+from bayesimpact.data.faults.hum import find_hum_notice
 from bayesimpact.data.faults.noise import find_noise, loud_recordings
 from bayesimpact.data.faults.quantised import find_quantised
 from bayesimpact.data.faults.slip import find_slips
@@ -26,6 +27,7 @@ DETECTORS: tuple[Callable[[Recording], list[Fault]], ...] = (
     find_noise,
     find_spikes,
     find_slips,
+    find_hum_notice,
 )
 """In this order, each on the recording without what the earlier ones found."""
 

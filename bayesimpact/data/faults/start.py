@@ -7,6 +7,7 @@ from scipy.ndimage import median_filter
 
 from bayesimpact.data.faults.fault import Array, Fault, amount, file_time
 from bayesimpact.data.faults.flat import reading_step
+from bayesimpact.data.hum import find_hum
 from bayesimpact.data.period import noise_level, rough_period
 from bayesimpact.data.recording import Recording
 
@@ -14,6 +15,7 @@ BAND = 5.0  # standard deviations of the noise, or two steps, about the first re
 NATURAL = 3.0  # times as long as a free motion stays in that band at a turning point
 SHORTEST = 0.08  # of a period
 LATE = 1.1  # of a period: a free decay is largest before
+PERIODS = 1.0  # of a hum, over which it is fitted first
 WIDE = 11  # samples of a running median: spikes of five do not show in it
 UNCROSSED = 0.75  # of a period: a free motion passes its rest within half a period
 GROWTH = 1.3  # largest excursion over what came before it on the same side
@@ -26,13 +28,17 @@ def find_start(recording: Recording) -> list[Fault]:
     point, sqrt(2 b / A) of a radian for a band b and an amplitude A. Hand: the largest excursion
     comes late and exceeds what came before on its side; the free decay begins where it is left.
     """
-    x = median_filter(recording.samples, WIDE, mode="nearest")  # blind to spikes
     if recording.used is not None and not recording.used[:3].all():
         return []
+    hum = find_hum(recording.samples, 1.0)
+    quiet = recording.samples
+    if hum is not None:
+        quiet = quiet - hum.readings(np.arange(quiet.size, dtype=np.float64))
+    x = median_filter(quiet, WIDE, mode="nearest")  # blind to spikes
     period = rough_period(x, 1.0)
     if period is None:
         return []
-    noise, step = noise_level(recording.samples), reading_step(recording.samples)
+    noise, step = noise_level(quiet), reading_step(recording.samples)
     band = max(BAND * noise, 2.0 * step, 1e-9 * float(np.ptp(x)))
     settled = float(np.median(x[x.size // 2 :]))
     peak = int(np.argmax(np.abs(x - settled)))
@@ -40,7 +46,7 @@ def find_start(recording: Recording) -> list[Fault]:
     natural = np.sqrt(2.0 * band / max(height, band)) * period / (2 * np.pi)
     least = max(NATURAL * natural, SHORTEST * period)
     hand = _grown(x - settled, peak, period)
-    rest = _leaves(x, peak if hand else 0, band)
+    rest = _leaves(x, peak if hand else 0, band, None if hum is None else hum.frequency)
     if not hand and rest <= least:
         return []
     first = rest if not hand else max(rest, peak)
@@ -66,12 +72,29 @@ def find_start(recording: Recording) -> list[Fault]:
     ]
 
 
-def _leaves(x: Array, first: int, band: float) -> int:
-    """First sample from `first` on that leaves a band about the reading there, for good."""
-    about = float(np.median(x[first : first + 3]))
-    outside = np.abs(x[first:] - about) > band
+def _leaves(x: Array, first: int, band: float, hum: float | None) -> int:
+    """First sample from `first` on that leaves a band about the reading there, for good.
+
+    What is left of a hum (its frequency in cycles per sample) is fitted beside the reading, over
+    all that was at rest so far.
+    """
+    if hum is None:
+        return first + _outside(x[first:] - float(np.median(x[first : first + 3])), band)
+    angle = 2 * np.pi * hum * np.arange(x.size - first)
+    columns = np.column_stack([np.ones(angle.size), np.cos(angle), np.sin(angle)])
+    size, longer = 0, int(np.ceil(PERIODS / hum))
+    while longer > size and longer < angle.size:
+        size = longer
+        found = np.linalg.lstsq(columns[:size], x[first : first + size], rcond=None)[0]
+        longer = _outside(x[first:] - columns @ found, band)
+    return first + longer
+
+
+def _outside(x: Array, band: float) -> int:
+    """First of two samples in a row that are outside of the band; all of them without any."""
+    outside = np.abs(x) > band
     twice = outside[:-1] & outside[1:]
-    return first + (int(np.argmax(twice)) if twice.any() else x.size - first)
+    return int(np.argmax(twice)) if twice.any() else int(x.size)
 
 
 def _grown(centred: Array, peak: int, period: float) -> bool:

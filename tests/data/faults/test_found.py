@@ -224,3 +224,21 @@ def test_faults_are_kept_where_campaign_toml_says_so(paper: Campaign) -> None:
     campaign = replace(spoiled(paper, change), keep_faults=True)
     same, faults = set_aside(campaign)
     assert same is campaign and len(faults) == 1
+
+
+@pytest.mark.parametrize("rest", [60, 150, 700])
+def test_a_rest_behind_a_hum_is_found(paper: Campaign, rest: int) -> None:
+    """Shorter than a period (about 150 samples), a hum of 90 um on readings of noise 5 um."""
+
+    def change(x: np.ndarray) -> np.ndarray:
+        noise = 5e-6 * np.random.default_rng(1).standard_normal(rest)
+        whole = np.concatenate([x[0] + noise, x])
+        return whole + 9e-5 * np.sin(2 * np.pi * 50.03 * 1e-3 * np.arange(whole.size) + 1.0)
+
+    campaign = spoiled(paper, change)
+    fault = only(campaign)
+    assert fault.id == "recording_start"
+    assert fault.spans[0][1] == pytest.approx(rest, abs=8)  # a turning point rests that long
+    (notice,) = [f for f in find_faults(campaign) if f.action == "notice"]
+    assert notice.id == "recording_hum" and "50.03 Hz" in notice.statement
+    assert notice.size == pytest.approx(9e-5, rel=0.02)
