@@ -130,7 +130,9 @@ def test_noise_without_a_gap_is_a_bound_that_a_residual_lowers() -> None:
 
 
 def test_rest_and_loud_parts_of_an_input_are_no_faults() -> None:
-    force = np.concatenate([np.zeros(600), _force("noise", 600)])
+    times = np.arange(600) * INTERVAL
+    steady = np.concatenate([np.zeros(600), 40.0 * np.sin(2 * np.pi * 60.0 * times)])
+    force = np.concatenate([np.zeros(600), _force("noise", 600)]) + steady
     motion, _ = driven_motion({**FREE, "y0": 0.0, "v0": 0.0}, force, INTERVAL)
     samples = motion + NOISE * np.random.default_rng(1).standard_normal(1200)
     driven = Recording("a", "", samples, INTERVAL, input=Input(force))

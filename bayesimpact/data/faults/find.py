@@ -31,9 +31,9 @@ DETECTORS: tuple[Callable[[Recording], list[Fault]], ...] = (
 )
 """In this order, each on the recording without what the earlier ones found."""
 
-
-FREE: tuple[Callable[[Recording], list[Fault]], ...] = (find_start, find_noise)
-"""Those that know a free decay only: under an input, rest and loud parts are what it makes them."""
+FREE = (find_start, find_noise, find_hum_notice)
+"""Those that know a free decay only: under an input, rest, loud parts and lines are what it makes
+of them."""
 DRIVEN = tuple(detector for detector in DETECTORS if detector not in FREE)
 
 
