@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -127,6 +128,17 @@ def test_noise_without_a_gap_is_a_bound_that_a_residual_lowers() -> None:
     recording = _band_limited(8192, 0.5, 2e-3)
     noise = estimate_noise(Campaign("rig", 1.0, (recording,), stop=False))
     assert noise.is_bound and noise.level > 2e-3
+
+
+def test_noise_under_a_rough_input() -> None:
+    """Kinks of the force at every sample are motion, which polynomials take for noise."""
+    for stop in (False, True):
+        campaign = _campaign(("noise",), stop)
+        noise = estimate_noise(campaign)
+        assert noise.level == pytest.approx(NOISE, rel=0.08)
+        free = replace(campaign.recordings[0], input=None)
+        alone = estimate_noise(replace(campaign, recordings=(free,)))
+        assert alone.level > 1.2 * noise.level
 
 
 def test_rest_and_loud_parts_of_an_input_are_no_faults() -> None:
