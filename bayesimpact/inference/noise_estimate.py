@@ -58,15 +58,15 @@ def estimate_noise(campaign: Campaign) -> Noise:
     raw level is scaled up by the filter's power (see `smoothed_level`).
     """
     known, smoothing = campaign.measurement.noise, campaign.measurement.smoothing
-    if smoothing is not None:
+    free = [r for r in campaign.recordings if r.input is None]
+    if not free:
+        noise = driven_noise(campaign.recordings, raw_noise(campaign.recordings), smoothing)
+    elif smoothing is not None:
         from bayesimpact.inference.spectrum import smoothed_noise
 
-        noise = smoothed_noise(campaign.recordings, smoothing)
+        noise = smoothed_noise(free, smoothing)
     else:
-        free = [r for r in campaign.recordings if r.input is None]
-        noise = raw_noise(free or campaign.recordings)
-        if not free:
-            noise = driven_noise(campaign.recordings, noise)
+        noise = raw_noise(free)
     if known is None:
         return noise
     return Noise(noise.correlation, smoothing, known, 0.0, noise.correlation_error, "campaign.toml")
