@@ -28,6 +28,7 @@ from bayesimpact.console import (
     unmade_words,
 )
 from bayesimpact.errors import InputError
+from bayesimpact.fleet.command import fleet
 from bayesimpact.trial.command import trial
 
 
@@ -300,4 +301,5 @@ def effects(seed: int, quiet: bool) -> None:
             click.echo(f"    {parameter.name} ({parameter.unit}{null}{scope})")
 
 
+main.add_command(fleet)
 main.add_command(trial)

@@ -22,9 +22,11 @@ LAYERS = (
     "diagnosis",
     "report",
     "workflow",
+    "cluster",
     "api",
-    "trial",
     "console",
+    "trial",
+    "fleet",
     "cli",
     "__main__",
 )
@@ -107,7 +109,12 @@ def test_only_the_command_line_prints() -> None:
             if isinstance(node, ast.Name) and module != "bayesimpact.cli":
                 assert node.id != "print", f"{module}, line {node.lineno}"
     printers = [m for m in MODULES if any(n.split(".")[0] == "click" for n in imported(m))]
-    assert printers == ["bayesimpact.cli", "bayesimpact.console", "bayesimpact.trial.command"]
+    assert printers == [
+        "bayesimpact.cli",
+        "bayesimpact.console",
+        "bayesimpact.fleet.command",
+        "bayesimpact.trial.command",
+    ]
 
 
 def test_importing_the_package_is_light() -> None:

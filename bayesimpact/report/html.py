@@ -62,28 +62,29 @@ def render(
     failed : what could not be drawn, with its reason
     """
     context = _context(results, pictures) | {"failures": dict(failed or {})}
-    return with_policy(_environment().get_template("report.html.j2").render(**context))
+    return with_policy(environment().get_template("report.html.j2").render(**context))
 
 
 def unfinished(results: Results, failed: Mapping[str, str]) -> str:
     """The page where even its words could not be written: the verdict, and why there is no more."""
     css = Markup((TEMPLATES / "style.css").read_text(encoding="utf-8"))
-    page = _environment().get_template("unfinished.html.j2")
+    page = environment().get_template("unfinished.html.j2")
     return with_policy(page.render(r=results, css=css, failures=dict(failed)))
 
 
 @cache
-def _environment() -> jinja2.Environment:
-    environment = jinja2.Environment(
+def environment() -> jinja2.Environment:
+    """Where templates come from, and what they may use."""
+    made = jinja2.Environment(
         loader=jinja2.FileSystemLoader(TEMPLATES),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["lower_first"] = lambda text: text[:1].lower() + text[1:]
-    environment.filters["bound"] = bound
-    return environment
+    made.filters["lower_first"] = lambda text: text[:1].lower() + text[1:]
+    made.filters["bound"] = bound
+    return made
 
 
 def _context(results: Results, pictures: Mapping[str, bytes]) -> dict[str, Any]:

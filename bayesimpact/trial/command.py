@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import click
+
+from bayesimpact.cluster import one_thread_each
 
 
 def _listed(text: str | None) -> tuple[str, ...] | None:
@@ -123,12 +124,6 @@ def trial(
     write(out / "summary.txt", text)
     if not quiet:
         click.echo(text, nl=False)
-
-
-def one_thread_each() -> None:
-    """Linear algebra on one thread: sums then round alike everywhere. Before NumPy loads."""
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ[name] = "1"
 
 
 def _json(content: Any) -> str:

@@ -19,11 +19,11 @@ import json
 import os
 import shutil
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from bayesimpact.cluster import executor
 from bayesimpact.errors import InputError
 from bayesimpact.trial.blind import answer, campaign_files, open_seal, seal, sealed_text
 from bayesimpact.trial.draw import draw
@@ -31,12 +31,8 @@ from bayesimpact.trial.line import trial_line
 from bayesimpact.trial.score import score
 from bayesimpact.trial.settings import Settings, settings_from
 
-Job = tuple[Any, ...]
 Step = Callable[[str, int], None]
 """(stage, trials done just now)."""
-
-THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-AHEAD = 3  # jobs per worker that wait in the cluster
 
 
 def draw_job(settings: Settings, seed: int) -> dict[str, Any]:
@@ -202,74 +198,3 @@ def write(file: Path, text: str) -> None:
     part = file.with_name(file.name + ".part")
     part.write_text(text, encoding="utf-8", newline="\n")
     os.replace(part, file)
-
-
-Spread = Callable[[Callable[..., Any], Iterator[tuple[int, Job]]], Iterator[tuple[int, Any]]]
-
-
-@contextmanager
-def executor(workers: int, scheduler: str | None) -> Iterator[Spread]:
-    """A way to run jobs (key, arguments) -> (key, result), as they finish."""
-    if scheduler is None and workers <= 1:
-        yield here
-        return
-    import distributed
-
-    make: Any = distributed.Client  # its signatures carry no types
-    local: Any = distributed.LocalCluster
-
-    if scheduler is not None:
-        with make(scheduler) as client:
-            yield _on(client)
-        return
-    one = dict.fromkeys(THREADS, "1")
-    with (
-        local(n_workers=workers, threads_per_worker=1, dashboard_address=None, env=one) as cluster,
-        make(cluster) as client,
-    ):
-        yield _on(client)
-
-
-def here(
-    function: Callable[..., Any], jobs: Iterator[tuple[int, Job]]
-) -> Iterator[tuple[int, Any]]:
-    """Jobs one after another, in this process."""
-    for key, arguments in jobs:
-        yield key, function(*arguments)
-
-
-def _on(client: Any) -> Spread:
-    import distributed
-
-    completed: Any = distributed.as_completed
-
-    def spread(
-        function: Callable[..., Any], jobs: Iterator[tuple[int, Job]]
-    ) -> Iterator[tuple[int, Any]]:
-        waiting: dict[Any, int] = {}
-        done: Any = completed()
-        room = AHEAD * max(1, len(client.scheduler_info()["workers"]))
-
-        def more() -> None:
-            while len(waiting) < room:
-                job = next(jobs, None)
-                if job is None:
-                    return
-                future = client.submit(function, *job[1], pure=False)
-                waiting[future] = job[0]
-                done.add(future)
-
-        more()
-        while waiting:
-            future = next(done)
-            key = waiting.pop(future)
-            result = future.result() if future.status == "finished" else _lost(future)
-            more()
-            yield key, result
-
-    return spread
-
-
-def _lost(future: Any) -> dict[str, str]:
-    """A job whose worker died (out of memory, say)."""
-    return {"failed": f"the worker was lost: {future.exception()!r}"}

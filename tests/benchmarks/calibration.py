@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
+from bayesimpact.cluster import executor
 from bayesimpact.trial.alarms import alarm, false_alarms
-from bayesimpact.trial.run import executor
 from bayesimpact.trial.sbc import MODELS, replicate, verdicts
 from bayesimpact.trial.settings import Settings
 from bayesimpact.trial.stamp import origin

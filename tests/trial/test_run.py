@@ -10,10 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from bayesimpact.cluster import executor
 from bayesimpact.errors import InputError
 from bayesimpact.trial import run
 from bayesimpact.trial.blind import finite, open_seal, seal, sealed_text
-from bayesimpact.trial.run import executor, run_trials
+from bayesimpact.trial.run import run_trials
 from bayesimpact.trial.settings import Settings, settings_from
 
 CONTROLS = Settings(kinds=("control",), benches=("small",), noises=("white",))
