@@ -43,4 +43,5 @@ def input_of(where: str, entry: RecordingTable, values: NDArray[np.float64] | No
     if given.scale == 0.0:
         raise InputError(f"{where}, input, key scale", "0", "a number other than 0")
     samples = given.scale * (values - values.mean() if given.remove_mean else values)
-    return checked(where, Input(samples, given.kind, given.gain == "free"))
+    made = Input(samples, given.kind, given.gain == "free", given.hold == "band_limited")
+    return checked(where, made)

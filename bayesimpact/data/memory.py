@@ -126,8 +126,10 @@ def _entry(where: str, given: object) -> dict[str, Any]:
         entry["used"] = given.used
         if given.input is not None:
             gain = "free" if given.input.free else "known"
+            hold = "band_limited" if given.input.band_limited else "first_order"
             entry["input"] = {
                 "samples": given.input.samples, "kind": given.input.kind, "gain": gain,
+                "hold": hold,
             }  # fmt: skip
     elif isinstance(given, Mapping):
         entry = {str(key): value for key, value in given.items()}

@@ -92,7 +92,8 @@ def _csv(recording: Recording, decimals: int | None) -> str:
 
 def _input(given: Input) -> dict[str, Any]:
     free = {"gain": "free"} if given.free else {}
-    return {"column": INPUT_COLUMN, "kind": given.kind, **free}
+    hold = {"hold": "band_limited"} if given.band_limited else {}
+    return {"column": INPUT_COLUMN, "kind": given.kind, **free, **hold}
 
 
 def _measurement(known: Measurement, quantity: str) -> list[str]:

@@ -150,7 +150,8 @@ def input_words(results: Results) -> str:
     shown = ", ".join(driven[:MOST_RECORDINGS])
     shown += f" and {len(driven) - MOST_RECORDINGS} more" if len(driven) > MOST_RECORDINGS else ""
     return (
-        f" With a measured input, taken as linear between samples: {shown}. The backbone knows "
+        " With a measured input, a line between samples unless campaign.toml says else: "
+        f"{shown}. The backbone knows "
         "free decays only: they have no part in its check."
     )
 

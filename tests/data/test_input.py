@@ -132,6 +132,19 @@ def test_force_of_a_moving_base() -> None:
     np.testing.assert_allclose(of_place[10:-10], exact[10:-10], atol=1e-7)
 
 
+@pytest.mark.parametrize("share", [0.05, 0.15, 0.3])
+def test_a_band_limited_input_keeps_its_amplitude(share: float) -> None:
+    """Seen through lines between samples, whose own loss is sinc2."""
+    angle = 2.0 * np.pi * share * np.arange(400)
+    force = Input(np.sin(angle), band_limited=True).force(1.0, 1e-3)
+    inner = slice(50, -50)
+    basis = np.column_stack([np.sin(angle), np.cos(angle)])[inner]
+    found = np.linalg.lstsq(basis, force[inner], rcond=None)[0] * np.sinc(share) ** 2
+    np.testing.assert_allclose(found, [1.0, 0.0], atol=3e-3)
+    constant = Input(np.full(400, 2.0), band_limited=True).force(1.0, 1e-3)
+    np.testing.assert_allclose(constant, 2.0, rtol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("keys", "words"),
     [

@@ -59,7 +59,7 @@ FILES: dict[str, str | bytes] = {
 NEAR = 'column = "near"\nunit = "mm"\n'
 INPUT = (
     f'{TOP}{ENTRY}time_column = 1\n{NEAR}[recording.input]\ncolumn = "far"\n'
-    'kind = "base_m_s2"\nscale = 3.0\ngain = "free"\nremove_mean = true\n'
+    'kind = "base_m_s2"\nscale = 3.0\ngain = "free"\nremove_mean = true\nhold = "band_limited"\n'
 )
 KEYS: dict[str, dict[str, tuple[str, str]]] = {
     "CampaignTable": {
@@ -102,7 +102,8 @@ KEYS: dict[str, dict[str, tuple[str, str]]] = {
         "skip": (f'{TOP}{OTHER}{ENTRY}skip = "the probe came loose"\n', ""),
     },
     "InputTable": {
-        key: (INPUT, "two columns") for key in ("column", "kind", "scale", "gain", "remove_mean")
+        key: (INPUT, "two columns")
+        for key in ("column", "kind", "scale", "gain", "remove_mean", "hold")
     },
     "MeasurementTable": {
         "noise_um": (TOP + ENTRY + CHAIN + "noise_um = 7.0\n", ""),
