@@ -107,8 +107,8 @@ def new(
     random: --seed is taken for the sake of scripts.
     """
     from bayesimpact.data import draft
+    from bayesimpact.data.quantity import UNITS
     from bayesimpact.data.read import load_campaign
-    from bayesimpact.data.table import UNITS
 
     if unit not in (None, *UNITS):
         raise InputError("--unit", f'"{unit}"', ", ".join(UNITS))

@@ -76,11 +76,18 @@ def vertex(step, y, v):
 
 @dataclass
 class Twin:
-    """Events (time, velocity, entry?) and displacement at the samples, as mpf."""
+    """Events (time, velocity, entry?) and y, y', y'' at the samples, as mpf."""
 
     events: list
-    displacement: list
+    motion: list
     contact_at_start: bool
+
+    @property
+    def displacement(self):
+        return self.derivative(0)
+
+    def derivative(self, order):
+        return [state[order] for state in self.motion]
 
 
 def begins_in_contact(q):
@@ -200,16 +207,16 @@ def twin(q, mass, interval, n, digits=50):
         contact = first = begins_in_contact(q)
         scale = max(abs(float(q[5])), abs(float(q[6])) / math.sqrt(float(q[1] / mass)), 1e-12)
         t, y, v = mp.mpf(0), q[5], q[6]
-        events, displacement = [], []
+        events, states = [], []
         while True:
             motion = _Stretch(q, mass, contact, t, y, v, nudge)
             event = None
             if stop and end > t:
                 event = _next_event(q, mass, contact, motion, t, y, v, end, scale)
-            while len(displacement) < n and (event is None or len(displacement) * interval < event):
-                displacement.append(motion(len(displacement) * interval)[0])
+            while len(states) < n and (event is None or len(states) * interval < event):
+                states.append(motion(len(states) * interval))
             if event is None:
-                return Twin(events, displacement, first)
+                return Twin(events, states, first)
             t, y, v = event, q[3], motion(event)[1]
             contact = not contact
             events.append((t, v, contact))

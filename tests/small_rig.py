@@ -7,9 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from bayesimpact.data.campaign import Campaign, Measurement
+from bayesimpact.data.quantity import Quantity
 from bayesimpact.model.parameters import Layout
-from bayesimpact.trial.rig import Effects, Release, Rig, make_campaign
+from bayesimpact.trial.rig import Effects, Release, Rig, make_campaign, motion
 from bayesimpact.trial.rig_chain import Chain
+from bayesimpact.trial.rig_motion import Motion
 
 RIG = Rig(
     mass=0.503,
@@ -40,6 +42,7 @@ def record(
     rate: float = 1000.0,
     duration: float = 2.0,
     measurement: Measurement | None = None,
+    quantity: Quantity = "displacement",
 ) -> Campaign:
     """Record a campaign; white noise of 5 um and rest readings by default."""
     return make_campaign(
@@ -52,7 +55,13 @@ def record(
         duration=duration,
         rng=np.random.default_rng(seed),
         measurement=measurement,
+        quantity=quantity,
     )
+
+
+def motion_of(number: int, rate: float = 1000.0, duration: float = 2.0) -> Motion:
+    """The true motion of one release of `RIG`."""
+    return motion(RIG, RELEASES[number], rate=rate, duration=duration)
 
 
 def true_values(

@@ -39,7 +39,7 @@ class Measurement:
 
     Attributes
     ----------
-    noise : standard deviation of the raw noise, m (or rad)
+    noise : standard deviation of the raw noise, m (or rad); None for velocities, accelerations
     smoothing : the filter that the recordings passed
     mass_sd : standard uncertainty of the mass, relative
     clock_sd : standard uncertainty of the clock rate, relative
@@ -118,6 +118,16 @@ class Campaign(Picklable):
         return html_table(f"{self.name}: {self.mass:g} kg", columns, rows)
 
     @property
+    def angular(self) -> bool:
+        """True when the motion is about an axis."""
+        return self.recordings[0].angular
+
+    @property
+    def mixed(self) -> bool:
+        """True when the recordings are not all of one quantity."""
+        return len({r.quantity for r in self.recordings}) > 1
+
+    @property
     def cases(self) -> tuple[str, ...]:
         """Obstacles in order of first appearance; () without a stop."""
         return tuple(dict.fromkeys(r.case for r in self.recordings)) if self.stop else ()
@@ -136,10 +146,11 @@ class Campaign(Picklable):
         Parameters
         ----------
         recordings : one or more, each a `Recording` (SI units) or a mapping with the keys of a
-            [[recording]]: `name`, `case`, `samples` (n,) and their `unit` (m, mm, um, rad, deg),
-            and either `times_s` (n,), evenly spaced unless `resample` is true, or
-            `sample_rate_hz`; `start_s`, `end_s`; `used` (n,), False where a sample is set aside;
-            `input` with its own `samples` (n,), SI units, and `kind`, `gain` as in campaign.toml
+            [[recording]]: `name`, `case`, `samples` (n,) and their `unit` (m, mm, um, rad, deg,
+            m/s, mm/s, m/s2, g, ...: the unit tells the quantity), and either `times_s` (n,),
+            evenly spaced unless `resample` is true, or `sample_rate_hz`; `start_s`, `end_s`;
+            `used` (n,), False where a sample is set aside; `input` with its own `samples` (n,), SI
+            units, and `kind`, `gain`, `hold` as in campaign.toml
         name, mass_kg, tables : any other key of campaign.toml, as there: `stop = False`,
             `measurement = {"noise_um": 5.0}`, `priors = {"k1": {...}}`, `beam`, ...
 

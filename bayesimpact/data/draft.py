@@ -12,11 +12,12 @@ from pathlib import Path
 import numpy as np
 
 from bayesimpact.data.foreign import file_bytes
+from bayesimpact.data.quantity import RESPONSE_COLUMNS, UNITS, is_angular, order_of
 from bayesimpact.data.readers import text
 from bayesimpact.data.readers.channel import Channel
-from bayesimpact.data.readers.choose import OTHER_MOTIONS, clock_of, guessed_response
+from bayesimpact.data.readers.choose import clock_of, guessed_response
 from bayesimpact.data.readers.formats import is_instrument_file, read_channels
-from bayesimpact.data.table import RESPONSE_COLUMNS, TIME_COLUMNS, UNITS
+from bayesimpact.data.table import TIME_COLUMNS
 from bayesimpact.errors import InputError
 
 ASSUMED = "ASSUMED"
@@ -105,7 +106,9 @@ def _look(path: Path, file: str, outside: bool) -> Look:
 
 def draft(title: str, looks: Sequence[Look], rig: Rig) -> Draft:
     """campaign.toml with one [[recording]] per file that may hold a response."""
-    angle = any(c.unit in ("rad", "deg") for one in looks for c in guessed_response(one.channels))
+    angle = any(
+        is_angular(UNITS[c.unit][0]) for one in looks for c in guessed_response(one.channels)
+    )
     what = "the inertia in kg m2" if angle else "the moving mass"
     lines = [
         f"# A first campaign.toml. {ASSUMED}: not in the files, to be checked. {NEEDED}: missing.",
@@ -200,7 +203,7 @@ def _keys(one: Look, rig: Rig) -> list[str]:
     """The lines that choose the channel and its clock."""
     lines = [f"encoding = {_toml(one.encoding)}"] if one.encoding else []
     candidates = guessed_response(one.channels)
-    others = [c for c in one.channels if not c.is_time and c.unit not in OTHER_MOTIONS]
+    others = [c for c in one.channels if not c.is_time]
     first_is_time = _rises_evenly(one.channels[0])
     if not candidates:
         candidates = [c for c in others if not (first_is_time and c is one.channels[0])]
@@ -218,6 +221,8 @@ def _keys(one: Look, rig: Rig) -> list[str]:
         block = response.block or str(blocks.index(response.block) + 1)
         lines.append(f"block = {_toml(block)}")
     lines.append(f"column = {_chosen(inside, response)}{note}")
+    if response.unit in UNITS and order_of(UNITS[response.unit][0]) > 0:
+        lines.append(f"quantity = {_toml(UNITS[response.unit][0])}")
     if response.unit not in UNITS and rig.unit is not None:
         lines.append(f"unit = {_toml(rig.unit)}")
     elif response.unit not in UNITS:

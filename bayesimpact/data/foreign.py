@@ -45,6 +45,7 @@ def read_foreign(source: Path, entry: RecordingTable, data: bytes) -> Table:
         time_column=entry.time_column,
         block=entry.block,
         unit=entry.unit,
+        quantity=entry.quantity,
         sample_rate=entry.sample_rate_hz,
         start=entry.start_s,
         end=entry.end_s,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.data.foreign import read_input
 from bayesimpact.data.input import Input, checked
+from bayesimpact.data.recording import Recording
 from bayesimpact.data.schema import RecordingTable
 from bayesimpact.data.table import Table
 from bayesimpact.errors import InputError
@@ -33,6 +35,16 @@ def with_input(source: Path, entry: RecordingTable, data: bytes, table: Table) -
         found = f"{other.samples.size} samples for {table.samples.size} of the response"
         raise InputError(f"{source}, key input", found, "an input for every sample of the response")
     return replace(table, input=other.samples[first - shift : end - shift])
+
+
+def check_quantities(where: str, recordings: Sequence[Recording]) -> None:
+    """Refuse inputs in a campaign where a probe reads a velocity or an acceleration."""
+    driven = [r.name for r in recordings if r.input is not None]
+    other = [r for r in recordings if r.order > 0]
+    if driven and other:
+        found = f"an input of {driven[0]}, and {other[0].name} of {other[0].quantity}"
+        accepted = "with an input, recordings of displacement or angle throughout"
+        raise InputError(f"{where}, key input", found, accepted)
 
 
 def input_of(where: str, entry: RecordingTable, values: NDArray[np.float64] | None) -> Input | None:

@@ -13,10 +13,11 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.clock import check_rate
 from bayesimpact.data.gaps import on_clock
 from bayesimpact.data.period import rough_period
+from bayesimpact.data.quantity import RESPONSE_COLUMNS, UNITS, is_angular, order_of, unit_of
 from bayesimpact.data.read import build_campaign
 from bayesimpact.data.recording import Recording
 from bayesimpact.data.schema import RecordingTable, parse_campaign
-from bayesimpact.data.table import RESPONSE_COLUMNS, TIME_COLUMNS, UNITS, Table
+from bayesimpact.data.table import TIME_COLUMNS, Table
 from bayesimpact.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -217,12 +218,14 @@ def _floats(where: str, values: Any) -> Floats:
 
 def _check_speed(where: str, table: Table) -> None:
     period = rough_period(table.samples, table.interval)
-    if period is None or table.quantity != "displacement":
-        return
+    order = order_of(table.quantity)
+    if period is None or is_angular(table.quantity) or order == 2:
+        return  # an impact's peak acceleration says nothing of the speed
     swing = float(np.max(np.abs(table.samples - np.median(table.samples))))
-    speed = 2.0 * np.pi * swing / period
+    speed = swing * (2.0 * np.pi / period) ** (1 - order)
     if speed > FASTEST:
-        found = f"{swing:.3g} m at {1 / period:.3g} Hz, a speed of {speed:.3g} m/s"
+        unit = unit_of(table.quantity)
+        found = f"{swing:.3g} {unit} at {1 / period:.3g} Hz, a speed of {speed:.3g} m/s"
         accepted = f"the unit of the samples ({', '.join(UNITS)}), and speeds below {FASTEST:g} m/s"
         raise InputError(f"{where}, key unit", found, accepted)
 

@@ -39,7 +39,8 @@ def parameter_ranges(mass: float, recordings: Sequence[Recording]) -> dict[str, 
     periods = [rough_period(r.samples, r.interval) or 0.5 * r.duration for r in recordings]
     omegas = 2.0 * np.pi / np.array(periods)
     slow, fast = float(omegas.min()) / SLOWER, float(omegas.max()) * FASTER
-    reach = FARTHER * max(float(np.ptp(r.samples)) for r in recordings)
+    reach = FARTHER * max(r.motion(rate) for r, rate in zip(recordings, omegas, strict=True))
+    beyond = FARTHER * max(float(np.ptp(r.samples)) for r in recordings)
     readings = [edge for r in recordings for edge in (r.samples.min(), r.samples.max())]
     return {
         "k1": (mass * slow**2, mass * fast**2),
@@ -49,8 +50,8 @@ def parameter_ranges(mass: float, recordings: Sequence[Recording]) -> dict[str, 
         "g": (-reach, reach),
         "y0": (-reach, reach),
         "v0": (-reach * fast, reach * fast),
-        "offset": (float(min(readings)) - reach, float(max(readings)) + reach),
-        "sigma": (FINEST * reach, reach),
+        "offset": (float(min(readings)) - beyond, float(max(readings)) + beyond),
+        "sigma": (FINEST * beyond, beyond),
     }
 
 

@@ -18,10 +18,11 @@ from bayesimpact.data.campaign import Beam, Campaign, Measurement, Smoothing
 from bayesimpact.data.entries import filled_in
 from bayesimpact.data.foreign import file_bytes, is_foreign, read_foreign
 from bayesimpact.data.gaps import excluded_spans
-from bayesimpact.data.input_column import input_of, with_input
+from bayesimpact.data.input_column import check_quantities, input_of, with_input
 from bayesimpact.data.period import rough_period
 from bayesimpact.data.prior_bounds import check_prior, parameter_ranges
-from bayesimpact.data.recording import Quantity, Recording
+from bayesimpact.data.quantity import Quantity, check_quantity, unit_of, with_article
+from bayesimpact.data.recording import Recording
 from bayesimpact.data.schema import (
     CampaignTable,
     LagTable,
@@ -216,7 +217,8 @@ def _table(source: Path, entry: RecordingTable, data: bytes) -> Table:
 def _recording(
     source: str, where: str, entry: RecordingTable, stop: bool, table: Table
 ) -> Recording:
-    bounds.check_readings(table.samples, "rad" if table.quantity == "angle" else "m", source)
+    check_quantity(f"{where}, key quantity", entry.quantity, table.quantity)
+    bounds.check_readings(table.samples, unit_of(table.quantity), source)
     bounds.check_interval(table.interval, source)
     # A sample at the very start or end counts in, however its time was rounded.
     margin = 1e-6
@@ -266,16 +268,16 @@ def _check_motion(where: str, recording: Recording) -> None:
 
 
 def _check_together(where: str, table: CampaignTable, recordings: list[Recording]) -> None:
-    quantity = recordings[0].quantity
+    first = recordings[0]
     for number, (entry, recording) in enumerate(zip(table.recording, recordings, strict=True), 1):
-        if recording.quantity != quantity:
+        if recording.angular != first.angular:
+            kind = "about an axis" if first.angular else "along a line"
             raise InputError(
                 f"{where}, recording {number} ({entry.file})",
-                f"an {recording.quantity}"
-                if recording.quantity == "angle"
-                else f"a {recording.quantity}",
-                f"the quantity of the first recording, {quantity}, throughout",
+                with_article(recording.quantity),
+                f"motion {kind}, as the first recording's {first.quantity}, throughout",
             )
+    check_quantities(where, recordings)
     if table.mass_uncertainty_kg >= table.mass_kg:
         found = f"{table.mass_uncertainty_kg:g} kg"
         accepted = f"less than the mass, {table.mass_kg:g} kg"
@@ -285,7 +287,7 @@ def _check_together(where: str, table: CampaignTable, recordings: list[Recording
 def _measurement(where: str, table: CampaignTable, recordings: list[Recording]) -> Measurement:
     given = table.measurement
     return Measurement(
-        noise=_noise(f"{where}, [measurement]", given, recordings[0].quantity),
+        noise=_noise(f"{where}, [measurement]", given, recordings),
         smoothing=_smoothing(f"{where}, [measurement], smoothing", given, recordings),
         mass_sd=table.mass_uncertainty_kg / table.mass_kg,
         clock_sd=given.clock_uncertainty_ppm * 1e-6,
@@ -294,18 +296,20 @@ def _measurement(where: str, table: CampaignTable, recordings: list[Recording]) 
     )
 
 
-def _noise(where: str, given: MeasurementTable, quantity: Quantity) -> float | None:
-    scales = {
+def _noise(where: str, given: MeasurementTable, recordings: list[Recording]) -> float | None:
+    scales: dict[Quantity, dict[str, float]] = {
         "displacement": {"noise_um": 1e-6},
         "angle": {"noise_mrad": 1e-3, "noise_deg": math.pi / 180.0},
     }
     levels = {key: getattr(given, key) for keys in scales.values() for key in keys}
+    other = next((r.quantity for r in recordings if r.quantity not in scales), None)
+    quantity = other or recordings[0].quantity
     levels = {key: level for key, level in levels.items() if level is not None}
-    accepted = " or ".join(scales[quantity])
+    accepted = " or ".join(scales.get(quantity, ())) or "no noise level: it is estimated"
     if len(levels) > 1:
         raise InputError(f"{where}, key {list(levels)[1]}", " and ".join(levels), accepted)
     for key, level in levels.items():
-        if key not in scales[quantity]:
+        if key not in scales.get(quantity, ()):
             raise InputError(
                 f"{where}, key {key}", f"a noise level for recordings of {quantity}", accepted
             )

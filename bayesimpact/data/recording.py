@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.input import Input
-
-Quantity = Literal["displacement", "angle"]
+from bayesimpact.data.quantity import Quantity, is_angular, order_of, unit_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +19,7 @@ class Recording:
     ----------
     name : file name without its ending; names the nuisance parameters `y0[name]`, ...
     case : the obstacle that was mounted; "" for a campaign without a stop
-    samples : (n,) read-only, m (or rad when `quantity` is "angle")
+    samples : (n,) read-only, in the SI unit of `quantity`
     interval : sampling interval, s
     start : time of the first sample on the file's own clock, s
     quantity : what was measured
@@ -95,4 +93,18 @@ class Recording:
     @property
     def unit(self) -> str:
         """SI unit of the samples."""
-        return "m" if self.quantity == "displacement" else "rad"
+        return unit_of(self.quantity)
+
+    @property
+    def order(self) -> int:
+        """Which time derivative of the displacement (or angle) the samples are: 0, 1 or 2."""
+        return order_of(self.quantity)
+
+    @property
+    def angular(self) -> bool:
+        """True when the motion is about an axis."""
+        return is_angular(self.quantity)
+
+    def motion(self, rate: float) -> float:
+        """Peak-to-peak displacement of an oscillation of angular frequency `rate`, rad/s, m."""
+        return float(np.ptp(self.samples)) / rate**self.order

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from bayesimpact.data import bounds
+from bayesimpact.data.quantity import QUANTITIES, UNITS, Quantity
 from bayesimpact.errors import InputError
 
 _SEEN = rf"^[^{bounds.UNSEEN}]*[^{bounds.UNSEEN}\s][^{bounds.UNSEEN}]*$"
@@ -77,9 +78,10 @@ class RecordingTable(_Table):
         None, ge=0, le=1_000_000, description="a whole number of lines, 0 to a million"
     )
     encoding: Text | None = Field(None, description='in quotes, as "latin-1", "utf-16"')
-    unit: Literal["m", "mm", "um", "rad", "deg"] | None = Field(
-        None, description="m, mm, um, rad or deg, in quotes"
+    unit: Literal[tuple(UNITS)] | None = Field(  # type: ignore[valid-type]
+        None, description=f"{', '.join(UNITS)}, in quotes"
     )
+    quantity: Quantity | None = Field(None, description=f"{', '.join(QUANTITIES)}, in quotes")
     start_s: Time | None = Field(None, description=f"{NUMBER}, s on the file's own clock")
     end_s: Time | None = Field(None, description=f"{NUMBER}, s on the file's own clock")
     exclude_s: list[Annotated[list[Time], Field(min_length=2, max_length=2)]] | None = Field(

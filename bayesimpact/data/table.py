@@ -13,18 +13,10 @@ from numpy.typing import NDArray
 
 from bayesimpact.data.clock import check_rate
 from bayesimpact.data.gaps import on_clock
-from bayesimpact.data.recording import Quantity
+from bayesimpact.data.quantity import RESPONSE_COLUMNS, UNITS, Quantity
 from bayesimpact.errors import InputError
 
-UNITS: dict[str, tuple[Quantity, float]] = {
-    "m": ("displacement", 1.0),
-    "mm": ("displacement", 1e-3),
-    "um": ("displacement", 1e-6),
-    "rad": ("angle", 1.0),
-    "deg": ("angle", math.pi / 180.0),
-}
 TIME_COLUMNS = {"time_s": 1.0, "time_ms": 1e-3}
-RESPONSE_COLUMNS = {f"{quantity}_{unit}": unit for unit, (quantity, _) in UNITS.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,10 +25,10 @@ class Table:
 
     Attributes
     ----------
-    samples : (n,) m or rad
+    samples : (n,)
     interval : s
     start : time of the first sample on the file's clock, s; 0 for a file without a time column
-    quantity : "displacement" or "angle"
+    quantity : what the samples are
     used : (n,) False where an uneven clock left a gap; None where every sample counts
     input : (n,) a measured input in SI units, see `bayesimpact.data.input`; None without one
     """

@@ -26,7 +26,8 @@ def write_campaign(
 
     Parameters
     ----------
-    decimals : of a millimetre (or of a milliradian) in the recordings; None: every digit, in m
+    decimals : of a millimetre (or of a milliradian) in the recordings; None: every digit, in SI, as
+        always for velocities and accelerations
     comment : first lines of campaign.toml, without the #
     """
     folder.mkdir(parents=True, exist_ok=True)
@@ -74,14 +75,13 @@ def _named(name: str, file: str) -> list[str]:
 
 
 def _csv(recording: Recording, decimals: int | None) -> str:
-    angle = recording.quantity == "angle"
     times = recording.start + recording.times
-    if decimals is None:
-        header = f"time_s,{recording.quantity}_{recording.unit}"
+    if decimals is None or recording.order > 0:
+        header = f"time_s,{recording.quantity}_{recording.unit.replace('/', '_')}"
         columns = [list(map(repr, x.tolist())) for x in (times, recording.samples)]
     else:
-        scale, places = (1.0, decimals + 3) if angle else (1e3, decimals)
-        header = "time_s,angle_rad" if angle else "time_s,displacement_mm"
+        scale, places = (1.0, decimals + 3) if recording.angular else (1e3, decimals)
+        header = "time_s,angle_rad" if recording.angular else "time_s,displacement_mm"
         columns = [[f"{t:.12g}" for t in times.tolist()]]
         columns.append([f"{x * scale:.{places}f}" for x in recording.samples.tolist()])
     if recording.input is not None:

@@ -83,7 +83,7 @@ def whitened(target: Target, values: Sequence[Array], sigma: Array) -> tuple[Arr
     """Signals (..., n_r) per recording, whitened and in units of the noise."""
     recordings, noise = target.oscillator.campaign.recordings, target.likelihood.noise
     rows = zip(values, recordings, sigma, strict=True)
-    return tuple(noise.whiten(v, r.interval, r.used) / s for v, r, s in rows)
+    return tuple(noise.whiten(v, r.interval, r.used, r.order) / s for v, r, s in rows)
 
 
 def _grid(effect: Effect, scales: Scales) -> list[dict[str, float]]:

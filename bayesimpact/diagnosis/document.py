@@ -24,7 +24,7 @@ from bayesimpact.diagnosis.whiteness import whiteness_p
 from bayesimpact.diagnosis.words import failure, parameter_shifts, remaining, statement, summary
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect
-from bayesimpact.model.parameters import angular, bare_name, is_added
+from bayesimpact.model.parameters import bare_name, is_added, unit_for
 
 Array = NDArray[np.float64]
 NORMAL_90 = 1.6448536269514722
@@ -51,7 +51,8 @@ def document(
     """
     d = diagnosis
     noise = d.identification.noise
-    angle = d.before.target.oscillator.campaign.recordings[0].quantity == "angle"
+    campaign = d.before.target.oscillator.campaign
+    angle, reading = campaign.angular, campaign.recordings[0]
     left = remainder(d.naming, d.after, d.remains)
     before = _parameters(d.before, intervals(d.before), draws_before)
     after = _parameters(d.after, d.intervals, draws_after if d.remains is None else None)
@@ -70,7 +71,7 @@ def document(
             alternatives,
             parameter_shifts(before, after) if d.verdict != "adequate" else {},
             _detectable(d),
-            remaining(left, angle=angle),
+            remaining(left, reading.unit),
             faults=in_words(faulty),
             angle=angle,
             drifts=d.naming.unknown.reach > 0,
@@ -100,6 +101,7 @@ def document(
         ],
         "evidence": _evidence(d),
         "certificate": None if certified is None else asdict(certified),
+        "reading": {"quantity": reading.quantity, "unit": reading.unit},
         "noise": {
             "sigma_m": noise.level,
             "correlation": "white" if noise.correlation == 0 else "ar1",
@@ -217,7 +219,6 @@ def _effect(
     whole = kept.get(frozenset(model), d.naming.chosen.candidate)
     smaller = kept.get(frozenset(model - {effect.id}), d.naming.base.candidate)
     value, unit, share = size(effect, d.before, d.after, d.scales)
-    quantity = d.after.target.oscillator.campaign.recordings[0].quantity
     own = [e.id for e in d.effects if e.id != "smoothing" or d.filtered is None]
     return common | {
         "probability": d.naming.probability(effect.id),
@@ -226,7 +227,7 @@ def _effect(
         "location": _location(d.locations[own.index(effect.id)]),
         "size": {
             "value": value,
-            "unit": angular(unit) if quantity == "angle" else unit,
+            "unit": unit_for(d.after.target.oscillator.campaign, effect, unit),
             "percent": 100 * share,
             "of": yardstick(effect),
         },

@@ -27,15 +27,12 @@ def campaign_scales(fit: Fit) -> Scales:
     o = fit.target.oscillator
     slots = o.layout.slots(fit.mode)
     c1, k1, c2, gap, k2 = slots[:, :5].T
-    samples = [r.samples for r in o.campaign.recordings]
-    offsets = slots[:, 10]
-    reach = np.array([np.max(np.abs(s - b)) for s, b in zip(samples, offsets, strict=True)])
-    depth = np.array([np.max(s - b) for s, b in zip(samples, offsets, strict=True)]) - gap
+    readings = [r.samples - b for r, b in zip(o.campaign.recordings, slots[:, 10], strict=True)]
+    moved = fit.displacements if o.orders.any() else readings
+    reach = np.array([np.max(np.abs(y)) for y in moved])
+    depth = np.array([np.max(y) for y in moved]) - gap
     speed = reach * np.sqrt(k1 / o.campaign.mass)
-    touches = [
-        int(np.sum((s[:-1] - b < g) & (s[1:] - b >= g)))
-        for s, b, g in zip(samples, offsets, gap, strict=True)
-    ]
+    touches = [int(np.sum((y[:-1] < g) & (y[1:] >= g))) for y, g in zip(moved, gap, strict=True)]
     indentation = float(max(depth.max(), 0.0)) if o.campaign.stop else 0.0
     return Scales(
         mass=o.campaign.mass,
@@ -53,7 +50,9 @@ def campaign_scales(fit: Fit) -> Scales:
         gap=float(gap.mean()) if o.campaign.stop else 0.0,
         cases=len(o.campaign.cases),
         recordings=len(o.campaign.recordings),
-        angle=o.campaign.recordings[0].quantity == "angle",
+        angle=o.campaign.angular,
+        reading=float(max(np.max(np.abs(x)) for x in readings)),
+        mixed=o.campaign.mixed,
     )
 
 

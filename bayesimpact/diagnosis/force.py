@@ -41,7 +41,6 @@ Array = NDArray[np.float64]
 
 NULL_DRAWS = 1000
 FACTORS = (1, 3, 7)  # 24, 10 and 6 knots: the evidence chooses how smooth a force is
-_OFFSET = SLOTS.index("offset")
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,9 +238,7 @@ def refinement(count: int, factor: int) -> Array:
 
 def motion_range(fit: Fit) -> tuple[float, float]:
     """Smallest and largest displacement of all fitted recordings about their rest, m."""
-    oscillator = fit.target.oscillator
-    offsets = oscillator.layout.slots(fit.mode)[:, _OFFSET]
-    moved = [p - b for p, b in zip(fit.predicted, offsets, strict=True)]
+    moved = fit.displacements
     return float(min(m.min() for m in moved)), float(max(m.max() for m in moved))
 
 
@@ -270,7 +267,8 @@ def whitened_one(fit: Fit, r: int, values: Array, sigma: Array) -> Array:
     oscillator, noise = fit.target.oscillator, fit.target.likelihood.noise
     recording = oscillator.campaign.recordings[r]
     filtered = smooth(values, oscillator.smoothing, recording.interval)
-    return np.asarray(noise.whiten(filtered, recording.interval, recording.used) / sigma[r])
+    white = noise.whiten(filtered, recording.interval, recording.used, recording.order)
+    return np.asarray(white / sigma[r])
 
 
 def _with_law(oscillator: Oscillator, effect: Effect) -> NDArray[np.int64]:
@@ -297,21 +295,15 @@ def _change(
     inputs = oscillator.inputs
     if inputs is not None:
         inputs = inputs.of(np.full(points.shape[0], r))
-    out = general_motions(points, oscillator.campaign.mass, counts, intervals, laws, inputs)
+    orders = np.full(points.shape[0], oscillator.orders[r])
+    out = general_motions(points, oscillator.campaign.mass, counts, intervals, laws, orders, inputs)
     return np.asarray(out[1:] - out[0])
 
 
 def trajectory_points(fit: Fit) -> Sequence[tuple[Array, Array]]:
     """Displacement and velocity of the fitted motion at the samples, per recording, m and m/s."""
-    oscillator = fit.target.oscillator
-    offsets = oscillator.layout.slots(fit.mode)[:, _OFFSET]
-    points = []
-    for predicted, offset, interval in zip(
-        fit.predicted, offsets, oscillator.intervals, strict=True
-    ):
-        y = predicted - offset
-        points.append((y, np.gradient(y, interval)))
-    return points
+    pairs = zip(fit.displacements, fit.target.oscillator.intervals, strict=True)
+    return [(y, np.gradient(y, interval)) for y, interval in pairs]
 
 
 __all__ = ["MissingForce", "missing_force", "motion_range", "trajectory_points", "whitened"]

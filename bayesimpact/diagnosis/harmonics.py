@@ -83,7 +83,7 @@ def line_blocks(fit: Fit, r: int, grid: Array) -> Blocks:
     step = 2 * np.pi * interval * (grid[1] - grid[0])
     first = 2 * np.pi * interval * grid[0]
     sums = czt(stacked, grid.size, np.exp(-1j * step), np.exp(1j * first), axis=-1)
-    lift = _whitening_gain(fit, grid, interval) / sigma
+    lift = _whitening_gain(fit, grid, interval) / (sigma * fit.target.likelihood.scales[r])
     sums = sums * np.exp(-2j * np.pi * grid * start)
     pairs = np.stack([-sums.imag, sums.real], axis=-1) * lift[:, None]  # (1 + k, F, 2)
     n = stacked.shape[-1]
@@ -98,7 +98,7 @@ def _whitening_gain(fit: Fit, grid: Array, interval: float) -> Array:
 
 
 def hums(fit: Fit, r: int, lines: Array) -> Array:
-    """Whitened sine and cosine of one metre at every frequency (F,), Hz: (2 F, n)."""
+    """Whitened sine and cosine of one unit of the reading at every frequency (F,), Hz: (2 F, n)."""
     recording = fit.target.oscillator.campaign.recordings[r]
     angle = 2 * np.pi * lines[:, None] * recording.times
     waves = np.stack([np.sin(angle), np.cos(angle)], axis=1).reshape(2 * lines.size, -1)
@@ -109,7 +109,9 @@ def force_responses(fit: Fit, r: int, grid: Array, scales: Scales) -> Array:
     """Whitened response to sine and cosine of one newton at every frequency (F,), Hz: (2 F, n)."""
     oscillator, sigma = fit.target.oscillator, sigma_of(fit)
     slots = oscillator.layout.slots(fit.mode)[r]
-    size = 1e-3 * float(sigma[r]) * scales.stiffness
+    rate = np.sqrt(scales.stiffness / scales.mass)
+    level = float(sigma[r] * fit.target.likelihood.scales[r])
+    size = float(1e-3 * level / rate ** int(oscillator.orders[r]) * scales.stiffness)
     q = np.tile(slots, (2 * grid.size + 1, 1))
     q[1:, _FORCE] = size
     q[1:, _OMEGA] = np.repeat(2 * np.pi * grid, 2)

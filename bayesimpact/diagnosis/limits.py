@@ -13,7 +13,7 @@ from bayesimpact.diagnosis.scan import Scan
 from bayesimpact.diagnosis.scores import Score
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Scales
-from bayesimpact.model.parameters import angular
+from bayesimpact.model.parameters import unit_for
 
 Array = NDArray[np.float64]
 
@@ -67,7 +67,6 @@ def _limit(fit: Fit, score: Score, scan: Scan, scales: Scales) -> Limit:
     upper = float(
         np.max([upper_limit(m, s, direction.one_sided) for m, s in zip(size, sd, strict=True)])
     )
-    quantity = fit.target.oscillator.campaign.recordings[0].quantity
     practical = PRACTICAL * parameter.scale(scales)
     power = float(stats.norm.sf(DETECTED - practical / sd[0]))
     column = scan.groups[scan.scores.index(score)][0]
@@ -78,7 +77,7 @@ def _limit(fit: Fit, score: Score, scan: Scan, scales: Scales) -> Limit:
     return Limit(
         score.effect.id,
         name,
-        angular(parameter.unit) if quantity == "angle" else parameter.unit,
+        unit_for(fit.target.oscillator.campaign, score.effect, parameter.unit),
         upper,
         score.limit,
         power,

@@ -39,9 +39,7 @@ def remainder(naming: Naming, after: Fit, left: State | None) -> Remainder | Non
         return None
     over = float(np.sqrt(after.reduced_chi2))
     rms = after.rms * float(np.sqrt(max(1.0 - 1.0 / max(over, 1.0) ** 2, 0.0)))
-    recordings = after.target.oscillator.campaign.recordings
-    centred = np.concatenate([r.samples - r.samples.mean() for r in recordings])
-    signal = float(np.sqrt(np.mean(centred**2)))
+    signal = after.signal
     best = max(naming.tried, key=naming.log_odds).fit
     place = locate(left.candidate.fit, best, left.unknown, ())
     return Remainder(

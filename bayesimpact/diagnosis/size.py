@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from bayesimpact.diagnosis.force import trajectory_points
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales, Size
-from bayesimpact.model.parameters import angular, instance_name
+from bayesimpact.model.parameters import instance_name, unit_for
 
 Array = NDArray[np.float64]
 IN_CONTACT = ("contact", "entry", "exit")
@@ -20,8 +20,7 @@ _SMALLER = (("mm", 1e-3), ("µm", 1e-6), ("nm", 1e-9))
 def size_in_words(effect: Effect, before: Fit, after: Fit, scales: Scales) -> tuple[str, float]:
     """Size of an effect as text, and relative to what it should be held against."""
     value, unit, share = size(effect, before, after, scales)
-    quantity = after.target.oscillator.campaign.recordings[0].quantity
-    return amount(value, angular(unit) if quantity == "angle" else unit), share
+    return amount(value, unit_for(after.target.oscillator.campaign, effect, unit)), share
 
 
 def amount(value: float, unit: str) -> str:
@@ -54,9 +53,10 @@ def size(effect: Effect, before: Fit, after: Fit, scales: Scales) -> Size:
         return peak, "N", peak / yardstick
     if effect.observe is not None:
         change = largest_change(effect, after)
-    else:
-        pairs = zip(after.predicted, before.predicted, strict=True)
-        change = max(float(np.abs(a - b).max()) for a, b in pairs)
+        return change, "m", change / scales.largest_reading
+    derived = after.target.oscillator.orders.any()
+    both = [f.displacements if derived else f.predicted for f in (after, before)]
+    change = max(float(np.abs(a - b).max()) for a, b in zip(*both, strict=True))
     return change, "m", change / scales.amplitude
 
 
@@ -83,10 +83,10 @@ def effect_numbers(effect: Effect, fit: Fit, r: int) -> list[float]:
 
 
 def largest_change(effect: Effect, fit: Fit) -> float:
-    """How far an effect of the measuring chain changes any reading, m."""
+    """How far an effect of the measuring chain changes any reading, in the reading's unit."""
     assert effect.observe is not None
     largest = 0.0
-    for r, (y, _) in enumerate(trajectory_points(fit)):
+    for r, y in enumerate(fit.readings):
         t = (
             np.arange(y.size, dtype=np.float64)
             * fit.target.oscillator.campaign.recordings[r].interval

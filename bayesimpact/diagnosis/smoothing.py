@@ -58,10 +58,11 @@ def whole_campaign(identification: Identification) -> Location:
     """The place of something in the measuring chain: all recordings, throughout."""
     fit = identification.fit
     campaign = fit.target.oscillator.campaign
-    samples = np.concatenate([r.samples for r in campaign.recordings])
-    speed = max(
-        float(np.max(np.abs(np.gradient(r.samples, r.interval)))) for r in campaign.recordings
-    )
+    recorded = [r.samples for r in campaign.recordings]
+    moved = fit.displacements if fit.target.oscillator.orders.any() else recorded
+    samples = np.concatenate(moved)
+    pairs = zip(moved, campaign.recordings, strict=True)
+    speed = max(float(np.max(np.abs(np.gradient(y, r.interval)))) for y, r in pairs)
     return Location(
         regime="measurement",
         share=1.0,

@@ -47,14 +47,14 @@ def parameter_shifts(
     return shifts
 
 
-def remaining(left: Remainder | None, *, angle: bool = False) -> str:
-    """What is left, in a sentence; empty where nothing is."""
+def remaining(left: Remainder | None, unit: str = "m") -> str:
+    """What is left, in a sentence; empty where nothing is. `unit` is that of the readings."""
     if left is None:
         return ""
     place = _REGIMES[left.regime]
     guess = left.guess.replace("_", " ")
     return (
-        f" Something remains: {amount(left.rms, 'rad' if angle else 'm')} rms, "
+        f" Something remains: {amount(left.rms, unit)} rms, "
         f"{two_digits(100 * left.share)} % of the signal and {two_digits(left.over_noise)} times "
         f"the noise with it, {place}; the next guess is {guess}. The intervals allow for it."
     )

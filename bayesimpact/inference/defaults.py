@@ -75,8 +75,10 @@ def _default(
         if campaign.measurement.noise is not None:
             return LogNormal(campaign.measurement.noise, 0.1)
         return LogUniform(1e-4 * noise.level, 1e4 * noise.level)
-    reach = 20 * max(float(np.ptp(r.samples)) for r in campaign.recordings)
     mass, k1 = campaign.mass, estimates.k1
+    reach = 20 * max(r.motion(np.sqrt(k1 / mass)) for r in campaign.recordings)
+    if kind == "offset":  # what is added to a reading is limited by the readings
+        reach = 20 * max(float(np.ptp(r.samples)) for r in campaign.recordings)
     stiffest = max([k1, *estimates.k2.values()])
     gain = 100 * abs(estimates.input_gain or 1.0)
     ranges = {

@@ -14,8 +14,10 @@ from bayesimpact.inference.likelihood import Likelihood, Linearisation
 from bayesimpact.inference.prior import Prior
 from bayesimpact.inference.priors import Priors
 from bayesimpact.model.oscillator import Oscillator
+from bayesimpact.model.parameters import SLOTS
 
 Array = NDArray[np.float64]
+_OFFSET = SLOTS.index("offset")
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +58,7 @@ class Fit:
     mode : (d,) parameters in the order of `target.oscillator.layout`
     covariance : (d, d) inverse of the negative log posterior's Gauss-Newton Hessian (Laplace)
     log_posterior : at the mode
-    sums : (R,) whitened sums of squares, m2
+    sums : (R,) whitened sums of squares, squared unit of the readings
     converged : the last step was below 1e-3 standard deviations
     iterations : steps taken
     linearisation : of every recording at the mode
@@ -116,12 +118,30 @@ class Fit:
 
     @cached_property
     def predicted(self) -> tuple[Array, ...]:
-        """What the probe would have read, per recording (n,), m."""
+        """What the probe would have read, per recording (n,), in the recording's SI unit."""
         return self.target.oscillator.predict(self.mode)
 
     @cached_property
+    def readings(self) -> tuple[Array, ...]:
+        """The same counted from the reading at rest."""
+        offsets = self.target.oscillator.layout.slots(self.mode)[:, _OFFSET]
+        return tuple(p - b for p, b in zip(self.predicted, offsets, strict=True))
+
+    @cached_property
+    def displacements(self) -> tuple[Array, ...]:
+        """Where the mass was by the model, per recording (n,), m, from its true rest.
+
+        For displacements as the probe saw it, sensor effects and filter included.
+        """
+        o = self.target.oscillator
+        return o.displacements(self.mode) if o.orders.any() else self.readings
+
+    @cached_property
     def residuals(self) -> tuple[Array, ...]:
-        """Recorded minus predicted, per recording (n,), m; 0 where a sample is set aside."""
+        """Recorded minus predicted, per recording (n,), in the recording's SI unit.
+
+        0 where a sample is set aside.
+        """
         recordings = self.target.oscillator.campaign.recordings
         pairs = zip(recordings, self.predicted, strict=True)
         return tuple(
@@ -131,9 +151,21 @@ class Fit:
 
     @property
     def rms(self) -> float:
-        """Root mean square residual over all samples that count, m."""
+        """Root mean square residual over all samples that count, in the first recording's unit.
+
+        Residuals of other quantities count by their noise, as in the likelihood.
+        """
         count = sum(r.count for r in self.target.oscillator.campaign.recordings)
-        return float(np.sqrt(sum(float(np.sum(r**2)) for r in self.residuals) / count))
+        pairs = zip(self.residuals, self.target.likelihood.scales, strict=True)
+        return float(np.sqrt(sum(float(np.sum((r / s) ** 2)) for r, s in pairs) / count))
+
+    @property
+    def signal(self) -> float:
+        """The same of the readings about their means."""
+        recordings = self.target.oscillator.campaign.recordings
+        pairs = zip(recordings, self.target.likelihood.scales, strict=True)
+        centred = np.concatenate([(r.samples - r.samples.mean()) / s for r, s in pairs])
+        return float(np.sqrt(np.mean(centred**2)))
 
 
 def grams(linearisation: Sequence[Linearisation]) -> tuple[Array, ...]:

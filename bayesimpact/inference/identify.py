@@ -10,7 +10,7 @@ search that failed shows.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from bayesimpact.inference.mode import find_mode
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.noise_estimate import estimate_noise
 from bayesimpact.inference.noise_refined import refined_noise
+from bayesimpact.inference.onsets import without_onsets
 from bayesimpact.inference.priors import Priors
 from bayesimpact.inference.search import Generation, SearchResult, metropolis_differential_evolution
 from bayesimpact.model.derivatives import grams
@@ -105,11 +106,18 @@ def identify(
     result = from_search = None
     if search:
         result, start = global_search(
-            oscillator, priors, guess, rng=rng, evaluations=evaluations, callback=callback
-        )
+            oscillator, priors, guess, rng=rng, evaluations=evaluations, callback=callback,
+            scales=target.likelihood.scales,
+        )  # fmt: skip
         from_search = _climbed(target, start)
     ends = [fit for fit in (from_guess, from_search) if fit is not None]
     best = max(ends, key=lambda fit: fit.log_posterior)
+    if (smooth := without_onsets(best)) is not campaign:
+        oscillator = replace(oscillator, campaign=smooth)
+        target = Target(Likelihood(oscillator, noise), priors)
+        ends = [find_mode(target, fit.mode) for fit in ends]
+        from_guess, from_search = ends[0], ends[1] if search else None
+        best = max(ends, key=lambda fit: fit.log_posterior)
     refined = noise if given else refined_noise(best)
     if refined is not noise:
         noise = refined
@@ -144,17 +152,19 @@ def global_search(
     factor: float = BOUND_FACTOR,
     evaluations: int | None = None,
     callback: Callable[[Generation], None] | None = None,
+    scales: Array | None = None,
 ) -> tuple[SearchResult, Array]:
     """Differential evolution on the physical parameters over the first cycles.
 
     Bounds are the guess divided and multiplied by `factor` (for the gap: the guess plus and minus
     `factor` times its size, at least a tenth of the motion), cut to the priors. Initial conditions
     and rest readings are not searched: for every candidate they take the values of two Gauss-Newton
-    steps. Returns the search and the full parameter vector (d,) of its winner.
+    steps. `scales` (R,) are the recordings' noise levels over that of the first one's quantity.
+    Returns the search and the full parameter vector (d,) of its winner.
     """
     k1 = float(guess[oscillator.layout.index("k1")])
     duration = SEARCH_CYCLES * 2 * np.pi / np.sqrt(k1 / oscillator.campaign.mass)
-    profile = _Profile(oscillator, guess, duration)
+    profile = _Profile(oscillator, guess, duration, scales)
     lower, upper = _within(priors, profile, guess, *profile.bounds(factor))
     result = metropolis_differential_evolution(
         profile,
@@ -187,14 +197,18 @@ def _within(
 class _Profile:
     """Profiled objective (N / 2) log S of the physical parameters, nuisances eliminated."""
 
-    def __init__(self, oscillator: Oscillator, guess: Array, duration: float) -> None:
+    def __init__(
+        self, oscillator: Oscillator, guess: Array, duration: float, scales: Array | None = None
+    ) -> None:
         layout = oscillator.layout
+        self.weights = 1.0 / (np.ones(oscillator.counts.size) if scales is None else scales) ** 2
         short = oscillator.campaign.excerpt(duration).thinned(duration / SEARCH_SAMPLES)
         self.short = Oscillator(short, (), layout, None)
         self.guess = guess
         self.physical = layout.roles("physical")
         self.positive = np.array([layout.parameters[i].lower == 0.0 for i in self.physical])
-        motion = max(float(np.ptp(r.samples)) for r in oscillator.campaign.recordings)
+        rate = np.sqrt(guess[layout.index("k1")] / oscillator.campaign.mass)
+        motion = max(r.motion(rate) for r in oscillator.campaign.recordings)
         self.reach = np.maximum(np.abs(guess[self.physical]), 0.1 * motion)
         self.columns = np.ascontiguousarray(layout.columns[:, : len(BASE_SLOTS)])
         self.constants = np.ascontiguousarray(layout.constants[:, : len(BASE_SLOTS)])
@@ -246,17 +260,18 @@ class _Profile:
         s = self.short
         sums, _ = sums_of_squares(
             np.ascontiguousarray(theta), self.columns, self.constants, s.campaign.mass, s.samples,
-            s.starts, s.counts, s.intervals, s.inputs,
+            s.starts, s.counts, s.intervals, s.orders, s.inputs,
         )  # fmt: skip
-        return np.asarray(sums.sum(axis=1))
+        return np.asarray((sums * self.weights).sum(axis=1))
 
     def _grams(self, theta: Array) -> Array:
         s = self.short
         matrices, codes = grams(
             np.ascontiguousarray(theta), self.columns, self.constants, s.campaign.mass, s.samples,
-            s.starts, s.counts, s.intervals, s.inputs,
+            s.starts, s.counts, s.intervals, s.orders, s.inputs,
         )  # fmt: skip
         failed = (codes != 0) | ~np.isfinite(matrices).all(axis=(2, 3))
+        matrices *= self.weights[:, None, None]
         matrices[failed] = np.eye(matrices.shape[-1]) * 1e300
         return np.asarray(matrices)
 

@@ -77,8 +77,13 @@ class Likelihood:
         """Log determinant of the whitening per recording, (R,)."""
         recordings = self.oscillator.campaign.recordings
         return np.array(
-            [self.noise.log_volume(r.samples.size, r.interval, r.used) for r in recordings]
+            [self.noise.log_volume(r.samples.size, r.interval, r.used, r.order) for r in recordings]
         )
+
+    @cached_property
+    def scales(self) -> Array:
+        """Level of every recording's noise over that of the first quantity's, (R,)."""
+        return np.array([self.noise.scales[order] for order in self.oscillator.orders])
 
     @cached_property
     def sigma_columns(self) -> Index:
@@ -103,9 +108,10 @@ class Likelihood:
                 o.starts,
                 o.counts,
                 o.intervals,
+                o.orders,
                 o.inputs,
             )
-            return np.asarray(sums)
+            return np.asarray(sums / self.scales**2)
         sums = np.empty((theta.shape[0], o.counts.size))
         size = max(1, _CHUNK_SAMPLES // (o.counts.size * int(o.counts.max())))
         for first in range(0, theta.shape[0], size):
@@ -119,7 +125,8 @@ class Likelihood:
         pairs = zip(
             self.oscillator.campaign.recordings, self.oscillator.predict(theta), strict=True
         )
-        return tuple(self.noise.whiten(r.samples - p, r.interval, r.used) for r, p in pairs)
+        noise = self.noise
+        return tuple(noise.whiten(r.samples - p, r.interval, r.used, r.order) for r, p in pairs)
 
     def per_recording(self, theta: Array) -> Array:
         """Log likelihood of every recording, (B, R); -inf where inadmissible."""
@@ -163,7 +170,7 @@ class Likelihood:
         """Linearisation from a prediction (n,) and derivatives (k, n)."""
         recording = self.oscillator.campaign.recordings[r]
         stacked = np.vstack([recording.samples - predicted, jacobian])
-        white = self.noise.whiten(stacked, recording.interval, recording.used)
+        white = self.noise.whiten(stacked, recording.interval, recording.used, recording.order)
         return Linearisation(white[0], white[1:].T, columns)
 
     def _exact(self, theta: Array) -> tuple[Linearisation, ...]:
@@ -173,7 +180,7 @@ class Likelihood:
         constants = np.ascontiguousarray(o.layout.constants[:, base])
         values, slopes, codes = trajectories_and_derivatives(
             np.ascontiguousarray(theta), columns, constants, o.campaign.mass, o.counts, o.intervals,
-            int(o.counts.sum()), o.inputs,
+            int(o.counts.sum()), o.orders, o.inputs,
         )  # fmt: skip
         result = []
         for r, (start, n) in enumerate(zip(o.starts, o.counts, strict=True)):

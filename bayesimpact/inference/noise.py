@@ -10,6 +10,9 @@ stage (least squares, likelihood, scores) sees white noise. Three kinds:
   filter's half-power frequency are used, each divided by what the filter left of the noise (Whittle
   1953).
 
+Where recordings are of several quantities, `sigma` is the level of the first one's, and the others'
+levels stand in fixed ratios to it (`scales`), by which whitening divides them.
+
 Samples that are set aside drop out. White and AR(1) noise whiten them to 0, so that shapes stay,
 and AR(1) noise takes its exact correlation over the gap. Behind a filter every stretch between
 gaps, less what the filter carried into it, is transformed on its own.
@@ -47,6 +50,8 @@ class Noise:
     correlation_error : standard error of `correlation`
     source : how it was estimated, in words
     is_bound : the level is known to be no more than this; it may be less
+    scales : level of readings that are a displacement, a velocity, an acceleration (or angles'),
+        over that of the campaign's first quantity
     """
 
     correlation: float = 0.0
@@ -56,6 +61,7 @@ class Noise:
     correlation_error: float = field(default=float("nan"), compare=False)
     source: str = "assumed"
     is_bound: bool = field(default=False, compare=False)
+    scales: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
     @property
     def is_white(self) -> bool:
@@ -68,11 +74,14 @@ class Noise:
         raw = "white" if self.correlation == 0.0 else f"AR(1), correlation {self.correlation:.2f}"
         return raw if self.smoothing is None else f"{raw}, smoothed ({self.smoothing.kind})"
 
-    def whiten(self, x: Array, interval: float, used: Mask | None = None) -> Array:
+    def whiten(self, x: Array, interval: float, used: Mask | None = None, order: int = 0) -> Array:
         """Whitened x: (..., n) samples to (..., m) numbers of variance sigma^2.
 
-        `used` (n,) is False where samples are set aside. m is n, or size(n) behind a filter.
+        `used` (n,) is False where samples are set aside. m is n, or size(n) behind a filter. The
+        samples are the `order`-th time derivative of a displacement.
         """
+        if self.scales[order] != 1.0:
+            x = x / self.scales[order]
         if self.smoothing is not None:
             if used is None:
                 return self._band(x, interval)
@@ -123,18 +132,23 @@ class Noise:
         inner = self._interior(n, interval)
         return float((self._band_size(n, interval) - 1) / ((inner.stop - inner.start) * interval))
 
-    def log_volume(self, n: int, interval: float, used: Mask | None = None) -> float:
+    def log_volume(
+        self, n: int, interval: float, used: Mask | None = None, order: int = 0
+    ) -> float:
         """Log determinant of the whitening operator (0 for the band: there it is a constant)."""
         if self.smoothing is not None:
             return 0.0
+        scaled = self.size(n, interval, used) * float(np.log(self.scales[order]))
         if used is not None:
             steps = np.diff(np.flatnonzero(used))
-            return -0.5 * float(np.sum(np.log1p(-(self.correlation ** (2.0 * steps)))))
-        return -0.5 * (n - 1) * float(np.log1p(-(self.correlation**2)))
+            return -0.5 * float(np.sum(np.log1p(-(self.correlation ** (2.0 * steps))))) - scaled
+        return -0.5 * (n - 1) * float(np.log1p(-(self.correlation**2))) - scaled
 
-    def coloured(self, rng: np.random.Generator, n: int, interval: float, sigma: float) -> Array:
+    def coloured(
+        self, rng: np.random.Generator, n: int, interval: float, sigma: float, order: int = 0
+    ) -> Array:
         """A draw of n samples of raw noise of level `sigma` (before any smoothing), m."""
-        white = rng.standard_normal(n) * sigma
+        white = rng.standard_normal(n) * (sigma * self.scales[order])
         if self.correlation == 0.0:
             return white
         from scipy.signal import lfilter

@@ -19,7 +19,7 @@ from scipy import stats
 from scipy.linalg import null_space, toeplitz
 from scipy.optimize import minimize_scalar
 
-from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.campaign import Campaign, Smoothing
 from bayesimpact.data.faults.flat import reading_step
 from bayesimpact.data.gaps import runs
 from bayesimpact.data.hum import Hum, find_hum
@@ -27,6 +27,7 @@ from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.noise_driven import driven_noise
+from bayesimpact.response.displacement import displacement_of
 from bayesimpact.response.swings import rough_period
 
 Array = NDArray[np.float64]
@@ -51,25 +52,39 @@ class _Remainder:
 
 
 def estimate_noise(campaign: Campaign) -> Noise:
-    """Level and AR(1) correlation of the raw noise, pooled over recordings.
+    """Level and AR(1) correlation of the raw noise, pooled over recordings of one quantity.
+
+    Where there are several quantities, the correlation is that of the first recording's.
 
     Free decays tell it best: recordings with a measured input only where there is none (see
     `driven_noise`). For recordings that were smoothed the remainders say what the filter left; the
     raw level is scaled up by the filter's power (see `smoothed_level`).
     """
     known, smoothing = campaign.measurement.noise, campaign.measurement.smoothing
-    free = [r for r in campaign.recordings if r.input is None]
-    if not free:
-        noise = driven_noise(campaign.recordings, raw_noise(campaign.recordings), smoothing)
-    elif smoothing is not None:
-        from bayesimpact.inference.spectrum import smoothed_noise
-
-        noise = smoothed_noise(free, smoothing)
-    else:
-        noise = raw_noise(free)
+    orders = list(dict.fromkeys(r.order for r in campaign.recordings))
+    found = {
+        order: _of_one([r for r in campaign.recordings if r.order == order], smoothing)
+        for order in orders
+    }
+    noise = found[orders[0]]
+    if len(found) > 1:
+        first, second, third = (found.get(o, noise).level / noise.level for o in range(3))
+        return replace(noise, scales=(first, second, third))
     if known is None:
         return noise
     return Noise(noise.correlation, smoothing, known, 0.0, noise.correlation_error, "campaign.toml")
+
+
+def _of_one(recordings: Sequence[Recording], smoothing: Smoothing | None) -> Noise:
+    """Of recordings of one quantity, behind a filter or none."""
+    free = [r for r in recordings if r.input is None]
+    if not free:
+        return driven_noise(recordings, raw_noise(recordings), smoothing)
+    if smoothing is None:
+        return raw_noise(free)
+    from bayesimpact.inference.spectrum import smoothed_noise
+
+    return smoothed_noise(free, smoothing)
 
 
 def raw_noise(recordings: Sequence[Recording]) -> Noise:
@@ -115,7 +130,8 @@ def _remainder(
     recordings: Sequence[Recording], hums: Sequence[Hum | None], per_period: float
 ) -> _Remainder | None:
     lengths = [
-        int(np.clip(rough_period(r.samples) / per_period, SMALLEST, LARGEST)) for r in recordings
+        int(np.clip(rough_period(r.samples, r.order) / per_period, SMALLEST, LARGEST))
+        for r in recordings
     ]
     length = min(lengths)
     powers = np.vander(np.linspace(-1, 1, length), DEGREE + 1)
@@ -161,7 +177,7 @@ def _without_shapes(
     shapes: Sequence[Array], recording: Recording, windows: Windows, basis: Array
 ) -> Array:
     """What polynomials leave of windows (count, length) of a recording, less these shapes."""
-    values = _centred(recording)[windows] @ basis
+    values = _centred(recording.samples)[windows] @ basis
     if not shapes or values.size < 8 * len(shapes):
         return np.asarray(values)
     columns = np.stack([(shape[windows] @ basis).ravel() for shape in shapes], axis=1)
@@ -170,18 +186,18 @@ def _without_shapes(
     return np.asarray(values - (columns @ found).reshape(values.shape))
 
 
-def _centred(recording: Recording) -> Array:
-    """Readings (n,) from where they settle."""
-    samples = recording.samples
+def _centred(samples: Array) -> Array:
+    """Samples (n,) from where they settle."""
     return samples - float(np.median(samples[-max(samples.size // 5, 1) :]))
 
 
 def _windows(recording: Recording, length: int, side: bool) -> Windows:
     """Samples of windows (count, length); with `side`, only of those on a stop's free side."""
-    centred = _centred(recording)
-    free = np.ones(centred.size, dtype=bool)
+    free = np.ones(recording.samples.size, dtype=bool)
     if side:
-        free = centred < -MARGIN * np.abs(centred).max()
+        derived = recording.order > 0
+        moved = _centred(displacement_of(recording).samples if derived else recording.samples)
+        free = moved < -MARGIN * np.abs(moved).max()
     if recording.used is not None:
         free = free & recording.used
     starts = [

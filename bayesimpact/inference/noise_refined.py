@@ -85,7 +85,8 @@ def refined_noise(fit: Fit) -> Noise:
     if noise.is_bound and fit.reduced_chi2 < 1.0:
         error = float(np.sqrt(0.5 / fit.target.likelihood.sizes.sum()))
         return replace(noise, level=fit.rms, level_error=error, source="residual of the base model")
-    if (noise.correlation == 0.0 and noise.smoothing is None) or fit.reduced_chi2 > GROSS:
+    plain = noise.correlation == 0.0 and noise.smoothing is None
+    if plain or fit.reduced_chi2 > GROSS or fit.target.oscillator.campaign.mixed:
         return noise
     found = _ordinates(fit, lowest := ABOVE * fastest_frequency(fit))
     if found.power.size < LEAST_ORDINATES:

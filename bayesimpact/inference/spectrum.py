@@ -217,7 +217,7 @@ def _periodogram(recording: Recording) -> tuple[Array, Array, float]:
     frequency, power = _periodogram_of(
         recording.samples, 1 / interval, window="hann", detrend="linear"
     )
-    lowest = ABOVE / (rough_period(recording.samples) * interval)
+    lowest = ABOVE / (rough_period(recording.samples, recording.order) * interval)
     # neighbours of a Hann window overlap: every second ordinate is nearly independent
     chosen = np.flatnonzero((frequency > lowest) & (frequency < 0.49 / interval))[::2]
     return frequency[chosen], power[chosen], interval

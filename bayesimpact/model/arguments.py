@@ -18,13 +18,14 @@ MANY = 2**62
 
 @dataclass(frozen=True, slots=True)
 class ModelArguments:
-    """theta (B, d), columns and constants (R, 11), intervals and counts (R,); read-only arrays."""
+    """theta (B, d), columns, constants (R, 11), intervals, counts, orders (R,), all read-only."""
 
     theta: Floats
     columns: Ints
     constants: Floats
     intervals: Floats
     counts: Ints
+    orders: Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +66,7 @@ def check_model(
     constants: ArrayLike,
     intervals: ArrayLike,
     counts: ArrayLike,
+    orders: ArrayLike | None = None,
 ) -> ModelArguments:
     """Check shapes and columns (see `simulate`); raises InputError."""
     model = ModelArguments(
@@ -73,6 +75,7 @@ def check_model(
         floats("constants", constants, 2),
         floats("intervals", intervals, 1),
         ints("counts", counts, 1),
+        ints("orders", np.zeros(np.size(counts)) if orders is None else orders, 1),
     )
     recordings = model.columns.shape[0]
     shapes = (
@@ -80,6 +83,7 @@ def check_model(
         ("constants", model.constants.shape, (recordings, 11)),
         ("intervals", model.intervals.shape, (recordings,)),
         ("counts", model.counts.shape, (recordings,)),
+        ("orders", model.orders.shape, (recordings,)),
     )
     for name, found, expected in shapes:
         if found != expected:
@@ -89,6 +93,8 @@ def check_model(
         raise InputError("columns", "an index outside theta", f"-1 to {width - 1}")
     if not within(model.counts, 1, MANY):
         raise InputError("counts", "a recording without samples", "at least 1")
+    if not within(model.orders, 0, 2):
+        raise InputError("orders", "an unknown time derivative", "0, 1 or 2")
     return model
 
 

@@ -66,8 +66,8 @@ def run_any(
 @compiled()
 def work(
     theta: Floats, columns: Ints, constants: Floats, mass: float, samples: Floats, starts: Ints,
-    counts: Ints, intervals: Floats, waves: Floats, first_wave: Ints, rows: Span, items: Span,
-    sse: Floats, values: Floats, codes: Ints,
+    counts: Ints, intervals: Floats, orders: Ints, waves: Floats, first_wave: Ints, rows: Span,
+    items: Span, sse: Floats, values: Floats, codes: Ints,
 ) -> None:  # fmt: skip
     """Fill one share of `codes` (B, R), and of `sse` (B, R) or, without samples, `values` (B, N).
 
@@ -83,13 +83,15 @@ def work(
             gather(q, theta[b], columns[r], constants[r])
             first, end = starts[r], starts[r] + counts[r]
             if samples.size:
-                sink = Sink(samples[first:end], nothing, nothing, no_events)
+                sink = Sink(
+                    samples[first:end], nothing, nothing, no_events, orders[r], 1.0 / intervals[r]
+                )
                 sse[b, r], _, codes[b, r] = run_any(
                     q, mass, intervals[r], counts[r], sink, mine, waves, first_wave[r]
                 )
             else:
                 out = values[b, first:end]
-                sink = Sink(samples, out, nothing, no_events)
+                sink = Sink(samples, out, nothing, no_events, orders[r], 1.0 / intervals[r])
                 _, _, codes[b, r] = run_any(
                     q, mass, intervals[r], counts[r], sink, mine, waves, first_wave[r]
                 )
@@ -100,15 +102,16 @@ def work(
 @compiled(parallel=True)
 def work_in_parts(
     theta: Floats, columns: Ints, constants: Floats, mass: float, samples: Floats, starts: Ints,
-    counts: Ints, intervals: Floats, waves: Floats, first_wave: Ints, parts: int, sse: Floats,
+    counts: Ints, intervals: Floats, orders: Ints, waves: Floats, first_wave: Ints, parts: int,
+    sse: Floats,
     values: Floats, codes: Ints,
 ) -> None:  # fmt: skip
     """As `work`, all shares, in parallel; numba's threads wake up sooner than Python's."""
     for part in numba.prange(parts):
         rows, items = share(part, parts, codes.shape[0], codes.shape[1])
         work(
-            theta, columns, constants, mass, samples, starts, counts, intervals, waves, first_wave,
-            rows, items, sse, values, codes,
+            theta, columns, constants, mass, samples, starts, counts, intervals, orders, waves,
+            first_wave, rows, items, sse, values, codes,
         )  # fmt: skip
 
 
@@ -118,6 +121,6 @@ def single(
     events: Floats,
 ) -> tuple[float, int, int]:  # fmt: skip
     """Simulate one recording into `out`, `speeds` and `events` (see `Sink`); as `kernel.run`."""
-    sink = Sink(no_data, out, speeds, events)
+    sink = Sink(no_data, out, speeds, events, 0, 1.0)
     done: tuple[float, int, int] = run(q, mass, interval, out.size, sink, shelf())
     return done

@@ -26,12 +26,34 @@ class Sink(NamedTuple):
     data (n,) : measured displacement, m, to be compared with
     out (n,), speeds (n,) : receive y + offset, m, and y', per interval, when `data` is empty
     events (capacity, 2) : receives times and velocities of the first events, in intervals
+    order : data and out are this time derivative of y (0, 1 or 2), in m/s^order; speeds need 0
+    rate : sampling intervals per second
     """
 
     data: Floats
     out: Floats
     speeds: Floats
     events: Floats
+    order: int
+    rate: float
+
+
+@inner(forceinline=True, fastmath={"contract"})
+def reading_of(
+    order: int, rate: float, b: float, K: float, w: float, rest: float, offset: float,
+    u: float, v: float, fs: float, fc: float,
+) -> tuple[float, float, float, float, float]:  # fmt: skip
+    """Return the shift and the motion (u, v, fs, fc) that the probe reads of this motion.
+
+    The time derivative of a motion u'' + 2 b u' + K u = fs cos + fc sin is one again, and is
+    written or compared like a displacement.
+    """
+    if order == 0:
+        return rest + offset, u, v, fs, fc
+    for _ in range(order):
+        u, v = rate * v, rate * (fs - 2.0 * b * v - K * u)
+        fs, fc = rate * w * fc, -rate * w * fs
+    return offset, u, v, fs, fc
 
 
 @inner(forceinline=True, fastmath={"contract"})
@@ -141,10 +163,11 @@ def pass_samples(
     if i >= end or data.size + out.size == 0:
         return 0.0
     w, phase, force = motion.w, motion.phase, motion.force
-    shift = rest + motion.offset
+    order, rate, offset = sink.order, sink.rate, motion.offset
     S, D = impulse_response(b, K, i - t)
     if force == 0.0:
         u, v = advance(b, K, u, v, S, D)
+        shift, u, v, fs, fc = reading_of(order, rate, b, K, w, rest, offset, u, v, 0.0, 0.0)
         total: float = pass_plain(data, out, speeds, tables, side, b, K, shift, u, v, i, end)
         return total
     fs, fc = force * math.sin(w * t + phase), force * math.cos(w * t + phase)
@@ -154,11 +177,12 @@ def pass_samples(
         u, v = advance_forced(b, K, w, u, v, fs, fc, S, D, E, F)
         fs, fc = force * math.sin(w * i + phase), force * math.cos(w * i + phase)
         block = min(i + LENGTH, end)
+        shift, ur, vr, fsr, fcr = reading_of(order, rate, b, K, w, rest, offset, u, v, fs, fc)
         if data.size > 0:
-            total += squares_forced(data, i, block, shift, tables, side, b, u, v, fs, fc)
+            total += squares_forced(data, i, block, shift, tables, side, b, ur, vr, fsr, fcr)
         else:
-            write(out, i, block, shift, tables, side, b, u, v)
-            add_force(out, i, block, tables, side, fs, fc)
+            write(out, i, block, shift, tables, side, b, ur, vr)
+            add_force(out, i, block, tables, side, fsr, fcr)
             if speeds.size > 0:
                 write_speeds(speeds, i, block, tables, side, b, K, w, u, v, fs, fc)
         if block == end:

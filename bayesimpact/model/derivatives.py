@@ -57,11 +57,11 @@ def find_events(
 ) -> tuple[Floats, int]:  # fmt: skip
     """Return (events, code): all events of one recording, in `events` if there is room."""
     nothing = np.empty(0)
-    sink = Sink(no_data, nothing, nothing, events)
+    sink = Sink(no_data, nothing, nothing, events, 0, 1.0)
     _, count, code = run_any(q, mass, interval, n, sink, mine, waves, wave)
     if count > events.shape[0] and code == OK:
         events = np.empty((count, 2))
-        sink = Sink(no_data, nothing, nothing, events)
+        sink = Sink(no_data, nothing, nothing, events, 0, 1.0)
         run_any(q, mass, interval, n, sink, mine, waves, wave)
     return events[:count], code
 
@@ -69,8 +69,8 @@ def find_events(
 @compiled(nogil=True)
 def work(
     theta: Floats, columns: Ints, constants: Floats, mass: float, samples: Floats, starts: Ints,
-    counts: Ints, intervals: Floats, waves: Floats, first_wave: Ints, size: int, rows: Span,
-    items: Span, out: Floats, values: Floats, jacobian: Floats, codes: Ints,
+    counts: Ints, intervals: Floats, orders: Ints, waves: Floats, first_wave: Ints, size: int,
+    rows: Span, items: Span, out: Floats, values: Floats, jacobian: Floats, codes: Ints,
 ) -> None:  # fmt: skip
     """Fill one share of `codes` (B, R), and of the Gram matrices `out` (B, R, 12, 12).
 
@@ -106,7 +106,7 @@ def work(
                     )  # fmt: skip
                 else:
                     sweep(
-                        q, mass, intervals[r], n, events,
+                        q, mass, intervals[r], n, orders[r], events,
                         wanted(active, columns[r], size > PLAIN), data, own, slopes, gram, room,
                     )  # fmt: skip
                 if not math.isfinite(gram.sum() + own.sum() + slopes.sum()):
@@ -126,6 +126,7 @@ def trajectories_and_derivatives(
     counts: ArrayLike,
     intervals: ArrayLike,
     n_total: int,
+    orders: ArrayLike | None = None,
     inputs: Inputs | None = None,
 ) -> tuple[Floats, Floats, Ints]:
     """Predict all recordings, offset included, with the derivatives of every sample.
@@ -137,7 +138,8 @@ def trajectories_and_derivatives(
     (n_total,) values, m; (n_total, 11) derivatives with respect to the q of the recording, SI
     units, 0 for the q that are constants; (R,) codes. Failed recordings are nan.
     """
-    model = check_model(np.atleast_2d(np.asarray(theta)), columns, constants, intervals, counts)
+    thetas = np.atleast_2d(np.asarray(theta))
+    model = check_model(thetas, columns, constants, intervals, counts, orders)
     if len(model.theta) != 1:
         raise InputError("theta", f"shape {model.theta.shape}", "one parameter vector")
     if int(model.counts.sum()) != n_total:
@@ -158,6 +160,7 @@ def grams(
     starts: ArrayLike,
     counts: ArrayLike,
     intervals: ArrayLike,
+    orders: ArrayLike | None = None,
     inputs: Inputs | None = None,
 ) -> tuple[Floats, Ints]:
     """Gram matrices of [J | residual] of every recording, without storing J.
@@ -171,7 +174,7 @@ def grams(
     codes; without the leading B for a theta (d,).
     """
     thetas = np.atleast_2d(np.asarray(theta, dtype=np.float64))
-    model = check_model(thetas, columns, constants, intervals, counts)
+    model = check_model(thetas, columns, constants, intervals, counts, orders)
     data, first = check_samples(samples, starts, model)
     out = np.empty((len(model.theta), len(model.columns), 12, 12))
     codes = _work(model, mass, data, first, inputs, out, np.empty(0), np.empty((0, 11)))
@@ -193,7 +196,7 @@ def _work(
     forced = forced or np.any((model.constants[:, A] != 0.0) & harmonic)
     before = (
         model.theta, model.columns, model.constants, float(mass), data, first, model.counts,
-        model.intervals, waves, first_wave, FORCED if forced else PLAIN,
+        model.intervals, model.orders, waves, first_wave, FORCED if forced else PLAIN,
     )  # fmt: skip
 
     by_rows = batch >= recordings

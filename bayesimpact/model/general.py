@@ -16,18 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.model.added.crossing import first_event, suspicious
-from bayesimpact.model.added.dense import LONGEST_STRIDE, fill_in
+from bayesimpact.model.added.dense import LONGEST_STRIDE, fill_in, reading
 from bayesimpact.model.added.flows import RENEWED, first_step, flow_from, next_step, stride_of
 from bayesimpact.model.added.memory import keep_memory, relax
 from bayesimpact.model.added.method import quarters
 from bayesimpact.model.added.resonator import ROWS
 from bayesimpact.model.added.rest import hold
-from bayesimpact.model.added.second import listens, respond
+from bayesimpact.model.added.second import added_reading, listens, respond
 from bayesimpact.model.added.situation import (
     HEADING,
     LEAVE,
     NONE,
-    SECOND_Q,
     SIDES,
     SLIDING,
     begin,
@@ -100,7 +99,7 @@ def cruise(y: Any, v: Any, n0: Any, j: Any, stride: Any, end: Any, flow: Any, w:
         if event:
             break
         fill_in(j, j + stride - 1, t, True, at, flow, w, y, v, n0, h, y1, v1, n1)
-        w.out[j + stride - 1] = y1
+        w.out[j + stride - 1] = reading(y1, v1, n1, flow, w)
         if second:
             respond(y, v, t, n0, y1, v1, n1, h, j, j + stride, flow, w)
         j += stride
@@ -135,7 +134,7 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
         if not expected:
             h, lands = next_step(y, v, t, n0, j, aligned, min(longest, ramp), flow, w)
             if not h > 0.0:  # an event on the sample itself
-                w.out[j] = y + w.s[SECOND_Q]
+                w.out[j] = reading(y, v, n0, flow, w) + added_reading(y, v, t, w)
                 t = j * w.interval
                 j += 1
                 continue
@@ -154,7 +153,7 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
         if reached > j + lands:
             fill_in(j, reached - lands, t, aligned, at, flow, w, y, v, n0, length, y1, v1, n1)
         if lands:
-            w.out[reached - 1] = y1
+            w.out[reached - 1] = reading(y1, v1, n1, flow, w)
         if second:
             respond(y, v, t, n0, y1, v1, n1, length, j, reached, flow, w)
         t = (reached - 1) * w.interval if lands else t + length
@@ -173,11 +172,24 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
     return y, v, t, j
 
 
+@inner()
+def first_reading(y: Any, v: Any, w: Any) -> Any:
+    """What the probe reads at t = 0."""
+    if w.order < 2:
+        return y if w.order == 0 else v
+    if v == 0.0 and w.q[FRICTION] > 0.0 and w.s[SLIDING] == 0.0:
+        return added_reading(y, v, 0.0, w)
+    set_directions(y, v, 0.0, w)
+    flow, _ = flow_from(y, v, 0.0, w)
+    force = 0.0 if flow.plain else push(y, v, 0.0, NOW, flow, w)
+    return reading(y, v, force, flow, w) + added_reading(y, v, 0.0, w)
+
+
 @inner(inline="always")
 def walk(w: Any) -> Any:
-    """Displacements at the samples, without the sensor's offset; returns a failure code."""
+    """Readings at the samples, without the sensor's offset; returns a failure code."""
     y, v = begin(w)
-    w.out[0] = y
+    w.out[0] = first_reading(y, v, w)
     t, j = 0.0, typed(1)
     events = EVENTS_AT_LEAST + EVENTS_PER_SAMPLE * w.n
     while j < w.n:
@@ -192,7 +204,9 @@ def walk(w: Any) -> Any:
 
 
 @inner(inline="always")
-def integrate(q: Any, mass: Any, interval: Any, laws: Any, out: Any, wave: Any, room: Any) -> Any:
+def integrate(
+    q: Any, mass: Any, interval: Any, laws: Any, order: Any, out: Any, wave: Any, room: Any
+) -> Any:
     """One trajectory, see `integrate_many`. The caller keeps `room`: w has only its addresses.
 
     wave : (n,) measured input, or (0,)
@@ -202,7 +216,7 @@ def integrate(q: Any, mass: Any, interval: Any, laws: Any, out: Any, wave: Any, 
     s, acting, work, tables, keys = room
     s[:], acting[:], work[:], keys[:] = 0.0, 0, 0.0, np.nan
     w = World(
-        mass, interval, out.size, floats_at(out.ctypes.data), floats_at(tables.ctypes.data),
+        mass, interval, out.size, order, floats_at(out.ctypes.data), floats_at(tables.ctypes.data),
         floats_at(keys.ctypes.data), laws.shape[0], floats_at(q.ctypes.data), q.ctypes.data,
         integers_at(laws.ctypes.data), integers_at(acting.ctypes.data),
         floats_at(work.ctypes.data), floats_at(s.ctypes.data), floats_at(wave.ctypes.data),
@@ -237,13 +251,15 @@ def room_for(size: Any) -> Any:
 
 @compiled(nogil=True)
 def _in_turn(
-    q: Any, mass: Any, intervals: Any, counts: Any, laws: Any, waves: Any, starts: Any, out: Any,
-    codes: Any,
+    q: Any, mass: Any, intervals: Any, counts: Any, laws: Any, orders: Any, waves: Any,
+    starts: Any, out: Any, codes: Any,
 ) -> Any:  # fmt: skip
     room = room_for(laws.shape[0])
     for k in range(q.shape[0]):
         wave = waves[:0] if starts[k] < 0 else waves[starts[k] : starts[k] + counts[k]]
-        codes[k] = integrate(q[k], mass, intervals[k], laws, out[k, : counts[k]], wave, room)
+        codes[k] = integrate(
+            q[k], mass, intervals[k], laws, orders[k], out[k, : counts[k]], wave, room
+        )
 
 
 def integrate_many(
@@ -255,6 +271,7 @@ def integrate_many(
     out: NDArray[np.float64],
     inputs: Inputs | None = None,
     *,
+    orders: NDArray[np.int64] | None = None,
     threads: bool | None = None,
 ) -> NDArray[np.int64]:
     """Trajectories of many slot vectors, each a recording of its own.
@@ -265,7 +282,8 @@ def integrate_many(
     mass : kg
     intervals, counts : (K,) sampling intervals, s, and numbers of samples
     laws : (L, 5 to 8) table of laws, see `bayesimpact.model.effects.effect.law_row`
-    out : (K, n) receives displacements, m, without the sensor's offset
+    out : (K, n) receives displacements, m, or what `orders` says, without the sensor's offset
+    orders : (K,) which time derivative of the displacement; None: 0 throughout
     inputs : measured forces, where recordings have any; the slot A is then their gain
     threads : share the work among threads; the numbers do not depend on it. None: where it pays
 
@@ -277,14 +295,15 @@ def integrate_many(
     table[:, : laws.shape[1]] = laws
     codes = np.zeros(q.shape[0], dtype=np.int64)
     q = np.ascontiguousarray(q)
+    orders = np.zeros_like(counts) if orders is None else np.ascontiguousarray(orders)
     given = inputs or Inputs(np.empty(0), np.full(q.shape[0], -1, dtype=np.int64))
     waves, starts = np.ascontiguousarray(given.values), np.ascontiguousarray(given.starts)
 
     def run(first: int, end: int) -> None:
         some = slice(first, end)
         _in_turn(
-            q[some], mass, intervals[some], counts[some], table, waves, starts[some], out[some],
-            codes[some],
+            q[some], mass, intervals[some], counts[some], table, orders[some], waves, starts[some],
+            out[some], codes[some],
         )  # fmt: skip
 
     if threads or (threads is None and q.shape[0] >= THREADING_PAYS):

@@ -89,6 +89,39 @@ def fill_forced_coefficients(
     return fs, fc
 
 
+@inner()
+def fill_reading(
+    stack: Floats, here: int, slot: int, active: Lanes, order: int, interval: float, beta: float,
+    K: float, w: float,
+) -> None:  # fmt: skip
+    """Write into `slot` the coefficients of the order-th time derivative of those in `here`.
+
+    The basis is closed under it: S' = D, D' = -2 b D - K S, G' = H, H' = S - 2 b H - K G, and with
+    a force E' = S - w F, F' = w E, Us' = F + w Uc, Uc' = E - w Us; X and P as S * E and S * F.
+    """
+    rate = 1.0 / interval
+    for i in active:
+        c = stack[i, slot]
+        c[:] = stack[i, here]
+        for _ in range(order):
+            S, D, G, H = c[S_], c[D_], c[G_], c[H_]
+            c[ONE] = 0.0
+            c[S_], c[D_] = rate * (H - K * D), rate * (S - beta * D)
+            c[G_], c[H_] = -rate * K * H, rate * (G - beta * H)
+            if c.size > PLAIN:
+                E, F, X, Xr, P, Pr, Us, Uc = (
+                    c[E_], c[F_], c[X_], c[XR], c[P_], c[PR], c[US], c[UC],
+                )  # fmt: skip
+                c[S_] += rate * E
+                c[E_], c[F_] = rate * (w * F + Xr + Uc), rate * (Pr + Us - w * E)
+                c[X_], c[XR] = -rate * K * Xr, rate * (X - beta * Xr)
+                c[P_], c[PR] = -rate * K * Pr, rate * (P - beta * Pr)
+                c[US], c[UC] = -rate * w * Uc, rate * w * Us
+        if i == OFFSET:  # a constant is added to the reading, whatever is read
+            c[:] = 0.0
+            c[ONE] = 1.0
+
+
 @inner(forceinline=True, fastmath={"contract"})
 def carry(
     stack: Floats, slot: int, active: Lanes, beta: float, K: float, S: float, D: float, G: float,

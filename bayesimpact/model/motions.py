@@ -1,4 +1,7 @@
-"""Many trajectories in one compiled call: one row per slot vector, whatever its recording."""
+"""Many trajectories in one compiled call: one row per slot vector, whatever its recording.
+
+`orders` (K,) says which time derivative of the displacement a row is to hold: 0, 1 or 2.
+"""
 
 from __future__ import annotations
 
@@ -17,9 +20,10 @@ _OFFSET = BASE_SLOTS.index("offset")
 
 
 def motions(
-    q: Array, mass: float, counts: Counts, intervals: Array, inputs: Inputs | None = None
-) -> Array:
-    """True displacements (K, max counts), m, of base oscillators with slots (K, 11).
+    q: Array, mass: float, counts: Counts, intervals: Array, orders: Counts,
+    inputs: Inputs | None = None,
+) -> Array:  # fmt: skip
+    """True displacements (K, max counts), m (or derivatives), of base oscillators, slots (K, 11).
 
     `inputs` are the rows' measured forces, where they have any. Rows are NaN where the parameters
     are inadmissible, and beyond their own count.
@@ -29,7 +33,15 @@ def motions(
     columns = np.arange(base.size, dtype=np.int64).reshape(base.shape)
     total = int(counts.sum())
     flat, codes = predictions(
-        base.reshape(1, -1), columns, np.zeros(base.shape), mass, counts, intervals, total, inputs
+        base.reshape(1, -1),
+        columns,
+        np.zeros(base.shape),
+        mass,
+        counts,
+        intervals,
+        total,
+        orders,
+        inputs,
     )
     shape = (q.shape[0], int(counts.max()))
     if total == shape[0] * shape[1]:
@@ -47,11 +59,12 @@ def general_motions(
     counts: Counts,
     intervals: Array,
     laws: NDArray[np.int64],
+    orders: Counts,
     inputs: Inputs | None = None,
 ) -> Array:
     """The same for oscillators with added effects: slots (K, Q), table of laws (L, 7)."""
     out = np.empty((q.shape[0], int(counts.max())))
-    codes = integrate_many(q, mass, intervals, counts, laws, out, inputs)
+    codes = integrate_many(q, mass, intervals, counts, laws, out, inputs, orders=orders)
     out[np.arange(out.shape[1]) >= counts[:, None]] = np.nan
     out[codes != 0] = np.nan
     return out

@@ -56,8 +56,13 @@ class Oscillator:
         return np.array([r.interval for r in self.campaign.recordings])
 
     @cached_property
+    def orders(self) -> NDArray[np.int64]:
+        """Which time derivative of the displacement every recording holds, (R,)."""
+        return np.array([r.order for r in self.campaign.recordings], dtype=np.int64)
+
+    @cached_property
     def samples(self) -> Array:
-        """All recordings one after another, (N,), m."""
+        """All recordings one after another, (N,), each in its own SI unit."""
         return np.concatenate([r.samples for r in self.campaign.recordings])
 
     @cached_property
@@ -158,7 +163,8 @@ class Oscillator:
         return self._read(r, motions[np.where(other, np.cumsum(other), 0)], theta)
 
     def _read(self, r: int, motion: Array, theta: Array) -> Array:
-        """Sensor, rest offset and filter on true displacements (B, n) of recording `r`."""
+        """Sensor, rest offset and filter on true displacements (or their time derivatives, as the
+        probe reads them), (B, n), of recording `r`."""
         times = np.arange(motion.shape[1]) * self.intervals[r]
         for effect, positions in self.sensors:
             assert effect.observe is not None
@@ -168,20 +174,30 @@ class Oscillator:
             motion + offset[:, None], self.smoothing, float(self.intervals[r])
         )
 
-    def motions_of(self, recordings: NDArray[np.int64], slots: Array) -> Array:
-        """True displacements, m, a row per recording index and slot vector; NaN where it fails."""
+    def displacements(self, theta: Array) -> tuple[Array, ...]:
+        """True displacements of all recordings, (n_r,), m, for one parameter vector (d,)."""
+        recordings = np.arange(self.counts.size)
+        rows = self.motions_of(recordings, self.layout.slots(theta), np.zeros_like(recordings))
+        return tuple(row[:n] for row, n in zip(rows, self.counts, strict=True))
+
+    def motions_of(
+        self,
+        recordings: NDArray[np.int64],
+        slots: Array,
+        orders: NDArray[np.int64] | None = None,
+    ) -> Array:
+        """True motions, a row per recording index and slot vector; NaN where it fails.
+
+        Displacements, m, or what the recording's probe reads of them; `orders` asks for others.
+        """
         q = np.ascontiguousarray(slots.reshape(recordings.size, -1))
+        orders = self.orders[recordings] if orders is None else orders
+        counts, intervals = self.counts[recordings], self.intervals[recordings]
         inputs = None if self.inputs is None else self.inputs.of(recordings)
         if self.is_base:
             base = np.ascontiguousarray(q[:, : len(BASE_SLOTS)])
-            return motions(
-                base, self.campaign.mass, self.counts[recordings], self.intervals[recordings],
-                inputs,
-            )  # fmt: skip
-        return general_motions(
-            q, self.campaign.mass, self.counts[recordings], self.intervals[recordings], self.laws,
-            inputs,
-        )  # fmt: skip
+            return motions(base, self.campaign.mass, counts, intervals, orders, inputs)
+        return general_motions(q, self.campaign.mass, counts, intervals, self.laws, orders, inputs)
 
 
 def build_oscillator(

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.quantity import reading_unit
 from bayesimpact.errors import InputError
 from bayesimpact.model.effects.effect import Effect, EffectParameter
 
@@ -106,7 +107,8 @@ def build_layout(
     def add(name: str, unit: str, role: Role, lower: float = -np.inf, upper: float = np.inf) -> int:
         if name not in position:
             position[name] = len(table)
-            table.append(Parameter(name, _unit(campaign, unit), role, lower, upper))
+            unit = angular(unit) if campaign.angular else unit
+            table.append(Parameter(name, unit, role, lower, upper))
         return position[name]
 
     _add_physical(campaign, binds, add)
@@ -114,13 +116,16 @@ def build_layout(
         for parameter in effect.parameters:
             if parameter.fixed is not None:
                 continue
+            unit = _read(campaign, effect, parameter.unit)
             for name in _instances(campaign, effect, parameter):
-                add(name, parameter.unit, "effect", parameter.lower, parameter.upper)
+                add(name, unit, "effect", parameter.lower, parameter.upper)
     for recording in campaign.recordings:
         for nuisance, unit in _NUISANCE_UNITS.items():
+            unit = reading_unit(unit, recording.order) if nuisance == "offset" else unit
             add(f"{nuisance}[{recording.name}]", unit, "nuisance")
-    for name in sigma_names(campaign, sigma_per_recording):
-        add(name, "m", "noise", 0.0)
+    orders = [r.order for r in campaign.recordings]
+    for name, order in zip(sigma_names(campaign, sigma_per_recording), orders, strict=False):
+        add(name, reading_unit("m", order), "noise", 0.0)
     columns, constants = _maps(campaign, effects, binds, position)
     return Layout(tuple(table), columns, constants)
 
@@ -151,8 +156,17 @@ def bare_name(name: str) -> str:
     return name.split("[")[0].split(".")[-1]
 
 
-def _unit(campaign: Campaign, unit: str) -> str:
-    return angular(unit) if campaign.recordings[0].quantity == "angle" else unit
+def unit_for(campaign: Campaign, effect: Effect | None, unit: str) -> str:
+    """A unit for displacements as it is for a campaign's: of angles, or of what the probe reads."""
+    unit = _read(campaign, effect, unit)
+    return angular(unit) if campaign.angular else unit
+
+
+def _read(campaign: Campaign, effect: Effect | None, unit: str) -> str:
+    """Effects of the probe act on the reading, whatever that is."""
+    if effect is None or effect.observe is None:
+        return unit
+    return reading_unit(unit, campaign.recordings[0].order)
 
 
 def _keys(campaign: Campaign, parameter: EffectParameter) -> tuple[str | None, ...]:

@@ -16,7 +16,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.model.blocks import Sink, pass_plain
+from bayesimpact.model.blocks import Sink, pass_plain, reading_of
 from bayesimpact.model.compiled import compiled, inner
 from bayesimpact.model.flow import advance
 from bayesimpact.model.scaled import Scaled
@@ -149,7 +149,10 @@ def fast_lane(
         end = math.ceil(t + wait)
         S, D = nearby(series, side, i - t)
         u, v = advance(b, K, u, v, S, D)
-        total += pass_plain(data, out, speeds, tables, side, b, K, rest + offset, u, v, i, end)
+        shift, u, v, _, _ = reading_of(
+            sink.order, sink.rate, b, K, 0.0, rest, offset, u, v, 0.0, 0.0
+        )
+        total += pass_plain(data, out, speeds, tables, side, b, K, shift, u, v, i, end)
         i = end
         remember(history, side, wait)
         t += wait

@@ -4,7 +4,9 @@
 
 or, for a recording with a measured input u (`Inputs`, linear between samples), = A u(t). Per
 recording the simulator takes q = (c1, k1, c2, g, k2, y0, v0, A, w, phase, offset), SI units, t = 0
-at the first sample; measured = y + offset. A campaign's parameter vector theta feeds the q of
+at the first sample; measured = the displacement y, or y' or y'' (the recording's `order`), plus
+offset. y'' jumps where a contact with damping begins or ends; a sample at that very instant reads
+what follows. A campaign's parameter vector theta feeds the q of
 every recording: q_i = theta[columns[r, i]], or constants[r, i] where columns[r, i] is -1. Without a
 stop g = inf and c2 = k2 = 0.
 """
@@ -61,6 +63,7 @@ def sums_of_squares(
     starts: ArrayLike,
     counts: ArrayLike,
     intervals: ArrayLike,
+    orders: ArrayLike | None = None,
     inputs: Inputs | None = None,
 ) -> tuple[Floats, Ints]:
     """Compare a batch of parameter vectors with all recordings, in one compiled call.
@@ -71,9 +74,10 @@ def sums_of_squares(
     columns : (R, 11) where each q of a recording stands in theta; -1: take `constants`
     constants : (R, 11) values of the q that are not in theta
     mass : kg
-    samples : (N,) measured displacement, m, of all recordings
+    samples : (N,) measured displacement, m (or its time derivative), of all recordings
     starts, counts : (R,) first sample and number of samples of every recording
     intervals : (R,) sampling intervals, s
+    orders : (R,) which time derivative of the displacement is measured; None: 0 throughout
     inputs : measured forces, where recordings have any
 
     Returns
@@ -81,7 +85,7 @@ def sums_of_squares(
     (B, R) sums of (sample - offset - y)^2, m^2, inf where a simulation failed; (B, R) codes, see
     `CODES`. The numbers do not depend on the number of threads.
     """
-    model = check_model(theta, columns, constants, intervals, counts)
+    model = check_model(theta, columns, constants, intervals, counts, orders)
     data, first = check_samples(samples, starts, model)
     sse = np.empty((len(model.theta), len(model.columns)))
     codes = _work(model, mass, data, first, inputs, sse, np.empty((0, 0)))
@@ -96,6 +100,7 @@ def predictions(
     counts: ArrayLike,
     intervals: ArrayLike,
     n_total: int,
+    orders: ArrayLike | None = None,
     inputs: Inputs | None = None,
 ) -> tuple[Floats, Ints]:
     """Predict what every recording would measure, offset included.
@@ -103,7 +108,7 @@ def predictions(
     Parameters as in `sums_of_squares`; n_total is the sum of `counts`. Returns (B, n_total) values,
     m, recordings one after the other, nan where a simulation failed, and (B, R) codes.
     """
-    model = check_model(theta, columns, constants, intervals, counts)
+    model = check_model(theta, columns, constants, intervals, counts, orders)
     if int(model.counts.sum()) != n_total:
         raise InputError("n_total", str(n_total), f"the sum of counts, {model.counts.sum()}")
     values = np.empty((len(model.theta), n_total))
@@ -223,7 +228,7 @@ def _work(
     codes = np.empty((batch, recordings), dtype=np.int64)
     arguments = (
         model.theta, model.columns, model.constants, float(mass), data, first, model.counts,
-        model.intervals, *check_inputs(inputs, model),
+        model.intervals, model.orders, *check_inputs(inputs, model),
     )  # fmt: skip
     parts = compiled_batch.parts(batch, int(model.counts.sum()))
     if parts == 1:

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.model import basis
 from bayesimpact.model.basis import fill_basis, fill_basis_series, fill_table, plain_basis
+from bayesimpact.model.blocks import reading_of
 from bayesimpact.model.compiled import inner, typed
 from bayesimpact.model.lanes import (
     RESIDUAL,
@@ -30,6 +31,7 @@ from bayesimpact.model.lanes import (
     carry_forced,
     fill_coefficients,
     fill_forced_coefficients,
+    fill_reading,
     fill_slopes,
     multiply,
 )  # fmt: skip
@@ -50,7 +52,8 @@ class Desk(NamedTuple):
     tables (2, basis, LENGTH), series (2, 3, TERMS), prefixes (2, LENGTH + 1, basis, basis),
     keys (2, 3) : of both regimes
     slopes (2, 3, 11) : derivatives of their 2 b, K and rest
-    stack, products (11, BLOCKS, basis), moments (BLOCKS, basis) : of the blocks
+    stack, products (11, BLOCKS + 1, basis), moments (BLOCKS, basis) : of the blocks; the last row
+        holds the motion's own coefficients where the probe reads a derivative of it
     point (2, basis), dy (11,), dv (11,) : at one time
     """
 
@@ -77,8 +80,8 @@ def desk(size: int, with_grams: bool) -> Desk:
         np.empty((2, lengths, size, size)),
         np.full((2, 3), np.nan),
         np.empty((2, 3, 11)),
-        np.empty((11, BLOCKS, size)),
-        np.empty((11, BLOCKS, size)),
+        np.empty((11, BLOCKS + 1, size)),
+        np.empty((11, BLOCKS + 1, size)),
         np.empty((BLOCKS, size)),
         np.empty((2, size)),
         np.empty(11),
@@ -99,11 +102,12 @@ def refill(room: Desk, side: int, b: float, K: float, w: float) -> None:
 
 @inner(fastmath={"contract"})
 def sweep(
-    q: Floats, mass: float, interval: float, n: int, events: Floats, active: Lanes,
+    q: Floats, mass: float, interval: float, n: int, order: int, events: Floats, active: Lanes,
     data: Floats, values: Floats, jacobian: Floats, gram: Floats, room: Desk,
 ) -> None:  # fmt: skip
     """Pass over one recording; add to `gram` (12, 12) if `data` has samples, else fill the others.
 
+    order : which time derivative of the displacement the samples are
     events : (k, 2) times and velocities of all events, in sampling intervals
     active : the q whose derivatives are wanted
     values, jacobian : (n,), (n, 11)
@@ -133,28 +137,33 @@ def sweep(
             # the motion from t on: the samples of a block, if t is one, then to `target`
             u = y - rest
             m = v + beta * u
-            fill_coefficients(stack, slot, active, slopes, side, beta, K, u, v, dy, dv)
+            here = slot if order == 0 else BLOCKS
+            fill_coefficients(stack, here, active, slopes, side, beta, K, u, v, dy, dv)
             if forced:
                 fs, fc = fill_forced_coefficients(
-                    stack, slot, active, slopes, side, q, mass, interval, t
+                    stack, here, active, slopes, side, q, mass, interval, t
                 )
-            here = slot
             if t == i and i < end:
                 block = min(i + LENGTH, end)
-                shift = rest + motion.offset
+                shift, ur, vr, fsr, fcr = reading_of(
+                    order, 1.0 / interval, b, K, motion.w, rest, motion.offset, u, v, fs, fc
+                )
+                mr = vr + beta * ur
+                if order > 0:
+                    fill_reading(stack, here, slot, active, order, interval, beta, K, motion.w)
                 if data.size == 0:
                     write_rows(
-                        stack, slot, active, tables, side, shift, u, m, fs, fc, values[i:block],
+                        stack, slot, active, tables, side, shift, ur, mr, fsr, fcr, values[i:block],
                         jacobian[i:block],
                     )  # fmt: skip
                 else:
                     if forced:
                         squares += forced_moments(
-                            moments, slot, tables, side, data, i, block, shift, u, m, fs, fc
+                            moments, slot, tables, side, data, i, block, shift, ur, mr, fsr, fcr
                         )
                     else:
                         squares += plain_moments(
-                            moments, slot, tables, side, data, i, block, shift, u, m
+                            moments, slot, tables, side, data, i, block, shift, ur, mr
                         )
                     multiply(stack, products, slot, active, prefixes, side, block - i)
                 slot += 1

@@ -9,6 +9,8 @@ from bayesimpact.inference.posterior import Posterior
 from bayesimpact.model.measurement import smooth
 from bayesimpact.report.results import Array, BackboneSummary, Curve
 from bayesimpact.response.check import BackboneCheck, check_backbone
+from bayesimpact.response.displacement import displacement
+from bayesimpact.response.observe import DRIFT
 
 TOTAL = 600
 """Simulated recordings of all recordings together, about."""
@@ -32,16 +34,7 @@ def backbone_summary(posterior: Posterior, rng: np.random.Generator) -> Backbone
     size = len(recordings)
     room = min(TOTAL // size, _SAMPLES // int(oscillator.counts.sum()))
     count = max(_FEWEST, min(_MOST, room))
-    found = [
-        check_backbone(
-            recording.samples,
-            simulated(posterior, r, count, rng),
-            recording.interval,
-            rest=float(np.median(posterior.column(f"offset[{recording.name}]"))),
-            damping="reference",
-        )
-        for r, recording in zip(free, recordings, strict=True)
-    ]
+    found = [_checked(posterior, r, simulated(posterior, r, count, rng)) for r in free]
     curves = [
         curve
         for recording, check in zip(recordings, found, strict=True)
@@ -67,8 +60,23 @@ def backbone_summary(posterior: Posterior, rng: np.random.Generator) -> Backbone
     )
 
 
+def _checked(posterior: Posterior, r: int, draws: Array) -> BackboneCheck:
+    """Bands of one recording; of a velocity or an acceleration, and of all simulated ones alike,
+    of the displacement behind it.
+    """
+    recording = posterior.fit.target.oscillator.campaign.recordings[r]
+    interval, order = recording.interval, recording.order
+    if order == 0:
+        rest = float(np.median(posterior.column(f"offset[{recording.name}]")))
+        return check_backbone(recording.samples, draws, interval, rest=rest, damping="reference")
+    own = displacement(recording.samples, interval, order).samples
+    moved = np.array([displacement(one, interval, order).samples for one in draws])
+    noise = DRIFT * float(np.ptp(own))
+    return check_backbone(own, moved, interval, rest=0.0, noise=noise, damping="reference")
+
+
 def simulated(posterior: Posterior, r: int, count: int, rng: np.random.Generator) -> Array:
-    """Recordings `r` of drawn parameters, (count, n), m, with noise of the level that the
+    """Recordings `r` of drawn parameters, (count, n), with noise of the level that the
     recordings show by themselves.
 
     The level in the draws would not do: where a model fits badly it has swallowed the misfit, and
@@ -77,7 +85,8 @@ def simulated(posterior: Posterior, r: int, count: int, rng: np.random.Generator
     likelihood = posterior.fit.target.likelihood
     noise, interval = likelihood.noise, float(likelihood.oscillator.intervals[r])
     motion = likelihood.oscillator.predict_recording(r, posterior.thinned(count, rng))
-    raw = [noise.coloured(rng, motion.shape[1], interval, noise.level) for _ in motion]
+    order = int(likelihood.oscillator.orders[r])
+    raw = [noise.coloured(rng, motion.shape[1], interval, noise.level, order) for _ in motion]
     return np.asarray(motion + smooth(np.array(raw), noise.smoothing, interval))
 
 

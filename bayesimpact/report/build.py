@@ -182,8 +182,11 @@ def recording_results(fit: Fit) -> tuple[RecordingResult, ...]:
                 excluded=() if recording.used is None else tuple(runs(~recording.used)),
                 input="" if recording.input is None else recording.input.kind,
                 predicted=np.asarray(predicted),
-                sigma=float(fit.mode[likelihood.sigma_columns[r]]),
-                noise_rms=_noise_rms(likelihood.noise, recording.interval),
+                quantity=recording.quantity,
+                displacement=fit.displacements[r] if recording.order > 0 else np.zeros(0),
+                scale=float(likelihood.scales[r]),
+                sigma=float(fit.mode[likelihood.sigma_columns[r]] * likelihood.scales[r]),
+                noise_rms=_noise_rms(likelihood.noise, recording.interval) * likelihood.scales[r],
                 reduced_chi2=float(fit.sums[r]) / likelihood.noise.level**2 / freedom,
                 whiteness_p=checks.whiteness(
                     fit.linearisation[r].residual, likelihood.noise.smoothing is not None

@@ -14,6 +14,7 @@ from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 from bayesimpact.report.figures.save import escaped
 from bayesimpact.report.figures.style import styled
+from bayesimpact.report.units import reading
 
 MOST = 60
 """Panels in one figure; what is beyond is named in the title."""
@@ -21,17 +22,17 @@ MOST = 60
 
 @styled
 def campaign_figure(campaign: Campaign, faults: Sequence[Fault] = ()) -> Figure:
-    """One panel per recording, time against displacement in mm (or angle in rad); faults in red."""
+    """One panel per recording, time against the reading (mm, mm/s, else SI); faults in red."""
     shown = campaign.recordings[:MOST]
     columns = min(3, len(shown))
     rows = -(-len(shown) // columns)
     figure = Figure(figsize=(4.2 * columns, 2.1 * rows + 0.6), layout="constrained", dpi=120)
-    axes = figure.subplots(rows, columns, squeeze=False, sharey=True)
+    axes = figure.subplots(rows, columns, squeeze=False, sharey=not campaign.mixed)
     for axis in axes.flat[len(shown) :]:
         axis.set_visible(False)
     for panel, (axis, recording) in enumerate(zip(axes.flat, shown, strict=False)):
-        angle = recording.quantity == "angle"
-        scale, label = (1.0, "angle, rad") if angle else (1e3, "displacement, mm")
+        read = reading(recording.quantity, recording.unit)
+        scale, label = read.scale, f"{recording.quantity.replace('_', ' ')}, {read.unit}"
         axis.plot(recording.start + recording.times, recording.samples * scale, lw=0.6)
         if recording.used is not None:
             _mark(axis, recording, runs(~recording.used), "0.6")

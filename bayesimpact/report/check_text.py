@@ -17,7 +17,10 @@ COLUMNS = 40
 
 def measured_noise(campaign: Campaign) -> Noise | None:
     """Noise as the recordings alone show it, whatever is stated; None where a filter hides it."""
-    return raw_noise(campaign.recordings) if campaign.measurement.smoothing is None else None
+    if campaign.measurement.smoothing is not None:
+        return None
+    first = campaign.recordings[0].quantity
+    return raw_noise([r for r in campaign.recordings if r.quantity == first])
 
 
 def campaign_text(campaign: Campaign, noise: Noise | None) -> str:
@@ -25,12 +28,13 @@ def campaign_text(campaign: Campaign, noise: Noise | None) -> str:
 
     `noise` is what `measured_noise` found.
     """
-    angle = campaign.recordings[0].quantity == "angle"
+    angle = campaign.angular
+    quantities = dict.fromkeys(r.quantity.replace("_", " ") for r in campaign.recordings)
     stop = f"stop, cases {', '.join(campaign.cases)}" if campaign.stop else "no stop"
     blocks = [
         f"{campaign.name}\n"
         f"{'inertia' if angle else 'mass'} {campaign.mass:g} {'kg m2' if angle else 'kg'}, {stop}, "
-        f"recordings of {campaign.recordings[0].quantity}, data {campaign.sha256[:12]}",
+        f"recordings of {' and '.join(quantities)}, data {campaign.sha256[:12]}",
         _recordings_block(campaign),
         _chain_block(campaign, noise),
         _unknowns_block(campaign),
@@ -82,11 +86,13 @@ def _recording_warnings(recording: Recording) -> list[str]:
 
 
 def _recordings_block(campaign: Campaign) -> str:
-    angle = campaign.recordings[0].quantity == "angle"
-    scale, unit = (180 / np.pi, "deg") if angle else (1e3, "mm")
+    units = list(dict.fromkeys(_shown(r)[1] for r in campaign.recordings))
     head = ["recording", "case", "samples", "Hz", "start s", "length s", "period s"]
-    rows = [[*head, f"first {unit}", f"largest {unit}", "decay"]]
+    rows = [[*head, f"first {' or '.join(units)}", "largest", "decay"]]
+    if len(units) == 1:
+        rows = [[*head, f"first {units[0]}", f"largest {units[0]}", "decay"]]
     for r in campaign.recordings:
+        scale, _ = _shown(r)
         period = rough_period(r.samples, r.interval)
         swing = np.abs(r.samples - np.median(r.samples)).max() * scale
         numbers = [1 / r.interval, r.start, r.duration, period, r.samples[0] * scale, swing]
@@ -113,6 +119,12 @@ def _inputs(campaign: Campaign) -> list[str]:
                 f"input of {r.name}: {r.input.kind}, {low:.4g} to {high:.4g} {unit}, {gain}"
             )
     return lines
+
+
+def _shown(recording: Recording) -> tuple[float, str]:
+    """Factor and unit in which a terminal shows readings."""
+    known = {"angle": (180 / np.pi, "deg"), "displacement": (1e3, "mm"), "velocity": (1e3, "mm/s")}
+    return known.get(recording.quantity, (1.0, recording.unit))
 
 
 def envelope_bars(recording: Recording) -> str:

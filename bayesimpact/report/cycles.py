@@ -32,17 +32,41 @@ class Cycle:
 
 
 def stop_level(results: Results, recording: RecordingResult) -> float | None:
-    """Reading of the probe where the stop begins, m; None where no single one is known."""
-    known = {row.name: row.median for row in results.rows}
-    own = [value for name, value in known.items() if name.endswith(f".g[{recording.name}]")]
-    gap = own[0] if own else known.get("g", float("nan"))
-    level = gap + known.get(f"offset[{recording.name}]", 0.0)
+    """Reading of the probe where the stop begins, m; None where no single one is known, or the
+    probe reads no displacement.
+    """
+    if recording.displacement.size:
+        return None
+    level = gap_of(results, recording) + offset_of(results, recording)
     return level if results.stop and np.isfinite(level) else None
 
 
-def touches(recording: RecordingResult, level: float) -> np.ndarray:
-    """Samples (k,) before which the fitted motion rises through a reading."""
-    y = recording.predicted
+def gap_of(results: Results, recording: RecordingResult) -> float:
+    """Displacement from the true rest at which the stop begins, m; not finite where unknown."""
+    known = {row.name: row.median for row in results.rows}
+    own = [value for name, value in known.items() if name.endswith(f".g[{recording.name}]")]
+    return own[0] if own else known.get("g", float("nan"))
+
+
+def offset_of(results: Results, recording: RecordingResult) -> float:
+    """Rest reading of the probe."""
+    rows = (row.median for row in results.rows if row.name == f"offset[{recording.name}]")
+    return next(rows, 0.0)
+
+
+def contacts(results: Results, recording: RecordingResult) -> tuple[Array, float | None]:
+    """The fitted motion (n,) and where on it the stop begins; None without a stop.
+
+    The reading, or, where the probe reads no displacement, the model's displacement.
+    """
+    if not recording.displacement.size:
+        return recording.predicted, stop_level(results, recording)
+    gap = gap_of(results, recording)
+    return recording.displacement, gap if results.stop and np.isfinite(gap) else None
+
+
+def touches(y: Array, level: float) -> np.ndarray:
+    """Samples (k,) before which a motion (n,) rises through a level."""
     return np.flatnonzero((y[1:] >= level) & (y[:-1] < level)) + 1
 
 
@@ -62,14 +86,14 @@ def cycles(results: Results) -> list[Cycle]:
         return []
     found = []
     for r, (recording, old) in enumerate(zip(results.recordings, before, strict=True)):
-        level = stop_level(results, recording)
-        starts = touches(recording, float(np.mean(recording.predicted)) if level is None else level)
+        y, level = contacts(results, recording)
+        starts = touches(y, float(np.mean(y)) if level is None else level)
         gain = (recording.samples - old) ** 2 - recording.residual**2
         total = np.concatenate([[0.0], np.cumsum(gain / (2 * recording.noise_rms**2))])
         for k, (first, last) in enumerate(pairwise(starts)):
             leave = int(first)
             if level is not None:
-                inside = recording.predicted[first:last] >= level
+                inside = y[first:last] >= level
                 leave = int(first + (np.argmin(inside) if not inside.all() else inside.size))
             found.append(
                 Cycle(r, k + 1, int(first), int(last), leave, float(total[last] - total[first]))

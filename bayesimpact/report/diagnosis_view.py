@@ -55,14 +55,14 @@ _FIT_ROWS = {
 
 def diagnosis_view(results: Results) -> dict[str, Any] | None:
     """Everything that the section on the diagnosis shows; None without one."""
-    diagnosis, unit = results.diagnosis, results.unit
+    diagnosis, unit, length = results.diagnosis, results.unit, results.length
     if diagnosis is None:
         return None
     before, after = (diagnosis.get("parameters", {}).get(k, {}) for k in ("before", "after"))
     return {
         "verdict": VERDICTS.get(diagnosis["verdict"], diagnosis["verdict"]),
         "changed": diagnosis["verdict"] != "adequate",
-        "location": _location(diagnosis.get("location"), unit),
+        "location": _location(diagnosis.get("location"), length),
         "effects": [_effect(effect) for effect in diagnosis.get("effects", [])],
         "alternatives": [
             {
@@ -72,7 +72,7 @@ def diagnosis_view(results: Results) -> dict[str, Any] | None:
             }
             for other in diagnosis.get("alternatives", [])
         ],
-        "remainder": remainder_rows(diagnosis.get("remainder"), unit),
+        "remainder": remainder_rows(diagnosis.get("remainder"), unit, length),
         "formulas": [_formula(formula) for formula in diagnosis.get("formulas") or ()],
         "fit": _fit(diagnosis.get("fit", {}), unit) + _backbones(results),
         "held_out": _held_out(diagnosis.get("fit", {})),
@@ -130,8 +130,13 @@ def size_words(size: Mapping[str, Any] | None) -> str:
     return words
 
 
-def remainder_rows(remainder: Mapping[str, Any] | None, unit: str) -> list[tuple[str, str]]:
-    """What stays unexplained beside the named effects, as name and value."""
+def remainder_rows(
+    remainder: Mapping[str, Any] | None, unit: str, length: str
+) -> list[tuple[str, str]]:
+    """What stays unexplained beside the named effects, as name and value.
+
+    `unit` is that of the readings, `length` of displacements.
+    """
     if not remainder:
         return []
     rows = []
@@ -146,7 +151,7 @@ def remainder_rows(remainder: Mapping[str, Any] | None, unit: str) -> list[tuple
     if remainder.get("regime"):
         rows.append(("regime", REGIMES.get(str(remainder["regime"]), str(remainder["regime"]))))
     if remainder.get("displacement_m"):
-        rows.append(("displacement", span_of(remainder["displacement_m"], unit)))
+        rows.append(("displacement", span_of(remainder["displacement_m"], length)))
     if remainder.get("recordings"):
         rows.append(("recordings", ", ".join(str(x) for x in remainder["recordings"])))
     if remainder.get("guess"):

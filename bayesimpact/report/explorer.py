@@ -15,10 +15,16 @@ from typing import Any
 
 import numpy as np
 
-from bayesimpact.report.cycles import before_predicted, stop_level, telling_cycle, touches
+from bayesimpact.report.cycles import (
+    before_predicted,
+    contacts,
+    stop_level,
+    telling_cycle,
+    touches,
+)
 from bayesimpact.report.figures.force_map import force_unit
 from bayesimpact.report.figures.recordings import shown_recordings
-from bayesimpact.report.figures.style import response
+from bayesimpact.report.figures.style import response, response_word
 from bayesimpact.report.force_in_time import force_in_time
 from bayesimpact.report.results import Array, Results
 from bayesimpact.report.rows import Z90
@@ -67,7 +73,7 @@ def explorer_data(results: Results) -> str:
     force = force_unit(results, results.diagnosis_arrays) if _has_force(results) else None
     residual = display(results.unit, max(results.rms, results.noise.level))
     content: dict[str, Any] = {
-        "word": "angle" if results.quantity == "angle" else "displacement",
+        "word": response_word(results),
         "unit": typeset(response(results).unit),
         "residualUnit": typeset(residual.unit),
         "forceUnit": "" if force is None else typeset(force.unit),
@@ -78,21 +84,29 @@ def explorer_data(results: Results) -> str:
     for r in shown:
         recording, size = results.recordings[r], min(results.recordings[r].samples.size, most)
         level = stop_level(results, recording)
+        motion, touched = contacts(results, recording)
+        size_of = max(results.rms, results.noise.level) * recording.scale
+        unit = display(recording.unit, size_of)
         old = None if before is None else before[r]
         item: dict[str, Any] = {
             "name": recording.name,
             "case": recording.case,
             "interval": recording.interval,
-            "level": None if level is None else level * response(results).scale,
-            "noise": _number(recording.noise_rms * residual.scale),
-            "impacts": [] if level is None else touches(recording, level).tolist(),
+            "level": None if level is None else level * response(results, recording).scale,
+            "noise": _number(recording.noise_rms * unit.scale),
+            "words": [
+                response_word(results, recording),
+                typeset(response(results, recording).unit),
+                typeset(unit.unit),
+            ],
+            "impacts": [] if touched is None else touches(motion, touched).tolist(),
             "best": best.first if best is not None and best.recording == r else None,
-            "samples": _floats(recording.samples[:size] * response(results).scale),
+            "samples": _floats(recording.samples[:size] * response(results, recording).scale),
             "residuals": [
-                _integers((recording.samples - model)[:size] * residual.scale)
+                _integers((recording.samples - model)[:size] * unit.scale)
                 for model in ([recording.predicted] if old is None else [old, recording.predicted])
             ],
-            "toUnit": response(results).scale / residual.scale,
+            "toUnit": response(results, recording).scale / unit.scale,
         }
         found = force_in_time(results, r, recording.predicted if old is None else old)
         if found is not None and force is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from bayesimpact.report.cycles import offset_of
 from bayesimpact.report.results import Array, Results
 
 
@@ -15,7 +16,7 @@ def force_in_time(results: Results, r: int, predicted: Array) -> tuple[Array, Ar
     Parameters
     ----------
     r : the recording
-    predicted : (n,) reading of the model whose motion it is, m
+    predicted : (n,) reading of the model whose motion it is
 
     Returns
     -------
@@ -25,8 +26,7 @@ def force_in_time(results: Results, r: int, predicted: Array) -> tuple[Array, Ar
     if "force_y" not in arrays:
         return None
     recording = results.recordings[r]
-    known = {row.name: row.median for row in results.rows}
-    y = predicted - known.get(f"offset[{recording.name}]", 0.0)
+    y = recording.motion(predicted, offset_of(results, recording))
     v = np.gradient(y, recording.interval)
     a, b, a_sd, b_sd, ab = (
         np.interp(y, arrays["force_y"], arrays[f"force_{key}"])

@@ -30,7 +30,7 @@ def inference_groups(posterior: Posterior, provenance: Provenance) -> Inference:
     every = -(-draws.shape[1] // DRAWS)
     draws = draws[:, ::every]
     values = likelihood.per_recording(draws.reshape(-1, draws.shape[-1]))
-    quantity, unit = campaign.recordings[0].quantity, campaign.recordings[0].unit
+    quantity, own = campaign.recordings[0].quantity, {r.name: r.unit for r in campaign.recordings}
     units = [p.unit for p in oscillator.layout.parameters]
     packed = pack_parameters(
         posterior.names, draws, units, {"case": campaign.cases, "recording": names}
@@ -44,11 +44,11 @@ def inference_groups(posterior: Posterior, provenance: Provenance) -> Inference:
                 quantity: Variable(values.reshape(*draws.shape[:2], -1), ("recording",))
             },
             "posterior_predictive": {
-                name: Variable(samples, (axes[name],), unit)
+                name: Variable(samples, (axes[name],), own[name])
                 for name, samples in _predictive(posterior).items()
             },
             "observed_data": {
-                r.name: Variable(r.samples, (axes[r.name],), unit) for r in campaign.recordings
+                r.name: Variable(r.samples, (axes[r.name],), r.unit) for r in campaign.recordings
             },
         },
         coords={

@@ -21,7 +21,7 @@ from bayesimpact.report.figures.save import DPI
 from bayesimpact.report.policy import with_policy
 from bayesimpact.report.results import Results
 from bayesimpact.report.story import corrected, story_rows
-from bayesimpact.report.units import bound
+from bayesimpact.report.units import bound, reading, typeset
 
 TEMPLATES = Path(__file__).parent / "template"
 _VERDICT_CLASS = {"adequate": "good", "inadequate": "bad", "slight": "", "overestimated": ""}
@@ -103,7 +103,7 @@ def _context(results: Results, pictures: Mapping[str, bytes]) -> dict[str, Any]:
         "d": told,
         "story": story_rows(results),
         "corrected": [p for p in told["parameters"] if p["name"] in first] if told else [],
-        "angle": results.quantity == "angle",
+        "angle": results.angular,
         "kind_words": words.kind_words(results),
         "byline": words.byline(results),
         "verdict_class": _verdict_class(results),
@@ -112,7 +112,7 @@ def _context(results: Results, pictures: Mapping[str, bytes]) -> dict[str, Any]:
         "parameters": parameters,
         "ratios": [v for v in parameters if v.ratio] if results.mass != 1.0 else [],
         "centre": "median" if results.kind == "posterior" else "mode",
-        "mass_symbol": "J" if results.quantity == "angle" else "m",
+        "mass_symbol": "J" if results.angular else "m",
         "failed": [c for c in results.failed if c.title != MISFIT],
         "reference_labels": tables.reference_labels(interest),
         "chain_stated": results.chain.stated,
@@ -122,7 +122,7 @@ def _context(results: Results, pictures: Mapping[str, bytes]) -> dict[str, Any]:
         "recordings": tables.recording_views(results),
         "recordings_words": words.recordings_words(results),
         "residual_unit": tables.residual_unit(results),
-        "response_unit": "rad" if results.quantity == "angle" else "mm",
+        "response_unit": typeset(reading(results.quantity, results.unit).unit),
         "pictures": groups,
         "search_words": words.search_words(results),
         "sampler": tables.sampler_views(results),

@@ -8,73 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.data.quantity import Quantity, is_angular, unit_of
+from bayesimpact.report.recording_result import RecordingResult as RecordingResult
+
 Array = NDArray[np.float64]
 
 STATUSES = ("passed", "failed", "note")
-
-
-@dataclass(frozen=True, eq=False)
-class RecordingResult:
-    """One recording and what the fit makes of it.
-
-    Attributes
-    ----------
-    name, case : as in the campaign; case is "" without a stop
-    interval, start : s
-    samples, predicted : (n,) recorded, and read from the model at the mode; m (or rad)
-    sigma : noise level of the fit, before any smoothing, m
-    noise_rms : root mean square that the independently estimated noise has in the recording, m
-    reduced_chi2 : whitened misfit against the noise level estimated from the recordings alone
-    whiteness_p : p-value that the whitened residual is white
-    excluded : first and last-plus-one sample of every span that is set aside
-    input : kind of the measured input, "" for a free decay
-    """
-
-    name: str
-    case: str
-    interval: float
-    start: float
-    samples: Array
-    predicted: Array
-    sigma: float
-    noise_rms: float
-    reduced_chi2: float
-    whiteness_p: float
-    excluded: tuple[tuple[int, int], ...] = ()
-    input: str = ""
-
-    @property
-    def times(self) -> Array:
-        """Time since the first sample, (n,), s."""
-        return np.arange(self.samples.size, dtype=np.float64) * self.interval
-
-    @property
-    def residual(self) -> Array:
-        """Recorded minus predicted, (n,), m; 0 where samples are set aside."""
-        residual = np.array(self.samples - self.predicted)
-        for first, end in self.excluded:
-            residual[first:end] = 0.0
-        return residual
-
-    @property
-    def count(self) -> int:
-        """Samples that count."""
-        return self.samples.size - sum(end - first for first, end in self.excluded)
-
-    @property
-    def rms(self) -> float:
-        """Root mean square of the residual, m."""
-        return float(np.sqrt(np.sum(self.residual**2) / self.count))
-
-    @property
-    def share(self) -> float:
-        """Root mean square of the residual over that of the signal about its mean."""
-        return self.rms / float(np.std(self.samples))
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,7 +238,8 @@ class Results:
 
     Attributes
     ----------
-    name, mass, stop, quantity : of the campaign; mass in kg (kg m2 for angles)
+    name, mass, stop, quantity : of the campaign; mass in kg (kg m2 for angles), the first
+        recording's quantity
     recordings, rows : what was measured; what was found
     effects : added to the base oscillator
     noise, chain : of the measurement
@@ -352,19 +297,30 @@ class Results:
 
     @property
     def unit(self) -> str:
-        """SI unit of the recordings."""
-        return "m" if self.quantity == "displacement" else "rad"
+        """SI unit of the recordings (of the first, where they differ)."""
+        return unit_of(cast(Quantity, self.quantity))
+
+    @property
+    def length(self) -> str:
+        """SI unit of the displacement: "m", or "rad" for angles."""
+        return "rad" if self.angular else "m"
+
+    @property
+    def angular(self) -> bool:
+        """True when the motion is about an axis."""
+        return is_angular(cast(Quantity, self.quantity))
 
     @property
     def rms(self) -> float:
-        """Root mean square residual over all samples, m (or rad)."""
+        """Root mean square residual over all samples, in `unit`; others count by their noise."""
         count = sum(r.count for r in self.recordings)
-        return float(np.sqrt(sum(np.sum(r.residual**2) for r in self.recordings) / count))
+        left = sum(np.sum((r.residual / r.scale) ** 2) for r in self.recordings)
+        return float(np.sqrt(left / count))
 
     @property
     def share(self) -> float:
         """Root mean square residual over that of the signals about their means."""
-        signal = np.concatenate([r.samples - r.samples.mean() for r in self.recordings])
+        signal = np.concatenate([(r.samples - r.samples.mean()) / r.scale for r in self.recordings])
         return self.rms / float(np.sqrt(np.mean(signal**2)))
 
     @property

@@ -37,7 +37,7 @@ def build_rows(
 ) -> tuple[Row, ...]:
     """One row per parameter; `draws` (S, d), or None for the Laplace approximation."""
     campaign = fit.target.oscillator.campaign
-    angle = campaign.recordings[0].quantity == "angle"
+    angle = campaign.angular
     titles = {e.id: e.title for e in fit.target.oscillator.effects}
     rows = []
     for i, parameter in enumerate(fit.target.oscillator.layout.parameters):

@@ -59,7 +59,7 @@ def _place(results: Results, location: Mapping[str, Any] | None) -> list[str | M
     regime = str(location["regime"])
     lines: list[str | Markup] = [REGIMES.get(regime, regime)]
     if regime != "measurement":
-        unit = results.unit
+        unit = results.length
         lines[0] += (
             f", at {span_of(location['displacement_m'], unit)} and "
             f"{span_of(location['velocity_m_s'], unit + '/s')}"
@@ -116,14 +116,14 @@ def _size(results: Results, diagnosis: Mapping[str, Any]) -> list[str | Markup]:
         ]
     force = (diagnosis.get("location") or {}).get("force_rms_n")
     if force and not lines:
-        unit = "N m" if results.quantity == "angle" else "N"
+        unit = "N m" if results.angular else "N"
         lines.append(f"unexplained force there: {amount(force, unit)} rms")
     return lines
 
 
 def _remains(results: Results, remainder: Mapping[str, Any] | None) -> list[str | Markup]:
     """What no named effect explains, in one sentence."""
-    rows = dict(remainder_rows(remainder, results.unit))
+    rows = dict(remainder_rows(remainder, results.unit, results.length))
     if not rows:
         return []
     words = f"unexplained: {rows['rms']} rms" if "rms" in rows else "something unexplained"

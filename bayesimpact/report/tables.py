@@ -17,6 +17,7 @@ from bayesimpact.report.units import (
     number,
     p_value,
     readable,
+    reading,
     signed,
     significant,
     typeset,
@@ -124,10 +125,10 @@ def deviation(row: Row, value: float) -> str:
 
 def recording_views(results: Results) -> list[dict[str, str]]:
     """Rows of the table of recordings."""
-    scale = 1.0 if results.quantity == "angle" else 1e3
     rows = []
     for r in results.recordings:
-        shown = display(results.unit, max(results.rms, results.noise.level))
+        shown = display(r.unit, max(results.rms, results.noise.level) * r.scale)
+        scale = reading(r.quantity, r.unit).scale
         rows.append(
             {
                 "name": r.name,

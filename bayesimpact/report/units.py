@@ -109,6 +109,14 @@ def display(unit: str, size: float) -> Display:
     return Display(1.0, unit)
 
 
+_READINGS = {"displacement": Display(1e3, "mm"), "velocity": Display(1e3, "mm/s")}
+
+
+def reading(quantity: str, unit: str) -> Display:
+    """How readings of a quantity are shown: mm, mm/s, all others in their SI `unit`."""
+    return _READINGS.get(quantity, Display(1.0, unit))
+
+
 def readable(unit: str, size: float) -> Display:
     """`display`, with a power of ten where no prefix brings `size` near one."""
     shown = display(unit, size)

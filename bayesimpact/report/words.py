@@ -32,7 +32,7 @@ def byline(results: Results) -> str:
 
 def facts(results: Results) -> list[tuple[str, str]]:
     """Figures at a glance."""
-    angle = results.quantity == "angle"
+    angle = results.angular
     mass = f"{results.mass:g} {typeset('kg m2' if angle else 'kg')}"
     found = [
         ("inertia" if angle else "mass", mass),
@@ -64,7 +64,7 @@ def parameter_words(results: Results) -> str:
 
 def interval_words(results: Results) -> str:
     """What the intervals contain, and what they do not."""
-    chain, mass = results.chain, "inertia" if results.quantity == "angle" else "mass"
+    chain, mass = results.chain, "inertia" if results.angular else "mass"
     if not chain.stated:
         return _unstated(results, mass)
     parts = [
@@ -98,7 +98,7 @@ def _unstated(results: Results, mass: str) -> str:
 
 def ratio_words(results: Results) -> str:
     """Why ratios are given."""
-    mass = "inertia" if results.quantity == "angle" else "mass"
+    mass = "inertia" if results.angular else "mass"
     if any(r.input for r in results.recordings) and not any(
         row.name == "input_gain" for row in results.rows
     ):

@@ -34,6 +34,8 @@ from bayesimpact.response.preloaded import estimate_preloaded, is_preloaded
 from bayesimpact.response.release import Oscillator, release
 from bayesimpact.response.swings import rough_period
 
+MEANS = 100.0  # the mean of a velocity or an acceleration is as good as that of so many samples
+
 
 @dataclass(frozen=True, eq=False)
 class Estimates(Picklable):
@@ -44,8 +46,9 @@ class Estimates(Picklable):
     k1, c1 : N/m, N s/m
     g, c2 : m, N s/m; without a stop infinite and zero
     k2 : case -> N/m; empty without a stop
-    offset, y0, v0 : recording -> m, m, m/s (rad for angles); y0 counts from the rest position
-    noise : recording -> standard deviation of the noise, m
+    offset, y0, v0 : recording -> the reading's unit, m, m/s (rad for angles); y0 counts from the
+        rest position
+    noise : recording -> standard deviation of the noise, in the reading's unit
     sd : parameter name -> rough standard error, names as in `values`; infinite where the recordings
         do not tell, for example k2 of an obstacle that was never touched
     impacts : recording -> number of cycles with an impact
@@ -207,9 +210,12 @@ def _collect(
             Oscillator(campaign.mass, c1, k1, c2, g, stiffness),
             max(observed.noises[r], 1e-12 * observed.size(r)),
         )
-        offset[name], noise[name] = float(flight.offsets[r]), observed.noises[r]
+        bias = observed.biases[r]
+        offset[name] = float(flight.offsets[r]) if bias is None else bias
+        noise[name] = observed.reading_noises[r]
         y0[name], v0[name], sd[f"y0[{name}]"], sd[f"v0[{name}]"] = start
-        sd[f"offset[{name}]"] = flight.sd_offset
+        still = flight.sd_offset if bias is None else np.std(recording.samples) / np.sqrt(MEANS)
+        sd[f"offset[{name}]"] = float(still)
     return Estimates(
         k1=k1,
         c1=c1,

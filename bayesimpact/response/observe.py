@@ -12,12 +12,15 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.response import local
 from bayesimpact.response.contact import Contact, Cycles
 from bayesimpact.response.cycles import cycle
+from bayesimpact.response.displacement import displacement_of
 from bayesimpact.response.flight import Arc, Flight, lower_arcs, solve_flight, waves_of
 from bayesimpact.response.rest import rest_position
 from bayesimpact.response.swings import half_swings, rough_period
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
+
+DRIFT = 0.005  # of the motion: what an integrated reading is off, however smooth it looks
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,12 +29,14 @@ class Observed:
 
     Attributes
     ----------
-    samples : (n,) each, m
+    samples : (n,) each, displacements, m; of other quantities as `displacement_of` finds them
     intervals : s
     periods : rough period, samples
-    noises : standard deviation of the noise, m
+    noises : standard deviation of the noise of these, m
     rests : rest reading, m
     arcs : flights on the free side, [first, end)
+    biases, reading_noises : offset of the probe (None: the displacement's rest reading is to be
+        found), and standard deviation of the noise, in the unit of the recording
     """
 
     samples: Sequence[Floats]
@@ -40,6 +45,8 @@ class Observed:
     noises: Sequence[float]
     rests: Sequence[float]
     arcs: Sequence[Sequence[Arc]]
+    biases: Sequence[float | None]
+    reading_noises: Sequence[float]
 
     def size(self, r: int) -> float:
         """Largest distance of a recording from its rest reading."""
@@ -59,12 +66,18 @@ class Observed:
 
 def look(campaign: Campaign) -> Observed:
     """Period, noise, rest reading and flights of every recording."""
-    samples = [r.samples for r in campaign.recordings]
+    found = [displacement_of(r) for r in campaign.recordings]
+    samples = [one.samples for one in found]
     intervals = [r.interval for r in campaign.recordings]
     periods = [rough_period(x) for x in samples]
-    noises = [local.noise_level(x, p) for x, p in zip(samples, periods, strict=True)]
+    noises = [
+        max(local.noise_level(x, p), DRIFT * float(np.ptp(x)) if r.order > 0 else 0.0)
+        for x, p, r in zip(samples, periods, campaign.recordings, strict=True)
+    ]
     rests = [rest_position(*args) for args in zip(samples, periods, noises, strict=True)]
-    first = Observed(samples, intervals, periods, noises, rests, [[(0, x.size)] for x in samples])
+    whole: list[list[Arc]] = [[(0, x.size)] for x in samples]
+    biases, reading_noises = [one.bias for one in found], [one.noise for one in found]
+    first = Observed(samples, intervals, periods, noises, rests, whole, biases, reading_noises)
     return with_arcs(first) if campaign.stop else first
 
 

@@ -14,6 +14,8 @@ from bayesimpact.response import local
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
+ALIKE = 0.2  # of the power of the strongest line
+
 
 @dataclass(frozen=True, eq=False)
 class HalfSwings:
@@ -38,22 +40,34 @@ class HalfSwings:
         return np.diff(self.crossings)
 
 
-def rough_period(samples: Floats) -> float:
-    """Period of the strongest component, in samples: good to some ten per cent."""
+def rough_period(samples: Floats, order: int = 0) -> float:
+    """Period of the strongest component, in samples: good to some ten per cent.
+
+    `order` says which time derivative of the displacement the samples are.
+    """
     settled = float(np.median(samples[-max(samples.size // 5, 1) :]))
     size = np.abs(samples - settled)
     # Only the part with motion: a decay that dies early must not drown in the noise after it.
     last = int(np.flatnonzero(size > 0.05 * size.max())[-1]) if size.any() else 0
     active = samples[: min(samples.size, max(16, int(1.2 * last)))]
     fade = np.cos(0.5 * np.pi * np.arange(active.size) / active.size) ** 2
+    if order > 0:  # a derivative averages to zero, and its median may lie off that
+        settled = float(np.average(active, weights=fade))
     points = 1 << int(np.ceil(np.log2(4 * active.size)))
     power = np.abs(np.fft.rfft((active - settled) * fade, points)) ** 2
     # A stop moves the middle of the swings as they decay: in the velocity this drift counts little,
     # but white noise would count more than the motion, so its floor goes first.
     floor = float(np.median(power[power.size // 2 :]))
-    power = np.maximum(power - 30 * floor, 0.0) * np.arange(power.size) ** 2.0
+    power = np.maximum(power - 30 * floor, 0.0)
     lowest = max(1, int(1.2 * points / active.size))
-    peak = lowest + int(np.argmax(power[lowest:]))
+    if order < 2:
+        power[1:] *= np.arange(1, power.size) ** (2.0 - 2.0 * order)
+        peak = lowest + int(np.argmax(power[lowest:]))
+        return points / peak
+    # Short contacts give an acceleration's harmonics the size of its first line, and to weigh them
+    # less would weigh the drift of the probe more: so the lowest line of those alike.
+    strong = lowest + int(np.argmax(power[lowest:] >= ALIKE * power[lowest:].max()))
+    peak = strong + int(np.argmax(power[strong : int(1.3 * strong) + 2]))
     return points / peak
 
 

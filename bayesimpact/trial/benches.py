@@ -14,7 +14,7 @@ from types import MappingProxyType
 import numpy as np
 
 from bayesimpact.data.campaign import Measurement, Smoothing
-from bayesimpact.data.recording import Quantity
+from bayesimpact.data.quantity import Quantity
 from bayesimpact.trial.bundle import PAPER_RIG
 from bayesimpact.trial.rig import Release, Rig
 from bayesimpact.trial.rig_chain import Chain

@@ -26,7 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Beam, Campaign, Measurement
-from bayesimpact.data.recording import Quantity, Recording
+from bayesimpact.data.quantity import Quantity, order_of
+from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 from bayesimpact.trial.rig_catalogue import CATALOGUE, Planted
 from bayesimpact.trial.rig_chain import Chain, Probe, measure
@@ -125,12 +126,14 @@ def record(
     rtol: float = 1e-12,
     atol: float = 1e-14,
     rest: float = 0.0,
+    quantity: Quantity = "displacement",
 ) -> NDArray[np.float64]:
-    """One recording, (round(rate * duration),), m; draws as many normal numbers from `rng`.
+    """One recording, (round(rate * duration),), in SI; draws as many normal numbers from `rng`.
 
     `rtol`, `atol` as for `motion`. With `rest` the recording begins so many seconds before the
     release, in which the mass is held at y0; forces count their time from the release, the chain
-    from the first sample.
+    from the first sample. The probe, its noise and its rest reading are those of `quantity`;
+    velocities and accelerations are the mass's own, without further modes.
 
     Raises
     ------
@@ -148,10 +151,12 @@ def record(
             if effect == "smoothing" and chain.smoothing is not None:
                 raise InputError("effects, smoothing", "a chain that smooths", "only one of both")
             chain = planted.chain(chain, numbers)
-    held = np.full(round(rest * rate), release.y0)
-    displacement = np.concatenate([held, truth.displacement])
-    times = sampling(rate, displacement.size / rate)
-    return measure(displacement, times, probe, chain, release.name, rng)
+    order = order_of(quantity)
+    true = (truth.displacement, truth.velocity, truth.acceleration)[order]
+    held = np.full(round(rest * rate), release.y0 if order == 0 else 0.0)
+    reading = np.concatenate([held, true])
+    times = sampling(rate, reading.size / rate)
+    return measure(reading, times, probe, chain, release.name, rng)
 
 
 def make_campaign(
@@ -180,7 +185,16 @@ def make_campaign(
         Recording(
             name=release.name,
             case=release.case,
-            samples=record(rig, release, effects, chain, rate=rate, duration=duration, rng=rng),
+            samples=record(
+                rig,
+                release,
+                effects,
+                chain,
+                rate=rate,
+                duration=duration,
+                rng=rng,
+                quantity=quantity,
+            ),
             interval=1 / rate,
             quantity=quantity,
         )

@@ -45,12 +45,15 @@ class Motion:
     times : (n,), s
     displacement, velocity : (n,), m and m/s; the displacement is that of the place at which the
         probe looks, further modes included
+    acceleration : (n,), m/s2, of the mass, by its equation of motion; a sample at the very end of
+        a contact or a flight takes what follows
     touches, leaves : instants at which contacts began and ended, s
     """
 
     times: NDArray[np.float64]
     displacement: NDArray[np.float64]
     velocity: NDArray[np.float64]
+    acceleration: NDArray[np.float64]
     touches: tuple[float, ...]
     leaves: tuple[float, ...]
 
@@ -79,7 +82,8 @@ def move(
     touches, leaves = (
         tuple(t for t in instants if t <= run.end) for instants in (run.touches, run.leaves)
     )
-    return Motion(times, run.samples[0], run.samples[1], touches, leaves)
+    y, v, a = run.samples
+    return Motion(times, y, v, a, touches, leaves)
 
 
 class _Run:
@@ -98,7 +102,7 @@ class _Run:
         self.t = 0.0
         self.end = float(times[-1])
         self.state: State = [site.y0, site.v0, *(s for part in parts for s in part.states)]
-        self.samples = np.empty((2, times.size))
+        self.samples = np.empty((3, times.size))
         self.seen = [place for part in parts for place in part.seen]
         self.filled = 0
         self.gap = site.gap
@@ -191,7 +195,7 @@ class _Run:
             dense = solver.dense_output()
             ends = (solver.t_old, solver.t, solver.y.tolist())
             event, t = self._first_event(piece, forces, dense, *ends)
-            self._sample(dense, t)
+            self._sample(dense, t, forces)
             if event is not None:
                 self._arrive(event, t, dense(t).tolist(), piece, forces)
                 return
@@ -200,12 +204,17 @@ class _Run:
                 break
         self.t, self.state = float(solver.t), solver.y.tolist()
 
-    def _sample(self, dense: Callable[..., NDArray[np.float64]], until: float) -> None:
+    def _sample(
+        self, dense: Callable[..., NDArray[np.float64]], until: float, forces: Balance
+    ) -> None:
         """Fill in the samples before `until`; the one at the very end of a piece is the next's."""
         upto = int(np.searchsorted(self.times, until, side="left"))
         if upto > self.filled:
-            states = dense(self.times[self.filled : upto])
-            self.samples[:, self.filled : upto] = states[:2]
+            times = self.times[self.filled : upto]
+            states = dense(times)
+            self.samples[:2, self.filled : upto] = states[:2]
+            rates = [forces.rhs(t, state) for t, state in zip(times, states.T, strict=True)]
+            self.samples[2, self.filled : upto] = [rate[1] for rate in rates]
             for place in self.seen:
                 self.samples[0, self.filled : upto] += states[place]
             self.filled = upto

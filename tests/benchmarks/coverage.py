@@ -1,6 +1,7 @@
 """Do 90 % intervals hold the truth nine times in ten? The paper's rig, nothing concealed.
 
     python tests/benchmarks/coverage.py --campaigns 100 --out tests/benchmarks/coverage.json
+    python tests/benchmarks/coverage.py --campaigns 24 --duration 3 --quantity acceleration
 
 The recordings come from the independent generator; every campaign has its own releases, rest
 readings and noise. Intervals are those of the posterior's normal approximation at the mode, which
@@ -25,6 +26,7 @@ from bayesimpact.trial.bundle import PAPER_RIG, paper_releases
 from bayesimpact.trial.rig import make_campaign
 from bayesimpact.trial.rig_chain import Chain
 
+NOISE = {"displacement": 5e-6, "velocity": 2e-4, "acceleration": 2e-2}  # m, m/s, m/s2
 QUANTILE = stats.norm.ppf(0.95)
 
 
@@ -39,17 +41,19 @@ def truth_of(rig, releases, offsets) -> dict[str, float]:
     return values
 
 
-def one(seed: int, duration: float) -> dict[str, float]:
+def one(seed: int, duration: float, quantity: str) -> dict[str, float]:
     """Errors of all parameters of one campaign in their standard deviations."""
     rng = np.random.default_rng([2026, seed])
     releases = paper_releases(rng)
-    offsets = {r.name: float(10e-6 * rng.standard_normal()) for r in releases}
-    chain = Chain(noise=5e-6, offsets=offsets)
+    noise = NOISE[quantity]
+    offsets = {r.name: float(2 * noise * rng.standard_normal()) for r in releases}
+    chain = Chain(noise=noise, offsets=offsets)
     campaign = make_campaign(
-        "coverage", PAPER_RIG, releases, chain=chain, rate=1000.0, duration=duration, rng=rng
-    )
+        "coverage", PAPER_RIG, releases, chain=chain, rate=1000.0, duration=duration, rng=rng,
+        quantity=quantity,
+    )  # fmt: skip
     fit = identify(campaign, rng=rng, search=False).fit
-    truth = truth_of(PAPER_RIG, releases, offsets) | {"sigma": 5e-6}
+    truth = truth_of(PAPER_RIG, releases, offsets) | {"sigma": noise}
     return {
         name: float((value - truth[name]) / sd)
         for name, value, sd in zip(fit.names, fit.mode, fit.sd, strict=True)
@@ -80,13 +84,15 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--campaigns", type=int, default=100)
     parser.add_argument("--duration", type=float, default=6.0)
+    parser.add_argument("--quantity", choices=NOISE, default="displacement")
     parser.add_argument("--out", type=Path)
     chosen = parser.parse_args()
-    errors = [one(seed, chosen.duration) for seed in range(chosen.campaigns)]
+    errors = [one(seed, chosen.duration, chosen.quantity) for seed in range(chosen.campaigns)]
     table = summary(errors)
     for name, row in table.items():
         share, spread = 100 * row["coverage90"], row["sd_of_z"]
-        print(f"{name:8s} {share:5.1f} %  sd of z {spread:.3f}  n {row['n']}")
+        ends = f"{100 * row['low']:.0f} to {100 * row['high']:.0f}"
+        print(f"{name:8s} {share:5.1f} % ({ends})  sd of z {spread:.3f}  n {row['n']}")
     if chosen.out is not None:
         commit = subprocess.run(
             ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False
@@ -94,6 +100,7 @@ def main() -> None:
         content = {
             "question": "coverage of 90 % intervals, base model, paper's rig",
             "campaigns": chosen.campaigns, "duration_s": chosen.duration, "commit": commit,
+            "quantity": chosen.quantity,
             "date": datetime.now(UTC).date().isoformat(), "machine": platform.machine(),
             "parameters": table,
         }  # fmt: skip

@@ -12,7 +12,6 @@ from click.testing import CliRunner, Result
 
 from bayesimpact.cli import main
 from bayesimpact.data.read import load_campaign
-from bayesimpact.errors import InputError
 
 
 def _new(folder: Path, *arguments: object) -> Result:
@@ -124,12 +123,13 @@ def test_nothing_is_written_for_a_bad_file(tmp_path: Path, name: str) -> None:
     assert not (tmp_path / "new").exists()
 
 
-def test_acceleration_is_read_and_said_unusable(tmp_path: Path) -> None:
+def test_acceleration_is_read_and_said(tmp_path: Path) -> None:
     rows = [f"{t:.6g},{x:.9g}" for t, x in zip(made.TIMES, made.MM, strict=True)]
     (tmp_path / "a.csv").write_text("Time [s],Accel [g]\n" + "\n".join(rows))
     result = _new(tmp_path, tmp_path / "a.csv")
     assert result.exit_code == 0
     assert "Accel [g], 600 samples" in result.output
-    assert "NEEDED: a displacement or an angle" in result.output
-    with pytest.raises(InputError, match=r"an acceleration \(g\)"):
-        load_campaign(tmp_path)
+    assert "NEEDED" not in result.output
+    (recording,) = load_campaign(tmp_path).recordings
+    assert recording.quantity == "acceleration"
+    np.testing.assert_allclose(recording.samples, made.MM * 9.80665, rtol=1e-7)

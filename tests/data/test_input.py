@@ -180,3 +180,12 @@ def test_an_input_that_never_changes_and_a_coarse_base() -> None:
             bi.Campaign.from_arrays(
                 [{**entry, "input": given}], name="rig", mass_kg=0.5, stop=False
             )
+
+
+def test_velocities_beside_an_input_are_refused() -> None:
+    entry: dict[str, Any] = {
+        "name": "a", "samples": decay(), "unit": "m/s", "sample_rate_hz": 500.0,
+        "input": {"samples": FORCE, "kind": "force_N"},
+    }  # fmt: skip
+    with pytest.raises(InputError, match="velocity"):
+        bi.Campaign.from_arrays([entry], name="rig", mass_kg=0.5, stop=False)

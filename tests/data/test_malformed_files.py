@@ -121,13 +121,13 @@ BAD: dict[str, tuple[str, Change, str, tuple[str, ...]]] = {
     "HDF5 empty group": ("a.h5", _h5(), "", ("without a channel",)),
     "HDF5 NaN": ("a.h5", _holed, "", ("sample 41", "channel x_mm", "no finite number")),
     "HDF5 other block": ("a.h5", made.hdf5, 'block = "run 2"\n', ("key block", '"run 2"', "run 1")),
-    "HDF5 velocity": (
+    "HDF5 force": (
         "a.h5",
-        lambda p: xr.Dataset({"v": ("time", made.MM, {"units": "m/s"})}).to_netcdf(
+        lambda p: xr.Dataset({"v": ("time", made.MM, {"units": "N"})}).to_netcdf(
             p, engine="h5netcdf"
         ),
         f'column = "v"\n{RATE}',
-        ("channel v", "a velocity (m/s)", "a displacement or an angle"),
+        ("channel v", "the unit N", "unit = ... in campaign.toml (m, mm, um"),
     ),
     "UFF text": ("a.uff", _bytes(b"    -1\n    58\nnothing\n"), "", ("a UFF file",)),
     "UFF cut": ("a.uff", _cut("UFF58", 0.3), "", ("a UFF file",)),

@@ -54,6 +54,7 @@ FILES: dict[str, str | bytes] = {
     "uneven": _uneven(),
     "shifted": csv(start=115.0),
     "preamble": "1,2,3\n" + TWO,
+    "two sensors": TWO.replace("t,near,far", "t [s],near [mm],far [mm/s]"),
     "Latin-1": TWO.replace("near", "näh").encode("latin-1"),
 }
 NEAR = 'column = "near"\nunit = "mm"\n'
@@ -88,6 +89,7 @@ KEYS: dict[str, dict[str, tuple[str, str]]] = {
             "Latin-1",
         ),
         "unit": (f"{TOP}{ENTRY}time_column = 1\n{NEAR}", "two columns"),
+        "quantity": (f'{TOP}{ENTRY}quantity = "velocity"\n', "two sensors"),
         "start_s": (f"{TOP}{ENTRY}start_s = 115.2\n", "shifted"),
         "end_s": (f"{TOP}{ENTRY}end_s = 116.0\n", "shifted"),
         "exclude_s": (f"{TOP}{ENTRY}exclude_s = [[115.1, 115.15], [115.5, 115.5]]\n", "shifted"),

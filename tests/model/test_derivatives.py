@@ -45,15 +45,15 @@ CASES = {
 }
 
 
-def analytic(q, mass, interval, n):
+def analytic(q, mass, interval, n, order=0):
     values, jacobian, codes = trajectories_and_derivatives(
-        q, EVERY, np.zeros((1, 11)), mass, [n], [interval], n
+        q, EVERY, np.zeros((1, 11)), mass, [n], [interval], n, [order]
     )
     assert codes[0] == 0
     return values, jacobian
 
 
-def differences(q, mass, interval, n):
+def differences(q, mass, interval, n, order=0):
     """Central differences of the twin, exact to about 20 digits."""
     out = np.zeros((n, 11))
     for i in range(10):
@@ -65,25 +65,28 @@ def differences(q, mass, interval, n):
             with mp.workdps(70):
                 moved = [mp.mpf(x) for x in q]
                 moved[i] += sign * step
-                sides.append(naive.twin(moved, mass, interval, n).displacement)
+                sides.append(naive.twin(moved, mass, interval, n).derivative(order))
         with mp.workdps(70):
             out[:, i] = [float((a - b) / (2 * step)) for a, b in zip(*sides, strict=True)]
     out[:, 10] = 1.0
     return out
 
 
+@pytest.mark.parametrize("order", [0, 1, 2])
 @pytest.mark.parametrize("case", CASES)
-def test_derivatives(case):
+def test_derivatives(case, order):
     q = np.array(list((BASE | CASES[case]).values()))
     n, interval = 16, 2.1e-2
-    values, jacobian = analytic(q, 0.503, interval, n)
-    exact = differences(q, 0.503, interval, n)
+    values, jacobian = analytic(q, 0.503, interval, n, order)
+    exact = differences(q, 0.503, interval, n, order)
     scale = np.abs(exact).max(0)
     # what a column's unit of change moves, relative to what the parameter itself has moved
     errors = np.abs(jacobian - exact).max(0) / np.where(scale > 0, scale, 1.0)
     assert np.all(errors < 1e-11), dict(zip(BASE, errors, strict=True))
-    whole = predictions(q[None], EVERY, np.zeros((1, 11)), 0.503, [n], [interval], n)[0][0]
-    np.testing.assert_allclose(values, whole, atol=1e-15)
+    whole = predictions(q[None], EVERY, np.zeros((1, 11)), 0.503, [n], [interval], n, [order])[0][0]
+    np.testing.assert_allclose(values, whole, atol=1e-15 * (W1 / interval) ** order)
+    twin = np.array(naive.twin(q, 0.503, interval, n).derivative(order), dtype=float) + q[10]
+    np.testing.assert_allclose(whole, twin, rtol=0, atol=1e-12 * np.abs(twin).max())
 
 
 def test_derivatives_of_random_systems():

@@ -149,7 +149,7 @@ def test_derivatives(stop: bool) -> None:
     oscillator = _oscillator(force, stop=stop)
     theta = _theta(oscillator, offset=2e-4)
     columns, constants = oscillator.layout.columns[:, :11], oscillator.layout.constants[:, :11]
-    rest = (VALUES["mass"], [force.size], [INTERVAL], force.size, oscillator.inputs)
+    rest = (VALUES["mass"], [force.size], [INTERVAL], force.size, None, oscillator.inputs)
     values, jacobian, codes = trajectories_and_derivatives(theta, columns, constants, *rest)
     assert codes[0] == 0
     np.testing.assert_allclose(values, oscillator.predict(theta)[0], atol=1e-15)
@@ -173,8 +173,8 @@ def test_products_of_derivatives() -> None:
     theta = _theta(oscillator)
     columns, constants = oscillator.layout.columns[:, :11], oscillator.layout.constants[:, :11]
     data = 1e-3 * np.random.default_rng(0).standard_normal(force.size)
-    one = (VALUES["mass"], data, [0], [force.size], [INTERVAL], oscillator.inputs)
-    rest = (VALUES["mass"], [force.size], [INTERVAL], force.size, oscillator.inputs)
+    one = (VALUES["mass"], data, [0], [force.size], [INTERVAL], None, oscillator.inputs)
+    rest = (VALUES["mass"], [force.size], [INTERVAL], force.size, None, oscillator.inputs)
     values, jacobian, _ = trajectories_and_derivatives(theta, columns, constants, *rest)
     rows = np.column_stack([jacobian, data - values])
     found, _ = grams(theta, columns, constants, *one)

@@ -94,7 +94,9 @@ def times_of(recording: Recording, spans: Sequence[Span]) -> str:
 
 
 def amount(value: float, unit: str) -> str:
-    """A displacement in um or mm, an angle in degrees."""
+    """A displacement in um or mm, an angle in degrees, other readings in their SI unit."""
     if unit == "rad":
         return f"{np.degrees(value):.3g} degrees"
+    if unit != "m":
+        return f"{value:.3g} {unit}"
     return f"{value * 1e3:.3g} mm" if abs(value) >= 1e-4 else f"{value * 1e6:.3g} um"

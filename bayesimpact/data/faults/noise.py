@@ -80,6 +80,8 @@ def loud_recordings(recordings: Sequence[Recording]) -> list[Fault]:
         return []
     levels = np.array([noise_level(r.samples) for r in recordings])
     usual = float(np.median(levels))
+    if len({r.quantity for r in recordings}) > 1:
+        return []
     if usual == 0.0:
         return []
     return [

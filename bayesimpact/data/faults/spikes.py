@@ -28,6 +28,8 @@ MOST = 0.01  # of the samples: more deviations than this are the signal
 def find_spikes(recording: Recording) -> list[Fault]:
     """Up to five samples in a row far off what both sides foretell alike; impacts are none.
 
+    A brief contact is a spike of the acceleration away from the stop: such a one does not count.
+
     The statistic is the smaller of the deviations from either side over the bulk of such
     deviations. It has to pass the Gaussian threshold and four times the 97th percentile over the
     recording, which is what the corners of the motion itself reach.
@@ -39,7 +41,8 @@ def find_spikes(recording: Recording) -> list[Fault]:
     found: list[tuple[float, float, Span]] = []
     for width in range(1, LONGEST + 1):
         for strength, size, span in _of_width(x, form, width, least):
-            found.append((strength, size, span))
+            if not (size < 0.0 and recording.order == 2 and recording.case):
+                found.append((strength, size, span))
     spans: list[tuple[float, float, Span]] = []
     for strength, size, (first, end) in sorted(found, reverse=True):
         if all(end + 1 < a or first > b + 1 for _, _, (a, b) in spans):

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.data.quantity import RESPONSE_COLUMNS, UNITS
 from bayesimpact.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -25,13 +26,14 @@ _UNITS = {
     "millimeter": "mm", "millimetre": "mm", "meter": "m", "metre": "m", "meters": "m",
     "°": "deg", "degree": "deg", "degrees": "deg", "radian": "rad", "radians": "rad",
     "sec": "s", "second": "s", "seconds": "s", "msec": "ms", "µs": "us", "μs": "us",
-    "m/s^2": "m/s2", "m/s²": "m/s2", "m/s/s": "m/s2", "m s-2": "m/s2", "g's": "g", "gn": "g",
-    "m s-1": "m/s", "rad/sec": "rad/s", "°/s": "deg/s", "volts": "V", "volt": "V", "newton": "N",
+    "m/s^2": "m/s2", "m/s²": "m/s2", "m/s/s": "m/s2", "m s-2": "m/s2", "mm/s^2": "mm/s2",
+    "mm/s²": "mm/s2", "g's": "g", "gn": "g", "m s-1": "m/s", "rad/sec": "rad/s", "°/s": "deg/s",
+    "rad/s^2": "rad/s2", "rad/s²": "rad/s2", "volts": "V", "volt": "V", "newton": "N",
 }  # fmt: skip
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
 _QUANTITY_UNITS = (
-    *("m", "cm", "mm", "um", "nm", "rad", "mrad", "deg", "m/s", "mm/s", "um/s", "m/s2", "mm/s2"),
-    *("g", "rad/s", "deg/s", "V", "mV", "N", "kN", "Hz", "A", "mA", "Pa", "bar", "degC"),
+    *UNITS,
+    *("cm", "nm", "mrad", "V", "mV", "N", "kN", "Hz", "A", "mA", "Pa", "bar", "degC"),
 )
 LABEL_UNITS = frozenset((*_QUANTITY_UNITS, *TIME_UNITS))
 """Units that a column's label or a row below it is understood to mean."""
@@ -98,6 +100,8 @@ def name_and_unit(label: str) -> tuple[str, str]:
         unit = spelt(next(group for group in match.groups()[1:] if group is not None))
         if unit in LABEL_UNITS:
             return match.group(1).strip() or label, unit
+    if label in RESPONSE_COLUMNS:
+        return label, RESPONSE_COLUMNS[label]
     head, _, tail = label.rpartition("_")
     if head and tail in ("m", "mm", "um", "rad", "deg", "s", "ms", "us"):
         return label, tail

@@ -13,17 +13,12 @@ from numpy.typing import NDArray
 from bayesimpact.data.clock import check_rate
 from bayesimpact.data.gaps import on_clock
 from bayesimpact.data.input import Kind, unit_factor
+from bayesimpact.data.quantity import UNITS, Quantity, order_of, units_of
 from bayesimpact.data.readers.channel import TIME_UNITS, Channel
-from bayesimpact.data.recording import Quantity
-from bayesimpact.data.table import UNITS, Table
+from bayesimpact.data.table import Table
 from bayesimpact.errors import InputError
 
 Floats = NDArray[np.float64]
-OTHER_MOTIONS = {
-    "m/s": "a velocity", "mm/s": "a velocity", "um/s": "a velocity", "m/s2": "an acceleration",
-    "mm/s2": "an acceleration", "g": "an acceleration", "rad/s": "an angular velocity",
-    "deg/s": "an angular velocity",
-}  # fmt: skip
 SHOWN = 12
 """Channels that a message lists."""
 
@@ -40,6 +35,7 @@ class Wanted:
     time_column: str | int | None = None
     block: str | int | None = None
     unit: str | None = None
+    quantity: Quantity | None = None
     sample_rate: float | None = None
     start: float | None = None
     end: float | None = None
@@ -90,9 +86,18 @@ def listed(channels: Sequence[Channel]) -> str:
     return ", ".join(names[:SHOWN]) + rest
 
 
-def guessed_response(channels: Sequence[Channel]) -> list[Channel]:
-    """The channels that may be the response: those with a unit of displacement or angle."""
-    return [c for c in channels if not c.is_time and c.unit in UNITS]
+def guessed_response(
+    channels: Sequence[Channel], quantity: Quantity | None = None
+) -> list[Channel]:
+    """The channels that may be the response: those of the quantity that is wanted.
+
+    Without one those with a unit of displacement or angle, else of a velocity, else acceleration.
+    """
+    known = [c for c in channels if not c.is_time and c.unit in UNITS]
+    if quantity is not None:
+        return [c for c in known if UNITS[c.unit][0] == quantity]
+    orders = [order_of(UNITS[c.unit][0]) for c in known]
+    return [c for c, order in zip(known, orders, strict=True) if order == min(orders)]
 
 
 def clock_of(channels: Sequence[Channel], channel: Channel) -> Channel | None:
@@ -133,7 +138,7 @@ def _named(path: Path, channels: Sequence[Channel], key: str, asked: str | int) 
 def _response(path: Path, channels: Sequence[Channel], wanted: Wanted) -> Channel:
     if wanted.column is not None:
         return _named(path, channels, "column", wanted.column)
-    fitting = guessed_response(channels)
+    fitting = guessed_response(channels, wanted.quantity)
     if not fitting:
         times = (
             ()
@@ -152,14 +157,11 @@ def _quantity(path: Path, channel: Channel, wanted: Wanted) -> tuple[Quantity, f
     if wanted.kind is not None:
         where = f"{path}, channel {channel.name}"
         return "displacement", unit_factor(where, wanted.kind, channel.unit)
-    return UNITS[_unit(path, channel, wanted.unit)]
+    return UNITS[_unit(path, channel, wanted)]
 
 
-def _unit(path: Path, channel: Channel, asked: str | None) -> str:
-    where = f"{path}, channel {channel.name}"
-    if channel.unit in OTHER_MOTIONS:
-        found = f"{OTHER_MOTIONS[channel.unit]} ({channel.unit})"
-        raise InputError(where, found, f"a displacement or an angle ({', '.join(UNITS)})")
+def _unit(path: Path, channel: Channel, wanted: Wanted) -> str:
+    where, asked = f"{path}, channel {channel.name}", wanted.unit
     if channel.unit in UNITS:
         if asked is not None and asked != channel.unit:
             found = f'unit = "{asked}" in campaign.toml'
@@ -167,7 +169,8 @@ def _unit(path: Path, channel: Channel, asked: str | None) -> str:
         return channel.unit
     if asked is None:
         found = f"the unit {channel.unit}" if channel.unit else "no unit for it"
-        raise InputError(where, found, f"unit = ... in campaign.toml ({', '.join(UNITS)})")
+        units = UNITS if wanted.quantity is None else units_of(wanted.quantity)
+        raise InputError(where, found, f"unit = ... in campaign.toml ({', '.join(units)})")
     return asked
 
 

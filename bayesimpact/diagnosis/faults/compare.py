@@ -60,9 +60,7 @@ class Compared:
 
 def base_failed(fit: Fit) -> bool:
     """True when a fit leaves more than half of the signal: no effect is worth a search then."""
-    samples = [r.samples - r.samples.mean() for r in fit.target.oscillator.campaign.recordings]
-    signal = float(np.sqrt(np.mean(np.concatenate(samples) ** 2)))
-    return bool(not np.isfinite(fit.rms) or fit.rms > FAILED * signal)
+    return bool(not np.isfinite(fit.rms) or fit.rms > FAILED * fit.signal)
 
 
 def misfits(fit: Fit) -> bool:

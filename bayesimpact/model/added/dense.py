@@ -2,7 +2,8 @@
 
 The exact linear flow, plus what the added forces contribute: a quintic that has the right value,
 slope and curvature at both ends of the step (Hermite). That contribution is small and smooth, so
-the samples are as accurate as the ends.
+the samples are as accurate as the ends. Of a velocity or an acceleration both parts are
+differentiated: the flow's derivative is a motion of the same flow.
 """
 
 from __future__ import annotations
@@ -13,6 +14,16 @@ from bayesimpact.model.compiled import inner
 from bayesimpact.model.flow import impulse_response
 
 LONGEST_STRIDE = 64  # samples that one step may span
+
+
+@inner(forceinline=True)
+def reading(y: Any, v: Any, n: Any, flow: Any, w: Any) -> Any:
+    """What is written of a state (y, v) with the added force n: y, y' or y''."""
+    if w.order == 0:
+        return y
+    if w.order == 1:
+        return v
+    return flow.inverse * n - 2.0 * flow.b * v - flow.K * (y - flow.rest)
 
 
 @inner(forceinline=True)
@@ -41,14 +52,25 @@ def fill_in(
         e1 *= h
     p3, p4 = 10.0 * e - 4.0 * e1 - 1.5 * a0 + 0.5 * a1, -15.0 * e + 7.0 * e1 + 1.5 * a0 - a1
     p5 = 6.0 * e - 3.0 * e1 - 0.5 * a0 + 0.5 * a1
+    rest, p2, pull = flow.rest, 0.5 * a0, -b2 * v - flow.K * u
+    p1 = p0 = 0.0
+    if w.order == 1:
+        rest, u, m = 0.0, v, -flow.K * u
+        p1, p2, p3, p4, p5 = a0 / h, 3.0 * p3 / h, 4.0 * p4 / h, 5.0 * p5 / h, 0.0
+    elif w.order == 2:
+        rest, u, m, h2 = 0.0, pull, -flow.K * v, h * h
+        p0, p1, p2 = a0 / h2, 6.0 * p3 / h2, 12.0 * p4 / h2
+        p3, p4, p5 = 20.0 * p5 / h2, 0.0, 0.0
     for i in range(end - first):
         x += dx
         if aligned:
             S, D = w.tables[table + 2 * i], w.tables[table + 2 * i + 1]
         else:
             S, D = impulse_response(flow.b, flow.K, x * h)
-        added = x * x * (0.5 * a0 + x * (p3 + x * (p4 + x * p5)))
-        w.out[first + i] = flow.rest + D * u + S * m + added
+        added = x * x * (p2 + x * (p3 + x * (p4 + x * p5)))
+        if w.order > 0:
+            added += p0 + x * p1
+        w.out[first + i] = rest + D * u + S * m + added
 
 
 @inner(forceinline=True)

@@ -9,8 +9,8 @@ import numpy as np
 from bayesimpact.model.added.flows import flow_from
 from bayesimpact.model.added.memory import keep_memory, relax_one
 from bayesimpact.model.added.resonator import fastest_body, relax_bodies
-from bayesimpact.model.added.second import listens, respond_at_rest
-from bayesimpact.model.added.situation import SECOND_Q, SLIDING, holding_force, static_force
+from bayesimpact.model.added.second import added_reading, listens, respond_at_rest
+from bayesimpact.model.added.situation import SLIDING, holding_force, static_force
 from bayesimpact.model.added.world import AHEAD, FORCE, NOW
 from bayesimpact.model.compiled import inner
 
@@ -18,13 +18,13 @@ from bayesimpact.model.compiled import inner
 @inner()
 def hold(y: Any, t: Any, j: Any, w: Any) -> Any:
     """Rest under dry friction until the other forces exceed it: (t, next sample)."""
-    second = listens(w)
+    second, shown = listens(w), y if w.order == 0 else 0.0
     if w.size == 0 and w.q[FORCE] == 0.0 and fastest_body(True, w) == 0.0:
         for i in range(j, w.n):
             if second:
                 respond_at_rest(y, t, i * w.interval - t, NOW, w)
                 t = i * w.interval
-            w.out[i] = y + w.s[SECOND_Q]
+            w.out[i] = shown + added_reading(y, 0.0, t, w)
         return t, w.n
     flow, longest = flow_from(y, 0.0, t, w)
     most = holding_force(y, t, w)
@@ -52,8 +52,8 @@ def hold(y: Any, t: Any, j: Any, w: Any) -> Any:
         keep_memory(w)
         t += h
         if cuts == 1:
-            w.out[j] = y + w.s[SECOND_Q]
             t = j * w.interval
+            w.out[j] = shown + added_reading(y, 0.0, t, w)
             j += 1
     return t, j
 

@@ -204,9 +204,31 @@ def respond(
                 a2 + 3.0 * done * a3, a3, dt,
             )  # fmt: skip
         if i < end:
-            w.out[i] += q + gain * extra
+            q1, p1 = q + gain * extra, p + gain * extra_rate
+            force = c * v + k * u + level + to * (a1 + to * (a2 + to * a3)) if touching else 0.0
+            w.out[i] += mode_reading(q1, p1, force, beta, W, w)
         done = to
     s[SECOND_Q], s[SECOND_P] = q + gain * extra, p + gain * extra_rate
+
+
+@inner(forceinline=True)
+def mode_reading(q: Any, p: Any, force: Any, beta: Any, W: Any, w: Any) -> Any:
+    """What the mode adds to a reading: q, q' = p or q'' under the contact force."""
+    if w.order == 0:
+        return q
+    if w.order == 1:
+        return p
+    return w.q[SECOND_GAIN] * force - 2.0 * beta * p - W * q
+
+
+@inner(forceinline=True)
+def added_reading(y: Any, v: Any, t: Any, w: Any) -> Any:
+    """The same at a state (y, v) of the mass whose laws stand in NOW; 0 without a second mode."""
+    if not listens(w):
+        return 0.0
+    beta, W = constants(w)
+    force = reaction(y, v, t, NOW, w) if w.order == 2 and w.s[MODE] == TOUCHING else 0.0
+    return mode_reading(w.s[SECOND_Q], w.s[SECOND_P], force, beta, W, w)
 
 
 @inner(forceinline=True)

@@ -33,7 +33,8 @@ class World(NamedTuple):
     mass: Any  # kg
     interval: Any  # s
     n: Any  # samples
-    out: Any  # (n,) displacements, m
+    order: Any  # of the time derivative of the displacement that is written: 0, 1 or 2
+    out: Any  # (n,) displacements, m, or m/s, m/s2
     tables: Any  # (2, LONGEST_STRIDE, 2) S and D of flight and of contact, see `dense`
     keys: Any  # (2, 2) b and K for which they hold
     size: Any  # number of laws L

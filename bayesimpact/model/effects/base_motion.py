@@ -7,6 +7,8 @@ At its null: r = 0 is the base model; frequency and damping then mean nothing.
 Energy: dissipates: what the frame takes it gives back, less what its damper takes.
 Valid: one mode of the frame in the direction of motion. A loose body on the oscillator is the same
 thing in other numbers: with r = mass of the body / m, every constant of the rig divided by 1 + r.
+Velocities and accelerations too are read relative to the frame; an accelerometer on the mass would
+read the frame's as well, which is not modelled.
 Its absence shows as a second frequency in free flight, and as damping that depends on frequency.
 Source: Den Hartog 1956, Mechanical Vibrations, chapter 3 (two degrees of freedom).
 Status: matrix exponential in coordinates of the room checked; compiled against two independent

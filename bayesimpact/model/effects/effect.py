@@ -37,6 +37,8 @@ class Scales:
     gap : g (0 without a stop)
     cases, recordings : how many there are
     angle : the recordings are of an angle, rad
+    reading : largest reading from rest in its own unit; 0 for that of displacements, `amplitude`
+    mixed : the recordings are of several quantities
     """
 
     mass: float
@@ -55,6 +57,13 @@ class Scales:
     cases: int = 1
     recordings: int = 1
     angle: bool = False
+    reading: float = 0.0
+    mixed: bool = False
+
+    @property
+    def largest_reading(self) -> float:
+        """The largest reading from rest, in its own unit; the amplitude of displacements."""
+        return self.reading or self.amplitude
 
     @property
     def force(self) -> float:
@@ -88,7 +97,7 @@ class EffectParameter:
 
     Attributes
     ----------
-    name, unit : unit for displacements; `bayesimpact.model.parameters.angular` translates
+    name, unit : unit for displacements; `bayesimpact.model.parameters.unit_for` translates
     scale : size that would be plausible, from the campaign's scales: the prior is half-Cauchy
         (Cauchy when both signs are admissible) about `null` with this scale; for a shape parameter
         the prior is log-normal about it, or log-uniform between two positive bounds
@@ -233,6 +242,8 @@ class Effect(Picklable):
         """True when a campaign of these scales could show the effect at all."""
         if self.needs_stop and scales.impacts == 0:
             return False
+        if self.observe is not None and scales.mixed:
+            return False  # its parameters would have another unit for every quantity
         return self.condition is None or self.condition(scales)
 
     def parameter(self, name: str) -> EffectParameter:

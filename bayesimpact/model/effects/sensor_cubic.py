@@ -35,6 +35,6 @@ EFFECT = Effect(
     statement=(
         "The probe is not linear: a cubic term adds up to {size} ({share} of the amplitude)."
     ),
-    parameters=(EffectParameter("gain", "1/m2", scale=lambda s: 0.01 / s.amplitude**2),),
+    parameters=(EffectParameter("gain", "1/m2", scale=lambda s: 0.01 / s.largest_reading**2),),
     observe=observe,
 )

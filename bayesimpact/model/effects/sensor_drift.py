@@ -32,6 +32,8 @@ EFFECT = Effect(
     regime="measurement",
     energy="none",
     statement="The probe's zero drifts by {size} during a recording ({share} of the amplitude).",
-    parameters=(EffectParameter("rate", "m/s", scale=lambda s: 0.01 * s.amplitude / s.duration),),
+    parameters=(
+        EffectParameter("rate", "m/s", scale=lambda s: 0.01 * s.largest_reading / s.duration),
+    ),
     observe=observe,
 )

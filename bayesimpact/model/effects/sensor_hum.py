@@ -36,7 +36,7 @@ EFFECT = Effect(
     energy="none",
     statement="The probe's signal carries a hum of {size} ({share} of the amplitude).",
     parameters=(
-        EffectParameter("amplitude", "m", scale=lambda s: 0.005 * s.amplitude, lower=0.0),
+        EffectParameter("amplitude", "m", scale=lambda s: 0.005 * s.largest_reading, lower=0.0),
         EffectParameter(
             "frequency",
             "Hz",

@@ -35,6 +35,6 @@ EFFECT = Effect(
     statement=(
         "The probe is not linear: a quadratic term adds up to {size} ({share} of the amplitude)."
     ),
-    parameters=(EffectParameter("gain", "1/m", scale=lambda s: 0.01 / s.amplitude),),
+    parameters=(EffectParameter("gain", "1/m", scale=lambda s: 0.01 / s.largest_reading),),
     observe=observe,
 )

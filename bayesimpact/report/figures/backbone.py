@@ -18,7 +18,7 @@ from bayesimpact.report.figures.style import (
     Array,
     label,
     new_figure,
-    response,
+    position,
     styled,
 )
 from bayesimpact.report.results import BackboneSummary, Curve, Results
@@ -53,7 +53,7 @@ def backbone_figures(results: Results) -> Mapping[str, Figure]:
 def _backbone(results: Results, summary: BackboneSummary, cases: Sequence[str]) -> Figure:
     """Amplitude against frequency; below, how far recorded frequencies are from simulated ones."""
     figure, panels = _grid(cases)
-    shown = response(results)
+    shown = position(results)
     for column, case in enumerate(cases):
         top, bottom = panels[:, column]
         for curve in _curves(summary, case):

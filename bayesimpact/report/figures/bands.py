@@ -13,7 +13,7 @@ from bayesimpact.report.figures.backbone import (
     deviation,
     deviation_limit,
 )
-from bayesimpact.report.figures.style import label, new_figure, response, styled
+from bayesimpact.report.figures.style import label, new_figure, position, styled
 from bayesimpact.report.results import BackboneSummary, Results
 from bayesimpact.report.units import p_words
 
@@ -32,13 +32,13 @@ def _figure(results: Results, before: BackboneSummary, after: BackboneSummary) -
     panels = figure.subplots(2, 2, sharex="col", sharey=True)
     sides = (("base model", before), ("with what was added", after))
     for row, (words, summary) in zip(panels, sides, strict=True):
-        _swings(row, summary, response(results).scale)
+        _swings(row, summary, position(results).scale)
         inside = f"{100 * summary.inside[-1]:.0f} % inside, {p_words(summary.p_values[-1])}"
         row[0].set_title(f"frequency, {words}: {inside}", loc="left")
         row[1].set_title(f"damping ratio, {words}", loc="left")
     limit = deviation_limit(panels.flat)
     panels[0, 0].set_ylim(-limit, limit)
-    panels[1, 0].set_xlabel(label("amplitude", response(results).unit))
+    panels[1, 0].set_xlabel(label("amplitude", position(results).unit))
     panels[1, 1].set_xlabel(label("time since the first sample", "s"))
     figure.supylabel("recorded \N{MINUS SIGN} simulated (half-widths of the band)", fontsize=9)
     handles, labels = panels[0, 0].get_legend_handles_labels()

@@ -16,8 +16,8 @@ from bayesimpact.report.figures.style import (
     Array,
     label,
     new_figure,
-    response,
-    response_word,
+    position,
+    position_word,
     styled,
 )
 from bayesimpact.report.results import Results
@@ -49,7 +49,7 @@ def _figure(results: Results, arrays: Mapping[str, Array]) -> Figure:
     upper.set_title("conservative part $a(y)$", loc="left")
     lower.set_title("dissipative part $b(y)\\,v$ at the fastest upward passage", loc="left")
     upper.tick_params(labelbottom=False)
-    x_label = label(response_word(results), response(results).unit)
+    x_label = label(position_word(results), position(results).unit)
     lower.set_xlabel(x_label)
     plane.set_xlabel(x_label)
     handles, labels = upper.get_legend_handles_labels()
@@ -61,16 +61,16 @@ def _figure(results: Results, arrays: Mapping[str, Array]) -> Figure:
 def force_unit(results: Results, arrays: Mapping[str, Array]) -> Display:
     """Forces in mN unless that gives unreadable numbers."""
     size = float(np.max(np.abs(arrays["force_a"]) + Z90 * arrays["force_a_sd"]))
-    if results.quantity == "displacement" and 1e-5 <= size < 10:
+    if not results.angular and 1e-5 <= size < 10:
         return Display(1e3, "mN")
-    return readable("N m" if results.quantity == "angle" else "N", size)
+    return readable("N m" if results.angular else "N", size)
 
 
 def _map(
     figure: Figure, axis: Axes, results: Results, arrays: Mapping[str, Array], unit: Display
 ) -> None:
     """Mean force in colour where the mass has been; a line around what exceeds its band."""
-    shown = response(results)
+    shown = position(results)
     y, low, high = (arrays[f"force_{k}"] for k in ("y", "v_low", "v_high"))
     v = np.linspace(low.min(), high.max(), _SPEEDS)[:, None]
     force = arrays["force_a"] + arrays["force_b"] * v
@@ -104,7 +104,7 @@ def _part(
     factor: Array,
 ) -> None:
     """One part with its 90 % band: what the base model leaves, what is left, what was learned."""
-    shown = response(results)
+    shown = position(results)
     x = arrays["force_y"] * shown.scale
     if "gap" in arrays:
         gap = arrays["gap"][0] * shown.scale

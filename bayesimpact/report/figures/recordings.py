@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 
 from bayesimpact.data.period import rough_period
-from bayesimpact.report.cycles import stop_level
+from bayesimpact.report.cycles import contacts, stop_level
 from bayesimpact.report.figures.style import (
     GREY,
     MODEL,
@@ -135,12 +135,12 @@ def _release(recording: RecordingResult) -> float:
 
 def close_up(results: Results, recording: RecordingResult) -> tuple[float, float, str]:
     """Start and end of the close-up, s, and what it shows: the deepest impact, or first cycles."""
-    level, t = stop_level(results, recording), recording.times
-    deepest = int(np.argmax(recording.predicted))
-    if level is None or not recording.predicted[deepest] >= level:
+    (y, level), t = contacts(results, recording), recording.times
+    deepest = int(np.argmax(y))
+    if level is None or not y[deepest] >= level:
         close = min(float(t[-1]), _release(recording) + CLOSE_UP_CYCLES * _period(results))
         return max(0.0, close - CLOSE_UP_CYCLES * _period(results)), close, "first cycles"
-    free = np.flatnonzero(recording.predicted < level)
+    free = np.flatnonzero(y < level)
     first = int(np.max(free[free < deepest], initial=0))
     last = int(np.min(free[free > deepest], initial=t.size - 1))
     margin = max(CLOSE_UP_SAMPLES, round(CLOSE_UP_MARGIN * (last - first)))
@@ -149,15 +149,15 @@ def close_up(results: Results, recording: RecordingResult) -> tuple[float, float
 
 
 def _residual_limit(results: Results) -> float:
-    """One scale for the residuals of all figures, m."""
+    """One scale for the residuals of all figures, in the unit of the first recording."""
     shown = shown_recordings(results)
-    sizes = [float(np.max(np.abs(r.residual), initial=0.0)) for r in shown]
-    sizes += [2.2 * r.noise_rms for r in shown]
+    sizes = [float(np.max(np.abs(r.residual), initial=0.0)) / r.scale for r in shown]
+    sizes += [2.2 * r.noise_rms / r.scale for r in shown]
     return 1.08 * max((size for size in sizes if np.isfinite(size)), default=0.0)
 
 
 def _motion(axis: Axes, results: Results, recording: RecordingResult, *, dots: bool) -> None:
-    shown = response(results)
+    shown = response(results, recording)
     t, y, fit = recording.times, recording.samples * shown.scale, recording.predicted * shown.scale
     # The recording is the wider of the two lines, or circles about the model's: both are seen.
     if dots:
@@ -169,13 +169,14 @@ def _motion(axis: Axes, results: Results, recording: RecordingResult, *, dots: b
     level = stop_level(results, recording)
     if level is not None:
         axis.axhline(level * shown.scale, color=GREY, lw=0.8, ls=(0, (4, 3)), label="stop")
-    axis.set_ylabel(label(f"{response_word(results)}\n", shown.unit).replace("\n ", "\n"))
+    words = f"{response_word(results, recording)}\n"
+    axis.set_ylabel(label(words, shown.unit).replace("\n ", "\n"))
     axis.grid(axis="y")
 
 
 def _residual(axis: Axes, results: Results, recording: RecordingResult, limit: float) -> None:
-    sizes = [x for x in (results.rms, results.noise.level) if np.isfinite(x)]
-    shown = display(results.unit, max(sizes, default=0.0))
+    sizes = [x * recording.scale for x in (results.rms, results.noise.level) if np.isfinite(x)]
+    shown, limit = display(recording.unit, max(sizes, default=0.0)), limit * recording.scale
     r = recording.residual * shown.scale
     axis.plot(*polyline(recording.times, r), color="#555555", lw=0.45, rasterized=True)
     band = 2 * recording.noise_rms * shown.scale

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
+from matplotlib import dates
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -23,6 +24,7 @@ from bayesimpact.report.figures.style import (
 
 Array = NDArray[np.float64]
 
+DATES: Any = dates  # carries no types
 ROW = 2.0  # height, in
 ACROSS = 2
 
@@ -71,7 +73,7 @@ def series_figure(panels: Sequence[Panel]) -> Figure:
         axis.set_xlabel("" if panel.is_date else label(panel.along.replace("_", " "), ""))
         axis.grid(axis="y")
         if panel.is_date:
-            ticks = AutoDateLocator(minticks=3, maxticks=6)
+            ticks = DATES.AutoDateLocator(minticks=3, maxticks=6)
             axis.xaxis.set_major_locator(ticks)
-            axis.xaxis.set_major_formatter(ConciseDateFormatter(ticks))
+            axis.xaxis.set_major_formatter(DATES.ConciseDateFormatter(ticks))
     return figure

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from bayesimpact.report.cycles import Cycle, before_predicted, stop_level, telling_cycle
+from bayesimpact.report.cycles import Cycle, before_predicted, contacts, telling_cycle
 from bayesimpact.report.figures.force_map import force_unit
 from bayesimpact.report.figures.style import (
     AFTER,
@@ -45,7 +45,7 @@ def best_gain(results: Results) -> str:
     if cycle is None:
         return ""
     recording = results.recordings[cycle.recording]
-    word = "cycle" if stop_level(results, recording) is None else "impact"
+    word = "cycle" if contacts(results, recording)[1] is None else "impact"
     return f"{recording.name}, {word} {cycle.number}"
 
 

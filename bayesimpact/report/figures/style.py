@@ -13,8 +13,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from bayesimpact.report.results import Results
-from bayesimpact.report.units import Display, decimals, display, number, readable, typeset
+from bayesimpact.report.results import RecordingResult, Results
+from bayesimpact.report.units import Display, decimals, display, number, readable, reading, typeset
 
 Array = NDArray[np.float64]
 P = ParamSpec("P")
@@ -84,14 +84,25 @@ def new_figure(height: float, width: float = WIDTH) -> Figure:
     return Figure(figsize=(width, height), layout="constrained", dpi=150)
 
 
-def response(results: Results) -> Display:
-    """How displacements (or angles) are shown: mm (or rad)."""
-    return Display(1.0, "rad") if results.quantity == "angle" else Display(1e3, "mm")
+def response(results: Results, recording: RecordingResult | None = None) -> Display:
+    """How the readings of a recording, or of the first, are shown: mm, mm/s, else in SI."""
+    one = recording or results.recordings[0]
+    return reading(one.quantity, one.unit)
 
 
-def response_word(results: Results) -> str:
+def position(results: Results) -> Display:
+    """How displacements (or angles) are shown, whatever the probe reads: mm (or rad)."""
+    return Display(1.0, "rad") if results.angular else Display(1e3, "mm")
+
+
+def response_word(results: Results, recording: RecordingResult | None = None) -> str:
     """What was recorded, for an axis."""
-    return "angle" if results.quantity == "angle" else "displacement"
+    return (recording or results.recordings[0]).quantity.replace("_", " ")
+
+
+def position_word(results: Results) -> str:
+    """Where the mass is, for an axis."""
+    return "angle" if results.angular else "displacement"
 
 
 def label(words: str, unit: str) -> str:

@@ -86,12 +86,13 @@
     for (const chart of old) chart.destroy();
     const r = content.recordings[state.recording], k = state.model, holder = part("charts");
     data = unpack(r);
+    const [word, unit, residualUnit] = r.words;
     const colour = modelColours[k], count = data.times.length, constant = (x) => new Float64Array(count).fill(x);
     const gap = { dash: [6, 4], width: 1, stroke: "#888" };
     const motion = [data.times, data.samples, data.models[k]];
     const lines = [
       // circles about the model's line as soon as there is room for them
-      { label: "recorded (" + content.unit + ")", stroke: colours.recorded, width: 3, points: { size: 7, space: 9, width: 1.5, fill: "#fff" } },
+      { label: "recorded (" + unit + ")", stroke: colours.recorded, width: 3, points: { size: 7, space: 9, width: 1.5, fill: "#fff" } },
       { label: content.models[k], stroke: colour, width: 1.5 },
     ];
     if (r.level !== null) {
@@ -101,9 +102,9 @@
     const limit = 1.05 * Math.max(reach(data.residuals), 2.2 * r.noise);
     const band = Object.assign({}, gap, { stroke: colours.band });
     const panels = [
-      [options(content.word + " (" + content.unit + ")", 230, digits(reach([data.samples])), lines), motion],
-      [options("residual (" + content.residualUnit + ")", 170, digits(limit),
-        [{ label: "recorded \u2212 " + content.models[k] + " (" + content.residualUnit + ")", stroke: colour, width: 1 },
+      [options(word + " (" + unit + ")", 230, digits(reach([data.samples])), lines), motion],
+      [options("residual (" + residualUnit + ")", 170, digits(limit),
+        [{ label: "recorded \u2212 " + content.models[k] + " (" + residualUnit + ")", stroke: colour, width: 1 },
           Object.assign({ label: "+2 sd of the noise" }, band), Object.assign({ label: "\u22122 sd" }, band)], [-limit, limit], [], !data.force),
       [data.times, data.residuals[k], constant(2 * r.noise), constant(-2 * r.noise)]],
     ];

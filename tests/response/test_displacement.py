@@ -1,0 +1,61 @@
+"""The displacement behind a velocity or an acceleration, against the motion it came from."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import small_rig
+
+from bayesimpact.response.displacement import displacement
+from bayesimpact.response.estimates import estimate
+from bayesimpact.response.swings import rough_period
+from bayesimpact.trial.rig import motion
+
+NOISE = {1: 2e-4, 2: 2e-2}
+STIFF = small_rig.Rig(0.503, 0.148, 808.556, 2.085, 1.1e-3, {"1": 8e4})
+
+
+@pytest.fixture(scope="module")
+def moved():
+    return motion(small_rig.RIG, small_rig.RELEASES[0], rate=1000.0, duration=3.0)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("bias", [0.0, 3.0])
+def test_displacement(moved, order, bias):
+    true = (moved.displacement, moved.velocity, moved.acceleration)[order]
+    rng = np.random.default_rng(order)
+    reading = true + NOISE[order] * rng.standard_normal(true.size) + bias
+    found = displacement(reading, 1e-3, order)
+    error = found.samples - moved.displacement
+    # The middle may be off by what the mean over whole cycles is off; the shape is not.
+    assert np.std(error) < 0.01 * np.ptp(moved.displacement)
+    assert abs(error.mean()) < 0.02 * np.ptp(moved.displacement)
+    assert found.bias == pytest.approx(bias, abs=0.02 * np.ptp(true))
+    assert found.noise == pytest.approx(NOISE[order], rel=0.3)
+
+
+def test_a_displacement_is_itself(moved):
+    found = displacement(moved.displacement, 1e-3, 0)
+    assert found.samples is moved.displacement and found.bias is None
+
+
+@pytest.mark.parametrize("rig", [small_rig.RIG, STIFF])
+def test_the_period_is_that_of_the_motion_whatever_is_read(rig):
+    found = motion(rig, small_rig.RELEASES[0], rate=1000.0, duration=3.0)
+    rising = np.flatnonzero((found.displacement[:-1] < 0) & (found.displacement[1:] >= 0))
+    shortest, longest = np.diff(rising).min(), np.diff(rising).max()
+    readings = (found.displacement, found.velocity, found.acceleration + 5.0)
+    for order, reading in enumerate(readings):
+        assert 0.8 * shortest < rough_period(reading, order) < 1.2 * longest
+
+
+@pytest.mark.parametrize("quantity", ["velocity", "acceleration"])
+def test_start_values(quantity):
+    chain = small_rig.Chain(noise=NOISE[1 if quantity == "velocity" else 2])
+    found = estimate(small_rig.record(quantity=quantity, chain=chain, duration=3.0)).values
+    true = small_rig.true_values(offsets=dict.fromkeys("abc", 0.0))
+    assert found["k1"] == pytest.approx(true["k1"], rel=0.1)
+    assert found["g"] == pytest.approx(true["g"], rel=0.1)
+    assert found["k2[1]"] == pytest.approx(true["k2[1]"], rel=0.4)
+    assert found["y0[a]"] == pytest.approx(true["y0[a]"], rel=0.15)
