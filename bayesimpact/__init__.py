@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from bayesimpact.data.read import load_campaign as load
     from bayesimpact.data.recording import Recording as Recording
     from bayesimpact.model.effects import EFFECTS as EFFECTS
+    from bayesimpact.model.effects import SEARCHED as SEARCHED
     from bayesimpact.model.effects import Effect as Effect
     from bayesimpact.model.experiment import simulate as simulate
     from bayesimpact.report.check_figure import plot as plot
@@ -47,11 +48,13 @@ _NAMES = {
     "corner": ("bayesimpact.report.notebook", "corner"),
     "diagnose": ("bayesimpact.api", "diagnose"),
     "EFFECTS": ("bayesimpact.model.effects", "EFFECTS"),
+    "SEARCHED": ("bayesimpact.model.effects", "SEARCHED"),
     "Effect": ("bayesimpact.model.effects", "Effect"),
 }
 
 __all__ = [
     "EFFECTS",
+    "SEARCHED",
     "Campaign",
     "Effect",
     "Recording",

@@ -99,7 +99,7 @@ def diagnose(
     *,
     seed: int | None = None,
     rng: Random = None,
-    effects: Sequence[Effect] | None = None,
+    effects: Sequence[Effect] | Path | str | None = None,
     search: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
@@ -109,15 +109,24 @@ def diagnose(
     ----------
     campaign : of `bi.load`
     seed, rng : randomness; see the module
-    effects : the catalogue to choose from; None: what the command searches, `bi.EFFECTS` but for
-        those that have to be asked for
+    effects : what to look for, as (*bi.SEARCHED, mine); or a file that defines effects of one's
+        own, which is executed: they are looked for beside the catalogue. None: what the catalogue
+        looks for by default, `bi.SEARCHED`
     search : False leaves the global search for the base model's mode out
     progress : called with every step in words
+
+    Raises
+    ------
+    InputError : an effect of one's own cannot be used; with the file, the line and the reason
     """
     from bayesimpact.diagnosis import loop
-    from bayesimpact.model.effects import SEARCHED
+    from bayesimpact.model.own_effects import catalogue_with, check_effects
 
-    chosen = SEARCHED if effects is None else tuple(effects)
+    if effects is None or isinstance(effects, Path | str):
+        chosen = catalogue_with(effects or ())
+    else:
+        chosen = tuple(effects)
+        check_effects(chosen)
     return loop.diagnose(
         campaign, rng=generator(seed, rng), effects=chosen, search=search, progress=progress
     )

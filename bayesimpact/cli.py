@@ -13,6 +13,7 @@ from typing import Any
 import click
 
 from bayesimpact.console import (
+    BAD_INPUT,
     NOT_CONVERGED,
     Commands,
     announce,
@@ -189,6 +190,14 @@ def sample(
     help="Repeat the loop on N simulated controls, and on N campaigns with what was named.",
 )
 @click.option("--resume", is_flag=True, help="Go on with the chains that DIR holds.")
+@click.option(
+    "--effects",
+    "own",
+    type=click.Path(path_type=Path),
+    metavar="FILE.py",
+    help="Effects of your own beside the catalogue. The file is executed as Python: it can do "
+    "whatever you can. Nothing else that a command takes is executed.",
+)
 @common
 @click.pass_context
 def diagnose(
@@ -198,14 +207,18 @@ def diagnose(
     quick: bool,
     certify: int,
     resume: bool,
+    own: Path | None,
     seed: int,
     quiet: bool,
 ) -> None:
     """Locate, name, model and show what the base model leaves out of CAMPAIGN."""
     loaded, out = loaded_campaign(campaign), results_folder(campaign, out)
+    from bayesimpact.model.own_effects import catalogue_with
     from bayesimpact.workflow import diagnose_campaign
 
+    effects = catalogue_with(own or ())
     command = f"bayesimpact diagnose {campaign} --out {out} --seed {seed}"
+    command += f" --effects {own}" if own else ""
     again = command + " --quick" * quick + f" --certify {certify}" * bool(certify)
     outcome = diagnose_campaign(
         loaded,
@@ -214,6 +227,7 @@ def diagnose(
         quick=quick,
         certify=certify,
         resume=resume,
+        effects=effects,
         command=command,
         say=telling(quiet),
     )
@@ -288,11 +302,33 @@ def demo(ctx: click.Context, out: Path, seed: int, quiet: bool) -> None:
 
 
 @main.command()
+@click.option(
+    "--check",
+    "own",
+    type=click.Path(path_type=Path),
+    metavar="FILE.py",
+    help="Check the effects that FILE.py defines as those of the catalogue are. The file is "
+    "executed as Python.",
+)
 @common
-def effects(seed: int, quiet: bool) -> None:
-    """List the catalogue of effects: equations, parameters and units."""
+@click.pass_context
+def effects(ctx: click.Context, own: Path | None, seed: int, quiet: bool) -> None:
+    """List the catalogue of effects: equations, parameters and units.
+
+    With --check, a table of checks of your own: units, limit at the null value, sign of the energy,
+    convergence of the steps, derivatives. Exit code 2 when one failed.
+    """
     from bayesimpact.model.effects.catalogue import catalogue
 
+    if own is not None:
+        from bayesimpact.diagnosis.effect_check import check_effect
+        from bayesimpact.model.own_effects import load_effects
+
+        checks = [one for effect in load_effects(own) for one in check_effect(effect)]
+        for check in checks:
+            if not quiet or check.result == "failed":
+                click.echo(f"{check.effect}  {check.name:<32} {check.result:<8} {check.detail}")
+        ctx.exit(BAD_INPUT if any(check.result == "failed" for check in checks) else 0)
     for row in catalogue():
         click.echo(f"{row.id}\n    {row.title}: {row.equation}   [{row.family}]")
         for parameter in row.parameters:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,8 @@ from bayesimpact.diagnosis.loop import Diagnosis, diagnose
 from bayesimpact.inference.identify import Identification, identify
 from bayesimpact.inference.posterior import Posterior, sample
 from bayesimpact.inference.progress import progress_bar
+from bayesimpact.model.effects import SEARCHED
+from bayesimpact.model.effects.effect import Effect
 from bayesimpact.report.archive import write_text
 from bayesimpact.report.build import versions
 from bayesimpact.report.diagnosis_arrays import diagnosis_arrays
@@ -133,17 +135,20 @@ def diagnose_campaign(
     quick: bool = False,
     certify: int = 0,
     resume: bool = False,
+    effects: Sequence[Effect] = SEARCHED,
     command: str = "",
     say: Say = silent,
 ) -> Outcome:
     """The whole loop: diagnosis.json, posterior.nc, figures and report in `out`; the chains of both
     models are kept in `out`/chain.
 
-    `certify`: how often the loop is repeated on simulated campaigns of this design. `resume`: go on
-    with the chains that `out` holds; the search, which has no randomness of its own, is repeated.
+    `effects`: what is looked for. `certify`: how often the loop is repeated on simulated campaigns
+    of this design. `resume`: go on with the chains that `out` holds; the search, which has no
+    randomness of its own, is repeated.
     """
     began = time.perf_counter()
-    diagnosis = diagnose(campaign, rng=np.random.default_rng(seed), search=not quick, progress=say)
+    chosen: dict[str, Any] = {"effects": effects, "progress": say}
+    diagnosis = diagnose(campaign, rng=np.random.default_rng(seed), search=not quick, **chosen)
     before = after = None
     if not quick:
         say("sampling both models")
@@ -155,9 +160,7 @@ def diagnose_campaign(
             after = sample(diagnosis.after, folder=chains / "after", max_steps=allowed, **kept)
     certified = None
     if certify:
-        certified = certificate(
-            diagnosis, certify, rng=np.random.default_rng([seed, 1]), progress=say
-        )
+        certified = certificate(diagnosis, certify, rng=np.random.default_rng([seed, 1]), **chosen)
     content = document(
         diagnosis,
         seed=seed,

@@ -127,7 +127,8 @@ def typical(effect: Effect, rig: TestRig, share: float = 1.0) -> dict[str, float
 
     def choose(parameter: EffectParameter, _: int) -> float:
         assert parameter.null is not None
-        return parameter.null + share * parameter.scale(scales)
+        away = share * parameter.scale(scales)
+        return parameter.null + (away if parameter.null < parameter.upper else -away)
 
     values = values_at(effect, rig, choose)
     for i, name in enumerate(values):

@@ -33,11 +33,15 @@ class Naive:
         self.c2 = self.number("contact_damping_per_case", "c2", self.c2)
         self.g = self.number("gap_per_recording", "g", self.g)
         self.gap, self.m2 = self.g, self.number("obstacle_mass", "mass")
-        self.one_sided = bool({"contact_no_tension", "obstacle_mass"} & set(self.effects))
+        self.one_sided = bool(
+            {"contact_no_tension", "obstacle_mass", "adhesion"} & set(self.effects)
+        )
+        self.pull = self.number("adhesion", "force")
         self.friction = self.number("coulomb_friction", "force")
         self.t, self.slide = 0.0, np.sign(self.v0)
-        # y, v, relaxation, then displacement and velocity of second mode, obstacle, frame
-        self.state = [self.y0, self.v0, *[0.0] * 7]
+        self.beyond = self.y0 < -self.number("spring_piecewise", "gap", np.inf)
+        # y, v, relaxation, displacement and velocity of second mode, obstacle, frame; loops
+        self.state = [self.y0, self.v0, *[0.0] * 9]
         self.ratio = self.number("base_motion", "mass_ratio")
         self.mode = FREE
 
@@ -53,6 +57,10 @@ class Naive:
         force += p("contact_hardening", "stiffness") * d**3
         n = p("contact_power_law", "exponent", 1.0)
         force += self.k2 * d * ((abs(d) / 1e-3) ** (n - 1) - 1) if d != 0 else 0.0
+        if "hunt_crossley" in self.effects:
+            n, chi = p("hunt_crossley", "exponent"), p("hunt_crossley", "damping")
+            force -= self.c2 * v + self.k2 * d
+            force += self.k2 * 1e-3 * np.sign(d) * abs(d / 1e-3) ** n * (1 + chi * v)
         if d > p("contact_second_stage", "depth", np.inf):
             force += p("contact_second_stage", "stiffness") * (
                 d - p("contact_second_stage", "depth")
@@ -78,6 +86,9 @@ class Naive:
         force += p("structural_damping", "loss") * self.k1 * abs(y) * self.slide
         if y < -p("opposite_stop", "gap", np.inf):
             force += p("opposite_stop", "stiffness") * (y + p("opposite_stop", "gap"))
+        if self.beyond:
+            force += p("spring_piecewise", "stiffness") * (y + p("spring_piecewise", "gap"))
+            force += p("spring_piecewise", "damping") * v
         return force
 
     def mode_of(self, effect: str) -> tuple[float, float]:
@@ -103,7 +114,7 @@ class Naive:
 
     def acceleration(self, t: float, state: list[float]) -> float:
         """y'' from m (y'' + X'') + N = 0, X'' = pull + r N / m; N contains m2 y''."""
-        force = self.everywhere(t, *state[:2]) + self.friction * self.slide
+        force = self.everywhere(t, *state[:2]) + self.friction * self.slide + self.slipping(state)
         touching, rest = self.mode == CONTACT, 1 + self.ratio
         if touching:
             force += self.obstacle(state)
@@ -124,7 +135,20 @@ class Naive:
         slope = [0.0 if held else v, a, rate]
         slope += [*self.second_mode(t, state, held), state[6], self.ringing(state)]
         shaken = -(self.ratio * a - self.frame_pull(state)) / (1 + self.ratio)
-        return [*slope, state[8], shaken]
+        return [*slope, state[8], shaken, *self.loops(slope[0], *state[9:])]
+
+    def loops(self, v: float, z: float, friction: float) -> list[float]:
+        """Rates of Bouc and Wen's z and of Dahl's friction force."""
+        p, F = self.number, self.number("presliding_friction", "force")
+        bouc_wen = v - p("hysteresis_bouc_wen", "decay") * v * self.slide * z
+        if F == 0:
+            return [bouc_wen, 0.0]
+        s = F / p("presliding_friction", "displacement")
+        return [bouc_wen, s * v * (1 - friction / F * self.slide)]
+
+    def slipping(self, state: list[float]) -> float:
+        """Forces of the two, N."""
+        return self.number("hysteresis_bouc_wen", "stiffness") * state[9] + state[10]
 
     def second_mode(self, t: float, state: list[float], held: bool) -> list[float]:
         """Rates of the mode that the contact force excites."""
@@ -142,9 +166,10 @@ class Naive:
         elif self.mode == RELEASED or not self.one_sided:
             found["gap"] = (lambda t, s: s[0] - self.gap, -1.0)
         else:
-            found["release"] = (self.reaction, -1.0)
+            found["release"] = (lambda t, s: self.reaction(t, s) + self.pull, -1.0)
         for effect, name, scale in (
             ("opposite_stop", "gap", -1.0),
+            ("spring_piecewise", "gap", -1.0),
             ("contact_second_stage", "depth", 1.0),
             ("structural_damping", "", -1.0),
         ):
@@ -161,7 +186,7 @@ class Naive:
         out, filled = np.empty(times.size), 0
         if self.y0 > self.gap:
             self.mode = CONTACT
-            if self.one_sided and self.reaction(0.0, self.state) <= 0:
+            if self.one_sided and self.reaction(0.0, self.state) <= -self.pull:
                 self.mode = RELEASED
         while filled < times.size:
             sign = self.start()
@@ -215,9 +240,12 @@ class Naive:
             before = self.state[1]
             mass = self.mass / (1 + self.ratio)
             self.state[1] *= mass / (mass + self.m2)
+            self.state[1] *= self.number("obstacle_restitution", "coefficient", 1.0)
             lost = mass * (before - self.state[1])
             self.state[4] += self.number("second_mode", "gain") * lost
             self.state[8] += self.ratio * lost / self.mass
+        elif name == "spring_piecewise":
+            self.beyond = not self.beyond
         elif name == "gap" and self.mode == RELEASED:
             self.mode = FREE
         elif name in ("gap", "release"):

@@ -5,16 +5,22 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
-from small_rig import RIG, record
+from small_rig import RELEASES, RIG, record
 
 from bayesimpact.cli import main
+from bayesimpact.data.read import load_campaign
 from bayesimpact.model.effects import EFFECTS
+from bayesimpact.model.experiment import simulate
+from bayesimpact.model.own_effects import load_effects
 from bayesimpact.trial.rig_files import write_campaign
 
 Run = Callable[..., tuple[int, str, str]]
+EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "own_effect.py"
 REAL = Path(
     os.environ.get(
         "BAYESIMPACT_RECORDINGS", Path(__file__).resolve().parents[2] / "shared" / "recordings"
@@ -99,6 +105,58 @@ def test_effects_lists_the_whole_catalogue(run: Run) -> None:
     code, out, _ = run("effects")
     assert code == 0
     assert all(f"\n{e.id}\n" in f"\n{out}" for e in EFFECTS)
+
+
+def test_effects_of_ones_own_are_checked(run: Run, tmp_path: Path) -> None:
+    code, out, _ = run("effects", "--check", EXAMPLE)
+    assert code == 0 and out.count("magnetic_detent") == out.count("passed") == 6
+    wrong = tmp_path / "wrong.py"
+    wrong.write_text(EXAMPLE.read_text().replace('"conserves"', '"dissipates"'))
+    code, out, _ = run("effects", "--quiet", "--check", wrong)
+    assert code == 2 and len(out.splitlines()) == 1 and "sign of the energy" in out
+
+
+def test_a_faulty_effect_is_refused_before_any_work(
+    run: Run, campaign: Path, tmp_path: Path
+) -> None:
+    wrong = tmp_path / "wrong.py"
+    wrong.write_text(EXAMPLE.read_text().replace('regime="free"', 'regime="sky"'))
+    for command in (
+        ("effects", "--check"),
+        ("diagnose", campaign, "--out", tmp_path / "out", "--effects"),
+    ):
+        code, out, err = run(*command, wrong)
+        assert code == 2 and out == "" and len(err.splitlines()) == 1
+        assert "wrong.py, line" in err and "found 'sky'; accepted: free, contact" in err
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_effect_of_ones_own_is_named(run: Run, campaign: Path, tmp_path: Path) -> None:
+    """A magnet that the catalogue does not know, played by the simulator with noise on top."""
+    (magnet,) = load_effects(EXAMPLE)
+    rng, kept = np.random.default_rng(5), load_campaign(campaign)
+    made = []
+    for old, release in zip(kept.recordings, RELEASES, strict=True):
+        rig: dict[str, float] = {
+            name: getattr(RIG, name) for name in ("mass", "c1", "k1", "c2", "g")
+        }
+        start = {"k2": RIG.k2[release.case], "y0": release.y0, "v0": release.v0}
+        clean = simulate(
+            effects=[(magnet, {"stiffness": 3.0, "width": 1.6e-3})],
+            interval=old.interval, n=old.samples.size, **rig, **start,
+        )  # fmt: skip
+        noise = 2e-6 * rng.standard_normal(old.samples.size)
+        made.append(replace(old, samples=clean.samples + noise))
+    write_campaign(tmp_path, replace(kept, recordings=tuple(made)))
+    options = ("--quick", "--quiet", "--effects", EXAMPLE)
+    code, _, _ = run("diagnose", tmp_path, "--out", tmp_path / "out", *options)
+    content = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    assert code == 0 and content["verdict"] == "named"
+    (found,) = content["effects"]
+    assert found["id"] == "magnetic_detent" and "A magnet" in found["statement"]
+    low, high = found["parameters"]["magnetic_detent.stiffness"]["ci90"]
+    assert low < 3.0 < high or abs(0.5 * (low + high) - 3.0) < 2 * (high - low)
+    assert "magnetic detent" in (tmp_path / "out" / "report.html").read_text()
 
 
 @pytest.mark.parametrize("name", ["pendulum", "ship_roll"])

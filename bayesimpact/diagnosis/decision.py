@@ -151,8 +151,8 @@ def in_its_place(naming: Naming, effect: Effect) -> Candidate | None:
 
 
 def holds(effects: Sequence[Effect], effect: Effect) -> bool:
-    """Whether a model has an effect, or one that reduces to it (`Effect.prefer`)."""
-    return any(effect.id in (e.id, e.prefer) for e in effects)
+    """Whether a model has an effect, one that reduces to it (`prefer`), or its restatement."""
+    return any(effect.id in (e.id, e.prefer) or effect.is_same_law(e) for e in effects)
 
 
 def misfit_above_noise(naming: Naming, fit: Fit) -> float:

@@ -55,10 +55,11 @@ def directions(fit: Fit, effects: Iterable[Effect], scales: Scales) -> tuple[Dir
     Effects with a phase are left to `periodic`, which scans frequencies.
     """
     have = {e.id for e in fit.target.oscillator.effects}
-    taken = {slot for e in fit.target.oscillator.effects for slot in e.binds}
     found = []
     for effect in effects:
-        if effect.id in have or is_periodic(effect) or taken & set(effect.binds):
+        if effect.id in have or is_periodic(effect):
+            continue
+        if not all(map(effect.stands_beside, fit.target.oscillator.effects)):
             continue
         if not effect.admissible(scales):
             continue

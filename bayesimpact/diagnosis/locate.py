@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from bayesimpact.diagnosis.directions import sigma_of
 from bayesimpact.diagnosis.force import MissingForce, trajectory_points
 from bayesimpact.diagnosis.naming import Naming
-from bayesimpact.diagnosis.size import effect_numbers
+from bayesimpact.diagnosis.size import effect_numbers, force_along
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Regime
 from bayesimpact.model.parameters import SLOTS
@@ -91,17 +91,12 @@ def own_force(
     displacement, velocity and time alone.
     """
     law = effect.law
-    if law is None or law.rate is not None:
+    if law is None or law.rate is not None or law.travel is not None:
         return None
     slots = fit.target.oscillator.layout.slots(fit.mode)
     found = []
     for r, ((y, v), t) in enumerate(zip(points, times, strict=True)):
-        q, p, d = slots[r], effect_numbers(effect, fit, r), y - slots[r][_GAP]
-        acts = (d > 0) | (law.where == "everywhere")
-        force = np.zeros(y.size)
-        for i in np.flatnonzero(acts).tolist():
-            force[i] = law.force(y[i], v[i], d[i], t[i], 0.0, float(d[i] > 0), p, q)
-        found.append(force)
+        found.append(force_along(law, y, v, t, effect_numbers(effect, fit, r), slots[r]))
     return found
 
 

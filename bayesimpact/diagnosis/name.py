@@ -318,7 +318,7 @@ class _Search(Models):
             for score in in_place_of(effect, self.worth_a_refit(found)):
                 if not is_redundant(rest, score.effect):
                     self.fit_one(rest, found, score)
-                    if not score.effect.parameters:
+                    if not score.effect.has_size:
                         self.exchange_on_off(chosen, effect, score.effect)
 
     def naming(self, base: State, chosen: State) -> Naming:

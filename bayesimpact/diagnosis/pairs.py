@@ -26,7 +26,7 @@ def promising_pairs(scan: Scan, *, count: int) -> tuple[Pair, ...]:
     pairs = []
     for i, j in itertools.combinations(chosen, 2):
         first, second = scan.scores[i], scan.scores[j]
-        if set(first.effect.binds) & set(second.effect.binds):
+        if not first.effect.stands_beside(second.effect):
             continue
         gain, admissible = _gain(scan, i, j)
         if admissible and gain > max(first.gain, second.gain) + 4.0:

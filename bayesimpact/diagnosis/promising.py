@@ -37,7 +37,7 @@ def worth_a_refit(scan: Scan, least: float = 0.0) -> list[Score]:
 
 
 def _is_a_leap(effect: Effect) -> bool:
-    return not effect.parameters or effect.prefer is not None
+    return not effect.has_size or effect.prefer is not None
 
 
 def is_redundant(candidate: Candidate, effect: Effect) -> bool:
@@ -62,9 +62,9 @@ def families(scan: Scan) -> list[list[Score]]:
     for score in scan.best():
         effect = score.effect
         held = by_family.setdefault(effect.family, [])
-        taken = {slot for s in held for slot in s.effect.binds}
+        beside = all(effect.stands_beside(s.effect) for s in held)
         shaped = any(p.circular for p in effect.parameters)
-        if score.gain > 0 and effect.parameters and not shaped and not taken & set(effect.binds):
+        if score.gain > 0 and effect.has_size and not shaped and beside:
             held.append(score)
     return [held[:JOINT] for held in by_family.values() if len(held) > 1]
 

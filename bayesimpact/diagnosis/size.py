@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from bayesimpact.diagnosis.force import trajectory_points
 from bayesimpact.inference.fit import Fit
-from bayesimpact.model.effects.effect import Effect, Scales, Size
-from bayesimpact.model.parameters import instance_name, unit_for
+from bayesimpact.model.effects.effect import Effect, Law, Numbers, Scales, Size
+from bayesimpact.model.parameters import SLOTS, instance_name, unit_for
 
 Array = NDArray[np.float64]
+_GAP = SLOTS.index("g")
 IN_CONTACT = ("contact", "entry", "exit")
 _SMALLER = (("mm", 1e-3), ("µm", 1e-6), ("nm", 1e-9))
 
@@ -102,11 +103,30 @@ def peak_force(effect: Effect, fit: Fit, points: int = 2000) -> float:
     slots = fit.target.oscillator.layout.slots(fit.mode)
     largest = 0.0
     for r, (y, v) in enumerate(trajectory_points(fit)):
-        interval = fit.target.oscillator.campaign.recordings[r].interval
-        q, p = slots[r], effect_numbers(effect, fit, r)
-        for i in range(0, y.size, max(1, y.size * len(slots) // points)):
-            d = y[i] - q[3]
-            if effect.law.where == "everywhere" or d > 0:
-                force = effect.law.force(y[i], v[i], d, i * interval, 0.0, float(d > 0), p, q)
-                largest = max(largest, abs(float(force)))
+        times = np.asarray(fit.target.oscillator.campaign.recordings[r].times)
+        few = slice(0, y.size, max(1, y.size * len(slots) // points))
+        numbers = effect_numbers(effect, fit, r), slots[r]
+        force = force_along(effect.law, y[few], v[few], times[few], *numbers)
+        largest = max(largest, float(np.abs(force).max()))
     return largest
+
+
+def force_along(law: Law, y: Array, v: Array, t: Array, p: Numbers, q: Array) -> Array:
+    """Force of a law without memory at displacements, velocities and times (n,), N."""
+    found = np.zeros(y.size)
+    for i in range(y.size):
+        d = y[i] - q[_GAP]
+        if law.where == "everywhere" or d > 0:
+            place = y[i], v[i], d, t[i]
+            z = branch(law, *place, float(d > 0), p, q)
+            found[i] = law.force(*place, z, float(d > 0), p, q)
+    return found
+
+
+def branch(
+    law: Law, y: float, v: float, d: float, t: float, touching: float, p: Numbers, q: Array
+) -> float:
+    """The state of a law whose force jumps: direction of the motion, or side of its surface."""
+    if law.jump_at_surface and law.surface is not None:
+        return float(np.sign(law.surface(y, v, d, t, 0.0, touching, p, q)))
+    return float(np.sign(v)) if law.jump_at_turn else 0.0

@@ -129,6 +129,10 @@ def _check(
         for parameter in effect.parameters:
             if parameter.replaces is not None:
                 values[parameter.replaces] = values[f"{effect.id}.{parameter.name}"]
+        for slot in effect.sets:
+            if values.get(slot):
+                found = f"{values[slot]:g} beside {effect.id}, which takes its place"
+                raise InputError(f"simulate, {slot}", found, "none")
     missing = [name for name in ("c1", "k1", "y0", "v0") if name not in values]
     if missing:
         raise InputError(f"simulate, {missing[0]}", "nothing", "a number")

@@ -40,13 +40,13 @@ from bayesimpact.model.added.world import (
     C1,
     C2,
     CONTACT_MASS,
-    FRAME_DAMPING,
     FRICTION,
     K1,
     K2,
     LAW_COLUMNS,
     NOW,
     OBSTACLE_MASS,
+    RESTITUTION,
     SECOND_DAMPING,
     SECOND_FREQUENCY,
     SECOND_GAIN,
@@ -75,7 +75,7 @@ def admissible(q: Any, mass: Any) -> Any:
     positive = mass > 0.0 and q[K1] > 0.0 and q[K2] >= 0.0 and q[C1] >= 0.0 and q[C2] >= 0.0
     if q[SECOND_GAIN] != 0.0 and not (q[SECOND_FREQUENCY] > 0.0 and q[SECOND_DAMPING] >= 0.0):
         return False
-    for i in range(OBSTACLE_MASS, FRAME_DAMPING + 1):
+    for i in range(OBSTACLE_MASS, RESTITUTION + 1):
         if not q[i] >= 0.0:
             return False
     return positive and q[CONTACT_MASS] >= 0.0 and q[FRICTION] >= 0.0

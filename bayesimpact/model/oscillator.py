@@ -18,7 +18,14 @@ from bayesimpact.model import measurement
 from bayesimpact.model.arguments import Inputs
 from bayesimpact.model.effects.effect import LAW_ROW, Effect, law_row
 from bayesimpact.model.motions import general_motions, motions
-from bayesimpact.model.parameters import BASE_SLOTS, SLOTS, Layout, build_layout, instance_name
+from bayesimpact.model.parameters import (
+    BASE_SLOTS,
+    SLOTS,
+    WITHOUT,
+    Layout,
+    build_layout,
+    instance_name,
+)
 
 Array = NDArray[np.float64]
 _OFFSET = SLOTS.index("offset")
@@ -98,10 +105,11 @@ class Oscillator:
     def is_base(self) -> bool:
         """True when every recording is a base oscillator (with parameters of its own, perhaps)."""
         added = slice(len(BASE_SLOTS), len(SLOTS))
+        idle = np.array([WITHOUT.get(slot, 0.0) for slot in SLOTS[added]])
         return (
             self.laws.shape[0] == 0
             and bool(np.all(self.layout.columns[:, added] < 0))
-            and not np.any(self.layout.constants[:, added])
+            and bool(np.all(self.layout.constants[:, added] == idle))
         )
 
     @cached_property

@@ -26,9 +26,11 @@ ADDED_SLOTS = (
     "friction", "contact_mass", "no_tension", "gap_step",
     "second_frequency", "second_damping", "second_gain",
     "obstacle_mass", "obstacle_frequency", "obstacle_damping",
-    "frame_ratio", "frame_frequency", "frame_damping",
+    "frame_ratio", "frame_frequency", "frame_damping", "adhesion", "restitution",
 )  # fmt: skip
 SLOTS = BASE_SLOTS + ADDED_SLOTS
+WITHOUT = {"restitution": 1.0}
+"""Values of added slots that nothing feeds, where that is not 0."""
 
 INPUT_GAIN = "input_gain"
 
@@ -111,7 +113,7 @@ def build_layout(
             table.append(Parameter(name, unit, role, lower, upper))
         return position[name]
 
-    _add_physical(campaign, binds, add)
+    _add_physical(campaign, {*binds, *(s for e in effects for s in e.sets)}, add)
     for effect in effects:
         for parameter in effect.parameters:
             if parameter.fixed is not None:
@@ -185,27 +187,27 @@ def _binds(
     campaign: Campaign, effects: Sequence[Effect]
 ) -> dict[str, tuple[Effect, EffectParameter]]:
     binds: dict[str, tuple[Effect, EffectParameter]] = {}
-    for effect in effects:
+    for i, effect in enumerate(effects):
         if effect.needs_stop and not campaign.stop:
             raise InputError(f"effect {effect.id}", "a campaign without a stop", "stop = true")
-        for slot, name in effect.binds.items():
+        for other in effects[:i]:
+            taken = effect.excludes(other)
+            if taken:
+                found = f"slot {min(taken)} taken by {other.id}"
+                raise InputError(f"effect {effect.id}", found, "one effect a slot")
+        for slot in (*effect.binds, *effect.sets):
             if slot not in SLOTS:
                 raise InputError(f"effect {effect.id}", f"slot {slot!r}", ", ".join(SLOTS))
-            if slot in binds:
-                raise InputError(
-                    f"effect {effect.id}",
-                    f"slot {slot} taken by {binds[slot][0].id}",
-                    "one effect a slot",
-                )
+        for slot, name in effect.binds.items():
             binds[slot] = (effect, effect.parameter(name))
     return binds
 
 
-def _add_physical(campaign: Campaign, binds: object, add: object) -> None:
-    assert isinstance(binds, dict) and callable(add)
+def _add_physical(campaign: Campaign, claimed: set[str], add: object) -> None:
+    assert callable(add)
     shared = ("c1", "k1", "c2", "g") if campaign.stop else ("c1", "k1")
     for name in shared:
-        if name not in binds:
+        if name not in claimed:
             lower = -np.inf if name == "g" else 0.0
             add(name, _SHARED_UNITS[name], "physical", lower)
     for case in campaign.cases:
@@ -224,6 +226,8 @@ def _maps(
     shape = (len(campaign.recordings), len(SLOTS) + len(law_parameters))
     columns = np.full(shape, -1, dtype=np.int64)
     constants = np.zeros(shape)
+    for slot, value in WITHOUT.items():
+        constants[:, SLOTS.index(slot)] = value
     if not campaign.stop:
         constants[:, SLOTS.index("g")] = np.inf
     for effect in effects:

@@ -70,22 +70,25 @@ class Plant:
         return enough and (angle or not self.angle)
 
 
-def _sign(rng: Rng) -> float:
+def sign_of(rng: Rng) -> float:
+    """A sign drawn at random."""
     return float(rng.choice([-1.0, 1.0]))
 
 
-def _one(name: str, scale: Callable[[Design], float], signed: bool = False) -> Callable[..., Form]:
+def one_number(
+    name: str, scale: Callable[[Design], float], signed: bool = False
+) -> Callable[..., Form]:
     """An effect with one number, small against its natural scale."""
 
     def form(design: Design, rng: Rng) -> Form:
-        sign = _sign(rng) if signed else 1.0
+        sign = sign_of(rng) if signed else 1.0
         return Form(lambda size: {name: sign * size}, 1e-4 * scale(design), largest=scale(design))
 
     return form
 
 
 def _exponent(design: Design, rng: Rng) -> Form:
-    sign = _sign(rng)
+    sign = sign_of(rng)
     return Form(lambda size: {"exponent": 1 + sign * size}, 1e-4, largest=0.4)
 
 
@@ -124,6 +127,17 @@ def _second_stage(design: Design, rng: Rng) -> Form:
     return Form(lambda size: {"stiffness": size, "depth": at}, 1e-4 * k2, largest=2 * k2)
 
 
+def _hunt_crossley(design: Design, rng: Rng) -> Form:
+    """Between a dashpot that grows with the depth, at size zero, and a stiffer or softer power."""
+    chi = log_uniform(rng, (0.03, 0.3)) / design.speed
+    sign = 1.0 if rng.random() < 0.8 else -1.0
+
+    def build(size: float) -> Parameters:
+        return {"exponent": 1 + sign * size, "damping": chi}
+
+    return Form(build, 1e-4, {"hunt_crossley": build(0.0)}, largest=1.0 if sign > 0 else 0.3)
+
+
 def _relaxation(design: Design, rng: Rng) -> Form:
     time = log_uniform(rng, (0.1, 1.0)) / design.contact_omega
     k2 = design.contact_stiffness
@@ -136,10 +150,20 @@ def _obstacle_mass(design: Design, rng: Rng) -> Form:
     return Form(lambda size: {"mass": size}, 1e-5 * mass, reference, largest=0.3 * mass)
 
 
+def _adhesion(design: Design, rng: Rng) -> Form:
+    force = design.contact_stiffness * design.indentation
+    reference: Effects = {"contact_no_tension": {}}
+    return Form(lambda size: {"force": size}, 1e-4 * force, reference, largest=0.3 * force)
+
+
+def _restitution(design: Design, rng: Rng) -> Form:
+    return Form(lambda size: {"coefficient": 1.0 - size}, 1e-5, largest=0.5)
+
+
 def _second_mode(design: Design, rng: Rng) -> Form:
     """Faster than a contact; what it adds stays below a third of the depth of contact."""
     omega = design.contact_omega * log_uniform(rng, (1.5, 8.0))
-    damping, sign = log_uniform(rng, (0.005, 0.1)), _sign(rng)
+    damping, sign = log_uniform(rng, (0.005, 0.1)), sign_of(rng)
 
     def build(size: float) -> Parameters:
         return {"frequency": omega / (2 * pi), "damping": damping, "gain": sign * size}
@@ -186,6 +210,18 @@ def _opposite_stop(design: Design, rng: Rng) -> Form:
     return Form(lambda size: {"stiffness": size, "gap": gap}, 1e-4 * k1, largest=5 * k1)
 
 
+def _spring_piecewise(design: Design, rng: Rng) -> Form:
+    """The damper takes a good share of what the spring stores."""
+    gap = design.amplitude * rng.uniform(0.4, 0.8)
+    time = log_uniform(rng, (0.1, 0.5)) / design.omega
+    k1 = design.rig.k1
+
+    def build(size: float) -> Parameters:
+        return {"stiffness": size, "gap": gap, "damping": time * size}
+
+    return Form(build, 1e-4 * k1, largest=5 * k1)
+
+
 def _power_damping(design: Design, rng: Rng) -> Form:
     """An exponent that none of the simpler laws has."""
     exponent = float(
@@ -194,6 +230,21 @@ def _power_damping(design: Design, rng: Rng) -> Form:
     unit = design.rig.c1 * design.speed / design.speed**exponent
     return Form(
         lambda size: {"coefficient": size, "exponent": exponent}, 1e-3 * unit, largest=10 * unit
+    )
+
+
+def _bouc_wen(design: Design, rng: Rng) -> Form:
+    """A loop as wide as the swing."""
+    decay, k1 = log_uniform(rng, (1.0, 5.0)) / design.amplitude, design.rig.k1
+    return Form(lambda size: {"stiffness": size, "decay": decay}, 1e-4 * k1, largest=k1)
+
+
+def _presliding(design: Design, rng: Rng) -> Form:
+    """It slides over most of the swing."""
+    way = design.amplitude * log_uniform(rng, (0.01, 0.1))
+    force = design.rig.k1 * design.amplitude
+    return Form(
+        lambda size: {"force": size, "displacement": way}, 1e-5 * force, largest=0.1 * force
     )
 
 
@@ -218,148 +269,75 @@ def _smoothing(design: Design, rng: Rng) -> Form:
 
 CATALOGUE_PLANTS: Mapping[str, Plant] = {
     "contact_damping_indentation": Plant(
-        ("contact",), _one("coefficient", lambda d: d.contact_stiffness / d.speed), 1
+        ("contact",), one_number("coefficient", lambda d: d.contact_stiffness / d.speed), 1
     ),
     "contact_damping_speed": Plant(
         ("contact",),
-        _one("coefficient", lambda d: d.contact_stiffness * d.indentation / d.speed**2),
+        one_number("coefficient", lambda d: d.contact_stiffness * d.indentation / d.speed**2),
         1,
     ),
     "contact_damping_per_case": Plant(("contact",), _per_case, 2, slot="c2"),
     "contact_hardening": Plant(
         ("contact",),
-        _one("stiffness", lambda d: 0.3 * d.contact_stiffness / d.indentation**2, signed=True),
+        one_number(
+            "stiffness", lambda d: 0.3 * d.contact_stiffness / d.indentation**2, signed=True
+        ),
         1,
     ),
     "contact_power_law": Plant(("contact",), _exponent, 1),
     "contact_second_stage": Plant(("contact",), _second_stage, 1),
+    "hunt_crossley": Plant(("contact",), _hunt_crossley, 1, slot="c2"),
     "contact_no_tension": Plant(("contact",), lambda d, r: Form(lambda s: {}, 0.0), 1, slot="end"),
     "contact_relaxation": Plant(("contact",), _relaxation, 1),
     "obstacle_mass": Plant(("contact",), _obstacle_mass, 1, slot="end"),
+    "adhesion": Plant(("contact",), _adhesion, 1, slot="end"),
+    "obstacle_restitution": Plant(("contact",), _restitution, 1),
     "obstacle_mode": Plant(("contact",), _obstacle_mode, 1),
     "base_motion": Plant(("everywhere", "free", "contact"), _base_motion),
     "second_mode": Plant(("contact",), _second_mode, 1),
-    "gap_wear": Plant(("contact",), _one("step", lambda d: 0.1 * d.indentation), 1, slot="wear"),
+    "gap_wear": Plant(
+        ("contact",), one_number("step", lambda d: 0.1 * d.indentation), 1, slot="wear"
+    ),
     "gap_per_recording": Plant(("contact",), _gaps, 1, 2, slot="g"),
-    "coulomb_friction": Plant(("free",), _one("force", lambda d: 0.1 * d.rig.k1 * d.amplitude)),
-    "quadratic_drag": Plant(("free",), _one("coefficient", lambda d: 10 * d.rig.c1 / d.speed)),
+    "coulomb_friction": Plant(
+        ("free",), one_number("force", lambda d: 0.1 * d.rig.k1 * d.amplitude)
+    ),
+    "quadratic_drag": Plant(
+        ("free",), one_number("coefficient", lambda d: 10 * d.rig.c1 / d.speed)
+    ),
     "spring_quadratic": Plant(
-        ("free",), _one("stiffness", lambda d: 0.3 * d.rig.k1 / d.amplitude, signed=True)
+        ("free",), one_number("stiffness", lambda d: 0.3 * d.rig.k1 / d.amplitude, signed=True)
     ),
     "spring_cubic": Plant(
-        ("free",), _one("stiffness", lambda d: 0.3 * d.rig.k1 / d.amplitude**2, signed=True)
+        ("free",), one_number("stiffness", lambda d: 0.3 * d.rig.k1 / d.amplitude**2, signed=True)
     ),
     "stiffness_drift": Plant(
-        ("free",), _one("rate", lambda d: 0.3 / d.duration, signed=True), slot="k1"
+        ("free",), one_number("rate", lambda d: 0.3 / d.duration, signed=True), slot="k1"
     ),
     "harmonic_forcing": Plant(("everywhere", "free"), _forcing),
     "opposite_stop": Plant(("free",), _opposite_stop, obstacles=1),
+    "spring_piecewise": Plant(("free",), _spring_piecewise, obstacles=1),
     "sensor_drift": Plant(
-        ("measurement",), _one("rate", lambda d: 0.3 * d.amplitude / d.duration, signed=True)
+        ("measurement",), one_number("rate", lambda d: 0.3 * d.amplitude / d.duration, signed=True)
     ),
     "sensor_quadratic": Plant(
-        ("measurement",), _one("gain", lambda d: 0.3 / d.amplitude, signed=True)
+        ("measurement",), one_number("gain", lambda d: 0.3 / d.amplitude, signed=True)
     ),
     "sensor_cubic": Plant(
-        ("measurement",), _one("gain", lambda d: 0.3 / d.amplitude**2, signed=True)
+        ("measurement",), one_number("gain", lambda d: 0.3 / d.amplitude**2, signed=True)
     ),
     "sensor_hum": Plant(("measurement",), _hum),
     "pendulum_sine": Plant(("free",), lambda d, r: Form(lambda s: {}, 0.0), angle=True),
-    "pendulum_with_spring": Plant(("free",), _one("stiffness", lambda d: d.rig.k1), angle=True),
+    "pendulum_with_spring": Plant(
+        ("free",), one_number("stiffness", lambda d: d.rig.k1), angle=True
+    ),
     "spring_quintic": Plant(
-        ("free",), _one("stiffness", lambda d: 0.3 * d.rig.k1 / d.amplitude**4, signed=True)
+        ("free",), one_number("stiffness", lambda d: 0.3 * d.rig.k1 / d.amplitude**4, signed=True)
     ),
     "power_damping": Plant(("free",), _power_damping),
-    "structural_damping": Plant(("free",), _one("loss", lambda d: 0.1), obstacles=1),
+    "structural_damping": Plant(("free",), one_number("loss", lambda d: 0.1), obstacles=1),
+    "hysteresis_bouc_wen": Plant(("free",), _bouc_wen),
+    "presliding_friction": Plant(("free",), _presliding),
     "smoothing": Plant(("measurement",), _smoothing, slot="smoothing", by_noise=True),
 }
 """Every effect of the catalogue that may be planted, by its id."""
-
-
-def _local(design: Design, rng: Rng) -> tuple[float, float]:
-    """Place and width of a local force on the free side, m."""
-    place = -design.amplitude * rng.uniform(0.2, 0.55)
-    return place, design.amplitude * rng.uniform(0.05, 0.12)
-
-
-def _detent(design: Design, rng: Rng) -> Form:
-    place, width = _local(design, rng)
-    sign, k1 = _sign(rng), design.rig.k1
-    return Form(
-        lambda size: {"stiffness": sign * size, "place": place, "width": width},
-        1e-4 * k1,
-        place=(place - 1.5 * width, place + 1.5 * width),
-        largest=2 * k1,
-    )
-
-
-def _hysteresis(design: Design, rng: Rng) -> Form:
-    width, k1 = design.amplitude * rng.uniform(0.1, 0.4), design.rig.k1
-    return Form(lambda size: {"stiffness": size, "width": width}, 1e-4 * k1, largest=k1)
-
-
-def _friction_pad(design: Design, rng: Rng) -> Form:
-    place, width = _local(design, rng)
-    extra, speed = rng.uniform(0.5, 2.0), 0.1 * design.speed
-    force = design.rig.k1 * design.amplitude
-    return Form(
-        lambda size: {
-            "force": size, "extra": extra * size, "speed": speed,
-            "low": place - width, "high": place + width,
-        },
-        1e-5 * force,
-        place=(place - width, place + width),
-        largest=0.1 * force,
-    )  # fmt: skip
-
-
-def _bump(design: Design, rng: Rng) -> Form:
-    place, width = _local(design, rng)
-    c1 = design.rig.c1
-    return Form(
-        lambda size: {"coefficient": size, "place": place, "width": width},
-        1e-3 * c1,
-        place=(place - 1.5 * width, place + 1.5 * width),
-        largest=100 * c1,
-    )
-
-
-def _brake(design: Design, rng: Rng) -> Form:
-    place, width = _local(design, rng)
-    low, high, c1 = place - 2 * width, place + 2 * width, design.rig.c1
-    return Form(
-        lambda size: {"coefficient": size, "low": low, "high": high},
-        1e-3 * c1,
-        place=(low, high),
-        largest=100 * c1,
-    )
-
-
-def _knock(design: Design, rng: Rng) -> Form:
-    time, width = design.duration * rng.uniform(0.2, 0.6), 0.5 * pi / design.omega
-    sign, scale = _sign(rng), design.rig.mass * design.speed
-    return Form(
-        lambda size: {"impulse": sign * size, "time": time, "width": width},
-        1e-5 * scale,
-        largest=0.3 * scale,
-    )
-
-
-_ANYWHERE = ("free", "everywhere")
-
-OUTSIDE_PLANTS: Mapping[str, Plant] = {
-    "detent": Plant(("free",), _detent),
-    "hysteresis": Plant(_ANYWHERE, _hysteresis),
-    "friction_pad": Plant(("free",), _friction_pad),
-    "damping_bump": Plant(("free",), _bump),
-    "eddy_brake": Plant(("free",), _brake),
-    "damping_drift": Plant(_ANYWHERE, _one("rate", lambda d: 3 / d.duration)),
-    "contact_friction": Plant(
-        ("contact",), _one("force", lambda d: 0.1 * d.contact_stiffness * d.indentation), 1
-    ),
-    "contact_preload": Plant(
-        ("contact",), _one("force", lambda d: 0.1 * d.contact_stiffness * d.indentation), 1
-    ),
-    "knock": Plant(_ANYWHERE, _knock),
-}
-"""Every force outside the catalogue that may be planted; a resonator is base_motion."""

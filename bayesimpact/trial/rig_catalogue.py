@@ -95,6 +95,16 @@ def _power_law(site: Site, p: Numbers, slot: int) -> Part:
     return in_contact(lambda d, v: k2 * d * ((abs(d) / MILLIMETRE) ** power - 1) if d else 0.0)
 
 
+def _hunt_crossley(site: Site, p: Numbers, slot: int) -> Part:
+    """K2 d^n (1 + chi v), d in mm, less the k2 d that the site has; its c2 is put to zero."""
+    k2, power, chi = site.k2, p["exponent"] - 1, p["damping"]
+
+    def force(d: float, v: float) -> float:
+        return k2 * d * ((abs(d) / MILLIMETRE) ** power * (1 + chi * v) - 1) if d else 0.0
+
+    return in_contact(force)
+
+
 def _second_stage(site: Site, p: Numbers, slot: int) -> Part:
     """Ks (d - ds) when d > ds."""
     ks, depth = p["stiffness"], p["depth"]
@@ -176,6 +186,18 @@ def _opposite_stop(site: Site, p: Numbers, slot: int) -> Part:
     return Part(law, kinks=(place,))
 
 
+def _spring_piecewise(site: Site, p: Numbers, slot: int) -> Part:
+    """Kp (y + gp) + cp v when y < -gp."""
+    kp, place, cp = p["stiffness"], -p["gap"], p["damping"]
+
+    def law(piece: Piece) -> Law | None:
+        if piece.above(place):
+            return None
+        return lambda t, y, v, state: kp * (y - place) + cp * v
+
+    return Part(law, kinks=(place,))
+
+
 def _pendulum(site: Site, p: Numbers, slot: int) -> Part:
     """What K sin y adds to K y; K is k1 for a plain pendulum."""
     weight = p.get("stiffness", site.k1)
@@ -210,6 +232,30 @@ def _structural_damping(site: Site, p: Numbers, slot: int) -> Part:
     return Part(law, kinks=(0.0,))
 
 
+def _bouc_wen(site: Site, p: Numbers, slot: int) -> Part:
+    """Force a z, z' = v - b abs(v) z."""
+    stiffness, decay = p["stiffness"], p["decay"]
+
+    def rates(piece: Piece) -> Rates:
+        signed = piece.sign * decay
+        return lambda t, y, v, state: (v * (1 - signed * state[slot]),)
+
+    law = everywhere(lambda t, y, v, state: stiffness * state[slot])
+    return Part(law, states=(0.0,), rates=rates)
+
+
+def _presliding(site: Site, p: Numbers, slot: int) -> Part:
+    """Dahl's friction: force F u, u' = v (1 - u sign(v)) / x."""
+    force, way = p["force"], p["displacement"]
+
+    def rates(piece: Piece) -> Rates:
+        sign = piece.sign
+        return lambda t, y, v, state: (v * (1 - sign * state[slot]) / way,)
+
+    law = everywhere(lambda t, y, v, state: force * state[slot])
+    return Part(law, states=(0.0,), rates=rates)
+
+
 def _smoothing(chain: Chain, p: Numbers) -> Chain:
     """Savitzky-Golay with window and order, or a first-order lag with time_constant."""
     if "time_constant" in p:
@@ -232,6 +278,12 @@ CATALOGUE: Mapping[str, Planted] = {
     "contact_hardening": Planted(("stiffness",), obstacle=True, part=_hardening),
     "contact_power_law": Planted(("exponent",), obstacle=True, part=_power_law),
     "contact_second_stage": Planted(("stiffness", "depth"), obstacle=True, part=_second_stage),
+    "hunt_crossley": Planted(
+        ("exponent", "damping"),
+        obstacle=True,
+        part=_hunt_crossley,
+        site=lambda site, p: replace(site, c2=0.0),
+    ),
     "contact_no_tension": Planted(
         obstacle=True, site=lambda site, p: replace(site, unilateral=True)
     ),
@@ -239,6 +291,16 @@ CATALOGUE: Mapping[str, Planted] = {
         ("mass",),
         obstacle=True,
         site=lambda site, p: replace(site, unilateral=True, obstacle_mass=p["mass"]),
+    ),
+    "adhesion": Planted(
+        ("force",),
+        obstacle=True,
+        site=lambda site, p: replace(site, unilateral=True, adhesion=p["force"]),
+    ),
+    "obstacle_restitution": Planted(
+        ("coefficient",),
+        obstacle=True,
+        site=lambda site, p: replace(site, restitution=p["coefficient"]),
     ),
     "contact_relaxation": Planted(("stiffness", "time"), obstacle=True, part=_relaxation),
     "obstacle_mode": Planted(("mass", "frequency", "damping"), obstacle=True, part=obstacle_mode),
@@ -261,6 +323,7 @@ CATALOGUE: Mapping[str, Planted] = {
         ("amplitude", "frequency"), per_recording=("phase",), part=_forcing
     ),
     "opposite_stop": Planted(("stiffness", "gap"), part=_opposite_stop),
+    "spring_piecewise": Planted(("stiffness", "gap", "damping"), part=_spring_piecewise),
     "sensor_drift": Planted(("rate",), probe=lambda probe, p: replace(probe, drift=p["rate"])),
     "sensor_quadratic": Planted(
         ("gain",), probe=lambda probe, p: replace(probe, quadratic=p["gain"])
@@ -272,6 +335,8 @@ CATALOGUE: Mapping[str, Planted] = {
     "spring_quintic": Planted(("stiffness",), part=_spring_quintic),
     "power_damping": Planted(("coefficient", "exponent"), part=_power_damping),
     "structural_damping": Planted(("loss",), part=_structural_damping),
+    "hysteresis_bouc_wen": Planted(("stiffness", "decay"), part=_bouc_wen),
+    "presliding_friction": Planted(("force", "displacement"), part=_presliding),
     "smoothing": Planted(optional=("window", "order", "time_constant"), chain=_smoothing),
     "noise_correlated": Planted(
         ("correlation",), chain=lambda chain, p: replace(chain, correlation=p["correlation"])

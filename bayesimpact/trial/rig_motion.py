@@ -5,10 +5,11 @@ Every turning point ends a piece, so the displacement is monotone on a piece, an
 y = const is crossed once or not at all: no impact is lost between two steps, however short. Events
 are located on the integrator's dense output.
 
-When contact ends for a unilateral obstacle (contact_no_tension, obstacle_mass): at the first
-instant at which its reaction falls through zero; a contact in which the reaction never was
-positive (a graze) ends at the gap. After that the mass is free until it has gone below the
-gap. The reaction is m2 y'' + c2 y' + k2 d + whatever other parts act between obstacle and mass.
+When contact ends for a unilateral obstacle (contact_no_tension, obstacle_mass, adhesion): at the
+first instant at which its reaction falls through zero (adhesion: through -F); a contact in which
+the reaction never was positive (a graze) ends at the gap. After that the mass is free until it has
+gone below the gap. The reaction is m2 y'' + c2 y' + k2 d + whatever other parts act between
+obstacle and mass.
 
 References: Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I (1993), II.5-6.
 """
@@ -124,7 +125,7 @@ class _Run:
         sign = 1 if self.site.v0 >= 0 else -1
         if self.site.unilateral:
             forces = balance(self.site, self.parts, self._piece_going(sign))
-            if forces.reaction(0.0, self.state) <= 0:
+            if forces.reaction(0.0, self.state) <= -self.site.adhesion:
                 self.touches.clear()
                 return _RELEASED
         return _CONTACT
@@ -253,11 +254,11 @@ class _Run:
                 last = dense(stop).tolist()
         if piece.contact and self.site.unilateral:
 
-            def reaction(t: float) -> float:
-                return forces.reaction(t, dense(t).tolist())
+            def holds(t: float) -> float:
+                return forces.reaction(t, dense(t).tolist()) + self.site.adhesion
 
-            if forces.reaction(stop, last) < 0 and reaction(start) > 0:
-                event, stop = _REACTION, _crossing(reaction, start, stop)
+            if forces.reaction(stop, last) + self.site.adhesion < 0 and holds(start) > 0:
+                event, stop = _REACTION, _crossing(holds, start, stop)
         return event, stop
 
     def _arrive(self, event: int, t: float, state: State, piece: Piece, forces: Balance) -> None:
@@ -287,13 +288,15 @@ class _Run:
 
     def _pulls(self, forces: Balance) -> bool:
         """Whether contact ends when the mass goes back through the gap."""
-        return not self.site.unilateral or forces.reaction(self.t, self.state) <= 0
+        force = forces.reaction(self.t, self.state) + self.site.adhesion
+        return not self.site.unilateral or force <= 0
 
     def _touch(self) -> None:
         self.touches.append(self.t)
         self.mode = _CONTACT
         before = self.state[1]
-        self.state[1] *= self.site.mass / (self.site.mass + self.site.obstacle_mass)
+        share = self.site.mass / (self.site.mass + self.site.obstacle_mass)
+        self.state[1] *= share * self.site.restitution
         for part in self.parts:
             if part.struck is not None:
                 part.struck(self.state, self.site.mass * (before - self.state[1]))

@@ -23,18 +23,6 @@ def _detent(site: Site, p: Numbers, slot: int) -> Part:
     return Part(everywhere(law))
 
 
-def _hysteresis(site: Site, p: Numbers, slot: int) -> Part:
-    """Bouc (1967), Wen (1976) with n = 1, gamma = 0: force k h, h' = v - abs(v) h / width."""
-    stiffness, rate = p["stiffness"], 1 / p["width"]
-
-    def rates(piece: Piece) -> Rates:
-        signed = piece.sign * rate
-        return lambda t, y, v, state: (v * (1 - signed * state[slot]),)
-
-    law = everywhere(lambda t, y, v, state: stiffness * state[slot])
-    return Part(law, states=(0.0,), rates=rates)
-
-
 def _inside(piece: Piece, low: float, high: float) -> bool:
     return piece.above(low) and not piece.above(high)
 
@@ -122,7 +110,6 @@ def _knock(site: Site, p: Numbers, slot: int) -> Part:
 
 OUTSIDE: Mapping[str, Planted] = {
     "detent": Planted(("stiffness", "place", "width"), part=_detent),
-    "hysteresis": Planted(("stiffness", "width"), part=_hysteresis),
     "friction_pad": Planted(("force", "extra", "speed", "low", "high"), part=_friction_pad),
     "damping_bump": Planted(("coefficient", "place", "width"), part=_damping_bump),
     "eddy_brake": Planted(("coefficient", "low", "high"), part=_eddy_brake),

@@ -98,6 +98,8 @@ class Site:
     y0, v0 : at the first sample, m and m/s
     unilateral : contact ends when the obstacle's reaction falls to zero, not at the gap
     obstacle_mass : picked up at touch, kg
+    adhesion : pull that an obstacle with `unilateral` stands before it lets go, N
+    restitution : share of the speed that is left after the instant of a touch
     gap_step : growth of the gap at the end of every contact, m
     """
 
@@ -113,4 +115,6 @@ class Site:
     v0: float
     unilateral: bool = False
     obstacle_mass: float = 0.0
+    adhesion: float = 0.0
+    restitution: float = 1.0
     gap_step: float = 0.0

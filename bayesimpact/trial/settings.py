@@ -10,7 +10,8 @@ from typing import Any
 from bayesimpact.errors import InputError
 from bayesimpact.model.effects import UNTRIED
 from bayesimpact.trial.benches import BENCHES, NOISES
-from bayesimpact.trial.plants import CATALOGUE_PLANTS, OUTSIDE_PLANTS
+from bayesimpact.trial.plants import CATALOGUE_PLANTS
+from bayesimpact.trial.plants_outside import OUTSIDE_PLANTS
 from bayesimpact.trial.strong_plants import CATALOGUE_STRONG, STRONG_OUTSIDE
 from bayesimpact.trial.strong_rigs import STRONG_BENCHES
 

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.errors import BayesimpactError
-from bayesimpact.trial.plants import CATALOGUE_PLANTS, OUTSIDE_PLANTS, Form, Plant
+from bayesimpact.trial.plants import CATALOGUE_PLANTS, Form, Plant
+from bayesimpact.trial.plants_outside import OUTSIDE_PLANTS
 from bayesimpact.trial.rig import Parameters
 from bayesimpact.trial.ruler import Ruler
 

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bayesimpact.model.effects import UNTRIED
 from bayesimpact.trial.benches import Design, Range, log_uniform
-from bayesimpact.trial.plants import CATALOGUE_PLANTS, OUTSIDE_PLANTS, Form, Plant
-from bayesimpact.trial.rig_catalogue import CATALOGUE
+from bayesimpact.trial.plants import CATALOGUE_PLANTS, Form, Plant
+from bayesimpact.trial.plants_outside import OUTSIDE_PLANTS
 
 Rng = np.random.Generator
 
@@ -90,7 +91,7 @@ CATALOGUE_STRONG: Mapping[str, Plant] = {
     name: PENDULUM if name == "pendulum_sine" else CATALOGUE_PLANTS[name]
     for sort in SORTS.values()
     for name in sort
-    if name == "pendulum_sine" or (name in CATALOGUE_PLANTS and name in CATALOGUE)
+    if name == "pendulum_sine" or (name in CATALOGUE_PLANTS and name not in UNTRIED)
 }
 """Effects of the catalogue that can be planted, by their id."""
 

@@ -36,7 +36,7 @@ from bayesimpact.trial.draw import draw
 from bayesimpact.trial.settings import Settings
 
 BUNDLED = {"nothing missing": PAPER, "two effects concealed": PAPER.parent / "concealed"}
-OUTSIDE = ("friction_pad", "hysteresis", "damping_bump")
+OUTSIDE = ("friction_pad", "eddy_brake", "damping_bump")
 SAMPLED = (*BUNDLED, "friction pad")
 SEED, STRENGTH = 11, (6.0, 8.0)  # of what is outside; detection limits
 RUNS = 3

@@ -24,6 +24,16 @@ def test_peak_force_along_the_motion(small):
     deepest = max((y - gap).max() for y, _ in trajectory_points(hard))
     found = peak_force(BY_ID["contact_hardening"], hard)
     assert found == pytest.approx(1e7 * deepest**3, rel=0.05)
+    lossy = with_effect(small, "structural_damping", loss=0.02)
+    found = peak_force(BY_ID["structural_damping"], lossy)
+    assert found == pytest.approx(0.02 * small.fit.value("k1") * largest, rel=0.02)
+    numbers = {"stiffness": 300.0, "gap": 0.5 * largest, "damping": 2.0}
+    bumper = with_effect(small, "spring_piecewise", **numbers)
+    motions = [np.stack(m) for m in trajectory_points(bumper)]
+    y, v = np.concatenate(motions, axis=1)
+    beyond = np.where(y < -0.5 * largest, 300.0 * (y + 0.5 * largest) + 2.0 * v, 0.0)
+    found = peak_force(BY_ID["spring_piecewise"], bumper)
+    assert found == pytest.approx(np.abs(beyond).max(), rel=0.02)
 
 
 def test_a_size_is_a_force_and_its_share(small):
@@ -47,7 +57,7 @@ def test_every_effect_has_a_size(small, effect_id):
     if not effect.admissible(scales):
         pytest.skip("not on this rig")
     value, unit, share = size(effect, small.fit, with_effect(small, effect_id), scales)
-    assert np.isfinite([value, share]).all() and unit in ("N", "m", "kg", "N s/m", "s")
+    assert np.isfinite([value, share]).all() and unit in ("N", "m", "kg", "N s/m", "s", "%")
 
 
 def test_sizes_that_effects_define(small):

@@ -12,7 +12,7 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 from bayesimpact.model.effects.effect import Effect, EffectParameter
-from bayesimpact.model.parameters import SLOTS, angular, build_layout
+from bayesimpact.model.parameters import SLOTS, WITHOUT, angular, build_layout
 
 
 def campaign(stop: bool = True, quantity: str = "displacement") -> Campaign:
@@ -60,7 +60,7 @@ def expected_slot(names: dict[str, float], slot: str, recording: str, case: str)
     for key in (f"{slot}[{recording}]", f"{slot}[{case}]", slot):
         if key in names:
             return names[key]
-    return 0.0
+    return WITHOUT.get(slot, 0.0)
 
 
 def test_every_recording_gets_its_own_values():

@@ -12,6 +12,7 @@ import numpy as np
 KINKS = (
     ("contact_second_stage", "depth", 1),
     ("opposite_stop", "gap", -1),
+    ("spring_piecewise", "gap", -1),
     ("friction_pad", "low", 1),
     ("friction_pad", "high", 1),
     ("eddy_brake", "low", 1),
@@ -28,6 +29,10 @@ def contact_forces(e, rig, k2, d, v, s):
     total = rig.c2 * v
     n = e.get("contact_power_law", {}).get("exponent", 1.0)
     total += k2 * d if n == 1 else k2 * d * (abs(d) / 1e-3) ** (n - 1)
+    if "hunt_crossley" in e:
+        p = e["hunt_crossley"]
+        n, chi = p["exponent"], p["damping"]
+        total = k2 * 1e-3 * sign(d) * (abs(d) / 1e-3) ** n * (1 + chi * v)
     if "contact_damping_indentation" in e:
         total += e["contact_damping_indentation"]["coefficient"] * d * v
     if "contact_damping_speed" in e:
@@ -63,6 +68,9 @@ def free_forces(e, rig, t, y, v, s):
     if "opposite_stop" in e:
         p = e["opposite_stop"]
         total += p["stiffness"] * min(y + p["gap"], 0.0)
+    if "spring_piecewise" in e and s["from"] <= -e["spring_piecewise"]["gap"]:
+        p = e["spring_piecewise"]
+        total += p["stiffness"] * (y + p["gap"]) + p["damping"] * v
     if "pendulum_sine" in e:
         total += e["pendulum_sine"].get("stiffness", rig.k1) * (sin(y) - y)
     if "pendulum_with_spring" in e:
@@ -78,8 +86,10 @@ def free_forces(e, rig, t, y, v, s):
         p = e["detent"]
         x = y - p["place"]
         total += p["stiffness"] * x * exp(-((x / p["width"]) ** 2))
-    if "hysteresis" in e:
-        total += e["hysteresis"]["stiffness"] * s["bouc"]
+    if "hysteresis_bouc_wen" in e:
+        total += e["hysteresis_bouc_wen"]["stiffness"] * s["bouc"]
+    if "presliding_friction" in e:
+        total += s["dahl"]
     if "damping_bump" in e:
         p = e["damping_bump"]
         total += p["coefficient"] * exp(-(((y - p["place"]) / p["width"]) ** 2)) * v
@@ -133,11 +143,24 @@ class NaiveRig:
             c2 = effects["contact_damping_per_case"]["c2"][release.case]
             self.rig = type(rig)(rig.mass, rig.c1, rig.k1, c2, rig.g, rig.k2)
         self.m2 = effects.get("obstacle_mass", {}).get("mass", 0.0)
-        self.one_sided = "obstacle_mass" in effects or "contact_no_tension" in effects
+        self.one_sided = bool({"obstacle_mass", "contact_no_tension", "adhesion"} & set(effects))
+        self.pull = effects.get("adhesion", {}).get("force", 0.0)
         self.touching = release.y0 > self.gap
         self.stuck = self.released = False
-        self.names = ("maxwell", "bouc", "x", "u", "q", "q_rate", "b", "b_rate", "X", "X_rate")
-        self.state = [release.y0, release.v0, 0.0, 0.0, release.y0, release.v0, *[0.0] * 6]
+        self.names = (
+            "maxwell",
+            "bouc",
+            "x",
+            "u",
+            "q",
+            "q_rate",
+            "b",
+            "b_rate",
+            "X",
+            "X_rate",
+            "dahl",
+        )
+        self.state = [release.y0, release.v0, 0.0, 0.0, release.y0, release.v0, *[0.0] * 7]
 
     def named(self, state):
         """Own states, and where the step began: it decides what is switched on."""
@@ -173,12 +196,15 @@ class NaiveRig:
             if ratio > 1.0:
                 force -= self.rig.mass / ratio * frame_hold(self.e["base_motion"], s)
             acceleration = -force / (self.rig.mass / ratio + self.m2 * self.touching)
-        out = [v, acceleration, *[0.0] * 10]
+        out = [v, acceleration, *[0.0] * 11]
         if "contact_relaxation" in self.e:
             p = self.e["contact_relaxation"]
             out[2] = p["stiffness"] * v * self.touching - s["maxwell"] / p["time"]
-        if "hysteresis" in self.e:
-            out[3] = v - abs(v) * s["bouc"] / self.e["hysteresis"]["width"]
+        if "hysteresis_bouc_wen" in self.e:
+            out[3] = v - abs(v) * s["bouc"] * self.e["hysteresis_bouc_wen"]["decay"]
+        if "presliding_friction" in self.e:
+            p = self.e["presliding_friction"]
+            out[12] = p["force"] / p["displacement"] * v * (1 - s["dahl"] / p["force"] * sign(v))
         if "resonator" in self.e:
             p = self.e["resonator"]
             out[4:6] = [s["u"], resonator_pull(p, y, v, s) / p["mass"]]
@@ -193,7 +219,7 @@ class NaiveRig:
         if "base_motion" in self.e:
             ratio = self.e["base_motion"]["mass_ratio"]
             shaken = -frame_hold(self.e["base_motion"], s) - ratio * acceleration
-            out[10:] = [s["X_rate"], shaken / (1 + ratio)]
+            out[10:12] = [s["X_rate"], shaken / (1 + ratio)]
         return out
 
     def place(self, y, v):
@@ -227,7 +253,7 @@ class NaiveRig:
         if self.stuck:
             out.append(abs(self.sums(t, state)[0]) <= dry_level(self.e, y, 0.0, self.touching))
         elif self.one_sided and self.touching:
-            out.append(self.reaction(t, state) <= 0)
+            out.append(self.reaction(t, state) <= -self.pull)
         return out
 
     def advance(self, t, h):
@@ -248,7 +274,7 @@ class NaiveRig:
     def events(self, t, old):
         y, v = self.state[:2]
         if self.touching:
-            self.released = self.one_sided and v < 0 and self.reaction(t, self.state) <= 0
+            self.released = self.one_sided and v < 0 and self.reaction(t, self.state) <= -self.pull
             if self.released or (not self.one_sided and y < self.gap):
                 self.touching = False
                 self.gap += self.step
@@ -259,6 +285,7 @@ class NaiveRig:
             ratio = self.e.get("base_motion", {}).get("mass_ratio", 0.0)
             mass = self.rig.mass / (1 + ratio)
             self.state[1] *= mass / (mass + self.m2)
+            self.state[1] *= self.e.get("obstacle_restitution", {}).get("coefficient", 1.0)
             lost = mass * (v - self.state[1])
             self.state[11] += ratio * lost / self.rig.mass
             self.state[7] += self.e.get("second_mode", {}).get("gain", 0.0) * lost

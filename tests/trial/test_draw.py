@@ -14,7 +14,8 @@ from bayesimpact.model.effects import EFFECTS
 from bayesimpact.trial.benches import BENCHES, NOISES, depth, draw_bench
 from bayesimpact.trial.blind import campaign_files, sealed_text
 from bayesimpact.trial.draw import draw
-from bayesimpact.trial.plants import CATALOGUE_PLANTS, OUTSIDE_PLANTS, Form
+from bayesimpact.trial.plants import CATALOGUE_PLANTS, Form
+from bayesimpact.trial.plants_outside import OUTSIDE_PLANTS
 from bayesimpact.trial.rig import Release, motion, record
 from bayesimpact.trial.rig_catalogue import CATALOGUE
 from bayesimpact.trial.rig_outside import OUTSIDE
@@ -37,11 +38,10 @@ def test_every_effect_can_be_planted() -> None:
     assert set(CATALOGUE_PLANTS) == set(CATALOGUE) - {"noise_correlated"}
     assert set(OUTSIDE_PLANTS) == set(OUTSIDE) - {"resonator"}  # which is base_motion
     assert {e.id for e in EFFECTS} - {"noise_correlated"} <= set(CATALOGUE_PLANTS)
-    binds = {e.id: set(e.binds) for e in EFFECTS}
-    for first, second in ((a, b) for a in binds for b in binds if a < b):
-        if binds[first] & binds[second]:  # no model can hold both
-            slot = CATALOGUE_PLANTS[first].slot
-            assert slot and slot == CATALOGUE_PLANTS[second].slot
+    for first, second in ((a, b) for a in EFFECTS for b in EFFECTS if a.id < b.id):
+        if first.excludes(second):  # no model can hold both
+            slot = CATALOGUE_PLANTS[first.id].slot
+            assert slot and slot == CATALOGUE_PLANTS[second.id].slot
 
 
 @pytest.mark.parametrize("effect", [*CATALOGUE_PLANTS, *OUTSIDE_PLANTS])

@@ -21,8 +21,11 @@ STRONG = {
     "contact_hardening": {"stiffness": 3e8},
     "contact_power_law": {"exponent": 1.2},
     "contact_second_stage": {"stiffness": 2000.0, "depth": 0.5e-3},
+    "hunt_crossley": {"exponent": 1.4, "damping": 0.9},
     "contact_no_tension": {},
     "obstacle_mass": {"mass": 0.01},
+    "adhesion": {"force": 1.0},
+    "obstacle_restitution": {"coefficient": 0.9},
     "contact_relaxation": {"stiffness": 600.0, "time": 5e-3},
     "second_mode": {"frequency": 25.0, "damping": 0.03, "gain": 1.5},
     "obstacle_mode": {"mass": 0.03, "frequency": 40.0, "damping": 0.03},
@@ -36,12 +39,14 @@ STRONG = {
     "stiffness_drift": {"rate": 0.1},
     "harmonic_forcing": {"amplitude": 0.3, "frequency": 9.0, "phase": {"r": 0.7}},
     "opposite_stop": {"stiffness": 1500.0, "gap": 3e-3},
+    "spring_piecewise": {"stiffness": 1500.0, "gap": 3e-3, "damping": 4.0},
     "pendulum_with_spring": {"stiffness": 3e6},
     "spring_quintic": {"stiffness": 5e10},
     "power_damping": {"coefficient": 0.5, "exponent": 1.5},
     "structural_damping": {"loss": 0.05},
+    "hysteresis_bouc_wen": {"stiffness": 150.0, "decay": 1e3},
+    "presliding_friction": {"force": 0.3, "displacement": 2e-4},
     "detent": {"stiffness": 400.0, "place": -1e-3, "width": 1e-3},
-    "hysteresis": {"stiffness": 150.0, "width": 1e-3},
     "friction_pad": {"force": 0.3, "extra": 0.2, "speed": 0.05, "low": -2e-3, "high": 0.5e-3},
     "damping_bump": {"coefficient": 2.0, "place": -2e-3, "width": 1e-3},
     "eddy_brake": {"coefficient": 2.0, "low": -2e-3, "high": -1e-3},
@@ -76,7 +81,7 @@ def against_naive(effects, release, *, duration, step, tolerance):
 @pytest.mark.parametrize("effect", STRONG)
 def test_equation_against_the_naive_twin(effect):
     # the naive twin loses its order at the root of d^n
-    rooted = effect in ("contact_power_law", "power_damping")
+    rooted = effect in ("contact_power_law", "power_damping", "hunt_crossley")
     tolerance = 5e-10 if rooted else 1e-10 if effect in MODES else 1e-11
     effects = {effect: STRONG[effect]}
     run = against_naive(effects, RELEASE, duration=0.35, step=1e-4, tolerance=tolerance)
@@ -90,7 +95,13 @@ def test_equation_against_the_naive_twin(effect):
         ("contact_damping_indentation", "contact_no_tension", "gap_wear", "quadratic_drag"),
         ("obstacle_mass", "contact_relaxation", "coulomb_friction", "spring_cubic"),
         ("contact_second_stage", "contact_damping_speed", "opposite_stop", "stiffness_drift"),
-        ("contact_no_tension", "contact_relaxation", "resonator", "hysteresis", "friction_pad"),
+        (
+            "contact_no_tension",
+            "contact_relaxation",
+            "resonator",
+            "hysteresis_bouc_wen",
+            "friction_pad",
+        ),
         ("obstacle_mass", "contact_preload", "contact_friction", "knock", "eddy_brake"),
         ("contact_second_stage", "gap_wear"),
         ("second_mode", "obstacle_mass", "contact_relaxation", "coulomb_friction"),
@@ -129,6 +140,7 @@ NULL = {
     "second_mode": {"frequency": 70.0, "damping": 0.03, "gain": 0.0},
     "obstacle_mode": {"mass": 0.0, "frequency": 70.0, "damping": 0.03},
     "base_motion": {"frequency": 15.0, "damping": 0.03, "mass_ratio": 0.0},
+    "obstacle_restitution": {"coefficient": 1.0},
     "gap_wear": {"step": 0.0},
     "gap_per_recording": {"g": {"r": 1.1e-3}},
     "coulomb_friction": {"force": 0.0},
@@ -138,10 +150,13 @@ NULL = {
     "stiffness_drift": {"rate": 0.0},
     "harmonic_forcing": {"amplitude": 0.0, "frequency": 9.0, "phase": {"r": 0.7}},
     "opposite_stop": {"stiffness": 0.0, "gap": 3e-3},
+    "spring_piecewise": {"stiffness": 0.0, "gap": 3e-3, "damping": 0.0},
     "pendulum_with_spring": {"stiffness": 0.0},
     "spring_quintic": {"stiffness": 0.0},
     "power_damping": {"coefficient": 0.0, "exponent": 0.5},
     "structural_damping": {"loss": 0.0},
+    "hysteresis_bouc_wen": {"stiffness": 0.0, "decay": 1e3},
+    "presliding_friction": {"force": 0.0, "displacement": 1e-4},
 }
 
 
@@ -162,6 +177,12 @@ def test_a_plain_pendulum_is_one_whose_weight_is_all_of_k1():
     assert (
         np.abs(one.displacement - motion(rig, release, rate=50, duration=9).displacement).max() > 1
     )
+
+
+def test_an_obstacle_that_does_not_stick_is_one_that_cannot_pull():
+    dry = motion(PAPER_RIG, RELEASE, {"adhesion": {"force": 0.0}}, rate=1000, duration=1)
+    none = motion(PAPER_RIG, RELEASE, {"contact_no_tension": {}}, rate=1000, duration=1)
+    assert np.array_equal(dry.displacement, none.displacement)
 
 
 def test_massless_obstacle_is_one_that_cannot_pull():

@@ -16,6 +16,7 @@ from bayesimpact.model.added.situation import (
     ONCE,
     PUSHED,
     SOON,
+    SURFACE,
     TURN,
     event_value,
     one_sided,
@@ -31,6 +32,9 @@ ROUNDS = 8
 # event, if the slope changes by no more than STRAIGHT of itself, and behind it, where a force may
 # have had a kink; the first trial aims short
 NEAR, STRAIGHT, BEHIND, AIM = 1e-5, 1e-4, 1e-7, 5e-6
+PAST = (
+    2e-13  # of the step, by which a surface is left behind: two laws may have theirs at one place
+)
 
 
 @inner()
@@ -103,6 +107,7 @@ def locate(
     now, column, short = typed(NOW), AHEAD if flow.memory else NOW, 1e-6 * h
     f0, d0, _ = value_and_slope(event, y, v, t, n0, now, short, flow, w)
     f1, d1, _ = value_and_slope(event, y1, v1, t + h, n1, column, short, flow, w)
+    past = PAST * h if event >= SURFACE else 0.0
     low, high, x = 0.0, h, h * (guess(max(f0, 0.0), h * d0, f1, h * d1) - AIM)
     for _ in range(TRIALS):
         if not low < x < high:
@@ -115,11 +120,14 @@ def locate(
             high = x
         change = -value / slope if slope < 0.0 else h
         if abs(change) <= 1e-13 * h or high - low <= 1e-15 * h:
-            break
+            if event < SURFACE or value < 0.0 or x + past > h:
+                break
+            x += past
+            continue
         bend = change * (slope - d0) / (x * slope)  # nearly
         near = -BEHIND * h <= change <= NEAR * h and abs(bend) < STRAIGHT
         if near and low < x + change < high and not flow.memory:
-            change *= 1.0 - 0.5 * bend
+            change = change * (1.0 - 0.5 * bend) + past
             jerk = -2.0 * flow.b * a - flow.K * v1
             y1 += change * (v1 + change * (0.5 * a + change * jerk / 6.0))
             return x + change, y1, v1 + change * (a + 0.5 * change * jerk), n1

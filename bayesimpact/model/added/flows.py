@@ -36,6 +36,7 @@ from bayesimpact.model.added.world import (
     LAW_PACE,
     LAW_RATE,
     LAW_SURFACE,
+    LAW_TRAVEL,
     LAW_TURN,
     NOW,
     OMEGA,
@@ -56,6 +57,7 @@ MAX_ANGLE_PLAIN = 0.6  # the same where nothing is added: exact, but one turning
 MAX_ANGLE_PACE = 0.32  # the same for an explicit dependence on time
 FINER = 2.4  # of a body on a spring of its own: it is not small, as other added forces are
 LONGER = 1.28  # where no force depends on the velocity: the method for these is the more accurate
+SHORTER = 0.5  # where a force that does is not smooth at the touch
 GRAINS = 1.1  # that a step may pass at the swing's highest speed
 ROUND_UP = 0.3  # of a sample: steps end on samples, and may be that much longer for it
 RENEWED = 64  # longest steps after which a flow is chosen anew: the swing may have grown
@@ -95,6 +97,7 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
             bounded = laws[LAW_COLUMNS * law + LAW_SURFACE] != 0
             rooted = laws[LAW_COLUMNS * law + LAW_TURN] != 0
             turns = turns or flags & ENDS_ON_TURNS != 0 or bounded or rooted
+            turns = turns or laws[LAW_COLUMNS * law + LAW_TRAVEL] != 0
             rough = rough or (touching and flags & ROUGH_AT_TOUCH != 0)
             tame = tame and flags & POLYNOMIAL != 0
             placed = placed and flags & PLACED != 0
@@ -137,6 +140,8 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
     placed = placed and not memory
     if placed and not plain:
         longest *= LONGER
+    if rough and not placed:
+        longest *= SHORTER
     joint = bodies > 0.0 and count == 0 and not forced
     if joint:
         longest = MAX_ANGLE_PLAIN / (np.sqrt(K) + bodies)

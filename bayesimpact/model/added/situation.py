@@ -2,8 +2,9 @@
 
 The mass is free, touches the obstacle, or is separated: beyond the gap though the obstacle, which
 cannot pull, has let go. A contact that cannot pull ends when its reaction, once positive, falls
-through zero, or at the gap if it never was positive. While separated, contact resumes as soon as
-the obstacle would push again (for a gap below zero; else the mass falls back below the gap first).
+through zero (with adhesion: through what that holds), or at the gap if it never was positive. While
+separated, contact resumes as soon as the obstacle would push again (for a gap below zero; else the
+mass falls back below the gap first).
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from bayesimpact.model.added.resonator import (
     share_of_frame,
 )
 from bayesimpact.model.added.world import (
+    ADHESION,
     AHEAD,
     C1,
     C2,
@@ -27,24 +29,31 @@ from bayesimpact.model.added.world import (
     CONTACT_ONLY,
     FRICTION,
     GAP_STEP,
+    JUMP_AT_SURFACE,
     JUMP_AT_TURN,
     K1,
     K2,
     LAW_COLUMNS,
+    LAW_FIRST,
     LAW_FLAGS,
     LAW_FORCE,
     LAW_SURFACE,
+    LAW_TRAVEL,
     NO_TENSION,
     NOW,
+    RESTITUTION,
     SECOND_GAIN,
     STAGE,
+    TURNED,
     V0,
+    WAY,
     WORK_COLUMNS,
     Y0,
     G,
     forcing,
     law_value,
 )
+from bayesimpact.model.callback import call_law
 from bayesimpact.model.compiled import inner
 
 # what holds between events: gap, kind of motion, direction of sliding (0: held), direction of
@@ -97,7 +106,7 @@ def event_value(event: Any, y: Any, v: Any, t: Any, column: Any, w: Any) -> Any:
         return s[GAP] - y if s[MODE] == FREE else -reaction(y, v, t, column, w)
     if event == LEAVE:
         pushed = one_sided(w.q) and s[PUSHED] != NEVER
-        return reaction(y, v, t, column, w) if pushed else y - s[GAP]
+        return reaction(y, v, t, column, w) + w.q[ADHESION] if pushed else y - s[GAP]
     if event == TURN:
         return v * s[HEADING]
     return s[SIDES + event - SURFACE] * surface_value(event - SURFACE, y, v, t, column, w)
@@ -137,13 +146,15 @@ def begin(w: Any) -> Any:
     q, s = w.q, w.s
     y, v = q[Y0], q[V0]
     begin_bodies(y, v, w)
+    for law in range(w.size):
+        w.work[WORK_COLUMNS * law + TURNED] = y
     s[GAP] = q[G]
     s[SLIDING] = np.sign(v)
     if y > s[GAP]:
         s[MODE] = TOUCHING
         push = reaction(y, v, 0.0, NOW, w)
         s[PUSHED] = ONCE if push > 0.0 else NEVER
-        if one_sided(q) and push <= 0.0:
+        if one_sided(q) and push <= -q[ADHESION]:
             s[MODE] = SEPARATED
     set_sides(y, v, 0.0, w)
     if v == 0.0:
@@ -170,8 +181,36 @@ def point_laws(direction: Any, w: Any) -> Any:
     """Tell the laws whose force jumps at a turning point which way the motion goes."""
     for law in range(w.size):
         if w.laws[LAW_COLUMNS * law + LAW_FLAGS] & JUMP_AT_TURN != 0:
-            at = WORK_COLUMNS * law
-            w.work[at + NOW] = w.work[at + STAGE] = w.work[at + AHEAD] = direction
+            tell(law, direction, w)
+
+
+@inner()
+def turn_paths(direction: Any, y: Any, w: Any) -> Any:
+    """States that follow the path go on from here in another direction; at rest they stay."""
+    for law in range(w.size):
+        travel, at = w.laws[LAW_COLUMNS * law + LAW_TRAVEL], WORK_COLUMNS * law
+        if travel != 0 and direction != 0.0 and w.work[at + WAY] != direction:
+            p, gone = w.base + 8 * w.laws[LAW_COLUMNS * law + LAW_FIRST], y - w.work[at + TURNED]
+            way, z = w.work[at + WAY], w.work[at + NOW]
+            touching = 1.0 if w.s[MODE] == TOUCHING else 0.0
+            z = call_law(travel, gone, way, y - w.s[GAP], 0.0, z, touching, p, w.base)
+            tell(law, z, w)
+            w.work[at + TURNED], w.work[at + WAY] = y, direction
+
+
+@inner()
+def tell(law: Any, branch: Any, w: Any) -> Any:
+    """Set the state of a law that has no rate: the branch of its force that holds now."""
+    at = WORK_COLUMNS * law
+    w.work[at + NOW] = w.work[at + STAGE] = w.work[at + AHEAD] = branch
+
+
+@inner()
+def set_side(law: Any, side: Any, w: Any) -> Any:
+    """Side of a law's surface; a law whose force jumps there is told."""
+    w.s[SIDES + law] = side
+    if w.laws[LAW_COLUMNS * law + LAW_FLAGS] & JUMP_AT_SURFACE != 0:
+        tell(law, side, w)
 
 
 @inner()
@@ -182,6 +221,7 @@ def set_directions(y: Any, v: Any, t: Any, w: Any) -> Any:
         point_laws(0.0, w)
         direction = w.s[SLIDING] if w.q[FRICTION] > 0.0 else np.sign(static_force(y, t, NOW, w))
     point_laws(direction, w)
+    turn_paths(direction, y, w)
 
 
 @inner()
@@ -211,7 +251,7 @@ def set_sides(y: Any, v: Any, t: Any, w: Any) -> Any:
     for law in range(w.size):
         if w.laws[LAW_COLUMNS * law + LAW_SURFACE] != 0:
             side = np.sign(surface_value(law, y, v, t, NOW, w))
-            w.s[SIDES + law] = side if side != 0.0 else 1.0
+            set_side(law, side if side != 0.0 else 1.0, w)
 
 
 @inner()
@@ -222,7 +262,7 @@ def resolve(event: Any, y: Any, v: Any, t: Any, w: Any) -> Any:
         if s[MODE] == FREE:
             y, before = s[GAP], v
             mass = w.mass * (1.0 - share_of_frame(w))
-            v *= mass / (mass + q[CONTACT_MASS])
+            v *= q[RESTITUTION] * mass / (mass + q[CONTACT_MASS])
             s[SECOND_P] += q[SECOND_GAIN] * mass * (before - v)
         s[MODE] = TOUCHING
         s[PUSHED] = ONCE if reaction(y, v, t, NOW, w) > 0.0 else NEVER
@@ -238,7 +278,7 @@ def resolve(event: Any, y: Any, v: Any, t: Any, w: Any) -> Any:
         if q[FRICTION] > 0.0:
             set_sliding(y, t, w)
     else:
-        s[SIDES + event - SURFACE] *= -1.0
+        set_side(event - SURFACE, -s[SIDES + event - SURFACE], w)
     return y, v
 
 

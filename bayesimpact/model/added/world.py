@@ -14,17 +14,18 @@ C1, K1, C2, G, K2, Y0, V0, FORCE, OMEGA, PHASE, OFFSET = range(11)
 FRICTION, CONTACT_MASS, NO_TENSION, GAP_STEP = range(11, 15)
 SECOND_FREQUENCY, SECOND_DAMPING, SECOND_GAIN = range(15, 18)
 OBSTACLE_MASS, OBSTACLE_FREQUENCY, OBSTACLE_DAMPING = range(18, 21)
-FRAME_RATIO, FRAME_FREQUENCY, FRAME_DAMPING = range(21, 24)
+FRAME_RATIO, FRAME_FREQUENCY, FRAME_DAMPING, ADHESION, RESTITUTION = range(21, 26)
 # columns of the table of laws, and its flags: bayesimpact.model.effects.effect.law_row
 LAW_FORCE, LAW_RATE, LAW_SURFACE, LAW_FLAGS = range(4)
-LAW_FIRST, LAW_PACE, LAW_GRAIN, LAW_TURN, LAW_COLUMNS = range(4, 9)
+LAW_FIRST, LAW_PACE, LAW_GRAIN, LAW_TURN, LAW_TRAVEL, LAW_COLUMNS = range(4, 10)
 CONTACT_ONLY, KINK_AT_TURN, ROUGH_AT_TOUCH, POLYNOMIAL, PLACED = 1, 2, 4, 8, 16
-JUMP_AT_TURN = 32
+JUMP_AT_TURN, JUMP_AT_SURFACE = 32, 64
 # columns of the work array, one row per law and two per body of `resonator`: a law's state at the
 # start of a step, at a stage and at the end; the kicks of six stages; exp(-lambda h / 4), lambda,
-# alpha, x_u, x_v
+# alpha, x_u, x_v; where the motion last turned, and which way it goes since, for a state that
+# follows the path (the state there stands in NOW, STAGE and AHEAD)
 NOW, STAGE, AHEAD, KICK = 0, 1, 2, 3
-FADE, LAMBDA, ALPHA, X_U, X_V, WORK_COLUMNS = range(9, 15)
+FADE, LAMBDA, ALPHA, X_U, X_V, TURNED, WAY, WORK_COLUMNS = range(9, 17)
 
 
 class World(NamedTuple):
@@ -85,9 +86,13 @@ def law_value(
     touching: Any,
     w: Any,
 ) -> Any:
-    """Value of one of a law's functions."""
-    p = w.base + 8 * w.laws[LAW_COLUMNS * law + LAW_FIRST]
-    return call_law(w.laws[LAW_COLUMNS * law + column], y, v, y - gap, t, z, touching, p, w.base)
+    """Value of one of a law's functions; z is its state, or that where the motion last turned."""
+    row, p = LAW_COLUMNS * law, w.base + 8 * w.laws[LAW_COLUMNS * law + LAW_FIRST]
+    d, travel = y - gap, w.laws[row + LAW_TRAVEL]
+    if travel != 0:
+        gone, way = y - w.work[WORK_COLUMNS * law + TURNED], w.work[WORK_COLUMNS * law + WAY]
+        z = call_law(travel, gone, way, d, t, z, touching, p, w.base)
+    return call_law(w.laws[row + column], y, v, d, t, z, touching, p, w.base)
 
 
 @inner(forceinline=True)

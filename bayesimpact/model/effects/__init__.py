@@ -1,6 +1,7 @@
 """The catalogue: one effect, one file; `EFFECTS` is the only registration."""
 
 from bayesimpact.model.effects import (
+    adhesion,
     base_motion,
     contact_damping_indentation,
     contact_damping_per_case,
@@ -14,12 +15,16 @@ from bayesimpact.model.effects import (
     gap_per_recording,
     gap_wear,
     harmonic_forcing,
+    hunt_crossley,
+    hysteresis_bouc_wen,
     obstacle_mass,
     obstacle_mode,
+    obstacle_restitution,
     opposite_stop,
     pendulum_sine,
     pendulum_with_spring,
     power_damping,
+    presliding_friction,
     quadratic_drag,
     second_mode,
     sensor_cubic,
@@ -28,6 +33,7 @@ from bayesimpact.model.effects import (
     sensor_quadratic,
     smoothing,
     spring_cubic,
+    spring_piecewise,
     spring_quadratic,
     spring_quintic,
     stiffness_drift,
@@ -42,8 +48,11 @@ EFFECTS: tuple[Effect, ...] = (
     contact_hardening.EFFECT,
     contact_power_law.EFFECT,
     contact_second_stage.EFFECT,
+    hunt_crossley.EFFECT,
     contact_no_tension.EFFECT,
     contact_relaxation.EFFECT,
+    adhesion.EFFECT,
+    obstacle_restitution.EFFECT,
     obstacle_mass.EFFECT,
     obstacle_mode.EFFECT,
     second_mode.EFFECT,
@@ -57,6 +66,7 @@ EFFECTS: tuple[Effect, ...] = (
     stiffness_drift.EFFECT,
     harmonic_forcing.EFFECT,
     opposite_stop.EFFECT,
+    spring_piecewise.EFFECT,
     sensor_drift.EFFECT,
     sensor_quadratic.EFFECT,
     sensor_cubic.EFFECT,
@@ -67,9 +77,17 @@ EFFECTS: tuple[Effect, ...] = (
     spring_quintic.EFFECT,
     power_damping.EFFECT,
     structural_damping.EFFECT,
+    hysteresis_bouc_wen.EFFECT,
+    presliding_friction.EFFECT,
 )
 
-UNTRIED = ("obstacle_mode", "base_motion")
+UNTRIED = (
+    "obstacle_mode",
+    "base_motion",
+    "adhesion",
+    "obstacle_restitution",
+    "presliding_friction",
+)
 """Simulated and fitted like any, but not looked for unless asked: trials have not shown yet that
 they are named rightly.
 """

@@ -150,8 +150,13 @@ class Law:
     force : N
     where : evaluated everywhere or in contact only
     rate : time derivative of the state z (a law with memory), or None
+    travel : for a state that follows the path and not the time (rate-independent hysteresis): its
+        value where the motion has gone by `y` (m, signed) since it last turned, in the direction
+        `v` (-1, 1; 0 before it first moves), from `z`, the state where it turned. Zero at a
+        recording's first sample; steps end on turning points
     surface : a smooth function of y or d whose zero is a kink of the force; steps end on it. (A
-        force may jump at the touch, being evaluated in contact only; other jumps cost accuracy.)
+        force may jump at the touch, being evaluated in contact only, and where a flag below says
+        so; other jumps cost accuracy.)
     pace : fastest rate at which the force depends on time explicitly, rad/s; steps resolve it
     kink_at_turn : the force has a kink at v = 0; steps end on turning points
     rough_at_touch : the force is continuous but not smooth at d = 0; steps begin small there
@@ -159,6 +164,7 @@ class Law:
         is continuous but not smooth at v = 0 (a root of the speed); steps end there
     jump_at_turn : the force jumps at v = 0; steps end on turning points, and z, of which the
         law then has no use of its own, is the direction of the motion: -1, 1, or 0 at rest
+    jump_at_surface : the force jumps at its surface; z is the side: the sign of `surface`
     polynomial : between its kinks the force is a polynomial of low degree of y and v, and of sines
         of time no faster than `pace`: it has no features that a look at four points of a swing
         misses, so steps may be longer where it is weak
@@ -173,6 +179,7 @@ class Law:
     force: Callable[..., float]
     where: Where = "everywhere"
     rate: Callable[..., float] | None = None
+    travel: Callable[..., float] | None = None
     surface: Callable[..., float] | None = None
     pace: Callable[..., float] | None = None
     grain: Callable[..., float] | None = None
@@ -180,6 +187,7 @@ class Law:
     kink_at_turn: bool = False
     rough_at_touch: bool = False
     jump_at_turn: bool = False
+    jump_at_surface: bool = False
     polynomial: bool = False
     ignores_speed: bool = False
 
@@ -198,7 +206,8 @@ class Effect(Picklable):
 
     It acts in one or more of four ways: `law` adds a force; `binds` feeds its parameters into slots
     of the oscillator (dry friction, mass of the obstacle, a gap of its own per recording, ...);
-    `sets` fixes slots; `observe(y (K, n), t (n,), p (K, n_p)) -> (K, n)` changes what the probe
+    `sets` fixes slots (c2 or g among them: the model then has no such unknown);
+    `observe(y (K, n), t (n,), p (K, n_p)) -> (K, n)` changes what the probe
     reads.
 
     Attributes
@@ -210,6 +219,8 @@ class Effect(Picklable):
     statement : sentence for the report with `{size}` and `{share}` filled in
     needs_stop : True when it makes no sense without an obstacle
     prefer : id of the simpler effect that this one reduces to at its null
+    restates : id of an effect that is the same law in other numbers, for another range of them: no
+        model holds both, and only their priors tell them apart
     condition : what else a campaign must offer (two obstacles, two impacts, ...); None for nothing
     size : how large it is for given parameters, where the peak of its force along the motion or of
         its change of the readings does not say so
@@ -229,6 +240,7 @@ class Effect(Picklable):
     observe: Observe | None = None
     needs_stop: bool = False
     prefer: str | None = None
+    restates: str | None = None
     condition: Callable[[Scales], bool] | None = None
     size: Callable[[Numbers, Scales], Size] | None = None
 
@@ -245,6 +257,25 @@ class Effect(Picklable):
         if self.observe is not None and scales.mixed:
             return False  # its parameters would have another unit for every quantity
         return self.condition is None or self.condition(scales)
+
+    @property
+    def has_size(self) -> bool:
+        """False for an effect that is on or off: it has no parameters, or only shapes."""
+        return not all(p.is_shape or p.fixed is not None for p in self.parameters)
+
+    def excludes(self, other: Effect) -> frozenset[str]:
+        """Slots that both claim: each feeds one, or one feeds what the other fixes."""
+        fixed = {s for s in self.sets if s in other.sets and self.sets[s] != other.sets[s]}
+        crossed = (set(self.binds) & set(other.sets)) | (set(self.sets) & set(other.binds))
+        return frozenset(fixed | crossed | (set(self.binds) & set(other.binds)))
+
+    def stands_beside(self, other: Effect) -> bool:
+        """True when one model may hold both."""
+        return not (self.excludes(other) or self.is_same_law(other))
+
+    def is_same_law(self, other: Effect) -> bool:
+        """True for two effects that differ in the names and ranges of their numbers only."""
+        return self.restates == other.id or other.restates == self.id
 
     def parameter(self, name: str) -> EffectParameter:
         """The parameter called `name`; KeyError when there is none."""
@@ -263,7 +294,7 @@ def _catalogued(id: str) -> Effect | None:
     return effect
 
 
-LAW_ROW = 8  # numbers in a law's row
+LAW_ROW = 9  # numbers in a law's row
 
 
 def law_row(law: Law, first: int) -> list[int]:
@@ -271,9 +302,9 @@ def law_row(law: Law, first: int) -> list[int]:
     functions = (law.force, law.rate, law.surface)
     flags = (law.where == "contact") + 2 * law.kink_at_turn + 4 * law.rough_at_touch
     flags += 8 * law.polynomial + 16 * law.ignores_speed
-    flags += 32 * law.jump_at_turn
+    flags += 32 * law.jump_at_turn + 64 * law.jump_at_surface
     force, rate, surface = (address(f) if f else 0 for f in functions)
-    extents = (law.pace, law.grain, law.first_at_turn)
+    extents = (law.pace, law.grain, law.first_at_turn, law.travel)
     return [force, rate, surface, flags, first, *(address(f) if f else 0 for f in extents)]
 
 

@@ -25,8 +25,11 @@ CONTRACT = {
     "contact_hardening": ["stiffness"],
     "contact_power_law": ["exponent"],
     "contact_second_stage": ["stiffness", "depth"],
+    "hunt_crossley": ["exponent", "damping"],
     "contact_no_tension": [],
     "contact_relaxation": ["stiffness", "time"],
+    "adhesion": ["force"],
+    "obstacle_restitution": ["coefficient"],
     "obstacle_mass": ["mass"],
     "obstacle_mode": ["mass", "frequency", "damping"],
     "base_motion": ["frequency", "damping", "mass_ratio"],
@@ -40,6 +43,7 @@ CONTRACT = {
     "stiffness_drift": ["rate"],
     "harmonic_forcing": ["amplitude", "frequency", "phase[recording]"],
     "opposite_stop": ["stiffness", "gap"],
+    "spring_piecewise": ["stiffness", "gap", "damping"],
     "sensor_drift": ["rate"],
     "sensor_quadratic": ["gain"],
     "sensor_cubic": ["gain"],
@@ -50,13 +54,17 @@ CONTRACT = {
     "spring_quintic": ["stiffness"],
     "power_damping": ["coefficient", "exponent"],
     "structural_damping": ["loss"],
+    "hysteresis_bouc_wen": ["stiffness", "decay"],
+    "presliding_friction": ["force", "displacement"],
 }
 DISSIPATIVE = {
     "contact_damping_indentation.coefficient", "contact_damping_speed.coefficient",
     "contact_relaxation.stiffness", "contact_second_stage.stiffness", "obstacle_mass.mass",
     "gap_wear.step", "coulomb_friction.force", "quadratic_drag.coefficient",
-    "opposite_stop.stiffness", "power_damping.coefficient", "structural_damping.loss",
-    "obstacle_mode.mass", "base_motion.mass_ratio",
+    "opposite_stop.stiffness", "spring_piecewise.stiffness", "spring_piecewise.damping",
+    "power_damping.coefficient", "structural_damping.loss",
+    "obstacle_mode.mass", "base_motion.mass_ratio", "hysteresis_bouc_wen.stiffness",
+    "presliding_friction.force", "adhesion.force",
 }  # fmt: skip
 OF_ANGLES = {"pendulum_sine", "pendulum_with_spring"}
 SIGNED = {
@@ -174,6 +182,7 @@ def test_admissible_only_where_it_could_show():
         e.id for e in EFFECTS if not e.needs_stop
     }
     assert not BY_ID["opposite_stop"].admissible(replace(scales, cases=0))
+    assert not BY_ID["spring_piecewise"].admissible(replace(scales, cases=0))
     assert not BY_ID["gap_wear"].admissible(replace(scales, impacts=1))
     assert not BY_ID["contact_damping_per_case"].admissible(replace(scales, cases=1))
     assert not BY_ID["gap_per_recording"].admissible(replace(scales, recordings=1))
@@ -187,11 +196,17 @@ def test_families_hold_the_near_neighbours():
         ("contact_damping_speed", "contact_damping_indentation"),
         ("contact_power_law", "contact_second_stage"),
         ("contact_hardening", "contact_power_law"),
+        ("hunt_crossley", "contact_power_law"),
         ("spring_cubic", "opposite_stop"),
+        ("opposite_stop", "spring_piecewise"),
         ("obstacle_mass", "contact_relaxation"),
+        ("obstacle_mass", "obstacle_restitution"),
+        ("adhesion", "obstacle_mass"),
         ("coulomb_friction", "quadratic_drag"),
         ("quadratic_drag", "power_damping"),
         ("power_damping", "structural_damping"),
+        ("coulomb_friction", "presliding_friction"),
+        ("presliding_friction", "hysteresis_bouc_wen"),
         ("spring_cubic", "pendulum_sine"),
         ("spring_cubic", "spring_quintic"),
     ):
@@ -221,9 +236,10 @@ def test_laws_that_are_said_to_ignore_the_speed_do():
         p = np.full(8, 1.3)
         changes = 0.0
         for y, v, w in rng.normal(size=(20, 3)):
-            d = abs(y)
-            one, other = (effect.law.force(y, x, d, 0.7, 0.1, 1.0, p, q) for x in (v, w))
-            changes = max(changes, abs(one - other))
+            for z in (-0.1, 0.1):
+                d = abs(y)
+                one, other = (effect.law.force(y, x, d, 0.7, z, 1.0, p, q) for x in (v, w))
+                changes = max(changes, abs(one - other))
         remembers = effect.law.rate is not None
         assert effect.law.ignores_speed == (changes == 0.0 and not remembers), effect.id
 

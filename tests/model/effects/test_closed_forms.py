@@ -9,6 +9,10 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 from scipy.special import airy, ellipk, gamma
 
+from bayesimpact.errors import InputError
+from bayesimpact.model.experiment import simulate as simulate_one
+from bayesimpact.model.oscillator import build_oscillator
+from bayesimpact.model.parameters import SLOTS
 from bayesimpact.model.simulate import simulate
 
 FREE = TestRig(mass=0.5, c1=0.0, k1=0.5 * (10 * np.pi) ** 2, k2=(), y0=(-6e-3,), v0=(0.0,))
@@ -225,3 +229,130 @@ def test_gap_wear_is_a_new_gap_after_every_contact():
     second = contacts[3] - start
     assert np.abs(y[start : start + second] - base[start : start + second]).max() > 1e-5
     np.testing.assert_allclose(y[start : start + second], again[:second], rtol=0, atol=1e-12)
+
+
+def test_beyond_the_clearance_both_springs_and_dampers_act():
+    """Released there, the mass is a linear oscillator until the clearance ends: its matrix."""
+    rig = changed(FREE, c1=0.2, rate=20000.0, duration=0.06)
+    kp, gp, cp = 600.0, 2.5e-3, 3.0
+    y = one("spring_piecewise", rig, stiffness=kp, gap=gp, damping=cp)
+    rest = -kp * gp / (rig.k1 + kp)
+    A = np.array([[0.0, 1.0], [-(rig.k1 + kp) / rig.mass, -(rig.c1 + cp) / rig.mass]])
+    times = np.arange(rig.count) / rig.rate
+    start = np.array([rig.y0[0] - rest, 0.0])
+    inside = np.array([rest + (expm(A * t) @ start)[0] for t in times])
+    leaves = int(np.argmax(inside > -gp))
+    assert 100 < leaves < rig.count - 100
+    np.testing.assert_allclose(y[:leaves], inside[:leaves], rtol=0, atol=1e-12)
+    # in the clearance only the suspension is left, from the speed that the damper left over
+    at = brentq(lambda t: rest + (expm(A * t) @ start)[0] + gp, times[leaves - 1], times[leaves])
+    B = np.array([[0.0, 1.0], [-rig.k1 / rig.mass, -rig.c1 / rig.mass]])
+    speed = (expm(A * at) @ start)[1]
+    after = [(expm(B * (t - at)) @ [-gp, speed])[0] for t in times[leaves:]]
+    np.testing.assert_allclose(y[leaves:], after, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(("exponent", "chi"), [(1.0, 0.5), (1.5, 0.5), (2.5, 3.0), (0.7, 2.0)])
+def test_hunt_and_crossley_leave_a_speed_that_hangs_on_chi_alone(exponent, chi):
+    """From v dv / (1 + chi v) = -k d^n dd / m: v / chi - ln(1 + chi v) / chi^2 is the same before
+    and after an impact, whatever k and n.
+    """
+    rig = changed(WALL, duration=0.3)
+    y = one("hunt_crossley", rig, exponent=exponent, damping=chi)
+    speed = (y[-1] - y[-2]) * rig.rate
+    invariant = lambda v: v / chi - np.log1p(chi * v) / chi**2  # noqa: E731
+    before = invariant(rig.v0[0])
+    expected = brentq(lambda v: invariant(v) - before, -1 / chi + 1e-9, -1e-9)
+    assert y[-1] < -1e-3 and speed == pytest.approx(expected, rel=1e-7)
+
+
+def test_the_dashpot_is_gone_beside_hunt_and_crossley():
+    """c2 is no unknown of the model, and no effect that needs it can stand beside."""
+    rig = TestRig()
+    oscillator = build_oscillator(rig.campaign(), [BY_ID["hunt_crossley"]])
+    assert "c2" not in oscillator.layout.names and "g" in oscillator.layout.names
+    slots = oscillator.layout.slots(np.ones(oscillator.layout.size))
+    assert np.all(slots[:, SLOTS.index("c2")] == 0.0)
+    with pytest.raises(InputError, match="slot c2 taken by hunt_crossley"):
+        build_oscillator(
+            rig.campaign(), [BY_ID["hunt_crossley"], BY_ID["contact_damping_per_case"]]
+        )
+    with pytest.raises(InputError, match="c2: found 2 beside hunt_crossley"):
+        simulate_one(
+            effects={"hunt_crossley": {"exponent": 1.5, "damping": 0.1}}, mass=0.5, c1=0.1,
+            k1=800.0, c2=2.0, k2=5000.0, g=1e-3, y0=-6e-3, v0=0.0, interval=1e-3, n=100,
+        )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "numbers"),
+    [
+        ("hysteresis_bouc_wen", {"stiffness": 60.0, "decay": 400.0}),
+        ("presliding_friction", {"force": 0.15, "displacement": 1 / 400.0}),
+    ],
+)
+def test_a_loop_takes_the_same_energy_however_slowly_it_is_gone_through(name, numbers):
+    """What a swing loses is what the path integral of the loop says, with the mass out of it.
+
+    From the first turning point to the second, z = tanh-like rises in closed form:
+    z = (1 - exp(-b u)) / b from z = 0, u being the way since the release.
+    """
+    b, peak = 400.0, 0.15
+    losses = []
+    for mass in (0.5, 5.0):
+        rig = changed(FREE, mass=mass, k1=500.0, rate=2000.0, duration=0.6 * np.sqrt(mass / 0.5))
+        y = one(name, rig, **numbers)
+        top = int(np.argmax(y[: rig.count // 2 + 1]))
+        left, here, right = y[top - 1 : top + 2]
+        losses.append(here - (right - left) ** 2 / (8 * (left - 2 * here + right)))
+    # k1 y0^2 / 2 - k1 y1^2 / 2 = work of the loop on the way u = y1 - y0
+    y0 = FREE.y0[0]
+
+    def balance(y1: float) -> float:
+        way = y1 - y0
+        work = peak * (way - (1 - np.exp(-b * way)) / b)
+        return 250.0 * (y0**2 - y1**2) - work
+
+    expected = brentq(balance, 1e-3, 6e-3)
+    np.testing.assert_allclose(losses, expected, rtol=0, atol=2e-9)
+
+
+def test_dahls_friction_and_bouc_and_wens_loop_are_one_law():
+    rig = TestRig(duration=1.0)
+    dahl = one("presliding_friction", rig, force=0.1, displacement=5e-4)
+    loop = one("hysteresis_bouc_wen", rig, stiffness=0.1 / 5e-4, decay=1 / 5e-4)
+    np.testing.assert_allclose(dahl, loop, rtol=0, atol=1e-12)
+    assert BY_ID["presliding_friction"].is_same_law(BY_ID["hysteresis_bouc_wen"])
+
+
+def test_short_presliding_is_dry_friction():
+    """What is left goes with the time to build the friction up, the root of the way."""
+    rig = TestRig(duration=1.0)
+    sliding = one("coulomb_friction", rig, force=0.05)
+    left = [
+        np.abs(one("presliding_friction", rig, force=0.05, displacement=way) - sliding).max()
+        for way in (1e-5, 1e-6)
+    ]
+    assert left[0] < 1e-4 and left[0] / left[1] == pytest.approx(10**0.5, rel=0.1)
+
+
+def test_adhesion_keeps_the_energy_of_the_stretched_obstacle():
+    """Without any damping an impact loses F^2 / (2 k2): what the spring holds when it lets go."""
+    rig, force = changed(WALL, duration=0.12), 2.0
+    y = one("adhesion", rig, force=force)
+    speed = (y[-1] - y[-2]) * rig.rate
+    kept = rig.v0[0] ** 2 - force**2 / (rig.k2[0] * rig.mass)
+    assert y[-1] < -force / rig.k2[0] and speed == pytest.approx(-np.sqrt(kept), rel=1e-8)
+    # a pull that is too strong to overcome: the mass stays and swings about the gap
+    held = one("adhesion", rig, force=1.1 * rig.v0[0] * np.sqrt(rig.k2[0] * rig.mass))
+    w = np.sqrt(rig.k2[0] / rig.mass)
+    t = np.arange(rig.count) / rig.rate - 1e-3 / rig.v0[0]
+    expected = np.where(t < 0, rig.v0[0] * t, rig.v0[0] / w * np.sin(w * t))
+    np.testing.assert_allclose(held, expected, rtol=0, atol=1e-11)
+
+
+def test_a_loss_in_the_instant_of_the_touch():
+    rig = changed(WALL, duration=0.12)
+    y = one("obstacle_restitution", rig, coefficient=0.8)
+    assert (y[-1] - y[-2]) * rig.rate == pytest.approx(-0.8 * rig.v0[0], rel=1e-9)
+    assert y.max() == pytest.approx(0.8 * rig.v0[0] * np.sqrt(rig.mass / rig.k2[0]), rel=1e-3)

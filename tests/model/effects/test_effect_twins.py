@@ -38,6 +38,12 @@ COMBINATIONS = (
     ("structural_damping", "obstacle_mass", "contact_relaxation"),
     ("power_damping", "spring_quintic", "contact_power_law"),
     ("structural_damping", "coulomb_friction", "harmonic_forcing"),
+    ("hysteresis_bouc_wen", "contact_relaxation", "structural_damping"),
+    ("presliding_friction", "hunt_crossley", "spring_piecewise", "gap_wear"),
+    ("hysteresis_bouc_wen", "coulomb_friction", "harmonic_forcing"),
+    ("adhesion", "obstacle_restitution", "contact_relaxation", "gap_wear"),
+    ("adhesion", "obstacle_mass", "second_mode"),
+    ("obstacle_restitution", "base_motion", "second_mode", "obstacle_mass"),
     ("second_mode", "contact_power_law"),
     ("second_mode", "coulomb_friction"),
     ("obstacle_mode", "base_motion", "contact_no_tension", "quadratic_drag"),
@@ -84,7 +90,7 @@ def test_combinations(names):
         assert np.abs(difference).max() < TOLERANCE
 
 
-@pytest.mark.parametrize("names", COMBINATIONS[:4] + COMBINATIONS[9:15], ids="+".join)
+@pytest.mark.parametrize("names", COMBINATIONS[:4] + COMBINATIONS[9:21], ids="+".join)
 def test_combinations_by_hand(names):
     effects, values = combined(names, PAPER)
     difference = moved(effects, values, PAPER) - by_hand(effects, values, PAPER)

@@ -12,10 +12,9 @@ from bayesimpact.model.oscillator import build_oscillator
 RIG = TestRig(duration=3.0)
 PLAIN = TestRig(k2=(), duration=3.0)
 EXACT = {"contact_damping_per_case", "gap_per_recording"}
-# contact_no_tension and pendulum_sine have no parameter, and obstacle_mass reduces to the former
-OTHERS = [
-    e for e in EFFECTS if e.id not in {"contact_no_tension", "obstacle_mass", "pendulum_sine"}
-]
+# some have no size, and obstacle_mass reduces to contact_no_tension
+OTHERS = [e for e in EFFECTS if e.has_size and e.id not in ("obstacle_mass", "adhesion")]
+ALONE = {"contact_no_tension", "pendulum_sine", "hunt_crossley"}
 
 
 @pytest.mark.parametrize("effect", OTHERS, ids=lambda e: e.id)
@@ -39,6 +38,10 @@ def test_null_without_a_stop(effect):
         np.testing.assert_allclose(a, b, rtol=0, atol=5e-13)
 
 
+def test_what_has_no_null_has_no_size():
+    assert {e.id for e in EFFECTS if not e.has_size} == ALONE
+
+
 def test_no_effect_runs_in_the_exact_simulator():
     assert build_oscillator(RIG.campaign(), []).is_base
     assert not build_oscillator(RIG.campaign(), [BY_ID["coulomb_friction"]]).is_base
@@ -47,9 +50,11 @@ def test_no_effect_runs_in_the_exact_simulator():
 def test_a_massless_obstacle_is_one_that_cannot_pull():
     mass, none = BY_ID["obstacle_mass"], BY_ID["contact_no_tension"]
     massless = RIG.readings([mass], {"obstacle_mass.mass": 0.0})
-    for a, b in zip(massless, RIG.readings([none], {}), strict=True):
+    dry = RIG.readings([BY_ID["adhesion"]], {"adhesion.force": 0.0})
+    for a, b, c in zip(massless, RIG.readings([none], {}), dry, strict=True):
         np.testing.assert_array_equal(a, b)
-    assert mass.prefer == none.id
+        np.testing.assert_array_equal(c, b)
+    assert mass.prefer == BY_ID["adhesion"].prefer == none.id
 
 
 def test_all_effects_at_once_at_their_nulls():

@@ -78,6 +78,21 @@ def test_hysteresis():
     assert np.abs(theirs - moved([], {}, RIG)).max() > 1e-4
 
 
+def own_path(y, v, d, t, z, touching, p, q):
+    fade = np.exp(-p[1] * abs(y))
+    return z * fade + v * (1 - fade) / p[1]
+
+
+def test_a_state_that_follows_the_path():
+    """The same model by the path in place of the rate: also the catalogue's."""
+    own, values = effect(Law(bouc_wen_force, travel=own_path, ignores_speed=True), 100.0, 150.0)
+    theirs = reference(lambda y, v, z: 100.0 * z, lambda y, v, z, _: v - 150.0 * abs(v) * z)
+    assert np.abs(moved([own], values, RIG) - theirs).max() < 1e-9
+    known = {"hysteresis_bouc_wen.stiffness": 100.0, "hysteresis_bouc_wen.decay": 150.0}
+    catalogued = moved([BY_ID["hysteresis_bouc_wen"]], known, RIG)
+    np.testing.assert_allclose(moved([own], values, RIG), catalogued, rtol=0, atol=1e-9)
+
+
 def layer_force(y, v, d, t, z, touching, p, q):
     return p[0] * z
 

@@ -1,0 +1,96 @@
+"""How forces from outside the catalogue are planted; a resonator is base_motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import pi
+
+import numpy as np
+
+from bayesimpact.trial.benches import Design
+from bayesimpact.trial.plants import Form, Plant, one_number, sign_of
+
+Rng = np.random.Generator
+
+
+def _local(design: Design, rng: Rng) -> tuple[float, float]:
+    """Place and width of a local force on the free side, m."""
+    place = -design.amplitude * rng.uniform(0.2, 0.55)
+    return place, design.amplitude * rng.uniform(0.05, 0.12)
+
+
+def _detent(design: Design, rng: Rng) -> Form:
+    place, width = _local(design, rng)
+    sign, k1 = sign_of(rng), design.rig.k1
+    return Form(
+        lambda size: {"stiffness": sign * size, "place": place, "width": width},
+        1e-4 * k1,
+        place=(place - 1.5 * width, place + 1.5 * width),
+        largest=2 * k1,
+    )
+
+
+def _friction_pad(design: Design, rng: Rng) -> Form:
+    place, width = _local(design, rng)
+    extra, speed = rng.uniform(0.5, 2.0), 0.1 * design.speed
+    force = design.rig.k1 * design.amplitude
+    return Form(
+        lambda size: {
+            "force": size, "extra": extra * size, "speed": speed,
+            "low": place - width, "high": place + width,
+        },
+        1e-5 * force,
+        place=(place - width, place + width),
+        largest=0.1 * force,
+    )  # fmt: skip
+
+
+def _bump(design: Design, rng: Rng) -> Form:
+    place, width = _local(design, rng)
+    c1 = design.rig.c1
+    return Form(
+        lambda size: {"coefficient": size, "place": place, "width": width},
+        1e-3 * c1,
+        place=(place - 1.5 * width, place + 1.5 * width),
+        largest=100 * c1,
+    )
+
+
+def _brake(design: Design, rng: Rng) -> Form:
+    place, width = _local(design, rng)
+    low, high, c1 = place - 2 * width, place + 2 * width, design.rig.c1
+    return Form(
+        lambda size: {"coefficient": size, "low": low, "high": high},
+        1e-3 * c1,
+        place=(low, high),
+        largest=100 * c1,
+    )
+
+
+def _knock(design: Design, rng: Rng) -> Form:
+    time, width = design.duration * rng.uniform(0.2, 0.6), 0.5 * pi / design.omega
+    sign, scale = sign_of(rng), design.rig.mass * design.speed
+    return Form(
+        lambda size: {"impulse": sign * size, "time": time, "width": width},
+        1e-5 * scale,
+        largest=0.3 * scale,
+    )
+
+
+_ANYWHERE = ("free", "everywhere")
+
+OUTSIDE_PLANTS: Mapping[str, Plant] = {
+    "detent": Plant(("free",), _detent),
+    "friction_pad": Plant(("free",), _friction_pad),
+    "damping_bump": Plant(("free",), _bump),
+    "eddy_brake": Plant(("free",), _brake),
+    "damping_drift": Plant(_ANYWHERE, one_number("rate", lambda d: 3 / d.duration)),
+    "contact_friction": Plant(
+        ("contact",), one_number("force", lambda d: 0.1 * d.contact_stiffness * d.indentation), 1
+    ),
+    "contact_preload": Plant(
+        ("contact",), one_number("force", lambda d: 0.1 * d.contact_stiffness * d.indentation), 1
+    ),
+    "knock": Plant(_ANYWHERE, _knock),
+}
+"""Every force outside the catalogue that may be planted; a resonator is base_motion."""
