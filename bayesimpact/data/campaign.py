@@ -9,6 +9,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
 
+import numpy as np
+
 from bayesimpact.data.frozen import Picklable
 from bayesimpact.data.html import html_table
 from bayesimpact.data.recording import Recording
@@ -147,7 +149,8 @@ class Campaign(Picklable):
             [[recording]]: `name`, `case`, `samples` (n,) and their `unit` (m, mm, um, rad, deg,
             m/s, mm/s, m/s2, g, ...: the unit tells the quantity), and either `times_s` (n,),
             evenly spaced unless `resample` is true, or `sample_rate_hz`; `start_s`, `end_s`;
-            `used` (n,), False where a sample is set aside
+            `used` (n,), False where a sample is set aside; `input` with its own `samples` (n,), SI
+            units, and `kind`, `gain`, `hold` as in campaign.toml
         name, mass_kg, tables : any other key of campaign.toml, as there: `stop = False`,
             `measurement = {"noise_um": 5.0}`, `priors = {"k1": {...}}`, `beam`, ...
 
@@ -226,14 +229,33 @@ class Campaign(Picklable):
         )
         return replace(self, recordings=kept)
 
+    def excerpt(self, duration: float) -> Campaign:
+        """The first `duration` seconds of every recording; of driven ones, the largest motion.
+
+        An input may begin with rest.
+        """
+        kept = []
+        for r in self.truncated(duration).recordings:
+            whole = next(other for other in self.recordings if other.name == r.name)
+            if r.input is None:
+                kept.append(r)
+                continue
+            power = np.cumsum(np.concatenate([[0.0], (whole.samples - whole.samples.mean()) ** 2]))
+            first = int(np.argmax(power[r.samples.size :] - power[: -r.samples.size]))
+            kept.append(whole.part(first, first + r.samples.size))
+        return replace(self, recordings=tuple(kept))
+
     def thinned(self, interval: float) -> Campaign:
-        """The same campaign, thinned to samples about `interval` seconds apart."""
+        """The same campaign, thinned to samples about `interval` seconds apart.
+
+        Recordings with an input stay as they are: between samples it has to be known.
+        """
         kept = []
         for r in self.recordings:
-            step = max(1, int(interval / r.interval))
+            step = 1 if r.input is not None else max(1, int(interval / r.interval))
             used = None if r.used is None else r.used[::step]
-            samples, interval = r.samples[::step], r.interval * step
-            kept.append(replace(r, samples=samples, interval=interval, used=used))
+            samples, spacing = r.samples[::step], r.interval * step
+            kept.append(replace(r, samples=samples, interval=spacing, used=used))
         return replace(self, recordings=tuple(kept))
 
 

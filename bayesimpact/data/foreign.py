@@ -54,6 +54,30 @@ def read_foreign(source: Path, entry: RecordingTable, data: bytes) -> Table:
     return choose(source, channels, wanted)
 
 
+def read_input(source: Path, entry: RecordingTable, data: bytes) -> Table:
+    """The channel that an entry's input means, in SI units, on the response's clock.
+
+    `InputError` as `choose` and the readers; for an input without a column.
+    """
+    given = entry.input
+    if given is None or given.column is None:
+        accepted = "the name of a column in quotes, or its number counted from 1"
+        raise InputError(f"{source}, input, key column", "nothing", accepted)
+    channels = read_channels(source, data, encoding=entry.encoding, skip_rows=entry.skip_rows or 0)
+    windowed = is_foreign(source, entry, data)  # as the response is read
+    wanted = Wanted(
+        column=given.column,
+        time_column=entry.time_column,
+        block=entry.block,
+        sample_rate=entry.sample_rate_hz,
+        start=entry.start_s if windowed else None,
+        end=entry.end_s if windowed else None,
+        resample=entry.resample,
+        kind=given.kind,
+    )
+    return choose(source, channels, wanted)
+
+
 def file_bytes(source: Path, where: str) -> bytes | None:
     """Content of a store that is a folder; None for a file, once its size proved readable."""
     if source.is_dir() and source.suffix.lower() == ".zarr":

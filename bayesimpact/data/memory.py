@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -47,6 +48,9 @@ def campaign_from_arrays(
         raise InputError(f"{door}, recordings", f"a {type(recordings).__name__}", accepted)
     given = [_entry(f"{door}, recording {i}", r) for i, r in enumerate(recordings, 1)]
     plain = [{k: _plain(v) for k, v in entry.items() if k not in _OWN} for entry in given]
+    for entry in plain:
+        if isinstance(entry.get("input"), dict):
+            entry["input"] = {k: v for k, v in entry["input"].items() if k not in _OWN}
     document = {"name": name, "mass_kg": mass, **tables}
     document = {key: _plain(value) for key, value in document.items()} | {"recording": plain}
     table = parse_campaign(document, door)
@@ -54,6 +58,8 @@ def campaign_from_arrays(
 
     def read(entry: RecordingTable, where: str) -> tuple[str, Table]:
         samples = _samples(where, entry, by_name[str(entry.name)])
+        if entry.input is not None:
+            samples = _with_input(where, entry, samples, by_name[str(entry.name)])
         _check_speed(where, samples)
         return where, samples
 
@@ -119,6 +125,13 @@ def _entry(where: str, given: object) -> dict[str, Any]:
             entry["case"] = given.case
         entry["times_s"] = given.start + given.times
         entry["used"] = given.used
+        if given.input is not None:
+            gain = "free" if given.input.free else "known"
+            hold = "band_limited" if given.input.band_limited else "first_order"
+            entry["input"] = {
+                "samples": given.input.samples, "kind": given.input.kind, "gain": gain,
+                "hold": hold,
+            }  # fmt: skip
     elif isinstance(given, Mapping):
         entry = {str(key): value for key, value in given.items()}
     else:
@@ -156,6 +169,21 @@ def _samples(where: str, entry: RecordingTable, given: Mapping[str, Any]) -> Tab
     if entry.sample_rate_hz is None:
         raise InputError(where, "no clock", "times_s (n,), or sample_rate_hz")
     return Table(samples * factor, 1.0 / entry.sample_rate_hz, 0.0, quantity, used)
+
+
+def _with_input(where: str, entry: RecordingTable, table: Table, given: Mapping[str, Any]) -> Table:
+    """The table with the input's samples, taken over to its clock as the response's are."""
+    where = f"{where}, input, key samples"
+    values = given["input"].get("samples")
+    if values is None:
+        raise InputError(where, "nothing", "numbers, (n,), SI units")
+    samples = _floats(where, values)
+    if samples.size != np.size(given["samples"]):
+        found = f"{samples.size} values for {np.size(given['samples'])} samples"
+        raise InputError(where, found, "one for every sample")
+    of_input = entry.model_copy(update={"unit": "m"})
+    other = _samples(where, of_input, {**given, "samples": samples})
+    return replace(table, input=other.samples)
 
 
 def _mask(where: str, given: Any, size: int) -> NDArray[np.bool_] | None:
@@ -215,6 +243,13 @@ def _column_entry(
     filled = {key: value for key, value in entry.items() if key != "column"}
     filled.setdefault("name", column)
     filled["samples"] = _numeric(frame[column])
+    given = filled.get("input")
+    if isinstance(given, Mapping) and "samples" not in given:
+        if given.get("column") not in columns:
+            where = f"{door}, recording {filled['name']}, input, key column"
+            accepted = f"one of the frame's columns: {', '.join(columns)}"
+            raise InputError(where, repr(given.get("column")), accepted)
+        filled["input"] = {**given, "samples": _numeric(frame[given["column"]])}
     times = [name for name in TIME_COLUMNS if name in columns]
     if times and "times_s" not in filled:
         filled["times_s"] = _numeric(frame[times[0]]) * TIME_COLUMNS[times[0]]

@@ -18,6 +18,7 @@ from bayesimpact.data.campaign import Beam, Campaign, Measurement, Smoothing
 from bayesimpact.data.entries import filled_in
 from bayesimpact.data.foreign import file_bytes, is_foreign, read_foreign
 from bayesimpact.data.gaps import excluded_spans
+from bayesimpact.data.input_column import check_quantities, input_of, with_input
 from bayesimpact.data.period import rough_period
 from bayesimpact.data.prior_bounds import check_prior, parameter_ranges
 from bayesimpact.data.quantity import Quantity, check_quantity, unit_of, with_article
@@ -36,6 +37,7 @@ from bayesimpact.data.table import Table, read_table
 from bayesimpact.errors import InputError
 
 CAMPAIGN_FILE = "campaign.toml"
+_ACCEPTED = "a free decay, or a motion with an input, of two periods or more"
 _EFFECT_PARAMETER = re.compile(r"[a-z]\w*\.[a-z]\w*(\[.+\])?")
 
 
@@ -65,7 +67,7 @@ def load_campaign(path: Path | str, folders: Sequence[Path | str] = ()) -> Campa
         if not data:
             data = _bytes(source, f"{where}, key file", bounds.TABLE_BYTES)
         digest.update(data)
-        return str(source), _table(source, entry, data)
+        return str(source), with_input(source, entry, data, _table(source, entry, data))
 
     campaign = build_campaign(str(file), table, read)
     return replace(campaign, sha256=digest.hexdigest(), folder=file.parent)
@@ -242,6 +244,7 @@ def _recording(
         start=table.start + first * interval,
         quantity=table.quantity,
         used=None if table.used is None else table.used[first:stop_at],
+        input=input_of(where, entry, None if table.input is None else table.input[first:stop_at]),
     )
     key = "exclude_s" if entry.exclude_s else "resample"
     recording = excluded_spans(f"{where}, key {key}", recording, entry.exclude_s or ())
@@ -255,13 +258,13 @@ def _check_motion(where: str, recording: Recording) -> None:
     samples = recording.samples
     if samples.max() == samples.min():
         found = f"{samples.size} samples that all equal {samples[0]:.6g} {recording.unit}"
-        raise InputError(where, found, "a free decay, two periods or more")
+        raise InputError(where, found, _ACCEPTED)
     period = rough_period(samples, recording.interval)
     if period is None or recording.duration < 2.0 * period * (1.0 - 1e-3):
         found = f"{samples.size} samples over {recording.duration:.4g} s, fewer than two periods"
         if period is not None:
             found += f" of about {period:.4g} s"
-        raise InputError(where, found, "a free decay, two periods or more")
+        raise InputError(where, found, _ACCEPTED)
 
 
 def _check_together(where: str, table: CampaignTable, recordings: list[Recording]) -> None:
@@ -274,6 +277,7 @@ def _check_together(where: str, table: CampaignTable, recordings: list[Recording
                 with_article(recording.quantity),
                 f"motion {kind}, as the first recording's {first.quantity}, throughout",
             )
+    check_quantities(where, recordings)
     if table.mass_uncertainty_kg >= table.mass_kg:
         found = f"{table.mass_uncertainty_kg:g} kg"
         accepted = f"less than the mass, {table.mass_kg:g} kg"
@@ -381,6 +385,8 @@ def _priors(
 def _prior_names(stop: bool, recordings: list[Recording]) -> list[str]:
     """Names a prior may carry: of one parameter, or of all that differ only in the brackets."""
     names = ["c1", "k1"]
+    if any(r.input is not None and r.input.free for r in recordings):
+        names.append("input_gain")
     if stop:
         names += ["c2", "g", "k2"]
         names += [f"k2[{case}]" for case in dict.fromkeys(r.case for r in recordings)]

@@ -1,18 +1,19 @@
-"""One recording of a free decay: checked, immutable, in SI units."""
+"""One recording of a motion, free or driven: checked, immutable, in SI units."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.data.input import Input
 from bayesimpact.data.quantity import Quantity, is_angular, order_of, unit_of
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Equally spaced samples of one free decay.
+    """Equally spaced samples of one free decay, or of one motion with a measured input.
 
     Attributes
     ----------
@@ -25,6 +26,7 @@ class Recording:
     used : (n,) read-only, False where a sample is set aside; None when all count. Samples that are
         set aside hold a smooth stand-in, for what needs a whole recording to start from; a longer
         mask is cut to the samples, so that a recording can be shortened at its end
+    input : what drove the motion, cut to the samples in the same way; None for a free decay
     """
 
     name: str
@@ -34,6 +36,7 @@ class Recording:
     start: float = 0.0
     quantity: Quantity = "displacement"
     used: NDArray[np.bool_] | None = None
+    input: Input | None = None
 
     def __repr__(self) -> str:
         """One line."""
@@ -45,6 +48,11 @@ class Recording:
         samples = np.array(self.samples, dtype=np.float64)
         samples.setflags(write=False)
         object.__setattr__(self, "samples", samples)
+        if self.input is not None:
+            if self.input.samples.size < samples.size:
+                found = self.input.samples.size
+                raise ValueError(f"{samples.size} samples, and an input of {found}")
+            object.__setattr__(self, "input", self.input.part(0, samples.size))
         if self.used is None:
             return
         used = np.array(self.used, dtype=np.bool_)[: samples.size]
@@ -56,6 +64,16 @@ class Recording:
     def __setstate__(self, state: dict[str, object]) -> None:
         self.__dict__.update(state)
         self.__post_init__()  # unpickled arrays can be written
+
+    def part(self, first: int, end: int) -> Recording:
+        """Samples first..end-1, with all that belongs to them."""
+        return replace(
+            self,
+            samples=self.samples[first:end],
+            start=self.start + first * self.interval,
+            used=None if self.used is None else self.used[first:end],
+            input=None if self.input is None else self.input.part(first, end),
+        )
 
     @property
     def times(self) -> NDArray[np.float64]:

@@ -42,6 +42,25 @@ class _Table(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
 
+class InputTable(_Table):
+    """The `input` of a [[recording]]: a column of the same file."""
+
+    column: Text | Count | None = Field(None, description=COLUMN)
+    kind: Literal["force_N", "base_m", "base_m_s2"] = Field(
+        description="force_N, base_m or base_m_s2, in quotes"
+    )
+    scale: Annotated[float, Field(ge=-1e12, le=1e12)] = Field(
+        1.0, description="a number other than 0, times the column (-1e+12 to 1e+12)"
+    )
+    gain: Literal["known", "free"] = Field(
+        "known", description='"known" (1) or "free": an unknown, input_gain'
+    )
+    remove_mean: bool = Field(False, description="true or false, without quotes")
+    hold: Literal["first_order", "band_limited"] = Field(
+        "first_order", description='"first_order" (a line between samples) or "band_limited"'
+    )
+
+
 class RecordingTable(_Table):
     """One [[recording]]."""
 
@@ -76,6 +95,9 @@ class RecordingTable(_Table):
         None, description=f"{POSITIVE}, true time over the file's time (0.001 to 1000)"
     )
     resample: bool = Field(False, description="true or false, without quotes")
+    input: InputTable | None = Field(
+        None, description='a measured input, as { column = "force", kind = "force_N" }'
+    )
     skip: Text | None = Field(None, description="the reason to leave it out, in quotes")
 
 
@@ -302,7 +324,10 @@ def _place(loc: tuple[Any, ...], document: dict[str, Any]) -> tuple[type[_Table]
         if len(loc) == 2:
             return CampaignTable, [f"recording {loc[1] + 1}"], first
         file = f" ({entry['file']})" if isinstance(entry.get("file"), str) else ""
-        return RecordingTable, [f"recording {loc[1] + 1}{file}"], str(loc[2])
+        own = [f"recording {loc[1] + 1}{file}"]
+        if loc[2] == "input" and len(loc) > 3:
+            return InputTable, [*own, "input"], str(loc[3])
+        return RecordingTable, own, str(loc[2])
     if first == "measurement":
         if len(loc) == 2:
             return MeasurementTable, ["[measurement]"], str(loc[1])

@@ -30,6 +30,7 @@ class Table:
     start : time of the first sample on the file's clock, s; 0 for a file without a time column
     quantity : what the samples are
     used : (n,) False where an uneven clock left a gap; None where every sample counts
+    input : (n,) a measured input in SI units, see `bayesimpact.data.input`; None without one
     """
 
     samples: NDArray[np.float64]
@@ -37,6 +38,7 @@ class Table:
     start: float
     quantity: Quantity
     used: NDArray[np.bool_] | None = None
+    input: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,11 @@ from typing import Any
 
 from bayesimpact.data.campaign import Beam, Campaign, Measurement, Smoothing
 from bayesimpact.data.gaps import excluded, runs
+from bayesimpact.data.input import Input
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 
+INPUT_COLUMN = "input"
 LONGEST = 200  # bytes of a recording's name that becomes a file's; file systems allow 255 in all
 _UNUSABLE = re.compile(r'[*?:<>|"\\]')  # patterns, and what some file systems refuse
 
@@ -43,6 +45,8 @@ def write_campaign(
         lines += ["", "[[recording]]", *_named(recording.name, file)]
         if campaign.stop:
             lines.append(f"case = {_toml(recording.case)}")
+        if recording.input is not None:
+            lines.append(f"input = {_toml(_input(recording.input))}")
         if recording.used is not None:
             lines.append(excluded(recording, runs(~recording.used)))
         (folder / file).write_text(_csv(recording, decimals), encoding="utf-8", newline="\n")
@@ -72,15 +76,24 @@ def _named(name: str, file: str) -> list[str]:
 
 def _csv(recording: Recording, decimals: int | None) -> str:
     times = recording.start + recording.times
-    pairs = zip(times.tolist(), recording.samples.tolist(), strict=True)
     if decimals is None or recording.order > 0:
-        rows = [f"time_s,{recording.quantity}_{recording.unit.replace('/', '_')}"]
-        rows += [f"{t!r},{sample!r}" for t, sample in pairs]
+        header = f"time_s,{recording.quantity}_{recording.unit.replace('/', '_')}"
+        columns = [list(map(repr, x.tolist())) for x in (times, recording.samples)]
     else:
         scale, places = (1.0, decimals + 3) if recording.angular else (1e3, decimals)
-        rows = ["time_s,angle_rad" if recording.angular else "time_s,displacement_mm"]
-        rows += [f"{t:.12g},{sample * scale:.{places}f}" for t, sample in pairs]
-    return "\n".join(rows) + "\n"
+        header = "time_s,angle_rad" if recording.angular else "time_s,displacement_mm"
+        columns = [[f"{t:.12g}" for t in times.tolist()]]
+        columns.append([f"{x * scale:.{places}f}" for x in recording.samples.tolist()])
+    if recording.input is not None:
+        header += f",{INPUT_COLUMN}"
+        columns.append(list(map(repr, recording.input.samples.tolist())))
+    return "\n".join([header, *map(",".join, zip(*columns, strict=True))]) + "\n"
+
+
+def _input(given: Input) -> dict[str, Any]:
+    free = {"gain": "free"} if given.free else {}
+    hold = {"hold": "band_limited"} if given.band_limited else {}
+    return {"column": INPUT_COLUMN, "kind": given.kind, **free, **hold}
 
 
 def _measurement(known: Measurement, quantity: str) -> list[str]:

@@ -292,8 +292,11 @@ def _change(
     points[1 + np.arange(2 * knots), columns] += steps
     intervals = np.full(points.shape[0], oscillator.intervals[r])
     counts = np.full(points.shape[0], n, dtype=np.int64)
+    inputs = oscillator.inputs
+    if inputs is not None:
+        inputs = inputs.of(np.full(points.shape[0], r))
     orders = np.full(points.shape[0], oscillator.orders[r])
-    out = general_motions(points, oscillator.campaign.mass, counts, intervals, laws, orders)
+    out = general_motions(points, oscillator.campaign.mass, counts, intervals, laws, orders, inputs)
     return np.asarray(out[1:] - out[0])
 
 

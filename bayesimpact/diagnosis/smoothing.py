@@ -27,10 +27,14 @@ SAVITZKY_GOLAY = replace(
 
 
 def proved_smoothing(campaign: Campaign) -> Fingerprint | None:
-    """The filter that the recordings prove and campaign.toml does not declare, or None."""
+    """The filter that the recordings prove and campaign.toml does not declare, or None.
+
+    Free decays only: the spectrum of an input may have gaps as well.
+    """
     if campaign.measurement.smoothing is not None or campaign.measurement.unfiltered:
         return None
-    return find_smoothing(campaign.recordings)
+    free = [r for r in campaign.recordings if r.input is None]
+    return find_smoothing(free) if free else None
 
 
 def filter_words(filtered: Fingerprint) -> str:

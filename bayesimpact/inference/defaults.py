@@ -9,6 +9,7 @@
 | v0 | uniform, +- 20 times the largest speed |
 | k2 | uniform, 0 to 1000 times the larger of the quick estimates of k1 and k2 |
 | sigma | log-uniform, eight decades about the estimate; log-normal, 10 %, about a stated noise |
+| input_gain | uniform, +- 100 times the quick estimate |
 | added effects | half-Cauchy (Cauchy with both signs) of a physical scale |
 | their shapes | log-normal, or log-uniform between two positive bounds |
 
@@ -79,7 +80,9 @@ def _default(
     if kind == "offset":  # what is added to a reading is limited by the readings
         reach = 20 * max(float(np.ptp(r.samples)) for r in campaign.recordings)
     stiffest = max([k1, *estimates.k2.values()])
+    gain = 100 * abs(estimates.input_gain or 1.0)
     ranges = {
+        "input_gain": (-gain, gain),
         "c1": (0.0, 2 * np.sqrt(k1 * mass)),
         "k1": (0.0, 100 * k1),
         "c2": (0.0, 40 * np.sqrt(stiffest * mass)),

@@ -102,14 +102,14 @@ def identify(
     priors = default_priors(oscillator, estimates, noise)
     guess = initial_theta(oscillator, estimates, noise)
     target = Target(Likelihood(oscillator, noise), priors)
-    from_guess = growing_horizon(target, guess)
+    from_guess = _climbed(target, guess)
     result = from_search = None
     if search:
         result, start = global_search(
             oscillator, priors, guess, rng=rng, evaluations=evaluations, callback=callback,
             scales=target.likelihood.scales,
         )  # fmt: skip
-        from_search = growing_horizon(target, start)
+        from_search = _climbed(target, start)
     ends = [fit for fit in (from_guess, from_search) if fit is not None]
     best = max(ends, key=lambda fit: fit.log_posterior)
     if (smooth := without_onsets(best)) is not campaign:
@@ -119,10 +119,21 @@ def identify(
         from_guess, from_search = ends[0], ends[1] if search else None
         best = max(ends, key=lambda fit: fit.log_posterior)
     refined = noise if given else refined_noise(best)
-    if refined != noise:
+    if refined is not noise:
         noise = refined
         best = find_mode(Target(Likelihood(oscillator, noise), priors), best.mode)
     return Identification(best, estimates, noise, result, from_guess, from_search)
+
+
+def _climbed(target: Target, start: Array) -> Fit:
+    """The mode over growing horizons or, where an input drives a recording, at once if better.
+
+    The first stretch of an input may tell nothing, and a driven motion forgets how it began.
+    """
+    grown = growing_horizon(target, start)
+    if target.oscillator.inputs is None:
+        return grown
+    return max(find_mode(target, start), grown, key=lambda fit: fit.log_posterior)
 
 
 def initial_theta(oscillator: Oscillator, estimates: Estimates, noise: Noise) -> Array:
@@ -163,7 +174,11 @@ def global_search(
         evaluations=evaluations or 1000 * lower.size,
         callback=callback,
     )
-    return result, profile.complete(result.best[None])[0]
+    winner = profile.complete(result.best[None])[0]
+    driven = [r.input is not None for r in oscillator.campaign.recordings]
+    own = profile.columns[driven][:, NUISANCE_SLOTS]
+    winner[own] = guess[own]  # the excerpt of a driven recording begins somewhere
+    return result, winner
 
 
 def _within(
@@ -187,7 +202,7 @@ class _Profile:
     ) -> None:
         layout = oscillator.layout
         self.weights = 1.0 / (np.ones(oscillator.counts.size) if scales is None else scales) ** 2
-        short = oscillator.campaign.truncated(duration).thinned(duration / SEARCH_SAMPLES)
+        short = oscillator.campaign.excerpt(duration).thinned(duration / SEARCH_SAMPLES)
         self.short = Oscillator(short, (), layout, None)
         self.guess = guess
         self.physical = layout.roles("physical")
@@ -224,7 +239,8 @@ class _Profile:
 
     def _solve(self, x: Array) -> tuple[Array, Array]:
         theta = np.repeat(self.guess[None], x.shape[0], axis=0)
-        theta[:, self.physical] = np.where(self.positive, np.exp(x), x)
+        coded = np.where(self.positive, x, 0.0)
+        theta[:, self.physical] = np.where(self.positive, np.exp(coded), x)
         best, lowest = theta, np.full(x.shape[0], np.inf)
         for last in (False, False, True):
             matrices = None if last else self._grams(theta)
@@ -244,7 +260,7 @@ class _Profile:
         s = self.short
         sums, _ = sums_of_squares(
             np.ascontiguousarray(theta), self.columns, self.constants, s.campaign.mass, s.samples,
-            s.starts, s.counts, s.intervals, s.orders,
+            s.starts, s.counts, s.intervals, s.orders, s.inputs,
         )  # fmt: skip
         return np.asarray((sums * self.weights).sum(axis=1))
 
@@ -252,7 +268,7 @@ class _Profile:
         s = self.short
         matrices, codes = grams(
             np.ascontiguousarray(theta), self.columns, self.constants, s.campaign.mass, s.samples,
-            s.starts, s.counts, s.intervals, s.orders,
+            s.starts, s.counts, s.intervals, s.orders, s.inputs,
         )  # fmt: skip
         failed = (codes != 0) | ~np.isfinite(matrices).all(axis=(2, 3))
         matrices *= self.weights[:, None, None]

@@ -109,6 +109,7 @@ class Likelihood:
                 o.counts,
                 o.intervals,
                 o.orders,
+                o.inputs,
             )
             return np.asarray(sums / self.scales**2)
         sums = np.empty((theta.shape[0], o.counts.size))
@@ -179,7 +180,7 @@ class Likelihood:
         constants = np.ascontiguousarray(o.layout.constants[:, base])
         values, slopes, codes = trajectories_and_derivatives(
             np.ascontiguousarray(theta), columns, constants, o.campaign.mass, o.counts, o.intervals,
-            int(o.counts.sum()), o.orders,
+            int(o.counts.sum()), o.orders, o.inputs,
         )  # fmt: skip
         result = []
         for r, (start, n) in enumerate(zip(o.starts, o.counts, strict=True)):

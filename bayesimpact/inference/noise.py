@@ -49,6 +49,7 @@ class Noise:
     level_error : relative standard error of `level`
     correlation_error : standard error of `correlation`
     source : how it was estimated, in words
+    is_bound : the level is known to be no more than this; it may be less
     scales : level of readings that are a displacement, a velocity, an acceleration (or angles'),
         over that of the campaign's first quantity
     """
@@ -59,6 +60,7 @@ class Noise:
     level_error: float = field(default=float("nan"), compare=False)
     correlation_error: float = field(default=float("nan"), compare=False)
     source: str = "assumed"
+    is_bound: bool = field(default=False, compare=False)
     scales: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
     @property

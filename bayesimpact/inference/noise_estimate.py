@@ -26,6 +26,7 @@ from bayesimpact.data.hum import Hum, find_hum
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise_driven import driven_noise
 from bayesimpact.response.displacement import displacement_of
 from bayesimpact.response.swings import rough_period
 
@@ -37,7 +38,6 @@ WINDOWS_PER_PERIOD = (12.0, 9.0, 7.0, 5.5, 4.5, 3.6, 3.0)
 SMALLEST, LARGEST = 12, 64
 KEPT = 0.999  # fraction of undisturbed windows that the outlier test keeps
 MARGIN = 0.05  # of the largest displacement, below rest: the free side, where no impact is
-HUM_COLUMNS = 4  # cosine and sine, and both growing by a line
 LEAST_NUMBERS = 60  # remainders that the free side must give
 LEAST_CORRELATION = 0.03  # a weaker AR(1) changes no interval by more than 3 %
 LEAST_GAIN = 4.0  # in log likelihood, to call the noise coloured: 1 false call in 200
@@ -56,8 +56,9 @@ def estimate_noise(campaign: Campaign) -> Noise:
 
     Where there are several quantities, the correlation is that of the first recording's.
 
-    For recordings that were smoothed the remainders say what the filter left; the raw level is
-    scaled up by the filter's power (see `smoothed_level`).
+    Free decays tell it best: recordings with a measured input only where there is none (see
+    `driven_noise`). For recordings that were smoothed the remainders say what the filter left; the
+    raw level is scaled up by the filter's power (see `smoothed_level`).
     """
     known, smoothing = campaign.measurement.noise, campaign.measurement.smoothing
     orders = list(dict.fromkeys(r.order for r in campaign.recordings))
@@ -76,11 +77,14 @@ def estimate_noise(campaign: Campaign) -> Noise:
 
 def _of_one(recordings: Sequence[Recording], smoothing: Smoothing | None) -> Noise:
     """Of recordings of one quantity, behind a filter or none."""
+    free = [r for r in recordings if r.input is None]
+    if not free:
+        return driven_noise(recordings, raw_noise(recordings), smoothing)
     if smoothing is None:
-        return raw_noise(recordings)
+        return raw_noise(free)
     from bayesimpact.inference.spectrum import smoothed_noise
 
-    return smoothed_noise(recordings, smoothing)
+    return smoothed_noise(free, smoothing)
 
 
 def raw_noise(recordings: Sequence[Recording]) -> Noise:
@@ -136,7 +140,7 @@ def _remainder(
 
     def left(free_side: bool) -> Array:
         rows = [
-            _without_hum(r, hum, _windows(r, length, free_side), basis)
+            _without_shapes(_shapes(r, hum), r, _windows(r, length, free_side), basis)
             for r, hum in zip(recordings, hums, strict=True)
         ]
         return np.concatenate(rows)
@@ -147,20 +151,37 @@ def _remainder(
     return _Remainder(values, basis) if values.shape[0] >= 4 else None
 
 
-def _without_hum(recording: Recording, hum: Hum | None, windows: Windows, basis: Array) -> Array:
-    """What polynomials leave of windows (count, length) of a recording, less a steady hum there.
+def _shapes(recording: Recording, hum: Hum | None) -> list[Array]:
+    """Signals (n,) that no polynomial follows, known but for their sizes.
 
-    Amplitude and phase may drift by a line through the recording: an error of the frequency, to
-    first order.
+    A steady hum, whose amplitude and phase may drift by a line through the recording: an error of
+    the frequency, to first order. The roughness of a motion under an input: that of the input's
+    double integral and, by the damping, of the triple one.
     """
-    values = _centred(recording.samples)[windows] @ basis
-    if hum is None or values.size < 8 * HUM_COLUMNS:
-        return np.asarray(values)
+    if recording.input is not None:
+        u = recording.input.force(1.0, recording.interval)
+        u = u - u.mean()
+        once = np.concatenate([[0.0], np.cumsum(0.5 * (u[1:] + u[:-1]))])
+        # exact for lines between samples
+        twice = np.concatenate([[0.0], np.cumsum(once[:-1] + u[:-1] / 3 + u[1:] / 6)])
+        return [twice, np.cumsum(twice)]
+    if hum is None:
+        return []
     times = recording.times
     angle = 2 * np.pi * hum.frequency * times
     place = times / times[-1]
-    shapes = [f * p for f in (np.cos(angle), np.sin(angle)) for p in (np.ones(place.size), place)]
+    return [f * p for f in (np.cos(angle), np.sin(angle)) for p in (np.ones(place.size), place)]
+
+
+def _without_shapes(
+    shapes: Sequence[Array], recording: Recording, windows: Windows, basis: Array
+) -> Array:
+    """What polynomials leave of windows (count, length) of a recording, less these shapes."""
+    values = _centred(recording.samples)[windows] @ basis
+    if not shapes or values.size < 8 * len(shapes):
+        return np.asarray(values)
     columns = np.stack([(shape[windows] @ basis).ravel() for shape in shapes], axis=1)
+    columns /= np.maximum(np.sqrt(np.sum(columns**2, axis=0)), 1e-300)
     found = np.linalg.lstsq(columns, values.ravel(), rcond=None)[0]
     return np.asarray(values - (columns @ found).reshape(values.shape))
 

@@ -105,7 +105,7 @@ def _proved(
 def without_lines(frequency: Array, power: Array, interval: float) -> tuple[Array, Array, float]:
     """A periodogram without the ordinates of a hum: far above all that noise would give there."""
     level = ndimage.median_filter(power, LINE_REACH, mode="nearest") / np.log(2.0)
-    noise = power < (np.log(power.size) + LINE) * level
+    noise = power < (np.log(max(power.size, 1)) + LINE) * level
     return frequency[noise], power[noise], interval
 
 

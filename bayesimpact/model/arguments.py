@@ -28,6 +28,38 @@ class ModelArguments:
     orders: Ints
 
 
+@dataclass(frozen=True, eq=False)
+class Inputs:
+    """Measured inputs of recordings.
+
+    Attributes
+    ----------
+    values : (M,) forces at the samples, N, recordings one after the other
+    starts : (R,) where a recording's input begins in `values`, -1 for a recording without one
+    """
+
+    values: Floats
+    starts: Ints
+
+    def of(self, recordings: Ints) -> Inputs:
+        """The same for these recordings (K,), in this order."""
+        return Inputs(self.values, self.starts[recordings])
+
+
+def check_inputs(inputs: Inputs | None, model: ModelArguments) -> tuple[Floats, Ints]:
+    """Values and starts, checked; raises InputError."""
+    if inputs is None:
+        return floats("inputs", (), 1), ints("inputs", np.full(model.counts.size, -1), 1)
+    values, starts = floats("inputs", inputs.values, 1), ints("inputs", inputs.starts, 1)
+    if starts.size != model.counts.size:
+        found = f"{starts.size} starts"
+        raise InputError("inputs", found, f"{model.counts.size}, one per recording")
+    ends = starts + model.counts
+    if not within(starts, -1, MANY) or np.any(ends[starts >= 0] > values.size):
+        raise InputError("inputs", "an input beyond the values", f"within 0..{values.size}")
+    return values, starts
+
+
 def check_model(
     theta: ArrayLike,
     columns: ArrayLike,

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from bayesimpact.model.blocks import Sink
 from bayesimpact.model.compiled import compiled, inner
+from bayesimpact.model.driven import run_driven
 from bayesimpact.model.kernel import run
-from bayesimpact.model.tables import shelf
+from bayesimpact.model.tables import Shelf, shelf
 from bayesimpact.model.threads import SHARES_PER_THREAD, available
 
 Floats = NDArray[np.float64]
@@ -49,15 +50,29 @@ def gather(q: Floats, theta: Floats, columns: Ints, constants: Floats) -> None:
         q[i] = theta[column] if column >= 0 else constants[i]
 
 
+@inner()
+def run_any(
+    q: Floats, mass: float, interval: float, n: int, sink: Sink, mine: Shelf, waves: Floats,
+    wave: int,
+) -> tuple[float, int, int]:  # fmt: skip
+    """Simulate a recording of n samples, whose input begins at waves[wave]; -1: it has none."""
+    if wave >= 0:
+        done: tuple[float, int, int] = run_driven(q, mass, interval, waves[wave : wave + n], sink)
+    else:
+        done = run(q, mass, interval, n, sink, mine)
+    return done
+
+
 @compiled()
 def work(
     theta: Floats, columns: Ints, constants: Floats, mass: float, samples: Floats, starts: Ints,
-    counts: Ints, intervals: Floats, orders: Ints, rows: Span, items: Span, sse: Floats,
-    values: Floats, codes: Ints,
+    counts: Ints, intervals: Floats, orders: Ints, waves: Floats, first_wave: Ints, rows: Span,
+    items: Span, sse: Floats, values: Floats, codes: Ints,
 ) -> None:  # fmt: skip
     """Fill one share of `codes` (B, R), and of `sse` (B, R) or, without samples, `values` (B, N).
 
     starts : where a recording begins in `samples` or `values`
+    waves, first_wave : inputs, N, and where a recording's begins in them, see `run_any`
     """
     q = np.empty(11)
     nothing = np.empty(0)
@@ -71,11 +86,15 @@ def work(
                 sink = Sink(
                     samples[first:end], nothing, nothing, no_events, orders[r], 1.0 / intervals[r]
                 )
-                sse[b, r], _, codes[b, r] = run(q, mass, intervals[r], counts[r], sink, mine)
+                sse[b, r], _, codes[b, r] = run_any(
+                    q, mass, intervals[r], counts[r], sink, mine, waves, first_wave[r]
+                )
             else:
                 out = values[b, first:end]
                 sink = Sink(samples, out, nothing, no_events, orders[r], 1.0 / intervals[r])
-                _, _, codes[b, r] = run(q, mass, intervals[r], counts[r], sink, mine)
+                _, _, codes[b, r] = run_any(
+                    q, mass, intervals[r], counts[r], sink, mine, waves, first_wave[r]
+                )
                 if codes[b, r] != 0:
                     out[:] = np.nan
 
@@ -83,15 +102,16 @@ def work(
 @compiled(parallel=True)
 def work_in_parts(
     theta: Floats, columns: Ints, constants: Floats, mass: float, samples: Floats, starts: Ints,
-    counts: Ints, intervals: Floats, orders: Ints, parts: int, sse: Floats,
+    counts: Ints, intervals: Floats, orders: Ints, waves: Floats, first_wave: Ints, parts: int,
+    sse: Floats,
     values: Floats, codes: Ints,
 ) -> None:  # fmt: skip
     """As `work`, all shares, in parallel; numba's threads wake up sooner than Python's."""
     for part in numba.prange(parts):
         rows, items = share(part, parts, codes.shape[0], codes.shape[1])
         work(
-            theta, columns, constants, mass, samples, starts, counts, intervals, orders, rows,
-            items, sse, values, codes,
+            theta, columns, constants, mass, samples, starts, counts, intervals, orders, waves,
+            first_wave, rows, items, sse, values, codes,
         )  # fmt: skip
 
 

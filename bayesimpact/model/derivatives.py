@@ -14,12 +14,19 @@ from numpy.typing import ArrayLike
 
 from bayesimpact.errors import InputError
 from bayesimpact.model import batch as compiled_batch
-from bayesimpact.model.arguments import ModelArguments, check_model, check_samples, no_samples
+from bayesimpact.model.arguments import (
+    Inputs,
+    ModelArguments,
+    check_inputs,
+    check_model,
+    check_samples,
+    no_samples,
+)
 from bayesimpact.model.basis import FORCED, PLAIN
-from bayesimpact.model.batch import Floats, Ints, Span, gather
+from bayesimpact.model.batch import Floats, Ints, Span, gather, run_any
 from bayesimpact.model.blocks import Sink
 from bayesimpact.model.compiled import compiled, inner
-from bayesimpact.model.kernel import run
+from bayesimpact.model.driven_sweep import sweep_driven
 from bayesimpact.model.scaled import OK, OVERFLOW, A
 from bayesimpact.model.sweep import Lanes, desk, sweep
 from bayesimpact.model.tables import Shelf, shelf
@@ -45,24 +52,25 @@ def wanted(active: Lanes, columns: Ints, forced: bool) -> Lanes:
 
 @compiled()
 def find_events(
-    q: Floats, mass: float, interval: float, n: int, no_data: Floats, events: Floats, mine: Shelf
-) -> tuple[Floats, int]:
+    q: Floats, mass: float, interval: float, n: int, no_data: Floats, events: Floats, mine: Shelf,
+    waves: Floats, wave: int,
+) -> tuple[Floats, int]:  # fmt: skip
     """Return (events, code): all events of one recording, in `events` if there is room."""
     nothing = np.empty(0)
-    _, count, code = run(
-        q, mass, interval, n, Sink(no_data, nothing, nothing, events, 0, 1.0), mine
-    )
+    sink = Sink(no_data, nothing, nothing, events, 0, 1.0)
+    _, count, code = run_any(q, mass, interval, n, sink, mine, waves, wave)
     if count > events.shape[0] and code == OK:
         events = np.empty((count, 2))
-        run(q, mass, interval, n, Sink(no_data, nothing, nothing, events, 0, 1.0), mine)
+        sink = Sink(no_data, nothing, nothing, events, 0, 1.0)
+        run_any(q, mass, interval, n, sink, mine, waves, wave)
     return events[:count], code
 
 
 @compiled(nogil=True)
 def work(
     theta: Floats, columns: Ints, constants: Floats, mass: float, samples: Floats, starts: Ints,
-    counts: Ints, intervals: Floats, orders: Ints, size: int, rows: Span, items: Span, out: Floats,
-    values: Floats, jacobian: Floats, codes: Ints,
+    counts: Ints, intervals: Floats, orders: Ints, waves: Floats, first_wave: Ints, size: int,
+    rows: Span, items: Span, out: Floats, values: Floats, jacobian: Floats, codes: Ints,
 ) -> None:  # fmt: skip
     """Fill one share of `codes` (B, R), and of the Gram matrices `out` (B, R, 12, 12).
 
@@ -86,12 +94,21 @@ def work(
                 own, slopes = values[first:end], jacobian[first:end]
             gram[:] = 0.0
             slopes[:] = 0.0
-            events, code = find_events(q, mass, intervals[r], n, samples[:0], first_events, mine)
+            wave = first_wave[r]
+            events, code = find_events(
+                q, mass, intervals[r], n, samples[:0], first_events, mine, waves, wave
+            )
             if code == OK:
-                sweep(
-                    q, mass, intervals[r], n, orders[r], events,
-                    wanted(active, columns[r], size > PLAIN), data, own, slopes, gram, room,
-                )  # fmt: skip
+                if wave >= 0:
+                    sweep_driven(
+                        q, mass, intervals[r], waves[wave : wave + n], events, columns[r], data,
+                        own, slopes, gram,
+                    )  # fmt: skip
+                else:
+                    sweep(
+                        q, mass, intervals[r], n, orders[r], events,
+                        wanted(active, columns[r], size > PLAIN), data, own, slopes, gram, room,
+                    )  # fmt: skip
                 if not math.isfinite(gram.sum() + own.sum() + slopes.sum()):
                     code = OVERFLOW
             if code != OK:
@@ -110,6 +127,7 @@ def trajectories_and_derivatives(
     intervals: ArrayLike,
     n_total: int,
     orders: ArrayLike | None = None,
+    inputs: Inputs | None = None,
 ) -> tuple[Floats, Floats, Ints]:
     """Predict all recordings, offset included, with the derivatives of every sample.
 
@@ -127,7 +145,9 @@ def trajectories_and_derivatives(
     if int(model.counts.sum()) != n_total:
         raise InputError("n_total", str(n_total), f"the sum of counts, {model.counts.sum()}")
     values, jacobian = np.empty(n_total), np.empty((n_total, 11))
-    codes = _work(model, mass, *no_samples(model), np.empty((0, 0, 12, 12)), values, jacobian)
+    codes = _work(
+        model, mass, *no_samples(model), inputs, np.empty((0, 0, 12, 12)), values, jacobian
+    )
     return values, jacobian, codes[0]
 
 
@@ -141,6 +161,7 @@ def grams(
     counts: ArrayLike,
     intervals: ArrayLike,
     orders: ArrayLike | None = None,
+    inputs: Inputs | None = None,
 ) -> tuple[Floats, Ints]:
     """Gram matrices of [J | residual] of every recording, without storing J.
 
@@ -156,23 +177,26 @@ def grams(
     model = check_model(thetas, columns, constants, intervals, counts, orders)
     data, first = check_samples(samples, starts, model)
     out = np.empty((len(model.theta), len(model.columns), 12, 12))
-    codes = _work(model, mass, data, first, out, np.empty(0), np.empty((0, 11)))
+    codes = _work(model, mass, data, first, inputs, out, np.empty(0), np.empty((0, 11)))
     if np.ndim(theta) == 1:
         return out[0], codes[0]
     return out, codes
 
 
 def _work(
-    model: ModelArguments, mass: float, data: Floats, first: Ints, out: Floats, values: Floats,
-    jacobian: Floats,
+    model: ModelArguments, mass: float, data: Floats, first: Ints, inputs: Inputs | None,
+    out: Floats, values: Floats, jacobian: Floats,
 ) -> Ints:  # fmt: skip
     batch, recordings = len(model.theta), len(model.columns)
     codes = np.empty((batch, recordings), dtype=np.int64)
-    # derivatives with respect to the force are wanted also where it is 0
-    forced = np.any(model.columns[:, A] >= 0) or np.any(model.constants[:, A] != 0.0)
+    waves, first_wave = check_inputs(inputs, model)
+    # derivatives with respect to a harmonic force are wanted also where it is 0
+    harmonic = first_wave < 0
+    forced = np.any((model.columns[:, A] >= 0) & harmonic)
+    forced = forced or np.any((model.constants[:, A] != 0.0) & harmonic)
     before = (
         model.theta, model.columns, model.constants, float(mass), data, first, model.counts,
-        model.intervals, model.orders, FORCED if forced else PLAIN,
+        model.intervals, model.orders, waves, first_wave, FORCED if forced else PLAIN,
     )  # fmt: skip
 
     by_rows = batch >= recordings

@@ -54,6 +54,7 @@ from bayesimpact.model.added.world import (
     G,
     World,
 )
+from bayesimpact.model.arguments import Inputs
 from bayesimpact.model.callback import floats_at, integers_at
 from bayesimpact.model.compiled import compiled, inner, typed
 from bayesimpact.model.threads import in_shares
@@ -203,8 +204,13 @@ def walk(w: Any) -> Any:
 
 
 @inner(inline="always")
-def integrate(q: Any, mass: Any, interval: Any, laws: Any, order: Any, out: Any, room: Any) -> Any:
-    """One trajectory, see `integrate_many`. The caller keeps `room`: w has only its addresses."""
+def integrate(
+    q: Any, mass: Any, interval: Any, laws: Any, order: Any, out: Any, wave: Any, room: Any
+) -> Any:
+    """One trajectory, see `integrate_many`. The caller keeps `room`: w has only its addresses.
+
+    wave : (n,) measured input, or (0,)
+    """
     if not admissible(q, mass):
         return BAD_PARAMETERS
     s, acting, work, tables, keys = room
@@ -213,12 +219,22 @@ def integrate(q: Any, mass: Any, interval: Any, laws: Any, order: Any, out: Any,
         mass, interval, out.size, order, floats_at(out.ctypes.data), floats_at(tables.ctypes.data),
         floats_at(keys.ctypes.data), laws.shape[0], floats_at(q.ctypes.data), q.ctypes.data,
         integers_at(laws.ctypes.data), integers_at(acting.ctypes.data),
-        floats_at(work.ctypes.data), floats_at(s.ctypes.data),
+        floats_at(work.ctypes.data), floats_at(s.ctypes.data), floats_at(wave.ctypes.data),
+        wave.size > 1, largest(wave),
     )  # fmt: skip
     code = walk(w)
     if code == OK and not np.all(np.isfinite(out)):
         return NOT_FINITE
     return code
+
+
+@inner()
+def largest(values: Any) -> Any:
+    """Largest size of values (n,), 0 without any."""
+    most = 0.0
+    for value in values:
+        most = max(most, abs(value))
+    return most
 
 
 @inner()
@@ -235,11 +251,15 @@ def room_for(size: Any) -> Any:
 
 @compiled(nogil=True)
 def _in_turn(
-    q: Any, mass: Any, intervals: Any, counts: Any, laws: Any, orders: Any, out: Any, codes: Any
-) -> Any:
+    q: Any, mass: Any, intervals: Any, counts: Any, laws: Any, orders: Any, waves: Any,
+    starts: Any, out: Any, codes: Any,
+) -> Any:  # fmt: skip
     room = room_for(laws.shape[0])
     for k in range(q.shape[0]):
-        codes[k] = integrate(q[k], mass, intervals[k], laws, orders[k], out[k, : counts[k]], room)
+        wave = waves[:0] if starts[k] < 0 else waves[starts[k] : starts[k] + counts[k]]
+        codes[k] = integrate(
+            q[k], mass, intervals[k], laws, orders[k], out[k, : counts[k]], wave, room
+        )
 
 
 def integrate_many(
@@ -249,6 +269,7 @@ def integrate_many(
     counts: NDArray[np.int64],
     laws: NDArray[np.int64],
     out: NDArray[np.float64],
+    inputs: Inputs | None = None,
     *,
     orders: NDArray[np.int64] | None = None,
     threads: bool | None = None,
@@ -263,6 +284,7 @@ def integrate_many(
     laws : (L, 5 to 8) table of laws, see `bayesimpact.model.effects.effect.law_row`
     out : (K, n) receives displacements, m, or what `orders` says, without the sensor's offset
     orders : (K,) which time derivative of the displacement; None: 0 throughout
+    inputs : measured forces, where recordings have any; the slot A is then their gain
     threads : share the work among threads; the numbers do not depend on it. None: where it pays
 
     Returns
@@ -274,19 +296,15 @@ def integrate_many(
     codes = np.zeros(q.shape[0], dtype=np.int64)
     q = np.ascontiguousarray(q)
     orders = np.zeros_like(counts) if orders is None else np.ascontiguousarray(orders)
+    given = inputs or Inputs(np.empty(0), np.full(q.shape[0], -1, dtype=np.int64))
+    waves, starts = np.ascontiguousarray(given.values), np.ascontiguousarray(given.starts)
 
     def run(first: int, end: int) -> None:
         some = slice(first, end)
         _in_turn(
-            q[some],
-            mass,
-            intervals[some],
-            counts[some],
-            table,
-            orders[some],
-            out[some],
-            codes[some],
-        )
+            q[some], mass, intervals[some], counts[some], table, orders[some], waves, starts[some],
+            out[some], codes[some],
+        )  # fmt: skip
 
     if threads or (threads is None and q.shape[0] >= THREADING_PAYS):
         in_shares(run, q.shape[0])

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.model.arguments import Inputs
 from bayesimpact.model.general import integrate_many
 from bayesimpact.model.parameters import BASE_SLOTS
 from bayesimpact.model.simulate import predictions
@@ -18,17 +19,29 @@ Counts = NDArray[np.int64]
 _OFFSET = BASE_SLOTS.index("offset")
 
 
-def motions(q: Array, mass: float, counts: Counts, intervals: Array, orders: Counts) -> Array:
+def motions(
+    q: Array, mass: float, counts: Counts, intervals: Array, orders: Counts,
+    inputs: Inputs | None = None,
+) -> Array:  # fmt: skip
     """True displacements (K, max counts), m (or derivatives), of base oscillators, slots (K, 11).
 
-    Rows are NaN where the parameters are inadmissible, and beyond their own count.
+    `inputs` are the rows' measured forces, where they have any. Rows are NaN where the parameters
+    are inadmissible, and beyond their own count.
     """
     base = q.copy()
     base[:, _OFFSET] = 0.0
     columns = np.arange(base.size, dtype=np.int64).reshape(base.shape)
     total = int(counts.sum())
     flat, codes = predictions(
-        base.reshape(1, -1), columns, np.zeros(base.shape), mass, counts, intervals, total, orders
+        base.reshape(1, -1),
+        columns,
+        np.zeros(base.shape),
+        mass,
+        counts,
+        intervals,
+        total,
+        orders,
+        inputs,
     )
     shape = (q.shape[0], int(counts.max()))
     if total == shape[0] * shape[1]:
@@ -41,11 +54,17 @@ def motions(q: Array, mass: float, counts: Counts, intervals: Array, orders: Cou
 
 
 def general_motions(
-    q: Array, mass: float, counts: Counts, intervals: Array, laws: NDArray[np.int64], orders: Counts
+    q: Array,
+    mass: float,
+    counts: Counts,
+    intervals: Array,
+    laws: NDArray[np.int64],
+    orders: Counts,
+    inputs: Inputs | None = None,
 ) -> Array:
     """The same for oscillators with added effects: slots (K, Q), table of laws (L, 7)."""
     out = np.empty((q.shape[0], int(counts.max())))
-    codes = integrate_many(q, mass, intervals, counts, laws, out, orders=orders)
+    codes = integrate_many(q, mass, intervals, counts, laws, out, inputs, orders=orders)
     out[np.arange(out.shape[1]) >= counts[:, None]] = np.nan
     out[codes != 0] = np.nan
     return out

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign, Smoothing
 from bayesimpact.model import measurement
+from bayesimpact.model.arguments import Inputs
 from bayesimpact.model.effects.effect import LAW_ROW, Effect, law_row
 from bayesimpact.model.motions import general_motions, motions
 from bayesimpact.model.parameters import (
@@ -70,6 +71,20 @@ class Oscillator:
     def samples(self) -> Array:
         """All recordings one after another, (N,), each in its own SI unit."""
         return np.concatenate([r.samples for r in self.campaign.recordings])
+
+    @cached_property
+    def inputs(self) -> Inputs | None:
+        """Measured forces on the mass, N, for a gain of 1; None when no recording has any."""
+        recordings = self.campaign.recordings
+        if all(r.input is None for r in recordings):
+            return None
+        parts, starts, total = [], [], 0
+        for r in recordings:
+            starts.append(-1 if r.input is None else total)
+            if r.input is not None:
+                parts.append(r.input.force(self.campaign.mass, r.interval))
+                total += r.samples.size
+        return Inputs(np.concatenate(parts), np.array(starts, dtype=np.int64))
 
     @cached_property
     def is_whole(self) -> bool:
@@ -186,10 +201,11 @@ class Oscillator:
         q = np.ascontiguousarray(slots.reshape(recordings.size, -1))
         orders = self.orders[recordings] if orders is None else orders
         counts, intervals = self.counts[recordings], self.intervals[recordings]
+        inputs = None if self.inputs is None else self.inputs.of(recordings)
         if self.is_base:
             base = np.ascontiguousarray(q[:, : len(BASE_SLOTS)])
-            return motions(base, self.campaign.mass, counts, intervals, orders)
-        return general_motions(q, self.campaign.mass, counts, intervals, self.laws, orders)
+            return motions(base, self.campaign.mass, counts, intervals, orders, inputs)
+        return general_motions(q, self.campaign.mass, counts, intervals, self.laws, orders, inputs)
 
 
 def build_oscillator(

@@ -32,6 +32,8 @@ SLOTS = BASE_SLOTS + ADDED_SLOTS
 WITHOUT = {"restitution": 1.0}
 """Values of added slots that nothing feeds, where that is not 0."""
 
+INPUT_GAIN = "input_gain"
+
 Role = Literal["physical", "effect", "nuisance", "noise"]
 _SHARED_UNITS = {"c1": "N s/m", "k1": "N/m", "c2": "N s/m", "g": "m"}
 _NUISANCE_UNITS = {"y0": "m", "v0": "m/s", "offset": "m"}
@@ -210,6 +212,8 @@ def _add_physical(campaign: Campaign, claimed: set[str], add: object) -> None:
             add(name, _SHARED_UNITS[name], "physical", lower)
     for case in campaign.cases:
         add(f"k2[{case}]", "N/m", "physical", 0.0)
+    if any(r.input is not None and r.input.free for r in campaign.recordings):
+        add(INPUT_GAIN, "-", "physical")
 
 
 def _maps(
@@ -230,10 +234,13 @@ def _maps(
         for slot, value in effect.sets.items():
             constants[:, SLOTS.index(slot)] = value
     for r, recording in enumerate(campaign.recordings):
+        constants[r, SLOTS.index("A")] = 0.0 if recording.input is None else 1.0
         plain = {
             "k2": f"k2[{recording.case}]",
             **{n: f"{n}[{recording.name}]" for n in _NUISANCE_UNITS},
         }
+        if recording.input is not None and recording.input.free:
+            plain["A"] = INPUT_GAIN
         for i, slot in enumerate(SLOTS):
             name = plain.get(slot, slot)
             if slot in binds:

@@ -2,8 +2,9 @@
 
     m y'' + c1 y' + k1 y + [c2 y' + k2 (y - g)] H(y - g) = A sin(w t + phase)   (Eq. 6)
 
-Per recording the simulator takes q = (c1, k1, c2, g, k2, y0, v0, A, w, phase, offset), SI units, t
-= 0 at the first sample; measured = the displacement y, or y' or y'' (the recording's `order`), plus
+or, for a recording with a measured input u (`Inputs`, linear between samples), = A u(t). Per
+recording the simulator takes q = (c1, k1, c2, g, k2, y0, v0, A, w, phase, offset), SI units, t = 0
+at the first sample; measured = the displacement y, or y' or y'' (the recording's `order`), plus
 offset. y'' jumps where a contact with damping begins or ends; a sample at that very instant reads
 what follows. A campaign's parameter vector theta feeds the q of
 every recording: q_i = theta[columns[r, i]], or constants[r, i] where columns[r, i] is -1. Without a
@@ -23,7 +24,9 @@ from bayesimpact.errors import InputError, SimulationError
 from bayesimpact.model import batch as compiled_batch
 from bayesimpact.model import scaled
 from bayesimpact.model.arguments import (
+    Inputs,
     ModelArguments,
+    check_inputs,
     check_model,
     check_samples,
     floats,
@@ -61,6 +64,7 @@ def sums_of_squares(
     counts: ArrayLike,
     intervals: ArrayLike,
     orders: ArrayLike | None = None,
+    inputs: Inputs | None = None,
 ) -> tuple[Floats, Ints]:
     """Compare a batch of parameter vectors with all recordings, in one compiled call.
 
@@ -74,6 +78,7 @@ def sums_of_squares(
     starts, counts : (R,) first sample and number of samples of every recording
     intervals : (R,) sampling intervals, s
     orders : (R,) which time derivative of the displacement is measured; None: 0 throughout
+    inputs : measured forces, where recordings have any
 
     Returns
     -------
@@ -83,7 +88,7 @@ def sums_of_squares(
     model = check_model(theta, columns, constants, intervals, counts, orders)
     data, first = check_samples(samples, starts, model)
     sse = np.empty((len(model.theta), len(model.columns)))
-    codes = _work(model, mass, data, first, sse, np.empty((0, 0)))
+    codes = _work(model, mass, data, first, inputs, sse, np.empty((0, 0)))
     return sse, codes
 
 
@@ -96,6 +101,7 @@ def predictions(
     intervals: ArrayLike,
     n_total: int,
     orders: ArrayLike | None = None,
+    inputs: Inputs | None = None,
 ) -> tuple[Floats, Ints]:
     """Predict what every recording would measure, offset included.
 
@@ -106,7 +112,7 @@ def predictions(
     if int(model.counts.sum()) != n_total:
         raise InputError("n_total", str(n_total), f"the sum of counts, {model.counts.sum()}")
     values = np.empty((len(model.theta), n_total))
-    codes = _work(model, mass, *no_samples(model), np.empty((0, 0)), values)
+    codes = _work(model, mass, *no_samples(model), inputs, np.empty((0, 0)), values)
     return values, codes
 
 
@@ -215,13 +221,14 @@ def simulate(
 
 
 def _work(
-    model: ModelArguments, mass: float, data: Floats, first: Ints, sse: Floats, values: Floats
-) -> Ints:
+    model: ModelArguments, mass: float, data: Floats, first: Ints, inputs: Inputs | None,
+    sse: Floats, values: Floats,
+) -> Ints:  # fmt: skip
     batch, recordings = len(model.theta), len(model.columns)
     codes = np.empty((batch, recordings), dtype=np.int64)
     arguments = (
         model.theta, model.columns, model.constants, float(mass), data, first, model.counts,
-        model.intervals, model.orders,
+        model.intervals, model.orders, *check_inputs(inputs, model),
     )  # fmt: skip
     parts = compiled_batch.parts(batch, int(model.counts.sum()))
     if parts == 1:

@@ -22,18 +22,19 @@ _PROBABILITY = 0.9  # of the bands of `response.check`
 def backbone_summary(posterior: Posterior, rng: np.random.Generator) -> BackboneSummary | None:
     """Bands, fraction inside and p-value per case; None when no recording has a complete swing.
 
+    Recordings with a measured input are left out: what shows in them is not the free motion.
     Damping ratios are those of Eq. 5, as in Fig. 13 of Tian et al. The p-values of the recordings
     of a case are combined by Fisher's method.
     """
     oscillator = posterior.fit.target.oscillator
-    size = len(oscillator.campaign.recordings)
+    free = [r for r, one in enumerate(oscillator.campaign.recordings) if one.input is None]
+    if not free:
+        return None
+    recordings = [oscillator.campaign.recordings[r] for r in free]
+    size = len(recordings)
     room = min(TOTAL // size, _SAMPLES // int(oscillator.counts.sum()))
     count = max(_FEWEST, min(_MOST, room))
-    found = [
-        _checked(posterior, r, simulated(posterior, r, count, rng))
-        for r in range(len(oscillator.campaign.recordings))
-    ]
-    recordings = oscillator.campaign.recordings
+    found = [_checked(posterior, r, simulated(posterior, r, count, rng)) for r in free]
     curves = [
         curve
         for recording, check in zip(recordings, found, strict=True)

@@ -180,6 +180,7 @@ def recording_results(fit: Fit) -> tuple[RecordingResult, ...]:
                 start=recording.start,
                 samples=np.asarray(recording.samples),
                 excluded=() if recording.used is None else tuple(runs(~recording.used)),
+                input="" if recording.input is None else recording.input.kind,
                 predicted=np.asarray(predicted),
                 quantity=recording.quantity,
                 displacement=fit.displacements[r] if recording.order > 0 else np.zeros(0),

@@ -77,7 +77,7 @@ def _recording_warnings(recording: Recording) -> list[str]:
     rest = np.median(recording.samples[recording.samples.size // 2 :])
     largest = int(np.argmax(np.abs(recording.samples - rest)))
     late = largest * recording.interval
-    if late > period:
+    if late > period and recording.input is None:
         warnings.append(
             f"the largest excursion comes {late:.3g} s after the first sample: if the recording "
             f"begins before the release, set start_s = {recording.start + late:.6g}"
@@ -104,7 +104,21 @@ def _recordings_block(campaign: Campaign) -> str:
         cells = [cell.rjust(width) for cell, width in zip(row, widths, strict=True)]
         cells[0], cells[-1] = row[0].ljust(widths[0]), row[-1]
         lines.append("  ".join(cells))
-    return "\n".join(lines)
+    return "\n".join([*lines, *_inputs(campaign)])
+
+
+def _inputs(campaign: Campaign) -> list[str]:
+    """A line per measured input."""
+    lines = []
+    for r in campaign.recordings:
+        if r.input is not None:
+            gain = "gain free" if r.input.free else "gain 1"
+            unit = {"force_N": "N", "base_m": "m", "base_m_s2": "m/s2"}[r.input.kind]
+            low, high = r.input.samples.min(), r.input.samples.max()
+            lines.append(
+                f"input of {r.name}: {r.input.kind}, {low:.4g} to {high:.4g} {unit}, {gain}"
+            )
+    return lines
 
 
 def _shown(recording: Recording) -> tuple[float, str]:

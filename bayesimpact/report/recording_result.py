@@ -30,6 +30,7 @@ class RecordingResult:
     quantity : what the probe reads
     displacement : (n,) of the model from the true rest, m; empty where the readings tell it
     scale : of its noise, over that of the first recording's quantity
+    input : kind of the measured input, "" for a free decay
     """
 
     name: str
@@ -46,6 +47,7 @@ class RecordingResult:
     quantity: str = "displacement"
     displacement: Array = field(default_factory=lambda: np.zeros(0))
     scale: float = 1.0
+    input: str = ""
 
     def motion(self, predicted: Array, offset: float) -> Array:
         """Displacement (n,), m, of a model that reads `predicted` (n,), from the true rest.

@@ -99,6 +99,13 @@ def _unstated(results: Results, mass: str) -> str:
 def ratio_words(results: Results) -> str:
     """Why ratios are given."""
     mass = "inertia" if results.angular else "mass"
+    if any(r.input for r in results.recordings) and not any(
+        row.name == "input_gain" for row in results.rows
+    ):
+        return (
+            f"A motion under a measured force tells the {mass} as well; here the one stated in "
+            "campaign.toml is taken as exact."
+        )
     if results.mass == 1.0:
         return (
             f"A free decay is the same for twice the {mass} with twice the stiffness and damping: "
@@ -124,6 +131,7 @@ def recordings_words(results: Results) -> str:
     )
     if any(r.excluded for r in results.recordings):
         words += " Shaded samples are set aside: they count nowhere, and a stand-in is drawn."
+    words += input_words(results)
     if results.notes:
         words += " Set aside: " + "; ".join(results.notes) + "."
     if len(results.recordings) > MOST_RECORDINGS:
@@ -132,6 +140,20 @@ def recordings_words(results: Results) -> str:
             "every case that fit worst."
         )
     return words
+
+
+def input_words(results: Results) -> str:
+    """Which recordings have a measured input, and what that means for them; "" without any."""
+    driven = [r.name for r in results.recordings if r.input]
+    if not driven:
+        return ""
+    shown = ", ".join(driven[:MOST_RECORDINGS])
+    shown += f" and {len(driven) - MOST_RECORDINGS} more" if len(driven) > MOST_RECORDINGS else ""
+    return (
+        " With a measured input, a line between samples unless campaign.toml says else: "
+        f"{shown}. The backbone knows "
+        "free decays only: they have no part in its check."
+    )
 
 
 def search_words(results: Results) -> str:

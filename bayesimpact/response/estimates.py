@@ -2,13 +2,14 @@
 
 k1, c1 and the rest readings come from the flights on the free side and from the free tails; gap,
 stiffness and damping of the stop from the cycles between lower turning points; y0 and v0 from the
-first samples. Nothing here follows a whole recording with impacts, so nothing can lock onto a
-wrong phase.
+first samples. Where a recording has a measured input, all of it comes from the equation of motion
+in weak form (`driven`). Nothing here follows a whole recording with impacts, so nothing can lock
+onto a wrong phase.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
@@ -17,7 +18,9 @@ import numpy as np
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.frozen import Picklable
 from bayesimpact.errors import InputError
+from bayesimpact.response import local
 from bayesimpact.response.contact import Contact, Free, fit_contact
+from bayesimpact.response.driven import estimate_driven
 from bayesimpact.response.flight import Flight
 from bayesimpact.response.observe import (
     Observed,
@@ -29,6 +32,7 @@ from bayesimpact.response.observe import (
 )
 from bayesimpact.response.preloaded import estimate_preloaded, is_preloaded
 from bayesimpact.response.release import Oscillator, release
+from bayesimpact.response.swings import rough_period
 
 MEANS = 100.0  # the mean of a velocity or an acceleration is as good as that of so many samples
 
@@ -48,6 +52,7 @@ class Estimates(Picklable):
     sd : parameter name -> rough standard error, names as in `values`; infinite where the recordings
         do not tell, for example k2 of an obstacle that was never touched
     impacts : recording -> number of cycles with an impact
+    input_gain : of the inputs whose gain is free, None without any
     """
 
     k1: float
@@ -61,6 +66,7 @@ class Estimates(Picklable):
     noise: Mapping[str, float]
     sd: Mapping[str, float]
     impacts: Mapping[str, int]
+    input_gain: float | None = None
 
     @property
     def values(self) -> dict[str, float]:
@@ -69,6 +75,8 @@ class Estimates(Picklable):
         if self.k2:
             named |= {"c2": self.c2, "g": self.g}
             named |= {f"k2[{case}]": value for case, value in self.k2.items()}
+        if self.input_gain is not None:
+            named["input_gain"] = self.input_gain
         for kind, table in (("y0", self.y0), ("v0", self.v0), ("offset", self.offset)):
             named |= {f"{kind}[{name}]": value for name, value in table.items()}
         return named
@@ -85,6 +93,8 @@ def estimate(campaign: Campaign) -> Estimates:
     ------
     InputError : the recordings show no oscillation that can be told from the noise
     """
+    if any(r.input is not None for r in campaign.recordings):
+        return _driven(campaign)
     observed = look(campaign)
     if campaign.stop:
         observed, flight = observe_flights(observed)
@@ -116,6 +126,39 @@ def estimate(campaign: Campaign) -> Estimates:
             relative = 0.5 * float(np.log(contact.k1 / _free(campaign.mass, flight).k1))
             flight = replace(flight, offsets=flight.offsets + relative * flight.offset_slope)
     return _collect(campaign, observed, flight, contact, impacts)
+
+
+def _driven(campaign: Campaign) -> Estimates:
+    """Estimates for a campaign with measured inputs; standard errors are not known."""
+    found, recordings = estimate_driven(campaign), campaign.recordings
+    known = found.k2[np.isfinite(found.k2)]
+    usual = float(np.exp(np.mean(np.log(known)))) if known.size else found.k1
+    k2 = np.where(np.isfinite(found.k2), found.k2, usual)
+    moved = [r.samples - o for r, o in zip(recordings, found.offset, strict=True)]
+    impacts = [int(np.sum((m[:-1] < found.gap) & (m[1:] >= found.gap))) for m in moved]
+
+    def named(values: Iterable[float]) -> Mapping[str, float]:
+        pairs = zip(recordings, values, strict=True)
+        return MappingProxyType({r.name: float(value) for r, value in pairs})
+
+    noises = [local.noise_level(r.samples, rough_period(r.samples)) for r in recordings]
+    free = any(r.input is not None and r.input.free for r in recordings)
+    estimates = Estimates(
+        k1=found.k1,
+        c1=found.c1,
+        g=found.gap,
+        c2=found.c2,
+        k2=MappingProxyType(dict(zip(campaign.cases, map(float, k2), strict=True))),
+        offset=named(found.offset),
+        y0=named(found.y0),
+        v0=named(found.v0),
+        noise=named(noises),
+        sd=MappingProxyType({}),
+        impacts=MappingProxyType({r.name: n for r, n in zip(recordings, impacts, strict=True)}),
+        input_gain=found.gain if free else None,
+    )
+    unknown = MappingProxyType({name: float("inf") for name in estimates.values})
+    return replace(estimates, sd=unknown)
 
 
 def _free(mass: float, flight: Flight) -> Free:

@@ -48,7 +48,9 @@ def measure(system: systems.System) -> Accuracy:
     with naive.mp.workdps(80):
         twin = naive.twin(q, mass, naive.mp.mpf(interval) * every, (n - 1) // every + 1)
     motion = simulate(**system.arguments)
-    events, code = find_events(q, mass, interval, n, np.empty(0), np.empty((64, 2)), shelf())
+    events, code = find_events(
+        q, mass, interval, n, np.empty(0), np.empty((64, 2)), shelf(), np.empty(0), -1
+    )
     assert code == 0
     scale = float(max(abs(y) for y in twin.displacement)) or 1.0
     pairs = zip(motion.displacement[::every], twin.displacement, strict=True)

@@ -58,6 +58,10 @@ FILES: dict[str, str | bytes] = {
     "Latin-1": TWO.replace("near", "näh").encode("latin-1"),
 }
 NEAR = 'column = "near"\nunit = "mm"\n'
+INPUT = (
+    f'{TOP}{ENTRY}time_column = 1\n{NEAR}[recording.input]\ncolumn = "far"\n'
+    'kind = "base_m_s2"\nscale = 3.0\ngain = "free"\nremove_mean = true\nhold = "band_limited"\n'
+)
 KEYS: dict[str, dict[str, tuple[str, str]]] = {
     "CampaignTable": {
         "name": (TOP + ENTRY, ""),
@@ -93,7 +97,15 @@ KEYS: dict[str, dict[str, tuple[str, str]]] = {
         "scale": (f"{TOP}{ENTRY}scale = 1.7\n", ""),
         "clock_ratio": (f"{TOP}{ENTRY}clock_ratio = 1.0002\n", "shifted"),
         "resample": (f"{TOP}{ENTRY}resample = true\n", "uneven"),
+        "input": (
+            f'{TOP}{ENTRY}time_column = 1\n{NEAR}input = {{ column = "far", kind = "force_N" }}\n',
+            "two columns",
+        ),
         "skip": (f'{TOP}{OTHER}{ENTRY}skip = "the probe came loose"\n', ""),
+    },
+    "InputTable": {
+        key: (INPUT, "two columns")
+        for key in ("column", "kind", "scale", "gain", "remove_mean", "hold")
     },
     "MeasurementTable": {
         "noise_um": (TOP + ENTRY + CHAIN + "noise_um = 7.0\n", ""),

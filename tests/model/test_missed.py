@@ -25,7 +25,7 @@ def worst_excess(system: systems.System) -> tuple[float, int]:
     """Largest breach of a regime, relative to the amplitude; and the number of events."""
     q, mass = system.q, system.mass
     events, code = find_events(
-        q, mass, system.interval, system.n, np.empty(0), np.empty((64, 2)), shelf()
+        q, mass, system.interval, system.n, np.empty(0), np.empty((64, 2)), shelf(), np.empty(0), -1
     )
     assert code == 0, system
     w1 = math.sqrt(q[1] / mass)

@@ -31,12 +31,17 @@ DETECTORS: tuple[Callable[[Recording], list[Fault]], ...] = (
 )
 """In this order, each on the recording without what the earlier ones found."""
 
+FREE = (find_start, find_noise, find_hum_notice)
+"""Those that know a free decay only: under an input, rest, loud parts and lines are what it makes
+of them."""
+DRIVEN = tuple(detector for detector in DETECTORS if detector not in FREE)
+
 
 def find_faults(campaign: Campaign) -> tuple[Fault, ...]:
     """Everything found in the recordings themselves, in their order; sample numbers as read."""
     found = [fault for r in campaign.recordings for fault in recording_faults(r)]
     found += find_duplicates(campaign.recordings)
-    found += loud_recordings(campaign.recordings)
+    found += loud_recordings([r for r in campaign.recordings if r.input is None])
     order = [r.name for r in campaign.recordings]
     return tuple(sorted(found, key=lambda fault: order.index(fault.recording)))
 
@@ -45,7 +50,7 @@ def recording_faults(recording: Recording) -> list[Fault]:
     """What is wrong with one recording, from itself alone."""
     found: list[Fault] = []
     rest, offset = recording, 0
-    for detector in DETECTORS:
+    for detector in DETECTORS if recording.input is None else DRIVEN:
         new = [_shifted(fault, offset) for fault in detector(rest)]
         new = [fault for fault in new if _fresh(recording, fault)]
         found += new
@@ -84,9 +89,7 @@ def applied(recording: Recording, faults: Sequence[Fault]) -> tuple[Recording, i
         raise ValueError(f"{end - first} of {recording.samples.size} samples left")
     if (first, end) == (0, recording.samples.size):
         return rest, 0
-    used = None if rest.used is None else rest.used[first:end]
-    start = recording.start + first * recording.interval
-    return replace(rest, samples=rest.samples[first:end], used=used, start=start), first
+    return rest.part(first, end), first
 
 
 def set_aside(campaign: Campaign) -> tuple[Campaign, tuple[Fault, ...]]:

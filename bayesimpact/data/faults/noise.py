@@ -76,11 +76,13 @@ def _fourth(x: np.ndarray) -> float:
 
 def loud_recordings(recordings: Sequence[Recording]) -> list[Fault]:
     """Notices of recordings whose noise is three times the usual one of the campaign, or more."""
+    if len(recordings) < 3:
+        return []
     levels = np.array([noise_level(r.samples) for r in recordings])
     usual = float(np.median(levels))
     if len({r.quantity for r in recordings}) > 1:
         return []
-    if len(recordings) < 3 or usual == 0.0:
+    if usual == 0.0:
         return []
     return [
         Fault(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.data.clock import check_rate
 from bayesimpact.data.gaps import on_clock
+from bayesimpact.data.input import Kind, unit_factor
 from bayesimpact.data.quantity import UNITS, Quantity, order_of, units_of
 from bayesimpact.data.readers.channel import TIME_UNITS, Channel
 from bayesimpact.data.table import Table
@@ -27,7 +28,7 @@ class Wanted:
     """What a [[recording]] says of the channel it means.
 
     `column` and `time_column` are names, or numbers counted from 1 in the file's (or block's) own
-    order; `start` and `end` in s.
+    order; `start` and `end` in s. `kind`: what is wanted is an input of that kind, no response.
     """
 
     column: str | int | None = None
@@ -39,6 +40,7 @@ class Wanted:
     start: float | None = None
     end: float | None = None
     resample: bool = False
+    kind: Kind | None = None
 
 
 def choose(path: Path, channels: Sequence[Channel], wanted: Wanted) -> Table:
@@ -52,9 +54,8 @@ def choose(path: Path, channels: Sequence[Channel], wanted: Wanted) -> Table:
     """
     inside = _of_block(path, channels, wanted.block)
     channel = _response(path, inside, wanted)
-    unit = _unit(path, channel, wanted)
+    quantity, factor = _quantity(path, channel, wanted)
     times = _times(path, channels, channel, wanted)
-    quantity, factor = UNITS[unit]
     first, last = _window(times, channel, wanted)
     if wanted.resample and not isinstance(times, tuple):
         first, last = _unbroken(times, channel.samples, first, last)
@@ -149,6 +150,14 @@ def _response(path: Path, channels: Sequence[Channel], wanted: Wanted) -> Channe
         return fitting[0]
     found = f"{'several' if fitting else 'no'} channels that may be the response"
     raise InputError(str(path), found, f'column = "...", one of {listed(channels)}')
+
+
+def _quantity(path: Path, channel: Channel, wanted: Wanted) -> tuple[Quantity, float]:
+    """What was measured, and the factor to SI units; an input's own quantity does not matter."""
+    if wanted.kind is not None:
+        where = f"{path}, channel {channel.name}"
+        return "displacement", unit_factor(where, wanted.kind, channel.unit)
+    return UNITS[_unit(path, channel, wanted)]
 
 
 def _unit(path: Path, channel: Channel, wanted: Wanted) -> str:

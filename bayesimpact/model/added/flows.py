@@ -48,6 +48,7 @@ from bayesimpact.model.added.world import (
     Y0,
     Flow,
     law_value,
+    strength,
 )
 from bayesimpact.model.compiled import inner
 
@@ -76,6 +77,7 @@ ENDS_ON_TURNS = KINK_AT_TURN | JUMP_AT_TURN
 # they are the usual ones, and by how much they are shortened and lengthened at most
 SLIGHT, LEAST_GAIN, MOST_GAIN = 0.07, 0.4, 3.2
 OUTSIDE = 0.04  # of a force that does not depend on the motion: nothing feeds its errors back
+DRIVEN = 4.0  # times its static deflection: a swing that an input is expected to cause
 OFF_TURN, OFF_PASSAGE = np.cos(np.pi / 8), np.sin(np.pi / 8)  # of the swing's four points
 
 
@@ -154,6 +156,8 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
     )  # fmt: skip
     if tame and not plain:
         longest *= gain(y, v, t, pace, longest, flow, w)
+    if w.driven:
+        longest = min(longest, w.interval)  # the input has a kink at every sample
     if grain < np.inf:
         longest = min(longest, GRAINS * grain / np.sqrt(K * (y - flow.rest) ** 2 + v * v))
     return flow, longest
@@ -169,6 +173,8 @@ def gain(y: Any, v: Any, t: Any, pace: Any, longest: Any, flow: Any, w: Any) -> 
     """
     q, w0, largest = w.q, np.sqrt(flow.K), 0.0
     speed = np.sqrt(flow.K * (y - flow.rest) ** 2 + v * v)
+    if w.driven:  # it may grow before the flow is renewed
+        speed = max(speed, DRIVEN * strength(w) * flow.inverse / w0)
     y0, v0, wait = speed / w0 * OFF_TURN, speed * OFF_PASSAGE, RENEWED * longest / 3.0
     if pace > 0.0:
         wait = 0.5 * np.pi / pace
@@ -185,7 +191,7 @@ def gain(y: Any, v: Any, t: Any, pace: Any, longest: Any, flow: Any, w: Any) -> 
             outside = left_out(flow.rest, 0.0, ts, flow, w)
         inside = left_out(flow.rest + ys, vs, ts, flow, w) - outside
         largest = max(largest, abs(inside) + OUTSIDE * abs(outside))
-    largest += OUTSIDE * abs(q[FORCE])
+    largest += OUTSIDE * strength(w)
     if largest == 0.0:
         return MOST_GAIN
     speed = max(speed, np.sqrt(q[K1] / w.mass * q[Y0] * q[Y0] + q[V0] * q[V0]))
@@ -287,6 +293,12 @@ def stride_of(longest: Any, w: Any) -> Any:
 
 
 @inner(forceinline=True)
+def not_beyond(left: Any, h: Any, w: Any) -> Any:
+    """A step of length h, ended on the next sample, `left` away, where the input has its kink."""
+    return (left, True) if w.driven and h >= left else (h, False)
+
+
+@inner(forceinline=True)
 def next_step(
     y: Any, v: Any, t: Any, n0: Any, j: Any, aligned: Any, longest: Any, flow: Any, w: Any
 ) -> Any:
@@ -296,23 +308,23 @@ def next_step(
     that they change smoothly with the parameters.
     """
     least = w.interval / MOST_CUTS
+    left = j * w.interval - t
     if flow.rough:
         if v != 0.0:
             away = (y - flow.gap) / v  # time since the touch, or minus the time to the release
             root = np.sqrt(abs(away) / longest)
             share = (SINCE if away >= 0.0 else UNTIL) * (LONGER if flow.placed else 1.0)
             longest *= min(1.0, max(FIRST, share * root * np.sqrt(root)))
-        return max(longest, least), False
+        return not_beyond(left, max(longest, least), w)
     if flow.first_at_turn < 1.0:
         pull = 2.0 * flow.b * v + flow.K * (y - flow.rest) - flow.inverse * n0
         if pull != 0.0:  # v / pull is the time since the turning point, or minus that to the next
             share = -SINCE_TURN if v * pull < 0.0 else UNTIL_TURN
             longest *= min(1.0, max(flow.first_at_turn, share * v / (pull * longest)))
-        return max(longest, least), False
+        return not_beyond(left, max(longest, least), w)
     longest = max(longest, least)
     stride = stride_of(longest, w)
     if aligned and stride > 0:
         return min(stride, w.n - j) * w.interval, True
-    left = j * w.interval - t
     cuts = int(np.ceil(left / longest * (1.0 - 1e-12)))
     return (left / cuts, False) if cuts > 1 else (left, True)

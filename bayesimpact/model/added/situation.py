@@ -92,7 +92,7 @@ def reaction(y: Any, v: Any, t: Any, column: Any, w: Any) -> Any:
     obstacle += body_force(OBSTACLE, y, v, w.s[GAP], column, w)
     if q[CONTACT_MASS] == 0.0:
         return obstacle
-    other = q[C1] * v + q[K1] * y + q[FRICTION] * w.s[SLIDING] - forcing(t, q)
+    other = q[C1] * v + q[K1] * y + q[FRICTION] * w.s[SLIDING] - forcing(t, w)
     other += laws_force(y, v, t, column, False, w) + body_force(FRAME, y, v, 0.0, column, w)
     mass = w.mass * (1.0 - share_of_frame(w))
     return (mass * obstacle - q[CONTACT_MASS] * other) / (mass + q[CONTACT_MASS])
@@ -168,7 +168,7 @@ def begin(w: Any) -> Any:
 def static_force(y: Any, t: Any, column: Any, w: Any) -> Any:
     """What pulls at the mass at rest, dry friction apart, N; the laws' states stand in `column`."""
     q, s = w.q, w.s
-    force = forcing(t, q) - q[K1] * y - laws_force(y, 0.0, t, column, False, w)
+    force = forcing(t, w) - q[K1] * y - laws_force(y, 0.0, t, column, False, w)
     force -= body_force(FRAME, y, 0.0, 0.0, column, w)
     if s[MODE] == TOUCHING:
         force -= q[K2] * (y - s[GAP]) + laws_force(y, 0.0, t, column, True, w)

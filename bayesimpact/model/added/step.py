@@ -39,7 +39,7 @@ def push(y: Any, v: Any, t: Any, column: Any, flow: Any, w: Any) -> Any:
             force -= law_value(law, LAW_FORCE, y, v, t, z, flow.gap, flow.touching, w)
     if flow.bodies:
         force += bodies_push(column, flow.touching == 1.0, w)
-    return force + forcing(t, w.q) if flow.forced else force
+    return force + forcing(t, w) if flow.forced else force
 
 
 @inner(forceinline=True)

@@ -45,6 +45,9 @@ class World(NamedTuple):
     acting: Any  # (L,) the laws that act in the present kind of motion come first
     work: Any  # (L + resonator.ROWS, WORK_COLUMNS)
     s: Any  # what holds between events, see `situation`
+    wave: Any  # (n,) measured input at the samples, N
+    driven: Any  # True when there is one
+    peak: Any  # its largest size, N
 
 
 class Flow(NamedTuple):
@@ -62,7 +65,7 @@ class Flow(NamedTuple):
     memory: Any  # True when a law has a state
     plain: Any  # True when nothing is added
     placed: Any  # True when no added force depends on the velocity
-    forced: Any  # True when the slots' harmonic force acts
+    forced: Any  # True when the slots' force acts
     turns: Any  # True when a force has a kink or jump at v = 0
     rough: Any  # True when a force is not smooth at the touch
     first_at_turn: Any  # shortest step where the motion turns, over the usual one
@@ -93,6 +96,18 @@ def law_value(
 
 
 @inner(forceinline=True)
-def forcing(t: Any, q: Any) -> Any:
-    """The slots' harmonic force, N."""
-    return q[FORCE] * np.sin(q[OMEGA] * t + q[PHASE])
+def forcing(t: Any, w: Any) -> Any:
+    """The slots' force, N: harmonic, or the measured input, which is linear between samples."""
+    q = w.q
+    if not w.driven:
+        return q[FORCE] * np.sin(q[OMEGA] * t + q[PHASE])
+    place = t / w.interval
+    i = min(max(int(place), 0), w.n - 2)
+    share = place - i
+    return q[FORCE] * ((1.0 - share) * w.wave[i] + share * w.wave[i + 1])
+
+
+@inner(forceinline=True)
+def strength(w: Any) -> Any:
+    """Largest size of the slots' force, N."""
+    return abs(w.q[FORCE]) * (w.peak if w.driven else 1.0)

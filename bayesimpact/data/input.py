@@ -1,0 +1,136 @@
+"""A measured input: the force on the mass, or the motion of the base, beside a recording."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.errors import InputError
+
+Kind = Literal["force_N", "base_m", "base_m_s2"]
+Floats = NDArray[np.float64]
+
+UNITS: dict[Kind, dict[str, float]] = {
+    "force_N": {"N": 1.0, "kN": 1e3, "mN": 1e-3},
+    "base_m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9},
+    "base_m_s2": {"m/s2": 1.0, "mm/s2": 1e-3, "g": 9.80665},
+}
+"""Units that a file may state for an input of each kind, in SI."""
+FAST = 0.2  # of the sampling rate: from five samples a period on a spline follows
+LITTLE = 0.01  # of a base's mean square, mean and trend apart, that may lie above that
+LEAST = 12  # samples, for a spline of degree five and a spectrum
+TAPS, FINE = 24, 1024  # of the filter on either side; of the spectrum that it comes from
+UNITLESS = ("", "V", "mV", "A", "mA")
+
+
+@dataclass(frozen=True, eq=False)
+class Input:
+    """What drives the oscillator while a recording runs.
+
+    Between its samples the force is linear in time (first-order hold). That weakens its component
+    of frequency f by sinc2(f / rate): a third is lost at a third of the sampling rate. Where the
+    input passed an anti-aliasing filter, `band_limited` puts it back: below half the rate the force
+    then is what it was (band-limited assumption: Pintelon and Schoukens 2012, System
+    Identification); the images above, which the mass hardly follows, stay. `base_m` and
+    `base_m_s2`: the recording is of the displacement relative to the base, and the force is minus
+    the mass times the base's acceleration.
+
+    Attributes
+    ----------
+    samples : (n,) read-only, one per sample of the recording; N (N m for an angle), m or m/s2
+    kind : what was measured
+    free : its gain is an unknown, `input_gain`; else it is 1
+    band_limited : see above
+    """
+
+    samples: Floats
+    kind: Kind = "force_N"
+    free: bool = False
+    band_limited: bool = False
+
+    def __post_init__(self) -> None:
+        samples = np.array(self.samples, dtype=np.float64)
+        samples.setflags(write=False)
+        object.__setattr__(self, "samples", samples)
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        self.__dict__.update(state)
+        self.__post_init__()  # unpickled arrays can be written
+
+    def part(self, first: int, end: int) -> Input:
+        """Samples first..end-1."""
+        return replace(self, samples=self.samples[first:end])
+
+    def force(self, mass: float, interval: float) -> Floats:
+        """The force on the mass at the samples, (n,), N, for a gain of 1.
+
+        The acceleration of a base whose displacement was recorded is the second derivative of the
+        interpolating spline of degree five.
+        """
+        force = self._force(mass, interval)
+        return sharpened(force) if self.band_limited else force
+
+    def _force(self, mass: float, interval: float) -> Floats:
+        if self.kind == "force_N":
+            return self.samples
+        if self.kind == "base_m_s2":
+            return -mass * self.samples
+        from scipy.interpolate import make_interp_spline
+
+        times = np.arange(self.samples.size) * interval
+        spline = make_interp_spline(times, self.samples, 5)
+        return np.asarray(-mass * spline.derivative(2)(times), dtype=np.float64)
+
+
+def sharpened(samples: Floats) -> Floats:
+    """Samples (n,) whose first-order hold has the spectrum that a band-limited signal had.
+
+    A symmetric filter of gain 1 / sinc2, tapered (Hann); beyond the ends samples are mirrored.
+    """
+    half = min(TAPS, samples.size - 1)
+    frequency: Floats = np.fft.rfftfreq(FINE).astype(np.float64)
+    weights = np.roll(np.fft.irfft(np.sinc(frequency) ** -2.0, FINE), FINE // 2)
+    taps = weights[FINE // 2 - half : FINE // 2 + half + 1] * np.hanning(2 * half + 3)[1:-1]
+    mirrored = np.pad(samples, half, mode="reflect", reflect_type="odd")
+    return np.convolve(mirrored, taps / taps.sum(), "valid")
+
+
+def checked(where: str, given: Input) -> Input:
+    """The same input.
+
+    Raises
+    ------
+    InputError
+        for an input that never changes; for a base's displacement that changes too fast between
+        samples for a second derivative: more than 1 % of its mean square above a fifth of the
+        sampling rate, where five samples or fewer make a period.
+    """
+    x = given.samples
+    if x.max() == x.min():
+        found = f"{x.size} values that all equal {x[0]:.6g}"
+        raise InputError(f"{where}, key input", found, "an input that changes")
+    if given.kind != "base_m":
+        return given
+    if x.size < LEAST:
+        raise InputError(f"{where}, key input", f"{x.size} samples", f"{LEAST} or more of a base")
+    place = np.linspace(-1.0, 1.0, x.size)
+    power = np.abs(np.fft.rfft(x - np.polyval(np.polyfit(place, x, 1), place))) ** 2
+    fast = float(power[np.fft.rfftfreq(x.size) > FAST].sum() / max(float(power.sum()), 1e-300))
+    if fast > LITTLE:
+        found = f"a base sampled too coarsely: {100 * fast:.2g} % of its power above a fifth of the"
+        accepted = f"at most {100 * LITTLE:g} % there; or the base's acceleration, base_m_s2"
+        raise InputError(f"{where}, key input", f"{found} sampling rate", accepted)
+    return given
+
+
+def unit_factor(where: str, kind: Kind, unit: str) -> float:
+    """From the unit that a file states for an input to SI; 1 where it states none, or volts."""
+    if unit in UNITLESS:
+        return 1.0
+    if unit not in UNITS[kind]:
+        accepted = f'for kind = "{kind}" one of {", ".join(UNITS[kind])}'
+        raise InputError(f"{where}, key input", f"a column in {unit}", accepted)
+    return UNITS[kind][unit]

@@ -1,0 +1,90 @@
+"""Noise of recordings with a measured input, where the motion is as fast as the input.
+
+Polynomials over short windows follow a slow motion, driven or not. Where a window of the fewest
+samples spans more than a part of a period, what they leave is motion. The spectrum then tells the
+noise where the input has none: above its band. Nonlinear distortion may fall there too, and the
+recorder's own filter cuts noise; both show as a floor that is not flat, of which the loudest part
+is taken: no less than the noise is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.data.campaign import Smoothing
+from bayesimpact.data.recording import Recording
+from bayesimpact.inference.noise import Noise
+from bayesimpact.model.measurement import gain
+from bayesimpact.response.swings import rough_period
+
+Array = NDArray[np.float64]
+
+SHORTEST_PERIOD = 36.0  # samples: three windows of twelve
+BAND = 64  # ordinates of a band, over which powers are averaged
+SILENT = 1e-3  # of the input's strongest band: below, it leaves a gap
+LEAST_BANDS = 4  # above the input's own
+TOP = 0.98  # of half the sampling rate: beyond, a recorder's filter may end
+FLAT = 4.0  # loudest over quietest band, in power, up to which a floor is flat
+MEDIAN = float(np.log(2.0))  # of an ordinate of white noise, over its mean
+
+
+def driven_noise(
+    recordings: Sequence[Recording], remainders: Noise, smoothing: Smoothing | None = None
+) -> Noise:
+    """The level from the gaps that the inputs leave, or what the polynomial `remainders` say.
+
+    The latter where the motion is slow against the sampling, or no input leaves a gap: the source
+    then says that they are no more than a bound, which the residual of a fit may lower. Behind a
+    filter, the level is raised by what the filter takes of white noise; also a bound.
+    """
+    if smoothing is not None:
+        behind = driven_noise(recordings, remainders)
+        frequency: Array = np.linspace(0.0, 0.5 / recordings[0].interval, 2001)
+        passed = float(np.mean(gain(smoothing, recordings[0].interval, frequency) ** 2))
+        level = behind.level / np.sqrt(passed)
+        return replace(
+            behind, correlation=0.0, smoothing=smoothing, level=float(level), is_bound=True
+        )
+    fast = [r for r in recordings if rough_period(r.samples) < SHORTEST_PERIOD]
+    if not fast:
+        return remainders
+    floors = [bands for r in fast if (bands := _gap(r)) is not None]
+    if not floors:
+        bound = "polynomial remainders, a bound: the motion is fast and the input leaves no gap"
+        return replace(remainders, correlation=0.0, source=bound, is_bound=True)
+    powers = np.concatenate(floors)
+    flat = float(powers.max()) <= FLAT * float(powers.min())
+    power = float(np.mean(powers) if flat else powers.max())
+    said = "" if flat else ", its loudest part"
+    return Noise(
+        level=float(np.sqrt(power)),
+        level_error=float(np.sqrt(0.5 / (powers.size * BAND))),
+        correlation_error=0.0,
+        source=f"spectrum above the input's band{said}",
+        is_bound=not flat,
+    )
+
+
+def _gap(recording: Recording) -> Array | None:
+    """Mean powers per sample, m2, of bands above the input's own; None where there are few."""
+    assert recording.input is not None
+    driving, response = _powers(recording.input.samples), _powers(recording.samples)
+    count = int(TOP * driving.size) // BAND
+    bands = driving[: count * BAND].reshape(count, BAND).mean(axis=1)
+    loud = np.flatnonzero(bands > SILENT * bands.max())
+    first = int(loud[-1]) + 2 if loud.size else 0  # one more: a window leaks into its neighbour
+    if count - first < LEAST_BANDS:
+        return None
+    ordinates = response[first * BAND : count * BAND].reshape(-1, BAND)
+    return np.asarray(np.median(ordinates, axis=1) / MEDIAN)  # blind to lines of a hum
+
+
+def _powers(samples: Array) -> Array:
+    """Periodogram under a Hann window, (n // 2 + 1,), of mean 1 for white noise of variance 1."""
+    window = np.hanning(samples.size)
+    spectrum = np.fft.rfft((samples - samples.mean()) * window)
+    return np.asarray(np.abs(spectrum) ** 2 / np.sum(window**2))

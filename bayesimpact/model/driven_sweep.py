@@ -1,0 +1,142 @@
+"""Derivatives of a driven recording whose events are known, carried from sample to sample.
+
+The derivatives of displacement and velocity obey the motion's own equation, driven by what a
+parameter changes of the forces; their responses are the integrals in `driven.Responses`. All of
+c1 ... A (the first eight of q) are carried side by side; through an event they follow the saltation
+rule of `sweep`. The input is continuous, so nothing is added there.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.model.compiled import inner, typed
+from bayesimpact.model.driven import Responses, advance_driven, responses
+from bayesimpact.model.scaled import C1, C2, K1, K2, OFFSET, V0, Y0, A, G, begins_in_contact, scale
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+LANES = 8
+RESIDUAL = 11
+
+
+@inner()
+def fill_lanes(slopes: Floats, wanted: Floats, q: Floats, mass: float, interval: float) -> None:
+    """Fill `slopes` (2, 3, LANES): derivatives of beta, K and p of flight and contact.
+
+    wanted : (LANES,) 1.0 or 0.0
+    """
+    per_mass = interval * interval / mass
+    slopes[:] = 0.0
+    slopes[:, 0, C1] = interval / mass
+    slopes[1, 0, C2] = interval / mass
+    slopes[:, 1, K1] = per_mass
+    slopes[1, 1, K2] = per_mass
+    if q[G] < math.inf:
+        slopes[1, 2, K2] = per_mass * q[G]
+        slopes[1, 2, G] = per_mass * q[K2]
+    for i in range(LANES):
+        slopes[:, :, i] *= wanted[i]
+
+
+@inner(forceinline=True, fastmath={"contract"})
+def carry_driven(
+    after: Responses, slopes: Floats, side: int, y: float, v: float, p: float, r: float,
+    now: float, rise: float, dy: Floats, dv: Floats,
+) -> None:  # fmt: skip
+    """Bring (dy, dv) through the motion from (y, v) under p + r s; now, rise: p and r per gain."""
+    beta, K, S, D = after.beta, after.K, after.S, after.D
+    B, R, G_, H = after.B, after.R, after.G, after.H
+    m = v + beta * y
+    turned = S - beta * H - K * G_  # H'
+    by_beta = K * G_ * y - H * v - p * G_ - r * after.P
+    rate_by_beta = K * H * y - turned * v - p * H - r * G_
+    by_K = -H * y - G_ * m - p * after.P - r * after.Q
+    rate_by_K = -turned * y - H * m - p * G_ - r * after.P
+    C, KS = D + beta * S, K * S
+    for i in range(LANES):
+        a, b, c = slopes[side, 0, i], slopes[side, 1, i], slopes[side, 2, i]
+        y_i, v_i = dy[i], dv[i]
+        dy[i] = C * y_i + S * v_i + (a * by_beta + b * by_K + c * B)
+        dv[i] = D * v_i - KS * y_i + (a * rate_by_beta + b * rate_by_K + c * S)
+    dy[A] += now * B + rise * R
+    dv[A] += now * S + rise * B
+
+
+@inner()
+def record(
+    i: int, y: float, offset: float, dy: Floats, row: Floats, data: Floats, values: Floats,
+    jacobian: Floats, gram: Floats,
+) -> None:  # fmt: skip
+    """Write sample i, or add its products to `gram` (12, 12); `row` (12,) is room for them."""
+    if data.size == 0:
+        values[i] = y + offset
+        for k in range(LANES):
+            jacobian[i, k] = dy[k]
+        jacobian[i, OFFSET] = row[OFFSET]
+        return
+    for k in range(LANES):
+        row[k] = dy[k]
+    row[RESIDUAL] = data[i] - offset - y
+    for k in range(RESIDUAL + 1):
+        mine = row[k]
+        for h in range(RESIDUAL + 1):
+            gram[k, h] += mine * row[h]
+
+
+@inner()
+def sweep_driven(
+    q: Floats, mass: float, interval: float, wave: Floats, events: Floats, columns: Ints,
+    data: Floats, values: Floats, jacobian: Floats, gram: Floats,
+) -> None:  # fmt: skip
+    """Pass over one recording; add to `gram` (12, 12) if `data` has samples, else fill the others.
+
+    events : (k, 2) times and velocities of all events, in sampling intervals
+    columns : (11,) -1 where a derivative is not wanted; it is left 0
+    values, jacobian : (n,), (n, 11)
+    """
+    motion = scale(q, mass, interval)
+    contact = begins_in_contact(q)
+    per_mass = interval * interval / mass
+    hold = per_mass * q[K2] * q[G] if q[G] < math.inf else 0.0
+    wanted, row = np.zeros(LANES), np.zeros(RESIDUAL + 1)
+    dy, dv, slopes = np.zeros(LANES), np.zeros(LANES), np.empty((2, 3, LANES))
+    for k in range(LANES):
+        wanted[k] = 1.0 if columns[k] >= 0 else 0.0
+    row[OFFSET] = 1.0 if columns[OFFSET] >= 0 else 0.0
+    fill_lanes(slopes, wanted, q, mass, interval)
+    dy[Y0], dv[V0] = wanted[Y0], interval * wanted[V0]
+    free = responses(2.0 * motion.b_flight, motion.K_flight, 1.0)
+    touching = responses(2.0 * motion.b_contact, motion.K_contact, 1.0)
+    y, v, e = q[Y0], q[V0] * interval, typed(0)
+    for i in range(wave.size):
+        record(i, y, q[OFFSET], dy, row, data, values, jacobian, gram)
+        if i == wave.size - 1:
+            break
+        now = per_mass * wave[i]
+        rise = per_mass * wave[i + 1] - now
+        r = q[A] * rise
+        now_A, rise_A = now * wanted[A], rise * wanted[A]
+        t = 0.0
+        while e < events.shape[0] and events[e, 0] <= i + 1.0:
+            flow, side, level = (touching, 1, hold) if contact else (free, 0, 0.0)
+            wait = events[e, 0] - i - t
+            after = responses(flow.beta, flow.K, wait)
+            p = q[A] * (now + rise * t) + level
+            carry_driven(after, slopes, side, y, v, p, r, now_A + rise_A * t, rise_A, dy, dv)
+            jump = (q[C2] if contact else -q[C2]) * interval / mass
+            for k in range(LANES):
+                dv[k] += jump * dy[k]
+            dv[G] -= jump * wanted[G]
+            t, y, v = events[e, 0] - i, motion.gap, events[e, 1]
+            contact = not contact
+            e += 1
+        flow, side, level = (touching, 1, hold) if contact else (free, 0, 0.0)
+        after = flow if t == 0.0 else responses(flow.beta, flow.K, 1.0 - t)
+        p = q[A] * (now + rise * t) + level
+        carry_driven(after, slopes, side, y, v, p, r, now_A + rise_A * t, rise_A, dy, dv)
+        y, v = advance_driven(after, y, v, p, r)

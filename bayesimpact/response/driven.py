@@ -1,0 +1,230 @@
+"""Quick estimates where recordings have a measured input: the equation of motion in weak form.
+
+The equation is multiplied by a smooth bump phi that vanishes outside a short stretch, integrated
+over it, and the derivatives are moved onto the bump by parts (modulating functions: Shinbrot 1957,
+Trans. ASME 79:1579):
+
+    int m phi'' y - c1 phi' y + k1 phi y + k2 phi w - c2 phi' w = int phi u,     w = max(y - g, 0)
+
+for (y - g)' = w' in contact. So no reading is differentiated, initial conditions do not enter, and
+all unknowns but the gap are found by linear least squares over many stretches; the reading at which
+a recording touches the stop is scanned, for each by itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.recording import Recording
+from bayesimpact.response.swings import rough_period
+
+Floats = NDArray[np.float64]
+
+POWER = 6  # of the bump (1 - x^2)^POWER: smooth enough for sums over samples to be integrals
+FREE, STOPPED = 0.6, 0.2  # half width of the bump, natural periods, without and with a stop
+LEAST_HALF = 4  # samples
+ROUNDS = 3
+PLACES = 41  # of the stop that are tried at once, between these quantiles of the readings
+LOW, HIGH = 0.02, 0.98
+FINER = 3  # rounds in which their spacing shrinks
+SEEN = 1.5  # times less is left, in squares, where a stop is seen
+LEAST_DAMPING = 1e-3  # damping ratio
+STARTING = 1 / 6  # of a natural period: readings that tell the initial motion
+
+
+@dataclass(frozen=True, eq=False)
+class Driven:
+    """What the weak form gives; names as in `bayesimpact.response.estimates.Estimates`.
+
+    k2 : (cases,) NaN where an obstacle was never touched; gap infinite without a stop
+    gain : of inputs with a free one; 1 without
+    offset, y0, v0 : one per recording
+    """
+
+    k1: float
+    c1: float
+    gap: float
+    c2: float
+    k2: Floats
+    gain: float
+    offset: Floats
+    y0: Floats
+    v0: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """Stretches of one recording: weights on samples, and products that do not depend on the gap.
+
+    phi, slope : (w,) weights of int phi x and of int phi' x
+    base : (n, 4) int phi y, -int phi' y, int phi u, int phi; target (n,) -int m phi'' y
+    """
+
+    phi: Floats
+    slope: Floats
+    base: Floats
+    target: Floats
+    hop: int
+
+
+def estimate_driven(campaign: Campaign) -> Driven:
+    """Estimates from all recordings of a campaign, free decays among them."""
+    recordings = campaign.recordings
+    natural = float(np.median([rough_period(r.samples) * r.interval for r in recordings]))
+    touch = np.full(len(recordings), np.inf)
+    for _ in range(ROUNDS):  # the width of the bumps follows the natural period
+        width = (STOPPED if campaign.stop else FREE) * natural
+        rows = [_rows(r, campaign.mass, width) for r in recordings]
+        if campaign.stop:
+            touch = np.array([_touch(campaign, r, own) for r, own in enumerate(rows)])
+        found = _solve(campaign, rows, touch)
+        stiffness = found.k1 if found.k1 > 0.0 else campaign.mass * (2 * np.pi / natural) ** 2
+        natural = 2 * np.pi * float(np.sqrt(campaign.mass / stiffness))
+    return _made_usable(campaign, found, stiffness)
+
+
+def bump(half: int) -> tuple[Floats, Floats, Floats]:
+    """phi, phi' and phi'' at 2 half + 1 samples, the sample as unit of time."""
+    x = np.linspace(-1.0, 1.0, 2 * half + 1)
+    inside = 1.0 - x * x
+    phi = inside**POWER
+    slope = -2.0 * POWER * x * inside ** (POWER - 1) / half
+    bend = 4.0 * POWER * (POWER - 1) * x * x * inside ** (POWER - 2)
+    return phi, slope, (bend - 2.0 * POWER * inside ** (POWER - 1)) / half**2
+
+
+def _rows(recording: Recording, mass: float, width: float) -> _Rows:
+    dt, most = recording.interval, (recording.samples.size - 1) // 4
+    half = max(min(round(width / dt), most), min(LEAST_HALF, most))
+    phi, slope, bend = bump(half)
+    phi, slope, bend = phi * dt, slope, bend / dt
+    hop = max(1, half // 2)
+    y = _products(recording.samples, hop, phi, -slope, bend)
+    push = np.zeros(y.shape[0])
+    if recording.input is not None:
+        # of a line between samples, to second order: the triangle's variance is dt^2 / 6
+        held = phi + dt * dt * bend / 12.0
+        push = _products(recording.input.force(mass, dt), hop, held)[:, 0]
+    whole = np.full(push.size, phi.sum())
+    kept = np.ones(push.size, dtype=bool)
+    if recording.used is not None:
+        kept = _products(np.where(recording.used, 0.0, 1.0), hop, np.ones(phi.size))[:, 0] == 0.0
+    weight = np.where(kept, 1.0, 0.0)
+    base = np.column_stack([y[:, 0], y[:, 1], push, whole]) * weight[:, None]
+    return _Rows(phi, -slope, base, -mass * y[:, 2] * weight, hop)
+
+
+def _products(x: Floats, hop: int, *weights: Floats) -> Floats:
+    """Sums of weights (w,) times x over windows that start `hop` samples apart, (n, weights)."""
+    windows = np.lib.stride_tricks.sliding_window_view(x, weights[0].size)[::hop]
+    return np.asarray(windows @ np.column_stack(weights))
+
+
+def _system(
+    campaign: Campaign, chosen: Sequence[int], rows: Sequence[_Rows], touch: Floats
+) -> tuple[Floats, Floats]:
+    """Matrix and right-hand side of the recordings `chosen`, whose rows and readings at the touch
+    these are; unknowns k1, c1, gain, [c2, k2 of every case], k1 times offsets.
+
+    Where no gain is free, its column is 0.
+    """
+    cases = campaign.cases
+    first = 3 + (1 + len(cases) if campaign.stop else 0)
+    blocks, right = [], []
+    for i, (r, own) in enumerate(zip(chosen, rows, strict=True)):
+        recording = campaign.recordings[r]
+        block = np.zeros((own.target.size, first + len(rows)))
+        block[:, :2] = own.base[:, :2]
+        target = own.target
+        if recording.input is not None and recording.input.free:
+            block[:, 2] = -own.base[:, 2]
+        else:
+            target = target + own.base[:, 2]
+        if np.isfinite(touch[i]):
+            inside = np.maximum(recording.samples - touch[i], 0.0)
+            touched = _products(inside, own.hop, own.phi, own.slope)
+            touched[own.base[:, 3] == 0.0] = 0.0
+            block[:, 3] = touched[:, 1]
+            block[:, 4 + cases.index(recording.case)] = touched[:, 0]
+        block[:, first + i] = -own.base[:, 3]
+        blocks.append(block)
+        right.append(target)
+    return np.concatenate(blocks), np.concatenate(right)
+
+
+def _least_squares(matrix: Floats, right: Floats) -> tuple[Floats, float]:
+    """Solution, 0 where a column is, and the mean square of what is left."""
+    size = np.sqrt(np.sum(matrix**2, axis=0))
+    scaled = matrix / np.where(size > 0.0, size, 1.0)
+    gram = scaled.T @ scaled
+    solution = np.linalg.pinv(gram, rcond=1e-12, hermitian=True) @ (scaled.T @ right)
+    left = right - scaled @ solution
+    return np.where(size > 0.0, solution / np.where(size > 0.0, size, 1.0), 0.0), float(left @ left)
+
+
+def _touch(campaign: Campaign, r: int, own: _Rows) -> float:
+    """Reading at which a recording, by itself, touches the stop; inf where none is seen."""
+
+    def left(touch: float) -> float:
+        return _least_squares(*_system(campaign, [r], [own], np.array([touch])))[1]
+
+    low, high = np.quantile(campaign.recordings[r].samples, [LOW, HIGH])
+    best, least = np.inf, left(np.inf) / SEEN
+    for _ in range(FINER):
+        places = np.linspace(low, high, PLACES)
+        lefts = [left(place) for place in places]
+        at = int(np.argmin(lefts))
+        if lefts[at] < least:
+            best, least = float(places[at]), lefts[at]
+        spacing = float(places[1] - places[0])
+        low, high = places[at] - 2 * spacing, places[at] + 2 * spacing
+    return best
+
+
+def _solve(campaign: Campaign, rows: Sequence[_Rows], touch: Floats) -> Driven:
+    """Estimates without the initial motion."""
+    solution, _ = _least_squares(*_system(campaign, range(len(rows)), rows, touch))
+    k1, c1, gain = (float(x) for x in solution[:3])
+    c2, k2 = 0.0, np.zeros(0)
+    if campaign.stop:
+        c2, k2 = float(solution[3]), solution[4 : 4 + len(campaign.cases)]
+    readings = [r.samples for r in campaign.recordings]
+    offset = solution[-len(rows) :] / k1 if k1 > 0.0 else np.array([x.mean() for x in readings])
+    free = any(r.input is not None and r.input.free for r in campaign.recordings)
+    seen = np.isfinite(touch)
+    gap = np.inf
+    if campaign.stop:  # never touched: no less than what was reached
+        reached = [float(x.max()) for x in readings]
+        gap = float(np.median((touch - offset)[seen]) if seen.any() else max(reached - offset))
+    none = np.zeros(len(rows))
+    return Driven(k1, c1, gap, c2, k2, gain if free else 1.0, offset, none, none)
+
+
+def _made_usable(campaign: Campaign, found: Driven, k1: float) -> Driven:
+    """The same inside physical bounds, with the initial motion of every recording."""
+    least = 2 * LEAST_DAMPING * float(np.sqrt(k1 * campaign.mass))
+    y0, v0 = [], []
+    for recording, offset in zip(campaign.recordings, found.offset, strict=True):
+        natural = 2 * np.pi * float(np.sqrt(campaign.mass / k1))
+        count = int(np.clip(STARTING * natural / recording.interval, 4, recording.samples.size))
+        times = recording.times[:count]
+        degree = 2 if count < 8 else 3
+        fit = np.polynomial.Polynomial.fit(times, recording.samples[:count] - offset, degree)
+        y0.append(float(fit(0.0)))
+        v0.append(float(fit.deriv()(0.0)))
+    return Driven(
+        k1=k1,
+        c1=max(found.c1, least),
+        gap=found.gap,
+        c2=max(found.c2, least if campaign.stop else 0.0),
+        k2=np.where(found.k2 > 0.01 * k1, found.k2, np.nan),
+        gain=found.gain,
+        offset=found.offset,
+        y0=np.array(y0),
+        v0=np.array(v0),
+    )
