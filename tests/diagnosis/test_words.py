@@ -35,7 +35,7 @@ def test_what_remains_is_said_in_units():
     said = remaining(left)
     assert "130 µm rms" in said and "2.2 % of the signal" in said and "11 times" in said
     assert "obstacle" in said and "gap wear" in said
-    assert remaining(None) == "" and "0.00013 rad" in remaining(left, angle=True)
+    assert remaining(None) == "" and "0.00013 rad" in remaining(left, "rad")
 
 
 def place(regime: str):

@@ -28,7 +28,7 @@ def lane(v, guess, limit, contact=False):
     mine.history[:] = 0.0
     mine.history[int(contact), 0], mine.history[int(contact), 4] = guess, 1.0
     nothing, found = np.empty(0), np.zeros((limit, 2))
-    sink = Sink(nothing, nothing, nothing, found)
+    sink = Sink(nothing, nothing, nothing, found, 0, 1.0)
     *_, count, _ = quick.fast_lane(mine, sink, MOTION, 100_000, limit, contact, 0.0, v, 0, 0)
     return found[:count]
 
