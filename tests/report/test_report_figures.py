@@ -56,7 +56,9 @@ def test_axes_carry_units() -> None:
 
 
 def test_angles_are_in_rad() -> None:
-    results = replace(make_results(1, stop=False), quantity="angle")
+    results = make_results(1, stop=False)
+    turned = tuple(replace(r, quantity="angle") for r in results.recordings)
+    results = replace(results, quantity="angle", recordings=turned)
     labels = axis_labels(all_figures(results)["fit"])
     assert "angle (rad)" in labels and not any("m)" in text.replace("µrad", "") for text in labels)
 
