@@ -26,7 +26,8 @@ def score(effect: Effect) -> Score:
 def test_a_loop_as_wide_as_the_swing_is_named():
     stiffness, decay = 8.0, 1 / 6e-3
     planted = {"hysteresis_bouc_wen": {"stiffness": stiffness, "decay": decay}}
-    found = bi.diagnose(small_rig.record(seed=11, effects=planted), search=False, seed=0)
+    campaign = small_rig.record(seed=11, effects=planted)
+    found = bi.diagnose(campaign, search=False, seed=0, effects=(*bi.SEARCHED, LOOP))
     assert found.verdict == "named" and [e.id for e in found.effects] == [LOOP.id]
     for name, true in (("stiffness", stiffness), ("decay", decay)):
         at = found.after.names.index(f"{LOOP.id}.{name}")
