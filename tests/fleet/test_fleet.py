@@ -116,11 +116,18 @@ def test_a_campaign_that_fails_stops_no_other(
 
 
 def test_a_cluster_gives_the_same_rows(folder: Path, done: Path, tmp_path: Path) -> None:
+    """But for rounding: linear algebra on several threads, as a test may have it, adds otherwise."""
     plan = load_plan(folder / "fleet.toml")
     few = replace(plan, sessions=plan.sessions[:2])
     rows = run.run_fleet(few, tmp_path, workers=2)
     alone = [json.loads((done / "rows" / f"week{w}.json").read_text())["row"] for w in (0, 1)]
-    assert rows == alone
+    for row, other in zip(rows, alone, strict=True):
+        assert {**row, "parameters": None} == {**other, "parameters": None}
+        assert row["parameters"].keys() == other["parameters"].keys()
+        for name, entry in row["parameters"].items():
+            width = entry["high"] - entry["low"]
+            for key in ("estimate", "low", "high"):
+                assert entry[key] == pytest.approx(other["parameters"][name][key], abs=1e-2 * width)
 
 
 def test_campaigns_with_other_physics_are_told_apart() -> None:
