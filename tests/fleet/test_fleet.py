@@ -116,7 +116,7 @@ def test_a_campaign_that_fails_stops_no_other(
 
 
 def test_a_cluster_gives_the_same_rows(folder: Path, done: Path, tmp_path: Path) -> None:
-    """But for rounding: linear algebra on several threads, as a test may have it, adds otherwise."""
+    """But for rounding: linear algebra on several threads adds in another order."""
     plan = load_plan(folder / "fleet.toml")
     few = replace(plan, sessions=plan.sessions[:2])
     rows = run.run_fleet(few, tmp_path, workers=2)
