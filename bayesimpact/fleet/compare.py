@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from bayesimpact.fleet.plan import Plan
 from bayesimpact.fleet.population import Population, population
-from bayesimpact.fleet.run import WIDTH_90, Row
-from bayesimpact.fleet.trend import Trend, find_trend
+from bayesimpact.fleet.run import Row
+from bayesimpact.fleet.trend import NORMAL_90, Trend, find_trend
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ class Series:
     @property
     def errors(self) -> Array:
         """Standard errors, as if the intervals were normal."""
-        return (self.high - self.low) / WIDTH_90
+        return (self.high - self.low) / (2 * NORMAL_90)
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,6 @@ Row = dict[str, Any]
 Step = Callable[[int], None]
 """Called with how many campaigns are done just now."""
 
-WIDTH_90 = 2 * 1.6448536269514722  # of a normal 90 % interval, standard deviations
 CHAIN = "chain"  # a folder that only `--resume` of a single campaign needs
 
 

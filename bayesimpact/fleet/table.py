@@ -12,7 +12,6 @@ from bayesimpact.fleet.plan import Plan
 from bayesimpact.fleet.run import Row
 from bayesimpact.report.archive import write_bytes, write_text
 
-FIRST = ("name", "date")
 FOUND = ("failed", "converged", "verdict", "effects", "reduced_chi2")
 
 
