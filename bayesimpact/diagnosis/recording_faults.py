@@ -58,9 +58,7 @@ def cleaned_campaign(campaign: Campaign, *, rng: np.random.Generator, search: bo
     return found if campaign.keep_faults else _without_spikes(found, campaign, rng=rng)
 
 
-def _without_spikes(
-    found: Corrected, as_read: Campaign, *, rng: np.random.Generator
-) -> Corrected:
+def _without_spikes(found: Corrected, as_read: Campaign, *, rng: np.random.Generator) -> Corrected:
     """The same without spikes that the fit shows, if it is right about all other samples.
 
     Where it is not, what stands out at a contact may be physics.

@@ -64,9 +64,11 @@ def _outcome(
     if "fault" in truth:
         named_faults = [f for f in faults if f.get("action") != "notice"]
         physics = [i for i in named if not i.startswith("recording_")]
-        if physics and verdict in ("named", "partly"):
+        planted = {p["id"] for p in truth["planted"]}
+        if set(physics) - planted and verdict in ("named", "partly"):
             return "wrong name"
-        return judge_fault(truth["fault"], named_faults)
+        outcome = judge_fault(truth["fault"], named_faults)
+        return outcome if outcome != "named" or set(physics) == planted else "fault alone"
     if not truth["kind"].startswith("several"):
         return judge(truth["kind"], [p["id"] for p in truth["planted"]], verdict, named)
     there = [p["id"] for p in truth["planted"] if not p["outside"]]

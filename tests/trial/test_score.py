@@ -211,5 +211,10 @@ def test_a_fault_is_right_alone_and_its_runs_have_a_summary() -> None:
     silent = answered(verdict="unknown", effects=[]) | {"faults": [notice]}
     outcomes = [score(truth, a)["outcome"] for a in (alone, beside, silent)]
     assert outcomes == ["named", "wrong name", "missed"]
+    both = truth | {"kind": "fault_single", "planted": TRUTH["planted"]}
+    (effect,) = ANSWER["effects"]
+    together = answered(effects=[effect, {"id": "recording_held", "parameters": {}}])
+    outcomes = [score(both, a | {"faults": [told]})["outcome"] for a in (together, alone, beside)]
+    assert outcomes == ["named", "fault alone", "wrong name"]
     text = summary_text(summarise([result(0, truth, alone), result(1, truth, silent)]))
     assert "faults named, with their place    50.0 %" in text
