@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.model.compiled import compiled
-from bayesimpact.model.free_changes import POINTS, FreeChanges, Stretch
+from bayesimpact.model.free_changes import POINTS, FreeChanges
 from bayesimpact.model.threads import in_shares
 
 Array = NDArray[np.float64]
@@ -33,29 +33,21 @@ def wave_responses(changes: FreeChanges, frequencies: Array) -> Array:
     """
     angles = 2 * np.pi * changes.interval * frequencies
     weights = _wave_weights(angles) * changes.interval
+    parts = changes.stretches
+    begins = np.array([part.begin for part in parts])
+    ends = np.cumsum([part.readings.shape[0] for part in parts])
+    readings = np.concatenate([part.readings for part in parts])
+    pushes, carried = np.concatenate(changes.pushes), changes.carried
     out = np.empty((2 * frequencies.size, changes.samples))
-    sizes = np.zeros((frequencies.size, 2), dtype=np.complex128)
-    for stretch in changes.stretches:
-        sizes = sizes @ changes.carried(stretch).T
-        _superpose(stretch, changes, angles, weights, sizes, out)
-    return out
-
-
-def _superpose(
-    stretch: Stretch, changes: FreeChanges, angles: Array, weights: Complex, sizes: Complex,
-    out: Array,
-) -> None:  # fmt: skip
-    """Fill in the stretch's part of `out` (2 F, n); `sizes` (F, 2) go on to its end."""
-    first, pushes = stretch.begin, changes.pushes(stretch)
-    part = out[:, first : first + stretch.readings.shape[0]]
 
     def run(low: int, high: int) -> None:
-        _accumulate(
-            stretch.readings, pushes, changes.direct, angles[low:high], weights[:, low:high], first,
-            sizes[low:high], part[2 * low : 2 * high],
+        _superpose(
+            readings, pushes, begins, ends, carried, changes.direct, angles[low:high],
+            weights[:, low:high], out[2 * low : 2 * high],
         )  # fmt: skip
 
-    in_shares(run, angles.size)
+    in_shares(run, frequencies.size)
+    return out
 
 
 def _wave_weights(angles: Array) -> Complex:
@@ -78,25 +70,30 @@ def _lagrange(x: Array) -> Array:
 
 
 @compiled(nogil=True)
-def _accumulate(
-    readings: Any, pushes: Any, direct: Any, angles: Any, weights: Any, begin: Any, sizes: Any,
-    out: Any,
+def _superpose(
+    readings: Any, pushes: Any, begins: Any, ends: Any, carried: Any, direct: Any, angles: Any,
+    weights: Any, out: Any,
 ) -> None:  # fmt: skip
-    """One stretch: `sizes` (F, 2), what the waves have made of both changes so far, go on."""
-    n, points = readings.shape[0], weights.shape[2]
+    """Fill in `out` (2 F, n), stretch by stretch: rows begin..end of `readings` and `pushes`."""
+    points = weights.shape[2]
     for f in range(angles.size):
         step = complex(np.cos(angles[f]), np.sin(angles[f]))
-        wave = complex(np.cos(begin * angles[f]), np.sin(begin * angles[f]))
-        one, other = sizes[f, 0], sizes[f, 1]
-        for i in range(n):
-            response = readings[i, 0] * one + readings[i, 1] * other + direct * wave
-            out[2 * f, i] = response.imag
-            out[2 * f + 1, i] = response.real
-            if i + 1 < n:
-                first = min(max(i + 1 - points // 2, 0), n - points)
-                for j in range(points):
-                    part = wave * weights[i - first, f, j]
-                    one += part * pushes[first + j, 0]
-                    other += part * pushes[first + j, 1]
-            wave *= step
-        sizes[f, 0], sizes[f, 1] = one, other
+        one = other = complex(0.0, 0.0)  # what the wave has made of both changes so far
+        for part in range(begins.size):
+            first, begin = (0 if part == 0 else ends[part - 1]), begins[part]
+            c = carried[part]
+            one, other = c[0, 0] * one + c[0, 1] * other, c[1, 0] * one + c[1, 1] * other
+            wave = complex(np.cos(begin * angles[f]), np.sin(begin * angles[f]))
+            n = ends[part] - first
+            for i in range(n):
+                row = first + i
+                response = readings[row, 0] * one + readings[row, 1] * other + direct * wave
+                out[2 * f, begin + i] = response.imag
+                out[2 * f + 1, begin + i] = response.real
+                if i + 1 < n:
+                    left = min(max(i + 1 - points // 2, 0), n - points)
+                    for j in range(points):
+                        push = wave * weights[i - left, f, j]
+                        one += push * pushes[first + left + j, 0]
+                        other += push * pushes[first + left + j, 1]
+                wave *= step

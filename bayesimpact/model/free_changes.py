@@ -7,6 +7,7 @@ included. As they decay they drown in rounding: others take over, stretch by str
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,21 +69,28 @@ class FreeChanges:
         """What a newton adds to the reading at once: an acceleration holds the force itself."""
         return 1 / self.mass if self.order == 2 else 0.0
 
-    def pushes(self, stretch: Stretch) -> Array:
-        """Both changes (n, 2) that a unit impulse makes at every sample of a stretch.
+    @cached_property
+    def pushes(self) -> tuple[Array, ...]:
+        """Both changes (n, 2) that a unit impulse makes at every sample, per stretch.
 
         Raises
         ------
         LinAlgError : the mass sticks, and what it did before is forgotten
         """
-        return np.linalg.solve(stretch.states, np.array([[0.0], [1 / self.mass]]))[..., 0]
+        unit = np.array([[0.0], [1 / self.mass]])
+        return tuple(np.linalg.solve(part.states, unit)[..., 0] for part in self.stretches)
 
-    def carried(self, stretch: Stretch) -> Array:
-        """(2, 2) what a change of the stretch before becomes at the begin of this one."""
-        number = self.stretches.index(stretch)
-        if number == 0:
-            return np.zeros((2, 2))
-        return np.linalg.solve(stretch.states[0], self.stretches[number - 1].states[-1])
+    @cached_property
+    def carried(self) -> Array:
+        """What a change of the stretch before becomes at the begin of each, (S, 2, 2).
+
+        Raises
+        ------
+        LinAlgError : as `pushes`
+        """
+        pairs = zip(self.stretches[1:], self.stretches, strict=False)
+        found = [np.linalg.solve(part.states[0], last.states[-1]) for part, last in pairs]
+        return np.array([np.zeros((2, 2)), *found])
 
 
 def free_changes(oscillator: Oscillator, r: int, slots: Array, small: float) -> FreeChanges:
@@ -96,23 +104,37 @@ def free_changes(oscillator: Oscillator, r: int, slots: Array, small: float) -> 
     mass, interval = oscillator.campaign.mass, float(oscillator.intervals[r])
     last, rate = int(oscillator.counts[r]) - 1, float(np.sqrt(slots[_K1] / mass))
     apart = max(1, round(0.5 * np.pi / (rate * interval)))
-    pushed = np.tile(slots, (3, 1))
-    free = pushed.copy()
-    free[1, _Y0] += small
-    free[2, _V0] += small * rate
-    q, waves = free, np.zeros((3, last + 1))
-    found: list[Stretch] = []
-    begin, own = 0, int(oscillator.orders[r])
-    while begin < last:
-        rows = {n: motions_beside(oscillator, r, q, n, waves=waves) for n in {0, 1, own}}
-        changes = {n: (x[1:] - x[0]).T for n, x in rows.items()}
-        states = np.stack([changes[0], changes[1]], axis=1)
-        end = begin + _fading(states[begin:] * [[1.0], [1 / rate]], 2 * apart + SHORTEST)
-        end = end if end + SHORTEST <= last else last
-        found.append(Stretch(begin, states[begin : end + 1], changes[own][begin : end + 1]))
-        q, waves, begin = pushed, np.zeros_like(waves), end
-        waves[[1, 2], [end - apart - 1, end - 1]] = small * slots[_K1]
-    return FreeChanges(tuple(found), mass, interval, own)
+    q = np.tile(slots, (3, 1))
+    q[1, _Y0] += small
+    q[2, _V0] += small * rate
+    waves = np.zeros((3, last + 1))
+    whole = _run(oscillator, r, q, waves)
+    length = _fading(whole.states * [[1.0], [1 / rate]], 2 * apart + SHORTEST)
+    begins = np.arange(0, max(last - SHORTEST, 1), length)
+    found = [_part(whole, 0, last if begins.size == 1 else length)]
+    q = np.tile(slots, (3, 1))
+    runs = []
+    for first in (1, 2):  # a push ends the stretch before in its own run: neighbours take turns
+        waves[:] = 0.0
+        for begin in begins[first::2]:
+            waves[[1, 2], [begin - apart - 1, begin - 1]] = small * slots[_K1]
+        runs.append(_run(oscillator, r, q, waves) if begins.size > first else whole)
+    for number, begin in enumerate(begins[1:]):
+        end = last if begin == begins[-1] else begin + length
+        found.append(_part(runs[number % 2], int(begin), int(end)))
+    return FreeChanges(tuple(found), mass, interval, int(oscillator.orders[r]))
+
+
+def _run(oscillator: Oscillator, r: int, q: Array, waves: Array) -> Stretch:
+    """Both changes over the whole recording."""
+    own = int(oscillator.orders[r])
+    rows = {n: motions_beside(oscillator, r, q, n, waves=waves) for n in {0, 1, own}}
+    changes = {n: (x[1:] - x[0]).T for n, x in rows.items()}
+    return Stretch(0, np.stack([changes[0], changes[1]], axis=1), changes[own])
+
+
+def _part(whole: Stretch, begin: int, end: int) -> Stretch:
+    return Stretch(begin, whole.states[begin : end + 1], whole.readings[begin : end + 1])
 
 
 def _fading(states: Array, least: int) -> int:
