@@ -72,7 +72,7 @@ def document(
             parameter_shifts(before, after) if d.verdict != "adequate" else {},
             _detectable(d) + _unfinished(d),
             remaining(left, reading.unit),
-            faults=in_words(faulty),
+            faults=in_words(d.corrected) if d.corrected else "",
             angle=angle,
             drifts=d.naming.unknown.reach > 0,
         ),

@@ -166,8 +166,8 @@ def gains_more(
     fit = before.identification.fit
     found = scan(fit, effects, campaign_scales(fit), rng=rng)
     most = max((score.gain for score in found.best()), default=0.0)
-    first, last = compared.compared[0], compared.compared[-1]
-    return gain(first.before, last.after, last.campaign) > RASH * most + NEAR_MARGIN
+    last = compared.compared[-1]
+    return gain(fit.reduced_chi2, last.after, last.campaign) > RASH * most + NEAR_MARGIN
 
 
 def is_doubtful(found: Diagnosis) -> bool:

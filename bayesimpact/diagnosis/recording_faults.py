@@ -29,7 +29,8 @@ class Corrected:
     ----------
     identification : of the base model on the corrected campaign
     own : faults found in the recordings themselves, notices among them
-    compared : faults found by comparing recordings, in the order of their correction
+    compared : faults found against the fit or by comparing recordings, in the order of their
+        correction
     """
 
     identification: Identification
@@ -72,7 +73,9 @@ def _without_spikes(found: Corrected, as_read: Campaign, *, rng: np.random.Gener
     if misfits(again.fit):
         return found
     again = replace(again, search=found.identification.search)
-    return Corrected(again, (*found.own, *(_as_read(f, campaign, as_read) for f in spikes)))
+    change = fit.reduced_chi2, again.fit.reduced_chi2
+    told = (_as_read(fault, campaign, as_read) for fault in spikes)
+    return Corrected(again, found.own, tuple(Compared(f, campaign, *change) for f in told))
 
 
 def _as_read(fault: Fault, campaign: Campaign, as_read: Campaign) -> Fault:
@@ -88,7 +91,8 @@ def compared_campaign(before: Corrected, *, rng: np.random.Generator, search: bo
     compared = () if campaign.keep_faults else compare_recordings(before.identification)
     if not compared:
         return before
-    return Corrected(identify(compared[-1].campaign, rng=rng, search=search), before.own, compared)
+    identification = identify(compared[-1].campaign, rng=rng, search=search)
+    return Corrected(identification, before.own, (*before.compared, *compared))
 
 
 def as_effects(corrected: Corrected) -> list[dict[str, Any]]:
@@ -110,6 +114,15 @@ def fault_entries(corrected: Corrected) -> list[dict[str, Any]]:
     ]
 
 
+def _sentence(fault: Fault, compared: Compared | None) -> str:
+    """What is wrong, and what correcting it changes."""
+    words = f"Recording {fault.recording}: {fault.statement}."
+    if compared is None or not np.isfinite(compared.before):
+        return words
+    change = f"from {compared.before:.3g} to {compared.after:.3g}"
+    return f"{words} Without it the base model's reduced chi2 goes {change}."
+
+
 def _entry(fault: Fault, compared: Compared | None) -> dict[str, Any]:
     others = sum(p for _, p in compared.alternatives) if compared else 0.0
     size = float(fault.size) if np.isfinite(fault.size) else 0.0
@@ -117,7 +130,7 @@ def _entry(fault: Fault, compared: Compared | None) -> dict[str, Any]:
         "id": fault.id,
         "title": fault.id.removeprefix("recording_").replace("_", " "),
         "family": "recording",
-        "statement": f"Recording {fault.recording}: {fault.statement}.",
+        "statement": _sentence(fault, compared),
         "probability": max(0.0, 1.0 - others),
         "delta_log_evidence": float(fault.strength) if compared else None,
         "parameters": {
@@ -146,6 +159,7 @@ def place(faults: Sequence[Fault]) -> dict[str, Any]:
     }
 
 
-def in_words(faults: Sequence[Fault]) -> str:
-    """Faults in a sentence each; empty without any."""
-    return "".join(f" Recording {f.recording}: {f.statement}." for f in faults)
+def in_words(corrected: Corrected) -> str:
+    """Faults that were set aside or corrected, in sentences; empty without any."""
+    by_comparison = {id(c.fault): c for c in corrected.compared}
+    return "".join(f" {_sentence(f, by_comparison.get(id(f)))}" for f in corrected.faults)
