@@ -58,15 +58,18 @@ class Foretold:
         return 2.0 * float(np.sum(np.log(np.diag(self.root))))
 
     @cached_property
+    def taken(self) -> Array:
+        """P (n, k) with W = I - P P': what the parameters take of the readings."""
+        return np.asarray(solve_triangular(self.root, self.factor.T, lower=True).T)
+
+    @property
     def freedom(self) -> float:
-        """n - tr W: what the parameters take of the noise."""
-        inner = solve_triangular(self.root, self.factor.T @ self.factor, lower=True)
-        return float(np.trace(solve_triangular(self.root.T, inner, lower=False)))
+        """n - tr W."""
+        return float(np.sum(self.taken**2))
 
     def weighed(self, x: Array) -> Array:
         """W x for x (n,) or (n, m)."""
-        inner = solve_triangular(self.root, self.factor.T @ x, lower=True)
-        return np.asarray(x - self.factor @ solve_triangular(self.root.T, inner, lower=False))
+        return np.asarray(x - self.taken @ (self.taken.T @ x))
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,5 +116,13 @@ def expected_odds(
     means = 0.5 * (fixed + quadratic) + draws @ (common.T @ left)
     across, square = remaining.T @ left, remaining.T @ remaining
     variances = left @ left + 2 * draws @ across + np.einsum("si,ij,sj->s", draws, square, draws)
+    variances += 0.5 * noise_alone(right, other)
     mean = 0.5 * (fixed + float(np.trace(gained)))
     return Odds(mean, means, np.sqrt(np.maximum(variances, 0.0)))
+
+
+def noise_alone(right: Foretold, other: Foretold) -> float:
+    """tr (W_i - W_j)^2: what noise contributes where both models foretell the same."""
+    own, others = (x.taken.T @ x.taken for x in (right, other))
+    both = right.taken.T @ other.taken
+    return max(float(np.sum(own**2) + np.sum(others**2) - 2 * np.sum(both**2)), 0.0)

@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign, Measurement
 from bayesimpact.data.recording import Recording
-from bayesimpact.design.candidates import Design, highest
+from bayesimpact.design.candidates import Design, highest, usual_release
 from bayesimpact.design.hypotheses import Hypothesis, Rivalry
 from bayesimpact.design.odds import Foretold, Odds, expected_odds
 from bayesimpact.inference.likelihood import Likelihood
+from bayesimpact.inference.noise import Noise
 from bayesimpact.model.effects.effect import EffectParameter
 from bayesimpact.model.oscillator import Oscillator, build_oscillator
 from bayesimpact.model.parameters import SLOTS, bare_name, is_added
@@ -187,8 +188,15 @@ def response(hypothesis: Hypothesis, design: Design, rivals: Rivalry) -> Respons
     prior[: shared.size, : shared.size] = hypothesis.covariance[np.ix_(position, position)]
     prior *= rivals.repetition
     prior[shared.size :, shared.size :] = np.diag(sd[own] ** 2)
-    likelihood = Likelihood(o, rivals.noise)
+    likelihood = Likelihood(o, noise_at(design.interval, rivals))
     return Response(likelihood, shared, own, position, mean, prior, steps, noise_level(rivals))
+
+
+def noise_at(interval: float, rivals: Rivalry) -> Noise:
+    """The noise at another sampling interval: its level stays, its correlation time too."""
+    usual = usual_release(rivals.releases).interval
+    correlation = max(rivals.noise.correlation, 0.0)
+    return replace(rivals.noise, correlation=correlation ** (interval / usual))
 
 
 def noise_level(rivals: Rivalry) -> float:

@@ -39,7 +39,7 @@ def _designs(content: Mapping[str, Any]) -> Figure:
         axes[0].set_xscale("symlog", linthresh=_LINEAR)
         axes[0].set_xlim(0.0, max(float(odds.max()), _LINEAR) * 1.4)
         axes[0].xaxis.set_major_formatter("{x:g}")
-        axes[0].set_xlabel("expected ln odds between the rivals (nats)")
+        axes[0].set_xlabel("expected ln odds (nats)")
     gain = 100.0 * np.array([d["narrowing"] for d in designs])
     axes[-1].hlines(rows, 0.0, gain, color=colours, lw=1.2)
     axes[-1].scatter(gain, rows, c=colours, s=28, zorder=3)

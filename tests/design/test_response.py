@@ -1,0 +1,89 @@
+"""What models foretell of a recording: against the simulator, a refit and recordings made so."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import sqrt
+
+import numpy as np
+import pytest
+from rivals import base_rivalry, fitted, rivalry_of
+from scipy.optimize import least_squares
+
+from bayesimpact.design.candidates import Design, first_designs
+from bayesimpact.design.hypotheses import Rivalry
+from bayesimpact.design.odds import expected_odds
+from bayesimpact.design.response import Response, noise_at, odds_between, response
+from bayesimpact.inference.identify import Identification
+from bayesimpact.inference.noise import Noise
+from bayesimpact.model.simulate import simulate
+
+
+@pytest.fixture(scope="module")
+def damped(small: Identification) -> Rivalry:
+    return rivalry_of(fitted(small, "coulomb_friction", "quadratic_drag"))
+
+
+def release(rivals: Rivalry) -> Design:
+    (found,) = [d for d in first_designs(rivals) if d.case == "1" and d.kind == "release"][3:4]
+    return found
+
+
+def test_the_base_model_foretells_what_the_simulator_does(small: Identification) -> None:
+    rivals = base_rivalry(small)
+    design, value = release(rivals), small.fit.value
+    found = response(rivals.hypotheses[0], design, rivals)
+    made = simulate(
+        mass=rivals.mass, c1=value("c1"), k1=value("k1"), c2=value("c2"), g=value("g"),
+        k2=value("k2[1]"), y0=design.y0, v0=0.0, interval=design.interval, n=design.samples,
+    )  # fmt: skip
+    assert found.predicted(found.mean) * found.sigma == pytest.approx(made.displacement, abs=1e-12)
+    removed = response(rivals.hypotheses[0], replace(design, stop=False), rivals)
+    free = simulate(
+        mass=rivals.mass, c1=value("c1"), k1=value("k1"), y0=design.y0, v0=0.0,
+        interval=design.interval, n=design.samples,
+    )  # fmt: skip
+    assert removed.predicted(removed.mean) * removed.sigma == pytest.approx(
+        free.displacement, abs=1e-12
+    )
+
+
+def test_a_stop_that_is_moved_is_a_parameter_of_the_recording(small: Identification) -> None:
+    rivals = base_rivalry(small)
+    moved = response(rivals.hypotheses[0], replace(release(rivals), gap_shift=1e-3), rivals)
+    names = moved.likelihood.oscillator.layout.names
+    assert "g" in [names[i] for i in moved.own]
+    assert moved.mean[names.index("g")] == pytest.approx(small.fit.value("g") + 1e-3)
+
+
+def imitated(right: Response, other: Response) -> float:
+    """The sum of squares that is left when SciPy refits the other model to the right one."""
+    values, vectors = np.linalg.eigh(other.prior / np.outer(*2 * (np.sqrt(np.diag(other.prior)),)))
+    scale = np.sqrt(np.diag(other.prior))
+    root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+
+    def misfit(u: np.ndarray) -> np.ndarray:
+        theta = other.mean.copy()
+        theta[other.moving] += root @ u
+        return np.concatenate([right.foretold.mean - other.predicted(theta), u])
+
+    start = np.zeros(other.prior.shape[0])
+    return float(2 * least_squares(misfit, start, x_scale="jac", xtol=1e-12).cost)
+
+
+def test_the_criterion_is_what_a_refit_leaves(damped: Rivalry) -> None:
+    """With T known, the rest of the expected odds follows in closed form."""
+    one, two = (response(h, release(damped), damped) for h in damped.hypotheses)
+    draws = np.zeros((1, one.shared.size))
+    found = odds_between(one, two, draws)
+    linear = expected_odds(one.foretold, two.foretold, draws)
+    difference = one.foretold.mean - two.foretold.mean
+    rest = linear.mean - 0.5 * float(difference @ two.foretold.weighed(difference))
+    assert 2 * (found.mean - rest) == pytest.approx(imitated(one, two), rel=0.02, abs=0.02)
+
+
+def test_noise_keeps_its_correlation_in_time(small: Identification) -> None:
+    rivals = replace(base_rivalry(small), noise=Noise(correlation=0.5))
+    interval = rivals.releases[0].interval
+    assert noise_at(interval / 2, rivals).correlation == pytest.approx(sqrt(0.5))
+    assert noise_at(interval, rivals).correlation == pytest.approx(0.5)
