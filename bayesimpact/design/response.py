@@ -39,12 +39,14 @@ STEP = 0.05
 """Difference steps, in standard deviations of the posterior: as in fits of added effects. Along a
 valley that is too much: no step moves a recording by more than about its noise, once in all.
 """
-ROUNDS = 8
+ROUNDS = 12
 """Steps at most by which a rival's parameters imitate another model."""
 DAMPING = (0.0, 1e-6, 1e-4, 1e-2, 1.0)
 """Of a step, the next where one leads uphill: along a valley the linear problem points too far."""
-SETTLED = 0.01
-"""Relative gain in the sum of squares below which they stop."""
+SETTLED = 0.02
+"""They stop where the sum of squares is what the linear problem promised, or falls no more, but for
+so much of it.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,9 +153,12 @@ def odds_between(right: Response, other: Response, draws: Array) -> Odds:
                 break
         if not least < distance:
             break
-        gain, distance = distance - least, least
-        theta, shift, left = trial, moved, remaining
-        if gain < SETTLED * distance + SETTLED:
+        promised = left - jacobian @ (moved - shift)
+        hoped = float(promised @ promised + moved @ other.precision @ moved)
+        near = min(abs(least - hoped), distance - least)
+        done = damping == 0.0 and near < SETTLED * (least + 1)
+        distance, theta, shift, left = least, trial, moved, remaining
+        if done:
             break
         mean, jacobian = other.linearised(theta)
         if not np.isfinite(jacobian).all():

@@ -62,6 +62,15 @@ def test_each_draw_has_its_own_mean_and_spread() -> None:
         assert abs(obtained.std() / sd - 1) < 4 / np.sqrt(obtained.size)  # two over a normal's
 
 
+def test_noise_alone_spreads_the_odds_of_models_that_agree() -> None:
+    rng = np.random.default_rng(7)
+    right, other = (Foretold(np.zeros(N), 5 * rng.standard_normal((N, 4)), 0) for _ in range(2))
+    odds = expected_odds(right, other, np.empty((1, 0)))
+    obtained = log_odds(rng.standard_normal((20_000, N)), right, other)
+    assert abs(obtained.std() / odds.sds[0] - 1) < 4 / np.sqrt(obtained.size)
+    assert abs(obtained.mean() - odds.mean) < 4 * odds.sds[0] / np.sqrt(obtained.size)
+
+
 def test_what_parameters_imitate_tells_nothing_apart() -> None:
     """A difference along a column of nearly unknown size is worth nothing; across it counts."""
     rng = np.random.default_rng(5)

@@ -32,15 +32,20 @@ def test_pairs_count_by_the_product_of_their_probabilities() -> None:
 
 def test_the_nearest_rival_decides_whether_it_settles(damped: Rivalry) -> None:
     first, second = damped.hypotheses
-    ahead = replace(damped, hypotheses=(replace(first, log_odds=2.0), second))
+    three = replace(damped, hypotheses=(replace(first, log_odds=2.0), second, second))
     pairs = {
-        (0, 1): Odds(9.0, np.array([9.0, 3.0]), np.array([2.0, 2.0])),
-        (1, 0): Odds(9.0, np.array([9.0, 9.0]), np.array([2.0, 2.0])),
+        (i, j): Odds(9.0, np.array([9.0, 3.0 + j]), np.array([2.0, 2.0]))
+        for i in range(3)
+        for j in range(3)
+        if i != j
     }
-    chance = [norm.cdf((2 + x - DECISIVE) / 2) for x in (9.0, 3.0)]
-    other = norm.cdf((9.0 - 2 - DECISIVE) / 2)
-    p = 1 / (1 + np.exp(-2.0))
-    assert settled(ahead, pairs) == pytest.approx(p * np.mean(chance) + (1 - p) * other)
+    now, p = [2.0, 0.0, 0.0], np.exp([2.0, 0.0, 0.0])
+    expected = 0.0
+    for i in range(3):
+        for x in (9.0, 3.0):  # over the draws; of these the second depends on the rival
+            leads = [now[i] - now[j] + x + j * (x < 9.0) for j in range(3) if j != i]
+            expected += 0.5 * p[i] / p.sum() * norm.cdf((min(leads) - DECISIVE) / 2)
+    assert settled(three, pairs) == pytest.approx(expected)
 
 
 def test_odds_beyond_the_decisive_ones_count_as_these(damped: Rivalry) -> None:

@@ -48,12 +48,49 @@ def test_the_base_model_foretells_what_the_simulator_does(small: Identification)
     )
 
 
+def test_without_the_stop_nothing_of_a_contact_acts(small: Identification) -> None:
+    """Not even an effect that acts at some indentation."""
+    rivals = rivalry_of(fitted(small, "contact_damping_indentation"))
+    model = rivals.hypotheses[0]
+    strong = replace(model, mode=np.where(np.char.find(model.names, ".") >= 0, 1e3, model.mode))
+    design = replace(release(rivals), stop=False)
+    made = response(strong, design, rivals)
+    weak = response(replace(model, effects=(), names=model.names), design, rivals)
+    assert made.predicted(made.mean) == pytest.approx(weak.predicted(weak.mean), abs=1e-3)
+
+
 def test_a_stop_that_is_moved_is_a_parameter_of_the_recording(small: Identification) -> None:
     rivals = base_rivalry(small)
     moved = response(rivals.hypotheses[0], replace(release(rivals), gap_shift=1e-3), rivals)
     names = moved.likelihood.oscillator.layout.names
     assert "g" in [names[i] for i in moved.own]
     assert moved.mean[names.index("g")] == pytest.approx(small.fit.value("g") + 1e-3)
+
+
+def test_the_criterion_holds_where_the_problem_is_not_linear(small: Identification) -> None:
+    """A rival with its stop far off: its parameters must move by many standard deviations."""
+    rivals = base_rivalry(small)
+    first = rivals.hypotheses[0]
+    at = first.known["g"]
+    wide = first.covariance.copy()
+    wide[at, :] = wide[:, at] = 0.0
+    wide[at, at] = 1e-4**2
+    off = replace(first, mode=first.mode + 1.5e-4 * (np.arange(first.mode.size) == at))
+    design = replace(release(rivals), duration=0.5)
+    one = response(first, design, rivals)
+    two = response(replace(off, covariance=wide), design, rivals)
+    draws = np.zeros((1, one.shared.size))
+    found = odds_between(one, two, draws)
+    linear = expected_odds(one.foretold, two.foretold, draws)
+    left = imitated(one, two)
+    assert left < 0.5 * linear_criterion(one, two)
+    assert 2 * (found.mean - linear.mean) + linear_criterion(one, two) == pytest.approx(left, abs=3)
+
+
+def linear_criterion(right: Response, other: Response) -> float:
+    """T of the linear problem."""
+    difference = right.foretold.mean - other.foretold.mean
+    return float(difference @ other.foretold.weighed(difference))
 
 
 def imitated(right: Response, other: Response) -> float:
@@ -77,8 +114,7 @@ def test_the_criterion_is_what_a_refit_leaves(damped: Rivalry) -> None:
     draws = np.zeros((1, one.shared.size))
     found = odds_between(one, two, draws)
     linear = expected_odds(one.foretold, two.foretold, draws)
-    difference = one.foretold.mean - two.foretold.mean
-    rest = linear.mean - 0.5 * float(difference @ two.foretold.weighed(difference))
+    rest = linear.mean - 0.5 * linear_criterion(one, two)
     assert 2 * (found.mean - rest) == pytest.approx(imitated(one, two), rel=0.02, abs=0.02)
 
 
