@@ -26,8 +26,9 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.recording import Recording
 from bayesimpact.design.candidates import Design
 from bayesimpact.design.hypotheses import Rivalry, rivalry
-from bayesimpact.design.rank import Proposal, proposals
+from bayesimpact.design.rank import Z90, Proposal, proposals
 from bayesimpact.diagnosis.loop import Diagnosis, diagnose
+from bayesimpact.inference.fit import Fit
 from bayesimpact.trial.draw import draw
 from bayesimpact.trial.rig import Release, Rig, record
 from bayesimpact.trial.rig_chain import Chain
@@ -82,8 +83,14 @@ def diagnosed(campaign: Campaign, seed: int) -> Diagnosis:
 
 def outcome(p: Proposal, found: Diagnosis, rivals: Rivalry) -> Row:
     """What a recording was expected to bring, and what it brought."""
-    odds = {frozenset(c.ids): found.naming.log_odds(c) for c in found.naming.tried}
+    tried = {frozenset(c.ids): c for c in found.naming.tried}
+    odds = {ids: found.naming.log_odds(c) for ids, c in tried.items()}
+    first = tried.get(frozenset(rivals.hypotheses[0].ids))
     return {
+        "halves": {
+            name: [before, after, None if first is None else sd_of(first.fit, name) * Z90]
+            for name, (before, after) in p.halves.items()
+        },
         "kind": p.design.kind,
         "case": p.design.case,
         "y0": p.design.y0,
@@ -94,6 +101,11 @@ def outcome(p: Proposal, found: Diagnosis, rivals: Rivalry) -> Row:
         "effects": [e.id for e in found.effects],
         "after": [odds.get(frozenset(h.ids)) for h in rivals.hypotheses],
     }
+
+
+def sd_of(fit: Fit, name: str) -> float:
+    """Standard deviation of one parameter."""
+    return float(fit.sd[fit.names.index(name)])
 
 
 def trial(seed: int) -> Row:
@@ -154,6 +166,13 @@ def summary(rows: Sequence[Row]) -> Row:
             "right": sum(a["verdict"] == "named" and a["effects"] == [t] for t, a in ends),
             "expected": sum(a["chance"] for _, a in ends),
         }
+    halves = [
+        h for row in open_ for a in row["arms"].values() for h in a.get("halves", {}).values()
+    ]
+    known = np.log([[b / a, b / o] for b, a, o in halves if o]).reshape(-1, 2)
+    if len(known):  # how much narrower k2 became, in logarithms, over what was foretold
+        ratio = known[:, 1] / known[:, 0]
+        result["narrowing"] = {"median": float(np.median(ratio)), "intervals": len(known)}
     both = pairs(open_)
     near = both[both[:, 0] <= LARGEST]
     if near.size:
