@@ -202,8 +202,11 @@ def write_diagnosis(
         arrays = diagnosis_arrays(diagnosis)
     except Exception as error:
         arrays, failed["arrays of the diagnosis' figures"] = {}, reason(error)
-    kept, models = rivals_content(rivalry(diagnosis))
-    arrays, plain = arrays | models, plain | {"hypotheses": _strict(kept)}
+    try:
+        kept, models = rivals_content(rivalry(diagnosis))
+        arrays, plain = arrays | models, plain | {"hypotheses": _strict(kept)}
+    except Exception as error:
+        failed["models for `bayesimpact next`"] = reason(error)
     told: dict[str, Any] = {
         "command": command,
         "seconds": float(content["seconds"]),

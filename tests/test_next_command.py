@@ -63,6 +63,9 @@ def test_it_ranks_writes_and_tells(run: Run, ambiguous: Path) -> None:
     assert content["schema"] == "bayesimpact/next/1" and content["verdict"] == "ambiguous"
     first, again = content["designs"][0], next(d for d in content["designs"] if d["repeats"])
     assert first["chance_to_settle"] >= again["chance_to_settle"]
+    named = " + ".join(e["id"] for e in old["effects"])
+    ids = [" + ".join(r["effects"]) or "none" for r in content["rivals"]]
+    assert ids[0] == named and set(ids[1:]) <= {a["id"] for a in old["alternatives"]}
     assert sum(r["probability"] for r in content["rivals"]) == pytest.approx(1.0)
     assert content["sentence"] in out
     told = json.loads((ambiguous / "diagnosis.json").read_text())

@@ -98,10 +98,12 @@ def ranked(found: Sequence[Proposal], rivals: Rivalry) -> list[Proposal]:
 
 
 def assess(design: Design, rivals: Rivalry, draws: Array) -> Proposal | None:
-    """What a design is expected to bring; None where a model's motion fails.
+    """What a design is expected to bring; None where a model's motion fails or has no curvature.
 
     `draws` (S, at least d) are standard normal numbers, the same for all designs.
     """
+    if not all(np.isfinite(h.covariance).all() for h in rivals.hypotheses):
+        return None
     responses = [response(h, design, rivals) for h in rivals.hypotheses]
     if not all(r.is_finite for r in responses):
         return None

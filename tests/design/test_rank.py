@@ -66,6 +66,17 @@ def test_designs_are_ranked_and_the_same_for_the_same_seed(damped: Rivalry) -> N
     assert [p.chance for p in again] == [p.chance for p in found]
 
 
+def test_a_model_that_fails_leaves_no_design(small: Identification) -> None:
+    rivals = base_rivalry(small)
+    first = rivals.hypotheses[0]
+    softer = first.mode * np.where(np.arange(first.mode.size) == first.known["k1"], -1.0, 1.0)
+    for broken in (
+        replace(first, mode=softer),
+        replace(first, covariance=np.full_like(first.covariance, np.nan)),
+    ):
+        assert proposals(replace(rivals, hypotheses=(broken,)), rng=np.random.default_rng(1)) == ()
+
+
 def test_where_nothing_is_open_the_stiffness_decides(small: Identification) -> None:
     found = proposals(base_rivalry(small), rng=np.random.default_rng(1))
     joining = [p.narrowing for p in found if p.design.joins]
