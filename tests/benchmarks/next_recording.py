@@ -158,7 +158,8 @@ def slope(predicted: np.ndarray, obtained: np.ndarray) -> tuple[float, float]:
 def summary(rows: Sequence[Row]) -> Row:
     """Shares settled, and the slope."""
     open_ = [row for row in rows if "arms" in row]
-    result: Row = {"trials": len(rows), "ambiguous": len(open_)}
+    seeds = [row["seed"] for row in rows]
+    result: Row = {"seeds": [min(seeds), max(seeds)], "trials": len(rows), "ambiguous": len(open_)}
     for arm in ("next", "repeat"):
         ends = [(row["truth"], row["arms"][arm]) for row in open_]
         result[arm] = {
