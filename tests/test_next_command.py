@@ -18,6 +18,7 @@ from bayesimpact.diagnosis.loop import diagnose
 from bayesimpact.inference.identify import Identification
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.report.archive import load_results, save_results
+from bayesimpact.report.figures.save import Drawn
 
 Run = Callable[..., tuple[int, str, str]]
 FEW = tuple(e for e in EFFECTS if e.id in ("spring_cubic", "spring_quintic", "quadratic_drag"))
@@ -45,13 +46,21 @@ def short(campaign: Campaign) -> Campaign:
     return campaign.truncated(1.0)
 
 
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reports without their figures, which take ten times as long as all the rest."""
+    monkeypatch.setattr("bayesimpact.report.write.save_all", lambda *_: Drawn())
+
+
 @pytest.fixture(scope="module")
 def ambiguous(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("ambiguous")
     campaign = short(record(7, {"spring_cubic": {"stiffness": 4e4}}))
     found = diagnose(campaign, rng=np.random.default_rng(0), effects=FEW, search=False)
     assert found.verdict == "ambiguous"
-    bi.save(found, out)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("bayesimpact.report.write.save_all", lambda *_: Drawn())
+        bi.save(found, out)
     return out
 
 
@@ -75,6 +84,7 @@ def test_it_ranks_writes_and_tells(run: Run, ambiguous: Path) -> None:
     assert "Which recording next" in page and (ambiguous / "figures" / "designs.png").exists()
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_again_it_says_the_same_once(run: Run, ambiguous: Path) -> None:
     run("next", ambiguous, "--quiet")
     before = (ambiguous / "next.json").read_text()
@@ -85,6 +95,7 @@ def test_again_it_says_the_same_once(run: Run, ambiguous: Path) -> None:
     assert json.loads((ambiguous / "diagnosis.json").read_text())["summary"].count(sentence) == 1
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_folder_without_a_diagnosis_is_refused(
     run: Run, small: Identification, ambiguous: Path, tmp_path: Path
 ) -> None:
