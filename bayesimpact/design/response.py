@@ -7,38 +7,27 @@ recording itself will tell them, so whatever they can imitate tells no models ap
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import pi, sqrt
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign, Measurement
 from bayesimpact.data.recording import Recording
-from bayesimpact.design.candidates import Design, highest, usual_release
+from bayesimpact.design.beliefs import belief
+from bayesimpact.design.candidates import Design, usual_release
 from bayesimpact.design.hypotheses import Hypothesis, Rivalry
 from bayesimpact.design.odds import Foretold, Odds, expected_odds
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.noise import Noise
-from bayesimpact.model.effects.effect import EffectParameter
 from bayesimpact.model.oscillator import Oscillator, build_oscillator
-from bayesimpact.model.parameters import SLOTS, bare_name, is_added
+from bayesimpact.model.parameters import SLOTS, bare_name
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-START = 0.1
-"""Standard deviation of start values and rest reading about the intended ones, in the highest
-release; the recording determines them a thousand times better, so the number hardly matters.
-"""
-UNIFORM = pi / sqrt(3.0)
-"""Standard deviation of a phase of which nothing is known."""
-STEP = 0.05
-"""Difference steps, in standard deviations of the posterior: as in fits of added effects. Along a
-valley that is too much: no step moves a recording by more than about its noise, once in all.
-"""
 ROUNDS = 12
 """Steps at most by which a rival's parameters imitate another model."""
 DAMPING = (0.0, 1e-6, 1e-4, 1e-2, 1.0)
@@ -77,6 +66,13 @@ class Response:
     def moving(self) -> Index:
         """Positions in theta of all parameters, shared ones first, (k,)."""
         return np.concatenate([self.shared, self.own])
+
+    def admissible(self, shift: Array) -> Array:
+        """Parameters (d,) that are shifted (k,) from their means as far as their bounds allow."""
+        parameters = self.likelihood.oscillator.layout.parameters
+        theta = self.mean.copy()
+        theta[self.moving] += shift
+        return np.clip(theta, [p.lower for p in parameters], [p.upper for p in parameters])
 
     @cached_property
     def root(self) -> Array:
@@ -144,9 +140,8 @@ def odds_between(right: Response, other: Response, draws: Array) -> Odds:
         downhill = jacobian.T @ left - other.precision @ shift
         least = distance
         for damping in DAMPING:
-            moved = shift + solved(curvature, downhill, damping)
-            trial = other.mean.copy()
-            trial[other.moving] += moved
+            trial = other.admissible(shift + solved(curvature, downhill, damping))
+            moved = trial[other.moving] - other.mean[other.moving]
             remaining = goal - other.predicted(trial)
             least = float(remaining @ remaining + moved @ other.precision @ moved)
             if least < distance:
@@ -183,7 +178,7 @@ def response(hypothesis: Hypothesis, design: Design, rivals: Rivalry) -> Respons
     name = new_name(rivals)
     o = oscillator(hypothesis, design, rivals, name)
     mean, sd, steps, known = np.array(
-        [_belief(hypothesis, o, n, design, rivals) for n in o.layout.names]
+        [belief(hypothesis, o, n, design, rivals) for n in o.layout.names]
     ).T
     columns = o.recording_columns(0)
     shared = np.array([i for i in columns if known[i] >= 0], dtype=np.int64)
@@ -234,62 +229,3 @@ def oscillator(hypothesis: Hypothesis, design: Design, rivals: Rivalry, name: st
         columns[:, SLOTS.index(slot)] = -1
         constants[:, SLOTS.index(slot)] = value
     return replace(made, layout=replace(made.layout, columns=columns, constants=constants))
-
-
-def _belief(
-    hypothesis: Hypothesis, o: Oscillator, name: str, design: Design, rivals: Rivalry
-) -> tuple[float, float, float, float]:
-    """Mean, standard deviation, difference step of a parameter; its position in the model, or -1
-    for one of the new recording's own.
-    """
-    place = hypothesis.known.get(name, -1)
-    bare = bare_name(name)
-    if place >= 0 and not (bare == "g" and design.gap_shift):
-        sd, value = float(hypothesis.sd[place]), float(hypothesis.mode[place])
-        step = min(step_of(sd, value), float(hypothesis.conditional_sd[place]))
-        return value, sd, step, place
-    alike = [i for n, i in hypothesis.known.items() if n.split("[")[0] == name.split("[")[0]]
-    values = hypothesis.mode[alike] if alike else np.zeros(1)
-    usual = float(np.median(hypothesis.sd[alike])) if alike else 0.0
-    height, rate = highest(rivals), rate_of(hypothesis, rivals)
-    wide = START * height
-    intended: Mapping[str, tuple[float, float]] = {
-        "y0": (design.y0, wide),
-        "v0": (design.v0, wide * rate),
-        "offset": (0.0, wide * rate ** o.orders[0]),
-        "g": (float(values.mean()) + design.gap_shift, max(float(values.std()), usual)),
-    }
-    mean, sd = float(values.mean()), max(float(values.std()), usual)
-    if bare in intended and (bare == "g" or not is_added(name)):
-        mean, sd = intended[bare]
-        if bare == "g" and design.gap_shift:
-            sd = max(sd, abs(design.gap_shift))
-    elif circular(hypothesis, name):
-        mean, sd = 0.0, UNIFORM
-    return mean, sd, step_of(usual or 1e-3 * sd, mean), -1
-
-
-def step_of(sd: float, value: float) -> float:
-    """Difference step of a parameter with a standard deviation."""
-    return STEP * sd if sd > 0 else 1e-6 * max(abs(float(value)), 1e-6)
-
-
-def circular(hypothesis: Hypothesis, name: str) -> bool:
-    """Whether a parameter of an effect is a phase."""
-    parameter = parameter_of(hypothesis, name)
-    return parameter is not None and parameter.circular
-
-
-def parameter_of(hypothesis: Hypothesis, name: str) -> EffectParameter | None:
-    """The record of an effect's parameter; None for one of the base oscillator."""
-    if not is_added(name):
-        return None
-    own, rest = name.split(".", 1)
-    (effect,) = [e for e in hypothesis.effects if e.id == own]
-    return effect.parameter(rest.split("[")[0])
-
-
-def rate_of(hypothesis: Hypothesis, rivals: Rivalry) -> float:
-    """Natural angular frequency in free flight, rad/s."""
-    known = [hypothesis.mode[i] for n, i in hypothesis.known.items() if bare_name(n) == "k1"]
-    return sqrt(max(float(np.mean(known)), 1e-300) / rivals.mass) if known else 1.0

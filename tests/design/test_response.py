@@ -21,7 +21,13 @@ from bayesimpact.model.simulate import simulate
 
 @pytest.fixture(scope="module")
 def damped(small: Identification) -> Rivalry:
-    return rivalry_of(fitted(small, "coulomb_friction", "quadratic_drag"))
+    """Two laws, either as large as would stand out by fifteen standard deviations."""
+    made = rivalry_of(fitted(small, "coulomb_friction", "quadratic_drag"))
+    large = [
+        replace(h, mode=h.mode + 15 * h.sd * np.array(["." in n for n in h.names]))
+        for h in made.hypotheses
+    ]
+    return replace(made, hypotheses=tuple(large))
 
 
 def release(rivals: Rivalry) -> Design:
@@ -115,7 +121,20 @@ def test_the_criterion_is_what_a_refit_leaves(damped: Rivalry) -> None:
     found = odds_between(one, two, draws)
     linear = expected_odds(one.foretold, two.foretold, draws)
     rest = linear.mean - 0.5 * linear_criterion(one, two)
+    assert linear_criterion(one, two) > 10
     assert 2 * (found.mean - rest) == pytest.approx(imitated(one, two), rel=0.02, abs=0.02)
+
+
+def test_a_rival_imitates_within_its_bounds(damped: Rivalry) -> None:
+    """Friction does not become negative to look like another model."""
+    friction = damped.hypotheses[0]
+    made = response(friction, release(damped), damped)
+    names = made.likelihood.oscillator.layout.names
+    at = names.index("coulomb_friction.force")
+    shift = np.where(made.moving == at, -1e3 * made.mean[at], 0.0)
+    assert made.mean[at] > 0.0 and made.admissible(shift)[at] == 0.0
+    shift = 0.1 * np.sqrt(np.diag(made.prior))
+    assert made.admissible(shift)[made.moving] == pytest.approx(made.mean[made.moving] + shift)
 
 
 def test_noise_keeps_its_correlation_in_time(small: Identification) -> None:
