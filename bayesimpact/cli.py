@@ -258,6 +258,42 @@ def report(
         ctx.exit(NOT_CONVERGED)
 
 
+@main.command("next")
+@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.option(
+    "--effects",
+    "own",
+    type=click.Path(path_type=Path),
+    metavar="FILE.py",
+    help="Effects of your own, as for the diagnosis. The file is executed as Python.",
+)
+@common
+@click.pass_context
+def next_(ctx: click.Context, folder: Path, own: Path | None, seed: int, quiet: bool) -> None:
+    """Which recording would settle what DIR's diagnosis left open.
+
+    Ranks releases, obstacles, lengths, rates and gaps by the ln odds that they are expected to give
+    between the models that are left, and by how they narrow k2. Writes DIR/next.json, and the
+    report with the table.
+    """
+    from bayesimpact.model.own_effects import load_effects
+    from bayesimpact.report.next_words import table_lines
+    from bayesimpact.workflow import NEXT_FILE, next_recording
+
+    effects = load_effects(own) if own else ()
+    if folder.is_dir() and (folder / "results.nc").exists():
+        made_folder(folder, f"bayesimpact next {folder}")
+    content, written = next_recording(folder, seed=seed, effects=effects, say=telling(quiet))
+    if not quiet:
+        for line in (*table_lines(content), content["sentence"]):
+            click.echo(line)
+        click.echo(f"next: {folder / NEXT_FILE}")
+        click.echo(f"report: {written.page}")
+    if written.failed:
+        click.echo(f"bayesimpact: {unmade_words(list(written.failed))}", err=True)
+        ctx.exit(NOT_CONVERGED)
+
+
 @main.command()
 @click.option(
     "--out",

@@ -13,22 +13,30 @@ import numpy as np
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.faults.find import set_aside
+from bayesimpact.design.document import next_document
+from bayesimpact.design.hypotheses import Rivalry, rivalry
+from bayesimpact.design.rank import proposals
+from bayesimpact.design.store import rivals_content, rivals_from
 from bayesimpact.diagnosis.certificate import certificate
 from bayesimpact.diagnosis.document import document
 from bayesimpact.diagnosis.loop import Diagnosis, diagnose
+from bayesimpact.errors import InputError
 from bayesimpact.inference.identify import Identification, identify
 from bayesimpact.inference.posterior import Posterior, sample
 from bayesimpact.inference.progress import progress_bar
-from bayesimpact.model.effects import SEARCHED
+from bayesimpact.model.effects import EFFECTS, SEARCHED
 from bayesimpact.model.effects.effect import Effect
-from bayesimpact.report.archive import write_text
+from bayesimpact.report.archive import load_results, write_text
 from bayesimpact.report.build import versions
 from bayesimpact.report.diagnosis_arrays import diagnosis_arrays
 from bayesimpact.report.figures.save import reason
+from bayesimpact.report.next_words import sentence
 from bayesimpact.report.results import Results
-from bayesimpact.report.write import Written, write_fit, write_posterior
+from bayesimpact.report.write import Written, write_fit, write_posterior, write_results
 
 DIAGNOSIS_FILE = "diagnosis.json"
+NEXT_FILE = "next.json"
+KEPT_APART = ("hypotheses", "next")  # of a diagnosis: in the results, not in diagnosis.json
 CHAIN_FOLDER = "chain"
 MAX_STEPS = 20_000
 LEARNED_STEPS = 300  # of a model with a learned force, whose many coefficients may mix slowly
@@ -194,6 +202,11 @@ def write_diagnosis(
         arrays = diagnosis_arrays(diagnosis)
     except Exception as error:
         arrays, failed["arrays of the diagnosis' figures"] = {}, reason(error)
+    try:
+        kept, models = rivals_content(rivalry(diagnosis))
+        arrays, plain = arrays | models, plain | {"hypotheses": _strict(kept)}
+    except Exception as error:
+        failed["models for `bayesimpact next`"] = reason(error)
     told: dict[str, Any] = {
         "command": command,
         "seconds": float(content["seconds"]),
@@ -205,6 +218,54 @@ def write_diagnosis(
         final = replace(diagnosis.identification, fit=diagnosis.after, search=None)
         return write_fit(final, out, seed=seed, **told)
     return write_posterior(after, diagnosis.identification, out, before=before, **told)
+
+
+def next_recording(
+    folder: Path, *, seed: int = 0, effects: Sequence[Effect] = (), say: Say = silent
+) -> tuple[dict[str, Any], Written]:
+    """Which recording would settle what a diagnosis left open: next.json, and the report anew.
+
+    Parameters
+    ----------
+    folder : what `diagnose_campaign` wrote
+    effects : of one's own, as for the diagnosis
+
+    Returns
+    -------
+    The content of next.json, and what the folder holds now.
+
+    Raises
+    ------
+    InputError : the folder holds no diagnosis, or its models have effects that are not known
+    """
+    results = load_results(folder)
+    diagnosis = dict(results.diagnosis or {})
+    rivals = _rivals(folder, results, (*EFFECTS, *effects))
+    found = proposals(rivals, rng=np.random.default_rng(seed), progress=say)
+    content = next_document(rivals, found, seed)
+    content["sentence"] = sentence(content)
+    old = (diagnosis.get("next") or {}).get("sentence", "")
+    summary = str(diagnosis["summary"]).removesuffix(old).rstrip()
+    diagnosis |= {"summary": f"{summary} {content['sentence']}".rstrip(), "next": _strict(content)}
+    say("writing the report")
+    write_text(folder / NEXT_FILE, json.dumps(diagnosis["next"], indent=1))
+    told = {k: v for k, v in diagnosis.items() if k not in KEPT_APART}
+    write_text(folder / DIAGNOSIS_FILE, json.dumps(told, indent=1))
+    return content, write_results(replace(results, diagnosis=diagnosis), folder)
+
+
+def _rivals(folder: Path, results: Results, effects: Sequence[Effect]) -> Rivalry:
+    """The models that the diagnosis of a folder left open."""
+    accepted = "a folder that this version of `bayesimpact diagnose --out DIR` wrote"
+    if results.diagnosis is None:
+        raise InputError(str(folder), "results without a diagnosis", accepted)
+    if "hypotheses" not in results.diagnosis:
+        raise InputError(str(folder), "a diagnosis without its models", accepted)
+    kept, arrays = results.diagnosis["hypotheses"], results.diagnosis_arrays
+    try:
+        return rivals_from(results.diagnosis["verdict"], kept, arrays, effects)
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(str(folder), f"models that cannot be read ({error})", accepted) from None
 
 
 def _strict(value: Any) -> Any:

@@ -20,6 +20,7 @@ LAYERS = (
     "response",
     "inference",
     "diagnosis",
+    "design",
     "report",
     "workflow",
     "cluster",

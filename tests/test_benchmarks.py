@@ -7,7 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks import bundled, figures, loops, peers, readme, record, samplers, sampling, scaling
+from benchmarks import (
+    bundled,
+    figures,
+    loops,
+    next_recording,
+    peers,
+    readme,
+    record,
+    samplers,
+    sampling,
+    scaling,
+)
 from benchmarks.kernel import campaign, check
 from benchmarks.sampling import Sampled
 
@@ -185,3 +196,32 @@ def test_a_timed_diagnosis_says_the_same_every_time() -> None:
     assert (found["s"], found["slowest_s"], found["processor_s"]) == (31.0, 33.0, 51.0)
     with pytest.raises(AssertionError):
         loops.summary([*runs, (30.0, 50.0, "named")])
+
+
+def proposed(after: list[float | None], verdict: str, named: list[str]) -> dict:
+    """One arm: of three rivals the second was planted; it led by 1 and -2 nats."""
+    odds = [[0.0, 9.0, 9.0], [4.0, 0.0, 8.0], [9.0, 9.0, 0.0]]
+    return {
+        "odds": odds, "chance": 0.75, "verdict": verdict, "effects": named, "after": after,
+        "halves": {"k2[1]": [2.0, 1.0, 1.0]},
+    }  # fmt: skip
+
+
+def test_what_proposals_settled_is_counted() -> None:
+    row = {
+        "seed": 7, "verdict": "ambiguous", "truth": "b", "ids": [["a"], ["b"], []],
+        "lo": [3.0, 4.0, 6.0],
+        "arms": {
+            "next": proposed([1.0, 7.0, None], "named", ["b"]),
+            "repeat": proposed([3.0, 6.0, 0.0], "named", ["a"]),
+        },
+    }  # fmt: skip
+    rows = [{"seed": 5, "verdict": "named", "truth": "a"}, row]
+    pairs = next_recording.pairs([row])
+    assert pairs.tolist() == [[4.0, 5.0], [4.0, 2.0], [8.0, 8.0]]
+    found = next_recording.summary(rows)
+    assert (found["trials"], found["ambiguous"], found["seeds"]) == (2, 1, [5, 7])
+    assert found["next"] == {"settled": 1, "right": 1, "expected": 0.75}
+    assert found["repeat"]["settled"] == 1 and found["repeat"]["right"] == 0
+    assert found["narrowing"] == {"median": pytest.approx(1.0), "intervals": 2}
+    assert found["slope"]["value"] == pytest.approx((5 + 2 + 8) / (4 + 4 + 8))

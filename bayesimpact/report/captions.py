@@ -48,6 +48,12 @@ DIAGNOSIS = {
         "half-widths of the 90 % band (grey). Left: frequency against amplitude. Right: damping "
         "ratio against time."
     ),
+    "designs": (
+        "Recordings that could be made next. Left, where rivals are left: the ln odds that each is "
+        "expected to give the right one over another, what refitted parameters can imitate taken "
+        "out; the dashed line is what a name needs. Right: by how much it narrows the stiffness. "
+        "Black: the best repeat of a recording; grey: a campaign of its own."
+    ),
     "shifts": (
         "How far the added physics moves the parameters, in standard deviations of the base model: "
         "medians and 90 % intervals."

@@ -8,6 +8,7 @@ from typing import Any
 
 from markupsafe import Markup
 
+from bayesimpact.report.next_words import next_view
 from bayesimpact.report.results import Results
 from bayesimpact.report.rows import Z90
 from bayesimpact.report.tables import span, symbol
@@ -82,6 +83,7 @@ def diagnosis_view(results: Results) -> dict[str, Any] | None:
             if name in after and name.partition("[")[0] not in NUISANCES
         ],
         "limits": [_limit(limit) for limit in diagnosis.get("limits", [])],
+        "next": next_view(diagnosis.get("next")),
     }
 
 

@@ -16,6 +16,7 @@ from benchmarks.tables import HERE, grid, stored
 from benchmarks.trial_tables import (
     blind_table,
     controls_table,
+    next_table,
     single_table,
     strong_table,
     trial_coverage_table,
@@ -246,6 +247,7 @@ TABLES = {
     "trial_coverage": trial_coverage_table,
     "singles": single_table,
     "strong": strong_table,
+    "next": next_table,
     "power": power_table,
     "sbc": sbc_table,
     "kernel": kernel_table,

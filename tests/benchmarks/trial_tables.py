@@ -175,3 +175,31 @@ def strong_table() -> str:
         f"95 % interval. Commit {t['commit'][:7]}, {t['date']}."
     )
     return grid(("several effects at once", "trials or intervals"), rows, foot)
+
+
+def next_table() -> str:
+    """Ambiguous campaigns with one recording more: the one proposed, or a repeat."""
+    if not (HERE / "next_recording.json").exists():
+        return "No run is stored yet."
+    t = stored("next_recording")
+    rows = []
+    for arm, words in (("next", "the first proposal"), ("repeat", "the best repeat")):
+        found = t[arm]
+        rows.append(
+            (
+                words,
+                share(rate(found["settled"], t["ambiguous"])),
+                str(found["right"]),
+                f"{found['expected']:.1f}",
+            )
+        )
+    s, k2 = t["slope"], t["narrowing"]
+    foot = (
+        f"{t['ambiguous']} ambiguous of {t['trials']} trials, seeds {t['seeds'][0]} to "
+        f"{t['seeds'][1]}. ln odds obtained for the planted effect over its rivals against those "
+        f"foretold: slope {s['value']:.2f} ± {s['se']:.2f} ({s['pairs']} pairs, "
+        f"{s['beyond']} with more foretold than counts left out). Narrowing of k2, obtained over "
+        f"foretold: median {k2['median']:.2f} of {k2['intervals']} intervals. Commit "
+        f"{(t['commit'] or '?')[:7]}, {t['date']}."
+    )
+    return grid(("recorded next", "named then", "rightly", "foretold"), rows, foot)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from matplotlib.figure import Figure
 
 from bayesimpact.report.figures.bands import band_figures
+from bayesimpact.report.figures.designs import design_figures
 from bayesimpact.report.figures.force_map import force_figures
 from bayesimpact.report.figures.gain import gain_figures
 from bayesimpact.report.figures.gaussian import gaussian_figures
@@ -25,5 +26,6 @@ DRAWERS: tuple[Drawer, ...] = (
     improvement_figures,
     band_figures,
     gaussian_figures,
+    design_figures,
 )
 """Functions from results to figures by name; each returns {} when its arrays are not there."""
