@@ -27,7 +27,7 @@ TEMPLATES = Path(__file__).parent / "template"
 _VERDICT_CLASS = {"adequate": "good", "inadequate": "bad", "slight": "", "overestimated": ""}
 _GROUPS = (
     *("story", "fit", "corner", "backbone", "search", "traces"),
-    *("force", "gain", "ranking", "limits", "improvement", "bands", "shifts"),
+    *("force", "formula", "gain", "ranking", "limits", "improvement", "bands", "shifts"),
 )
 _PIXELS_PER_INCH = 96
 _SENTENCE_END = re.compile(r"(?<=[a-z0-9)])\. (?=[A-Z])")

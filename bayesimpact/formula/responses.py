@@ -1,0 +1,183 @@
+"""How the recordings would change under a small force of the state, without simulating it.
+
+About a fitted motion a small force f(t) moves the state by
+
+    (u, u')(t) = Phi(t) W(t),     W(t) = -1/m int_0^t Phi(s)^-1 (0, 1) f(s) ds,
+
+where Phi is the derivative of the state with respect to the initial one, jumps at the obstacle
+included (Mueller 1995, Chaos Solitons Fractals 5:1671, saltation). Phi is had from four simulated
+motions per recording; after that every term of the grammar costs one sum over its own force history
+along the motion. A spline a(y) + b(y) v would show only what is linear in v; the force history
+itself, scored on the residual, tells |v| v from v.
+
+Of laws with a memory or a further mode in the fitted model only displacement and velocity are
+perturbed here; such a score is approximate, and the refit that follows is not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.formula.grammar import ONE, Term
+from bayesimpact.inference.fit import Fit
+from bayesimpact.model.motions import general_motions, motions
+from bayesimpact.model.parameters import BASE_SLOTS, SLOTS
+
+Array = NDArray[np.float64]
+
+STEP = 1e-4  # of the initial state, relative to amplitude and speed
+POINTS = 300  # in a free period: a jump of a force lies within half a step, 0.2 % of the period
+FINEST = 12  # times finer than the samples
+_Y0, _V0, _GAP = (SLOTS.index(n) for n in ("y0", "v0", "g"))
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """One recording's fitted motion on a grid `factor` times as fine as its samples.
+
+    Attributes
+    ----------
+    y, v, d, t : displacement m, velocity m/s, indentation m, time s, (n,)
+    kernel : (2, n) Phi^-1 (0, 1) / -m
+    rows : (2, samples) derivative of what the probe reads, before filter, by the initial state
+    direct : what an acceleration reads of the force itself, 1/kg; 0 for other quantities
+    shares : (n - 1,) share of a step before the touch or the turn within it; 0.5 else
+    interval, factor : of the fine grid, s; fine steps in a sample
+    """
+
+    y: Array
+    v: Array
+    d: Array
+    t: Array
+    kernel: Array
+    rows: Array
+    direct: float
+    shares: Array
+    interval: float
+    factor: int
+
+
+def motion_of(fit: Fit, r: int) -> Motion:
+    """The fitted motion of one recording and its dependence on the initial state."""
+    oscillator = fit.target.oscillator
+    mass, interval = oscillator.campaign.mass, float(oscillator.intervals[r])
+    q = oscillator.layout.slots(fit.mode)[r]
+    period = 2 * np.pi * np.sqrt(mass / q[SLOTS.index("k1")])
+    factor = int(np.clip(np.ceil(POINTS * interval / period), 1, FINEST))
+    if oscillator.inputs is not None:  # a measured force is known at the samples
+        factor = 1
+    count = (int(oscillator.counts[r]) - 1) * factor + 1
+    reach = float(np.abs(fit.displacements[r]).max())
+    steps = STEP * reach * np.array([1.0, 2 * np.pi / period])
+    points = np.repeat(q[None], 5, axis=0)
+    for i, slot in enumerate((_Y0, _V0)):
+        points[1 + 2 * i, slot] += steps[i]
+        points[2 + 2 * i, slot] -= steps[i]
+    order = int(oscillator.orders[r])
+    y, v = (_simulated(fit, r, points, k, count, interval / factor) for k in (0, 1))
+    change = [(x[1::2] - x[2::2]) / (2 * steps[:, None]) for x in (y, v)]
+    read = change[order] if order < 2 else _change_of_acceleration(fit, r, points, steps)
+    (a, b), (c, e) = change
+    kernel = np.stack([b, -a]) / ((a * e - b * c) * mass)
+    d = y[0] - q[_GAP] if oscillator.campaign.stop else np.full(count, -np.inf)
+    return Motion(
+        y[0], v[0], d, np.arange(count, dtype=np.float64) * (interval / factor), kernel,
+        read[:, ::factor] if order < 2 else read, -1 / mass if order == 2 else 0.0,
+        _shares(v[0], d), interval / factor, factor,
+    )  # fmt: skip
+
+
+def _simulated(fit: Fit, r: int, points: Array, order: int, count: int, interval: float) -> Array:
+    """Motions, (B, count), of slot vectors (B, Q)."""
+    oscillator = fit.target.oscillator
+    size = points.shape[0]
+    inputs = None if oscillator.inputs is None else oscillator.inputs.of(np.full(size, r))
+    counts, intervals = np.full(size, count, dtype=np.int64), np.full(size, interval)
+    orders, mass = np.full(size, order, dtype=np.int64), oscillator.campaign.mass
+    if oscillator.is_base:
+        base = np.ascontiguousarray(points[:, : len(BASE_SLOTS)])
+        return motions(base, mass, counts, intervals, orders, inputs)
+    return general_motions(points, mass, counts, intervals, oscillator.laws, orders, inputs)
+
+
+def _change_of_acceleration(fit: Fit, r: int, points: Array, steps: Array) -> Array:
+    oscillator = fit.target.oscillator
+    count, interval = int(oscillator.counts[r]), float(oscillator.intervals[r])
+    x = _simulated(fit, r, points, 2, count, interval)
+    return np.asarray((x[1::2] - x[2::2]) / (2 * steps[:, None]))
+
+
+def _shares(v: Array, d: Array) -> Array:
+    """Where in a step the touch or the turn lies, by linear interpolation."""
+    shares = np.full(v.size - 1, 0.5)
+    for x in (v, d):
+        if np.isfinite(x).all():
+            crossed = np.flatnonzero(np.sign(x[1:]) * np.sign(x[:-1]) < 0)
+            shares[crossed] = x[crossed] / (x[crossed] - x[crossed + 1])
+    return shares
+
+
+def responses(motion: Motion, terms: Sequence[Term]) -> tuple[Array, Array, Array]:
+    """What the probe would read of each term's force of unit size, before its filter.
+
+    Returns
+    -------
+    responses (K, samples); the largest force of each term along the motion, (K,); its mean power
+    with the motion, W, (K,)
+    """
+    forces = _forces(motion, terms)
+    before, after = _weights(motion)
+    samples = motion.rows.shape[1]
+    inner = (before[:, :-1] + after[:, 1:]) if before.shape[1] > 1 else before[:, :0]
+    nodes = np.concatenate([before[:, :1], inner], axis=1).reshape(2, samples - 1, motion.factor)
+    parts = np.einsum(
+        "ksf,tsf->tks", nodes, forces[:, :-1].reshape(len(terms), samples - 1, motion.factor)
+    )
+    state = np.zeros((len(terms), 2, samples))
+    np.cumsum(parts, axis=2, out=state[:, :, 1:])
+    at_samples = forces[:, :: motion.factor]
+    last = after[:, motion.factor - 1 :: motion.factor]  # the last half step to each sample
+    state[:, :, 1:] += last * at_samples[:, None, 1:]
+    out = np.einsum("ks,tks->ts", motion.rows, state)
+    if motion.direct:
+        out += motion.direct * at_samples
+    return (
+        out,
+        np.maximum(forces.max(axis=1), -forces.min(axis=1)),
+        forces @ motion.v / motion.v.size,
+    )
+
+
+def _forces(motion: Motion, terms: Sequence[Term]) -> Array:
+    """Force of each term along the motion, (K, n); factors that terms share are computed once."""
+    out = np.empty((len(terms), motion.y.size))
+    known: dict[object, Array] = {}
+    for i, term in enumerate(terms):
+        where = replace(term, speed=ONE, fade=0.0, drift=0)
+        if where not in known:
+            known[where] = where.of_position(motion.y, motion.d)
+        speed = (term.speed, term.fade)
+        if speed not in known:
+            known[speed] = term.of_speed(motion.v)
+        np.multiply(known[where], known[speed], out=out[i])
+        if term.drift:
+            out[i] *= motion.t
+    return out
+
+
+def _weights(motion: Motion) -> tuple[Array, Array]:
+    """Kernel times the share of every step that its first and its last point stand for."""
+    share = motion.interval * motion.shares
+    return share * motion.kernel[:, :-1], (motion.interval - share) * motion.kernel[:, 1:]
+
+
+def largest_force(
+    motions: Sequence[Motion], terms: Sequence[Term], sizes: Sequence[float]
+) -> float:
+    """Peak of the force of some terms together along all motions, N."""
+    weights = np.array(sizes)
+    return max(float(np.abs(weights @ _forces(m, terms)).max()) for m in motions)
