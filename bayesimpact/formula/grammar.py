@@ -186,7 +186,10 @@ class Term:
     def of_speed(self, v: Array) -> Array:
         """Factors of the speed, (n,)."""
         fading = np.exp(-np.abs(v) / self.fade) if self.fade > 0 else 1.0
-        return np.asarray(self.speed(v) * fading)
+        m = self.speed.exponent
+        if m.is_integer():
+            return np.asarray(self.speed(v) * fading)
+        return np.asarray((v * v + SLOW**2) ** (0.5 * (m - 1.0)) * v * fading)
 
     def force(self, y: Array, v: Array, d: Array, t: Array) -> Array:
         """Force per unit of size at displacements m, velocities, indentations, times (n,)."""

@@ -26,8 +26,8 @@ def force(y, v, d, t, z, touching, p, q):  # type: ignore[no-untyped-def]
     inside = 1.0
     x = y - p[5] * p[1]
     if p[4] == 1.0:
-        x = d - p[1]
-        if x <= 0.0:
+        x = d - p[1]  # called in contact only: a force that jumps at the touch is there at d = 0
+        if p[1] > 0.0 and x <= 0.0:
             inside = 0.0
     elif p[4] == 2.0:
         x = p[5] * y - p[1]
@@ -191,7 +191,7 @@ def law_of(term: Term) -> Law:
         kink_at_turn=not jumps and (rooted or term.fade > 0 or m == Power(2.0, True)),
         first_at_turn=first_at_turn if rooted else None,
         rough_at_touch=term.region == "contact" and not term.position.exponent.is_integer(),
-        grain=grain if term.region == "bump" else None,
+        grain=grain if term.region in ("bump", "box") else None,
         polynomial=_is_polynomial(term),
         ignores_speed=m.is_one and term.fade == 0.0,
     )

@@ -45,8 +45,8 @@ class Motion:
     kernel : (2, n) Phi^-1 (0, 1) / -m
     rows : (2, samples) derivative of what the probe reads, before filter, by the initial state
     direct : what an acceleration reads of the force itself, 1/kg; 0 for other quantities
-    shares : (n - 1,) share of a step before the touch or the turn within it; 0.5 else
-    interval, factor : of the fine grid, s; fine steps in a sample
+    steps : (2, n - 1) weights of both ends of every step in an integral over time, s
+    factor : fine steps in a sample
     """
 
     y: Array
@@ -56,8 +56,7 @@ class Motion:
     kernel: Array
     rows: Array
     direct: float
-    shares: Array
-    interval: float
+    steps: Array
     factor: int
 
 
@@ -87,7 +86,8 @@ def motion_of(fit: Fit, r: int) -> Motion:
     return Motion(
         y[0], v[0], d, np.arange(count, dtype=np.float64) * (interval / factor), kernel,
         read[:, ::factor] if order < 2 else read, -1 / mass if order == 2 else 0.0,
-        _shares(v[0], d), interval / factor, factor,
+        _steps(v[0], d, interval / factor),
+        factor,
     )  # fmt: skip
 
 
@@ -111,14 +111,43 @@ def _change_of_acceleration(fit: Fit, r: int, points: Array, steps: Array) -> Ar
     return np.asarray((x[1::2] - x[2::2]) / (2 * steps[:, None]))
 
 
-def _shares(v: Array, d: Array) -> Array:
-    """Where in a step the touch or the turn lies, by linear interpolation."""
-    shares = np.full(v.size - 1, 0.5)
-    for x in (v, d):
-        if np.isfinite(x).all():
-            crossed = np.flatnonzero(np.sign(x[1:]) * np.sign(x[:-1]) < 0)
-            shares[crossed] = x[crossed] / (x[crossed] - x[crossed + 1])
-    return shares
+def _steps(v: Array, d: Array, h: float) -> Array:
+    """Weights of the first and of the last point of every step, (2, n - 1), s.
+
+    The trapezoidal rule with Gregory's corrections at every touch and turn, where forces jump: a
+    sum over a whole swing is then as good as its ends. The rest of a step to that moment is the
+    integral of the parabola through the three nearest points on its side.
+    """
+    weights = np.full((2, v.size - 1), 0.5 * h)
+    for x, rate in ((v, None), (d, v)):
+        if not np.isfinite(x).all():
+            continue
+        i = np.flatnonzero(np.sign(x[1:]) * np.sign(x[:-1]) < 0)
+        i = i[(i > 1) & (i < v.size - 3)]
+        share = x[i] / (x[i] - x[i + 1])
+        if rate is not None:
+            share = _crossing(share, x[i], x[i + 1], h * rate[i], h * rate[i + 1])
+        weights[:, i] = 0.0
+        for side, step, part in ((0, -1, share), (1, 1, 1.0 - share)):
+            for k, own in enumerate(_end(part)):
+                np.add.at(weights[side], i + step * k, h * own)
+    return weights
+
+
+def _end(part: Array) -> tuple[Array, Array, Array]:
+    """Weights, in steps, of the last three points before a jump that lies `part` of a step on."""
+    slope, bend = part**2 / 4, part**3 / 6 - 1 / 24
+    return part + 3 * slope + bend - 1 / 12, -4 * slope - 2 * bend + 1 / 12, slope + bend
+
+
+def _crossing(u: Array, x0: Array, x1: Array, r0: Array, r1: Array) -> Array:
+    """Zero of the cubic with values x and slopes r at 0 and 1, from near u: two Newton steps."""
+    for _ in range(2):
+        a, b = 2 * (x0 - x1) + r0 + r1, 3 * (x1 - x0) - 2 * r0 - r1
+        value = ((a * u + b) * u + r0) * u + x0
+        slope = (3 * a * u + 2 * b) * u + r0
+        u = np.clip(u - value / np.where(slope == 0.0, np.inf, slope), 0.0, 1.0)
+    return u
 
 
 def responses(motion: Motion, terms: Sequence[Term]) -> tuple[Array, Array, Array]:
@@ -130,9 +159,9 @@ def responses(motion: Motion, terms: Sequence[Term]) -> tuple[Array, Array, Arra
     with the motion, W, (K,)
     """
     forces = _forces(motion, terms)
-    before, after = _weights(motion)
+    before, after = motion.steps[0] * motion.kernel[:, :-1], motion.steps[1] * motion.kernel[:, 1:]
     samples = motion.rows.shape[1]
-    inner = (before[:, :-1] + after[:, 1:]) if before.shape[1] > 1 else before[:, :0]
+    inner = before[:, 1:] + after[:, :-1]
     nodes = np.concatenate([before[:, :1], inner], axis=1).reshape(2, samples - 1, motion.factor)
     parts = np.einsum(
         "ksf,tsf->tks", nodes, forces[:, :-1].reshape(len(terms), samples - 1, motion.factor)
@@ -167,12 +196,6 @@ def _forces(motion: Motion, terms: Sequence[Term]) -> Array:
         if term.drift:
             out[i] *= motion.t
     return out
-
-
-def _weights(motion: Motion) -> tuple[Array, Array]:
-    """Kernel times the share of every step that its first and its last point stand for."""
-    share = motion.interval * motion.shares
-    return share * motion.kernel[:, :-1], (motion.interval - share) * motion.kernel[:, 1:]
 
 
 def largest_force(

@@ -171,7 +171,7 @@ def _force(term: Term, sided: bool) -> str:
     product = " * ".join(factors)
     if sided:
         return f"{product} if z > 0.0 else 0.0"
-    if term.region == "contact":
+    if term.region == "contact" and term.place > 0:
         return f"{product} if {x} > 0.0 else 0.0"
     return product
 
