@@ -64,7 +64,8 @@ class Formula:
     log_odds : against the base model, on the scale of `Naming.log_odds`
     probability : among all hypotheses of the diagnosis
     refitted : fitted in full, or scored only
-    alike : how many others are as good as the same
+    alike : others that are as good as the same, likeliest first, without numbers of their shapes
+        that differ alone; `ALIKE` at most
     effects : one per term, to be fitted or written to a file
     peak : largest force of all terms together along the motion, N
     """

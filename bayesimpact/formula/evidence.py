@@ -16,7 +16,7 @@ for all pairs of further terms at once.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,19 +73,14 @@ def subsets(problem: Problem, most: int = 3) -> list[Subset]:
     unit = np.sqrt(np.diag(problem.information))
     scaled = problem.information / np.outer(unit, unit)
     work = _Work(problem, unit, scaled, problem.score / unit)
-    found = work.singles()
+    work.singles()
     if most > 1:
         for i in range(unit.size - 1):
-            found += work.pairs(i)
-            if most > 2 and i < unit.size - 2:
-                found += work.triples(i)
-            if len(found) > 20 * KEPT:
-                found = _best(found)
-    return _best(found)
-
-
-def _best(found: Sequence[Subset]) -> list[Subset]:
-    return sorted(found, key=lambda s: -s.log_odds)[:KEPT]
+            work.pairs(i)
+    if most > 2:
+        for i in range(unit.size - 2):
+            work.triples(i)
+    return work.best()
 
 
 @dataclass(eq=False)
@@ -97,13 +92,15 @@ class _Work:
     s: Array
     b: Array
     least: float = -np.inf
+    rows: list[Array] = field(default_factory=list)  # (m, 7): log odds, three terms, three sizes
+    waiting: int = 0
 
-    def singles(self) -> list[Subset]:
+    def singles(self) -> None:
         one = np.arange(self.b.size)
         odds = self.log_odds((one,), (self.b,), np.zeros(one.size))
-        return self._kept((one,), (self.b,), odds)
+        self._keep((one,), (self.b,), odds)
 
-    def pairs(self, i: int) -> list[Subset]:
+    def pairs(self, i: int) -> None:
         j = np.arange(i + 1, self.b.size)
         c = self.s[i, j]
         det = 1.0 - c**2
@@ -111,9 +108,9 @@ class _Work:
         a0, a1 = (self.b[i] - c * self.b[j]) / det, (self.b[j] - c * self.b[i]) / det
         first = np.full(j.size, i)
         odds = self.log_odds((first, j), (a0, a1), np.log(det))
-        return self._kept((first, j), (a0, a1), odds)
+        self._keep((first, j), (a0, a1), odds)
 
-    def triples(self, i: int) -> list[Subset]:
+    def triples(self, i: int) -> None:
         rest = np.arange(i + 1, self.b.size)
         c = self.s[i, rest]
         g = self.s[np.ix_(rest, rest)] - np.outer(c, c)
@@ -124,7 +121,7 @@ class _Work:
         aj, ak = (h[j] * gkk - h[k] * gjk) / det, (h[k] * gjj - h[j] * gjk) / det
         ai = self.b[i] - c[j] * aj - c[k] * ak
         terms = (np.full(j.size, i), rest[j], rest[k])
-        return self._kept(terms, (ai, aj, ak), self.log_odds(terms, (ai, aj, ak), np.log(det)))
+        self._keep(terms, (ai, aj, ak), self.log_odds(terms, (ai, aj, ak), np.log(det)))
 
     def _promising(
         self, i: int, rest: NDArray[np.int64], g: Array, h: Array
@@ -166,19 +163,33 @@ class _Work:
                 taken = taken + p.power[t] * a / self.unit[t]
             return np.where(np.isfinite(value) & (taken >= 0.0), value, -np.inf)
 
-    def _kept(
+    def _keep(
         self, terms: Sequence[NDArray[np.int64]], sizes: Sequence[Array], odds: Array
-    ) -> list[Subset]:
-        """The best of some subsets, sizes for the terms' own units."""
+    ) -> None:
+        """Remember those that may be among the best."""
         good = np.flatnonzero(odds > self.least)
-        if good.size > KEPT:
-            good = good[np.argpartition(odds[good], -KEPT)[-KEPT:]]
-            self.least = max(self.least, float(odds[good].min()))
-        return [
-            Subset(
-                tuple(int(t[m]) for t in terms),
-                tuple(float(a[m] / self.unit[t[m]]) for t, a in zip(terms, sizes, strict=True)),
-                float(odds[m]),
-            )
-            for m in good
-        ]
+        row = np.full((good.size, 7), np.nan)
+        row[:, 0] = odds[good]
+        for k, (t, a) in enumerate(zip(terms, sizes, strict=True)):
+            row[:, 1 + k], row[:, 4 + k] = t[good], a[good] / self.unit[t[good]]
+        self.rows.append(row)
+        self.waiting += good.size
+        if self.waiting > 4 * KEPT:
+            self._shrink()
+
+    def _shrink(self) -> None:
+        whole = np.concatenate(self.rows)
+        whole = whole[np.argsort(-whole[:, 0], kind="stable")[:KEPT]]
+        if whole.shape[0] == KEPT:
+            self.least = float(whole[-1, 0])
+        self.rows, self.waiting = [whole], whole.shape[0]
+
+    def best(self) -> list[Subset]:
+        """Those that are left, best first."""
+        self._shrink()
+        found = []
+        for row in self.rows[0]:
+            terms = row[1:4][np.isfinite(row[1:4])].astype(np.int64)
+            sizes = row[4 : 4 + terms.size]
+            found.append(Subset(tuple(terms.tolist()), tuple(sizes.tolist()), float(row[0])))
+        return found

@@ -61,11 +61,13 @@ class Power:
         raised = 0 if self.exponent in (0.0, 1.0) else 2
         return 2 + raised + (0 if self.is_plain else 1)
 
-    def text(self, x: str) -> str:
-        """In words of mathematics."""
+    def text(self, x: str, *, positive: bool = False) -> str:
+        """In words of mathematics; without signs where x is positive."""
         if self.is_one:
             return ""
         n = f"{self.exponent:g}"
+        if positive:
+            return x if n == "1" else f"{x}^{n}"
         if self.exponent == 0.0:
             return f"sign({x})"
         if self.is_plain:
@@ -200,7 +202,8 @@ class Term:
         x, where = self._where("mrad" if angle else "mm")
         speed = self.speed.text("v")
         fading = f"exp(-|v|/{_short(self.fade)} {'rad' if angle else 'm'}/s)" if self.fade else ""
-        words = ["t" if self.drift else "", where[0], self.position.text(x), speed, fading]
+        position = self.position.text(x, positive=self.region in ("contact", "beyond"))
+        words = ["t" if self.drift else "", where[0], position, speed, fading]
         return " ".join(w for w in [*words, where[1]] if w)
 
     def _where(self, unit: str) -> tuple[str, tuple[str, str]]:
