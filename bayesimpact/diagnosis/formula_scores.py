@@ -28,7 +28,7 @@ from bayesimpact.model.effects.effect import Scales
 Array = NDArray[np.float64]
 
 LEAST_KEPT = 1e-3  # of a response that other parameters must leave, for its size to mean something
-REFINED = (0.3, 0.15)  # steps of places, in widths; widths change by as many octaves
+REFINED = (0.25,)  # steps of places, in widths; widths change by as many octaves
 HEADS = 12  # terms whose shapes are refined
 OF_A_KIND = 2
 BEYOND_NOISE = 0.1  # norm of a response, noise = 1, at the plausible size, to be worth anything
@@ -72,7 +72,7 @@ def formula_scores(fit: Fit, scales: Scales, *, repetition: float = 1.0) -> Form
     whole = library(scales, *reach)
     motions = [motion_of(fit, r) for r in range(len(fit.linearisation))]
     alone: dict[str, Any] = {"scales": scales, "repetition": repetition, "together": False}
-    local = (*(t for t in whole if t.shapes), *local_starts(*reach))
+    local = (*(t for t in whole if t.shapes and not t.width), *local_starts(*reach))
     heads = _likeliest(score_terms(fit, motions, local, **alone))
     for step in REFINED:
         around = [n for t in heads for n in neighbours(t, step, max(-reach[0], reach[1]))]

@@ -33,7 +33,7 @@ def _entry(f: Formula, scales: Scales, angle: bool) -> dict[str, Any]:
         "percent": 100 * f.peak / yardstick,
         "of": f"the peak elastic force of the {'obstacle' if contact else 'suspension'}",
         "fitted": f.refitted,
-        "alike": f.alike,
+        "alike": list(f.alike),
     }
 
 

@@ -52,6 +52,7 @@ Array = NDArray[np.float64]
 REFITTED = 4  # formulas of different classes
 BEHIND = 60.0  # nats by which a score may underrate a formula that a refit would put first
 LISTED = 20
+ALIKE = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +65,7 @@ class Formula:
     log_odds : against the base model, on the scale of `Naming.log_odds`
     probability : among all hypotheses of the diagnosis
     refitted : fitted in full, or scored only
-    alike : others that are as good as the same, likeliest first, without numbers of their shapes
-        that differ alone; `ALIKE` at most
+    alike : other formulas that the recordings do not tell from it, likeliest first, `ALIKE` at most
     effects : one per term, to be fitted or written to a file
     peak : largest force of all terms together along the motion, N
     """
@@ -75,7 +75,7 @@ class Formula:
     log_odds: float
     probability: float
     refitted: bool
-    alike: int
+    alike: tuple[str, ...]
     effects: tuple[Effect, ...]
     peak: float
 
@@ -310,12 +310,24 @@ def _listed(
             sizes = tuple(float(values[f"{effect_id(t)}.size"]) for t in terms)
             terms = tuple(fitted_term(t, values) for t in terms)
         peak = largest_force(scores.motions, terms, sizes)
-        whole, alike = candidate is not None, len(head.alike)
+        whole, alike = candidate is not None, _alike(head, scores.terms)
         rows.append(Formula(terms, sizes, odds, 0.0, whole, alike, effects, peak))
     rows.sort(key=lambda f: -f.log_odds)
     known = [naming.log_odds(c) for c in naming.tried if c not in fitted.values()]
     total = float(np.logaddexp.reduce([*known, *(f.log_odds for f in rows)]))
     return tuple(replace(f, probability=float(np.exp(f.log_odds - total))) for f in rows[:LISTED])
+
+
+def _alike(head: FormulaClass, terms: Sequence[Term]) -> tuple[str, ...]:
+    """Formulas of a class within the decisive odds that differ in more than their shapes."""
+    known = {tuple(sorted(repr(terms[i].kind) for i in head.best.terms))}
+    found: list[str] = []
+    for subset in head.alike:
+        kinds = tuple(sorted(repr(terms[i].kind) for i in subset.terms))
+        if kinds not in known and subset.log_odds > head.best.log_odds - DECISIVE:
+            known.add(kinds)
+            found.append(formula_text([terms[i] for i in subset.terms]))
+    return tuple(found[:ALIKE])
 
 
 def fitted_term(term: Term, values: dict[str, float]) -> Term:

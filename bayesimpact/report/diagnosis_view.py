@@ -173,6 +173,7 @@ def _formula(formula: Mapping[str, Any], force: str) -> dict[str, str]:
         "probability": probability(formula.get("probability")),
         "odds": _plain(formula.get("log_odds"), 1),
         "fitted": "" if formula.get("fitted", True) else "scored only",
+        "alike": "; ".join(formula.get("alike") or ()),
     }
 
 
