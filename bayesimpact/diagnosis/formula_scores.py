@@ -28,7 +28,7 @@ from bayesimpact.model.effects.effect import Scales
 Array = NDArray[np.float64]
 
 LEAST_KEPT = 1e-3  # of a response that other parameters must leave, for its size to mean something
-REFINED = (0.25,)  # steps of places, in widths; widths change by as many octaves
+REFINED = (0.25, 0.12, 0.06)  # steps of places, in widths; widths change by as many octaves
 HEADS = 12  # terms whose shapes are refined
 OF_A_KIND = 2
 BEYOND_NOISE = 0.1  # norm of a response, noise = 1, at the plausible size, to be worth anything

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -49,7 +50,7 @@ from bayesimpact.model.effects.effect import Effect, Scales
 
 Array = NDArray[np.float64]
 
-REFITTED = 4  # formulas of different classes
+REFITTED = 6  # formulas of different kinds
 BEHIND = 60.0  # nats by which a score may underrate a formula that a refit would put first
 LISTED = 20
 ALIKE = 3
@@ -118,6 +119,16 @@ class _Search:
     scores: FormulaScores
     scales: Scales
 
+    @cached_property
+    def kind_prices(self) -> Array:
+        """Price of every term with its shape free: that of all terms of its kind together, (K,)."""
+        kinds = [t.kind for t in self.scores.terms]
+        share = np.exp(-self.scores.problem.price)
+        total: dict[object, float] = {}
+        for kind, part in zip(kinds, share, strict=True):
+            total[kind] = total.get(kind, 0.0) + float(part)
+        return -np.log([total[kind] for kind in kinds])
+
     @property
     def others(self) -> tuple[Effect, ...]:
         """Effects of the model beside the learned force."""
@@ -149,33 +160,59 @@ def with_formulas(
     if not heads:
         return answer
     search = _Search(answer, scores, scales)
-    fitted: dict[int, Candidate] = {}
-    for i, head in enumerate(heads[:REFITTED]):
-        if head.best.log_odds > heads[0].best.log_odds - BEHIND:
-            progress(
-                f"fitting the formula {formula_text([scores.terms[k] for k in head.best.terms])}"
-            )
-            found = refitted(search, head.best)
-            if found is not None:
-                fitted[i] = found
+    fitted: dict[Subset, Candidate] = {}
+    for subset in worth_a_refit(ranked, scores.terms):
+        text = formula_text([scores.terms[k] for k in subset.terms])
+        progress(f"fitting the formula {text}")
+        found = refitted(search, subset)
+        if found is not None:
+            fitted[subset] = found
     if not fitted:
         return answer
     naming = joined(answer.naming, list(fitted.values()))
-    first = max(fitted, key=lambda i: naming.log_odds(fitted[i]))
+    first = max(fitted, key=lambda s: naming.log_odds(fitted[s]))
     listed = _listed(search, naming, heads, fitted)
-    named = _may_be_named(search, naming, heads, ranked, fitted, first)
+    named = _may_be_named(search, naming, ranked, fitted, first)
     state = None
     if named:
         progress("scoring what the formula lacks")
         state = _examined(fitted[first], effects, scales, rng)
         named = state.is_white
-    seen = _seen_as(search, heads[first].best)
+    seen = _seen_as(search, first)
     found_formulas = Formulas(listed, answer.after, named, seen)
     if not named or state is None:
         return replace(answer, formulas=found_formulas)
     ids = frozenset(fitted[first].ids)
     naming = replace(naming, chosen=state, states={**naming.states, ids: state})
     return Answer(naming, _decided(answer, fitted[first]), fitted[first].fit, None, found_formulas)
+
+
+def worth_a_refit(ranked: Sequence[Subset], terms: Sequence[Term]) -> list[Subset]:
+    """The likeliest formulas that differ in more than the numbers of their shapes, best first.
+
+    Those that contain a likelier one with fewer terms show only that no more is needed: one of them
+    is enough. Shapes stand on grids here, so a rival may be better than it looks.
+    """
+    found: list[Subset] = []
+    known: set[tuple[str, ...]] = set()
+    larger = 0
+    for subset in ranked:
+        kinds = kinds_of(subset, terms)
+        if subset.log_odds < ranked[0].log_odds - BEHIND or len(found) == REFITTED:
+            break
+        if kinds in known:
+            continue
+        contains = any(set(kinds_of(s, terms)) <= set(kinds) for s in found)
+        if not contains or not larger:
+            larger += contains
+            known.add(kinds)
+            found.append(subset)
+    return found
+
+
+def kinds_of(subset: Subset, terms: Sequence[Term]) -> tuple[str, ...]:
+    """Kinds of a formula's terms, sorted."""
+    return tuple(sorted(repr(terms[i].kind) for i in subset.terms))
 
 
 def refitted(search: _Search, subset: Subset) -> Candidate | None:
@@ -207,9 +244,7 @@ def refitted(search: _Search, subset: Subset) -> Candidate | None:
     step = difference_steps(reference, target, steps)
     start = best_start(target, unshifted, predicted, step)
     fit = find_mode(target, start, steps=step, tolerance=TOLERANCE, max_iterations=ITERATIONS)
-    extra = sum(_price(search, i) for i in subset.terms)
-    extra -= len(own) * search.answer.naming.prior_cost
-    return Candidate(effects, fit, model_evidence(fit) - max(extra, 0.0))
+    return Candidate(effects, fit, model_evidence(fit) - _extra(search, subset))
 
 
 def _effect(search: _Search, i: int, size: float) -> Effect:
@@ -223,9 +258,7 @@ def _effect(search: _Search, i: int, size: float) -> Effect:
 
 def _price(search: _Search, i: int) -> float:
     """Of a term whose shape is free: all terms of its kind together."""
-    terms, price = search.scores.terms, search.scores.problem.price
-    same = [p for t, p in zip(terms, price, strict=True) if t.kind == terms[i].kind]
-    return -float(np.logaddexp.reduce(-np.array(same)))
+    return float(search.kind_prices[i])
 
 
 def joined(naming: Naming, candidates: Sequence[Candidate]) -> Naming:
@@ -239,31 +272,38 @@ def joined(naming: Naming, candidates: Sequence[Candidate]) -> Naming:
 def _may_be_named(
     search: _Search,
     naming: Naming,
-    heads: Sequence[FormulaClass],
     ranked: Sequence[Subset],
-    fitted: dict[int, Candidate],
-    first: int,
+    fitted: dict[Subset, Candidate],
+    first: Subset,
 ) -> bool:
-    """Whether a formula leads all other hypotheses by the decisive odds and explains the rest."""
-    candidate = fitted[first]
+    """Whether a formula leads all other hypotheses by the decisive odds and explains the rest.
+
+    With the price of their lengths, which says what is simpler, and with that of effects alone: no
+    name rests on being shorter to write.
+    """
+    candidate, scores = fitted[first], search.scores
     if not candidate.fit.converged or leaves_something(candidate.fit):
         return False
-    reached, own = naming.log_odds(candidate), set(candidate.ids)
-    rivals = [naming.log_odds(c) for c in naming.tried if not own <= set(c.ids)]
+    own = set(candidate.ids)
     reference = search.answer.after
+    others = [c for c in naming.tried if not own <= set(c.ids)]
     if any(e.id == LEARNED for e in reference.target.oscillator.effects):
-        learned = Candidate(
-            reference.target.oscillator.effects, reference, model_evidence(reference)
-        )
-        rivals.append(naming.log_odds(learned))
-    terms, subset = search.scores.terms, heads[first].best
-    kinds = {terms[i].kind for i in subset.terms}
-    rivals += [
-        reached + s.log_odds - subset.log_odds
-        for s in ranked
-        if not kinds <= {terms[i].kind for i in s.terms}
-    ]
-    return reached > max(rivals, default=-np.inf) + DECISIVE
+        evidence = model_evidence(reference)
+        others.append(Candidate(reference.target.oscillator.effects, reference, evidence))
+    extra = {id(c): _extra(search, s) for s, c in fitted.items()}
+    rivals = [(naming.log_odds(c), extra.get(id(c), 0.0)) for c in others]
+    kinds = set(kinds_of(first, scores.terms))
+    reached, length = naming.log_odds(candidate), _extra(search, first)
+    scored = [s for s in ranked if not kinds <= set(kinds_of(s, scores.terms))]
+    rivals += [(reached + s.log_odds - first.log_odds, _extra(search, s)) for s in scored]
+    leads = [min(reached - odds, reached + length - odds - more) for odds, more in rivals]
+    return min(leads, default=np.inf) > DECISIVE
+
+
+def _extra(search: _Search, subset: Subset) -> float:
+    """What a formula's length costs beyond the price of as many effects, nats."""
+    cost = search.answer.naming.prior_cost
+    return max(sum(_price(search, i) - cost for i in subset.terms), 0.0)
 
 
 def _examined(
@@ -291,40 +331,52 @@ def _listed(
     search: _Search,
     naming: Naming,
     heads: Sequence[FormulaClass],
-    fitted: dict[int, Candidate],
+    fitted: dict[Subset, Candidate],
 ) -> tuple[Formula, ...]:
-    """The list, likeliest first; scored ones are set off as their nearest fitted one was."""
-    offset = min(naming.log_odds(c) - heads[i].best.log_odds for i, c in fitted.items())
-    scores = search.scores
+    """The list, likeliest first; scored ones are set off as the fitted ones were, at least."""
+    offset = min(naming.log_odds(c) - s.log_odds for s, c in fitted.items())
+    terms = search.scores.terms
+    classes = {s: h for h in heads for s in (h.best, *h.alike)}
     rows = []
-    for i, head in enumerate(heads[: 2 * LISTED]):
-        subset, candidate = head.best, fitted.get(i)
-        effects = tuple(
-            _effect(search, k, a) for k, a in zip(subset.terms, subset.sizes, strict=True)
-        )
-        terms, sizes = tuple(scores.terms[k] for k in subset.terms), subset.sizes
-        odds = subset.log_odds + offset
-        if candidate is not None:
-            odds = naming.log_odds(candidate)
-            values = dict(zip(candidate.fit.names, candidate.fit.mode, strict=True))
-            sizes = tuple(float(values[f"{effect_id(t)}.size"]) for t in terms)
-            terms = tuple(fitted_term(t, values) for t in terms)
-        peak = largest_force(scores.motions, terms, sizes)
-        whole, alike = candidate is not None, _alike(head, scores.terms)
-        rows.append(Formula(terms, sizes, odds, 0.0, whole, alike, effects, peak))
+    for subset, candidate in fitted.items():
+        values = dict(zip(candidate.fit.names, candidate.fit.mode, strict=True))
+        own = [terms[k] for k in subset.terms]
+        sizes = tuple(float(values[f"{effect_id(t)}.size"]) for t in own)
+        found = tuple(fitted_term(t, values) for t in own)
+        alike = _alike(classes[subset], subset, terms)
+        rows.append(_row(search, subset, (found, sizes), naming.log_odds(candidate), alike))
+    for head in heads[: 2 * LISTED]:
+        if not {head.best, *head.alike} & fitted.keys():
+            own = [terms[k] for k in head.best.terms]
+            alike = _alike(head, head.best, terms)
+            odds = head.best.log_odds + offset
+            row = _row(search, head.best, (tuple(own), head.best.sizes), odds, alike)
+            rows.append(replace(row, refitted=False))
     rows.sort(key=lambda f: -f.log_odds)
     known = [naming.log_odds(c) for c in naming.tried if c not in fitted.values()]
     total = float(np.logaddexp.reduce([*known, *(f.log_odds for f in rows)]))
     return tuple(replace(f, probability=float(np.exp(f.log_odds - total))) for f in rows[:LISTED])
 
 
-def _alike(head: FormulaClass, terms: Sequence[Term]) -> tuple[str, ...]:
+def _row(
+    search: _Search,
+    subset: Subset,
+    found: tuple[tuple[Term, ...], tuple[float, ...]],
+    log_odds: float,
+    alike: tuple[str, ...],
+) -> Formula:
+    effects = tuple(_effect(search, k, a) for k, a in zip(subset.terms, subset.sizes, strict=True))
+    peak = largest_force(search.scores.motions, *found)
+    return Formula(*found, log_odds, 0.0, True, alike, effects, peak)
+
+
+def _alike(head: FormulaClass, own: Subset, terms: Sequence[Term]) -> tuple[str, ...]:
     """Formulas of a class within the decisive odds that differ in more than their shapes."""
-    known = {tuple(sorted(repr(terms[i].kind) for i in head.best.terms))}
+    known = {kinds_of(own, terms)}
     found: list[str] = []
-    for subset in head.alike:
-        kinds = tuple(sorted(repr(terms[i].kind) for i in subset.terms))
-        if kinds not in known and subset.log_odds > head.best.log_odds - DECISIVE:
+    for subset in (head.best, *head.alike):
+        kinds = kinds_of(subset, terms)
+        if kinds not in known and subset.log_odds > own.log_odds - DECISIVE:
             known.add(kinds)
             found.append(formula_text([terms[i] for i in subset.terms]))
     return tuple(found[:ALIKE])
