@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from bayesimpact.diagnosis.formulas import Formula, Formulas, formula_text
+from bayesimpact.diagnosis.formula_list import Formula, Formulas, formula_text
 from bayesimpact.formula.write import effect_file
 from bayesimpact.model.effects.effect import Scales
 from bayesimpact.model.parameters import angular

@@ -15,7 +15,8 @@ from bayesimpact.diagnosis.decision import Decision, Verdict, decide
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.faults.compare import base_failed
 from bayesimpact.diagnosis.force import MissingForce
-from bayesimpact.diagnosis.formulas import Answer, Formulas, with_formulas
+from bayesimpact.diagnosis.formula_list import Formulas
+from bayesimpact.diagnosis.formulas import Answer, with_formulas
 from bayesimpact.diagnosis.heldout import HeldOut, held_out_cases, held_out_recordings
 from bayesimpact.diagnosis.intervals import Intervals, intervals
 from bayesimpact.diagnosis.learned import LEARNED
