@@ -93,7 +93,7 @@ def refitted(question: Question, subset: Subset) -> Candidate | None:
     scores, reference = question.scores, question.reference
     terms = [scores.terms[i] for i in subset.terms]
     own = tuple(effect_for(question, i, a) for i, a in zip(subset.terms, subset.sizes, strict=True))
-    if len({e.id for e in own}) < len(own):
+    if len({e.id for e in (*own, *question.others)}) < len(own) + len(question.others):
         return None
     if not all(e.stands_beside(o) for e in own for o in (*question.others, *own) if e is not o):
         return None
@@ -124,7 +124,9 @@ def effect_for(question: Question, i: int, size: float) -> Effect:
     term = scores.terms[i]
     reach = max(float(np.abs(y).max()) for y in scores.fit.displacements)
     signed = term.energy != "dissipates" or size < 0
-    return effect_of(term, float(scores.size[i]), reach, scales.speed, signed=signed)
+    return effect_of(
+        term, float(scores.size[i]), reach, scales.speed, signed=signed, angle=scales.angle
+    )
 
 
 def length_price(question: Question, subset: Subset) -> float:

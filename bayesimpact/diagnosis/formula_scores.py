@@ -8,7 +8,7 @@ a learned force is scored as it is.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,6 +31,7 @@ LEAST_KEPT = 1e-3  # of a response that other parameters must leave, for its siz
 REFINED = (0.25, 0.12, 0.06)  # steps of places, in widths; widths change by as many octaves
 HEADS = 12  # terms whose shapes are refined
 OF_A_KIND = 2
+LONGEST = 60_000  # samples of a recording: responses of the whole library then take 0.25 GB
 BEYOND_NOISE = 0.1  # norm of a response, noise = 1, at the plausible size, to be worth anything
 
 
@@ -48,7 +49,7 @@ class FormulaScores:
     shift : (names,) of these when the learned force is taken out
     size : (K,) plausible sizes
     seen : (learned, K) coefficients of the learned force that would say the same as a term
-    motions : of all recordings
+    motions : of the recordings that were scored
     """
 
     fit: Fit
@@ -66,11 +67,12 @@ def formula_scores(fit: Fit, scales: Scales, *, repetition: float = 1.0) -> Form
     """Score the library on a fit; `repetition` samples are worth an independent one.
 
     The shapes of the likeliest local terms are refined: grids are coarse against what the
-    recordings can tell.
+    recordings can tell. Recordings of more than `LONGEST` samples are left to the refits.
     """
     reach = motion_range(fit)
     whole = library(scales, *reach)
-    motions = [motion_of(fit, r) for r in range(len(fit.linearisation))]
+    counts = fit.target.oscillator.counts
+    motions = {r: motion_of(fit, r) for r in range(counts.size) if counts[r] <= LONGEST}
     alone: dict[str, Any] = {"scales": scales, "repetition": repetition, "together": False}
     local = (*(t for t in whole if t.shapes and not t.width), *local_starts(*reach))
     heads = _likeliest(score_terms(fit, motions, local, **alone))
@@ -97,21 +99,24 @@ def _likeliest(scores: FormulaScores) -> list[Term]:
 
 def score_terms(
     fit: Fit,
-    motions: Sequence[Motion],
+    motions: Mapping[int, Motion],
     terms: tuple[Term, ...],
     scales: Scales,
     repetition: float,
     together: bool = True,
 ) -> FormulaScores:
-    """Score given terms on a fit whose motions are known; without `together` each by itself."""
+    """Score given terms on a fit, by the recordings whose motions are given.
+
+    Without `together` each by itself: `information` is then diagonal.
+    """
     learned = np.array([n.startswith(f"{LEARNED}.") for n in fit.names])
     noise = fit.target.oscillator.layout.roles("noise")
     others = np.setdiff1d(np.flatnonzero(~learned), noise)
     curvature = fit.target.priors.information(fit.mode)[others]
     slope = np.nan_to_num(fit.target.priors.gradient(fit.mode))[others]
     sums = _Sums(fit, others, learned, len(terms), together)
-    for r in range(len(fit.linearisation)):
-        sums.add(r, motions[r], terms)
+    for r, motion in motions.items():
+        sums.add(r, motion, terms)
     solve = inverse(sums.own + np.diag(curvature))
     own_score = sums.own_score + slope
     information = sums.terms - sums.cross.T @ solve @ sums.cross
@@ -140,7 +145,7 @@ def score_terms(
         solve @ own_score,
         plausible[k],
         _seen(fit, sums, solve)[:, k],
-        tuple(motions),
+        tuple(motions.values()),
     )
 
 
@@ -151,6 +156,8 @@ def _seen(fit: Fit, sums: _Sums, solve: Array) -> Array:
     by least squares over the responses, under the prior that the learned force has.
     """
     learned = sums.learned
+    if not learned.size:
+        return np.zeros((0, sums.score.size))
     prior = fit.target.priors.information(fit.mode)[learned]
     through = solve @ sums.learned_own
     information = sums.learned_learned - sums.learned_own.T @ through + np.diag(prior)

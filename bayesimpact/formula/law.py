@@ -8,7 +8,14 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from bayesimpact.formula.grammar import REGIONS, SLOW, Power, Term
-from bayesimpact.model.effects.effect import Effect, EffectParameter, Law, Scales
+from bayesimpact.model.effects.effect import (
+    Effect,
+    EffectParameter,
+    Law,
+    Numbers,
+    Scales,
+    Size,
+)
 from bayesimpact.model.power import power
 
 PREFIX = "formula_"
@@ -112,7 +119,18 @@ class Fixed:
         return self.value
 
 
-def effect_of(term: Term, scale: float, reach: float, speed: float, *, signed: bool) -> Effect:
+@dataclass(frozen=True)
+class FrictionSize:
+    """Size of dry friction, which has no law: its force over the peak elastic force."""
+
+    def __call__(self, p: Numbers, scales: Scales) -> Size:
+        """The size."""
+        return p[0], "N", p[0] / scales.force
+
+
+def effect_of(
+    term: Term, scale: float, reach: float, speed: float, *, signed: bool, angle: bool = False
+) -> Effect:
     """The effect that adds a term.
 
     Parameters
@@ -120,8 +138,9 @@ def effect_of(term: Term, scale: float, reach: float, speed: float, *, signed: b
     scale : plausible size of its force, as `grammar.Term.unit` says
     reach, speed : largest displacement, m, and speed, m/s, which bound its shapes
     signed : negative sizes are admissible too
+    angle : the displacement is an angle; only words differ
     """
-    text = term.text()
+    text = term.text(angle=angle)
     size = EffectParameter(
         "size", term.unit, scale=Fixed(scale), lower=-math.inf if signed else 0.0
     )
@@ -138,7 +157,8 @@ def effect_of(term: Term, scale: float, reach: float, speed: float, *, signed: b
         "needs_stop": term.region == "contact",
     }
     if is_friction(term) and not signed:  # the oscillator's own, which sticks
-        return Effect(**common, parameters=(size,), binds=MappingProxyType({"friction": "size"}))  # type: ignore[arg-type]
+        binds = MappingProxyType({"friction": "size"})
+        return Effect(**common, parameters=(size,), binds=binds, size=FrictionSize())  # type: ignore[arg-type]
     bounds = {"place": reach, "width": reach, "fade": speed}
     own = tuple(
         EffectParameter(
