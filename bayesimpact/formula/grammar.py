@@ -197,33 +197,35 @@ class Term:
         """Force per unit of size at displacements m, velocities, indentations, times (n,)."""
         return self.of_position(y, d) * self.of_speed(v) * t**self.drift
 
-    def text(self, *, angle: bool = False) -> str:
-        """The term without its size, numbers of its shape in mm (mrad)."""
-        x, where = self._where("mrad" if angle else "mm")
-        speed = self.speed.text("v")
-        fading = f"exp(-|v|/{_short(self.fade)} {'rad' if angle else 'm'}/s)" if self.fade else ""
+    def text(self, *, angle: bool = False, numbers: bool = True) -> str:
+        """The term without its size, numbers of its shape in mm (mrad), or letters for them."""
+        place, width, fade = "p", "w", "u"
+        if numbers:
+            unit = "mrad" if angle else "mm"
+            place, width = (f"{_short(1e3 * x)} {unit}" for x in (self.place, self.width))
+            fade = f"{_short(self.fade)} {'rad' if angle else 'm'}/s"
+        x, before, after = self._where(place, width)
         position = self.position.text(x, positive=self.region in ("contact", "beyond"))
-        words = ["t" if self.drift else "", where[0], position, speed, fading]
-        return " ".join(w for w in [*words, where[1]] if w)
+        fading = f"exp(-|v|/({fade}))" if self.fade else ""
+        words = ["t" if self.drift else "", before, position, self.speed.text("v"), fading, after]
+        return " ".join(w for w in words if w)
 
-    def _where(self, unit: str) -> tuple[str, tuple[str, str]]:
+    def _where(self, place: str, width: str) -> tuple[str, str, str]:
         """The coordinate, and what stands before and after for the region."""
-        place = f"{_short(1e3 * self.place)} {unit}"
-        if self.region == "contact":
-            deeper = f"(d - {place})" if self.place else "d"
-            after = f"in contact where d > {place}" if self.place else "in contact"
-            return deeper, ("", after)
-        if self.region == "beyond":
-            sign, before = ("", ">") if self.side > 0 else ("-", "< -")
-            return f"({sign}y - {place})", ("", f"where y {before}{' ' * (sign == '')}{place}")
         if self.region == "everywhere":
-            return "y", ("", "")
-        shift = f"{'-' if self.side > 0 else '+'} {place}"
-        x = f"(y {shift})" if self.place else "y"
-        width = f"{_short(1e3 * self.width)} {unit}"
+            return "y", "", ""
+        if self.region == "contact":
+            if not self.place:
+                return "d", "", "in contact"
+            return f"(d - {place})", "", f"in contact where d > {place}"
+        if self.region == "beyond":
+            if self.side > 0:
+                return f"(y - {place})", "", f"where y > {place}"
+            return f"(-y - {place})", "", f"where y < -{place}"
+        x = f"(y {'-' if self.side > 0 else '+'} {place})" if self.place else "y"
         if self.region == "box":
-            return x, ("", f"where |{x.strip('()')}| < {width}")
-        return x, (f"exp(-({x}/{width})^2)", "")
+            return x, "", f"where |{x.strip('()')}| < {width}"
+        return x, f"exp(-({x}/{width})^2)", ""
 
 
 def _raised(exponent: float) -> str:

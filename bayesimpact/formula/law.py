@@ -28,13 +28,13 @@ def force(y, v, d, t, z, touching, p, q):  # type: ignore[no-untyped-def]
 
     p = (size, place, width, fade, region, side, exponent and parity of the coordinate, of the
     speed, drift); regions are numbered as in `grammar.REGIONS`. z is the side of a surface (box,
-    beyond) or the direction of the motion (dry friction).
+    beyond, second stage) or the direction of the motion (dry friction).
     """
     inside = 1.0
     x = y - p[5] * p[1]
     if p[4] == 1.0:
         x = d - p[1]  # called in contact only: a force that jumps at the touch is there at d = 0
-        if p[1] > 0.0 and x <= 0.0:
+        if p[1] > 0.0 and z <= 0.0:
             inside = 0.0
     elif p[4] == 2.0:
         x = p[5] * y - p[1]
@@ -140,14 +140,14 @@ def effect_of(
     signed : negative sizes are admissible too
     angle : the displacement is an angle; only words differ
     """
-    text = term.text(angle=angle)
+    text = term.text(angle=angle, numbers=False)
     size = EffectParameter(
         "size", term.unit, scale=Fixed(scale), lower=-math.inf if signed else 0.0
     )
     common = {
         "id": effect_id(term),
         "family": FAMILY,
-        "title": text,
+        "title": f"force A {text}",
         "equation": f"A {text}",
         "regime": term.regime,
         "energy": "either" if signed and term.energy == "dissipates" else term.energy,
@@ -206,7 +206,7 @@ def law_of(term: Term) -> Law:
         force,
         where="contact" if term.region == "contact" else "everywhere",
         surface=surface,
-        jump_at_surface=term.region in ("beyond", "box"),
+        jump_at_surface=surface in (edges, deeper) or term.region == "beyond",
         jump_at_turn=jumps,
         kink_at_turn=not jumps and (rooted or term.fade > 0 or m == Power(2.0, True)),
         first_at_turn=first_at_turn if rooted else None,
@@ -232,10 +232,15 @@ def is_friction(term: Term) -> bool:
 
 
 def effect_id(term: Term) -> str:
-    """An id that says which term it is."""
-    words = term.text().replace("|v|^", "abs v ").replace("|", " abs ").replace("-", " m ")
-    words = words.replace("^", " ").replace(".", "_").replace(">", " from ").replace("<", " below ")
-    return PREFIX + re.sub(r"[^a-z0-9]+", "_", words.lower()).strip("_")
+    """An id that says which term it is, and at which shape, um or mm/s, it was found."""
+    words = term.text(numbers=False).replace("|v|^", "abs v ").replace("|", " abs ")
+    words = words.replace("-", " m ").replace("^", " ").replace(".", "_")
+    words = words.replace(">", " from ").replace("<", " below ")
+    own = {"place": 1e6, "width": 1e6, "fade": 1e3}
+    shape = [f"{round(own[name] * value)}" for name, value in term.shapes.items()]
+    side = "m" if term.side < 0 and term.place else ""
+    at = f" at {side}" + "_".join(shape) if shape else ""
+    return PREFIX + re.sub(r"[^a-z0-9]+", "_", (words + at).lower()).strip("_")
 
 
 def is_formula(effect: Effect) -> bool:

@@ -19,7 +19,7 @@ SIGN, V, DRAG = Power(0.0, True), Power(1.0, True), Power(2.0, True)
 LINEAR = Power(1.0, True)
 
 POSITIONS = (
-    ONE, Power(0.5, True), LINEAR, Power(1.0, False), Power(2.0, False), Power(2.0, True),
+    ONE, LINEAR, Power(1.0, False), Power(1.5, True), Power(2.0, False), Power(2.0, True),
     Power(3.0, True), Power(4.0, False), Power(5.0, True),
 )  # fmt: skip
 SPEEDS = (

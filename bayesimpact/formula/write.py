@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import textwrap
 from collections.abc import Sequence
 
 from bayesimpact.formula.grammar import SLOW, Power, Term
@@ -17,11 +19,6 @@ Found by `bayesimpact diagnose`{status}. Check it and look for it again with
 
 Each part stands on the left-hand side of m y'' + c1 y' + k1 y + ... = 0.
 """
-
-import math
-
-from bayesimpact.model.effects import Effect, EffectParameter, Law
-from bayesimpact.model.power import power
 '''
 ARGUMENTS = "y, v, d, t, z, touching, p, q"
 _SHAPES = ("place", "width", "fade")
@@ -45,7 +42,17 @@ def effect_file(
     parts = [HEAD.format(title=title, status=status)]
     for i, (term, effect, size) in enumerate(zip(terms, effects, sizes, strict=True)):
         parts.append(_one(str(i + 1) if len(terms) > 1 else "", term, effect, size))
-    return "\n\n".join(parts)
+    body = "\n\n\n".join(part.rstrip() for part in parts[1:]) + "\n"
+    return "\n\n".join([parts[0].strip(), *_imports(body), ""]) + "\n" + body
+
+
+def _imports(body: str) -> list[str]:
+    """What the functions of a file use."""
+    names = "Effect, EffectParameter" + (", Law" if "Law(" in body else "")
+    lines = [f"from bayesimpact.model.effects import {names}"]
+    if "power(" in body:
+        lines.append("from bayesimpact.model.power import power")
+    return [*(["import math"] if "math." in body else []), "\n".join(lines)]
 
 
 def _one(number: str, term: Term, effect: Effect, size: float) -> str:
@@ -53,13 +60,15 @@ def _one(number: str, term: Term, effect: Effect, size: float) -> str:
     functions, law = _law(number, term, effect)
     lines = [
         f"FOUND{number} = Effect(",
-        f"    id={effect.id!r},",
-        f"    family={effect.family!r},",
-        f"    title={effect.title!r},",
-        f"    equation={effect.equation!r},",
-        f"    regime={effect.regime!r},",
-        f"    energy={effect.energy!r},",
-        f"    statement={effect.statement!r},",
+        f"    id={_quoted(effect.id)},",
+        f"    family={_quoted(effect.family)},",
+        f"    title={_quoted(effect.title)},",
+        f"    equation={_quoted(effect.equation)},",
+        f"    regime={_quoted(effect.regime)},",
+        f"    energy={_quoted(effect.energy)},",
+        "    statement=(",
+        *(f"        {_quoted(words)}" for words in _wrapped(effect.statement)),
+        "    ),",
         "    parameters=(",
         *_parameters(term, effect, size),
         "    ),",
@@ -67,7 +76,7 @@ def _one(number: str, term: Term, effect: Effect, size: float) -> str:
         *(["    needs_stop=True,"] if effect.needs_stop else []),
         ")\n",
     ]
-    return "\n\n".join([*functions, "\n".join(lines)])
+    return "\n\n\n".join([*functions, "\n".join(lines)])
 
 
 def _parameters(term: Term, effect: Effect, size: float) -> list[str]:
@@ -75,13 +84,16 @@ def _parameters(term: Term, effect: Effect, size: float) -> list[str]:
     bound = ", lower=0.0" if first.lower == 0.0 else ""
     scale = f"lambda s: {first.scale(None):.6g}"  # type: ignore[arg-type]
     found = f"  # {size:.6g} was found"
-    lines = [f"        EffectParameter('size', {first.unit!r}, scale={scale}{bound}),{found}"]
+    lines = [
+        f'        EffectParameter("size", {_quoted(first.unit)}, scale={scale}{bound}),{found}',
+    ]
     for name, value in term.shapes.items():
         p = effect.parameter(name)
-        lines.append(
-            f"        EffectParameter({name!r}, {p.unit!r}, scale=lambda s: {value:.6g}, "
-            f"lower={p.lower:.6g}, upper={p.upper:.6g}, null=None, grid=lambda s: [{value:.6g}]),"
-        )
+        lines += [
+            f"        EffectParameter({_quoted(name)}, {_quoted(p.unit)},",
+            f"                        scale=lambda s: {value:.6g}, grid=lambda s: [{value:.6g}],",
+            f"                        lower={p.lower:.6g}, upper={p.upper:.6g}, null=None),",
+        ]
     return lines
 
 
@@ -131,6 +143,16 @@ def _law(number: str, term: Term, effect: Effect) -> tuple[list[str], list[str]]
     return functions, [f"    law=Law({', '.join(words)}),"]
 
 
+def _quoted(text: str) -> str:
+    return json.dumps(text)
+
+
+def _wrapped(text: str) -> list[str]:
+    """A sentence in pieces that fit a line, each but the last with the space that follows it."""
+    lines = textwrap.wrap(text, 80, break_long_words=False, break_on_hyphens=False)
+    return [f"{line} " for line in lines[:-1]] + lines[-1:]
+
+
 def _function(name: str, says: str, body: Sequence[str]) -> str:
     lines = [f"def {name}({ARGUMENTS}):", f'    """{says}"""', *(f"    {line}" for line in body)]
     return "\n".join(lines)
@@ -171,8 +193,6 @@ def _force(term: Term, sided: bool) -> str:
     product = " * ".join(factors)
     if sided:
         return f"{product} if z > 0.0 else 0.0"
-    if term.region == "contact" and term.place > 0:
-        return f"{product} if {x} > 0.0 else 0.0"
     return product
 
 

@@ -26,9 +26,10 @@ CLASSES: Mapping[str, tuple[str, str]] = {
 
 def formula_class(text: str) -> tuple[str, str]:
     """Place and dependence on the speed of a term, from its text (`formula.grammar.Term.text`)."""
+    text = text.removeprefix("force A ")
     if "in contact" in text:
         place = "contact"
-    elif text.startswith("exp(-((") or text.startswith("exp(-(y") or "where |y" in text:
+    elif text.startswith(("exp(-((", "exp(-(y")) or "where |y" in text:
         place = "local"
     elif text.startswith("t "):
         place = "t"
