@@ -142,7 +142,7 @@ def _may_be_named(
     scored = [s for s in ranked if not kinds <= set(kinds_of(s, scores.terms))]
     rivals += [(reached + s.log_odds - first.log_odds, length_price(question, s)) for s in scored]
     leads = [min(reached - odds, reached + length - odds - more) for odds, more in rivals]
-    return min(leads, default=np.inf) > DECISIVE
+    return bool(min(leads, default=np.inf) > DECISIVE)
 
 
 def _examined(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from small_rig import PLAIN, PLAIN_RELEASES, record
 
+from bayesimpact.diagnosis import formulas
 from bayesimpact.diagnosis.decision import Decision
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.force import missing_drift, missing_force
@@ -17,13 +19,15 @@ from bayesimpact.diagnosis.formula_words import formula_entries, found_file
 from bayesimpact.diagnosis.formulas import Answer, joined, with_formulas
 from bayesimpact.diagnosis.learned import LEARNED
 from bayesimpact.diagnosis.naming import Naming, State
-from bayesimpact.diagnosis.refit import base_candidate, residual_repetition
+from bayesimpact.diagnosis.refit import Candidate, base_candidate, residual_repetition
 from bayesimpact.diagnosis.scan import score_directions
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.diagnosis.unknown import with_force
+from bayesimpact.formula.evidence import Subset
+from bayesimpact.formula.grammar import ONE, Power, Term
 from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.identify import identify
-from bayesimpact.model.effects.effect import Scales
+from bayesimpact.model.effects.effect import Effect, Scales
 from bayesimpact.model.own_effects import load_effects
 from bayesimpact.report.formula_arrays import formula_arrays
 
@@ -138,3 +142,22 @@ def test_text_has_a_letter_for_every_size(detent: Any) -> None:
     _, found, _ = detent
     text = formula_text([f.terms[0] for f in found.formulas.ranked[:2]])
     assert text.startswith("A ") and " + B " in text
+
+
+@pytest.mark.parametrize(("price", "named"), [(12.0, False), (5.0, True)])
+def test_no_name_rests_on_being_shorter_to_write(price: float, named: bool, detent: Any) -> None:
+    """A rival seven nats behind: for its length, or for what it explains."""
+    _, found, _ = detent
+    fit = found.after
+    terms = (Term("everywhere", ONE, Power(2.0, True)), Term("everywhere", ONE, Power(3.0, True)))
+    question = SimpleNamespace(
+        scores=SimpleNamespace(terms=terms), reference=fit, cost=4.0,
+        kind_prices=np.array([5.0, price]),
+    )  # fmt: skip
+    own = Effect("formula_one", "formula", "", "", "free", "either", "")
+    other = Effect("formula_two", "formula", "", "", "free", "either", "")
+    first, second = Subset((0,), (1.0,), 100.0), Subset((1,), (1.0,), 93.0)
+    fitted = {first: Candidate((own,), fit, 0.0), second: Candidate((other,), fit, -7.0)}
+    naming = replace(found.naming, tried=tuple(fitted.values()))
+    said = formulas._may_be_named(question, naming, [first, second], fitted, first)  # type: ignore[arg-type]
+    assert said is named

@@ -62,8 +62,9 @@ def test_the_true_sum_is_first_and_the_price_decides_near_nothing() -> None:
 def test_no_better_subset_is_skipped_where_not_all_are_kept(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    p = problem(6, {2: 0.2, 5: -0.2})
+    p = problem(6, {2: 0.4, 5: -0.4, 7: 0.3})
     every = subsets(p)
+    assert len(every[0].terms) == 3
     monkeypatch.setattr("bayesimpact.formula.evidence.KEPT", 10)
     assert KEPT > 10
     assert [s.terms for s in subsets(p)] == [s.terms for s in every[:10]]

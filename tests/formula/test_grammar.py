@@ -108,7 +108,16 @@ def test_file_is_the_term_for_every_kind(tmp_path: Any) -> None:
         np.testing.assert_allclose(
             found, SIZE * term.force(*visited(term)), rtol=1e-9, err_msg=term.text()
         )
-        assert law.where == law_of(term).where and law.jump_at_turn == law_of(term).jump_at_turn
+        own, p = law_of(term), numbers(term, effect(term, signed=True))
+        for flag in ("where", "jump_at_turn", "jump_at_surface", "kink_at_turn", "polynomial"):
+            assert getattr(law, flag) == getattr(own, flag), term.text()
+        for name in ("grain", "first_at_turn"):
+            mine, its = getattr(law, name), getattr(own, name)
+            assert (mine is None) == (its is None), term.text()
+            if its is not None:
+                z = (0.0,) * 6
+                short = [SIZE, *term.shapes.values()]
+                assert mine(*z, short, None) == pytest.approx(its(*z, p, None), rel=1e-5)
 
 
 def test_file_of_three_terms_can_be_used(tmp_path: Any) -> None:
