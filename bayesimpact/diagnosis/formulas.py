@@ -38,6 +38,7 @@ from bayesimpact.diagnosis.scan import scan
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.formula.classes import formula_classes, term_classes
 from bayesimpact.formula.evidence import Subset, subsets
+from bayesimpact.formula.grammar import Term
 from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
@@ -91,7 +92,7 @@ def with_formulas(
     naming = joined(answer.naming, list(fitted.values()))
     first = max(fitted, key=lambda s: naming.log_odds(fitted[s]))
     rows = listed(question, naming, heads, fitted)
-    named = _may_be_named(question, naming, ranked, fitted, first)
+    named = answer.naming.finished and _may_be_named(question, naming, ranked, fitted, first)
     state = None
     if named:
         progress("scoring what the formula lacks")
@@ -129,20 +130,41 @@ def _may_be_named(
     candidate, scores = fitted[first], question.scores
     if not candidate.fit.converged or leaves_something(candidate.fit):
         return False
-    own = set(candidate.ids)
+    own, terms = set(candidate.ids), scores.terms
     reference = question.reference
-    others = [c for c in naming.tried if not own <= set(c.ids)]
+    subset_of = {id(c): s for s, c in fitted.items()}
+    kinds = set(kinds_of(first, terms))
+    rivals: list[tuple[float, float, float]] = []  # odds, what length costs of them, lead needed
+    for c in naming.tried:
+        if not own <= set(c.ids):
+            s = subset_of.get(id(c))
+            extra = length_price(question, s) if s else 0.0
+            rivals.append((naming.log_odds(c), extra, needed_lead(kinds, s, terms)))
     if any(e.id == LEARNED for e in reference.target.oscillator.effects):
         evidence = model_evidence(reference)
-        others.append(Candidate(reference.target.oscillator.effects, reference, evidence))
-    extra = {id(c): length_price(question, s) for s, c in fitted.items()}
-    rivals = [(naming.log_odds(c), extra.get(id(c), 0.0)) for c in others]
-    kinds = set(kinds_of(first, scores.terms))
+        learned = Candidate(reference.target.oscillator.effects, reference, evidence)
+        rivals.append((naming.log_odds(learned), 0.0, DECISIVE))
     reached, length = naming.log_odds(candidate), length_price(question, first)
-    scored = [s for s in ranked if not kinds <= set(kinds_of(s, scores.terms))]
-    rivals += [(reached + s.log_odds - first.log_odds, length_price(question, s)) for s in scored]
-    leads = [min(reached - odds, reached + length - odds - more) for odds, more in rivals]
-    return bool(min(leads, default=np.inf) > DECISIVE)
+    for s in ranked:
+        if not kinds <= set(kinds_of(s, terms)):
+            odds = reached + s.log_odds - first.log_odds
+            rivals.append((odds, length_price(question, s), needed_lead(kinds, s, terms)))
+    return all(
+        reached - odds > least and reached + length - odds - extra > least
+        for odds, extra, least in rivals
+    )
+
+
+def needed_lead(kinds: set[str], rival: Subset | None, terms: Sequence[Term]) -> float:
+    """Odds by which a formula of these kinds must lead a rival.
+
+    One that reduces to it, because a bump as wide as the motion or a fading beyond all speeds is
+    the force everywhere, only refines it: it must not be the likelier one.
+    """
+    if rival is None:
+        return DECISIVE
+    wide = {repr(terms[i].everywhere.kind) for i in rival.terms}
+    return 0.0 if kinds <= wide | set(kinds_of(rival, terms)) else DECISIVE
 
 
 def _examined(

@@ -115,6 +115,12 @@ class Term:
         )  # fmt: skip
 
     @property
+    def everywhere(self) -> Term:
+        """What a bump, a box or a fading becomes where it is wide: the same force everywhere."""
+        local = self.region in ("bump", "box") and self.position.is_one
+        return Term("everywhere", self.position, self.speed) if local or self.fade > 0 else self
+
+    @property
     def shapes(self) -> dict[str, float]:
         """Shape parameters by name."""
         own = {"place": self.place, "width": self.width, "fade": self.fade}

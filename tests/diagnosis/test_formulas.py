@@ -144,12 +144,21 @@ def test_text_has_a_letter_for_every_size(detent: Any) -> None:
     assert text.startswith("A ") and " + B " in text
 
 
-@pytest.mark.parametrize(("price", "named"), [(12.0, False), (5.0, True)])
-def test_no_name_rests_on_being_shorter_to_write(price: float, named: bool, detent: Any) -> None:
-    """A rival seven nats behind: for its length, or for what it explains."""
+CUBE = Term("everywhere", ONE, Power(3.0, True))
+WIDE = Term("bump", ONE, Power(2.0, True), -1, 2e-3, 5e-3)
+
+
+@pytest.mark.parametrize(
+    ("rival", "price", "named"),
+    [(CUBE, 12.0, False), (CUBE, 5.0, True), (WIDE, 9.0, True), (WIDE, 13.0, False)],
+)
+def test_no_name_rests_on_being_shorter_to_write(
+    rival: Term, price: float, named: bool, detent: Any
+) -> None:
+    """A rival seven nats behind, for its length or for what it explains; a wide bump refines."""
     _, found, _ = detent
     fit = found.after
-    terms = (Term("everywhere", ONE, Power(2.0, True)), Term("everywhere", ONE, Power(3.0, True)))
+    terms = (Term("everywhere", ONE, Power(2.0, True)), rival)
     question = SimpleNamespace(
         scores=SimpleNamespace(terms=terms), reference=fit, cost=4.0,
         kind_prices=np.array([5.0, price]),
