@@ -6,10 +6,10 @@ refitted in full, as effects like any. One is named when
 
 - it leaves nothing, by the tests that the catalogue's models pass (`State.is_white`), and
 - it leads every other hypothesis by the decisive odds: the models of the search, the learned force,
-  and all other formulas that do not contain it, fitted or scored.
+  and all other formulas that do not contain it, fitted or scored; with the price of their lengths
+  and without it, as effects are compared.
 
-Its price is that of its description and not less than that of an effect. Else the verdict stays,
-and the formulas are listed with their odds.
+Else the verdict stays, and the formulas are listed with their odds.
 """
 
 from __future__ import annotations
