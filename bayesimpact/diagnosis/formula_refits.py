@@ -24,6 +24,7 @@ from bayesimpact.model.effects.effect import Effect, Scales
 Array = NDArray[np.float64]
 
 REFITTED = 6  # formulas of different kinds
+MOST_SHAPES = 3  # of one formula: with more of them a climb takes half a minute, and rarely rests
 BEHIND = 60.0  # nats by which a score may underrate a formula that a refit would put first
 
 
@@ -71,7 +72,7 @@ def worth_a_refit(ranked: Sequence[Subset], terms: Sequence[Term]) -> list[Subse
         kinds = kinds_of(subset, terms)
         if subset.log_odds < ranked[0].log_odds - BEHIND or len(found) == REFITTED:
             break
-        if kinds in known:
+        if kinds in known or sum(len(terms[i].shapes) for i in subset.terms) > MOST_SHAPES:
             continue
         contains = any(set(kinds_of(s, terms)) <= set(kinds) for s in found)
         if not contains or not larger:

@@ -15,6 +15,7 @@ from bayesimpact.diagnosis.decision import Decision
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.force import missing_drift, missing_force
 from bayesimpact.diagnosis.formula_list import formula_text
+from bayesimpact.diagnosis.formula_refits import worth_a_refit
 from bayesimpact.diagnosis.formula_words import formula_entries, found_file
 from bayesimpact.diagnosis.formulas import Answer, joined, with_formulas
 from bayesimpact.diagnosis.learned import LEARNED
@@ -170,3 +171,15 @@ def test_no_name_rests_on_being_shorter_to_write(
     naming = replace(found.naming, tried=tuple(fitted.values()))
     said = formulas._may_be_named(question, naming, [first, second], fitted, first)  # type: ignore[arg-type]
     assert said is named
+
+
+def test_refitted_are_formulas_of_different_kinds_few_of_which_only_add() -> None:
+    square, cube = Power(2.0, True), Power(3.0, True)
+    bump = Term("bump", ONE, square, -1, 2e-3, 5e-4)
+    terms = [Term("everywhere", ONE, square), CUBE, Term("everywhere", cube), bump]
+    terms += [replace(bump, place=3e-3), Term("everywhere", square)]
+    order = [(0,), (0, 1), (0, 2), (3,), (4,), (3, 4), (5,)]
+    ranked = [Subset(t, (1.0,) * len(t), 50.0 - i) for i, t in enumerate(order)]
+    ranked.append(Subset((1, 2), (1.0, 1.0), -20.0))
+    found = [s.terms for s in worth_a_refit(ranked, terms)]
+    assert found == [(0,), (0, 1), (3,), (5,)]
