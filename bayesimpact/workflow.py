@@ -19,6 +19,7 @@ from bayesimpact.design.rank import proposals
 from bayesimpact.design.store import rivals_content, rivals_from
 from bayesimpact.diagnosis.certificate import certificate
 from bayesimpact.diagnosis.document import document
+from bayesimpact.diagnosis.formula_words import EFFECT_FILE, found_file
 from bayesimpact.diagnosis.loop import Diagnosis, diagnose
 from bayesimpact.errors import InputError
 from bayesimpact.inference.identify import Identification, identify
@@ -197,6 +198,8 @@ def write_diagnosis(
     out.mkdir(parents=True, exist_ok=True)
     plain = _strict(content)
     write_text(out / DIAGNOSIS_FILE, json.dumps(plain, indent=1))
+    if diagnosis.formulas is not None:
+        write_text(out / EFFECT_FILE, found_file(diagnosis.formulas))
     failed = {}
     try:
         arrays = diagnosis_arrays(diagnosis)

@@ -19,6 +19,7 @@ LAYERS = (
     "model",
     "response",
     "inference",
+    "formula",
     "diagnosis",
     "design",
     "report",

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.diagnosis.certificate import Certificate
+from bayesimpact.diagnosis.formula_words import formula_entries
 from bayesimpact.diagnosis.intervals import Intervals, intervals
 from bayesimpact.diagnosis.limits import PRACTICAL, Limit
 from bayesimpact.diagnosis.locate import Location
@@ -79,7 +80,7 @@ def document(
         "location": _location(d.location) or (place(faulty) if faulty else None),
         "faults": fault_entries(d.corrected) if d.corrected else [],
         "remainder": _remainder(left),
-        "formulas": [],
+        "formulas": formula_entries(d.formulas, d.scales, angle=angle),
         "effects": (as_effects(d.corrected) if d.corrected else [])
         + [_effect(d, e, text, after) for e, text in zip(d.effects, statements, strict=True)],
         "alternatives": [_alternative(d, c) for c in _others(d)],

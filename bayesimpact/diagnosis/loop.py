@@ -15,6 +15,8 @@ from bayesimpact.diagnosis.decision import Decision, Verdict, decide
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.faults.compare import base_failed, gain
 from bayesimpact.diagnosis.force import MissingForce
+from bayesimpact.diagnosis.formula_list import Formulas
+from bayesimpact.diagnosis.formulas import Answer, with_formulas
 from bayesimpact.diagnosis.heldout import HeldOut, held_out_cases, held_out_recordings
 from bayesimpact.diagnosis.intervals import Intervals, intervals
 from bayesimpact.diagnosis.learned import LEARNED
@@ -28,6 +30,7 @@ from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.scan import scan
 from bayesimpact.diagnosis.smoothing import SAVITZKY_GOLAY, proved_smoothing, whole_campaign
 from bayesimpact.diagnosis.unknown import with_force
+from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification, identify
 from bayesimpact.inference.spectrum import Fingerprint
@@ -70,6 +73,7 @@ class Diagnosis:
     scales : physical sizes of the campaign
     filtered : the filter that the noise spectrum proves and campaign.toml does not declare
     corrected : faults of the recordings, set aside or corrected before anything else
+    formulas : for a learned force, where something is unknown
     """
 
     verdict: Verdict
@@ -90,6 +94,7 @@ class Diagnosis:
     scales: Scales
     filtered: Fingerprint | None = None
     corrected: Corrected | None = None
+    formulas: Formulas | None = None
 
     def __repr__(self) -> str:
         """One line."""
@@ -177,6 +182,7 @@ def is_doubtful(found: Diagnosis) -> bool:
     Physics shows differently in recordings of different amplitude.
     """
     own = any(p.scope != "campaign" for e in found.effects for p in e.parameters if not p.circular)
+    own = own or any(map(is_formula, found.effects))
     return own or found.verdict in ("partly", "ambiguous", "unknown")
 
 
@@ -238,6 +244,9 @@ def diagnose_fit(
     naming = name(base, effects, scales, rng=rng, progress=say)
     decision = decide(naming)
     after, state = extension(naming, decision, scales, say)
+    answer = Answer(naming, decision, after, state)
+    answer = with_formulas(answer, effects, scales, rng=rng, progress=say)
+    naming, decision, after, state = answer.naming, answer.decision, answer.after, answer.state
     location, held, cases = None, None, None
     locations: tuple[Location, ...] = ()
     if decision.verdict != "adequate":
@@ -267,6 +276,7 @@ def diagnose_fit(
         intervals(after, state),
         state,
         scales,
+        formulas=answer.formulas,
     )
 
 

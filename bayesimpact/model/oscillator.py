@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +47,10 @@ class Oscillator:
     effects: tuple[Effect, ...]
     layout: Layout
     smoothing: Smoothing | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For pickle: addresses of compiled laws mean nothing in another process."""
+        return {name: value for name, value in self.__dict__.items() if name != "laws"}
 
     @cached_property
     def counts(self) -> NDArray[np.int64]:

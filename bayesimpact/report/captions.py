@@ -21,6 +21,11 @@ DIAGNOSIS = {
         "split into a conservative part and a dissipative part, with 90 % bands. What "
         "changes of the base parameters could imitate is taken out."
     ),
+    "formula": (
+        "The likeliest formula against the force that was learned, as a(y) + b(y) v can show it: a "
+        "law of another power of the speed appears as the b(y) that fits it best. What changes of "
+        "the base parameters could imitate is taken out of both. Grey area: contact."
+    ),
     "gain": (
         "Where the extended model explains more: gain in log likelihood over the base model. A "
         "gain of 1 nat makes a stretch e times likelier; small negative ones are chance."

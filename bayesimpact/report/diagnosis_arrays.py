@@ -14,6 +14,7 @@ from bayesimpact.inference.fit import Fit
 from bayesimpact.model.parameters import SLOTS
 from bayesimpact.report.build import recording_results
 from bayesimpact.report.force_arrays import force_arrays
+from bayesimpact.report.formula_arrays import formula_arrays
 from bayesimpact.report.results import Array
 
 _BANDS = 36  # of frequency
@@ -25,6 +26,7 @@ def diagnosis_arrays(d: Diagnosis) -> dict[str, Array]:
     """Arrays by name; recordings and cases in the campaign's order.
 
     force_*, left_*, learned_*, gap : see `force_arrays`
+    reference_*, formula_* : see `formula_arrays`
     gain : (R, bins) log likelihood gained per recording and stretch of time, nats
     impact_gain : (R, K) the same from each touch to the next, NaN after the last
     before_predicted : (N,) reading of the base model, recordings one after the other, m
@@ -36,6 +38,7 @@ def diagnosis_arrays(d: Diagnosis) -> dict[str, Array]:
     """
     arrays = {
         **force_arrays(d),
+        **formula_arrays(d),
         "before_mode": d.before.mode,
         "before_covariance": d.before.covariance,
     }

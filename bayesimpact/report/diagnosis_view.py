@@ -74,7 +74,10 @@ def diagnosis_view(results: Results) -> dict[str, Any] | None:
             for other in diagnosis.get("alternatives", [])
         ],
         "remainder": remainder_rows(diagnosis.get("remainder"), unit, length),
-        "formulas": [_formula(formula) for formula in diagnosis.get("formulas") or ()],
+        "formulas": [
+            _formula(formula, "N m" if results.angular else "N")
+            for formula in diagnosis.get("formulas") or ()
+        ],
         "fit": _fit(diagnosis.get("fit", {}), unit) + _backbones(results),
         "held_out": _held_out(diagnosis.get("fit", {})),
         "parameters": [
@@ -161,13 +164,18 @@ def remainder_rows(
     return rows
 
 
-def _formula(formula: Mapping[str, Any]) -> dict[str, str]:
+def _formula(formula: Mapping[str, Any], force: str) -> dict[str, str]:
     """A formula for a learned force, as a row of the table."""
+    peak = {"value": formula.get("peak_n"), "unit": force, "percent": formula.get("percent")}
     return {
         "formula": str(formula.get("formula", "")),
         "unit": typeset(str(formula.get("unit") or "")),
+        "sizes": ", ".join(significant(float(x), 3) for x in formula.get("sizes") or ()),
+        "peak": size_words({**peak, "of": formula.get("of")}),
         "probability": probability(formula.get("probability")),
         "odds": _plain(formula.get("log_odds"), 1),
+        "fitted": "" if formula.get("fitted", True) else "scored only",
+        "alike": "; ".join(formula.get("alike") or ()),
     }
 
 

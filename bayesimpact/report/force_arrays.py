@@ -40,7 +40,7 @@ def force_arrays(d: Diagnosis) -> dict[str, Array]:
     force, fit = d.force, d.naming.base.candidate.fit
     y = np.linspace(force.low, force.low + force.spacing * (force.knots - 3), POINTS)
     slow, fast = _velocities(fit, y)
-    rest = _Rest(knots_of(force.effect), fit, y)
+    rest = Rest(knots_of(force.effect), fit, y)
     arrays = {"force_y": y, "force_v_low": slow, "force_v_high": fast}
     if d.verdict == "adequate":
         unit = d.scales.force, d.scales.force / d.scales.speed
@@ -52,13 +52,13 @@ def force_arrays(d: Diagnosis) -> dict[str, Array]:
         width = np.repeat(
             [force.effect.parameter(n).scale(d.scales) for n in ("a1", "b1")], left.knots
         )
-        beside = _Rest(knots_of(left.effect), d.naming.chosen.candidate.fit, y)
+        beside = Rest(knots_of(left.effect), d.naming.chosen.candidate.fit, y)
         arrays |= beside.parts("left", *_posterior(left, width))
     learned = [e for e in d.after.target.oscillator.effects if e.id == LEARNED]
     if learned and (knots := knots_of(learned[0])).reach == 0.0:
         values = dict(zip(d.after.names, d.after.mode, strict=True))
         own = np.array([values[n] for n in coefficient_names(knots.count)])
-        maps = _Rest(knots, fit, y).maps
+        maps = Rest(knots, fit, y).maps
         arrays |= {f"learned_{part}": maps[part] @ own for part in "ab"}
     return arrays
 
@@ -72,7 +72,7 @@ def _posterior(force: MissingForce, width: Array) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Rest:
+class Rest:
     """From coefficients to what no change of the base parameters imitates.
 
     Attributes

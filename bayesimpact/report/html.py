@@ -27,7 +27,8 @@ TEMPLATES = Path(__file__).parent / "template"
 _VERDICT_CLASS = {"adequate": "good", "inadequate": "bad", "slight": "", "overestimated": ""}
 _GROUPS = (
     *("story", "fit", "corner", "backbone", "search", "traces"),
-    *("force", "gain", "ranking", "limits", "improvement", "bands", "shifts", "designs"),
+    *("force", "formula", "gain", "ranking", "limits", "improvement"),
+    *("bands", "shifts", "designs"),
 )
 _PIXELS_PER_INCH = 96
 _SENTENCE_END = re.compile(r"(?<=[a-z0-9)])\. (?=[A-Z])")

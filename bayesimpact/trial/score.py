@@ -6,7 +6,7 @@ Verdicts against truths:
 |---|---|---|
 | control | quiet (adequate) | false alarm (anything else) |
 | effects of the catalogue | named (all, and no other) | wrong name, missed |
-| a force outside it | unknown | wrong name, missed |
+| a force outside it | unknown, or a formula of its class (`formula_score`) | wrong name, missed |
 
 Ambiguous, partly (with no wrong name), and unknown for effects of the catalogue, are abstentions:
 neither. Several effects at once: `score_strong`.
@@ -20,12 +20,13 @@ from typing import Any
 import numpy as np
 
 from bayesimpact.trial.faults import judge_fault
+from bayesimpact.trial.formula_score import is_right, split
 from bayesimpact.trial.score_strong import inconsistent, judge_several, quality
 
 NORMAL_90 = 1.6448536269514722
 QUIET = ("noise_correlated",)  # reported beside a verdict, never a name
 BASE = ("c1", "k1", "c2", "g", "k2")
-RIGHT = ("quiet", "named", "unknown outside", "partly outside")
+RIGHT = ("quiet", "named", "unknown outside", "partly outside", "formula")
 
 
 def score(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> dict[str, Any]:
@@ -33,6 +34,8 @@ def score(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> dict[str, Any]
     planted = [p["id"] for p in truth["planted"]]
     named = [e["id"] for e in answer["effects"] if e["id"] not in QUIET]
     outcome = _outcome(truth, answer["verdict"], named, answer.get("faults", ()))
+    if names_the_force(truth, answer):
+        outcome = "formula"
     sets = [set(named), *(set(a["id"].split(" + ")) for a in answer["alternatives"])]
     return {
         "truth": truth["fault"]["id"]
@@ -55,6 +58,14 @@ def score(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> dict[str, Any]
         "held_out_se": answer["fit"]["held_out_gain"]["se"],
         "seconds": answer["seconds"],
     }
+
+
+def names_the_force(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> bool:
+    """Whether the answer is a formula, and nothing else, for a force outside the catalogue."""
+    others, formulas = split(answer["effects"])
+    if truth["kind"] != "outside" or answer["verdict"] != "named" or set(others) - set(QUIET):
+        return False
+    return is_right(formulas, [p["id"] for p in truth["planted"]])
 
 
 def _outcome(

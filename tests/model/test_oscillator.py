@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 from effect_rigs import BY_ID
@@ -189,3 +191,12 @@ def test_a_first_row_that_cannot_be_simulated_stays_alone():
     theta[0, oscillator.layout.names.index("k1")] = np.nan
     readings = oscillator.predict_recording(0, theta)
     assert np.isnan(readings[0]).all() and np.isfinite(readings[1:]).all()
+
+
+def test_addresses_of_compiled_laws_stay_in_their_process() -> None:
+    """Another process would jump to them."""
+    oscillator = build_oscillator(campaign(), (BY_ID["spring_cubic"],))
+    laws = oscillator.laws
+    again = pickle.loads(pickle.dumps(oscillator))
+    assert "laws" in oscillator.__dict__ and "laws" not in again.__dict__
+    np.testing.assert_array_equal(again.laws, laws)

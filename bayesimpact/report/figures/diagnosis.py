@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from bayesimpact.report.figures.bands import band_figures
 from bayesimpact.report.figures.designs import design_figures
 from bayesimpact.report.figures.force_map import force_figures
+from bayesimpact.report.figures.formula import formula_figures
 from bayesimpact.report.figures.gain import gain_figures
 from bayesimpact.report.figures.gaussian import gaussian_figures
 from bayesimpact.report.figures.improvement import improvement_figures
@@ -21,6 +22,7 @@ Drawer = Callable[[Results], Mapping[str, Figure]]
 DRAWERS: tuple[Drawer, ...] = (
     story_figures,
     force_figures,
+    formula_figures,
     gain_figures,
     ranking_figures,
     improvement_figures,

@@ -1,0 +1,136 @@
+"""Which formulas are refitted in full, and how."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.diagnosis.evidence import model_evidence
+from bayesimpact.diagnosis.extend import difference_steps, extend, transfer
+from bayesimpact.diagnosis.formula_scores import FormulaScores
+from bayesimpact.diagnosis.learned import LEARNED
+from bayesimpact.diagnosis.refit import ITERATIONS, TOLERANCE, Candidate, best_start, step_sizes
+from bayesimpact.formula.evidence import Subset
+from bayesimpact.formula.grammar import Term
+from bayesimpact.formula.law import effect_id, effect_of, starts_of
+from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.mode import find_mode
+from bayesimpact.model.effects.effect import Effect, Scales
+
+Array = NDArray[np.float64]
+
+REFITTED = 6  # formulas of different kinds
+MOST_SHAPES = 3  # of one formula: with more of them a climb takes half a minute, and rarely rests
+BEHIND = 60.0  # nats by which a score may underrate a formula that a refit would put first
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """What refits need to know.
+
+    Attributes
+    ----------
+    reference : the fit that the terms were scored on
+    cost : nats per effect
+    """
+
+    reference: Fit
+    cost: float
+    scores: FormulaScores
+    scales: Scales
+
+    @cached_property
+    def kind_prices(self) -> Array:
+        """Price of every term with its shape free: that of all terms of its kind together, (K,)."""
+        kinds = [t.kind for t in self.scores.terms]
+        share = np.exp(-self.scores.problem.price)
+        total: dict[object, float] = {}
+        for kind, part in zip(kinds, share, strict=True):
+            total[kind] = total.get(kind, 0.0) + float(part)
+        return -np.log([total[kind] for kind in kinds])
+
+    @property
+    def others(self) -> tuple[Effect, ...]:
+        """Effects of the model beside the learned force."""
+        return tuple(e for e in self.reference.target.oscillator.effects if e.id != LEARNED)
+
+
+def worth_a_refit(ranked: Sequence[Subset], terms: Sequence[Term]) -> list[Subset]:
+    """The likeliest formulas that differ in more than the numbers of their shapes, best first.
+
+    Those that contain a likelier one with fewer terms show only that no more is needed: one of them
+    is enough. Shapes stand on grids here, so a rival may be better than it looks.
+    """
+    found: list[Subset] = []
+    known: set[tuple[str, ...]] = set()
+    larger = 0
+    for subset in ranked:
+        kinds = kinds_of(subset, terms)
+        if subset.log_odds < ranked[0].log_odds - BEHIND or len(found) == REFITTED:
+            break
+        if kinds in known or sum(len(terms[i].shapes) for i in subset.terms) > MOST_SHAPES:
+            continue
+        contains = any(set(kinds_of(s, terms)) <= set(kinds) for s in found)
+        if not contains or not larger:
+            larger += contains
+            known.add(kinds)
+            found.append(subset)
+    return found
+
+
+def kinds_of(subset: Subset, terms: Sequence[Term]) -> tuple[str, ...]:
+    """Kinds of a formula's terms, sorted."""
+    return tuple(sorted(repr(terms[i].kind) for i in subset.terms))
+
+
+def refitted(question: Question, subset: Subset) -> Candidate | None:
+    """A formula fitted in full, from where the scores expect it; None where it cannot stand beside
+    the model's effects. Its price beyond that of effects is taken off its evidence.
+    """
+    scores, reference = question.scores, question.reference
+    terms = [scores.terms[i] for i in subset.terms]
+    own = tuple(effect_for(question, i, a) for i, a in zip(subset.terms, subset.sizes, strict=True))
+    if len({e.id for e in (*own, *question.others)}) < len(own) + len(question.others):
+        return None
+    if not all(e.stands_beside(o) for e in own for o in (*question.others, *own) if e is not o):
+        return None
+    effects = (*question.others, *own)
+    target = extend(reference, effects, question.scales)
+    names = target.oscillator.layout.names
+    shapes = {name: value for t in terms for name, value in starts_of(t).items()}
+    unshifted = transfer(reference, target.oscillator.layout, effects, question.scales, shapes)
+    predicted = unshifted.copy()
+    at, sizes = list(subset.terms), np.array(subset.sizes)
+    shift = scores.shift - scores.absorbed[:, at] @ sizes
+    for name, by in zip(scores.names, shift, strict=True):
+        predicted[names.index(name)] += by
+    steps = step_sizes(names, effects, question.scales, ())
+    sd = 1.0 / np.sqrt(np.diag(scores.problem.information)[at])
+    for term, size, error in zip(terms, sizes, sd, strict=True):
+        predicted[names.index(f"{effect_id(term)}.size")] = size
+        steps[f"{effect_id(term)}.size"] = float(error)
+    step = difference_steps(reference, target, steps)
+    start = best_start(target, unshifted, predicted, step)
+    fit = find_mode(target, start, steps=step, tolerance=TOLERANCE, max_iterations=ITERATIONS)
+    return Candidate(effects, fit, model_evidence(fit) - length_price(question, subset))
+
+
+def effect_for(question: Question, i: int, size: float) -> Effect:
+    """The effect of term i; a dissipative one whose size came out negative may have either sign."""
+    scores, scales = question.scores, question.scales
+    term = scores.terms[i]
+    reach = max(float(np.abs(y).max()) for y in scores.fit.displacements)
+    signed = term.energy != "dissipates" or size < 0
+    return effect_of(
+        term, float(scores.size[i]), reach, scales.speed, signed=signed, angle=scales.angle
+    )
+
+
+def length_price(question: Question, subset: Subset) -> float:
+    """What a formula's length costs beyond the price of as many effects, nats."""
+    cost = question.cost
+    return max(sum(float(question.kind_prices[i]) - cost for i in subset.terms), 0.0)

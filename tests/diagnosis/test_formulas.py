@@ -1,0 +1,185 @@
+"""From a learned force to a formula: found, named only where nothing else fits alike, written."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from small_rig import PLAIN, PLAIN_RELEASES, record
+
+from bayesimpact.diagnosis import formulas
+from bayesimpact.diagnosis.decision import Decision
+from bayesimpact.diagnosis.extend import campaign_scales
+from bayesimpact.diagnosis.force import missing_drift, missing_force
+from bayesimpact.diagnosis.formula_list import formula_text
+from bayesimpact.diagnosis.formula_refits import worth_a_refit
+from bayesimpact.diagnosis.formula_words import formula_entries, found_file
+from bayesimpact.diagnosis.formulas import Answer, joined, with_formulas
+from bayesimpact.diagnosis.learned import LEARNED
+from bayesimpact.diagnosis.naming import Naming, State
+from bayesimpact.diagnosis.refit import Candidate, base_candidate, residual_repetition
+from bayesimpact.diagnosis.scan import score_directions
+from bayesimpact.diagnosis.thresholds import DECISIVE
+from bayesimpact.diagnosis.unknown import with_force
+from bayesimpact.formula.evidence import Subset
+from bayesimpact.formula.grammar import ONE, Power, Term
+from bayesimpact.formula.law import is_formula
+from bayesimpact.inference.identify import identify
+from bayesimpact.model.effects.effect import Effect, Scales
+from bayesimpact.model.own_effects import load_effects
+from bayesimpact.report.formula_arrays import formula_arrays
+
+DETENT = {"stiffness": 8.0, "place": -2.5e-3, "width": 7e-4}
+DRAG = {"coefficient": 0.02}  # seven times as much is told from v^3
+
+
+def unknown(effects: dict[str, Any]) -> tuple[Answer, Scales]:
+    """What a diagnosis that knows no effect ends with: a learned force and the verdict unknown."""
+    rng = np.random.default_rng(0)
+    campaign = record(3, effects, rig=PLAIN, releases=PLAIN_RELEASES, duration=4.0, rate=500.0)
+    base = base_candidate(identify(campaign, rng=rng, search=False).fit)
+    scales = campaign_scales(base.fit)
+    force = missing_force(base.fit, scales, rng=rng)
+    state = State(
+        base, score_directions(base.fit, (), rng=rng), force,
+        missing_drift(base.fit, scales, rng=rng),
+    )  # fmt: skip
+    naming = Naming(state, state, (base,), np.log(50.0), residual_repetition(base.fit))
+    learned = with_force(base, force, scales)
+    return Answer(naming, Decision("unknown", ()), learned.fit, state), scales
+
+
+def asked(answer: Answer, scales: Scales) -> Answer:
+    said: list[str] = []
+    rng = np.random.default_rng(1)
+    return with_formulas(answer, (), scales, rng=rng, progress=said.append)
+
+
+@pytest.fixture(scope="module")
+def detent() -> tuple[Answer, Answer, Scales]:
+    before, scales = unknown({"detent": DETENT})
+    return before, asked(before, scales), scales
+
+
+@pytest.fixture(scope="module")
+def drag() -> tuple[Answer, Answer, Scales]:
+    before, scales = unknown({"quadratic_drag": DRAG})
+    return before, asked(before, scales), scales
+
+
+def test_a_force_of_no_catalogue_is_named_with_its_numbers(detent: Any) -> None:
+    _, found, _ = detent
+    assert found.decision.verdict == "named" and found.state is None
+    assert all(map(is_formula, found.decision.effects)) and len(found.decision.effects) == 1
+    first = found.formulas.ranked[0]
+    (term,) = first.terms
+    assert (term.region, term.side, term.position.odd) == ("bump", -1, True)
+    values = dict(zip(found.after.names, found.after.mode, strict=True))
+    sd = dict(zip(found.after.names, found.after.sd, strict=True))
+    names = {n.split(".")[1]: n for n in values if n.startswith("formula_")}
+    for own, true in (("size", "stiffness"), ("place", "place"), ("width", "width")):
+        off = (values[names[own]] - abs(DETENT[true])) / sd[names[own]]
+        assert abs(off) < 4.0, own
+    assert LEARNED not in {e.id for e in found.after.target.oscillator.effects}
+
+
+def test_the_one_named_leads_all_others_by_the_decisive_odds(detent: Any) -> None:
+    before, found, _ = detent
+    first, own = found.formulas.ranked[0], set(found.naming.chosen.candidate.ids)
+    rivals = [c for c in found.naming.tried if not own <= set(c.ids)]
+    assert rivals and all(first.log_odds > found.naming.log_odds(c) + DECISIVE for c in rivals)
+    assert found.naming.chosen.is_white and not before.naming.chosen.is_white
+    assert sum(f.probability for f in found.formulas.ranked) <= 1.0 + 1e-9
+    odds = [f.log_odds for f in found.formulas.ranked]
+    assert odds == sorted(odds, reverse=True)
+
+
+def test_a_law_that_another_imitates_is_listed_and_not_named(drag: Any) -> None:
+    before, found, scales = drag
+    assert found.decision is before.decision and found.after is before.after
+    assert not found.formulas.named
+    entries = formula_entries(found.formulas, scales, angle=False)
+    near = [e for e in entries if e["log_odds"] > entries[0]["log_odds"] - DECISIVE]
+    listed = [text for e in near for text in (e["formula"], *e["alike"])]
+    assert {"A |v| v", "A v^3"} <= set(listed)
+    assert all(e["unit"] == "N s2/m2" for e in entries if e["formula"] == "A |v| v")
+    share = entries[0]["peak_n"] / scales.force
+    assert entries[0]["percent"] == pytest.approx(100 * share)
+
+
+def test_what_is_not_unknown_is_left_alone(drag: Any) -> None:
+    before, _, scales = drag
+    named = Answer(before.naming, Decision("named", ()), before.after, None)
+    assert asked(named, scales) is named
+
+
+def test_file_of_the_formula_is_ready_for_use(detent: Any, tmp_path: Any) -> None:
+    _, found, _ = detent
+    file = tmp_path / "effect_found.py"
+    file.write_text(found_file(found.formulas))
+    assert [e.id for e in load_effects(file)] == [e.id for e in found.decision.effects]
+    assert "named" in file.read_text().split('"""')[1]
+
+
+def test_picture_shows_the_formula_within_the_band_of_the_learned_force(detent: Any) -> None:
+    _, found, _ = detent
+    arrays = formula_arrays(SimpleNamespace(formulas=found.formulas))  # type: ignore[arg-type]
+    learned, seen, sd = (arrays[k] for k in ("reference_a", "formula_a", "reference_a_sd"))
+    assert np.mean(np.abs(seen - learned) < 3 * sd) > 0.9
+    assert np.abs(seen - learned).max() < 0.5 * np.abs(learned).max()
+
+
+def test_samples_are_counted_by_the_best_of_all_models(detent: Any) -> None:
+    before, found, _ = detent
+    again = joined(before.naming, [found.naming.chosen.candidate])
+    assert again.repetition < before.naming.repetition
+    assert again.tried[0] is found.naming.chosen.candidate
+
+
+def test_text_has_a_letter_for_every_size(detent: Any) -> None:
+    _, found, _ = detent
+    text = formula_text([f.terms[0] for f in found.formulas.ranked[:2]])
+    assert text.startswith("A ") and " + B " in text
+
+
+CUBE = Term("everywhere", ONE, Power(3.0, True))
+WIDE = Term("bump", ONE, Power(2.0, True), -1, 2e-3, 5e-3)
+
+
+@pytest.mark.parametrize(
+    ("rival", "price", "named"),
+    [(CUBE, 12.0, False), (CUBE, 5.0, True), (WIDE, 9.0, True), (WIDE, 13.0, False)],
+)
+def test_no_name_rests_on_being_shorter_to_write(
+    rival: Term, price: float, named: bool, detent: Any
+) -> None:
+    """A rival seven nats behind, for its length or for what it explains; a wide bump refines."""
+    _, found, _ = detent
+    fit = found.after
+    terms = (Term("everywhere", ONE, Power(2.0, True)), rival)
+    question = SimpleNamespace(
+        scores=SimpleNamespace(terms=terms), reference=fit, cost=4.0,
+        kind_prices=np.array([5.0, price]),
+    )  # fmt: skip
+    own = Effect("formula_one", "formula", "", "", "free", "either", "")
+    other = Effect("formula_two", "formula", "", "", "free", "either", "")
+    first, second = Subset((0,), (1.0,), 100.0), Subset((1,), (1.0,), 93.0)
+    fitted = {first: Candidate((own,), fit, 0.0), second: Candidate((other,), fit, -7.0)}
+    naming = replace(found.naming, tried=tuple(fitted.values()))
+    said = formulas._may_be_named(question, naming, [first, second], fitted, first)  # type: ignore[arg-type]
+    assert said is named
+
+
+def test_refitted_are_formulas_of_different_kinds_few_of_which_only_add() -> None:
+    square, cube = Power(2.0, True), Power(3.0, True)
+    bump = Term("bump", ONE, square, -1, 2e-3, 5e-4)
+    terms = [Term("everywhere", ONE, square), CUBE, Term("everywhere", cube), bump]
+    terms += [replace(bump, place=3e-3), Term("everywhere", square)]
+    order = [(0,), (0, 1), (0, 2), (3,), (4,), (3, 4), (5,)]
+    ranked = [Subset(t, (1.0,) * len(t), 50.0 - i) for i, t in enumerate(order)]
+    ranked.append(Subset((1, 2), (1.0, 1.0), -20.0))
+    found = [s.terms for s in worth_a_refit(ranked, terms)]
+    assert found == [(0,), (0, 1), (3,), (5,)]

@@ -1,0 +1,85 @@
+"""Responses to small forces along a motion, against motions simulated with these forces."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from small_rig import PLAIN, PLAIN_RELEASES, RELEASES, RIG, record, vector
+
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.formula.grammar import ONE, Power, Term
+from bayesimpact.formula.law import effect_id, effect_of, starts_of
+from bayesimpact.formula.responses import largest_force, motion_of, responses
+from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.identify import identify
+from bayesimpact.model.oscillator import build_oscillator
+
+SIGN, V, DRAG = Power(0.0, True), Power(1.0, True), Power(2.0, True)
+FREE = (
+    Term("everywhere", ONE, SIGN),
+    Term("everywhere", ONE, DRAG),
+    Term("everywhere", Power(3.0, True)),
+    Term("everywhere", Power(1.0, True), SIGN),
+    Term("everywhere", ONE, V, drift=1),
+    Term("everywhere", ONE, SIGN, fade=0.05),
+    Term("beyond", Power(1.0, False), side=-1, place=3e-3),
+    Term("bump", Power(1.0, True), ONE, -1, 2e-3, 7e-4),
+    Term("bump", ONE, V, -1, 2e-3, 7e-4),
+    Term("box", ONE, V, -1, 2e-3, 7e-4),
+)
+CONTACT = (
+    Term("contact", ONE),
+    Term("contact", Power(1.5, False)),
+    Term("contact", Power(1.0, False), V),
+    Term("contact", ONE, DRAG),
+    Term("contact", Power(1.0, False), place=5e-4),
+)
+
+
+def fitted(campaign: Campaign) -> Fit:
+    return identify(campaign, rng=np.random.default_rng(0), search=False).fit
+
+
+@pytest.fixture(scope="module")
+def with_stop() -> Fit:
+    return fitted(record(rig=RIG, releases=RELEASES[:2], duration=1.0))
+
+
+@pytest.fixture(scope="module")
+def without_stop() -> Fit:
+    return fitted(record(rig=PLAIN, releases=PLAIN_RELEASES[:1], duration=1.0))
+
+
+def simulated(fit: Fit, term: Term, size: float) -> tuple[np.ndarray, ...]:
+    """Difference of two simulated motions over the size of the force that makes it, m/unit."""
+    campaign = fit.target.oscillator.campaign
+    effect = effect_of(term, 1.0, 6.5e-3, 0.3, signed=True)
+    assert effect.law is not None  # dry friction as a law too: the motion does not stick here
+    with_it = build_oscillator(campaign, (effect,))
+    known = dict(zip(fit.names, fit.mode, strict=True)) | starts_of(term)
+    both = []
+    for value in (size, -size):
+        values = known | {f"{effect_id(term)}.size": value}
+        both.append(with_it.displacements(vector(with_it.layout, values)))
+    return tuple((a - b) / (2 * size) for a, b in zip(*both, strict=True))
+
+
+def away(fit: Fit, term: Term) -> float:
+    """Largest difference of both responses over the larger one, all recordings."""
+    motions = [motion_of(fit, r) for r in range(len(fit.predicted))]
+    size = 5e-4 / max(largest_force([m], [term], [1.0]) for m in motions)
+    wanted = simulated(fit, term, size)
+    found = [responses(m, [term])[0][0] for m in motions]
+    return max(
+        float(np.abs(a - b).max() / np.abs(b).max()) for a, b in zip(found, wanted, strict=True)
+    )
+
+
+@pytest.mark.parametrize("term", FREE, ids=effect_id)
+def test_response_is_that_of_a_simulation_without_a_stop(without_stop: Fit, term: Term) -> None:
+    assert away(without_stop, term) < 0.02
+
+
+@pytest.mark.parametrize("term", (*FREE, *CONTACT), ids=effect_id)
+def test_response_is_that_of_a_simulation_with_a_stop(with_stop: Fit, term: Term) -> None:
+    assert away(with_stop, term) < 0.02
