@@ -110,6 +110,24 @@ def test_a_killed_run_goes_on(
     assert {k: v for k, v in tree(killed).items() if "part" not in k} == tree(whole)
 
 
+@pytest.mark.parametrize("victim", ["_log", "_finish"])
+def test_a_kill_while_a_trial_is_put_away(
+    victim: str, quick: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Between its result and its line in the log, or between its campaign and its result."""
+    whole, killed = tmp_path / "whole", tmp_path / "killed"
+    run_trials(quick, SEEDS, whole)
+
+    def dies(store: run.Store, *told: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
+        patched.setattr(run.Store, victim, dies)
+        run_trials(quick, SEEDS, killed)
+    run_trials(quick, SEEDS, killed)
+    assert tree(killed) == tree(whole) and not list((killed / "campaigns").iterdir())
+
+
 def test_what_goes_wrong_in_one_trial_is_recorded(
     quick: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
