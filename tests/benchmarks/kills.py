@@ -23,7 +23,8 @@ from record import keep
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from kills import RESUME, killed_and_resumed, run, state, unfinished
-from small_rig import PLAIN, PLAIN_RELEASES, RELEASES, record
+from small_fleet import write_fleet
+from small_rig import RELEASES, record
 
 from bayesimpact.trial.rig_files import write_campaign
 
@@ -82,16 +83,11 @@ class Victim:
 def victims(folder: Path) -> dict[str, Victim]:
     """The commands with small campaigns of their own."""
     write_campaign(folder / "stop", record(seed=3, duration=0.6, releases=RELEASES[:1]))
-    lines = ['name = "two days"', 'command = "fit"']
-    for day in (1, 2):
-        campaign = record(seed=3 + day, rig=PLAIN, releases=PLAIN_RELEASES[:1], duration=0.5)
-        write_campaign(folder / f"day{day}", campaign)
-        lines += ["[[campaign]]", f'folder = "day{day}"', f"date = 2026-05-0{day}"]
-    (folder / "fleet.toml").write_text("\n".join(lines) + "\n")
+    file = write_fleet(folder, 2)
     return {
         "sample": Victim(["sample", str(folder / "stop"), "--quiet"], RESUME),
-        "diagnose": Victim(["diagnose", str(folder / "day1"), "--quiet"], RESUME),
-        "fleet": Victim(["fleet", str(folder / "fleet.toml"), "--quiet"], ()),
+        "diagnose": Victim(["diagnose", str(folder / "day0"), "--quiet"], RESUME),
+        "fleet": Victim(["fleet", str(file), "--quiet"], ()),
         "trial": Victim(["trial", *TRIALS, "--quiet"], ()),
     }
 
