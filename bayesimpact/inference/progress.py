@@ -1,4 +1,4 @@
-"""A bar for the sampler's progress, in terminals and notebooks."""
+"""Bars for what takes long, in terminals and notebooks: the sampler's steps, a search's refits."""
 
 from __future__ import annotations
 
@@ -6,6 +6,18 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from bayesimpact.inference.sample import Progress
+
+
+class Refit(str):
+    """What a search fits next, in words, and how many refits there have been with it."""
+
+    number: int
+
+    def __new__(cls, words: str, number: int) -> Refit:
+        """Words that can be told as any others."""
+        made = super().__new__(cls, words)
+        made.number = number
+        return made
 
 
 @contextmanager
@@ -22,6 +34,32 @@ def progress_bar(shown: bool | None = None) -> Iterator[Callable[[Progress], Non
         bar.total, bar.n = where.max_steps, where.steps
         effective = "" if where.ess is None else f", {where.ess:.0f} effective draws"
         bar.set_description(f"sampling{', burn-in' if where.burning else effective}")
+
+    try:
+        yield tell
+    finally:
+        bar.close()
+
+
+@contextmanager
+def refit_bar(
+    say: Callable[[str], None], shown: bool | None = None
+) -> Iterator[Callable[[str], None]]:
+    """What a diagnosis tells goes to `say`, but for its refits, which a bar counts and names.
+
+    How many there will be nobody knows beforehand, so the bar has no end. `shown` as above; where
+    no bar is shown, refits are told to `say` too.
+    """
+    from tqdm.auto import tqdm
+
+    bar = tqdm(unit=" refits", disable=None if shown is None else not shown, leave=False)
+
+    def tell(words: str) -> None:
+        if isinstance(words, Refit) and not bar.disable:
+            bar.n = words.number
+            bar.set_description_str(words)
+        else:
+            say(words)
 
     try:
         yield tell
