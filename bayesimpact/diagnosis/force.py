@@ -246,7 +246,7 @@ def basis_responses(fit: Fit, effect: Effect, knots: int, scales: Scales) -> tup
     """Whitened responses (noise = 1) to a unit of each coefficient: per recording (n, 2 knots)."""
     oscillator, sigma = fit.target.oscillator, sigma_of(fit)
     head = [p.fixed for p in effect.parameters if p.fixed is not None]
-    table = _with_law(oscillator, effect)
+    table = with_law(oscillator, effect)
     slots = oscillator.layout.slots(fit.mode)
     step = np.repeat([scales.force, scales.force / scales.speed], knots)
     result = []
@@ -271,7 +271,7 @@ def whitened_one(fit: Fit, r: int, values: Array, sigma: Array) -> Array:
     return np.asarray(white / sigma[r])
 
 
-def _with_law(oscillator: Oscillator, effect: Effect) -> NDArray[np.int64]:
+def with_law(oscillator: Oscillator, effect: Effect) -> NDArray[np.int64]:
     assert effect.law is not None
     first = len(SLOTS) + sum(len(e.parameters) for e in oscillator.effects if e.law is not None)
     row = np.array([law_row(effect.law, first)], dtype=np.int64)

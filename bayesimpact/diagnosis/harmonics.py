@@ -1,7 +1,4 @@
-"""Sines and cosines against a fit: their products with each other, J and the residual.
-
-A force on the mass answers through the model, a hum in the probe's signal through the filter alone.
-"""
+"""Sines and cosines against a fit: their products with each other, J and the residual."""
 
 from __future__ import annotations
 
@@ -21,13 +18,10 @@ from bayesimpact.inference.fit import (
     inverse,
     likelihood_information,
 )
-from bayesimpact.model.effects.effect import Scales
-from bayesimpact.model.parameters import SLOTS
 
 Array = NDArray[np.float64]
 
 AT_ONCE = 32  # frequencies whose responses fit into a processor's cache
-_FORCE, _OMEGA, _PHASE = (SLOTS.index(s) for s in ("A", "w", "phase"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,21 +97,6 @@ def hums(fit: Fit, r: int, lines: Array) -> Array:
     angle = 2 * np.pi * lines[:, None] * recording.times
     waves = np.stack([np.sin(angle), np.cos(angle)], axis=1).reshape(2 * lines.size, -1)
     return whitened_one(fit, r, waves, sigma_of(fit))
-
-
-def force_responses(fit: Fit, r: int, grid: Array, scales: Scales) -> Array:
-    """Whitened response to sine and cosine of one newton at every frequency (F,), Hz: (2 F, n)."""
-    oscillator, sigma = fit.target.oscillator, sigma_of(fit)
-    slots = oscillator.layout.slots(fit.mode)[r]
-    rate = np.sqrt(scales.stiffness / scales.mass)
-    level = float(sigma[r] * fit.target.likelihood.scales[r])
-    size = float(1e-3 * level / rate ** int(oscillator.orders[r]) * scales.stiffness)
-    q = np.tile(slots, (2 * grid.size + 1, 1))
-    q[1:, _FORCE] = size
-    q[1:, _OMEGA] = np.repeat(2 * np.pi * grid, 2)
-    q[1:, _PHASE] = np.tile([0.0, 0.5 * np.pi], grid.size)
-    motion = oscillator.motions_of(np.full(q.shape[0], r), q)
-    return whitened_one(fit, r, motion[1:] - motion[0], sigma) / size
 
 
 def projected(fit: Fit, blocks: Sequence[Blocks]) -> tuple[Array, Array]:

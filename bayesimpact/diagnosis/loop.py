@@ -13,7 +13,7 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.html import html_table
 from bayesimpact.diagnosis.decision import Decision, Verdict, decide
 from bayesimpact.diagnosis.extend import campaign_scales
-from bayesimpact.diagnosis.faults.compare import base_failed
+from bayesimpact.diagnosis.faults.compare import base_failed, gain
 from bayesimpact.diagnosis.force import MissingForce
 from bayesimpact.diagnosis.heldout import HeldOut, held_out_cases, held_out_recordings
 from bayesimpact.diagnosis.intervals import Intervals, intervals
@@ -22,8 +22,10 @@ from bayesimpact.diagnosis.limits import Limit, limits
 from bayesimpact.diagnosis.locate import Location, locate, locate_effect
 from bayesimpact.diagnosis.name import name
 from bayesimpact.diagnosis.naming import Naming, State, is_large
+from bayesimpact.diagnosis.promising import NEAR_MARGIN, RASH
 from bayesimpact.diagnosis.recording_faults import Corrected, cleaned_campaign, compared_campaign
 from bayesimpact.diagnosis.refit import Candidate
+from bayesimpact.diagnosis.scan import scan
 from bayesimpact.diagnosis.smoothing import SAVITZKY_GOLAY, proved_smoothing, whole_campaign
 from bayesimpact.diagnosis.unknown import with_force
 from bayesimpact.inference.fit import Fit
@@ -136,28 +138,43 @@ def diagnose(
     say("fitting the base model")
     corrected = cleaned_campaign(campaign, rng=rng, search=search)
     options: dict[str, Any] = {"rng": rng, "effects": effects, "progress": say}
-    if base_failed(corrected.identification.fit):  # no physics is worth a search yet
-        say("comparing the recordings")
-        corrected = compared_campaign(corrected, rng=rng, search=search)
-        return _of_corrected(corrected, **options)
-    found = _of_corrected(corrected, **options)
-    if not is_doubtful(found):
-        return found
     say("comparing the recordings")
     compared = compared_campaign(corrected, rng=rng, search=search)
-    if compared is corrected:
+    if base_failed(corrected.identification.fit):  # no physics is worth a search yet
+        return _of_corrected(compared, **options)
+    again = None
+    if compared is not corrected and gains_more(compared, corrected, effects, rng=rng):
+        again = _of_corrected(compared, **options)
+        if again.verdict in ("adequate", "named"):
+            return again
+    found = _of_corrected(corrected, **options)
+    if compared is corrected or not is_doubtful(found):
         return found
-    again = _of_corrected(compared, **options)
+    again = again or _of_corrected(compared, **options)
     simpler = len(again.effects) + len(compared.compared) <= len(found.effects)
     settled = again.verdict in ("adequate", "named")
     return again if settled and (simpler or found.verdict != "named") else found
+
+
+def gains_more(
+    compared: Corrected, before: Corrected, effects: Sequence[Effect], *, rng: np.random.Generator
+) -> bool:
+    """Whether correcting faults gains more than any single effect promises: faults come first then.
+
+    Where physics is missing, recordings of different amplitude show it each in its own way.
+    """
+    fit = before.identification.fit
+    found = scan(fit, effects, campaign_scales(fit), rng=rng)
+    most = max((score.gain for score in found.best()), default=0.0)
+    first, last = compared.compared[0], compared.compared[-1]
+    return gain(first.before, last.after, last.campaign) > RASH * most + NEAR_MARGIN
 
 
 def is_doubtful(found: Diagnosis) -> bool:
     """Whether what was found may be a fault of a recording: nothing that holds for all recordings
     alike explains them.
 
-    Physics shows differently in recordings of different amplitude, so it is searched first.
+    Physics shows differently in recordings of different amplitude.
     """
     own = any(p.scope != "campaign" for e in found.effects for p in e.parameters if not p.circular)
     return own or found.verdict in ("partly", "ambiguous", "unknown")

@@ -21,6 +21,7 @@ from bayesimpact.diagnosis.naming import Naming, State, is_large
 from bayesimpact.diagnosis.pairs import promising_pairs
 from bayesimpact.diagnosis.promising import (
     NEAR_MARGIN,
+    RASH,
     families,
     in_place_of,
     is_redundant,
@@ -43,7 +44,6 @@ MOST_EFFECTS = 3
 MOST_LARGE = 5  # where the base misfit is large: several strong effects act at once
 MANY = 3  # effects from which on they may imitate a single force
 LOST = 30.0  # by how much an effect alone must fall behind the base model to be given up, nats
-RASH = 1.5  # by how much a score may underrate what a refit gains
 BEAM = 3  # models that are extended while the best one is not white
 PAIRS = 4  # refitted at the first step
 EXCHANGES = 3  # rounds of leaving out and exchanging effects

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from bayesimpact.diagnosis.directions import is_periodic
+from bayesimpact.diagnosis.forced_responses import force_responses
 from bayesimpact.diagnosis.harmonics import (
     Blocks,
     blocks_in_parts,
-    force_responses,
     hums,
     joined,
     line_blocks,
@@ -125,7 +125,7 @@ def _best_frequency(fit: Fit, effect: Effect, scales: Scales) -> Score | None:
 
 def _blocks(fit: Fit, r: int, effect: Effect, grid: Array, above: Array, scales: Scales) -> Blocks:
     if effect.observe is None:
-        shaken = partial(force_responses, fit, r, scales=scales)
+        shaken = force_responses(fit, r, grid, scales)
         return joined(blocks_in_parts(fit, r, grid, shaken))
     waves = partial(hums, fit, r)
     slow = grid < SWINGING * scales.natural_frequency

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from bayesimpact.diagnosis.directions import is_periodic
-from bayesimpact.diagnosis.harmonics import Blocks, blocks_of, force_responses, hums, projected
+from bayesimpact.diagnosis.forced_responses import simulated_responses
+from bayesimpact.diagnosis.harmonics import Blocks, blocks_of, hums, projected
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
 
@@ -37,10 +38,9 @@ def steadiness(fit: Fit, scales: Scales) -> tuple[float, ...]:
 
 
 def _blocks(fit: Fit, r: int, effect: Effect, lines: Array, scales: Scales) -> Blocks:
-    columns = (
-        force_responses(fit, r, lines, scales) if effect.observe is None else hums(fit, r, lines)
-    )
-    return blocks_of(fit, r, columns[None])
+    if effect.observe is None:
+        return blocks_of(fit, r, simulated_responses(fit, r, lines, scales)[None])
+    return blocks_of(fit, r, hums(fit, r, lines)[None])
 
 
 def _p_value(fit: Fit, blocks: list[Blocks]) -> float:

@@ -12,9 +12,9 @@ from effect_rigs import BY_ID
 
 from bayesimpact.data.campaign import Campaign, Measurement, Smoothing
 from bayesimpact.diagnosis.extend import campaign_scales, extend, transfer
+from bayesimpact.diagnosis.forced_responses import force_responses, simulated_responses
 from bayesimpact.diagnosis.harmonics import (
     blocks_of,
-    force_responses,
     hums,
     line_blocks,
     projected,
@@ -159,7 +159,7 @@ def test_scores_are_those_of_the_mode_although_a_climb_ended_beside_it():
 
     def numbers(at: Fit) -> np.ndarray:
         waves = [
-            force_responses(at, r, lines, scales).reshape(lines.size, 2, -1)
+            simulated_responses(at, r, lines, scales).reshape(lines.size, 2, -1)
             for r in range(len(at.linearisation))
         ]
         information, score = projected(at, [blocks_of(at, r, w) for r, w in enumerate(waves)])

@@ -152,7 +152,7 @@ def _next(
     number = known[best.hypothesis.recording][0]
     after = corrected(campaign, number, best)
     value = _chi2(after, noise)
-    if not _improves(chi2, value, campaign):
+    if gain(chi2, value, campaign) <= THRESHOLD:
         return None
     fault = as_fault(campaign.recordings[number], best, odds, THRESHOLD)
     return Compared(fault, after, chi2, value, _alternatives(ranked, own))
@@ -181,8 +181,8 @@ def _chi2(campaign: Campaign, noise: Noise) -> float:
     return fit.reduced_chi2
 
 
-def _improves(before: float, after: float, campaign: Campaign) -> bool:
-    """Whether a correction gains more than `THRESHOLD` nats, at the noise that remains."""
+def gain(before: float, after: float, campaign: Campaign) -> float:
+    """Nats that a correction gains by its reduced chi-squared, at the noise that remains."""
     samples = sum(r.count for r in campaign.recordings)
-    gain = 0.5 * samples * (before - after) / max(after, 1.0)
-    return bool(np.isfinite(after) and gain > THRESHOLD)
+    found = 0.5 * samples * (before - after) / max(after, 1.0)
+    return float(found) if np.isfinite(after) else -np.inf
