@@ -1,6 +1,6 @@
 """Campaigns that nobody expects but the door lets in: each ends in a report with all its parts.
 
-All of them, by the command: `python tests/benchmarks/strange.py`.
+All of them, by the command: `python tests/benchmarks/strange_campaigns.py`.
 """
 
 from __future__ import annotations

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 from bayesimpact.inference.sample import Progress
 
@@ -26,9 +28,7 @@ def progress_bar(shown: bool | None = None) -> Iterator[Callable[[Progress], Non
 
     `shown` None: only where standard error is a terminal, or in a notebook.
     """
-    from tqdm.auto import tqdm
-
-    bar = tqdm(unit=" steps", disable=None if shown is None else not shown, leave=False)
+    bar = _bar(" steps", shown)
 
     def tell(where: Progress) -> None:
         bar.total, bar.n = where.max_steps, where.steps
@@ -50,9 +50,7 @@ def refit_bar(
     How many there will be nobody knows beforehand, so the bar has no end. `shown` as above; where
     no bar is shown, refits are told to `say` too.
     """
-    from tqdm.auto import tqdm
-
-    bar = tqdm(unit=" refits", disable=None if shown is None else not shown, leave=False)
+    bar = _bar(" refits", shown)
 
     def tell(words: str) -> None:
         if isinstance(words, Refit) and not bar.disable:
@@ -65,3 +63,10 @@ def refit_bar(
         yield tell
     finally:
         bar.close()
+
+
+def _bar(unit: str, shown: bool | None) -> Any:
+    with warnings.catch_warnings():  # that a notebook could have finer bars
+        warnings.simplefilter("ignore")
+        from tqdm.auto import tqdm
+    return tqdm(unit=unit, disable=None if shown is None else not shown, leave=False)

@@ -9,8 +9,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from bayesimpact.cli import main
 from bayesimpact.cluster import executor
+from bayesimpact.data.lock import locked
 from bayesimpact.errors import InputError
 from bayesimpact.trial import run
 from bayesimpact.trial.blind import finite, open_seal, seal, sealed_text
@@ -220,3 +223,11 @@ def test_what_json_does_not_have() -> None:
 
     found = finite({"a": float("nan"), "b": (np.float64(1), np.int64(2)), "c": np.array([np.inf])})
     assert json.loads(json.dumps(found, allow_nan=False)) == {"a": None, "b": [1.0, 2], "c": [None]}
+
+
+def test_two_runs_in_one_folder_are_refused(quick: Settings, tmp_path: Path) -> None:
+    arguments = ["trial", "--number", "1", "--out", str(tmp_path), "--quiet"]
+    with locked(tmp_path):
+        result = CliRunner().invoke(main, arguments)
+    assert result.exit_code == 2 and "another run at work" in result.output
+    assert not (tmp_path / "settings.json").exists()

@@ -1,8 +1,10 @@
-"""Strange campaigns through whole commands: `python tests/benchmarks/strange.py [COMMAND...]`.
+"""Strange campaigns through whole commands.
+
+    python tests/benchmarks/strange_campaigns.py [COMMAND...]
 
 Every campaign of tests/strange.py, which the door lets in, is given to COMMAND (`diagnose --quick`;
-`fit`, ...): it has to end in a report, with exit code 0 or 3 and no more than a line on standard
-error. Exit codes, what was said and seconds go to strange.json.
+`fit`, ...): it has to end in a report, with exit code 0 or 3. Exit codes, what was said and seconds
+go to strange_campaigns.json.
 """
 
 from __future__ import annotations
