@@ -87,6 +87,8 @@ def coloured(memory: float) -> np.ndarray:
 
 
 NAMES = HEAD.replace('"rig"', '"$x$ <b>&amp; \\\\frac{ é"') + ONE + f'case = "{"$][" * 66}"\n'
+RUBBER = "[beam.1]\nlength_mm = 100.0\nwidth_mm = 1.0\nthickness_mm = 0.1\n"
+RUBBER += "youngs_modulus_mpa = 10.0\n"
 MEASURED = "[measurement]\n"
 SMOOTH = MEASURED + "smoothing = "
 
@@ -151,6 +153,12 @@ STRANGE: dict[str, Callable[[], Strange]] = {
     ),
     "a clock of ten per cent": lambda: plain(more=MEASURED + "clock_uncertainty_ppm = 1e5\n"),
     "a gain of ten per cent": lambda: plain(more=MEASURED + "gain_uncertainty_percent = 10.0\n"),
+    "the tail alone": lambda: plain(more="start_s = 0.8\n"),
+    "upside down": lambda: plain(more="scale = -1.0\n"),
+    "a clock of half the speed": lambda: plain(more="clock_ratio = 2.0\n"),
+    "spikes that are to be kept": lambda: plain(spiked(50, 2e-3), toml=f'faults = "keep"\n{PLAIN}'),
+    "half of the mass unsure": lambda: plain(toml=f"mass_uncertainty_kg = 0.25\n{PLAIN}"),
+    "a beam as soft as rubber": lambda: impacts(RUBBER),
     # quantities and inputs
     "velocities": lambda: of_quantity(1, "time_s,velocity_m_s"),
     "accelerations": lambda: of_quantity(2, "time_s,acceleration_m_s2"),
