@@ -4,7 +4,8 @@ Let S be the likeliest set of effects that the search reached.
 
 1. S leaves nothing that stands out from the noise (`State.is_white`):
    `adequate` when S is empty; `unknown` when one free force in the place of all effects beats S by
-   the decisive odds; `ambiguous` when another set comes within these odds; else `named`.
+   the decisive odds; `ambiguous` when another set comes within these odds, or the search ended by
+   its limit before all that might were fitted; else `named`.
 2. Something remains beside S. An effect of S is needed when
    - every set of effects without it trails S by the decisive odds, or trails it at all where it has
      more effects or parameters than S: what remains makes odds small, and more to fit with makes
@@ -70,7 +71,8 @@ def decide(naming: Naming) -> Decision:
         if naming.prefers_learned_force():
             return Decision("unknown", ())
         rivals = naming.rivals()
-        return Decision("ambiguous" if rivals else "named", effects, rivals)
+        settled = naming.finished and not rivals
+        return Decision("named" if settled else "ambiguous", effects, rivals)
     needed = tuple(e for e in effects if is_needed(naming, e))
     if not needed:
         return Decision("unknown", ())
@@ -82,6 +84,8 @@ def is_needed(naming: Naming, effect: Effect) -> bool:
     if not (may_be_needed(naming, effect) and stands_out(naming, effect)):
         return False
     chosen = frozenset(naming.chosen.candidate.ids)
+    if not (naming.finished or naming.residual):
+        return False  # the search ended before it was compared
     reached = naming.with_residual_force(chosen)
     return not any(
         naming.with_residual_force(ids) > reached + lead(naming, ids)

@@ -70,7 +70,7 @@ def document(
             d.location,
             alternatives,
             parameter_shifts(before, after) if d.verdict != "adequate" else {},
-            _detectable(d),
+            _detectable(d) + _unfinished(d),
             remaining(left, reading.unit),
             faults=in_words(faulty),
             angle=angle,
@@ -152,6 +152,12 @@ def _detectable(d: Diagnosis) -> str:
         f"What could still hide below its limit moves k2 by at most {worst[0]:.1f} of its standard "
         f"deviations ({worst[1]})."
     )
+
+
+def _unfinished(d: Diagnosis) -> str:
+    if d.naming.finished:
+        return ""
+    return " The search ended by its limit: not everything that may be missing was tried."
 
 
 def _statement(d: Diagnosis, effect: Effect) -> str:

@@ -8,7 +8,8 @@ physics and decide between near-opposites that scores cannot tell apart.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -48,6 +49,7 @@ BEAM = 3  # models that are extended while the best one is not white
 PAIRS = 4  # refitted at the first step
 EXCHANGES = 3  # rounds of leaving out and exchanging effects
 BUDGET = 150  # refits
+PATIENCE = 900.0  # s: no refit begins later; an answer that says so is worth more than none
 
 
 def name(
@@ -57,6 +59,7 @@ def name(
     *,
     rng: np.random.Generator,
     progress: Progress | None = None,
+    clock: Callable[[], float] = time.monotonic,
 ) -> Naming:
     """Find the effects that the base model of `fit` leaves out.
 
@@ -67,8 +70,11 @@ def name(
     noise level allows, for what remains may yet be explained; effects that the odds do not demand
     are left out afterwards, and each that stays is exchanged for every other that might do what it
     does.
+
+    A search that has begun `BUDGET` refits or taken `PATIENCE` seconds by the `clock` begins no
+    more, and names nothing that it has not compared with all that might do the same.
     """
-    search = _Search(effects, scales, rng, progress or (lambda message: None))
+    search = _Search(effects, scales, rng, progress or (lambda message: None), clock)
     state = base = search.examine(base_candidate(fit))
     beam = [base]
     while not state.is_white and len(state.candidate.effects) < search.most and search.may_go_on():
@@ -88,6 +94,17 @@ def name(
 
 class _Search(Models):
     """Which models to fit next, and what they are worth."""
+
+    def __init__(
+        self,
+        effects: Sequence[Effect],
+        scales: Scales,
+        rng: np.random.Generator,
+        progress: Progress,
+        clock: Callable[[], float],
+    ) -> None:
+        super().__init__(effects, scales, rng, progress)
+        self.clock, self.end = clock, clock() + PATIENCE
 
     @property
     def cost(self) -> float:
@@ -126,8 +143,10 @@ class _Search(Models):
         found = [
             self.fit_one(state.candidate, state.scan, score)
             for score in scores
-            if not is_redundant(state.candidate, score.effect)
+            if not is_redundant(state.candidate, score.effect) and self.may_go_on()
         ]
+        if not self.may_go_on():
+            return found
         if not state.candidate.effects:
             best_single = max((c.log_evidence for c in found), default=-np.inf)
             for pair in promising_pairs(state.scan, count=PAIRS):
@@ -157,7 +176,7 @@ class _Search(Models):
 
     def may_go_on(self) -> bool:
         """Whether the budget allows for more refits."""
-        return self.refits < BUDGET
+        return self.refits < BUDGET and self.clock() < self.end
 
     def is_hopeless(self, state: State) -> bool:
         """Whether a free force will explain what the effects still to come cannot, say the scores.
@@ -264,7 +283,8 @@ class _Search(Models):
         for _ in range(EXCHANGES):
             state = self.eliminated(state)
             for candidate in self.near(state):
-                self.exchange(candidate)
+                if self.may_go_on():
+                    self.exchange(candidate)
             best = self.best(len(state.candidate.effects))
             if set(best.ids) == set(state.candidate.ids):
                 break
@@ -316,7 +336,7 @@ class _Search(Models):
                     if len(joint) > 1 and joint[0].effect.family == effect.family:
                         self.fit_more(rest, joint)
             for score in in_place_of(effect, self.worth_a_refit(found)):
-                if not is_redundant(rest, score.effect):
+                if self.may_go_on() and not is_redundant(rest, score.effect):
                     self.fit_one(rest, found, score)
                     if not score.effect.has_size:
                         self.exchange_on_off(chosen, effect, score.effect)
@@ -356,5 +376,9 @@ class _Search(Models):
                 parts += [smaller[effect.id], *([other] if other else [])]
         if len(parts) > 1:  # a force in the place of all of them too
             parts.append(found.base.candidate)
-        residual = {frozenset(p.ids): self.with_residual(self.examine(p)) for p in parts}
+        residual: dict[frozenset[str], Candidate] = {}
+        for part in parts:
+            if self.clock() > self.end:  # what is not compared with all of them is not needed
+                return replace(found, states=dict(self.states), finished=False)
+            residual[frozenset(part.ids)] = self.with_residual(self.examine(part))
         return replace(found, states=dict(self.states), residual=residual)

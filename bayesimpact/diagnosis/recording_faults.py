@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,13 @@ import numpy as np
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.faults.fault import Fault, fault_document
 from bayesimpact.data.faults.find import set_aside
-from bayesimpact.diagnosis.faults.compare import Compared, compare_recordings
+from bayesimpact.diagnosis.faults.compare import (
+    Compared,
+    base_failed,
+    compare_recordings,
+    misfits,
+)
+from bayesimpact.diagnosis.faults.outliers import residual_spikes, without_spikes
 from bayesimpact.inference.identify import Identification, identify
 
 
@@ -48,7 +54,32 @@ def cleaned_campaign(campaign: Campaign, *, rng: np.random.Generator, search: bo
     InputError : a recording shows no oscillation
     """
     cleaned, own = set_aside(campaign)
-    return Corrected(identify(cleaned, rng=rng, search=search), own)
+    found = Corrected(identify(cleaned, rng=rng, search=search), own)
+    return found if campaign.keep_faults else _without_spikes(found, campaign, rng=rng)
+
+
+def _without_spikes(found: Corrected, as_read: Campaign, *, rng: np.random.Generator) -> Corrected:
+    """The same without spikes that the fit shows, if it is right about all other samples.
+
+    Where it is not, what stands out at a contact may be physics.
+    """
+    fit = found.identification.fit
+    spikes = () if base_failed(fit) else residual_spikes(fit)
+    if not spikes:
+        return found
+    campaign = without_spikes(fit.target.oscillator.campaign, spikes)
+    again = identify(campaign, rng=rng, search=False)
+    if misfits(again.fit):
+        return found
+    again = replace(again, search=found.identification.search)
+    return Corrected(again, (*found.own, *(_as_read(f, campaign, as_read) for f in spikes)))
+
+
+def _as_read(fault: Fault, campaign: Campaign, as_read: Campaign) -> Fault:
+    """A fault with its samples counted from the recording's first as it was read."""
+    now, before = ({r.name: r for r in c.recordings}[fault.recording] for c in (campaign, as_read))
+    cut = round((now.start - before.start) / now.interval)
+    return replace(fault, spans=tuple((a + cut, b + cut) for a, b in fault.spans))
 
 
 def compared_campaign(before: Corrected, *, rng: np.random.Generator, search: bool) -> Corrected:

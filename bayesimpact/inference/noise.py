@@ -125,6 +125,25 @@ class Noise:
         signal = _signal(white, inner.stop - inner.start, self._band_size(n, interval))
         return signal, inner.start * interval
 
+    def ordinates(
+        self, white: Array, n: int, interval: float, used: Mask | None = None
+    ) -> tuple[Array, Array]:
+        """Frequencies (m,), Hz, rising, and powers (m,) of whitened numbers behind a filter.
+
+        Of every stretch between gaps; sums of two squares.
+        """
+        whole = [self._interior(n, interval)]
+        frequencies, powers, begin = [], [], 0
+        for s in whole if used is None else self._stretches(used, interval):
+            length = s.stop - s.start
+            m = int(self._spectrum(length, interval, False).size) - 1
+            real, imaginary = np.split(white[begin + 1 : begin + 1 + 2 * m], 2)
+            frequencies.append(np.arange(1, m + 1) / (length * interval))
+            powers.append(real**2 + imaginary**2)
+            begin += 2 * m + 1
+        order = np.argsort(np.concatenate(frequencies), kind="stable")
+        return np.concatenate(frequencies)[order], np.concatenate(powers)[order]
+
     def highest(self, n: int, interval: float) -> float:
         """Highest frequency that the whitened numbers of n samples know, Hz."""
         if self.smoothing is None:

@@ -1,127 +1,99 @@
-"""Small harmonic forces on a known motion: the responses at many frequencies from one transition.
+"""Responses of a known motion to small harmonic forces on the mass, by superposition.
 
-The change x of displacement and velocity under a small force f(t) on the mass obeys a linear
-equation along the motion, whatever laws act on it: x(t) = W(t) Integral W(s)^-1 (0, f(s) / m) ds,
-where the columns of W are two independent solutions without the force (variation of parameters:
-Coddington and Levinson 1955, chapter 3). They are differences of simulated motions, so they carry
-contacts, too, jumps at the touch included. As they decay they drown in rounding: others take over,
-stretch by stretch.
+The change x of displacement and velocity under a small force f(t) obeys a linear equation along the
+motion, whatever laws act on it: x(t) = W(t) Integral W(s)^-1 (0, f(s) / m) ds, where the columns of
+W are two independent solutions without the force (variation of parameters: Coddington and Levinson
+1955, chapter 3). A law with a state of its own needs more than two, and a mass that sticks has
+none: a simulation or two must say whether the answers serve.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.model.compiled import compiled
+from bayesimpact.model.free_changes import POINTS, FreeChanges
 from bayesimpact.model.threads import in_shares
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-POINTS = 6  # samples between which a response to pushes is interpolated
 QUADRATURE = 14  # nodes for a wave times a polynomial over one interval: exact to rounding
 
 
-@dataclass(frozen=True, eq=False)
-class Stretch:
-    """Two independent free changes of a motion over a part of a recording.
-
-    Attributes
-    ----------
-    begin : its first sample; the last one is the next stretch's first
-    states : (n, 2, 2) displacement and velocity (middle axis) of both changes
-    readings : (n, 2) what the recording reads of both
-    """
-
-    begin: int
-    states: Array
-    readings: Array
-
-
-def wave_responses(
-    stretches: Sequence[Stretch], mass: float, interval: float, order: int, frequencies: Array
-) -> Array:
+def wave_responses(changes: FreeChanges, frequencies: Array) -> Array:
     """Responses (2 F, n) to a sine and a cosine of one newton at every frequency (F,), Hz.
 
-    Parameters
-    ----------
-    stretches : of the whole recording, each of `POINTS` samples or more
-    mass, interval : kg, s
-    order : which time derivative of the displacement is read
+    Raises
+    ------
+    LinAlgError : the mass sticks
     """
-    angles = 2 * np.pi * interval * frequencies
-    weights = _weights(angles) * interval
-    direct = 1 / mass if order == 2 else 0.0  # an acceleration holds the force itself
-    size = stretches[-1].begin + stretches[-1].readings.shape[0]
-    out = np.empty((2 * frequencies.size, size))
-    changes = np.zeros((frequencies.size, 2), dtype=np.complex128)
-    for last, stretch in zip([None, *stretches[:-1]], stretches, strict=True):
-        if last is not None:
-            changes = changes @ np.linalg.solve(stretch.states[0], last.states[-1]).T
-        pushes = np.linalg.solve(stretch.states, np.array([[0.0], [1 / mass]]))[..., 0]
-        _superpose(stretch, pushes, direct, angles, weights, changes, out)
+    angles = 2 * np.pi * changes.interval * frequencies
+    weights = _wave_weights(angles) * changes.interval
+    parts = changes.stretches
+    begins = np.array([part.begin for part in parts])
+    ends = np.cumsum([part.readings.shape[0] for part in parts])
+    readings = np.concatenate([part.readings for part in parts])
+    pushes, carried = np.concatenate(changes.pushes), changes.carried
+    out = np.empty((2 * frequencies.size, changes.samples))
+
+    def run(low: int, high: int) -> None:
+        _superpose(
+            readings, pushes, begins, ends, carried, changes.direct, angles[low:high],
+            weights[:, low:high], out[2 * low : 2 * high],
+        )  # fmt: skip
+
+    in_shares(run, frequencies.size)
     return out
 
 
-def _superpose(
-    stretch: Stretch, pushes: Array, direct: float, angles: Array, weights: Complex,
-    changes: Complex, out: Array,
-) -> None:  # fmt: skip
-    """Fill in the stretch's part of `out` (2 F, n); `changes` (F, 2) go on to its end."""
-    first = stretch.begin
-    part = out[:, first : first + stretch.readings.shape[0]]
+def _wave_weights(angles: Array) -> Complex:
+    """Integrals (POINTS - 1, F, POINTS) over 0 < x < 1 of exp(i angle x) times polynomials.
 
-    def run(low: int, high: int) -> None:
-        _accumulate(
-            stretch.readings, pushes, direct, angles[low:high], weights[:, low:high], first,
-            changes[low:high], part[2 * low : 2 * high],
-        )  # fmt: skip
-
-    in_shares(run, angles.size)
-
-
-def _weights(angles: Array) -> Complex:
-    """Integrals (P - 1, F, P) of exp(i angle x) over 0 < x < 1 times Lagrange polynomials.
-
-    Those on P neighbouring whole numbers that begin at 0, -1, ... and hold 0 and 1.
+    Those of Lagrange on neighbouring whole numbers that begin at 0, -1, ... and hold 0 and 1.
     """
     x, w = np.polynomial.legendre.leggauss(QUADRATURE)
     x, w = 0.5 * (x + 1), 0.5 * w
     waves = np.exp(1j * angles[:, None] * x) * w
+    return np.array([waves @ _lagrange(x + first) for first in range(POINTS - 1)])
+
+
+def _lagrange(x: Array) -> Array:
+    """Lagrange polynomials (n, POINTS) on 0, 1, ... at x (n,)."""
     points = np.arange(float(POINTS))
     own = np.eye(POINTS, dtype=bool)
-    found = []
-    for first in range(POINTS - 1):
-        factors = (x[:, None, None] + first - points) / np.where(own, 1.0, points[:, None] - points)
-        found.append(waves @ np.where(own, 1.0, factors).prod(axis=-1))
-    return np.array(found)
+    factors = (x[:, None, None] - points) / np.where(own, 1.0, points[:, None] - points)
+    return np.asarray(np.where(own, 1.0, factors).prod(axis=-1))
 
 
 @compiled(nogil=True)
-def _accumulate(
-    readings: Any, pushes: Any, direct: Any, angles: Any, weights: Any, begin: Any, changes: Any,
-    out: Any,
+def _superpose(
+    readings: Any, pushes: Any, begins: Any, ends: Any, carried: Any, direct: Any, angles: Any,
+    weights: Any, out: Any,
 ) -> None:  # fmt: skip
-    """One stretch: `changes` (F, 2), what the waves have made of both so far, go on."""
-    n, points = readings.shape[0], weights.shape[2]
+    """Fill in `out` (2 F, n), stretch by stretch: rows begin..end of `readings` and `pushes`."""
+    points = weights.shape[2]
     for f in range(angles.size):
         step = complex(np.cos(angles[f]), np.sin(angles[f]))
-        wave = complex(np.cos(begin * angles[f]), np.sin(begin * angles[f]))
-        one, other = changes[f, 0], changes[f, 1]
-        for i in range(n):
-            response = readings[i, 0] * one + readings[i, 1] * other + direct * wave
-            out[2 * f, i] = response.imag
-            out[2 * f + 1, i] = response.real
-            if i + 1 < n:
-                first = min(max(i + 1 - points // 2, 0), n - points)
-                for j in range(points):
-                    part = wave * weights[i - first, f, j]
-                    one += part * pushes[first + j, 0]
-                    other += part * pushes[first + j, 1]
-            wave *= step
-        changes[f, 0], changes[f, 1] = one, other
+        one = other = complex(0.0, 0.0)  # what the wave has made of both changes so far
+        for part in range(begins.size):
+            first, begin = (0 if part == 0 else ends[part - 1]), begins[part]
+            c = carried[part]
+            one, other = c[0, 0] * one + c[0, 1] * other, c[1, 0] * one + c[1, 1] * other
+            wave = complex(np.cos(begin * angles[f]), np.sin(begin * angles[f]))
+            n = ends[part] - first
+            for i in range(n):
+                row = first + i
+                response = readings[row, 0] * one + readings[row, 1] * other + direct * wave
+                out[2 * f, begin + i] = response.imag
+                out[2 * f + 1, begin + i] = response.real
+                if i + 1 < n:
+                    left = min(max(i + 1 - points // 2, 0), n - points)
+                    for j in range(points):
+                        push = wave * weights[i - left, f, j]
+                        one += push * pushes[first + left + j, 0]
+                        other += push * pushes[first + left + j, 1]
+                wave *= step

@@ -188,9 +188,7 @@ def recording_results(fit: Fit) -> tuple[RecordingResult, ...]:
                 sigma=float(fit.mode[likelihood.sigma_columns[r]] * likelihood.scales[r]),
                 noise_rms=_noise_rms(likelihood.noise, recording.interval) * likelihood.scales[r],
                 reduced_chi2=float(fit.sums[r]) / likelihood.noise.level**2 / freedom,
-                whiteness_p=checks.whiteness(
-                    fit.linearisation[r].residual, likelihood.noise.smoothing is not None
-                ),
+                whiteness_p=checks.whiteness(fit, r),
             )
         )
     return tuple(found)

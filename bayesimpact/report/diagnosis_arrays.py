@@ -101,9 +101,11 @@ def _power(fit: Fit) -> tuple[Array, Array]:
         white = part.residual / noise.level
         if noise.smoothing is None:
             power = np.abs(np.fft.rfft(white)[1:-1]) ** 2 / white.size
+            frequency = np.arange(1, power.size + 1) / recording.duration
         else:
-            real, imaginary = np.split(white[1:], 2)
-            power = 0.5 * (real**2 + imaginary**2)
-        frequencies.append(np.arange(1, power.size + 1) / recording.duration)
+            n, interval = recording.samples.size, recording.interval
+            frequency, power = noise.ordinates(white, n, interval, recording.used)
+            power = 0.5 * power
+        frequencies.append(frequency)
         powers.append(power)
     return np.concatenate(frequencies), np.concatenate(powers)

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from bayesimpact.diagnosis.whiteness import ljung_box
+from bayesimpact.inference.fit import Fit
 
 Array = NDArray[np.float64]
 
@@ -28,15 +29,14 @@ def flat_spectrum(power: Array) -> float:
     return float(stats.kstest(np.cumsum(power)[:-1] / total, "uniform").pvalue)
 
 
-def whiteness(white: Array, banded: bool) -> float:
-    """p-value of a whitened residual.
+def whiteness(fit: Fit, r: int) -> float:
+    """p-value of a recording's whitened residual.
 
-    Parameters
-    ----------
-    white : (n,) numbers of `inference.noise.Noise.whiten`
-    banded : they are Fourier coefficients (mean, real parts, imaginary parts) instead of a series
+    Behind a filter the numbers are Fourier coefficients: their powers must be of one level.
     """
-    if not banded:
+    white, noise = fit.linearisation[r].residual, fit.target.likelihood.noise
+    if noise.smoothing is None:
         return ljung_box(white)
-    real, imaginary = np.split(white[1:], 2)
-    return flat_spectrum(real**2 + imaginary**2)
+    recording = fit.target.oscillator.campaign.recordings[r]
+    n, interval = recording.samples.size, recording.interval
+    return flat_spectrum(noise.ordinates(white, n, interval, recording.used)[1])

@@ -23,7 +23,7 @@ OPTIONS: tuple[Callable[[Callable[..., None]], Callable[..., None]], ...] = (
                  show_default=True, help="weak: effects near the detection limit. strong: several "
                  "at once and a gross misfit, as real recordings have them."),
     click.option("--kinds", metavar="A,B", help="control, single, pair, outside; in turn. [all] "
-                 "fault: a fault of a recording. "
+                 "fault: a fault of a recording, fault_single: an effect as well. "
                  "strong: several, several_outside. [several twice]"),
     click.option("--effects", metavar="A,B", help="Effects of the catalogue to plant. [all]"),
     click.option("--outside", metavar="A,B", help="Forces outside the catalogue to plant. [all]"),

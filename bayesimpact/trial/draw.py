@@ -14,8 +14,9 @@ from bayesimpact.errors import InputError
 from bayesimpact.trial.benches import BENCHES, Design, draw_bench, log_uniform
 from bayesimpact.trial.drawn import Drawn
 from bayesimpact.trial.faults import PLANTS, plant_fault
+from bayesimpact.trial.faults_rig import OTHER_RIG, another_rig
 from bayesimpact.trial.plants import CATALOGUE_PLANTS
-from bayesimpact.trial.rig import make_campaign
+from bayesimpact.trial.rig import Effects, make_campaign
 from bayesimpact.trial.ruler import Ruler, clean_readings, true_parameters
 from bayesimpact.trial.settings import Settings
 from bayesimpact.trial.sizing import Sized, Unsuitable, outside, pair, plant_of, single
@@ -58,24 +59,28 @@ def _attempt(settings: Settings, seed: int, kind: str, turn: int, rng: Rng) -> D
     design = draw_bench(bench, str(rng.choice(_noises(settings, ids))), rng)
     strengths = [log_uniform(rng, settings.strength) for _ in ids]
     found: tuple[Sized, ...] = ()
-    if kind == "single":
+    if kind in ("single", "fault_single"):
         found = (single(Ruler(design, rng), ids[0], strengths[0], settings.strength[0], rng),)
     elif kind == "pair":
         found = pair(Ruler(design, rng), ids, strengths, settings.strength[0], rng)
     elif kind == "outside":
         found = (outside(Ruler(design, rng), ids[0], strengths[0], rng),)
     drawn = _recorded(settings, seed, kind, design, found, rng)
-    return _with_fault(drawn, turn, rng) if kind == "fault" else drawn
+    if kind not in ("fault", "fault_single"):
+        return drawn
+    return _with_fault(drawn, design, {one.effect: one.numbers for one in found}, turn, rng)
 
 
-def _with_fault(drawn: Drawn, turn: int, rng: Rng) -> Drawn:
+def _with_fault(drawn: Drawn, design: Design, effects: Effects, turn: int, rng: Rng) -> Drawn:
     """The same trial with the fault whose turn it is in one recording."""
-    kind = list(PLANTS)[turn % len(PLANTS)]
+    kind = [*PLANTS, OTHER_RIG][turn % (len(PLANTS) + 1)]
+    if kind == OTHER_RIG:
+        campaign, fault = another_rig(drawn.campaign, design, effects, rng)
+        return Drawn(campaign, {**drawn.truth, "fault": fault})
     planted = plant_fault(drawn.campaign, kind, drawn.truth["noise_m"], rng)
     if planted is None:
         raise Unsuitable(f"a rig that cannot show the fault {kind}")
-    campaign, fault = planted
-    return Drawn(campaign, {**drawn.truth, "fault": fault})
+    return Drawn(planted[0], {**drawn.truth, "fault": planted[1]})
 
 
 def _effects(settings: Settings, kind: str, turn: int, rng: Rng) -> tuple[str, ...]:
@@ -84,7 +89,7 @@ def _effects(settings: Settings, kind: str, turn: int, rng: Rng) -> tuple[str, .
     if kind == "outside":
         return (settings.outside[turn % len(settings.outside)],)
     first = settings.effects[turn % len(settings.effects)]
-    if kind == "single":
+    if kind in ("single", "fault_single"):
         return (first,)
     partners = [
         e

@@ -13,7 +13,8 @@ def trial_line(result: Mapping[str, Any]) -> str:
     if truth is not None:
         planted = " + ".join(p["id"] for p in truth["planted"]) or "nothing"
         if "fault" in truth:
-            planted = f"{truth['fault']['id']} in {truth['fault']['recording']}"
+            fault = f"{truth['fault']['id']} in {truth['fault']['recording']}"
+            planted = f"{fault} + {planted}" if truth["planted"] else fault
         text += f" {truth['kind']} | {truth['bench']}, {truth['noise_kind']}"
         if "misfit" in truth:
             text += f", misfit {truth['misfit']:.3g}"

@@ -62,9 +62,13 @@ def _outcome(
 ) -> str:
     """The outcome by the rules of its regime."""
     if "fault" in truth:
-        outcome = judge_fault(truth["fault"], faults)
-        physics = verdict == "named" and outcome == "missed" and named
-        return "wrong name" if physics else outcome
+        named_faults = [f for f in faults if f.get("action") != "notice"]
+        physics = [i for i in named if not i.startswith("recording_")]
+        planted = {p["id"] for p in truth["planted"]}
+        if set(physics) - planted and verdict in ("named", "partly"):
+            return "wrong name"
+        outcome = judge_fault(truth["fault"], named_faults)
+        return outcome if outcome != "named" or set(physics) == planted else "fault alone"
     if not truth["kind"].startswith("several"):
         return judge(truth["kind"], [p["id"] for p in truth["planted"]], verdict, named)
     there = [p["id"] for p in truth["planted"] if not p["outside"]]

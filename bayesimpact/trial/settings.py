@@ -69,7 +69,7 @@ class Settings:
             raise InputError("trial, regime", self.regime, ", ".join(REGIMES))
         strong = self.regime == "strong"
         known = {
-            "kinds": STRONG_KINDS if strong else (*KINDS, "fault"),
+            "kinds": STRONG_KINDS if strong else (*KINDS, "fault", "fault_single"),
             "effects": tuple(CATALOGUE_STRONG if strong else CATALOGUE_PLANTS),
             "outside": tuple(STRONG_OUTSIDE if strong else OUTSIDE_PLANTS),
             "benches": tuple(STRONG_BENCHES if strong else BENCHES),

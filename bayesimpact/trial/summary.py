@@ -132,10 +132,11 @@ def _by(scored: Sequence[Result], key: Callable[[Result], str]) -> dict[str, Any
 
 
 def _by_effect(scored: Sequence[Result]) -> dict[str, Any]:
-    """Effect -> outcomes of all trials that it was planted in, alone or with another."""
+    """Effect or fault -> outcomes of all trials that it was planted in, alone or with another."""
     table: dict[str, dict[str, Counter[str]]] = {}
     for r in scored:
-        for planted in r["truth"]["planted"]:
+        fault = [r["truth"]["fault"]] if "fault" in r["truth"] else []
+        for planted in (*r["truth"]["planted"], *fault):
             row = table.setdefault(planted["id"], {})
             row.setdefault(r["truth"]["kind"], Counter())[r["score"]["outcome"]] += 1
     return {k: {kind: dict(c) for kind, c in row.items()} for k, row in sorted(table.items())}

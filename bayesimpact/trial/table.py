@@ -12,6 +12,8 @@ RIGHT = {
     "single": "single effects named",
     "pair": "pairs named in full",
     "outside": "outside forces called unknown",
+    "fault": "faults named, with their place",
+    "fault_single": "fault and effect both named",
     "several": "all named, all in catalogue",
     "several_outside": "partly or unknown, one outside",
 }

@@ -16,12 +16,12 @@ from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.forced_responses import (
     force_responses,
     simulated_responses,
-    stretches,
 )
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.experiment import simulate
 from bayesimpact.model.forced import wave_responses
+from bayesimpact.model.free_changes import FreeChanges, Stretch, free_changes
 from bayesimpact.model.oscillator import build_oscillator
 
 MASS, STIFFNESS, DAMPING, INTERVAL = 0.5, 900.0, 1.5, 1e-3
@@ -53,8 +53,14 @@ def superposed(fit: Fit, frequencies: np.ndarray, monkeypatch: pytest.MonkeyPatc
     grid = np.linspace(frequencies[0], frequencies[-1], 50)
     responses = force_responses(fit, 0, grid, scales)
     with monkeypatch.context() as context:
-        context.setattr(module, "general_motions", None)  # a simulation would fail
+        context.setattr(module, "motions_beside", None)  # a simulation would fail
         return responses(frequencies)
+
+
+def changes_of(fit: Fit) -> FreeChanges:
+    """Of the first recording."""
+    oscillator = fit.target.oscillator
+    return free_changes(oscillator, 0, oscillator.layout.slots(fit.mode)[0], 1e-9)
 
 
 def test_they_are_the_simulated_ones_through_contacts(monkeypatch):
@@ -69,13 +75,17 @@ def test_they_are_the_simulated_ones_through_contacts(monkeypatch):
 def test_they_are_the_closed_form_of_a_linear_oscillator():
     """Duhamel's integral of a sine, at rest before it: long after its own decay too."""
     fit = fitted(long_decay())
-    scales, n = campaign_scales(fit), 16_000
-    found = stretches(fit, 0, scales)
-    assert len(found) > 3  # one alone would drown in rounding
+    n, changes = 16_000, changes_of(fit)
+    assert len(changes.stretches) > 3  # one alone would drown in rounding
     k, c = fit.value("k1"), fit.value("c1")
     t = np.arange(n) * INTERVAL
     decay, w0 = 0.5 * c / MASS, np.sqrt(k / MASS)
     wd = np.sqrt(w0**2 - decay**2)
+
+    def reading(stretch: Stretch, order: int) -> Stretch:
+        y, v = stretch.states[:, 0], stretch.states[:, 1]
+        return replace(stretch, readings=(y, v, -(k * y + c * v) / MASS)[order])
+
     for order in (0, 1, 2):
         for frequency in (2.0, 6.75, 20.0):
             w = 2 * np.pi * frequency
@@ -86,15 +96,10 @@ def test_they_are_the_closed_form_of_a_linear_oscillator():
             exact = steady * (1j * w) ** order
             exact += both[0] * s**order * np.exp(s * t)
             exact += both[1] * s.conjugate() ** order * np.exp(s.conjugate() * t)
-            first = (
-                [replace(x, readings=x.states[:, order]) for x in found]
-                if order < 2
-                else [
-                    replace(x, readings=-(k * x.states[:, 0] + c * x.states[:, 1]) / MASS)
-                    for x in found
-                ]
+            read = tuple(reading(x, order) for x in changes.stretches)
+            ours = wave_responses(
+                replace(changes, stretches=read, order=order), np.array([frequency])
             )
-            ours = wave_responses(first, MASS, INTERVAL, order, np.array([frequency]))
             assert error(ours, np.stack([exact.imag, exact.real])) < 1e-3
 
 
@@ -128,9 +133,9 @@ def test_where_superposition_fails_they_are_simulated(wrong, monkeypatch):
     """As behind a law with a state of its own, or where the mass sticks."""
     fit = identify(small_rig.record(6), rng=np.random.default_rng(0), search=False).fit
     scales = campaign_scales(fit)
-    right = stretches(fit, 0, scales)
-    false = [replace(x, readings=wrong * x.readings) for x in right]
-    monkeypatch.setattr(module, "stretches", lambda *_: false)
+    changes = changes_of(fit)
+    false = [replace(x, readings=wrong * x.readings) for x in changes.stretches]
+    monkeypatch.setattr(module, "free_changes", lambda *_: replace(changes, stretches=tuple(false)))
     grid = np.linspace(0.5, 3, 40) * scales.natural_frequency
     found = force_responses(fit, 0, grid, scales)(grid[[0, 13]])
     assert error(found, simulated_responses(fit, 0, grid[[0, 13]], scales)) == 0.0

@@ -10,8 +10,12 @@ import pytest
 import small_rig
 from effect_rigs import BY_ID
 
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.faults.noise import loud_recordings
+from bayesimpact.data.faults.spikes import find_spikes
 from bayesimpact.diagnosis.document import document
 from bayesimpact.diagnosis.loop import Diagnosis, diagnose
+from bayesimpact.diagnosis.recording_faults import cleaned_campaign
 from bayesimpact.workflow import _strict
 
 CATALOGUE = tuple(BY_ID[i] for i in ("coulomb_friction", "gap_per_recording", "sensor_drift"))
@@ -62,3 +66,41 @@ def test_what_is_to_be_kept_is_kept() -> None:
     found = diagnose(campaign, rng=np.random.default_rng(0), effects=CATALOGUE[:1], search=False)
     assert found.corrected is not None and found.corrected.faults == ()
     assert written(found)["faults"][0]["id"] == "recording_spikes"  # told all the same
+
+
+def at_the_deepest(campaign: Campaign) -> tuple[Campaign, int]:
+    """A spike of three samples in contact, where the motion is bent, at a low sampling rate."""
+    samples = campaign.recordings[0].samples.copy()
+    deepest = 60 + int(np.argmax(samples[60:120]))
+    samples[deepest : deepest + 3] += 60 * small_rig.NOISE
+    first = replace(campaign.recordings[0], samples=samples)
+    return replace(campaign, recordings=(first, *campaign.recordings[1:])), deepest
+
+
+def test_a_spike_that_a_contact_hides_shows_against_the_fit() -> None:
+    campaign, deepest = at_the_deepest(small_rig.record(62, rate=300.0))
+    assert find_spikes(campaign.recordings[0]) == []
+    found = cleaned_campaign(campaign, rng=np.random.default_rng(0), search=False)
+    (fault,) = found.faults
+    assert (fault.id, fault.recording) == ("recording_spikes", "a")
+    assert fault.spans == ((deepest, deepest + 3),)
+    assert found.identification.fit.reduced_chi2 < 1.1
+
+
+def test_what_stands_out_beside_a_wrong_model_is_left_to_physics() -> None:
+    """The same spike where a spring is missing as well: the fit does not tell them apart."""
+    effects = {"spring_cubic": {"stiffness": 2e6}}
+    campaign, _ = at_the_deepest(small_rig.record(62, effects, rate=300.0))
+    found = cleaned_campaign(campaign, rng=np.random.default_rng(0), search=False)
+    assert found.faults == ()
+    assert found.identification.fit.reduced_chi2 > 1.5
+
+
+def test_a_recording_in_another_unit_is_not_loud() -> None:
+    campaign = small_rig.record(63)
+    assert loud_recordings(campaign.recordings) == []
+    first, *others = campaign.recordings
+    assert loud_recordings([replace(first, samples=1000 * first.samples), *others]) == []
+    noise = 20 * small_rig.NOISE * np.random.default_rng(1).standard_normal(first.samples.size)
+    (loud,) = loud_recordings([replace(first, samples=first.samples + noise), *others])
+    assert loud.recording == "a"

@@ -12,7 +12,7 @@ from effect_rigs import BY_ID
 
 from bayesimpact.data.campaign import Campaign, Measurement, Smoothing
 from bayesimpact.diagnosis.extend import campaign_scales, extend, transfer
-from bayesimpact.diagnosis.forced_responses import force_responses, simulated_responses
+from bayesimpact.diagnosis.forced_responses import simulated_responses
 from bayesimpact.diagnosis.harmonics import (
     blocks_of,
     hums,

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy import stats
 from synthetic import make_results
 
+from bayesimpact.data.campaign import Smoothing
+from bayesimpact.inference.noise import Noise
+from bayesimpact.model.measurement import smooth
 from bayesimpact.report.checks import judge, judged
 from bayesimpact.report.results import EffectSummary
 from bayesimpact.report.whiteness import flat_spectrum, whiteness
@@ -118,30 +122,39 @@ def series(rho: float, n: int, rng: np.random.Generator) -> np.ndarray:
     return x
 
 
-def coefficients(x: np.ndarray, keep: int) -> np.ndarray:
-    """Mean, real and imaginary parts, as the band-limited whitening gives them."""
-    f = np.fft.rfft(x)[:keep] / np.sqrt(0.5 * x.size)
-    return np.concatenate([f[:1].real / np.sqrt(2), f[1:].real, f[1:].imag])
+FILTER = Smoothing(kind="savgol", window=11, polyorder=2)
 
 
-@pytest.mark.parametrize("banded", [False, True])
-def test_whiteness_is_uniform_on_noise(banded: bool) -> None:
+def p_value(x: np.ndarray, smoothing: Smoothing | None, used: np.ndarray | None) -> float:
+    """Whiteness of a residual x, as a fit of one recording would hold it."""
+    noise = Noise(smoothing=smoothing, level=1.0)
+    recording = SimpleNamespace(samples=x, interval=1e-3, used=used)
+    seen = x if smoothing is None else smooth(x, smoothing, 1e-3)
+    campaign = SimpleNamespace(recordings=[recording])
+    target = SimpleNamespace(
+        likelihood=SimpleNamespace(noise=noise), oscillator=SimpleNamespace(campaign=campaign)
+    )
+    part = SimpleNamespace(residual=noise.whiten(seen, 1e-3, used))
+    return whiteness(SimpleNamespace(target=target, linearisation=[part]), 0)
+
+
+def gap(n: int) -> np.ndarray:
+    used = np.ones(n, dtype=bool)
+    used[n // 3 : n // 3 + 7] = False
+    return used
+
+
+@pytest.mark.parametrize(
+    ("smoothing", "gapped"), [(None, False), (None, True), (FILTER, False), (FILTER, True)]
+)
+def test_whiteness_is_uniform_on_noise_and_sees_colour(smoothing, gapped: bool) -> None:
     rng = np.random.default_rng(3)
-    p = []
-    for _ in range(400):
-        x = rng.standard_normal(1000)
-        p.append(whiteness(coefficients(x, 120) if banded else x, banded))
+    used = gap(1000) if gapped else None
+    p = [p_value(rng.standard_normal(1000), smoothing, used) for _ in range(300)]
     assert stats.kstest(p, "uniform").pvalue > 0.001
-
-
-@pytest.mark.parametrize("banded", [False, True])
-def test_whiteness_sees_colour(banded: bool) -> None:
-    rng = np.random.default_rng(4)
-    found = 0
-    for _ in range(20):
-        x = series(0.4, 2000, rng)
-        found += whiteness(coefficients(x, 800) if banded else x, banded) < 0.01
-    assert found == 20
+    used = gap(2000) if gapped else None
+    coloured = [p_value(series(0.9, 2000, rng), smoothing, used) for _ in range(20)]
+    assert max(coloured) < 0.01
 
 
 def test_flat_spectrum_is_uniform_on_few_powers() -> None:

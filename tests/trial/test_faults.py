@@ -60,3 +60,24 @@ def test_a_trial_says_in_its_truth_what_was_put_in_and_is_the_same_again() -> No
     assert one.truth["fault"]["id"] == "recording_held"
     for a, b in zip(one.campaign.recordings, again.campaign.recordings, strict=True):
         np.testing.assert_array_equal(a.samples, b.samples)
+
+
+def test_a_recording_of_another_rig_has_another_motion_and_the_rest_stays() -> None:
+    seed = len(PLANTS)  # whose turn it is
+    drawn = draw(SETTINGS, seed)
+    fault = drawn.truth["fault"]
+    assert fault["id"] == "recording_other_rig" and abs(fault["size"] - 1) >= 0.003
+    control = draw(Settings(kinds=("control",), benches=("small",), noises=("white",)), seed)
+    noise = drawn.truth["noise_m"]
+    for one, sound in zip(drawn.campaign.recordings, control.campaign.recordings, strict=True):
+        changed = np.max(np.abs(one.samples - sound.samples)) > 10 * noise
+        assert changed == (one.name == fault["recording"])
+
+
+def test_a_fault_and_an_effect_stand_in_one_truth() -> None:
+    settings = Settings(
+        kinds=("fault_single",), benches=("small",), noises=("white",), effects=("spring_cubic",)
+    )
+    truth = draw(settings, 0).truth
+    assert truth["fault"]["id"] == "recording_spikes"
+    assert [p["id"] for p in truth["planted"]] == ["spring_cubic"]

@@ -197,3 +197,24 @@ def test_the_summary_adds_up() -> None:
     text = summary_text(summary)
     assert "seed 1: spring_cubic [3.0] on small, white: wrong name gap_wear" in text
     assert "seed 9: failed" in text
+
+
+def test_a_fault_is_right_alone_and_its_runs_have_a_summary() -> None:
+    fault = {"id": "recording_held", "recording": "a", "start_s": 1.0, "end_s": 1.2, "timed": True}
+    truth = copy.deepcopy(TRUTH) | {"kind": "fault", "planted": [], "fault": fault}
+    told = fault | {"action": "exclude"}
+    notice = told | {"id": "recording_noise", "action": "notice"}
+    alone = answered(effects=[{"id": "recording_held", "parameters": {}}]) | {
+        "faults": [told, notice]
+    }
+    beside = answered(effects=[{"id": "gap_wear", "parameters": {}}]) | {"faults": [told]}
+    silent = answered(verdict="unknown", effects=[]) | {"faults": [notice]}
+    outcomes = [score(truth, a)["outcome"] for a in (alone, beside, silent)]
+    assert outcomes == ["named", "wrong name", "missed"]
+    both = truth | {"kind": "fault_single", "planted": TRUTH["planted"]}
+    (effect,) = ANSWER["effects"]
+    together = answered(effects=[effect, {"id": "recording_held", "parameters": {}}])
+    outcomes = [score(both, a | {"faults": [told]})["outcome"] for a in (together, alone, beside)]
+    assert outcomes == ["named", "fault alone", "wrong name"]
+    text = summary_text(summarise([result(0, truth, alone), result(1, truth, silent)]))
+    assert "faults named, with their place    50.0 %" in text

@@ -75,7 +75,10 @@ def _fourth(x: np.ndarray) -> float:
 
 
 def loud_recordings(recordings: Sequence[Recording]) -> list[Fault]:
-    """Notices of recordings whose noise is three times the usual one of the campaign, or more."""
+    """Notices of recordings whose noise is three times the usual one of the campaign, or more.
+
+    Of the readings' size too: where both are larger alike, the unit or the gain is another.
+    """
     if len(recordings) < 3:
         return []
     levels = np.array([noise_level(r.samples) for r in recordings])
@@ -84,6 +87,9 @@ def loud_recordings(recordings: Sequence[Recording]) -> list[Fault]:
         return []
     if usual == 0.0:
         return []
+    sizes = np.array([float(np.std(r.samples)) for r in recordings])
+    relative = levels / np.maximum(sizes, 1e-300)
+    loud = (levels > LOUD * usual) & (relative > LOUD * np.median(relative))
     return [
         Fault(
             id="recording_noise",
@@ -100,8 +106,6 @@ def loud_recordings(recordings: Sequence[Recording]) -> list[Fault]:
             threshold=float(2.0 * np.sqrt(r.samples.size) / SCATTER),
             action="notice",
         )
-        for r, level in zip(recordings, levels, strict=True)
-        if level > LOUD * usual
-        and reading_step(r.samples) < level
-        and _fourth(r.samples) < 1.25 * level
+        for r, level, is_loud in zip(recordings, levels, loud, strict=True)
+        if is_loud and reading_step(r.samples) < level and _fourth(r.samples) < 1.25 * level
     ]
