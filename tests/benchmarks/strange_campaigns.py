@@ -52,8 +52,8 @@ def run(command: list[str]) -> dict[str, Any]:
             sys.stderr.write(f"{kind}: {ending}\n")
     codes = Counter(str(e["exit"]) for e in endings.values())
     good = sum(e["report"] and e["exit"] in (0, 3) for e in endings.values())
-    return {"command": " ".join(command), "asked": len(STRANGE), "campaigns": len(endings), "reports": good,
-            "exit_codes": dict(codes), "endings": endings}  # fmt: skip
+    return {"command": " ".join(command), "asked": len(STRANGE), "campaigns": len(endings),
+            "reports": good, "exit_codes": dict(codes), "endings": endings}  # fmt: skip
 
 
 if __name__ == "__main__":
