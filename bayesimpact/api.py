@@ -19,7 +19,7 @@ from bayesimpact.errors import InputError
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification, identify
 from bayesimpact.inference.posterior import Posterior
-from bayesimpact.inference.progress import progress_bar
+from bayesimpact.inference.progress import progress_bar, refit_bar
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -113,7 +113,8 @@ def diagnose(
         own, which is executed: they are looked for beside the catalogue. None: what the catalogue
         looks for by default, `bi.SEARCHED`
     search : False leaves the global search for the base model's mode out
-    progress : called with every step in words
+    progress : called with every step in words; None: a bar counts the refits of the search where
+        standard error is a terminal
 
     Raises
     ------
@@ -127,9 +128,11 @@ def diagnose(
     else:
         chosen = tuple(effects)
         check_effects(chosen)
-    return loop.diagnose(
-        campaign, rng=generator(seed, rng), effects=chosen, search=search, progress=progress
-    )
+    shown = None if progress is None else False
+    with refit_bar(progress or (lambda words: None), shown) as tell:
+        return loop.diagnose(
+            campaign, rng=generator(seed, rng), effects=chosen, search=search, progress=tell
+        )
 
 
 def summary(found: Identification | Posterior | Results | Diagnosis) -> DataFrame:

@@ -230,6 +230,7 @@ def diagnose(
         effects=effects,
         command=command,
         say=telling(quiet),
+        bar=False if quiet else None,
     )
     announce(outcome, out, quiet)
     finish(ctx, outcome)
@@ -322,6 +323,7 @@ def demo(ctx: click.Context, out: Path, seed: int, quiet: bool) -> None:
 
     say = telling(quiet)
     told: dict[str, Any] = {"seed": seed, "command": "bayesimpact demo", "say": say}
+    told["bar"] = False if quiet else None
     say("part 1: recordings that hide nothing")
     first = sample_campaign(open_book, made_folder(out, "bayesimpact demo"), **told)
     announce(first, out, quiet)

@@ -147,11 +147,13 @@ def made_folder(out: Path, go_on: str = "") -> Path:
 
 
 def telling(quiet: bool) -> Callable[[str], None]:
-    """Progress in words on stderr, with the seconds since the start; nothing when quiet.
-
-    What must be compiled is announced until the command ends.
+    """Progress in words on stderr, with the seconds since the start, above whatever bar is shown;
+    nothing when quiet. What must be compiled is announced until the command ends.
     """
+    import sys
     import time
+
+    from tqdm import tqdm
 
     from bayesimpact.model.compiled import compilation_announced
 
@@ -159,7 +161,7 @@ def telling(quiet: bool) -> Callable[[str], None]:
 
     def say(message: str) -> None:
         if not quiet:
-            click.echo(f"[{time.perf_counter() - began:6.1f} s] {message}", err=True)
+            tqdm.write(f"[{time.perf_counter() - began:6.1f} s] {message}", file=sys.stderr)
 
     click.get_current_context().with_resource(compilation_announced(say))
     return say

@@ -24,7 +24,7 @@ from bayesimpact.diagnosis.loop import Diagnosis, diagnose
 from bayesimpact.errors import InputError
 from bayesimpact.inference.identify import Identification, identify
 from bayesimpact.inference.posterior import Posterior, sample
-from bayesimpact.inference.progress import progress_bar
+from bayesimpact.inference.progress import progress_bar, refit_bar
 from bayesimpact.model.effects import EFFECTS, SEARCHED
 from bayesimpact.model.effects.effect import Effect
 from bayesimpact.report.archive import load_results, write_text
@@ -147,29 +147,35 @@ def diagnose_campaign(
     effects: Sequence[Effect] = SEARCHED,
     command: str = "",
     say: Say = silent,
+    bar: bool | None = False,
 ) -> Outcome:
     """The whole loop: diagnosis.json, posterior.nc, figures and report in `out`; the chains of both
     models are kept in `out`/chain.
 
     `effects`: what is looked for. `certify`: how often the loop is repeated on simulated campaigns
     of this design. `resume`: go on with the chains that `out` holds; the search, which has no
-    randomness of its own, is repeated.
+    randomness of its own, is repeated. `bar`: as in `sample_campaign`, of refits too.
     """
     began = time.perf_counter()
-    chosen: dict[str, Any] = {"effects": effects, "progress": say}
-    diagnosis = diagnose(campaign, rng=np.random.default_rng(seed), search=not quick, **chosen)
+    rng = np.random.default_rng(seed)
+    with refit_bar(say, bar) as tell:
+        diagnosis = diagnose(campaign, rng=rng, search=not quick, effects=effects, progress=tell)
     before = after = None
     if not quick:
         say("sampling both models")
         chains = out / CHAIN_FOLDER
-        kept: dict[str, Any] = {"seed": seed, "resume": resume, "tell": say}
-        before = after = sample(diagnosis.before, folder=chains / "before", **kept)
-        if diagnosis.after is not diagnosis.before:
-            allowed = LEARNED_STEPS if diagnosis.verdict == "unknown" else MAX_STEPS
-            after = sample(diagnosis.after, folder=chains / "after", max_steps=allowed, **kept)
+        with progress_bar(bar) as callback:
+            kept: dict[str, Any] = {"seed": seed, "resume": resume, "tell": say}
+            kept["callback"] = callback
+            before = after = sample(diagnosis.before, folder=chains / "before", **kept)
+            if diagnosis.after is not diagnosis.before:
+                allowed = LEARNED_STEPS if diagnosis.verdict == "unknown" else MAX_STEPS
+                after = sample(diagnosis.after, folder=chains / "after", max_steps=allowed, **kept)
     certified = None
     if certify:
-        certified = certificate(diagnosis, certify, rng=np.random.default_rng([seed, 1]), **chosen)
+        again = np.random.default_rng([seed, 1])
+        with refit_bar(say, bar) as tell:
+            certified = certificate(diagnosis, certify, rng=again, effects=effects, progress=tell)
     content = document(
         diagnosis,
         seed=seed,

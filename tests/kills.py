@@ -7,9 +7,11 @@ import json
 import signal
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import h5netcdf
 import numpy as np
 
 from bayesimpact.report.archive_arviz import read_posterior
@@ -33,10 +35,13 @@ try:
 finally:
     print(count)
 """
-_VARIES = ("date", "command", "versions")  # of fit.json: not the same in two runs
+_VARIES = ("date", "command", "versions", "seconds", "commit")  # not the same in two runs
+RESUME = ("--resume",)  # what `sample` and `diagnose` take; `fleet` and `trial` go on by themselves
 
 
-def run(arguments: list[str], *, write: int = 0, seconds: float | None = None) -> tuple[int, str]:
+def run(
+    arguments: Sequence[str], *, write: int = 0, seconds: float | None = None
+) -> tuple[int, str]:
     """Exit code and output of a command; killed at a write or after some seconds."""
     command = [sys.executable, "-P", "-c", AT_A_WRITE, str(write), *arguments]
     with subprocess.Popen(
@@ -51,7 +56,12 @@ def run(arguments: list[str], *, write: int = 0, seconds: float | None = None) -
 
 
 def killed_and_resumed(
-    arguments: list[str], out: Path, *, write: int = 0, seconds: float | None = None
+    arguments: Sequence[str],
+    out: Path,
+    *,
+    write: int = 0,
+    seconds: float | None = None,
+    resume: Sequence[str] = RESUME,
 ) -> bool:
     """Run into `out` with one kill, then resume to the end -> whether the kill met the run.
 
@@ -62,24 +72,48 @@ def killed_and_resumed(
     code, _ = run([*arguments, "--out", str(out)], write=write, seconds=seconds)
     if code != -signal.SIGKILL and code not in (0, 3):
         raise RuntimeError(f"exit {code} before any kill")
-    again, said = run([*arguments, "--out", str(out), "--resume"])
+    again, said = run([*arguments, "--out", str(out), *resume])
     if again not in (0, 3):
         raise RuntimeError(f"exit {again} when resumed: {said[-2000:]}")
     return code == -signal.SIGKILL
 
 
-def state(out: Path) -> dict[str, Any]:
-    """What must be the same, bit for bit, however often a run was killed: digests by name."""
-    found = {}
-    for file in sorted(out.glob("chain/**/*.npz")):
+def state(out: Path) -> dict[str, str]:
+    """What must be the same, bit for bit, however often a run was killed: digests by name.
+
+    Of figures and pages, which bear dates, only that they are there. Hidden files are left out:
+    the lock, and what a killed process had not yet moved to its place.
+    """
+    files = (f for f in sorted(out.rglob("*")) if f.is_file() and not f.name.startswith("."))
+    return {str(f.relative_to(out)): hashlib.sha256(_content(f)).hexdigest() for f in files}
+
+
+def unfinished(out: Path) -> list[str]:
+    """Hidden files that are no lock: left by a killed process."""
+    files = (f.name for f in out.rglob(".*") if f.is_file())
+    return sorted(name for name in files if not name.endswith(".lock"))
+
+
+def _content(file: Path) -> bytes:
+    if file.suffix == ".npz":
         with np.load(file, allow_pickle=False) as content:
-            parts = b"".join(name.encode() + content[name].tobytes() for name in content.files)
-        found[str(file.relative_to(out))] = hashlib.sha256(parts).hexdigest()
-    told = json.loads((out / "fit.json").read_text())
-    kept = {key: value for key, value in told.items() if key not in _VARIES}
-    found["fit.json"] = hashlib.sha256(json.dumps(kept).encode()).hexdigest()
-    draws = read_posterior(out / "posterior.nc").groups["posterior"]
-    parts = b"".join(name.encode() + v.values.tobytes() for name, v in sorted(draws.items()))
-    found["posterior"] = hashlib.sha256(parts).hexdigest()
-    left = [f.name for f in out.rglob("*") if f.name.endswith(".unfinished")]
-    return {**found, "unfinished": left}
+            return b"".join(name.encode() + content[name].tobytes() for name in content.files)
+    if file.suffix == ".json":
+        return json.dumps(_same(json.loads(file.read_text())), sort_keys=True).encode()
+    if file.name == "posterior.nc":
+        draws = read_posterior(file).groups["posterior"]
+        return b"".join(name.encode() + v.values.tobytes() for name, v in sorted(draws.items()))
+    if file.name == "results.nc":
+        with h5netcdf.File(file, "r") as content:
+            arrays = {k: v[...] for k, v in content.variables.items() if k != "record"}
+        return b"".join(name.encode() + arrays[name].tobytes() for name in sorted(arrays))
+    if file.name == "log.txt":  # of trials: all of a line but its seconds
+        return b"\n".join(line.rpartition(b"|")[0] for line in file.read_bytes().splitlines())
+    return b"" if file.suffix in (".html", ".png", ".pdf", ".txt") else file.read_bytes()
+
+
+def _same(value: Any) -> Any:
+    """Content of a JSON file without what varies from run to run."""
+    if isinstance(value, dict):
+        return {key: _same(inner) for key, inner in value.items() if key not in _VARIES}
+    return [_same(inner) for inner in value] if isinstance(value, list) else value

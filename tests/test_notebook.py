@@ -10,7 +10,7 @@ import small_rig
 from effect_rigs import BY_ID
 
 import bayesimpact as bi
-from bayesimpact.data.html import html_table
+from bayesimpact.data.html import html_table, resolved
 from bayesimpact.diagnosis.loop import Diagnosis, diagnose
 
 
@@ -29,6 +29,19 @@ def test_a_table_is_escaped() -> None:
     html = html_table("<b>", ["a & b"], [("<script>", 1234.5678, 3)])
     assert cells(html) == ["<script>", "1235", "3"]
     assert "<script>" not in html and "<b>" not in html and "a &amp; b" in html
+
+
+def test_a_number_has_two_digits_of_its_uncertainty() -> None:
+    assert resolved(0.14800996, 1.1e-5) == "0.14801"
+    assert resolved(5350.38, 0.28) == "5350.38"
+    assert resolved(5350.38, 280.0) == "5350"
+    assert resolved(0.0, 1.0) == "0" and resolved(float("nan"), 1.0) == "nan"
+
+
+def test_a_figure_shows_itself(found: Diagnosis) -> None:
+    """Without pyplot, that is; see `report.figures.inline`."""
+    figure = bi.plot(found.before.target.oscillator.campaign)
+    assert figure._repr_png_().startswith(b"\x89PNG")
 
 
 def test_a_campaign_lists_its_recordings(found: Diagnosis) -> None:

@@ -18,6 +18,7 @@ from bayesimpact.diagnosis.refit import Candidate, exchanged, refit, without
 from bayesimpact.diagnosis.scan import Scan, scan
 from bayesimpact.diagnosis.scores import Score
 from bayesimpact.diagnosis.valley import followed
+from bayesimpact.inference.progress import Refit
 from bayesimpact.model.effects.effect import Effect, Scales
 
 STARTS = 2  # points of an effect's shape grid from which it is fitted
@@ -113,9 +114,13 @@ class Models:
         begun = (candidate.ids, candidate.fit.log_posterior, shapes)
         if begun not in self.begun:
             self.begun.add(begun)
-            self.refits += 1
-            self.progress("fitting " + " + ".join((*candidate.ids, *(s.effect.id for s in scores))))
+            self.tell("fitting " + " + ".join((*candidate.ids, *(s.effect.id for s in scores))))
             self.keep(refit(candidate.fit, scores, self.scales))
+
+    def tell(self, words: str) -> None:
+        """Count a refit, and say which."""
+        self.refits += 1
+        self.progress(Refit(words, self.refits))
 
     def is_known(self, key: frozenset[str]) -> bool:
         """Whether a model has its mode; a climb that gave up may do better from elsewhere."""
@@ -126,8 +131,7 @@ class Models:
         step = (frozenset(candidate.ids), effect.id)
         if step not in self.dropped:
             self.dropped.add(step)
-            self.refits += 1
-            self.progress("without " + effect.id)
+            self.tell("without " + effect.id)
             self.keep(without(candidate, effect, self.scales))
         return self.tried[frozenset(i for i in candidate.ids if i != effect.id)]
 
@@ -136,8 +140,7 @@ class Models:
         begun = (candidate.ids, candidate.fit.log_posterior, old.id, new.id)
         if begun not in self.begun:
             self.begun.add(begun)
-            self.refits += 1
-            self.progress(f"{new.id} in place of {old.id} in " + " + ".join(candidate.ids))
+            self.tell(f"{new.id} in place of {old.id} in " + " + ".join(candidate.ids))
             self.keep(exchanged(candidate, old, new, self.scales))
 
     def finished(self, candidate: Candidate) -> Candidate:

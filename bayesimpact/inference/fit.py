@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.data.html import html_table
+from bayesimpact.data.html import html_table, resolved
 from bayesimpact.inference.likelihood import Likelihood, Linearisation
 from bayesimpact.inference.prior import Prior
 from bayesimpact.inference.priors import Priors
@@ -82,11 +82,10 @@ class Fit:
     def _repr_html_(self) -> str:
         """Parameters that all recordings share, SI, for a notebook."""
         layout = self.target.oscillator.layout
-        shared = layout.roles("physical", "effect")
-        rows = [
-            (layout.names[i], float(self.mode[i]), float(self.sd[i]), layout.parameters[i].unit)
-            for i in shared
-        ]
+        rows = []
+        for i in layout.roles("physical", "effect"):
+            mode, sd = float(self.mode[i]), float(self.sd[i])
+            rows.append((layout.names[i], resolved(mode, sd), sd, layout.parameters[i].unit))
         caption = f"{self!r}, reduced chi2 {self.reduced_chi2:.4g}"
         return html_table(caption, ("parameter", "mode", "sd", "unit"), rows)
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.data.html import html_table
+from bayesimpact.data.html import html_table, resolved
 from bayesimpact.errors import InputError
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.sample import Chains, sample_posterior
@@ -81,9 +81,9 @@ class Posterior:
         layout = self.fit.target.oscillator.layout
         rows = []
         for i in layout.roles("physical", "effect"):
-            low, middle, high = np.percentile(self.draws[:, i], [5, 50, 95])
-            name, unit = layout.names[i], layout.parameters[i].unit
-            rows.append((name, float(middle), float(low), float(high), unit))
+            low, middle, high = np.percentile(self.draws[:, i], [5, 50, 95]).tolist()
+            shown = (resolved(x, high - low) for x in (middle, low, high))
+            rows.append((layout.names[i], *shown, layout.parameters[i].unit))
         return html_table(repr(self), ("parameter", "median", "5 %", "95 %", "unit"), rows)
 
     def thinned(self, count: int, rng: np.random.Generator) -> Array:

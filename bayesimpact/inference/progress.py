@@ -1,11 +1,25 @@
-"""A bar for the sampler's progress, in terminals and notebooks."""
+"""Bars for what takes long, in terminals and notebooks: the sampler's steps, a search's refits."""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 from bayesimpact.inference.sample import Progress
+
+
+class Refit(str):
+    """What a search fits next, in words, and how many refits there have been with it."""
+
+    number: int
+
+    def __new__(cls, words: str, number: int) -> Refit:
+        """Words that can be told as any others."""
+        made = super().__new__(cls, words)
+        made.number = number
+        return made
 
 
 @contextmanager
@@ -14,9 +28,7 @@ def progress_bar(shown: bool | None = None) -> Iterator[Callable[[Progress], Non
 
     `shown` None: only where standard error is a terminal, or in a notebook.
     """
-    from tqdm.auto import tqdm
-
-    bar = tqdm(unit=" steps", disable=None if shown is None else not shown, leave=False)
+    bar = _bar(" steps", shown)
 
     def tell(where: Progress) -> None:
         bar.total, bar.n = where.max_steps, where.steps
@@ -27,3 +39,34 @@ def progress_bar(shown: bool | None = None) -> Iterator[Callable[[Progress], Non
         yield tell
     finally:
         bar.close()
+
+
+@contextmanager
+def refit_bar(
+    say: Callable[[str], None], shown: bool | None = None
+) -> Iterator[Callable[[str], None]]:
+    """What a diagnosis tells goes to `say`, but for its refits, which a bar counts and names.
+
+    How many there will be nobody knows beforehand, so the bar has no end. `shown` as above; where
+    no bar is shown, refits are told to `say` too.
+    """
+    bar = _bar(" refits", shown)
+
+    def tell(words: str) -> None:
+        if isinstance(words, Refit) and not bar.disable:
+            bar.n = words.number
+            bar.set_description_str(words)
+        else:
+            say(words)
+
+    try:
+        yield tell
+    finally:
+        bar.close()
+
+
+def _bar(unit: str, shown: bool | None) -> Any:
+    with warnings.catch_warnings():  # that a notebook could have finer bars
+        warnings.simplefilter("ignore")
+        from tqdm.auto import tqdm
+    return tqdm(unit=unit, disable=None if shown is None else not shown, leave=False)

@@ -12,6 +12,7 @@ from bayesimpact.data.faults.fault import Fault
 from bayesimpact.data.gaps import runs
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
+from bayesimpact.report.figures.inline import inline
 from bayesimpact.report.figures.save import escaped
 from bayesimpact.report.figures.style import styled
 from bayesimpact.report.units import reading
@@ -53,7 +54,7 @@ def campaign_figure(campaign: Campaign, faults: Sequence[Fault] = ()) -> Figure:
 
 
 def plot(what: Campaign | Recording | Iterable[Recording]) -> Figure:
-    """`campaign_figure` of a campaign, or of one or more recordings.
+    """`campaign_figure` of a campaign, or of one or more recordings, which notebooks show.
 
     Raises
     ------
@@ -61,13 +62,13 @@ def plot(what: Campaign | Recording | Iterable[Recording]) -> Figure:
         when there is nothing to plot.
     """
     if isinstance(what, Campaign):
-        return campaign_figure(what)
+        return inline(campaign_figure(what))
     recordings = (what,) if isinstance(what, Recording) else tuple(what)
     if not recordings or not all(isinstance(r, Recording) for r in recordings):
         found = ", ".join(type(r).__name__ for r in recordings) or "nothing"
         raise InputError("plot", found, "a Campaign, a Recording, or several of them")
     title = recordings[0].name if len(recordings) == 1 else f"{len(recordings)} recordings"
-    return campaign_figure(Campaign(title, 1.0, recordings, stop=False))
+    return inline(campaign_figure(Campaign(title, 1.0, recordings, stop=False)))
 
 
 def _mark(axis: Axes, recording: Recording, spans: Sequence[tuple[int, int]], colour: str) -> None:

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 def corner(posterior: Posterior, before: Posterior | None = None) -> Figure:
     """Corner plot of the physical parameters and effects; `before` is drawn beside, where given."""
     from bayesimpact.report.figures.corner import corner_figure
+    from bayesimpact.report.figures.inline import inline
 
     results = results_from_posterior(posterior, backbone=False, before=before)
     assert results.draws is not None
-    return corner_figure(results.draws, before=results.before)
+    return inline(corner_figure(results.draws, before=results.before))

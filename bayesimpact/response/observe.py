@@ -75,6 +75,11 @@ def look(campaign: Campaign) -> Observed:
         for x, p, r in zip(samples, periods, campaign.recordings, strict=True)
     ]
     rests = [rest_position(*args) for args in zip(samples, periods, noises, strict=True)]
+    if not campaign.stop:  # the motion passes its rest: an extrapolation may lie elsewhere
+        rests = [
+            rest if x.min() < rest < x.max() else float(np.median(x))
+            for x, rest in zip(samples, rests, strict=True)
+        ]
     whole: list[list[Arc]] = [[(0, x.size)] for x in samples]
     biases, reading_noises = [one.bias for one in found], [one.noise for one in found]
     first = Observed(samples, intervals, periods, noises, rests, whole, biases, reading_noises)

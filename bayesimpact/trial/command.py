@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from bayesimpact.cluster import one_thread_each
+from bayesimpact.console import made_folder
 
 
 def _listed(text: str | None) -> tuple[str, ...] | None:
@@ -110,7 +111,7 @@ def trial(
     results = run_trials(
         settings,
         range(seed, seed + number),
-        out,
+        made_folder(out, "the same command"),
         workers=workers,
         scheduler=scheduler,
         keep=keep,

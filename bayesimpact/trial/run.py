@@ -79,6 +79,7 @@ def run_trials(
     InputError : `out` holds a run with other settings, or a truth that no longer fits its seal
     """
     store = Store(out, settings)
+    store.mend_log()
     say = step or (lambda stage, count: None)
     with executor(workers, scheduler) as spread:
         missing = [seed for seed in seeds if not store.is_drawn(seed)]
@@ -168,9 +169,9 @@ class Store:
                 result |= {"failed": traceback.format_exc(), "stage": "scoring"}
         else:
             result["stage"] = "diagnosing"
-        self._finish(seed, result)
         if not keep:
-            shutil.rmtree(self._campaign(seed))
+            self._discard(seed)  # before the result: killed in between, the trial is drawn anew
+        self._finish(seed, result)
 
     def result(self, seed: int) -> dict[str, Any]:
         """What is stored of a finished trial."""
@@ -180,6 +181,26 @@ class Store:
     def _finish(self, seed: int, result: Mapping[str, Any]) -> None:
         content = {"schema": "bayesimpact/trial/1", "seed": seed, **result}
         write(self._result(seed), json.dumps(content, indent=1, allow_nan=False) + "\n")
+        self._log(content)
+
+    def mend_log(self) -> None:
+        """Write the lines that a kill between a result and its line has cost."""
+        log = self.out / "log.txt"
+        known = {line.split()[0] for line in log.read_text().splitlines()} if log.exists() else ()
+        for file in sorted(self._results(), key=lambda f: int(f.stem)):
+            if file.stem not in known:
+                self._log(self.result(int(file.stem)))
+
+    def _results(self) -> list[Path]:
+        return [f for f in (self.out / "trials").glob("*.json") if f.stem.isdigit()]
+
+    def _discard(self, seed: int) -> None:
+        """Delete the campaign; campaign.toml first, for without it nothing is taken for whole."""
+        folder = self._campaign(seed)
+        (folder / "campaign.toml").unlink()
+        shutil.rmtree(folder)
+
+    def _log(self, content: Mapping[str, Any]) -> None:
         with (self.out / "log.txt").open("a", encoding="utf-8", newline="\n") as log:
             log.write(trial_line(content) + "\n")
 

@@ -252,3 +252,14 @@ def test_noise_alone_is_refused(stop: bool) -> None:
     campaign = Campaign("noise", 1.0, (Recording("a", "1", noise, 1e-3),), stop)
     with pytest.raises(InputError, match="no oscillation"):
         estimate(campaign)
+
+
+def test_a_plain_oscillator_passes_its_rest() -> None:
+    """A tone that does not decay beside the motion: the centres of the swings lie elsewhere."""
+    t = np.arange(600) * 2e-3
+    swing = -6e-3 * np.exp(-0.15 * t) * np.cos(2 * np.pi * 6.4 * t) + 1e-3 * np.cos(80.4 * t)
+    samples = swing + 5e-6 * np.random.default_rng(0).standard_normal(600)
+    recording = Recording("a", "", samples, 2e-3)
+    found = estimate(Campaign("rig", 0.503, (recording,), stop=False))
+    assert found.k1 == pytest.approx(0.503 * (2 * np.pi * 6.4) ** 2, rel=0.01)
+    assert abs(found.offset["a"]) < 1e-3

@@ -9,8 +9,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from bayesimpact.cli import main
 from bayesimpact.cluster import executor
+from bayesimpact.data.lock import locked
 from bayesimpact.errors import InputError
 from bayesimpact.trial import run
 from bayesimpact.trial.blind import finite, open_seal, seal, sealed_text
@@ -110,6 +113,24 @@ def test_a_killed_run_goes_on(
     assert {k: v for k, v in tree(killed).items() if "part" not in k} == tree(whole)
 
 
+@pytest.mark.parametrize("victim", ["_log", "_finish"])
+def test_a_kill_while_a_trial_is_put_away(
+    victim: str, quick: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Between its result and its line in the log, or between its campaign and its result."""
+    whole, killed = tmp_path / "whole", tmp_path / "killed"
+    run_trials(quick, SEEDS, whole)
+
+    def dies(store: run.Store, *told: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
+        patched.setattr(run.Store, victim, dies)
+        run_trials(quick, SEEDS, killed)
+    run_trials(quick, SEEDS, killed)
+    assert tree(killed) == tree(whole) and not list((killed / "campaigns").iterdir())
+
+
 def test_what_goes_wrong_in_one_trial_is_recorded(
     quick: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -202,3 +223,11 @@ def test_what_json_does_not_have() -> None:
 
     found = finite({"a": float("nan"), "b": (np.float64(1), np.int64(2)), "c": np.array([np.inf])})
     assert json.loads(json.dumps(found, allow_nan=False)) == {"a": None, "b": [1.0, 2], "c": [None]}
+
+
+def test_two_runs_in_one_folder_are_refused(quick: Settings, tmp_path: Path) -> None:
+    arguments = ["trial", "--number", "1", "--out", str(tmp_path), "--quiet"]
+    with locked(tmp_path):
+        result = CliRunner().invoke(main, arguments)
+    assert result.exit_code == 2 and "another run at work" in result.output
+    assert not (tmp_path / "settings.json").exists()
