@@ -12,6 +12,7 @@ from typing import Any
 if __name__ == "__main__":  # imports go by the tests' folder, not by this one
     sys.path[0] = str(Path(__file__).resolve().parents[1])
 
+from benchmarks.fault_tables import fault_table
 from benchmarks.tables import HERE, grid, stored
 from benchmarks.trial_tables import (
     blind_table,
@@ -247,6 +248,7 @@ TABLES = {
     "trial_coverage": trial_coverage_table,
     "singles": single_table,
     "strong": strong_table,
+    "faults": fault_table,
     "next": next_table,
     "power": power_table,
     "sbc": sbc_table,

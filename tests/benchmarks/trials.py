@@ -26,6 +26,8 @@ def row(result: dict[str, Any]) -> dict[str, Any]:
         "rig": truth["bench"],
         "noise": truth["noise_kind"],
         "planted": [p["id"] for p in truth["planted"]],
+        "fault": (truth.get("fault") or {}).get("id"),
+        "right": score["right"],
         "strengths": [None if s is None else round(s, 2) for s in score["strengths"]],
         "named": score["named"],
         "outcome": score["outcome"],
