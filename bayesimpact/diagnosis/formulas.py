@@ -64,9 +64,9 @@ def with_formulas(
     progress: Callable[[str], None],
 ) -> Answer:
     """The answer with formulas for what is unknown, and with one of them named where the odds say
-    so; as it is where nothing is unknown.
+    so; as it is where nothing is unknown, or the search ended by its limit.
     """
-    if answer.decision.verdict not in ("unknown", "partly"):
+    if answer.decision.verdict not in ("unknown", "partly") or not answer.naming.finished:
         return answer
     progress("scoring formulas")
     repetition = residual_repetition(answer.after)
@@ -92,7 +92,7 @@ def with_formulas(
     naming = joined(answer.naming, list(fitted.values()))
     first = max(fitted, key=lambda s: naming.log_odds(fitted[s]))
     rows = listed(question, naming, heads, fitted)
-    named = answer.naming.finished and _may_be_named(question, naming, ranked, fitted, first)
+    named = _may_be_named(question, naming, ranked, fitted, first)
     state = None
     if named:
         progress("scoring what the formula lacks")

@@ -136,11 +136,10 @@ class _Work:
         with np.errstate(invalid="ignore", divide="ignore"):
             squared = np.outer(h**2, diagonal)
             gain = (squared + squared.T - 2 * np.outer(h, h) * g) / det + self.b[i] ** 2
-        left = np.maximum(p.left - gain, 1e-3 * p.left)
+            left = np.maximum(p.left - gain, 1e-3 * p.left)
+            bound = -0.5 * p.samples * np.log(left / p.left)
+            bound += 1.5 * np.log(2 * np.pi * left / p.samples)
         peak = -np.log(np.pi * self.unit * p.scale) - p.price
-        bound = -0.5 * p.samples * np.log(left / p.left) + 1.5 * np.log(
-            2 * np.pi * left / p.samples
-        )
         bound += peak[i] + peak[rest][:, None] + peak[rest] - 0.5 * np.log(COLLINEAR)
         found = np.argwhere(np.triu((det > COLLINEAR) & (bound > self.least), 1))
         return found[:, 0], found[:, 1]

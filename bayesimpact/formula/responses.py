@@ -1,14 +1,11 @@
 """How the recordings would change under a small force of the state, without simulating it.
 
-About a fitted motion a small force f(t) moves the state by
-
-    (u, u')(t) = Phi(t) W(t),     W(t) = -1/m int_0^t Phi(s)^-1 (0, 1) f(s) ds,
-
-where Phi is the derivative of the state with respect to the initial one, jumps at the obstacle
-included (Mueller 1995, Chaos Solitons Fractals 5:1671, saltation). Phi is had from four simulated
-motions per recording; after that every term of the grammar costs one sum over its own force history
-along the motion. A spline a(y) + b(y) v would show only what is linear in v; the force history
-itself, scored on the residual, tells |v| v from v.
+About a fitted motion the state's change obeys a linear equation, whatever laws act: it is a sum of
+two free changes (`bayesimpact.model.free_changes`, jumps at the obstacle included), and a force
+pushes both, instant by instant (variation of parameters). The free changes are had from a few
+simulated motions per recording; after that every term of the grammar costs one sum over its own
+force history along the motion. A spline a(y) + b(y) v would show only what is linear in v; the
+force history itself, scored on the residual, tells |v| v from v.
 
 Of laws with a memory or a further mode in the fitted model only displacement and velocity are
 perturbed here; such a score is approximate, and the refit that follows is not.
@@ -24,16 +21,34 @@ from numpy.typing import NDArray
 
 from bayesimpact.formula.grammar import ONE, Term
 from bayesimpact.inference.fit import Fit
-from bayesimpact.model.motions import general_motions, motions
-from bayesimpact.model.parameters import BASE_SLOTS, SLOTS
+from bayesimpact.model.free_changes import free_changes, motions_beside
+from bayesimpact.model.parameters import SLOTS
 
 Array = NDArray[np.float64]
 
-STEP = 1e-4  # of the initial state, relative to amplitude and speed
+STEP = 1e-6  # of the state, over the largest one: small enough for free changes
 POINTS = 200  # in a free period; errors are below 0.5 % (2 % for a box) of a response, by test
 FINEST = 12  # times finer than the samples
 BLOCK = 64  # terms at once, so that memory stays bounded
-_Y0, _V0, _GAP = (SLOTS.index(n) for n in ("y0", "v0", "g"))
+_GAP, _K1 = (SLOTS.index(n) for n in ("g", "k1"))
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Free changes over a part of a recording.
+
+    Attributes
+    ----------
+    begin : its first sample; the last one is the next stretch's first
+    pushes : (2, n) what a unit impulse against the motion's direction makes of both, at every point
+    rows : (2, samples) what the probe reads of both, before its filter
+    carried : (2, 2) what both of the stretch before become at its begin
+    """
+
+    begin: int
+    pushes: Array
+    rows: Array
+    carried: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +58,7 @@ class Motion:
     Attributes
     ----------
     y, v, d, t : displacement m, velocity m/s, indentation m, time s, (n,)
-    kernel : (2, n) Phi^-1 (0, 1) / -m
-    rows : (2, samples) derivative of what the probe reads, before filter, by the initial state
+    stretches : its free changes
     direct : what an acceleration reads of the force itself, 1/kg; 0 for other quantities
     steps : (2, n - 1) weights of both ends of every step in an integral over time, s
     factor : fine steps in a sample
@@ -54,62 +68,41 @@ class Motion:
     v: Array
     d: Array
     t: Array
-    kernel: Array
-    rows: Array
+    stretches: tuple[Stretch, ...]
     direct: float
     steps: Array
     factor: int
 
+    @property
+    def samples(self) -> int:
+        """Of the recording."""
+        return (self.y.size - 1) // self.factor + 1
+
 
 def motion_of(fit: Fit, r: int) -> Motion:
-    """The fitted motion of one recording and its dependence on the initial state."""
+    """The fitted motion of one recording and its free changes.
+
+    Raises
+    ------
+    LinAlgError : the mass sticks, and what it did before is forgotten
+    """
     oscillator = fit.target.oscillator
-    mass, interval = oscillator.campaign.mass, float(oscillator.intervals[r])
     q = oscillator.layout.slots(fit.mode)[r]
-    period = 2 * np.pi * np.sqrt(mass / q[SLOTS.index("k1")])
-    factor = int(np.clip(np.ceil(POINTS * interval / period), 1, FINEST))
-    if oscillator.inputs is not None:  # a measured force is known at the samples
-        factor = 1
-    count = (int(oscillator.counts[r]) - 1) * factor + 1
+    rate = np.sqrt(q[_K1] / oscillator.campaign.mass)
+    points = POINTS * float(oscillator.intervals[r]) * rate / (2 * np.pi)
+    factor = int(np.clip(np.ceil(points), 1, FINEST))
     reach = float(np.abs(fit.displacements[r]).max())
-    steps = STEP * reach * np.array([1.0, 2 * np.pi / period])
-    points = np.repeat(q[None], 5, axis=0)
-    for i, slot in enumerate((_Y0, _V0)):
-        points[1 + 2 * i, slot] += steps[i]
-        points[2 + 2 * i, slot] -= steps[i]
-    order = int(oscillator.orders[r])
-    y, v = (_simulated(fit, r, points, k, count, interval / factor) for k in (0, 1))
-    change = [(x[1::2] - x[2::2]) / (2 * steps[:, None]) for x in (y, v)]
-    read = change[order] if order < 2 else _change_of_acceleration(fit, r, points, steps)
-    (a, b), (c, e) = change
-    kernel = np.stack([b, -a]) / ((a * e - b * c) * mass)
-    d = y[0] - q[_GAP] if oscillator.campaign.stop else np.full(count, -np.inf)
-    return Motion(
-        y[0], v[0], d, np.arange(count, dtype=np.float64) * (interval / factor), kernel,
-        read[:, ::factor] if order < 2 else read, -1 / mass if order == 2 else 0.0,
-        _steps(v[0], d, interval / factor),
-        factor,
-    )  # fmt: skip
-
-
-def _simulated(fit: Fit, r: int, points: Array, order: int, count: int, interval: float) -> Array:
-    """Motions, (B, count), of slot vectors (B, Q)."""
-    oscillator = fit.target.oscillator
-    size = points.shape[0]
-    inputs = None if oscillator.inputs is None else oscillator.inputs.of(np.full(size, r))
-    counts, intervals = np.full(size, count, dtype=np.int64), np.full(size, interval)
-    orders, mass = np.full(size, order, dtype=np.int64), oscillator.campaign.mass
-    if oscillator.is_base:
-        base = np.ascontiguousarray(points[:, : len(BASE_SLOTS)])
-        return motions(base, mass, counts, intervals, orders, inputs)
-    return general_motions(points, mass, counts, intervals, oscillator.laws, orders, inputs)
-
-
-def _change_of_acceleration(fit: Fit, r: int, points: Array, steps: Array) -> Array:
-    oscillator = fit.target.oscillator
-    count, interval = int(oscillator.counts[r]), float(oscillator.intervals[r])
-    x = _simulated(fit, r, points, 2, count, interval)
-    return np.asarray((x[1::2] - x[2::2]) / (2 * steps[:, None]))
+    y, v = (motions_beside(oscillator, r, q[None], k, factor=factor)[0] for k in (0, 1))
+    d = y - q[_GAP] if oscillator.campaign.stop else np.full(y.size, -np.inf)
+    changes = free_changes(oscillator, r, q, STEP * reach, factor=factor)
+    stretches = tuple(
+        Stretch(part.begin // factor, -push.T, part.readings[::factor].T, carried)
+        for part, push, carried in zip(
+            changes.stretches, changes.pushes, changes.carried, strict=True
+        )
+    )
+    t, steps = np.arange(y.size) * changes.interval, _steps(v, d, changes.interval)
+    return Motion(y, v, d, t, stretches, -changes.direct, steps, factor)
 
 
 def _steps(v: Array, d: Array, h: float) -> Array:
@@ -159,7 +152,7 @@ def responses(motion: Motion, terms: Sequence[Term]) -> tuple[Array, Array, Arra
     responses (K, samples); the largest force of each term along the motion, (K,); its mean power
     with the motion, W, (K,)
     """
-    out = np.empty((len(terms), motion.rows.shape[1]))
+    out = np.empty((len(terms), motion.samples))
     largest, power = np.empty(len(terms)), np.empty(len(terms))
     for first in range(0, len(terms), BLOCK):
         block = slice(first, first + BLOCK)
@@ -172,18 +165,31 @@ def responses(motion: Motion, terms: Sequence[Term]) -> tuple[Array, Array, Arra
 
 def _answers(motion: Motion, forces: Array) -> Array:
     """Responses (K, samples) to forces along the motion (K, n)."""
-    before, after = motion.steps[0] * motion.kernel[:, :-1], motion.steps[1] * motion.kernel[:, 1:]
-    count, samples = forces.shape[0], motion.rows.shape[1]
+    out = np.empty((forces.shape[0], motion.samples))
+    state = np.zeros((2, forces.shape[0]))
+    for part in motion.stretches:
+        samples, first = part.rows.shape[1], part.begin * motion.factor
+        end = first + (samples - 1) * motion.factor
+        state = part.carried @ state
+        states = _states(part, motion, forces[:, first : end + 1], motion.steps[:, first:end])
+        states += state[..., None]
+        np.einsum("ks,kts->ts", part.rows, states, out=out[:, part.begin : part.begin + samples])
+        state = states[..., -1]
+    return out + motion.direct * forces[:, :: motion.factor] if motion.direct else out
+
+
+def _states(part: Stretch, motion: Motion, forces: Array, steps: Array) -> Array:
+    """What forces (K, n) make of both free changes by every sample, (2, K, samples)."""
+    before, after = steps[0] * part.pushes[:, :-1], steps[1] * part.pushes[:, 1:]
+    count, samples, factor = forces.shape[0], part.rows.shape[1], motion.factor
     inner = before[:, 1:] + after[:, :-1]
-    nodes = np.concatenate([before[:, :1], inner], axis=1).reshape(2, samples - 1, motion.factor)
-    cells = forces[:, :-1].reshape(count, samples - 1, motion.factor)
-    state = np.zeros((count, 2, samples))
-    np.cumsum(np.einsum("ksf,tsf->tks", nodes, cells), axis=2, out=state[:, :, 1:])
-    at_samples = forces[:, :: motion.factor]
-    last = after[:, motion.factor - 1 :: motion.factor]  # the last half step to each sample
-    state[:, :, 1:] += last * at_samples[:, None, 1:]
-    out = np.einsum("ks,tks->ts", motion.rows, state)
-    return np.asarray(out + motion.direct * at_samples if motion.direct else out)
+    nodes = np.concatenate([before[:, :1], inner], axis=1).reshape(2, samples - 1, factor)
+    nodes[:, 1:, 0] = before[:, factor::factor]  # what ends at a sample is added there
+    cells = forces[:, :-1].reshape(count, samples - 1, factor)
+    last = after[:, None, factor - 1 :: factor] * forces[:, factor::factor]
+    states = np.zeros((2, count, samples))
+    np.cumsum(np.einsum("ksf,tsf->kts", nodes, cells) + last, axis=2, out=states[:, :, 1:])
+    return states
 
 
 def _forces(motion: Motion, terms: Sequence[Term]) -> Array:

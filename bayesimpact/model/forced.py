@@ -38,7 +38,7 @@ def wave_responses(changes: FreeChanges, frequencies: Array) -> Array:
     ends = np.cumsum([part.readings.shape[0] for part in parts])
     readings = np.concatenate([part.readings for part in parts])
     pushes, carried = np.concatenate(changes.pushes), changes.carried
-    out = np.empty((2 * frequencies.size, changes.samples))
+    out = np.empty((2 * frequencies.size, changes.points))
 
     def run(low: int, high: int) -> None:
         _superpose(

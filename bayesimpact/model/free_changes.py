@@ -32,7 +32,7 @@ class Stretch:
 
     Attributes
     ----------
-    begin : its first sample; the last one is the next stretch's first
+    begin : its first point; the last one is the next stretch's first
     states : (n, 2, 2) displacement and velocity (middle axis) of both changes
     readings : (n, 2) what the recording reads of both
     """
@@ -49,7 +49,7 @@ class FreeChanges:
     Attributes
     ----------
     stretches : one after the other
-    mass, interval : kg, s
+    mass, interval : kg, s between points, one or several of which make a sample
     order : which time derivative of the displacement the recording reads
     """
 
@@ -59,8 +59,8 @@ class FreeChanges:
     order: int
 
     @property
-    def samples(self) -> int:
-        """Of the recording."""
+    def points(self) -> int:
+        """Of the recording: its samples, where there is one point for each."""
         last = self.stretches[-1]
         return int(last.begin + last.readings.shape[0])
 
@@ -93,23 +93,27 @@ class FreeChanges:
         return np.array([np.zeros((2, 2)), *found])
 
 
-def free_changes(oscillator: Oscillator, r: int, slots: Array, small: float) -> FreeChanges:
+def free_changes(
+    oscillator: Oscillator, r: int, slots: Array, small: float, *, factor: int = 1
+) -> FreeChanges:
     """Changes of recording r's motion by the initial state, later ones by short pushes.
 
     Parameters
     ----------
     slots : (Q,) of the recording
     small : size of the changes, m: small enough to be linear
+    factor : points per sample
     """
-    mass, interval = oscillator.campaign.mass, float(oscillator.intervals[r])
-    last, rate = int(oscillator.counts[r]) - 1, float(np.sqrt(slots[_K1] / mass))
+    mass, interval = oscillator.campaign.mass, float(oscillator.intervals[r]) / factor
+    last, rate = (int(oscillator.counts[r]) - 1) * factor, float(np.sqrt(slots[_K1] / mass))
     apart = max(1, round(0.5 * np.pi / (rate * interval)))
     q = np.tile(slots, (3, 1))
     q[1, _Y0] += small
     q[2, _V0] += small * rate
     waves = np.zeros((3, last + 1))
-    whole = _run(oscillator, r, q, waves)
+    whole = _run(oscillator, r, q, waves, factor)
     length = _fading(whole.states * [[1.0], [1 / rate]], 2 * apart + SHORTEST)
+    length = -(-length // factor) * factor  # stretches begin on samples
     begins = np.arange(0, max(last - SHORTEST, 1), length)
     found = [_part(whole, 0, last if begins.size == 1 else length)]
     q = np.tile(slots, (3, 1))
@@ -118,17 +122,17 @@ def free_changes(oscillator: Oscillator, r: int, slots: Array, small: float) -> 
         waves[:] = 0.0
         for begin in begins[first::2]:
             waves[[1, 2], [begin - apart - 1, begin - 1]] = small * slots[_K1]
-        runs.append(_run(oscillator, r, q, waves) if begins.size > first else whole)
+        runs.append(_run(oscillator, r, q, waves, factor) if begins.size > first else whole)
     for number, begin in enumerate(begins[1:]):
         end = last if begin == begins[-1] else begin + length
         found.append(_part(runs[number % 2], int(begin), int(end)))
     return FreeChanges(tuple(found), mass, interval, int(oscillator.orders[r]))
 
 
-def _run(oscillator: Oscillator, r: int, q: Array, waves: Array) -> Stretch:
+def _run(oscillator: Oscillator, r: int, q: Array, waves: Array, factor: int) -> Stretch:
     """Both changes over the whole recording."""
     own = int(oscillator.orders[r])
-    rows = {n: motions_beside(oscillator, r, q, n, waves=waves) for n in {0, 1, own}}
+    rows = {n: motions_beside(oscillator, r, q, n, waves=waves, factor=factor) for n in {0, 1, own}}
     changes = {n: (x[1:] - x[0]).T for n, x in rows.items()}
     return Stretch(0, np.stack([changes[0], changes[1]], axis=1), changes[own])
 
@@ -153,23 +157,38 @@ def motions_beside(
     *,
     laws: Laws | None = None,
     waves: Array | None = None,
+    factor: int = 1,
 ) -> Array:
     """Motions (K, n) of recording r for slots (K, Q), with forces beside its own and its input.
 
     laws : table for the general simulator; None: the oscillator's own
-    waves : (K, n) forces at the samples, N
+    waves : (K, n) forces at the points, N
+    factor : points per sample
     """
-    rows = np.full(q.shape[0], r)
-    inputs = None if oscillator.inputs is None else oscillator.inputs.of(rows)
-    if waves is not None:
-        q, waves = q.copy(), waves.copy()
-        if inputs is None or inputs.starts[0] < 0:
+    count = (int(oscillator.counts[r]) - 1) * factor + 1
+    own = _measured_input(oscillator, r, factor)
+    if waves is None:
+        inputs = None if own is None else Inputs(own, np.zeros(q.shape[0], dtype=np.int64))
+    else:
+        if own is None:
+            q = q.copy()
             q[:, _GAIN] = 1.0
         else:
-            first = int(inputs.starts[0])
-            waves = waves / q[:, [_GAIN]] + inputs.values[first : first + waves.shape[1]]
-        inputs = Inputs(waves.reshape(-1), np.arange(q.shape[0]) * waves.shape[1])
+            waves = waves / q[:, [_GAIN]] + own
+        inputs = Inputs(waves.reshape(-1), np.arange(q.shape[0]) * count)
     return general_motions(
-        q, oscillator.campaign.mass, oscillator.counts[rows], oscillator.intervals[rows],
+        q, oscillator.campaign.mass, np.full(q.shape[0], count),
+        np.full(q.shape[0], float(oscillator.intervals[r]) / factor),
         oscillator.laws if laws is None else laws, np.full(q.shape[0], order), inputs,
     )  # fmt: skip
+
+
+def _measured_input(oscillator: Oscillator, r: int, factor: int) -> Array | None:
+    """Recording r's input at its points, (n,): linear between the samples; None without one."""
+    inputs = None if oscillator.inputs is None else oscillator.inputs.of(np.array([r]))
+    if inputs is None or inputs.starts[0] < 0:
+        return None
+    first, count = int(inputs.starts[0]), int(oscillator.counts[r])
+    values = inputs.values[first : first + count]
+    points = np.arange((count - 1) * factor + 1) / factor
+    return values if factor == 1 else np.asarray(np.interp(points, np.arange(count), values))

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from small_rig import PLAIN, PLAIN_RELEASES, RELEASES, RIG, record, vector
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.input import Input
+from bayesimpact.data.recording import Recording
 from bayesimpact.formula.grammar import ONE, Power, Term
 from bayesimpact.formula.law import effect_id, effect_of, starts_of
 from bayesimpact.formula.responses import largest_force, motion_of, responses
@@ -50,6 +54,20 @@ def without_stop() -> Fit:
     return fitted(record(rig=PLAIN, releases=PLAIN_RELEASES[:1], duration=1.0))
 
 
+@pytest.fixture(scope="module")
+def driven() -> Fit:
+    """Forced by noise, nine samples a period, until e^-170 of what began it is left."""
+    rng, n = np.random.default_rng(5), 5000
+    force = Input(1e5 * np.convolve(rng.standard_normal(n), np.ones(4) / 4, mode="same"))
+    recording = Recording("driven", "", np.zeros(n), 1.6e-3, input=force)
+    oscillator = build_oscillator(Campaign("driven", 1.0, (recording,), stop=False))
+    known = {name: 0.0 for name in oscillator.layout.names} | {"c1": 43.0, "k1": 190e3}
+    (samples,) = oscillator.displacements(vector(oscillator.layout, known))
+    reach = float(np.abs(samples).max())
+    samples = samples + 1e-4 * reach * rng.standard_normal(n)
+    return fitted(Campaign("driven", 1.0, (replace(recording, samples=samples),), stop=False))
+
+
 def simulated(fit: Fit, term: Term, size: float) -> tuple[np.ndarray, ...]:
     """Difference of two simulated motions over the size of the force that makes it, m/unit."""
     campaign = fit.target.oscillator.campaign
@@ -78,6 +96,12 @@ def away(fit: Fit, term: Term) -> float:
 @pytest.mark.parametrize("term", FREE, ids=effect_id)
 def test_response_is_that_of_a_simulation_without_a_stop(without_stop: Fit, term: Term) -> None:
     assert away(without_stop, term) < 0.02
+
+
+@pytest.mark.parametrize("term", FREE[1:4], ids=effect_id)
+def test_response_to_an_input_outlasts_what_began_the_motion(driven: Fit, term: Term) -> None:
+    assert len(motion_of(driven, 0).stretches) > 3
+    assert away(driven, term) < 0.02
 
 
 @pytest.mark.parametrize("term", (*FREE, *CONTACT), ids=effect_id)
