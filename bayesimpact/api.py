@@ -120,7 +120,7 @@ def diagnose(
     ------
     InputError : an effect of one's own cannot be used; with the file, the line and the reason
     """
-    from bayesimpact.diagnosis import loop
+    from bayesimpact.diagnosis.diagnose import diagnose as diagnosed
     from bayesimpact.model.own_effects import catalogue_with, check_effects
 
     if effects is None or isinstance(effects, Path | str):
@@ -130,7 +130,7 @@ def diagnose(
         check_effects(chosen)
     shown = None if progress is None else False
     with refit_bar(progress or (lambda words: None), shown) as tell:
-        return loop.diagnose(
+        return diagnosed(
             campaign, rng=generator(seed, rng), effects=chosen, search=search, progress=tell
         )
 

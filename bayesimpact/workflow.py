@@ -18,9 +18,10 @@ from bayesimpact.design.hypotheses import Rivalry, rivalry
 from bayesimpact.design.rank import proposals
 from bayesimpact.design.store import rivals_content, rivals_from
 from bayesimpact.diagnosis.certificate import certificate
+from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.document import document
 from bayesimpact.diagnosis.formula_words import EFFECT_FILE, found_file
-from bayesimpact.diagnosis.loop import Diagnosis, diagnose
+from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.errors import InputError
 from bayesimpact.inference.identify import Identification, identify
 from bayesimpact.inference.posterior import Posterior, sample

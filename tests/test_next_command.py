@@ -14,7 +14,7 @@ from small_rig import record
 import bayesimpact as bi
 from bayesimpact.cli import main
 from bayesimpact.data.campaign import Campaign
-from bayesimpact.diagnosis.loop import diagnose
+from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.inference.identify import Identification
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.report.archive import load_results, save_results

@@ -11,7 +11,8 @@ from effect_rigs import BY_ID
 
 import bayesimpact as bi
 from bayesimpact.data.html import html_table, resolved
-from bayesimpact.diagnosis.loop import Diagnosis, diagnose
+from bayesimpact.diagnosis.diagnose import diagnose
+from bayesimpact.diagnosis.loop import Diagnosis
 
 
 @pytest.fixture(scope="module")

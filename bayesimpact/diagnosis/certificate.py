@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayesimpact.data.campaign import Campaign
-from bayesimpact.diagnosis.loop import Diagnosis, diagnose
+from bayesimpact.diagnosis.diagnose import diagnose
+from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects import SEARCHED
 from bayesimpact.model.effects.effect import Effect

@@ -1,19 +1,16 @@
-"""The loop: fit the base model, ask whether anything is missing, locate, name, model, show."""
+"""The loop on a base fit: ask whether anything is missing, locate, name, model, show."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.html import html_table
 from bayesimpact.diagnosis.decision import Decision, Verdict, decide
 from bayesimpact.diagnosis.extend import campaign_scales
-from bayesimpact.diagnosis.faults.compare import base_failed, gain
 from bayesimpact.diagnosis.force import MissingForce
 from bayesimpact.diagnosis.formula_list import Formulas
 from bayesimpact.diagnosis.formulas import Answer, with_formulas
@@ -24,15 +21,12 @@ from bayesimpact.diagnosis.limits import Limit, limits
 from bayesimpact.diagnosis.locate import Location, locate, locate_effect
 from bayesimpact.diagnosis.name import name
 from bayesimpact.diagnosis.naming import Naming, State, is_large
-from bayesimpact.diagnosis.promising import NEAR_MARGIN, RASH
-from bayesimpact.diagnosis.recording_faults import Corrected, cleaned_campaign, compared_campaign
+from bayesimpact.diagnosis.recording_faults import Corrected
 from bayesimpact.diagnosis.refit import Candidate
-from bayesimpact.diagnosis.scan import scan
-from bayesimpact.diagnosis.smoothing import SAVITZKY_GOLAY, proved_smoothing, whole_campaign
+from bayesimpact.diagnosis.smoothing import SAVITZKY_GOLAY
 from bayesimpact.diagnosis.unknown import with_force
-from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.fit import Fit
-from bayesimpact.inference.identify import Identification, identify
+from bayesimpact.inference.identify import Identification
 from bayesimpact.inference.spectrum import Fingerprint
 from bayesimpact.model.effects import SEARCHED
 from bayesimpact.model.effects.effect import Effect, Scales
@@ -40,14 +34,6 @@ from bayesimpact.model.threads import linear_algebra_alone
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
-BESIDE: Mapping[Verdict, Verdict] = {
-    "adequate": "named",
-    "named": "named",
-    "partly": "partly",
-    "ambiguous": "ambiguous",
-    "unknown": "partly",
-}
-"""Verdicts where a fault of a recording or a filter has been named already."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,117 +100,6 @@ class Diagnosis:
                 low, middle, high = self.intervals.quantiles(name)
                 found.append((name, f"{middle:.4g} ({low:.4g} to {high:.4g}) {unit}"))
         return html_table(repr(self), ("", "median (90 %)"), found)
-
-
-@linear_algebra_alone()
-def diagnose(
-    campaign: Campaign,
-    *,
-    rng: np.random.Generator,
-    effects: Sequence[Effect] = SEARCHED,
-    search: bool = True,
-    progress: Progress | None = None,
-) -> Diagnosis:
-    """Locate, name and model what the base oscillator leaves out of a campaign's recordings.
-
-    Parameters
-    ----------
-    campaign : the recordings
-    rng : source of all random numbers
-    effects : the catalogue, and effects of one's own
-    search : False leaves out the global search and trusts the quick estimates
-    progress : called with a few words before every longer step
-
-    Raises
-    ------
-    InputError : a recording shows no oscillation
-    """
-    say = progress or (lambda message: None)
-    say("fitting the base model")
-    corrected = cleaned_campaign(campaign, rng=rng, search=search)
-    options: dict[str, Any] = {"rng": rng, "effects": effects, "progress": say}
-    say("comparing the recordings")
-    compared = compared_campaign(corrected, rng=rng, search=search)
-    if base_failed(corrected.identification.fit):  # no physics is worth a search yet
-        return _of_corrected(compared, **options)
-    again = None
-    if compared is not corrected and gains_more(compared, corrected, effects, rng=rng):
-        again = _of_corrected(compared, **options)
-        if again.verdict in ("adequate", "named"):
-            return again
-    found = _of_corrected(corrected, **options)
-    if compared is corrected or not is_doubtful(found):
-        return found
-    again = again or _of_corrected(compared, **options)
-    simpler = len(again.effects) + len(compared.compared) <= len(found.effects)
-    settled = again.verdict in ("adequate", "named")
-    return again if settled and (simpler or found.verdict != "named") else found
-
-
-def gains_more(
-    compared: Corrected, before: Corrected, effects: Sequence[Effect], *, rng: np.random.Generator
-) -> bool:
-    """Whether correcting faults gains more than any single effect promises: faults come first then.
-
-    Where physics is missing, recordings of different amplitude show it each in its own way.
-    """
-    fit = before.identification.fit
-    found = scan(fit, effects, campaign_scales(fit), rng=rng)
-    most = max((score.gain for score in found.best()), default=0.0)
-    last = compared.compared[-1]
-    return gain(fit.reduced_chi2, last.after, last.campaign) > RASH * most + NEAR_MARGIN
-
-
-def is_doubtful(found: Diagnosis) -> bool:
-    """Whether what was found may be a fault of a recording: nothing that holds for all recordings
-    alike explains them.
-
-    Physics shows differently in recordings of different amplitude.
-    """
-    own = any(p.scope != "campaign" for e in found.effects for p in e.parameters if not p.circular)
-    own = own or any(map(is_formula, found.effects))
-    return own or found.verdict in ("partly", "ambiguous", "unknown")
-
-
-def _of_corrected(
-    corrected: Corrected,
-    *,
-    rng: np.random.Generator,
-    effects: Sequence[Effect],
-    progress: Progress,
-) -> Diagnosis:
-    """The diagnosis of a campaign whose faults are set aside or corrected."""
-    for fault in corrected.faults:
-        progress(f"set aside or corrected: {fault.recording}: {fault.statement} ({fault.id})")
-    identification = corrected.identification
-    campaign = identification.fit.target.oscillator.campaign
-    filtered = proved_smoothing(campaign)
-    if filtered is None:
-        found = diagnose_fit(identification, rng=rng, effects=effects, progress=progress)
-    else:
-        progress("the noise spectrum proves a filter: fitting through it")
-        measurement = replace(campaign.measurement, smoothing=filtered.smoothing)
-        through = identify(replace(campaign, measurement=measurement), rng=rng, search=False)
-        found = diagnose_fit(through, rng=rng, effects=effects, progress=progress)
-        found = with_smoothing(found, identification, filtered)
-    if not corrected.faults:
-        return replace(found, corrected=corrected)
-    return replace(found, verdict=BESIDE[found.verdict], corrected=corrected)
-
-
-def with_smoothing(
-    found: Diagnosis, identification: Identification, filtered: Fingerprint
-) -> Diagnosis:
-    """The diagnosis made through the filter, told from the fit that knew nothing of it."""
-    return replace(
-        found,
-        verdict=BESIDE[found.verdict],
-        identification=replace(found.identification, search=identification.search),
-        before=identification.fit,
-        effects=(SAVITZKY_GOLAY, *found.effects),
-        location=found.location or whole_campaign(identification),
-        filtered=filtered,
-    )
 
 
 @linear_algebra_alone()

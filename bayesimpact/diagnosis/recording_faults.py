@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -17,8 +18,10 @@ from bayesimpact.diagnosis.faults.compare import (
     compare_recordings,
     misfits,
 )
-from bayesimpact.diagnosis.faults.outliers import residual_spikes, without_spikes
+from bayesimpact.diagnosis.faults.outliers import residual_spikes, spikes_set_aside
 from bayesimpact.inference.identify import Identification, identify
+
+Step = tuple[Compared, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,26 +59,29 @@ def cleaned_campaign(campaign: Campaign, *, rng: np.random.Generator, search: bo
     """
     cleaned, own = set_aside(campaign)
     found = Corrected(identify(cleaned, rng=rng, search=search), own)
-    return found if campaign.keep_faults else _without_spikes(found, campaign, rng=rng)
-
-
-def _without_spikes(found: Corrected, as_read: Campaign, *, rng: np.random.Generator) -> Corrected:
-    """The same without spikes that the fit shows, if it is right about all other samples.
-
-    Where it is not, what stands out at a contact may be physics.
-    """
     fit = found.identification.fit
-    spikes = () if base_failed(fit) else residual_spikes(fit)
+    spikes = () if campaign.keep_faults or base_failed(fit) else residual_spikes(fit)
     if not spikes:
         return found
-    campaign = without_spikes(fit.target.oscillator.campaign, spikes)
-    again = identify(campaign, rng=rng, search=False)
-    if misfits(again.fit):
-        return found
-    again = replace(again, search=found.identification.search)
-    change = fit.reduced_chi2, again.fit.reduced_chi2
+    without = without_spikes(found, spikes, campaign, rng=rng)
+    # where a fit is wrong, what stands out at a contact may be physics
+    return found if misfits(without.identification.fit) else without
+
+
+def without_spikes(
+    found: Corrected, spikes: Sequence[Fault], as_read: Campaign, *, rng: np.random.Generator
+) -> Corrected:
+    """The same with spikes set aside that a fit shows."""
+    before = found.identification
+    campaign = spikes_set_aside(before.fit.target.oscillator.campaign, spikes)
+    again = replace(identify(campaign, rng=rng, search=False), search=before.search)
+    change = before.fit.reduced_chi2, again.fit.reduced_chi2
     told = (_as_read(fault, campaign, as_read) for fault in spikes)
-    return Corrected(again, found.own, tuple(Compared(f, campaign, *change) for f in told))
+    return replace(
+        found,
+        identification=again,
+        compared=(*found.compared, *(Compared(f, campaign, *change) for f in told)),
+    )
 
 
 def _as_read(fault: Fault, campaign: Campaign, as_read: Campaign) -> Fault:
@@ -85,14 +91,20 @@ def _as_read(fault: Fault, campaign: Campaign, as_read: Campaign) -> Fault:
     return replace(fault, spans=tuple((a + cut, b + cut) for a, b in fault.spans))
 
 
-def compared_campaign(before: Corrected, *, rng: np.random.Generator, search: bool) -> Corrected:
-    """The same with faults corrected that comparing the recordings shows; as it was without any."""
-    campaign = before.identification.fit.target.oscillator.campaign
-    compared = () if campaign.keep_faults else compare_recordings(before.identification)
-    if not compared:
-        return before
-    identification = identify(compared[-1].campaign, rng=rng, search=search)
-    return Corrected(identification, before.own, (*before.compared, *compared))
+def comparisons(before: Corrected) -> tuple[Step, ...]:
+    """Faults that comparing the recordings shows, what is corrected together in a step."""
+    if before.identification.fit.target.oscillator.campaign.keep_faults:
+        return ()
+    found = compare_recordings(before.identification)
+    return tuple(tuple(step) for _, step in groupby(found, key=lambda one: one.after))
+
+
+def with_step(
+    before: Corrected, step: Step, *, rng: np.random.Generator, search: bool
+) -> Corrected:
+    """The same with a step of `comparisons` corrected, after all before it."""
+    identification = identify(step[-1].campaign, rng=rng, search=search)
+    return Corrected(identification, before.own, (*before.compared, *step))
 
 
 def as_effects(corrected: Corrected) -> list[dict[str, Any]]:

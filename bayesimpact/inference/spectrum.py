@@ -20,6 +20,7 @@ from scipy import ndimage, optimize, signal, stats
 from scipy.linalg import null_space, toeplitz
 
 from bayesimpact.data.campaign import Smoothing
+from bayesimpact.data.gaps import runs
 from bayesimpact.data.recording import Recording
 from bayesimpact.inference.noise import Noise
 from bayesimpact.model.measurement import gain
@@ -70,8 +71,9 @@ def find_smoothing(recordings: Sequence[Recording]) -> Fingerprint | None:
     likeliest one for white noise must then stand, for white or AR(1) noise, against every spectrum
     that falls or rises throughout.
     """
-    spectra = [without_lines(*_periodogram(r)) for r in recordings]
-    shortest = min(r.samples.size for r in recordings)
+    stretches = [part for r in recordings for part in _stretches(r)]
+    spectra = [without_lines(*_periodogram(r)) for r in stretches]
+    shortest = min(r.samples.size for r in stretches)
     best, most = None, -np.inf
     for window in WINDOWS:
         for order in ORDERS:
@@ -209,6 +211,15 @@ def _covariance(smoothing: Smoothing, recording: Recording, length: int) -> Arra
     frequency: Array = np.asarray(np.fft.rfftfreq(size, recording.interval), dtype=np.float64)
     power = gain(smoothing, recording.interval, frequency) ** 2
     return np.asarray(toeplitz(np.fft.irfft(power, size)[:length]))
+
+
+def _stretches(recording: Recording) -> list[Recording]:
+    """Parts between samples that are set aside, the longest and those half as long at least."""
+    if recording.used is None:
+        return [recording]
+    parts = runs(recording.used)
+    longest = max(end - first for first, end in parts)
+    return [recording.part(a, b) for a, b in parts if b - a >= 0.5 * longest]
 
 
 def _periodogram(recording: Recording) -> tuple[Array, Array, float]:

@@ -20,8 +20,8 @@ import numpy as np
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.read import load_campaign
+from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.document import document
-from bayesimpact.diagnosis.loop import diagnose
 from bayesimpact.errors import InputError
 from bayesimpact.trial.rig_files import write_campaign
 from bayesimpact.workflow import DIAGNOSIS_FILE, diagnose_campaign

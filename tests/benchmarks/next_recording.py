@@ -27,7 +27,8 @@ from bayesimpact.data.recording import Recording
 from bayesimpact.design.candidates import Design
 from bayesimpact.design.hypotheses import Rivalry, rivalry
 from bayesimpact.design.rank import Z90, Proposal, proposals
-from bayesimpact.diagnosis.loop import Diagnosis, diagnose
+from bayesimpact.diagnosis.diagnose import diagnose
+from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.inference.fit import Fit
 from bayesimpact.trial.draw import draw
 from bayesimpact.trial.rig import Release, Rig, record

@@ -9,7 +9,7 @@ from driven_twin import Law, driven_motion
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.input import Input
 from bayesimpact.data.recording import Recording
-from bayesimpact.diagnosis.loop import diagnose
+from bayesimpact.diagnosis.diagnose import diagnose
 
 TRUTH = {"mass": 0.5, "c1": 0.6, "k1": 800.0, "y0": 1e-4, "v0": 0.01}
 STOP = {"c2": 2.0, "g": 1.1e-3, "k2": 5000.0}

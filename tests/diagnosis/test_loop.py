@@ -12,8 +12,9 @@ import small_rig
 from effect_rigs import BY_ID
 from scipy import stats
 
+from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.document import document
-from bayesimpact.diagnosis.loop import Diagnosis, diagnose
+from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.workflow import _strict
 
 CATALOGUE = tuple(

@@ -13,8 +13,9 @@ from effect_rigs import BY_ID
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.faults.noise import loud_recordings
 from bayesimpact.data.faults.spikes import find_spikes
+from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.document import document
-from bayesimpact.diagnosis.loop import Diagnosis, diagnose
+from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.diagnosis.recording_faults import cleaned_campaign
 from bayesimpact.workflow import _strict
 
@@ -94,6 +95,39 @@ def test_what_stands_out_beside_a_wrong_model_is_left_to_physics() -> None:
     found = cleaned_campaign(campaign, rng=np.random.default_rng(0), search=False)
     assert found.faults == ()
     assert found.identification.fit.reduced_chi2 > 1.5
+
+
+def test_spikes_that_show_only_beside_the_physics_are_set_aside_too() -> None:
+    """A gravity pendulum with spikes as small as what the missing sine leaves."""
+    releases = small_rig.PLAIN_RELEASES
+    campaign = small_rig.record(
+        62, rig=replace(small_rig.PLAIN, spring_cubic=-4e5), releases=releases, duration=2.0
+    )
+    samples = campaign.recordings[1].samples.copy()
+    for place in (130, 1910):
+        samples[place : place + 3] += 25 * small_rig.NOISE
+    spoiled = replace(campaign.recordings[1], samples=samples)
+    recordings = (campaign.recordings[0], spoiled, *campaign.recordings[2:])
+    campaign = replace(campaign, recordings=recordings)
+    cubic = (BY_ID["spring_cubic"], *CATALOGUE[:1])
+    found = diagnose(campaign, rng=np.random.default_rng(0), effects=cubic, search=False)
+    assert found.verdict == "named" and [e.id for e in found.effects] == ["spring_cubic"]
+    assert found.corrected is not None
+    assert [f.id for f in found.corrected.faults] == ["recording_spikes"]
+
+
+def test_doubtful_faults_come_after_certain_ones_and_physics() -> None:
+    """A wrong case label is certain; a probe that is not linear must not become another rig."""
+    campaign = small_rig.record(63, rig=replace(small_rig.RIG, sensor_quadratic=0.4))
+    wrong = replace(campaign.recordings[1], case=campaign.recordings[-1].case)
+    campaign = replace(
+        campaign, recordings=(campaign.recordings[0], wrong, *campaign.recordings[2:])
+    )
+    quadratic = (BY_ID["sensor_quadratic"], *CATALOGUE[:1])
+    found = diagnose(campaign, rng=np.random.default_rng(0), effects=quadratic, search=False)
+    assert found.corrected is not None
+    assert [f.id for f in found.corrected.faults] == ["recording_case"]
+    assert [e.id for e in found.effects] == ["sensor_quadratic"]
 
 
 def test_a_recording_in_another_unit_is_not_loud() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import small_rig
 
-from bayesimpact.diagnosis.loop import diagnose
+from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.smoothing import whole_campaign
 from bayesimpact.trial.rig_chain import Chain
 

@@ -8,8 +8,9 @@ import small_rig
 from effect_rigs import BY_ID
 
 from bayesimpact.data.campaign import Measurement, Smoothing
+from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.document import document
-from bayesimpact.diagnosis.loop import Diagnosis, diagnose
+from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.diagnosis.smoothing import proved_smoothing
 from bayesimpact.trial.rig_chain import Chain
 

@@ -37,6 +37,18 @@ def filtered(recordings: list[Recording], window: int, order: int) -> list[Recor
     return [replace(r, samples=savgol_filter(r.samples, window, order)) for r in recordings]
 
 
+def test_a_filter_is_found_beside_samples_that_are_set_aside(silent):
+    """They may be as bad as they like."""
+    recordings = filtered(noisy(silent, 1), 21, 2)
+    loud = recordings[0].samples.copy()
+    loud[700:1100] += 100 * small_rig.NOISE * np.random.default_rng(2).standard_normal(400)
+    used = np.ones(loud.size, bool)
+    used[690:1110] = False
+    found = find_smoothing([replace(recordings[0], samples=loud, used=used), *recordings[1:]])
+    assert found is not None
+    assert (found.smoothing.window, found.smoothing.polyorder) == (21, 2)
+
+
 @pytest.mark.parametrize("rho", [0.0, 0.6])
 @pytest.mark.parametrize(("window", "order"), FILTERS)
 def test_a_filter_is_found_behind_white_and_coloured_noise(silent, window, order, rho):

@@ -9,7 +9,8 @@ import pytest
 import small_rig
 from effect_rigs import BY_ID
 
-from bayesimpact.diagnosis.loop import Diagnosis, diagnose
+from bayesimpact.diagnosis.diagnose import diagnose
+from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.report.diagnosis_arrays import diagnosis_arrays, spectrum
 from bayesimpact.report.force_arrays import POINTS, force_arrays
 from bayesimpact.report.results import Array

@@ -24,6 +24,8 @@ USUAL = 99.0  # percentile of the statistic that the motion alone may reach
 BEYOND = 3.0  # times that percentile
 BENDS = 3.0  # samples: how far a corner of the motion within a few samples may displace both sides
 MOST = 3  # slips: more jumps than this are the signal
+WIDEST = 5  # samples of a spike
+CHANCE = 3.0  # standard deviations
 REPEATED = 3  # samples of a block written twice, at least
 LONGEST = 200  # samples of such a block
 COARSE = 0.02  # of neighbours equal: from here on equal blocks are the step's
@@ -35,7 +37,8 @@ def find_slips(recording: Recording) -> list[Fault]:
     The statistic is the distance of the two extrapolations half way between two samples, over the
     bulk of such distances. A corner keeps the displacement and may only shift it by its change of
     slope times a few samples; besides, three times the 99th percentile over the recording has to be
-    passed, which is what corners of the motion reach. The remedy keeps the longest part without a
+    passed, which is what corners of the motion reach. Where both sides do meet once a few samples
+    beside the place are left out, those were a spike. The remedy keeps the longest part without a
     slip: how many samples are missing need then not be known.
     """
     x = recording.samples
@@ -54,7 +57,9 @@ def find_slips(recording: Recording) -> list[Fault]:
     usual = float(np.percentile(jump, USUAL))
     strong = (jump > max(least * level, BEYOND * usual)) & (jump > BENDS * np.nan_to_num(bend))
     places = [
-        p for p in _peaks(jump, strong, form[1]) if _both_sides_hold(x, p, form, level, least)
+        p
+        for p in _peaks(jump, strong, form[1])
+        if _both_sides_hold(x, p, form, level, least) and not _meet_across(x, p, form)
     ]
     places = _apart([*places, *_written_twice(x)], form[1])
     if not places or len(places) > MOST:
@@ -109,6 +114,23 @@ def _both_sides_hold(
     sides = foretell(x, form, 0, -0.5)
     size = abs(float(sides.after[place] - sides.before[place]))
     return bool(np.nanmax(np.abs([*left, *right])) < max(2 * least * level, 0.25 * size))
+
+
+def _meet_across(x: Array, place: int, form: tuple[int, int]) -> bool:
+    """Whether both sides meet across a few samples just before a place, or just after it.
+
+    They meet where their distance is what noise makes of it, and the jump without the gap is not.
+    """
+    near = foretell(x, form, 0, -0.5)
+    jump = near.after[place] - near.before[place]
+    for gap in range(1, WIDEST + 1):
+        sides = foretell(x, form, gap, 0.5 * (gap - 1))
+        apart = sides.after - sides.before
+        noise = CHANCE * robust_sd(apart)
+        for first in (place - gap, place):
+            if abs(apart[first]) < noise < abs(apart[first] - jump):
+                return True
+    return False
 
 
 def _fault(

@@ -6,6 +6,7 @@ In the residual of a fit there are no impacts, unless the model is wrong.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -27,7 +28,7 @@ def residual_spikes(fit: Fit) -> tuple[Fault, ...]:
     return tuple(found)
 
 
-def without_spikes(campaign: Campaign, faults: tuple[Fault, ...]) -> Campaign:
+def spikes_set_aside(campaign: Campaign, faults: Sequence[Fault]) -> Campaign:
     """The campaign with these spikes set aside."""
     recordings = []
     for recording in campaign.recordings:

@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from bayesimpact.data.bundled import bundled_campaign
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.faults.fault import Fault
-from bayesimpact.data.faults.find import find_faults, set_aside
+from bayesimpact.data.faults.find import find_faults, recording_faults, set_aside
 from bayesimpact.data.faults.flat import reading_step
 from bayesimpact.data.read import load_campaign
 from bayesimpact.data.recording import Recording
@@ -64,6 +65,23 @@ def test_spikes(paper: Campaign, size: float, width: int) -> None:
     assert covered(fault) == {i + k for i in places for k in range(width)}
     assert fault.size == pytest.approx(size, rel=0.2)
     assert fault.remedy.startswith("exclude_s = [[0.8116, ")
+
+
+def pendulum_with_spikes(size: float) -> Recording:
+    """A slow decay under coloured noise with three spikes of three samples, in units of noise."""
+    rng, n = np.random.default_rng(4), 3800
+    noise = lfilter([1.0], [1.0, -0.48], 3.4e-5 * rng.standard_normal(n + 50))[50:]
+    t = 0.01 * np.arange(n)
+    x = -0.04 * np.exp(-0.02 * t) * np.cos(2 * np.pi * t / 1.04) + noise
+    for place, sign in ((830, 1), (1910, -1), (3410, 1)):
+        x[place : place + 3] += sign * size * 3.9e-5
+    return Recording("decay", "", x, 0.01)
+
+
+def test_what_lies_behind_a_spike_is_no_slip() -> None:
+    """The motion goes on behind it where it would have gone."""
+    for size in (15.0, 25.0, 60.0):
+        assert "recording_slip" not in {f.id for f in recording_faults(pendulum_with_spikes(size))}
 
 
 def test_an_impact_is_no_spike_however_short() -> None:

@@ -1,0 +1,199 @@
+"""The whole way: faults of the recordings and missing physics, told from one another.
+
+1. What recordings show of themselves is set aside, and the base model fitted.
+2. What comparing them shows is corrected, step by step, as long as a step gains more than any
+   effect promises.
+3. Physics is searched. Where that ends in doubt, once more with the other steps corrected: the
+   simpler of two answers that explain everything stays.
+4. Spikes may only show against a fit with that physics: then once more without them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.diagnosis.decision import Verdict
+from bayesimpact.diagnosis.extend import campaign_scales
+from bayesimpact.diagnosis.faults.compare import base_failed, gain
+from bayesimpact.diagnosis.faults.outliers import residual_spikes
+from bayesimpact.diagnosis.loop import Diagnosis, Progress, diagnose_fit
+from bayesimpact.diagnosis.promising import NEAR_MARGIN, RASH
+from bayesimpact.diagnosis.recording_faults import (
+    Corrected,
+    Step,
+    cleaned_campaign,
+    comparisons,
+    with_step,
+    without_spikes,
+)
+from bayesimpact.diagnosis.scan import scan
+from bayesimpact.diagnosis.smoothing import SAVITZKY_GOLAY, proved_smoothing, whole_campaign
+from bayesimpact.formula.law import is_formula
+from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.identify import Identification, identify
+from bayesimpact.inference.spectrum import Fingerprint
+from bayesimpact.model.effects import SEARCHED
+from bayesimpact.model.effects.effect import Effect
+from bayesimpact.model.threads import linear_algebra_alone
+
+BESIDE: Mapping[Verdict, Verdict] = {
+    "adequate": "named",
+    "named": "named",
+    "partly": "partly",
+    "ambiguous": "ambiguous",
+    "unknown": "partly",
+}
+"""Verdicts where a fault of a recording or a filter has been named already."""
+
+OPEN: Mapping[Verdict, int] = {"adequate": 0, "named": 0, "ambiguous": 1}
+"""Verdicts that explain everything, by what they leave open."""
+
+Search = Callable[[Corrected], Diagnosis]
+
+
+@linear_algebra_alone()
+def diagnose(
+    campaign: Campaign,
+    *,
+    rng: np.random.Generator,
+    effects: Sequence[Effect] = SEARCHED,
+    search: bool = True,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Locate, name and model what the base oscillator leaves out of a campaign's recordings.
+
+    Parameters
+    ----------
+    campaign : the recordings
+    rng : source of all random numbers
+    effects : the catalogue, and effects of one's own
+    search : False leaves out the global search and trusts the quick estimates
+    progress : called with a few words before every longer step
+
+    Raises
+    ------
+    InputError : a recording shows no oscillation
+    """
+    say = progress or (lambda message: None)
+
+    def physics(corrected: Corrected) -> Diagnosis:
+        return _of_corrected(corrected, rng=rng, effects=effects, progress=say)
+
+    say("fitting the base model")
+    cleaned = cleaned_campaign(campaign, rng=rng, search=search)
+    as_is = cleaned.identification.fit
+    say("comparing the recordings")
+    certain, doubtful = cleaned, list(comparisons(cleaned))
+    while doubtful and is_certain(doubtful[0], certain.identification.fit, effects, rng=rng):
+        certain = with_step(certain, doubtful.pop(0), rng=rng, search=search)
+    found = physics(certain)
+    if doubtful and is_doubtful(found):
+        corrected = certain
+        for step in doubtful:
+            corrected = with_step(corrected, step, rng=rng, search=search)
+        found = _simpler(found, physics(corrected))
+    elif certain is not cleaned and not is_settled(found) and not base_failed(as_is):
+        alone = physics(cleaned)
+        found = alone if is_settled(alone) else found
+    return _without_late_spikes(found, campaign, physics, rng=rng)
+
+
+def is_certain(
+    step: Step, fit: Fit, effects: Sequence[Effect], *, rng: np.random.Generator
+) -> bool:
+    """Whether correcting faults gains more than any single effect promises: they come first then.
+
+    Where physics is missing, recordings of different amplitude show it each in its own way.
+    """
+    if base_failed(fit):
+        return True
+    found = scan(fit, effects, campaign_scales(fit), rng=rng)
+    most = max((score.gain for score in found.best()), default=0.0)
+    last = step[-1]
+    return gain(fit.reduced_chi2, last.after, last.campaign) > RASH * most + NEAR_MARGIN
+
+
+def is_settled(found: Diagnosis) -> bool:
+    """Whether nothing remains and nothing is open."""
+    return found.verdict in ("adequate", "named")
+
+
+def is_doubtful(found: Diagnosis) -> bool:
+    """Whether what was found may be a fault of a recording: nothing that holds for all recordings
+    alike explains them.
+
+    Physics shows differently in recordings of different amplitude.
+    """
+    own = any(p.scope != "campaign" for e in found.effects for p in e.parameters if not p.circular)
+    own = own or any(map(is_formula, found.effects))
+    return own or not is_settled(found)
+
+
+def _simpler(found: Diagnosis, again: Diagnosis) -> Diagnosis:
+    """Of an answer and the one with further faults corrected: what leaves less open, with least.
+
+    Faults that leave something unexplained have not proved themselves.
+    """
+    order = (OPEN.get(again.verdict, 2), _size(again)), (OPEN.get(found.verdict, 2), _size(found))
+    return again if again.verdict in OPEN and order[0] <= order[1] else found
+
+
+def _size(found: Diagnosis) -> int:
+    """Effects, and faults that comparing recordings showed."""
+    return len(found.effects) + (len(found.corrected.compared) if found.corrected else 0)
+
+
+def _without_late_spikes(
+    found: Diagnosis, as_read: Campaign, physics: Search, *, rng: np.random.Generator
+) -> Diagnosis:
+    """The answer without spikes that only the extended fit shows, if it leaves nothing then."""
+    spikes = () if as_read.keep_faults or base_failed(found.after) else residual_spikes(found.after)
+    if not spikes or found.corrected is None:
+        return found
+    again = physics(without_spikes(found.corrected, spikes, as_read, rng=rng))
+    return again if is_settled(again) and len(again.effects) <= len(found.effects) else found
+
+
+def _of_corrected(
+    corrected: Corrected,
+    *,
+    rng: np.random.Generator,
+    effects: Sequence[Effect],
+    progress: Progress,
+) -> Diagnosis:
+    """The diagnosis of a campaign whose faults are set aside or corrected."""
+    for fault in corrected.faults:
+        progress(f"set aside or corrected: {fault.recording}: {fault.statement} ({fault.id})")
+    identification = corrected.identification
+    campaign = identification.fit.target.oscillator.campaign
+    filtered = proved_smoothing(campaign)
+    if filtered is None:
+        found = diagnose_fit(identification, rng=rng, effects=effects, progress=progress)
+    else:
+        progress("the noise spectrum proves a filter: fitting through it")
+        measurement = replace(campaign.measurement, smoothing=filtered.smoothing)
+        through = identify(replace(campaign, measurement=measurement), rng=rng, search=False)
+        found = diagnose_fit(through, rng=rng, effects=effects, progress=progress)
+        found = with_smoothing(found, identification, filtered)
+    if not corrected.faults:
+        return replace(found, corrected=corrected)
+    return replace(found, verdict=BESIDE[found.verdict], corrected=corrected)
+
+
+def with_smoothing(
+    found: Diagnosis, identification: Identification, filtered: Fingerprint
+) -> Diagnosis:
+    """The diagnosis made through the filter, told from the fit that knew nothing of it."""
+    return replace(
+        found,
+        verdict=BESIDE[found.verdict],
+        identification=replace(found.identification, search=identification.search),
+        before=identification.fit,
+        effects=(SAVITZKY_GOLAY, *found.effects),
+        location=found.location or whole_campaign(identification),
+        filtered=filtered,
+    )
