@@ -13,10 +13,13 @@ from effect_rigs import BY_ID
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.faults.noise import loud_recordings
 from bayesimpact.data.faults.spikes import find_spikes
+from bayesimpact.diagnosis import diagnose as module
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.document import document
+from bayesimpact.diagnosis.faults.compare import Compared
 from bayesimpact.diagnosis.loop import Diagnosis
-from bayesimpact.diagnosis.recording_faults import cleaned_campaign
+from bayesimpact.diagnosis.recording_faults import Corrected, Step, cleaned_campaign
+from bayesimpact.trial.rig import Release
 from bayesimpact.workflow import _strict
 
 CATALOGUE = tuple(BY_ID[i] for i in ("coulomb_friction", "gap_per_recording", "sensor_drift"))
@@ -98,33 +101,46 @@ def test_what_stands_out_beside_a_wrong_model_is_left_to_physics() -> None:
 
 
 def test_spikes_that_show_only_beside_the_physics_are_set_aside_too() -> None:
-    """A gravity pendulum with spikes as small as what the missing sine leaves."""
-    releases = small_rig.PLAIN_RELEASES
+    """Their size is that of what the missing spring leaves."""
+    cubic = {"spring_cubic": {"stiffness": -4e5}}
+    releases = (*small_rig.PLAIN_RELEASES, Release("c", "", -5.5e-3))
     campaign = small_rig.record(
-        62, rig=replace(small_rig.PLAIN, spring_cubic=-4e5), releases=releases, duration=2.0
+        62, cubic, rig=small_rig.PLAIN, releases=releases, rate=100.0, duration=8.0
     )
     samples = campaign.recordings[1].samples.copy()
-    for place in (130, 1910):
-        samples[place : place + 3] += 25 * small_rig.NOISE
+    for place in (130, 610):
+        samples[place : place + 3] += 15 * small_rig.NOISE
     spoiled = replace(campaign.recordings[1], samples=samples)
     recordings = (campaign.recordings[0], spoiled, *campaign.recordings[2:])
     campaign = replace(campaign, recordings=recordings)
-    cubic = (BY_ID["spring_cubic"], *CATALOGUE[:1])
-    found = diagnose(campaign, rng=np.random.default_rng(0), effects=cubic, search=False)
+    catalogue = (BY_ID["spring_cubic"], *CATALOGUE[:1])
+    found = diagnose(campaign, rng=np.random.default_rng(0), effects=catalogue, search=False)
     assert found.verdict == "named" and [e.id for e in found.effects] == ["spring_cubic"]
     assert found.corrected is not None
     assert [f.id for f in found.corrected.faults] == ["recording_spikes"]
 
 
-def test_doubtful_faults_come_after_certain_ones_and_physics() -> None:
+def test_doubtful_faults_come_after_certain_ones_and_physics(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """A wrong case label is certain; a probe that is not linear must not become another rig."""
-    campaign = small_rig.record(63, rig=replace(small_rig.RIG, sensor_quadratic=0.4))
-    wrong = replace(campaign.recordings[1], case=campaign.recordings[-1].case)
-    campaign = replace(
-        campaign, recordings=(campaign.recordings[0], wrong, *campaign.recordings[2:])
-    )
-    quadratic = (BY_ID["sensor_quadratic"], *CATALOGUE[:1])
-    found = diagnose(campaign, rng=np.random.default_rng(0), effects=quadratic, search=False)
+    compared = module.comparisons
+
+    def and_another_rig(before: Corrected) -> tuple[Step, ...]:
+        (label,) = compared(before)
+        known = label[-1]
+        without = replace(known.campaign, recordings=known.campaign.recordings[:-1])
+        fault = replace(known.fault, id="recording_other_rig", recording="d")
+        return label, (Compared(fault, without, known.after, 0.99 * known.after),)
+
+    monkeypatch.setattr(module, "comparisons", and_another_rig)
+    releases = (*small_rig.RELEASES, Release("d", "2", -6e-3))
+    probe = {"sensor_quadratic": {"gain": 0.8}}
+    campaign = small_rig.record(63, probe, releases=releases)
+    first, second, *others = campaign.recordings
+    campaign = replace(campaign, recordings=(first, replace(second, case="2"), *others))
+    catalogue = (BY_ID["sensor_quadratic"], *CATALOGUE[:1])
+    found = diagnose(campaign, rng=np.random.default_rng(0), effects=catalogue, search=False)
     assert found.corrected is not None
     assert [f.id for f in found.corrected.faults] == ["recording_case"]
     assert [e.id for e in found.effects] == ["sensor_quadratic"]

@@ -14,9 +14,11 @@ from bayesimpact.data.recording import Recording
 BAND = 5.0  # standard deviations of the noise, or two steps, about the first reading
 NATURAL = 3.0  # times as long as a free motion stays in that band at a turning point
 SHORTEST = 0.08  # of a period
+FEWEST = 3  # samples, whose median is the reading at rest: no more of them would be no rest
 LATE = 1.1  # of a period: a free decay is largest before
 PERIODS = 1.0  # of a hum, over which it is fitted first
 WIDE = 11  # samples of a running median: spikes of five do not show in it
+NARROW = 1 / 8  # of a period, at most: a wider one bends the motion
 UNCROSSED = 0.75  # of a period: a free motion passes its rest within half a period
 GROWTH = 1.3  # largest excursion over what came before it on the same side
 
@@ -34,17 +36,18 @@ def find_start(recording: Recording) -> list[Fault]:
     quiet = recording.samples
     if hum is not None:
         quiet = quiet - hum.readings(np.arange(quiet.size, dtype=np.float64))
-    x = median_filter(quiet, WIDE, mode="nearest")  # blind to spikes
-    period = rough_period(x, 1.0)
+    period = rough_period(quiet, 1.0)
     if period is None:
         return []
+    half = int(min(WIDE, NARROW * period) - 1) // 2
+    x = median_filter(quiet, 2 * max(half, 0) + 1, mode="nearest")  # blind to spikes
     noise, step = noise_level(quiet), reading_step(recording.samples)
     band = max(BAND * noise, 2.0 * step, 1e-9 * float(np.ptp(x)))
     settled = float(np.median(x[x.size // 2 :]))
     peak = int(np.argmax(np.abs(x - settled)))
     height = abs(float(x[peak] - settled))
     natural = np.sqrt(2.0 * band / max(height, band)) * period / (2 * np.pi)
-    least = max(NATURAL * natural, SHORTEST * period)
+    least = max(NATURAL * natural, SHORTEST * period, FEWEST)
     hand = _grown(x - settled, peak, period)
     rest = _leaves(x, peak if hand else 0, band, None if hum is None else hum.frequency)
     if not hand and rest <= least:
@@ -79,7 +82,7 @@ def _leaves(x: Array, first: int, band: float, hum: float | None) -> int:
     all that was at rest so far.
     """
     if hum is None:
-        return first + _outside(x[first:] - float(np.median(x[first : first + 3])), band)
+        return first + _outside(x[first:] - float(np.median(x[first : first + FEWEST])), band)
     angle = 2 * np.pi * hum * np.arange(x.size - first)
     columns = np.column_stack([np.ones(angle.size), np.cos(angle), np.sin(angle)])
     size, longer = 0, int(np.ceil(PERIODS / hum))

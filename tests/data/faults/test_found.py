@@ -170,6 +170,16 @@ def test_rest_and_pull_before_the_release(paper: Campaign) -> None:
         assert kept.start == pytest.approx(fault.spans[0][1] * 1e-3)
 
 
+@pytest.mark.parametrize("samples", [8.0, 16.0, 31.0])
+def test_a_free_decay_of_few_samples_a_period_begins_at_once(samples: float) -> None:
+    """Nothing that is done against spikes may bend it."""
+    t = np.arange(800) / samples
+    x = 5e-3 * np.exp(-0.02 * t) * np.cos(2 * np.pi * t)
+    x += 5e-6 * np.random.default_rng(1).standard_normal(t.size)
+    found = recording_faults(Recording("decay", "", x, 0.01))
+    assert [f for f in found if f.action != "notice"] == []
+
+
 def test_noise_that_rises_for_a_while(paper: Campaign) -> None:
     rng = np.random.default_rng(3)
 
