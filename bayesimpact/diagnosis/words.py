@@ -53,10 +53,15 @@ def remaining(left: Remainder | None, unit: str = "m") -> str:
         return ""
     place = _REGIMES[left.regime]
     guess = left.guess.replace("_", " ")
+    size = "smaller than the noise"
+    if left.rms > 0.0:
+        size = (
+            f"{amount(left.rms, unit)} rms, {two_digits(100 * left.share)} % of the signal and "
+            f"{two_digits(left.over_noise)} times the noise with it"
+        )
     return (
-        f" Something remains: {amount(left.rms, unit)} rms, "
-        f"{two_digits(100 * left.share)} % of the signal and {two_digits(left.over_noise)} times "
-        f"the noise with it, {place}; the next guess is {guess}. The intervals allow for it."
+        f" Something remains: {size}, {place}; the next guess is {guess}. "
+        "The intervals allow for it."
     )
 
 

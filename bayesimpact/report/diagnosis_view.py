@@ -171,7 +171,7 @@ def _formula(formula: Mapping[str, Any], force: str) -> dict[str, str]:
         "formula": str(formula.get("formula", "")),
         "unit": typeset(str(formula.get("unit") or "")),
         "sizes": ", ".join(significant(float(x), 3) for x in formula.get("sizes") or ()),
-        "peak": size_words({**peak, "of": formula.get("of")}),
+        "peak": size_words(peak),
         "probability": probability(formula.get("probability")),
         "odds": _plain(formula.get("log_odds"), 1),
         "fitted": "" if formula.get("fitted", True) else "scored only",
