@@ -68,12 +68,21 @@ def _attempt(settings: Settings, seed: int, kind: str, turn: int, rng: Rng) -> D
     drawn = _recorded(settings, seed, kind, design, found, rng)
     if kind not in ("fault", "fault_single"):
         return drawn
-    return _with_fault(drawn, design, {one.effect: one.numbers for one in found}, turn, rng)
+    faults = _faults(settings, ids)
+    rounds = turn // len(settings.effects) if ids else 0  # another fault each time round
+    effects = {one.effect: one.numbers for one in found}
+    return _with_fault(drawn, design, effects, faults[(turn + rounds) % len(faults)], rng)
 
 
-def _with_fault(drawn: Drawn, design: Design, effects: Effects, turn: int, rng: Rng) -> Drawn:
-    """The same trial with the fault whose turn it is in one recording."""
-    kind = [*PLANTS, OTHER_RIG][turn % (len(PLANTS) + 1)]
+def _faults(settings: Settings, ids: tuple[str, ...]) -> list[str]:
+    """Faults that some rig shows on which these effects can stand."""
+    cases = max(BENCHES[name].cases for name in _possible(settings, ids))
+    known = [k for k, plant in PLANTS.items() if cases >= (2 if k == "case" else plant.stop)]
+    return [*known, OTHER_RIG]
+
+
+def _with_fault(drawn: Drawn, design: Design, effects: Effects, kind: str, rng: Rng) -> Drawn:
+    """The same trial with a fault in one recording."""
     if kind == OTHER_RIG:
         campaign, fault = another_rig(drawn.campaign, design, effects, rng)
         return Drawn(campaign, {**drawn.truth, "fault": fault})

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from bayesimpact.data.faults.fault import fault_document
 from bayesimpact.data.faults.find import find_faults
+from bayesimpact.trial import draw as draw_module
 from bayesimpact.trial.draw import draw
 from bayesimpact.trial.faults import PLANTS, judge_fault, plant_fault
 from bayesimpact.trial.settings import Settings
@@ -81,3 +84,10 @@ def test_a_fault_and_an_effect_stand_in_one_truth() -> None:
     truth = draw(settings, 0).truth
     assert truth["fault"]["id"] == "recording_spikes"
     assert [p["id"] for p in truth["planted"]] == ["spring_cubic"]
+
+
+def test_faults_beside_an_effect_are_those_that_its_rigs_can_show() -> None:
+    settings = replace(SETTINGS, benches=("paper", "torsion", "plain"))
+    assert draw_module._faults(settings, ()) == [*PLANTS, "other_rig"]
+    beside = draw_module._faults(settings, ("pendulum_sine",))
+    assert {"reversed", "gain", "clock", "case"}.isdisjoint(beside) and "duplicate" in beside
