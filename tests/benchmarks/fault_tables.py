@@ -6,33 +6,31 @@ from benchmarks.tables import HERE, grid, stored
 from benchmarks.trial_tables import share
 
 BASE = ("c1", "k1", "c2", "g", "k2")
-ALONE, BESIDE, NONE = "faults", "fault_single", "controls"
+RUNS = {"faults": "alone: named, with its place", "fault_single": "beside an effect: both"}
+KINDS = {"faults": "fault", "fault_single": "fault_single"}
+SHARES = {
+    "confident_wrong_names": "a wrong name given with confidence",
+    "worse": "fit worse after than before",
+    "crashes": "crashes, report and figures included",
+}
 
 
 def fault_table() -> str:
-    """Every fault alone and beside an effect, and what is reported where there is none."""
-    if not all((HERE / f"{name}.json").exists() for name in (ALONE, BESIDE)):
+    """Every fault alone and, once that run is stored, beside an effect."""
+    runs = {name: stored(name) for name in RUNS if (HERE / f"{name}.json").exists()}
+    if not runs:
         return "No run is stored yet."
-    alone, beside = stored(ALONE), stored(BESIDE)
-    kinds = sorted({answer["fault"] for answer in alone["answers"]})
-    rows = [(f"`{kind}`", _right(alone, kind), _right(beside, kind)) for kind in kinds]
+    faults = sorted({answer["fault"] for t in runs.values() for answer in t["answers"]})
+    rows = [(f"`{fault}`", *(_right(t, fault) for t in runs.values())) for fault in faults]
+    rows.append(("all", *(share(t["right"][KINDS[name]]) for name, t in runs.items())))
+    rows += [(words, *(share(t[key]) for t in runs.values())) for key, words in SHARES.items()]
     rows += [
-        ("all", share(alone["right"]["fault"]), share(beside["right"]["fault_single"])),
-        _both("a wrong name given with confidence", "confident_wrong_names"),
-        _both("fit worse after than before", "worse"),
-        _both("crashes, report and figures included", "crashes"),
+        (f"90 % intervals of {p} hold the truth", *(_held(t, p) for t in runs.values()))
+        for p in BASE
     ]
-    rows += [
-        (f"90 % intervals of {name} hold the truth", _held(alone, name), _held(beside, name))
-        for name in BASE
-    ]
-    head = ("fault of one recording", "alone: named, with its place", "beside an effect: both")
-    feet = [_run(t) for t in (alone, beside)]
-    return grid(head, rows, f"{'; '.join(feet)}. In brackets: 95 % interval.")
-
-
-def _both(words: str, key: str) -> tuple[str, str, str]:
-    return words, share(stored(ALONE)[key]), share(stored(BESIDE)[key])
+    feet = "; ".join(_run(t) for t in runs.values())
+    head = ("fault of one recording", *(RUNS[name] for name in runs))
+    return grid(head, rows, f"{feet}. In brackets: 95 % interval.")
 
 
 def _right(run: dict, kind: str) -> str:
