@@ -17,6 +17,7 @@ Let S be the likeliest set of effects that the search reached.
      residual force by these odds (as in 1), and
    - no other effect in its place, with such a force beside, comes within these odds of that, or
      above it where it has more parameters: what remains may be what tells two laws apart.
+   A search that ended by its limit must have fitted all of these.
    With needed effects the verdict is `partly`, without any it is `unknown`. Other effects of S stay
    in the fitted model, but are not named.
 
@@ -84,14 +85,26 @@ def is_needed(naming: Naming, effect: Effect) -> bool:
     if not (may_be_needed(naming, effect) and stands_out(naming, effect)):
         return False
     chosen = frozenset(naming.chosen.candidate.ids)
-    if not (naming.finished or naming.residual):
-        return False  # the search ended before it was compared
+    if not (naming.finished or is_compared(naming, effect)):
+        return False
     reached = naming.with_residual_force(chosen)
     return not any(
         naming.with_residual_force(ids) > reached + lead(naming, ids)
         for ids, candidate in naming.residual.items()
         if not holds(candidate.effects, effect)
     )
+
+
+def is_compared(naming: Naming, effect: Effect) -> bool:
+    """Whether a search that ended by its limit has still fitted what an effect must beat.
+
+    With a residual force: the chosen model, the base model, the one without the effect, and the
+    likeliest with another in its place.
+    """
+    chosen = frozenset(naming.chosen.candidate.ids)
+    other = in_its_place(naming, effect)
+    rivals = {chosen, frozenset[str](), chosen - {effect.id}}
+    return rivals | ({frozenset(other.ids)} if other else set()) <= naming.residual.keys()
 
 
 def lead(naming: Naming, ids: frozenset[str]) -> float:

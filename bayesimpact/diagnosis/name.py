@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bayesimpact.diagnosis.decision import in_its_place, may_be_needed
+from bayesimpact.diagnosis.decision import in_its_place, may_be_needed, ordered
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.force import missing_contact
 from bayesimpact.diagnosis.models import SHORT, STARTS, Models, Progress
@@ -372,15 +372,16 @@ class _Search(Models):
         tried = tuple(sorted(self.tried.values(), key=self.worth, reverse=True))
         found = replace(found, tried=tried, states=dict(self.states))
         parts = [chosen]
-        for effect in chosen.effects:
-            if may_be_needed(found, effect):
-                other = in_its_place(found, effect)
-                parts += [smaller[effect.id], *([other] if other else [])]
-        if len(parts) > 1:  # a force in the place of all of them too
+        needed = [e for e in ordered(found, chosen.effects) if may_be_needed(found, e)]
+        if needed:  # a force in the place of all of them too
             parts.append(found.base.candidate)
+        for effect in needed:
+            other = in_its_place(found, effect)
+            parts += [smaller[effect.id], *([other] if other else [])]
         residual: dict[frozenset[str], Candidate] = {}
-        for part in parts:
-            if self.clock() > self.end:  # what is not compared with all of them is not needed
-                return replace(found, states=dict(self.states), finished=False)
-            residual[frozenset(part.ids)] = self.with_residual(self.examine(part))
+        for ids, part in {frozenset(p.ids): p for p in parts}.items():
+            if self.clock() > self.end:  # what is not compared with all of its own is not needed
+                found = replace(found, finished=False)
+                break
+            residual[ids] = self.with_residual(self.examine(part))
         return replace(found, states=dict(self.states), residual=residual)

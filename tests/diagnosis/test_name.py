@@ -162,6 +162,22 @@ def test_an_effect_that_a_residual_force_replaces_is_not_needed():
         assert judge(found) == verdict, (beside, instead)
 
 
+def test_a_search_that_ended_by_its_limit_needs_only_what_it_has_compared():
+    """The effect with a residual force beside, and such a force in its place."""
+    found = remaining(something_left(), 100.0, 10.0, beside=110.0, instead=100.0)
+    ended = replace(found, finished=False)
+    assert judge(found) == judge(ended) == "partly"
+    for missing in found.residual:
+        some = {key: model for key, model in found.residual.items() if key != missing}
+        assert judge(replace(ended, residual=some)) == "unknown"
+    other = candidate(DRAG, 50.0)
+    ended = remaining(something_left(), 100.0, 10.0, other, beside=110.0, instead=100.0)
+    ended = replace(ended, finished=False)
+    assert judge(ended) == "unknown"
+    fitted = {frozenset([DRAG]): replace(other, log_evidence=1050.0)}
+    assert judge(replace(ended, residual={**ended.residual, **fitted})) == "partly"
+
+
 def test_an_effect_whose_place_another_can_take_beside_a_residual_force_is_not_needed():
     """What remains may be what tells two laws apart."""
     other = candidate(DRAG, 50.0)
