@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.formula.grammar import ONE, Term
 from bayesimpact.inference.fit import Fit
-from bayesimpact.model.free_changes import free_changes, motions_beside
+from bayesimpact.model.free_changes import FreeChanges, free_changes, motions_beside
 from bayesimpact.model.parameters import SLOTS
 
 Array = NDArray[np.float64]
@@ -34,32 +34,13 @@ _GAP, _K1 = (SLOTS.index(n) for n in ("g", "k1"))
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
-    """Free changes over a part of a recording.
-
-    Attributes
-    ----------
-    begin : its first sample; the last one is the next stretch's first
-    pushes : (2, n) what a unit impulse against the motion's direction makes of both, at every point
-    rows : (2, samples) what the probe reads of both, before its filter
-    carried : (2, 2) what both of the stretch before become at its begin
-    """
-
-    begin: int
-    pushes: Array
-    rows: Array
-    carried: Array
-
-
-@dataclass(frozen=True, eq=False)
 class Motion:
     """One recording's fitted motion on a grid `factor` times as fine as its samples.
 
     Attributes
     ----------
     y, v, d, t : displacement m, velocity m/s, indentation m, time s, (n,)
-    stretches : its free changes
-    direct : what an acceleration reads of the force itself, 1/kg; 0 for other quantities
+    changes : its free changes on that grid
     steps : (2, n - 1) weights of both ends of every step in an integral over time, s
     factor : fine steps in a sample
     """
@@ -68,8 +49,7 @@ class Motion:
     v: Array
     d: Array
     t: Array
-    stretches: tuple[Stretch, ...]
-    direct: float
+    changes: FreeChanges
     steps: Array
     factor: int
 
@@ -95,14 +75,9 @@ def motion_of(fit: Fit, r: int) -> Motion:
     y, v = (motions_beside(oscillator, r, q[None], k, factor=factor)[0] for k in (0, 1))
     d = y - q[_GAP] if oscillator.campaign.stop else np.full(y.size, -np.inf)
     changes = free_changes(oscillator, r, q, STEP * reach, factor=factor)
-    stretches = tuple(
-        Stretch(part.begin // factor, -push.T, part.readings[::factor].T, carried)
-        for part, push, carried in zip(
-            changes.stretches, changes.pushes, changes.carried, strict=True
-        )
-    )
+    _ = changes.pushes, changes.carried  # raise here, where the caller expects it
     t, steps = np.arange(y.size) * changes.interval, _steps(v, d, changes.interval)
-    return Motion(y, v, d, t, stretches, -changes.direct, steps, factor)
+    return Motion(y, v, d, t, changes, steps, factor)
 
 
 def _steps(v: Array, d: Array, h: float) -> Array:
@@ -167,21 +142,28 @@ def _answers(motion: Motion, forces: Array) -> Array:
     """Responses (K, samples) to forces along the motion (K, n)."""
     out = np.empty((forces.shape[0], motion.samples))
     state = np.zeros((2, forces.shape[0]))
-    for part in motion.stretches:
-        samples, first = part.rows.shape[1], part.begin * motion.factor
-        end = first + (samples - 1) * motion.factor
-        state = part.carried @ state
-        states = _states(part, motion, forces[:, first : end + 1], motion.steps[:, first:end])
+    changes, factor = motion.changes, motion.factor
+    for part, pushes, carried in zip(
+        changes.stretches, changes.pushes, changes.carried, strict=True
+    ):
+        own = slice(part.begin, part.begin + part.readings.shape[0])
+        rows = part.readings[::factor].T
+        first = part.begin // factor
+        state = carried @ state
+        # laws stand on the left-hand side: their force acts against the motion's direction
+        states = _states(
+            -pushes.T, forces[:, own], motion.steps[:, own][:, : pushes.shape[0] - 1], factor
+        )
         states += state[..., None]
-        np.einsum("ks,kts->ts", part.rows, states, out=out[:, part.begin : part.begin + samples])
+        np.einsum("ks,kts->ts", rows, states, out=out[:, first : first + rows.shape[1]])
         state = states[..., -1]
-    return out + motion.direct * forces[:, :: motion.factor] if motion.direct else out
+    return out - changes.direct * forces[:, ::factor] if changes.direct else out
 
 
-def _states(part: Stretch, motion: Motion, forces: Array, steps: Array) -> Array:
+def _states(pushes: Array, forces: Array, steps: Array, factor: int) -> Array:
     """What forces (K, n) make of both free changes by every sample, (2, K, samples)."""
-    before, after = steps[0] * part.pushes[:, :-1], steps[1] * part.pushes[:, 1:]
-    count, samples, factor = forces.shape[0], part.rows.shape[1], motion.factor
+    before, after = steps[0] * pushes[:, :-1], steps[1] * pushes[:, 1:]
+    count, samples = forces.shape[0], (forces.shape[1] - 1) // factor + 1
     inner = before[:, 1:] + after[:, :-1]
     nodes = np.concatenate([before[:, :1], inner], axis=1).reshape(2, samples - 1, factor)
     nodes[:, 1:, 0] = before[:, factor::factor]  # what ends at a sample is added there

@@ -100,7 +100,7 @@ def test_response_is_that_of_a_simulation_without_a_stop(without_stop: Fit, term
 
 @pytest.mark.parametrize("term", FREE[1:4], ids=effect_id)
 def test_response_to_an_input_outlasts_what_began_the_motion(driven: Fit, term: Term) -> None:
-    assert len(motion_of(driven, 0).stretches) > 3
+    assert len(motion_of(driven, 0).changes.stretches) > 3
     assert away(driven, term) < 0.02
 
 
