@@ -87,7 +87,7 @@ def diagnose(
     cleaned = cleaned_campaign(campaign, rng=rng, search=search)
     as_is = cleaned.identification.fit
     say("comparing the recordings")
-    certain, doubtful = cleaned, list(comparisons(cleaned))
+    certain, doubtful = cleaned, list(comparisons(cleaned, campaign))
     while doubtful and is_certain(doubtful[0], certain.identification.fit, effects, rng=rng):
         certain = with_step(certain, doubtful.pop(0), rng=rng, search=search)
     found = physics(certain)

@@ -85,17 +85,21 @@ def without_spikes(
 
 
 def _as_read(fault: Fault, campaign: Campaign, as_read: Campaign) -> Fault:
-    """A fault with its samples counted from the recording's first as it was read."""
+    """A fault found in a campaign, its samples counted from the recording's first as read."""
     now, before = ({r.name: r for r in c.recordings}[fault.recording] for c in (campaign, as_read))
     cut = round((now.start - before.start) / now.interval)
     return replace(fault, spans=tuple((a + cut, b + cut) for a, b in fault.spans))
 
 
-def comparisons(before: Corrected) -> tuple[Step, ...]:
+def comparisons(before: Corrected, as_read: Campaign) -> tuple[Step, ...]:
     """Faults that comparing the recordings shows, what is corrected together in a step."""
-    if before.identification.fit.target.oscillator.campaign.keep_faults:
+    campaign = before.identification.fit.target.oscillator.campaign
+    if campaign.keep_faults:
         return ()
-    found = compare_recordings(before.identification)
+    found = [
+        replace(one, fault=_as_read(one.fault, campaign, as_read))
+        for one in compare_recordings(before.identification)
+    ]
     return tuple(tuple(step) for _, step in groupby(found, key=lambda one: one.after))
 
 

@@ -126,8 +126,8 @@ def test_doubtful_faults_come_after_certain_ones_and_physics(
     """A wrong case label is certain; a probe that is not linear must not become another rig."""
     compared = module.comparisons
 
-    def and_another_rig(before: Corrected) -> tuple[Step, ...]:
-        (label,) = compared(before)
+    def and_another_rig(before: Corrected, as_read: Campaign) -> tuple[Step, ...]:
+        (label,) = compared(before, as_read)
         known = label[-1]
         without = replace(known.campaign, recordings=known.campaign.recordings[:-1])
         fault = replace(known.fault, id="recording_other_rig", recording="d")

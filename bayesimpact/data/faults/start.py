@@ -12,6 +12,8 @@ from bayesimpact.data.period import noise_level, rough_period
 from bayesimpact.data.recording import Recording
 
 BAND = 5.0  # standard deviations of the noise, or two steps, about the first reading
+LEAST_BAND = 0.01  # of the amplitude: noise behind a filter does not show in differences, and a
+# free motion takes 2 % of a period to leave this band
 NATURAL = 3.0  # times as long as a free motion stays in that band at a turning point
 SHORTEST = 0.08  # of a period
 FEWEST = 3  # samples, whose median is the reading at rest: no more of them would be no rest
@@ -42,10 +44,10 @@ def find_start(recording: Recording) -> list[Fault]:
     half = int(min(WIDE, NARROW * period) - 1) // 2
     x = median_filter(quiet, 2 * max(half, 0) + 1, mode="nearest")  # blind to spikes
     noise, step = noise_level(quiet), reading_step(recording.samples)
-    band = max(BAND * noise, 2.0 * step, 1e-9 * float(np.ptp(x)))
     settled = float(np.median(x[x.size // 2 :]))
     peak = int(np.argmax(np.abs(x - settled)))
     height = abs(float(x[peak] - settled))
+    band = max(BAND * noise, 2.0 * step, LEAST_BAND * height)
     natural = np.sqrt(2.0 * band / max(height, band)) * period / (2 * np.pi)
     least = max(NATURAL * natural, SHORTEST * period, FEWEST)
     hand = _grown(x - settled, peak, period)

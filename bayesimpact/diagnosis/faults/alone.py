@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import BayesimpactError
+from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.noise import Noise
 
@@ -42,19 +43,25 @@ def inverted(recording: Recording) -> Recording:
     return replace(recording, samples=-recording.samples)
 
 
-def fit_alone(campaign: Campaign, recording: Recording, noise: Noise) -> Alone | None:
-    """The parameters that one recording shows; None where it allows no fit.
-
-    A gap that is not positive has no logarithm: it counts as not measured.
-    """
+def own_fit(campaign: Campaign, recording: Recording, noise: Noise) -> Fit | None:
+    """The base model fitted to one recording; None where it allows no fit."""
     one = replace(campaign, recordings=(recording,))
     try:
         fit = identify(one, rng=np.random.default_rng(0), noise=noise, search=False).fit
     except (BayesimpactError, ValueError, np.linalg.LinAlgError):
         return None
-    chi2 = fit.reduced_chi2
-    if not np.isfinite(chi2):
+    return fit if np.isfinite(fit.reduced_chi2) else None
+
+
+def fit_alone(campaign: Campaign, recording: Recording, noise: Noise) -> Alone | None:
+    """The parameters that one recording shows; None where it allows no fit.
+
+    A gap that is not positive has no logarithm: it counts as not measured.
+    """
+    fit = own_fit(campaign, recording, noise)
+    if fit is None:
         return None
+    chi2 = fit.reduced_chi2
     names = NAMES if campaign.stop else NAMES[:2]
     at = [fit.target.oscillator.layout.index(_name(n, recording.case)) for n in names]
     values = fit.mode[at]

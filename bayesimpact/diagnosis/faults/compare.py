@@ -1,10 +1,12 @@
 """Which recording disagrees with the others, and what is wrong with it.
 
 1. Every recording is identified alone, and where that leaves much, once more with the other sign.
-2. The recordings' own parameters are compared (see `together`); the likeliest fault is corrected if
+2. Where it still leaves more than chance, samples may be missing (see `slip`): believed if the
+   recording fits with its readings put where they belong.
+3. The recordings' own parameters are compared (see `together`); the likeliest fault is corrected if
    its log odds against no fault, all faults being equally likely beforehand, pass the threshold.
-3. The campaign is fitted before and after; a correction that does not improve it is not believed.
-4. Again, until nothing is found, or a third of the recordings has been corrected.
+4. The campaign is fitted before and after; a correction that does not improve it is not believed.
+5. Again from 3, until nothing is found, or a third of the recordings has been corrected.
 """
 
 from __future__ import annotations
@@ -13,11 +15,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.faults.fault import Fault
+from bayesimpact.data.faults.find import applied
 from bayesimpact.diagnosis.faults.alone import Alone, fit_alone, inverted
 from bayesimpact.diagnosis.faults.correct import as_fault, corrected
+from bayesimpact.diagnosis.faults.slip import find_shift, slip_fault
 from bayesimpact.diagnosis.faults.together import (
     Hypothesis,
     Weighed,
@@ -26,7 +31,10 @@ from bayesimpact.diagnosis.faults.together import (
 from bayesimpact.errors import BayesimpactError
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification, identify
+from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.noise import Noise
+
+Array = NDArray[np.float64]
 
 THRESHOLD = 12.0
 """Log odds of a fault over none: its scatter is estimated from few recordings, whose tails are
@@ -67,13 +75,18 @@ def misfits(fit: Fit) -> bool:
     """Whether the base fit misses any recording by more than chance, so that comparing is due."""
     likelihood = fit.target.likelihood
     chi2 = fit.sums / likelihood.noise.level**2 / likelihood.sizes
-    error = likelihood.noise.level_error
-    relative = 2.0 * (error if np.isfinite(error) else 0.0)
+    return bool(np.any(chi2 > largest_by_chance(chi2, likelihood.sizes, likelihood.noise)))
+
+
+def largest_by_chance(chi2: Array, sizes: Array, noise: Noise) -> Array:
+    """Misfit (R,) up to which a recording agrees with the noise level and with the others.
+
+    `chi2` (R,) are the reduced misfits, `sizes` (R,) the independent numbers of the recordings.
+    """
+    relative = 2.0 * (noise.level_error if np.isfinite(noise.level_error) else 0.0)
     # against the noise level, and against each other, where the level's error cancels
     usual = min(float(np.median(chi2)), 1.0 + SIGNIFICANT * relative)
-    return bool(
-        np.any(chi2 / max(usual, 1e-300) - 1.0 > SIGNIFICANT * np.sqrt(2 / likelihood.sizes))
-    )
+    return np.asarray(max(usual, 1e-300) * (1.0 + SIGNIFICANT * np.sqrt(2 / sizes)))
 
 
 def compare_recordings(identification: Identification) -> tuple[Compared, ...]:
@@ -86,17 +99,18 @@ def compare_recordings(identification: Identification) -> tuple[Compared, ...]:
         return ()
     campaign, noise = fit.target.oscillator.campaign, identification.noise
     alone = {r.name: fit_alone(campaign, r, noise) for r in campaign.recordings}
-    found, campaign, chi2 = _signs(campaign, alone, noise, fit.reduced_chi2)
-    allowed = int(SHARE * len(campaign.recordings))
-    while len(found) < allowed or (found and found[-1].fault.id == "recording_reversed"):
+    signs, campaign, chi2 = _signs(campaign, alone, noise, fit.reduced_chi2)
+    slips, campaign, chi2 = _slips(campaign, alone, fit.target.likelihood, chi2)
+    differing: list[Compared] = []
+    while len(differing) < int(SHARE * len(campaign.recordings)):
         step = _next(campaign, alone, noise, chi2)
-        if step is None or sum(f.fault.id != "recording_reversed" for f in found) >= allowed:
+        if step is None:
             break
-        found.append(step)
+        differing.append(step)
         name, campaign, chi2 = step.fault.recording, step.campaign, step.after
         changed = [r for r in campaign.recordings if r.name == name]
         alone[name] = fit_alone(campaign, changed[0], noise) if changed else None
-    return tuple(found)
+    return (*signs, *slips, *differing)
 
 
 def _signs(
@@ -130,6 +144,33 @@ def _signs(
     if found:
         after = _chi2(campaign, noise)
         found = [replace(f, after=after) for f in found]
+        chi2 = after
+    return found, campaign, chi2
+
+
+def _slips(
+    campaign: Campaign, alone: dict[str, Alone | None], likelihood: Likelihood, chi2: float
+) -> tuple[list[Compared], Campaign, float]:
+    """Recordings that fit once samples are where they belong; `alone` is brought up to date."""
+    found: list[Compared] = []
+    noise, recordings = likelihood.noise, campaign.recordings
+    misfit = np.array(
+        [np.inf if (a := alone[r.name]) is None else a.reduced_chi2 for r in recordings]
+    )
+    least = largest_by_chance(misfit, likelihood.sizes, noise)
+    for i in np.flatnonzero(misfit > least):
+        shifted = find_shift(campaign, recordings[i], noise)
+        if shifted is None or shifted[1].reduced_chi2 > least[i]:
+            continue
+        fault = slip_fault(recordings[i], shifted[0])
+        one = applied(recordings[i], [fault])[0]
+        campaign = replace(
+            campaign,
+            recordings=tuple(one if r.name == one.name else r for r in campaign.recordings),
+        )
+        alone[one.name] = fit_alone(campaign, one, noise)
+        after = _chi2(campaign, noise)
+        found.append(Compared(fault, campaign, chi2, after))
         chi2 = after
     return found, campaign, chi2
 

@@ -170,6 +170,15 @@ def test_rest_and_pull_before_the_release(paper: Campaign) -> None:
         assert kept.start == pytest.approx(fault.spans[0][1] * 1e-3)
 
 
+def test_a_rest_under_smoothed_noise(paper: Campaign) -> None:
+    """What a filter leaves of the noise is slow: differences tell a small part of it."""
+    noise = 1e-4 * np.random.default_rng(3).standard_normal(180)
+    slow = np.convolve(noise, np.full(21, 1 / 21), mode="valid")
+    fault = only(spoiled(paper, lambda x: np.concatenate([x[0] + slow, x])))
+    assert fault.id == "recording_start"
+    assert slow.size <= fault.spans[0][1] <= slow.size + 12
+
+
 @pytest.mark.parametrize("samples", [8.0, 16.0, 31.0])
 def test_a_free_decay_of_few_samples_a_period_begins_at_once(samples: float) -> None:
     """Nothing that is done against spikes may bend it."""

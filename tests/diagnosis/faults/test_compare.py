@@ -125,3 +125,19 @@ def test_another_rig(paper: Campaign, what: str, by: float) -> None:
     share = by if name == "case2_a" else 1 / by
     assert found.fault.size == pytest.approx(100 * (share - 1), rel=0.05)
     assert name not in [r.name for r in found.campaign.recordings]
+
+
+@pytest.mark.parametrize("count", [2, -3])
+def test_samples_missing_at_a_turning_point(paper: Campaign, count: int) -> None:
+    """The motion hardly moves there: no jump, but all that follows is out of phase."""
+    x = paper.recordings[ODD].samples
+    middle = x.size // 3
+    turn = middle + int(np.argmin(x[middle : middle + 60]))  # the turning point away from the stop
+    moved = np.concatenate([x[:turn], x[turn + count :]])
+    found = only(changed(paper, lambda r: replace(r, samples=moved)))
+    assert (found.fault.id, found.fault.size) == ("recording_slip", abs(count))
+    assert ("lost" in found.fault.statement) == (count > 0)
+    place = paper.recordings[ODD].start + turn * paper.recordings[ODD].interval
+    assert found.fault.start_s - 0.003 <= place <= found.fault.end_s + 0.003
+    corrected = found.campaign.recordings[ODD]
+    assert corrected.samples.size == pytest.approx(max(turn, x.size - turn), abs=12)

@@ -1,0 +1,149 @@
+"""A slip that its own jump does not show: from one sample on a recording runs early or late.
+
+Samples lost near a turning point displace the motion by hardly more than the noise, but all that
+follows is out of phase. Against the fit of the recording alone such a shift is one more column of
+the linear model, v(t) from a sample on, for every sample at once by cumulative sums: the score test
+of a change point (Rao 1948). What the score proposes is then done: the readings are put where they
+belong, and have to fit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.faults.fault import FALSE_ALARM, Fault, file_time
+from bayesimpact.data.gaps import without
+from bayesimpact.data.recording import Recording
+from bayesimpact.diagnosis.faults.alone import own_fit
+from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.noise import Noise
+
+Array = NDArray[np.float64]
+
+PLACE = 0.5 * float(chi2.isf(1e-3, 1))  # nats: less likely places than this are no candidates
+EDGE = 8  # samples at either end, after which a shift is told from the start values
+
+
+@dataclass(frozen=True)
+class Shift:
+    """From a sample on, a recording comes `samples` too early (> 0: lost) or too late.
+
+    Attributes
+    ----------
+    place : first sample after the slip, the likeliest
+    earliest, latest : between which it lies
+    samples : how many are missing; negative for samples written twice
+    gain : nats, in the linear approximation
+    """
+
+    place: int
+    earliest: int
+    latest: int
+    samples: float
+    gain: float
+
+
+def likeliest_shift(fit: Fit) -> Shift | None:
+    """The shift that explains most of the residual of a fit to one recording, if any does.
+
+    None where the gain stays below what white noise reaches at one of its samples with a chance of
+    `FALSE_ALARM`.
+    """
+    likelihood, noise = fit.target.likelihood, fit.target.likelihood.noise
+    (recording,), (near,) = fit.target.oscillator.campaign.recordings, fit.linearisation
+    motion = np.gradient(fit.predicted[0])
+    velocity = noise.whiten(motion, recording.interval, recording.used, recording.order)
+    white = np.vstack([near.residual, velocity, near.jacobian.T])
+    count = recording.samples.size
+    signals, start = noise.in_time(white, count, recording.interval, recording.used)
+    residual, moved, columns = signals[0], signals[1], signals[2:].T
+    basis = np.linalg.qr(columns / np.linalg.norm(columns, axis=0).clip(1e-300))[0]
+    residual = residual - basis @ (basis.T @ residual)
+    slope = _from_here_on(moved * residual)
+    shared = _from_here_on(moved[:, None] * basis)
+    size = _from_here_on(moved**2) - np.einsum("np,np->n", shared, shared)
+    free = size > 1e-6 * float(np.sum(moved**2))
+    score = np.where(free, slope**2 / np.where(free, size, 1.0), 0.0)
+    score[:EDGE] = score[-EDGE:] = 0.0
+    best = int(np.argmax(score))
+    left = float(residual @ residual - score[best]) / float(likelihood.sizes[0])
+    nats = 0.5 * score / max(noise.level**2, left)
+    if nats[best] < 0.5 * chi2.isf(FALSE_ALARM / score.size, 1):
+        return None
+    near_best = np.flatnonzero(nats > nats[best] - PLACE)
+    first, spacing = round(start / recording.interval), count / score.size
+    earliest, place, latest = (
+        first + round(spacing * int(i)) for i in (near_best[0], best, near_best[-1])
+    )
+    return Shift(place, earliest, latest, float(slope[best] / size[best]), float(nats[best]))
+
+
+def _from_here_on(x: Array) -> Array:
+    """Sums of (n, ...) from every row to the last."""
+    return np.asarray(np.cumsum(x[::-1], axis=0)[::-1])
+
+
+def put_right(recording: Recording, place: int, samples: int) -> Recording:
+    """The recording with readings from `place` on where they belong in time.
+
+    Lost samples leave a gap, samples written twice go.
+    """
+    x = recording.samples
+    used = np.ones(x.size, bool) if recording.used is None else recording.used
+    if samples < 0:
+        end = place - samples
+        x, used = (np.concatenate([a[:place], a[end:]]) for a in (x, used))
+        return replace(recording, samples=x, used=used)
+    x = np.concatenate([x[:place], np.full(samples, x[place]), x[place:]])
+    used = np.concatenate([used[:place], np.ones(samples, bool), used[place:]])
+    return without(replace(recording, samples=x, used=used), [(place, place + samples)])
+
+
+def find_shift(campaign: Campaign, recording: Recording, noise: Noise) -> tuple[Shift, Fit] | None:
+    """The shift of a recording, in whole samples, and the fit to it with that put right."""
+    own = own_fit(campaign, recording, noise)
+    shift = None if own is None or recording.input is not None else likeliest_shift(own)
+    if shift is None:
+        return None
+    tried = []
+    for samples in {round(shift.samples) + by for by in (-1, 0, 1)} - {0}:
+        fit = own_fit(campaign, put_right(recording, shift.place, samples), noise)
+        if fit is not None and np.isfinite(fit.reduced_chi2):
+            tried.append((fit.reduced_chi2, samples, fit))
+    if not tried:
+        return None
+    _, samples, fit = min(tried, key=lambda one: one[:2])
+    return replace(shift, samples=float(samples)), fit
+
+
+def slip_fault(recording: Recording, shift: Shift) -> Fault:
+    """The slip as a record; its remedy keeps the longer part."""
+    size, count = recording.samples.size, int(shift.samples)
+    if shift.earliest >= size - shift.latest:
+        span, remedy = (shift.earliest, size), "end_s"
+        edge = file_time(recording, shift.earliest - 0.6)
+    else:
+        span, remedy = (0, shift.latest), "start_s"
+        edge = file_time(recording, shift.latest - 0.4)
+    words = "lost" if count > 0 else "written twice"
+    noun = "sample" if abs(count) == 1 else "samples"
+    when = file_time(recording, shift.place)
+    return Fault(
+        id="recording_slip",
+        recording=recording.name,
+        spans=(span,),
+        start_s=file_time(recording, shift.earliest - 1),
+        end_s=file_time(recording, shift.latest),
+        size=float(abs(count)),
+        unit="-",
+        statement=f"{abs(count)} {noun} {words} at {when:.6g} s: what follows is out of phase",
+        remedy=f"{remedy} = {edge:.9g}",
+        strength=shift.gain,
+        threshold=0.5 * float(chi2.isf(FALSE_ALARM / size, 1)),
+        action="cut",
+    )
