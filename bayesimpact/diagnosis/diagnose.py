@@ -96,7 +96,7 @@ def diagnose(
         for step in doubtful:
             corrected = with_step(corrected, step, rng=rng, search=search)
         found = _simpler(found, physics(corrected))
-    elif certain is not cleaned and not is_settled(found) and not base_failed(as_is):
+    elif certain is not cleaned and found.verdict not in OPEN and not base_failed(as_is):
         alone = physics(cleaned)
         found = alone if is_settled(alone) else found
     return _without_late_spikes(found, campaign, physics, rng=rng)
