@@ -105,7 +105,7 @@ def grain(y, v, d, t, z, touching, p, q):  # type: ignore[no-untyped-def]
 
 def first_at_turn(y, v, d, t, z, touching, p, q):  # type: ignore[no-untyped-def]
     """Shortest step at a turning point over the usual one, as in the catalogue's power_damping."""
-    return min(1.0, power(1e-4, min(1.0, 2.0 - p[8])))
+    return min(1.0, power(1e-6, min(1.0, 2.0 - p[8]) / (1.0 + p[8])))
 
 
 @dataclass(frozen=True)

@@ -1,62 +1,28 @@
 """How the recordings would change under a small force of the state, without simulating it.
 
-About a fitted motion the state's change obeys a linear equation, whatever laws act: it is a sum of
-two free changes (`bayesimpact.model.free_changes`, jumps at the obstacle included), and a force
-pushes both, instant by instant (variation of parameters). The free changes are had from a few
-simulated motions per recording; after that every term of the grammar costs one sum over its own
-force history along the motion. A spline a(y) + b(y) v would show only what is linear in v; the
+Every term of the grammar costs one sum over its own force history along the fitted motion
+(`bayesimpact.model.superposition`). A spline a(y) + b(y) v would show only what is linear in v; the
 force history itself, scored on the residual, tells |v| v from v.
 
 Of laws with a memory or a further mode in the fitted model only displacement and velocity are
-perturbed here; such a score is approximate, and the refit that follows is not.
+perturbed; such a score is approximate, and the refit that follows is not.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.formula.grammar import ONE, Term
 from bayesimpact.inference.fit import Fit
-from bayesimpact.model.free_changes import FreeChanges, free_changes, motions_beside
-from bayesimpact.model.parameters import SLOTS
+from bayesimpact.model.superposition import Motion, answers, motion_along
 
 Array = NDArray[np.float64]
 
-STEP = 1e-6  # of the state, over the largest one: small enough for free changes
-POINTS = 200  # in a free period; errors are below 0.5 % (2 % for a box) of a response, by test
-FINEST = 12  # times finer than the samples
 BLOCK = 64  # terms at once, so that memory stays bounded
-_GAP, _K1 = (SLOTS.index(n) for n in ("g", "k1"))
-
-
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """One recording's fitted motion on a grid `factor` times as fine as its samples.
-
-    Attributes
-    ----------
-    y, v, d, t : displacement m, velocity m/s, indentation m, time s, (n,)
-    changes : its free changes on that grid
-    steps : (2, n - 1) weights of both ends of every step in an integral over time, s
-    factor : fine steps in a sample
-    """
-
-    y: Array
-    v: Array
-    d: Array
-    t: Array
-    changes: FreeChanges
-    steps: Array
-    factor: int
-
-    @property
-    def samples(self) -> int:
-        """Of the recording."""
-        return (self.y.size - 1) // self.factor + 1
 
 
 def motion_of(fit: Fit, r: int) -> Motion:
@@ -67,56 +33,8 @@ def motion_of(fit: Fit, r: int) -> Motion:
     LinAlgError : the mass sticks, and what it did before is forgotten
     """
     oscillator = fit.target.oscillator
-    q = oscillator.layout.slots(fit.mode)[r]
-    rate = np.sqrt(q[_K1] / oscillator.campaign.mass)
-    points = POINTS * float(oscillator.intervals[r]) * rate / (2 * np.pi)
-    factor = int(np.clip(np.ceil(points), 1, FINEST))
     reach = float(np.abs(fit.displacements[r]).max())
-    y, v = (motions_beside(oscillator, r, q[None], k, factor=factor)[0] for k in (0, 1))
-    d = y - q[_GAP] if oscillator.campaign.stop else np.full(y.size, -np.inf)
-    changes = free_changes(oscillator, r, q, STEP * reach, factor=factor)
-    _ = changes.pushes, changes.carried  # raise here, where the caller expects it
-    t, steps = np.arange(y.size) * changes.interval, _steps(v, d, changes.interval)
-    return Motion(y, v, d, t, changes, steps, factor)
-
-
-def _steps(v: Array, d: Array, h: float) -> Array:
-    """Weights of the first and of the last point of every step, (2, n - 1), s.
-
-    The trapezoidal rule with Gregory's corrections at every touch and turn, where forces jump: a
-    sum over a whole swing is then as good as its ends. The rest of a step to that moment is the
-    integral of the parabola through the three nearest points on its side.
-    """
-    weights = np.full((2, v.size - 1), 0.5 * h)
-    for x, rate in ((v, None), (d, v)):
-        if not np.isfinite(x).all():
-            continue
-        i = np.flatnonzero(np.sign(x[1:]) * np.sign(x[:-1]) < 0)
-        i = i[(i > 1) & (i < v.size - 3)]
-        share = x[i] / (x[i] - x[i + 1])
-        if rate is not None:
-            share = _crossing(share, x[i], x[i + 1], h * rate[i], h * rate[i + 1])
-        weights[:, i] = 0.0
-        for side, step, part in ((0, -1, share), (1, 1, 1.0 - share)):
-            for k, own in enumerate(_end(part)):
-                np.add.at(weights[side], i + step * k, h * own)
-    return weights
-
-
-def _end(part: Array) -> tuple[Array, Array, Array]:
-    """Weights, in steps, of the last three points before a jump that lies `part` of a step on."""
-    slope, bend = part**2 / 4, part**3 / 6 - 1 / 24
-    return part + 3 * slope + bend - 1 / 12, -4 * slope - 2 * bend + 1 / 12, slope + bend
-
-
-def _crossing(u: Array, x0: Array, x1: Array, r0: Array, r1: Array) -> Array:
-    """Zero of the cubic with values x and slopes r at 0 and 1, from near u: two Newton steps."""
-    for _ in range(2):
-        a, b = 2 * (x0 - x1) + r0 + r1, 3 * (x1 - x0) - 2 * r0 - r1
-        value = ((a * u + b) * u + r0) * u + x0
-        slope = (3 * a * u + 2 * b) * u + r0
-        u = np.clip(u - value / np.where(slope == 0.0, np.inf, slope), 0.0, 1.0)
-    return u
+    return motion_along(oscillator, r, oscillator.layout.slots(fit.mode)[r], reach)
 
 
 def responses(motion: Motion, terms: Sequence[Term]) -> tuple[Array, Array, Array]:
@@ -132,46 +50,10 @@ def responses(motion: Motion, terms: Sequence[Term]) -> tuple[Array, Array, Arra
     for first in range(0, len(terms), BLOCK):
         block = slice(first, first + BLOCK)
         forces = _forces(motion, terms[block])
-        out[block] = _answers(motion, forces)
+        out[block] = answers(motion, forces)
         largest[block] = np.maximum(forces.max(axis=1), -forces.min(axis=1))
         power[block] = forces @ motion.v / motion.v.size
     return out, largest, power
-
-
-def _answers(motion: Motion, forces: Array) -> Array:
-    """Responses (K, samples) to forces along the motion (K, n)."""
-    out = np.empty((forces.shape[0], motion.samples))
-    state = np.zeros((2, forces.shape[0]))
-    changes, factor = motion.changes, motion.factor
-    for part, pushes, carried in zip(
-        changes.stretches, changes.pushes, changes.carried, strict=True
-    ):
-        own = slice(part.begin, part.begin + part.readings.shape[0])
-        rows = part.readings[::factor].T
-        first = part.begin // factor
-        state = carried @ state
-        # laws stand on the left-hand side: their force acts against the motion's direction
-        states = _states(
-            -pushes.T, forces[:, own], motion.steps[:, own][:, : pushes.shape[0] - 1], factor
-        )
-        states += state[..., None]
-        np.einsum("ks,kts->ts", rows, states, out=out[:, first : first + rows.shape[1]])
-        state = states[..., -1]
-    return out - changes.direct * forces[:, ::factor] if changes.direct else out
-
-
-def _states(pushes: Array, forces: Array, steps: Array, factor: int) -> Array:
-    """What forces (K, n) make of both free changes by every sample, (2, K, samples)."""
-    before, after = steps[0] * pushes[:, :-1], steps[1] * pushes[:, 1:]
-    count, samples = forces.shape[0], (forces.shape[1] - 1) // factor + 1
-    inner = before[:, 1:] + after[:, :-1]
-    nodes = np.concatenate([before[:, :1], inner], axis=1).reshape(2, samples - 1, factor)
-    nodes[:, 1:, 0] = before[:, factor::factor]  # what ends at a sample is added there
-    cells = forces[:, :-1].reshape(count, samples - 1, factor)
-    last = after[:, None, factor - 1 :: factor] * forces[:, factor::factor]
-    states = np.zeros((2, count, samples))
-    np.cumsum(np.einsum("ksf,tsf->kts", nodes, cells) + last, axis=2, out=states[:, :, 1:])
-    return states
 
 
 def _forces(motion: Motion, terms: Sequence[Term]) -> Array:

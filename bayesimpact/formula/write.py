@@ -119,7 +119,8 @@ def _law(number: str, term: Term, effect: Effect) -> tuple[list[str], list[str]]
         )
         words.append(f"surface=surface{number}")
     if law.first_at_turn is not None:
-        body = f"return {min(1.0, 1e-4 ** min(1.0, 2.0 - term.speed.exponent)):.6g}"
+        n = term.speed.exponent
+        body = f"return {min(1.0, 1e-6 ** (min(1.0, 2.0 - n) / (1.0 + n))):.6g}"
         functions.append(
             _function(f"first{number}", "Shortest step at a turn over the usual one.", [body])
         )

@@ -49,11 +49,13 @@ class FreeChanges:
     Attributes
     ----------
     stretches : one after the other
+    motion : (2, n) displacement, m, and velocity, m/s, of the motion that is changed
     mass, interval : kg, s between points, one or several of which make a sample
     order : which time derivative of the displacement the recording reads
     """
 
     stretches: tuple[Stretch, ...]
+    motion: Array
     mass: float
     interval: float
     order: int
@@ -107,34 +109,39 @@ def free_changes(
     mass, interval = oscillator.campaign.mass, float(oscillator.intervals[r]) / factor
     last, rate = (int(oscillator.counts[r]) - 1) * factor, float(np.sqrt(slots[_K1] / mass))
     apart = max(1, round(0.5 * np.pi / (rate * interval)))
-    q = np.tile(slots, (3, 1))
-    q[1, _Y0] += small
-    q[2, _V0] += small * rate
-    waves = np.zeros((3, last + 1))
-    whole = _run(oscillator, r, q, waves, factor)
+    own = int(oscillator.orders[r])
+    waves = np.zeros((2, last + 1))
+
+    def motions(q: Array) -> dict[int, Array]:
+        return {
+            n: motions_beside(oscillator, r, q, n, waves=waves[: len(q)], factor=factor)
+            for n in {0, 1, own}
+        }
+
+    base = motions(slots[None])
+
+    def run(q: Array) -> Stretch:  # both changes over the whole recording
+        changes = {n: (x - base[n]).T for n, x in motions(q).items()}
+        return Stretch(0, np.stack([changes[0], changes[1]], axis=1), changes[own])
+
+    q = np.tile(slots, (2, 1))
+    q[0, _Y0] += small
+    q[1, _V0] += small * rate
+    whole = run(q)
     length = _fading(whole.states * [[1.0], [1 / rate]], 2 * apart + SHORTEST)
     length = -(-length // factor) * factor  # stretches begin on samples
     begins = np.arange(0, max(last - SHORTEST, 1), length)
     found = [_part(whole, 0, last if begins.size == 1 else length)]
-    q = np.tile(slots, (3, 1))
     runs = []
     for first in (1, 2):  # a push ends the stretch before in its own run: neighbours take turns
         waves[:] = 0.0
         for begin in begins[first::2]:
-            waves[[1, 2], [begin - apart - 1, begin - 1]] = small * slots[_K1]
-        runs.append(_run(oscillator, r, q, waves, factor) if begins.size > first else whole)
+            waves[[0, 1], [begin - apart - 1, begin - 1]] = small * slots[_K1]
+        runs.append(run(np.tile(slots, (2, 1))) if begins.size > first else whole)
     for number, begin in enumerate(begins[1:]):
         end = last if begin == begins[-1] else begin + length
         found.append(_part(runs[number % 2], int(begin), int(end)))
-    return FreeChanges(tuple(found), mass, interval, int(oscillator.orders[r]))
-
-
-def _run(oscillator: Oscillator, r: int, q: Array, waves: Array, factor: int) -> Stretch:
-    """Both changes over the whole recording."""
-    own = int(oscillator.orders[r])
-    rows = {n: motions_beside(oscillator, r, q, n, waves=waves, factor=factor) for n in {0, 1, own}}
-    changes = {n: (x[1:] - x[0]).T for n, x in rows.items()}
-    return Stretch(0, np.stack([changes[0], changes[1]], axis=1), changes[own])
+    return FreeChanges(tuple(found), np.concatenate([base[0], base[1]]), mass, interval, own)
 
 
 def _part(whole: Stretch, begin: int, end: int) -> Stretch:

@@ -160,7 +160,7 @@ class Oscillator:
         motions = self.motions_of(np.tile(recordings, flat.shape[0]), self.layout.slots(flat))
         rows = motions.reshape(flat.shape[0], recordings.size, -1)
         predicted = [
-            self._read(r, rows[:, r, : self.counts[r]], flat) for r in range(recordings.size)
+            self.read(r, rows[:, r, : self.counts[r]], flat) for r in range(recordings.size)
         ]
         return tuple(p.reshape(*theta.shape[:-1], p.shape[-1]) for p in predicted)
 
@@ -173,9 +173,9 @@ class Oscillator:
         other = (np.delete(q, _OFFSET, axis=1) != np.delete(q[0], _OFFSET)).any(axis=1)
         simulated = np.concatenate([[0], np.flatnonzero(other)])
         motions = self.motions_of(np.full(simulated.size, r), q[simulated])
-        return self._read(r, motions[np.where(other, np.cumsum(other), 0)], theta)
+        return self.read(r, motions[np.where(other, np.cumsum(other), 0)], theta)
 
-    def _read(self, r: int, motion: Array, theta: Array) -> Array:
+    def read(self, r: int, motion: Array, theta: Array) -> Array:
         """Sensor, rest offset and filter on true displacements (or their time derivatives, as the
         probe reads them), (B, n), of recording `r`."""
         times = np.arange(motion.shape[1]) * self.intervals[r]

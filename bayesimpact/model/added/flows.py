@@ -70,8 +70,8 @@ RAMP = 0.3  # first step of a contact over the time constant of a law's state
 # where a force is not smooth at the touch: shortest step over the longest; then, for times in units
 # of the longest step, step over the 3/4th power of the time since the touch, or to the release
 FIRST, SINCE, UNTIL = 1.0 / 80.0, 0.46, 0.27
-# the same where it is not smooth at a turning point: there the step is a share of the time itself
-SINCE_TURN, UNTIL_TURN = 0.5, 0.3
+# the same where it is not smooth at a turning point; not much longer there than the time itself
+SINCE_TURN, UNTIL_TURN, MOST_SINCE, MOST_UNTIL = 0.8, 0.46, 1.0, 0.5
 ENDS_ON_TURNS = KINK_AT_TURN | JUMP_AT_TURN
 # a force without features admits longer steps the weaker it is: share of the linear force at which
 # they are the usual ones, and by how much they are shortened and lengthened at most
@@ -319,8 +319,11 @@ def next_step(
     if flow.first_at_turn < 1.0:
         pull = 2.0 * flow.b * v + flow.K * (y - flow.rest) - flow.inverse * n0
         if pull != 0.0:  # v / pull is the time since the turning point, or minus that to the next
-            share = -SINCE_TURN if v * pull < 0.0 else UNTIL_TURN
-            longest *= min(1.0, max(flow.first_at_turn, share * v / (pull * longest)))
+            away = abs(v / (pull * longest))
+            root = np.sqrt(away)
+            share, most = (SINCE_TURN, MOST_SINCE) if v * pull < 0.0 else (UNTIL_TURN, MOST_UNTIL)
+            graded = min(share * root * np.sqrt(root), most * away)
+            longest *= min(1.0, max(flow.first_at_turn, graded))
         return not_beyond(left, max(longest, least), w)
     longest = max(longest, least)
     stride = stride_of(longest, w)

@@ -36,8 +36,11 @@ def force(
 def first_at_turn(
     y: float, v: float, d: float, t: float, z: float, touching: float, p: Numbers, q: Numbers
 ) -> float:
-    """Shortest step at a turning point over the usual one: 1 from a square on, 1e-4 to a line."""
-    return float(min(1.0, power(1e-4, min(1.0, 2.0 - p[1]))))
+    """Shortest step at a turning point over the usual one: 1 from a square on.
+
+    Up to a line the error of that step, as its length to the power n + 1, is the same for every n.
+    """
+    return float(min(1.0, power(1e-6, min(1.0, 2.0 - p[1]) / (1.0 + p[1]))))
 
 
 EFFECT = Effect(

@@ -1,0 +1,140 @@
+"""Readings near known ones, for derivatives: under other forces of laws they are superposed.
+
+A residual force has tens of coefficients. To first order each adds a small force along the known
+motion, and what that does follows from the motion's free changes (`superposition`), where a
+simulation each would cost the most of a fit. Some are simulated all the same: they say whether
+superposition serves, which it does not where a law has a state of its own or the mass sticks, nor
+where forces do so nearly the same that their differences drown in its errors.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.model.added.world import (
+    CONTACT_ONLY,
+    JUMP_AT_SURFACE,
+    JUMP_AT_TURN,
+    LAW_FIRST,
+    LAW_FLAGS,
+    LAW_FORCE,
+    LAW_RATE,
+    LAW_TRAVEL,
+)
+from bayesimpact.model.callback import call_law
+from bayesimpact.model.compiled import compiled
+from bayesimpact.model.oscillator import Oscillator
+from bayesimpact.model.parameters import SLOTS
+from bayesimpact.model.superposition import Motion, answers, motion_along
+from bayesimpact.model.threads import in_shares
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+PAYS = 40  # motions from which on superposition costs less than they do
+CHECKED = 3  # of them, by simulation
+BLOCK = 64  # forces at once, so that memory stays bounded
+_OFFSET = SLOTS.index("offset")
+
+
+def readings_near(oscillator: Oscillator, r: int, theta: Array, error: float) -> Array:
+    """`predict_recording` for parameters (B, d) close to the first ones, exact to first order.
+
+    error : root of the sum of squares by which a motion may be wrong, in the recording's unit
+    """
+    q = oscillator.layout.slots(theta)[:, r]
+    q[:, _OFFSET] = 0.0
+    pushed = _pushed(q, oscillator.laws)
+    if pushed.size == 0 or oscillator.campaign.stop:
+        return oscillator.predict_recording(r, theta)
+    judges = pushed[np.linspace(0, pushed.size - 1, CHECKED + 2).astype(int)[1:-1]]
+    rest = np.setdiff1d(pushed, judges)
+    simulated = np.setdiff1d(np.arange(q.shape[0]), rest)
+    motions = np.empty((q.shape[0], int(oscillator.counts[r])))
+    motions[simulated] = oscillator.motions_of(np.full(simulated.size, r), q[simulated])
+    if not np.isfinite(motions[0]).all():  # it ran away
+        return oscillator.predict_recording(r, theta)
+    changes = _changes(oscillator, r, q[np.concatenate([[0], judges, rest])])
+    wrong = changes[:CHECKED] - (motions[judges] - motions[0])
+    if not np.all(np.linalg.norm(wrong, axis=1) <= error):
+        return oscillator.predict_recording(r, theta)
+    motions[rest] = motions[0] + changes[CHECKED:]
+    return oscillator.read(r, motions, theta)
+
+
+def _pushed(q: Array, laws: Index) -> Index:
+    """Which slots (B, Q) differ from the first by the force of one steady law alone.
+
+    Only where there are so many of one law that superposition pays.
+    """
+    apart = q != q[0]
+    found = []
+    for (first, end), steady in zip(_spans(q.shape[1], laws), _is_steady(laws), strict=True):
+        inside = apart[:, first:end].any(axis=1)
+        alone = np.flatnonzero(inside & ~np.delete(apart, slice(first, end), axis=1).any(axis=1))
+        if steady and alone.size >= PAYS:
+            found.append(alone)
+    return np.concatenate(found) if found else np.zeros(0, dtype=np.int64)
+
+
+def _spans(size: int, laws: Index) -> Index:
+    """First slot and end of every law's parameters, (L, 2)."""
+    ends = np.append(laws[1:, LAW_FIRST], size)[: laws.shape[0]]
+    return np.stack([laws[:, LAW_FIRST], ends], axis=1)
+
+
+def _is_steady(laws: Index) -> Flags:
+    """Which laws act everywhere, without a state of their own and without jumps, (L,)."""
+    free = laws[:, LAW_FLAGS] & (CONTACT_ONLY | JUMP_AT_TURN | JUMP_AT_SURFACE) == 0
+    return np.asarray(free & (laws[:, LAW_RATE] == 0) & (laws[:, LAW_TRAVEL] == 0))
+
+
+def _changes(oscillator: Oscillator, r: int, q: Array) -> Array:
+    """By how much the motions of slots (1 + K, Q) differ from the first one, (K, n), superposed.
+
+    NaN where the mass sticks.
+    """
+    found = np.full((q.shape[0] - 1, int(oscillator.counts[r])), np.nan)
+    try:
+        y = oscillator.motions_of(np.array([r]), q[:1], np.array([0]))
+        motion = motion_along(oscillator, r, q[0], float(np.abs(y).max()))
+    except np.linalg.LinAlgError:
+        return found
+    for first in range(0, found.shape[0], BLOCK):
+        rows = np.concatenate([q[:1], q[1 + first : 1 + first + BLOCK]])
+        found[first : first + BLOCK] = answers(motion, _forces(motion, rows, oscillator.laws))
+    return found
+
+
+def _forces(motion: Motion, q: Array, laws: Index) -> Array:
+    """By how much the laws' forces along a motion differ from those of the first slots, (K, n)."""
+    out = np.zeros((q.shape[0] - 1, motion.y.size))
+    for law, (first, end) in zip(laws, _spans(q.shape[1], laws), strict=True):
+        rows = np.flatnonzero((q[:, first:end] != q[0, first:end]).any(axis=1))
+
+        def add(low: int, high: int, law: Index = law, rows: Index = rows) -> None:
+            _add_forces(law, motion.y, motion.v, motion.d, motion.t, q, rows[low:high], out)
+
+        in_shares(add, rows.size)
+    return out
+
+
+@compiled(nogil=True)
+def _add_forces(
+    law: Any, y: Any, v: Any, d: Any, t: Any, q: Any, rows: Any, out: Any
+) -> None:  # fmt: skip
+    """Add to `out` (K, n) a law's force for some rows of q (1 + K, Q), less that for the first."""
+    base, size, place = q.ctypes.data, 8 * q.shape[1], 8 * law[LAW_FIRST]
+    for i in range(y.size):
+        touching = 1.0 if d[i] > 0.0 else 0.0
+        known = call_law(law[LAW_FORCE], y[i], v[i], d[i], t[i], 0.0, touching, base + place, base)
+        for row in rows:
+            own = base + row * size
+            out[row - 1, i] += (
+                call_law(law[LAW_FORCE], y[i], v[i], d[i], t[i], 0.0, touching, own + place, own)
+                - known
+            )
