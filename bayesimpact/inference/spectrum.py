@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage, optimize, signal, stats
-from scipy.linalg import null_space, toeplitz
+from scipy.linalg import toeplitz
 
 from bayesimpact.data.campaign import Smoothing
 from bayesimpact.data.gaps import runs
@@ -43,7 +43,8 @@ LINE = 7.0  # nats beyond the largest of as many ordinates of noise
 LEAST_FIT = 1e-4  # p-value of the scatter about the filter's spectrum
 FLOORS = (-30.0, 10.0)  # log of a white floor over the passband: none, and nothing else
 STRONG = 0.3  # of the largest variance: combinations of a half swing that the filter let pass
-
+LONGEST = 1024  # samples of a half swing that are used, for eigenvectors in a second
+MOTION = 3  # unknowns of a half swing at a given frequency and decay
 
 Spectra = list[tuple[Array, Array, float]]  # frequencies Hz, ordinates, sampling interval s
 
@@ -129,29 +130,46 @@ def smoothed_noise(recordings: Sequence[Recording], smoothing: Smoothing) -> Noi
 
     Frequency and decay of the swings are those that leave the least.
     """
-    groups = [g for g in (_half_swings(r) for r in recordings) if g is not None]
-    if not groups:
+    found = [(r, s) for r in recordings if (s := _half_swings(r)) is not None]
+    swings = [_passband(s, smoothing, r.interval) for r, s in found]
+    swings = [one for one in swings if one.numbers.shape[1] > MOTION]
+    if not swings:
         raise ValueError("too few half swings for a noise estimate")
 
     def energy(x: Array) -> float:
-        return sum(_passed(rows, times, smoothing, r, x)[0] for r, rows, times in groups)
+        return sum(_left(one, x)[0] for one in swings)
 
     # windows end where the motion crosses its median, on the free side: the whole swing is longer
-    first = 0.9 * np.pi / max(2 * times[-1] for _, _, times in groups)
+    first = 0.9 * np.pi / max(one.duration for one in swings)
     start = first * np.array([[1.0, 0.0], [0.9, 0.0], [1.0, 0.01]])
-    options = {"initial_simplex": start, "xatol": 1e-5 * first, "fatol": 1e-3, "maxiter": 200}
+    options = {"initial_simplex": start, "xatol": 1e-7 * first, "fatol": np.inf, "maxiter": 400}
     best = _minimize(energy, start[0], method="Nelder-Mead", options=options).x
-    parts = [_passed(rows, times, smoothing, r, best) for r, rows, times in groups]
+    parts = [_left(one, best) for one in swings]
     freedom = sum(f for _, f in parts)
     level = float(np.sqrt(sum(e for e, _ in parts) / freedom))
     return Noise(0.0, smoothing, level, float(np.sqrt(0.5 / freedom)), 0.0, "half swings")
 
 
-Swings = tuple[Recording, Array, Array]
+@dataclass(frozen=True, eq=False)
+class _Swings:
+    """Half swings of a recording as white numbers in a filter's passband.
+
+    Attributes
+    ----------
+    duration : of a half swing, s
+    numbers : (W, m), of variance that of the raw noise
+    times : (n,) of a half swing's samples from its middle, s
+    white : (n, m), samples to numbers
+    """
+
+    duration: float
+    numbers: Array
+    times: Array
+    white: Array
 
 
-def _half_swings(recording: Recording) -> Swings | None:
-    """Windows (W, n) about the lower turning points, and times (n,) from their middles, s."""
+def _half_swings(recording: Recording) -> tuple[float, Array, Array] | None:
+    """Duration, s, windows (W, n) about the lower turning points, and times (n,) from there, s."""
     centred = recording.samples - np.median(recording.samples)
     below = centred < 0
     turns = np.flatnonzero(np.diff(below.astype(int)))
@@ -159,32 +177,36 @@ def _half_swings(recording: Recording) -> Swings | None:
     if not spans:
         return None
     half_period = float(np.median([s for s in spans if s > 0.5 * max(spans)]))
-    length = int(half_period)
+    length = min(int(half_period), LONGEST)
     starts = _swings(recording, length)
     if length < 8 or not starts:
         return None
     steps = np.arange(length, dtype=np.float64) - 0.5 * (length - 1)
     times = np.asarray(steps * recording.interval, dtype=np.float64)
-    return recording, np.array([recording.samples[s : s + length] for s in starts]), times
+    rows = np.array([recording.samples[s : s + length] for s in starts])
+    return (half_period - 1.0) * recording.interval, rows, times
 
 
-def _passed(
-    rows: Array, times: Array, smoothing: Smoothing, recording: Recording, x: Array
-) -> tuple[float, int]:
-    """Energy over the filter's power, and degrees of freedom, that sinusoids leave in its passband.
+def _passband(swings: tuple[float, Array, Array], smoothing: Smoothing, interval: float) -> _Swings:
+    """What the filter lets pass of half swings, its power divided out."""
+    duration, rows, times = swings
+    values, vectors = np.linalg.eigh(_covariance(smoothing, interval, times.size))
+    strong = values > STRONG * values[-1]
+    white = vectors[:, strong] / np.sqrt(values[strong])
+    return _Swings(duration, (rows - rows.mean(axis=1, keepdims=True)) @ white, times, white)
+
+
+def _left(swings: _Swings, x: Array) -> tuple[float, int]:
+    """Energy and degrees of freedom that decaying sinusoids leave of half swings.
 
     x: angular frequency, rad/s, and decay rate, 1/s.
     """
+    times = swings.times
     decay = np.exp(-x[1] * times)
-    motion = [decay * np.cos(x[0] * times), decay * np.sin(x[0] * times)]
-    basis = null_space(np.vstack([np.ones(times.size), *motion]))
-    values, vectors = np.linalg.eigh(
-        basis.T @ _covariance(smoothing, recording, times.size) @ basis
-    )
-    strong = values > STRONG * values[-1]
-    numbers = (rows - rows.mean(axis=1, keepdims=True)) @ basis @ vectors[:, strong]
-    energy = np.sum(numbers**2 / values[strong], axis=1)
-    freedom = int(strong.sum())
+    motion = [np.ones(times.size), decay * np.cos(x[0] * times), decay * np.sin(x[0] * times)]
+    basis = np.linalg.qr(swings.white.T @ np.column_stack(motion))[0]
+    energy = np.sum((swings.numbers - (swings.numbers @ basis) @ basis.T) ** 2, axis=1)
+    freedom = swings.numbers.shape[1] - MOTION
     scale = np.median(energy) / stats.chi2.median(freedom)
     kept = energy <= scale * stats.chi2.ppf(0.999, freedom)
     return float(energy[kept].sum()), int(kept.sum()) * freedom
@@ -206,10 +228,10 @@ def _swings(recording: Recording, length: int) -> list[int]:
     return starts
 
 
-def _covariance(smoothing: Smoothing, recording: Recording, length: int) -> Array:
+def _covariance(smoothing: Smoothing, interval: float, length: int) -> Array:
     size = 8 * length
-    frequency: Array = np.asarray(np.fft.rfftfreq(size, recording.interval), dtype=np.float64)
-    power = gain(smoothing, recording.interval, frequency) ** 2
+    frequency: Array = np.asarray(np.fft.rfftfreq(size, interval), dtype=np.float64)
+    power = gain(smoothing, interval, frequency) ** 2
     return np.asarray(toeplitz(np.fft.irfft(power, size)[:length]))
 
 

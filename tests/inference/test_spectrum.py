@@ -12,7 +12,7 @@ from scipy.signal import butter, lfilter, savgol_filter
 from bayesimpact.data.campaign import Smoothing
 from bayesimpact.data.recording import Recording
 from bayesimpact.inference.noise import Noise
-from bayesimpact.inference.spectrum import find_smoothing, nulls
+from bayesimpact.inference.spectrum import find_smoothing, nulls, smoothed_noise
 from bayesimpact.trial.rig import Release
 from bayesimpact.trial.rig_chain import Chain
 
@@ -124,3 +124,22 @@ def test_nulls_are_where_a_sine_vanishes(window, order):
     for frequency in nulls(Smoothing("savgol", window, order), 1e-3, count=2):
         wave = savgol_filter(np.sin(2 * np.pi * frequency * t), window, order)[window:-window]
         assert np.abs(wave).max() < 5e-3
+
+
+@pytest.mark.parametrize("samples", [120, 700, 2200])  # of a period
+def test_the_raw_level_behind_a_known_filter(samples, monkeypatch):
+    """Half swings of any length, at the cost of one eigenvalue problem a recording."""
+    solved = []
+    eigh = np.linalg.eigh
+    monkeypatch.setattr(np.linalg, "eigh", lambda a: solved.append(len(a)) or eigh(a))
+    filtering = Smoothing("savgol", 15, 2)
+    ratios = []
+    for seed in range(4):
+        t = np.arange(12 * samples) / samples
+        motion = 5e-3 * np.exp(-0.1 * t) * np.cos(2 * np.pi * t)
+        noise = 1e-6 * np.random.default_rng(seed).standard_normal(t.size)
+        recording = Recording("a", "", savgol_filter(motion + noise, 15, 2), 1e-3)
+        found = smoothed_noise([recording], filtering)
+        ratios.append((found.level / 1e-6 - 1.0) / found.level_error)
+    assert len(solved) == 4 and max(solved) <= 1024
+    assert abs(np.mean(ratios)) < 4 / np.sqrt(4)
