@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import small_rig
 from click.testing import CliRunner
+from coarse_figures import draw_coarsely
 
 from bayesimpact.cli import main
 from bayesimpact.fleet import run
@@ -45,7 +46,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def done(folder: Path) -> Path:
     out = folder / "out"
-    result = CliRunner().invoke(main, ["fleet", str(folder / "fleet.toml"), "--out", str(out)])
+    with pytest.MonkeyPatch.context() as patch:
+        draw_coarsely(patch)
+        result = CliRunner().invoke(main, ["fleet", str(folder / "fleet.toml"), "--out", str(out)])
     assert result.exit_code == 3, result.output  # one campaign is lost
     assert "lost" in result.output
     return out
@@ -77,6 +80,7 @@ def test_a_gap_that_grows_is_told(done: Path) -> None:
     assert (done / "campaigns" / "week0" / "report.html").exists()
 
 
+@pytest.mark.usefixtures("coarse_figures")
 def test_what_is_done_is_not_done_again(
     folder: Path, done: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

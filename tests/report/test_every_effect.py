@@ -4,7 +4,6 @@ brings along is missing anywhere.
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from coarse_figures import draw_coarsely
 from diagnosed import DIAGNOSIS, LIMITS, MODELS, estimate, made_up_arrays
 from effect_rigs import BY_ID, with_effect
 from matplotlib.figure import Figure
@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification
 from bayesimpact.report.archive import load_results
-from bayesimpact.report.figures import gaussian, save, shares
+from bayesimpact.report.figures import gaussian, save
 from bayesimpact.report.figures.corner import Normal, corner_figure
 from bayesimpact.report.figures.gaussian import gaussian_figures
 from bayesimpact.report.figures.improvement import improvement_figures
@@ -43,18 +43,10 @@ def few_pairs(after: Normal, *, before: Normal, **told: Any) -> Figure:
 
 @pytest.fixture(autouse=True)
 def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What reads parameters is drawn, with few pixels, no PDF and no second process."""
-
-    def saved(name: str, figure: Figure, folder: Path) -> bytes:
-        figure.set_layout_engine("none")
-        stream = io.BytesIO()
-        figure.savefig(stream, format="png", dpi=12)
-        return stream.getvalue()
-
-    monkeypatch.setattr(save, "_saved", saved)
+    """What reads parameters is drawn, coarsely."""
+    draw_coarsely(monkeypatch)
     monkeypatch.setattr(save, "DIAGNOSIS", (improvement_figures, gaussian_figures))
     monkeypatch.setattr(gaussian, "corner_figure", few_pairs)
-    monkeypatch.setattr(shares, "started", lambda folder: None)
 
 
 def extended(small: Identification, effect_id: str) -> Fit:
