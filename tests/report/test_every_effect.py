@@ -9,9 +9,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import coarse_figures
 import numpy as np
 import pytest
-from coarse_figures import draw_coarsely
 from diagnosed import DIAGNOSIS, LIMITS, MODELS, estimate, made_up_arrays
 from effect_rigs import BY_ID, with_effect
 from matplotlib.figure import Figure
@@ -41,10 +41,23 @@ def few_pairs(after: Normal, *, before: Normal, **told: Any) -> Figure:
     return corner_figure(some(after), before=some(before), **told)
 
 
+MOTIONS: dict[str, bytes] = {}
+
+
+def saved(name: str, figure: Figure, folder: Path) -> bytes:
+    """A figure's file; recorded motions, which look alike whatever the effect, from the first."""
+    if not name.startswith("fit"):
+        return coarse_figures.saved(name, figure, folder)
+    if name not in MOTIONS:
+        MOTIONS[name] = coarse_figures.saved(name, figure, folder)
+    return MOTIONS[name]
+
+
 @pytest.fixture(autouse=True)
 def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What reads parameters is drawn, coarsely."""
-    draw_coarsely(monkeypatch)
+    """What shows parameters is drawn, coarsely."""
+    coarse_figures.draw_coarsely(monkeypatch)
+    monkeypatch.setattr(save, "_saved", saved)
     monkeypatch.setattr(save, "DIAGNOSIS", (improvement_figures, gaussian_figures))
     monkeypatch.setattr(gaussian, "corner_figure", few_pairs)
 
