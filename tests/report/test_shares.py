@@ -16,7 +16,7 @@ from bayesimpact.report.results import Results
 
 @pytest.fixture
 def told(tmp_path: Path) -> Results:
-    results = replace(diagnosed(), sampler=None, backbone=None)
+    results = replace(diagnosed(1, 1), sampler=None, backbone=None)
     save_results(results, tmp_path)
     return results
 
