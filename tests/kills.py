@@ -18,8 +18,9 @@ from bayesimpact.report.archive_arviz import read_posterior
 
 # Kills its process in place of the n-th renaming of a finished file: what was written is there in
 # full under another name, or not at all. n = 0: never; at the end it says how many there were.
+# Figures, of which only the names are compared, have few pixels, and their PDF is a copy of that.
 AT_A_WRITE = """
-import os, signal, sys
+import io, os, signal, sys
 rename, count, fatal = os.replace, 0, int(sys.argv[1])
 def counted(source, target, **more):
     global count
@@ -30,6 +31,17 @@ def counted(source, target, **more):
     rename(source, target, **more)
 os.replace = counted
 from bayesimpact.cli import main
+from bayesimpact.report.figures import save
+def saved(name, figure, folder):
+    figure.set_layout_engine("none")
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=12)
+    folder.mkdir(parents=True, exist_ok=True)
+    for ending in ("png", "pdf"):
+        with save.atomic(folder / f"{save.file_name(name)}.{ending}") as temporary:
+            temporary.write_bytes(stream.getvalue())
+    return stream.getvalue()
+save._saved = saved
 try:
     main(sys.argv[2:])
 finally:

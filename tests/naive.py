@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import mpmath as mp
 import numpy as np
@@ -140,7 +141,7 @@ class _Stretch:
 def _solve(function, low, high):
     """Root of a monotone function (returning value and slope) that changes sign in [low, high]."""
     sign = function(high)[0] > 0
-    for _ in range(30):
+    for _ in range(8):
         middle = (low + high) / 2
         if (function(middle)[0] > 0) == sign:
             high = middle
@@ -209,7 +210,7 @@ def twin(q, mass, interval, n, digits=50):
         t, y, v = mp.mpf(0), q[5], q[6]
         events, states = [], []
         while True:
-            motion = _Stretch(q, mass, contact, t, y, v, nudge)
+            motion = cache(_Stretch(q, mass, contact, t, y, v, nudge))
             event = None
             if stop and end > t:
                 event = _next_event(q, mass, contact, motion, t, y, v, end, scale)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 
 from bayesimpact.data.campaign import Campaign, Measurement
 from bayesimpact.data.quantity import Quantity
 from bayesimpact.model.parameters import Layout
+from bayesimpact.trial import rig as generator
 from bayesimpact.trial.rig import Effects, Release, Rig, make_campaign, motion
 from bayesimpact.trial.rig_chain import Chain
 from bayesimpact.trial.rig_motion import Motion
@@ -32,6 +35,19 @@ PLAIN = Rig(mass=0.503, c1=0.148, k1=808.556)  # without a stop
 PLAIN_RELEASES = (Release("a", "", -6.5e-3, 1e-3), Release("b", "", 4.5e-3))
 
 
+_MOTIONS: dict[str, Motion] = {}
+
+
+def _once(rig: Rig, release: Release, effects: Effects, **how: Any) -> Motion:
+    """The motion of a release; a campaign with another seed has the same under its noise."""
+    key = repr((rig, release, effects, how))
+    if key not in _MOTIONS:
+        _MOTIONS[key] = motion(rig, release, effects, **how)
+        for array in (getattr(_MOTIONS[key], n) for n in ("displacement", "velocity")):
+            array.flags.writeable = False
+    return _MOTIONS[key]
+
+
 def record(
     seed: int = 1,
     effects: Effects | None = None,
@@ -45,18 +61,19 @@ def record(
     quantity: Quantity = "displacement",
 ) -> Campaign:
     """Record a campaign; white noise of 5 um and rest readings by default."""
-    return make_campaign(
-        "small rig",
-        rig,
-        releases,
-        effects,
-        chain or Chain(noise=NOISE, offsets=OFFSETS),
-        rate=rate,
-        duration=duration,
-        rng=np.random.default_rng(seed),
-        measurement=measurement,
-        quantity=quantity,
-    )
+    with patch.object(generator, "motion", _once):
+        return make_campaign(
+            "small rig",
+            rig,
+            releases,
+            effects,
+            chain or Chain(noise=NOISE, offsets=OFFSETS),
+            rate=rate,
+            duration=duration,
+            rng=np.random.default_rng(seed),
+            measurement=measurement,
+            quantity=quantity,
+        )
 
 
 def motion_of(number: int, rate: float = 1000.0, duration: float = 2.0) -> Motion:

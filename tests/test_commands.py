@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from coarse_figures import draw_coarsely
 from small_rig import RELEASES, RIG, record
 
 from bayesimpact.cli import main
@@ -49,12 +50,14 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def sampled(campaign: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("sampled")
-    with pytest.raises(SystemExit) as ended:
+    with pytest.MonkeyPatch.context() as patch, pytest.raises(SystemExit) as ended:
+        draw_coarsely(patch)
         main(["sample", str(campaign), "--out", str(out), "--quiet"])
     assert ended.value.code in (0, None)
     return out
 
 
+@pytest.mark.usefixtures("coarse_figures")
 def test_fit_writes_the_mode_near_the_truth(run: Run, campaign: Path, tmp_path: Path) -> None:
     code, out, _ = run("fit", campaign, "--out", tmp_path)
     assert code == 0
@@ -69,6 +72,7 @@ def test_sample_leaves_what_the_contract_names(sampled: Path) -> None:
     assert {"posterior.nc", "report.html", "figures", "fit.json"} <= names
 
 
+@pytest.mark.usefixtures("coarse_figures")
 def test_resume_gives_the_same_posterior(run: Run, campaign: Path, sampled: Path) -> None:
     before = (sampled / "fit.json").read_text()
     code, _, _ = run("sample", campaign, "--out", sampled, "--resume", "--quiet")
@@ -131,6 +135,7 @@ def test_a_faulty_effect_is_refused_before_any_work(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.usefixtures("coarse_figures")
 def test_an_effect_of_ones_own_is_named(run: Run, campaign: Path, tmp_path: Path) -> None:
     """A magnet that the catalogue does not know, played by the simulator with noise on top."""
     (magnet,) = load_effects(EXAMPLE)
@@ -159,6 +164,7 @@ def test_an_effect_of_ones_own_is_named(run: Run, campaign: Path, tmp_path: Path
     assert "magnetic detent" in (tmp_path / "out" / "report.html").read_text()
 
 
+@pytest.mark.usefixtures("coarse_figures")
 @pytest.mark.parametrize("name", ["pendulum", "ship_roll"])
 def test_a_linear_oscillator_is_told_not_to_fit(run: Run, name: str, tmp_path: Path) -> None:
     if not (REAL / name).exists():

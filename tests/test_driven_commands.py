@@ -42,6 +42,7 @@ def _run(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
     return captured.out
 
 
+@pytest.mark.usefixtures("coarse_figures")
 def test_check_fit_and_report(
     campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -56,6 +57,7 @@ def test_check_fit_and_report(
     assert "With a measured input" in page and "gain of the measured input" in page
 
 
+@pytest.mark.usefixtures("coarse_figures")
 def test_a_quick_diagnosis(
     campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

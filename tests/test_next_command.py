@@ -64,6 +64,7 @@ def ambiguous(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+@pytest.mark.usefixtures("coarse_figures")
 def test_it_ranks_writes_and_tells(run: Run, ambiguous: Path) -> None:
     old = json.loads((ambiguous / "diagnosis.json").read_text())
     code, out, _ = run("next", ambiguous)

@@ -104,6 +104,7 @@ def test_a_chain_that_is_a_file(
     assert code == 2 and error.count("\n") == 1 and "chain" in error
 
 
+@pytest.mark.usefixtures("coarse_figures")
 def test_a_figure_that_fails_costs_nothing_else_and_report_finishes_it(
     capsys: pytest.CaptureFixture[str],
     campaign: Path,

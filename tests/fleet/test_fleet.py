@@ -7,11 +7,13 @@ import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import small_rig
 from click.testing import CliRunner
+from coarse_figures import draw_coarsely
 
 from bayesimpact.cli import main
 from bayesimpact.fleet import run
@@ -21,6 +23,7 @@ from bayesimpact.fleet.table import columns
 from bayesimpact.fleet.write import fleet_results
 
 SESSIONS = 7
+JOB = run.campaign_job
 GROWTH = 1e-5  # m, of the gap from session to session
 
 
@@ -45,7 +48,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def done(folder: Path) -> Path:
     out = folder / "out"
-    result = CliRunner().invoke(main, ["fleet", str(folder / "fleet.toml"), "--out", str(out)])
+    with pytest.MonkeyPatch.context() as patch:
+        draw_coarsely(patch)
+        result = CliRunner().invoke(main, ["fleet", str(folder / "fleet.toml"), "--out", str(out)])
     assert result.exit_code == 3, result.output  # one campaign is lost
     assert "lost" in result.output
     return out
@@ -77,6 +82,7 @@ def test_a_gap_that_grows_is_told(done: Path) -> None:
     assert (done / "campaigns" / "week0" / "report.html").exists()
 
 
+@pytest.mark.usefixtures("coarse_figures")
 def test_what_is_done_is_not_done_again(
     folder: Path, done: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -115,8 +121,18 @@ def test_a_campaign_that_fails_stops_no_other(
     assert not list((tmp_path / "rows").iterdir())  # tried again next time
 
 
-def test_a_cluster_gives_the_same_rows(folder: Path, done: Path, tmp_path: Path) -> None:
+def coarse_job(*job: Any) -> object:
+    """A campaign's job, in whatever process it is done."""
+    with pytest.MonkeyPatch.context() as patch:
+        draw_coarsely(patch)
+        return JOB(*job)
+
+
+def test_a_cluster_gives_the_same_rows(
+    folder: Path, done: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """But for rounding: linear algebra on several threads adds in another order."""
+    monkeypatch.setattr(run, "campaign_job", coarse_job)
     plan = load_plan(folder / "fleet.toml")
     few = replace(plan, sessions=plan.sessions[:2])
     rows = run.run_fleet(few, tmp_path, workers=2)

@@ -69,7 +69,7 @@ def test_effective_size_of_an_autoregressive_process(rho):
 @pytest.mark.parametrize(("share", "steps"), [(0.8, 150), (0.2, 300)])
 def test_effective_size_is_honest_for_interacting_walkers(share, steps):
     """ESS from one run against the error of the mean over replicated runs of the real move set."""
-    dimension, walkers, replicates = 5, 16, 60
+    dimension, walkers, replicates = 10, 22, 30
     frame = Frame(np.zeros(dimension), np.eye(dimension))
     mixture = Mixture((frame,), np.array([FIRST_WEIGHTS]))
     means, claims = [], []
@@ -87,7 +87,7 @@ def test_effective_size_is_honest_for_interacting_walkers(share, steps):
         sampler.run_mcmc(state, steps, skip_initial_state_check=True)
         chain = sampler.get_chain()
         means.append(chain.mean(axis=(0, 1)))
-        if k % 6 == 0:
+        if k % 3 == 0:
             claims.append(effective_sizes(chain[None])[0].mean())
     truth = 1.0 / np.mean(np.square(means))  # relative error sqrt(2/300) = 8 %
     assert np.mean(claims) == pytest.approx(truth, rel=4.0 * np.sqrt(2.0 / 300.0))

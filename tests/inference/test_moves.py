@@ -98,8 +98,8 @@ def test_variance_ratio_is_one(name, correlated, dimension):
         log_density,
         draw,
         lambda: MOVES[name](dimension, factor),
-        walkers=max(48, 2 * dimension + 2),
-        steps=120,
+        walkers=max(96, 4 * dimension + 4),
+        steps=60,
     )
     assert error < 0.02
     assert abs(mean) < LIMIT * error
@@ -128,14 +128,14 @@ WRONG = {
 @pytest.mark.parametrize("name", WRONG)
 def test_the_check_catches_wrong_moves(name, dimension):
     _, log_density, draw, variance_excess = gaussian(dimension, False)
-    walkers = 4 * (dimension // 2 + 1)
+    walkers = 8 * (dimension // 2 + 1)
     mean, error = excess(
         variance_excess,
         log_density,
         draw,
         lambda: WRONG[name](dimension),
         walkers=walkers,
-        steps=120,
+        steps=60,
     )
     assert abs(mean) > 2.0 * LIMIT * error
 
@@ -167,8 +167,8 @@ def skewed_excess(make_moves, dimension):
     def start(rng, count):
         return draw(rng, (count, dimension))
 
-    walkers = max(32, 2 * dimension + 2)
-    return excess(moments, log_density, start, make_moves, walkers=walkers, steps=120)
+    walkers = max(64, 4 * dimension + 4)
+    return excess(moments, log_density, start, make_moves, walkers=walkers, steps=60)
 
 
 @pytest.mark.parametrize("dimension", [7, 25])

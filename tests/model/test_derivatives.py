@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import mpmath as mp
 import naive
@@ -53,21 +54,27 @@ def analytic(q, mass, interval, n, order=0):
     return values, jacobian
 
 
-def differences(q, mass, interval, n, order=0):
-    """Central differences of the twin, exact to about 20 digits."""
-    out = np.zeros((n, 11))
+@cache
+def twins(q, mass, interval, n):
+    """The twin of q, and the number, step and twins to either side of every finite parameter."""
+    sides = []
     for i in range(10):
         if not math.isfinite(q[i]):
             continue
-        step = mp.mpf(max(abs(q[i]), 1e-3)) * mp.mpf(10) ** -16
-        sides = []
-        for sign in (1, -1):
-            with mp.workdps(70):
-                moved = [mp.mpf(x) for x in q]
-                moved[i] += sign * step
-                sides.append(naive.twin(moved, mass, interval, n).derivative(order))
         with mp.workdps(70):
-            out[:, i] = [float((a - b) / (2 * step)) for a, b in zip(*sides, strict=True)]
+            step = mp.mpf(max(abs(q[i]), 1e-3)) * mp.mpf(10) ** -16
+            moved = [[mp.mpf(x) + s * step * (i == j) for j, x in enumerate(q)] for s in (1, -1)]
+            sides.append((i, step, [naive.twin(m, mass, interval, n) for m in moved]))
+    return naive.twin(q, mass, interval, n), sides
+
+
+def differences(q, mass, interval, n, order=0):
+    """Central differences of the twin, exact to about 20 digits."""
+    out = np.zeros((n, 11))
+    for i, step, sides in twins(tuple(q), mass, interval, n)[1]:
+        pairs = zip(*(side.derivative(order) for side in sides), strict=True)
+        with mp.workdps(70):
+            out[:, i] = [float((a - b) / (2 * step)) for a, b in pairs]
     out[:, 10] = 1.0
     return out
 
@@ -85,7 +92,7 @@ def test_derivatives(case, order):
     assert np.all(errors < 1e-11), dict(zip(BASE, errors, strict=True))
     whole = predictions(q[None], EVERY, np.zeros((1, 11)), 0.503, [n], [interval], n, [order])[0][0]
     np.testing.assert_allclose(values, whole, atol=1e-15 * (W1 / interval) ** order)
-    twin = np.array(naive.twin(q, 0.503, interval, n).derivative(order), dtype=float) + q[10]
+    twin = np.array(twins(tuple(q), 0.503, interval, n)[0].derivative(order), dtype=float) + q[10]
     np.testing.assert_allclose(whole, twin, rtol=0, atol=1e-12 * np.abs(twin).max())
 
 

@@ -4,12 +4,12 @@ brings along is missing anywhere.
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import coarse_figures
 import numpy as np
 import pytest
 from diagnosed import DIAGNOSIS, LIMITS, MODELS, estimate, made_up_arrays
@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification
 from bayesimpact.report.archive import load_results
-from bayesimpact.report.figures import gaussian, save, shares
+from bayesimpact.report.figures import gaussian, save
 from bayesimpact.report.figures.corner import Normal, corner_figure
 from bayesimpact.report.figures.gaussian import gaussian_figures
 from bayesimpact.report.figures.improvement import improvement_figures
@@ -41,20 +41,25 @@ def few_pairs(after: Normal, *, before: Normal, **told: Any) -> Figure:
     return corner_figure(some(after), before=some(before), **told)
 
 
+MOTIONS: dict[str, bytes] = {}
+
+
+def saved(name: str, figure: Figure, folder: Path) -> bytes:
+    """A figure's file; recorded motions, which look alike whatever the effect, from the first."""
+    if not name.startswith("fit"):
+        return coarse_figures.saved(name, figure, folder)
+    if name not in MOTIONS:
+        MOTIONS[name] = coarse_figures.saved(name, figure, folder)
+    return MOTIONS[name]
+
+
 @pytest.fixture(autouse=True)
 def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What reads parameters is drawn, with few pixels, no PDF and no second process."""
-
-    def saved(name: str, figure: Figure, folder: Path) -> bytes:
-        figure.set_layout_engine("none")
-        stream = io.BytesIO()
-        figure.savefig(stream, format="png", dpi=12)
-        return stream.getvalue()
-
+    """What shows parameters is drawn, coarsely."""
+    coarse_figures.draw_coarsely(monkeypatch)
     monkeypatch.setattr(save, "_saved", saved)
     monkeypatch.setattr(save, "DIAGNOSIS", (improvement_figures, gaussian_figures))
     monkeypatch.setattr(gaussian, "corner_figure", few_pairs)
-    monkeypatch.setattr(shares, "started", lambda folder: None)
 
 
 def extended(small: Identification, effect_id: str) -> Fit:

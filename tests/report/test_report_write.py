@@ -103,6 +103,7 @@ def test_posterior_in_numbers(posterior: Posterior, identification: Identificati
     )
 
 
+@pytest.mark.usefixtures("coarse_figures")
 def test_folder_of_a_posterior(
     posterior: Posterior, identification: Identification, tmp_path: Path
 ) -> None:
@@ -115,6 +116,7 @@ def test_folder_of_a_posterior(
     assert results.before is not None and results.before_backbone is not None
 
 
+@pytest.mark.usefixtures("coarse_figures")
 def test_report_again_from_files_alone(tmp_path: Path) -> None:
     write_results(make_results(1, 1, n=200, sampled=False), tmp_path)
     page = (tmp_path / REPORT_FILE).read_text()
@@ -191,6 +193,7 @@ def softening_pendulum() -> Campaign:
     return Campaign("pendulum", 1.0, (recording,), stop=False)
 
 
+@pytest.mark.usefixtures("coarse_figures")
 def test_report_of_a_linear_oscillator_that_does_not_fit(tmp_path: Path) -> None:
     found = identify(softening_pendulum(), rng=np.random.default_rng(1), search=False)
     results = write_fit(found, tmp_path, seed=1).results

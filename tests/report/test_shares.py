@@ -16,7 +16,7 @@ from bayesimpact.report.results import Results
 
 @pytest.fixture
 def told(tmp_path: Path) -> Results:
-    results = replace(diagnosed(), sampler=None, backbone=None)
+    results = replace(diagnosed(1, 1), sampler=None, backbone=None)
     save_results(results, tmp_path)
     return results
 
@@ -30,6 +30,7 @@ def test_two_processes_draw_what_one_does(told: Results, tmp_path: Path) -> None
         assert (tmp_path / "figures" / f"{name}.png").read_bytes() == data
 
 
+@pytest.mark.usefixtures("coarse_figures")
 @pytest.mark.parametrize("interpreter", ["/bin/false", "/no/such/file"])
 def test_one_process_draws_all_where_no_other_starts(
     told: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, interpreter: str

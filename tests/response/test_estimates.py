@@ -50,8 +50,8 @@ def failures(found: Found) -> dict[str, int]:
 
 
 @pytest.fixture(scope="module")
-def hundred() -> Found:
-    return all_of([random_rig(seed) for seed in range(100)])
+def many() -> Found:
+    return all_of([random_rig(seed) for seed in range(60)])
 
 
 def paper_campaign(
@@ -70,18 +70,18 @@ def paper_campaign(
     return Campaign("paper", PAPER["mass"], tuple(recordings))
 
 
-def test_a_hundred_random_rigs(hundred: Found) -> None:
+def test_many_random_rigs(many: Found) -> None:
     """One of 200 rigs drawn like this missed one parameter (c2) when the test was written."""
-    counts = failures(hundred)
-    assert all(count <= 3 for count in counts.values()), counts
+    counts = failures(many)
+    assert all(count <= 1 for count in counts.values()), counts
 
 
-def test_the_errors_are_of_the_size_they_say(hundred: Found) -> None:
+def test_the_errors_are_of_the_size_they_say(many: Found) -> None:
     """Standardised errors neither vanish nor explode; floors make them rather too large."""
     ratios = np.array(
         [
             abs(found.values[name] - true) / found.sd[name]
-            for rig, found in hundred
+            for rig, found in many
             for name, true in rig.truth.items()
             if name in ("k1", "c1", "g") or name.startswith("k2")
         ]

@@ -22,6 +22,7 @@ SETTINGS = strong_settings(
 )
 
 
+@pytest.mark.usefixtures("coarse_figures")
 def test_a_strong_trial_from_draw_to_summary(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -68,6 +68,7 @@ def diagnosed(folder: Path, out: Path) -> dict[str, Any]:
     return content
 
 
+@pytest.mark.usefixtures("coarse_figures")
 def test_a_diagnosis_is_the_same_with_the_truth_absent_or_poisoned(
     concealed: Path, tmp_path: Path, opened: list[str]
 ) -> None:
@@ -136,6 +137,7 @@ def run_demo(
     return run
 
 
+@pytest.mark.usefixtures("coarse_figures")
 def test_the_demo_opens_the_truth_last(
     run_demo: Callable[..., int],
     tmp_path: Path,
@@ -154,6 +156,7 @@ def test_the_demo_opens_the_truth_last(
     assert (tmp_path / "out" / "concealed" / "diagnosis.json").is_file()
 
 
+@pytest.mark.usefixtures("coarse_figures")
 def test_a_quiet_demo_does_not_open_it(
     run_demo: Callable[..., int], opened: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

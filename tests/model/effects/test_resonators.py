@@ -33,10 +33,10 @@ def test_two_contacts_and_the_flights_around_them(frequency, damping):
     state, t, rates = np.array([rig.y0[0], rig.v0[0], 0.0, 0.0, 1.0]), 0.0, free
     times, expected, touches = np.arange(rig.count) / rig.rate, [], 0
     while len(expected) < rig.count:
-        ahead = np.arange(2e-3, 0.3, 2e-4)
-        sign = 1.0 if rates is free else -1.0
-        beyond = [sign * ((expm(rates * s) @ state)[0] - rig.g) > 0 for s in ahead]
-        later = ahead[np.argmax(beyond)]
+        later, step, sign = 2e-3, expm(rates * 2e-4), 1.0 if rates is free else -1.0
+        ahead = expm(rates * later) @ state
+        while sign * (ahead[0] - rig.g) <= 0:
+            later, ahead = later + 2e-4, step @ ahead
 
         def height(s: float, rates: np.ndarray = rates, state: np.ndarray = state) -> float:
             return float((expm(rates * s) @ state)[0] - rig.g)
