@@ -21,9 +21,10 @@ from bayesimpact.diagnosis.learned import LEARNED
 from bayesimpact.formula.evidence import Problem, single_log_odds
 from bayesimpact.formula.grammar import Term
 from bayesimpact.formula.library import library, local_starts, neighbours
-from bayesimpact.formula.responses import Motion, motion_of, responses
+from bayesimpact.formula.responses import motion_of, responses
 from bayesimpact.inference.fit import Fit, inverse
 from bayesimpact.model.effects.effect import Scales
+from bayesimpact.model.superposition import Motion
 
 Array = NDArray[np.float64]
 
