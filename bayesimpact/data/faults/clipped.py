@@ -18,7 +18,8 @@ def find_clipped(recording: Recording) -> list[Fault]:
     """Runs at the largest or the smallest reading that hide a motion beyond it.
 
     A turning point that the readings' step flattens hides less than a step; three steps, and three
-    standard deviations of the noise, count.
+    standard deviations of the noise, count. A run at the beginning may be a rest, unless another
+    one has the same reading.
     """
     x = recording.samples
     unit = max(reading_step(x), noise_level(x))
@@ -27,9 +28,9 @@ def find_clipped(recording: Recording) -> list[Fault]:
         cut = [
             run
             for run in flats(x, LEAST)
-            if run.value == extreme and run.missed > MISSED * unit and run.first > 0
+            if run.value == extreme and run.missed > MISSED * unit
         ]
-        if len(cut) >= SEVERAL or any(run.size >= LONG for run in cut):
+        if len(cut) >= SEVERAL or any(run.size >= LONG and run.first > 0 for run in cut):
             found.append(_fault(recording, extreme, side, cut, unit))
     return found
 

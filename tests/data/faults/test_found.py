@@ -126,6 +126,14 @@ def test_a_dead_tail_is_cut(paper: Campaign) -> None:
     assert fault.remedy == "end_s = 3.9984"
 
 
+def test_clipping_from_the_first_sample_on_is_no_rest(paper: Campaign) -> None:
+    x = paper.recordings[4].samples
+    limit = 0.98 * float(x[80:220].min())  # the second turning point on the side of the release
+    fault = only(spoiled(paper, lambda x: np.maximum(x, limit)))
+    assert fault.id == "recording_clipped" and fault.size == limit
+    assert fault.spans[0][0] == 0 and len(fault.spans) == 2
+
+
 @pytest.mark.parametrize("low", [True, False])
 def test_clipping(paper: Campaign, low: bool) -> None:
     x = paper.recordings[4].samples
