@@ -26,9 +26,7 @@ def find_clipped(recording: Recording) -> list[Fault]:
     found = []
     for extreme, side in ((float(x.max()), "largest"), (float(x.min()), "smallest")):
         cut = [
-            run
-            for run in flats(x, LEAST)
-            if run.value == extreme and run.missed > MISSED * unit
+            run for run in flats(x, LEAST) if run.value == extreme and run.missed > MISSED * unit
         ]
         if len(cut) >= SEVERAL or any(run.size >= LONG and run.first > 0 for run in cut):
             found.append(_fault(recording, extreme, side, cut, unit))
