@@ -2,7 +2,8 @@
 
 1. What recordings show of themselves is set aside, and the base model fitted.
 2. What comparing them shows is corrected, step by step, as long as a step gains more than any
-   effect promises.
+   effect promises. Where physics then leaves something, once more without these corrections, unless
+   one gained more than all effects together promise.
 3. Physics is searched. Where that ends in doubt, once more with the other steps corrected: the
    simpler of two answers that explain everything stays.
 4. Spikes may only show against a fit with that physics: then once more without them.
@@ -14,6 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.diagnosis.decision import Verdict
@@ -39,6 +41,8 @@ from bayesimpact.inference.spectrum import Fingerprint
 from bayesimpact.model.effects import SEARCHED
 from bayesimpact.model.effects.effect import Effect
 from bayesimpact.model.threads import linear_algebra_alone
+
+Array = NDArray[np.float64]
 
 BESIDE: Mapping[Verdict, Verdict] = {
     "adequate": "named",
@@ -85,10 +89,14 @@ def diagnose(
 
     say("fitting the base model")
     cleaned = cleaned_campaign(campaign, rng=rng, search=search)
-    as_is = cleaned.identification.fit
     say("comparing the recordings")
-    certain, doubtful = cleaned, list(comparisons(cleaned, campaign))
-    while doubtful and is_certain(doubtful[0], certain.identification.fit, effects, rng=rng):
+    certain, doubtful, proved = cleaned, list(comparisons(cleaned, campaign)), False
+    while doubtful:
+        fit = certain.identification.fit
+        promised = promised_gains(fit, effects, rng=rng)
+        if not exceeds(doubtful[0], fit, float(promised.max(initial=0.0))):
+            break
+        proved = proved or exceeds(doubtful[0], fit, float(promised.sum()))
         certain = with_step(certain, doubtful.pop(0), rng=rng, search=search)
     found = physics(certain)
     if doubtful and is_doubtful(found):
@@ -96,25 +104,28 @@ def diagnose(
         for step in doubtful:
             corrected = with_step(corrected, step, rng=rng, search=search)
         found = _simpler(found, physics(corrected))
-    elif certain is not cleaned and found.verdict not in OPEN and not base_failed(as_is):
+    elif certain is not cleaned and not proved and found.verdict not in OPEN:
         alone = physics(cleaned)
         found = alone if is_settled(alone) else found
     return _without_late_spikes(found, campaign, physics, rng=rng)
 
 
-def is_certain(
-    step: Step, fit: Fit, effects: Sequence[Effect], *, rng: np.random.Generator
-) -> bool:
-    """Whether correcting faults gains more than any single effect promises: they come first then.
+def promised_gains(fit: Fit, effects: Sequence[Effect], *, rng: np.random.Generator) -> Array:
+    """What single effects promise to gain over a base fit, nats, (E,); () where it is no fit."""
+    if base_failed(fit):
+        return np.zeros(0)
+    found = scan(fit, effects, campaign_scales(fit), rng=rng)
+    return np.array([score.gain for score in found.best()])
+
+
+def exceeds(step: Step, fit: Fit, promised: float) -> bool:
+    """Whether correcting faults gains more than `promised`, nats, by effects that are missing.
 
     Where physics is missing, recordings of different amplitude show it each in its own way.
     """
-    if base_failed(fit):
-        return True
-    found = scan(fit, effects, campaign_scales(fit), rng=rng)
-    most = max((score.gain for score in found.best()), default=0.0)
     last = step[-1]
-    return gain(fit.reduced_chi2, last.after, last.campaign) > RASH * most + NEAR_MARGIN
+    gained = gain(fit.reduced_chi2, last.after, last.campaign)
+    return base_failed(fit) or gained > RASH * promised + NEAR_MARGIN
 
 
 def is_settled(found: Diagnosis) -> bool:

@@ -146,6 +146,26 @@ def test_doubtful_faults_come_after_certain_ones_and_physics(
     assert [e.id for e in found.effects] == ["sensor_quadratic"]
 
 
+@pytest.mark.parametrize(("effects", "searches"), [(3, 1), (10**7, 2)])
+def test_a_proved_fault_is_not_searched_without(
+    monkeypatch: pytest.MonkeyPatch, effects: int, searches: int
+) -> None:
+    """Where something remains: once, unless so many effects might explain it all together."""
+    asked = []
+    of_corrected = module._of_corrected
+
+    def remains(corrected: Corrected, **others) -> Diagnosis:
+        asked.append(corrected)
+        return replace(of_corrected(corrected, **others), verdict="partly")
+
+    monkeypatch.setattr(module, "_of_corrected", remains)
+    monkeypatch.setattr(module, "promised_gains", lambda *_, **__: np.ones(effects))
+    found = faulty(lambda samples: 1.05 * samples)
+    assert found.corrected is not None
+    assert [f.id for f in found.corrected.faults] == ["recording_gain"]
+    assert len(asked) == searches
+
+
 def test_a_recording_in_another_unit_is_not_loud() -> None:
     campaign = small_rig.record(63)
     assert loud_recordings(campaign.recordings) == []
