@@ -17,11 +17,11 @@ from bayesimpact.design.document import next_document
 from bayesimpact.design.hypotheses import Rivalry, rivalry
 from bayesimpact.design.rank import proposals
 from bayesimpact.design.store import rivals_content, rivals_from
-from bayesimpact.diagnosis.certificate import certificate
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.document import document
 from bayesimpact.diagnosis.formula_words import EFFECT_FILE, found_file
 from bayesimpact.diagnosis.loop import Diagnosis
+from bayesimpact.diagnosis.parametric_bootstrap import certificate
 from bayesimpact.errors import InputError
 from bayesimpact.inference.identify import Identification, identify
 from bayesimpact.inference.posterior import Posterior, sample

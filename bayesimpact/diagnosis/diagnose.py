@@ -23,7 +23,7 @@ from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.faults.compare import base_failed, gain
 from bayesimpact.diagnosis.faults.outliers import residual_spikes
 from bayesimpact.diagnosis.loop import Diagnosis, Progress, diagnose_fit
-from bayesimpact.diagnosis.promising import NEAR_MARGIN, RASH
+from bayesimpact.diagnosis.promising import NEAR_MARGIN, SCORE_UNDERESTIMATE
 from bayesimpact.diagnosis.recording_faults import (
     Corrected,
     Step,
@@ -125,7 +125,7 @@ def exceeds(step: Step, fit: Fit, promised: float) -> bool:
     """
     last = step[-1]
     gained = gain(fit.reduced_chi2, last.after, last.campaign)
-    return base_failed(fit) or gained > RASH * promised + NEAR_MARGIN
+    return base_failed(fit) or gained > SCORE_UNDERESTIMATE * promised + NEAR_MARGIN
 
 
 def is_settled(found: Diagnosis) -> bool:

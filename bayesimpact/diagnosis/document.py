@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.diagnosis.certificate import Certificate
 from bayesimpact.diagnosis.formula_words import formula_entries
 from bayesimpact.diagnosis.intervals import Intervals, intervals
 from bayesimpact.diagnosis.limits import PRACTICAL, Limit
 from bayesimpact.diagnosis.locate import Location
 from bayesimpact.diagnosis.loop import Diagnosis
+from bayesimpact.diagnosis.parametric_bootstrap import Certificate
 from bayesimpact.diagnosis.recording_faults import as_effects, fault_entries, in_words, place
 from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.remainder import Remainder, remainder

@@ -59,7 +59,7 @@ class Question:
         return tuple(e for e in self.reference.target.oscillator.effects if e.id != LEARNED)
 
 
-def worth_a_refit(ranked: Sequence[Subset], terms: Sequence[Term]) -> list[Subset]:
+def refit_candidates(ranked: Sequence[Subset], terms: Sequence[Term]) -> list[Subset]:
     """The likeliest formulas that differ in more than the numbers of their shapes, best first.
 
     Those that contain a likelier one with fewer terms show only that no more is needed: one of them

@@ -27,8 +27,8 @@ from bayesimpact.diagnosis.formula_refits import (
     Question,
     kinds_of,
     length_price,
+    refit_candidates,
     refitted,
-    worth_a_refit,
 )
 from bayesimpact.diagnosis.formula_scores import formula_scores
 from bayesimpact.diagnosis.learned import LEARNED
@@ -81,7 +81,7 @@ def with_formulas(
         return answer
     question = Question(answer.after, answer.naming.prior_cost, scores, scales)
     fitted: dict[Subset, Candidate] = {}
-    for subset in worth_a_refit(ranked, scores.terms):
+    for subset in refit_candidates(ranked, scores.terms):
         text = formula_text([scores.terms[k] for k in subset.terms])
         progress(f"fitting the formula {text}")
         found = refitted(question, subset)

@@ -14,10 +14,10 @@ from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.force import missing_drift, missing_force
 from bayesimpact.diagnosis.naming import State, is_large, leaves_something
 from bayesimpact.diagnosis.own_band import shakes_in_own_band
+from bayesimpact.diagnosis.profile_likelihood import followed
 from bayesimpact.diagnosis.refit import Candidate, exchanged, refit, without
 from bayesimpact.diagnosis.scan import Scan, scan
 from bayesimpact.diagnosis.scores import Score
-from bayesimpact.diagnosis.valley import followed
 from bayesimpact.inference.progress import Refit
 from bayesimpact.model.effects.effect import Effect, Scales
 

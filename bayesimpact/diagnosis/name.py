@@ -22,11 +22,11 @@ from bayesimpact.diagnosis.naming import Naming, State, is_large
 from bayesimpact.diagnosis.pairs import promising_pairs
 from bayesimpact.diagnosis.promising import (
     NEAR_MARGIN,
-    RASH,
+    SCORE_UNDERESTIMATE,
     families,
     in_place_of,
     is_redundant,
-    worth_a_refit,
+    refit_candidates,
 )
 from bayesimpact.diagnosis.refit import (
     Candidate,
@@ -80,7 +80,7 @@ def name(
     state = base = search.examine(base_candidate(fit))
     beam = [base]
     while not state.is_white and len(state.candidate.effects) < search.most and search.may_go_on():
-        promising = [s for s in beam if not search.is_hopeless(s)]
+        promising = [s for s in beam if not search.is_dominated(s)]
         better = search.best_first(state, [c for s in promising for c in search.extended(s)])
         if not better or search.promise(better[0]) <= search.promise(state.candidate):
             break
@@ -141,7 +141,7 @@ class _Search(Models):
         Only those that may overtake the best model so far, as far as scores tell.
         """
         behind = max(map(self.worth, self.tried.values())) - self.worth(state.candidate)
-        scores = self.worth_a_refit(state.scan, behind / RASH)
+        scores = self.refit_candidates(state.scan, behind / SCORE_UNDERESTIMATE)
         found = [
             self.fit_one(state.candidate, state.scan, score)
             for score in scores
@@ -180,7 +180,7 @@ class _Search(Models):
         """Whether the budget allows for more refits."""
         return self.refits < BUDGET and self.clock() < self.end
 
-    def is_hopeless(self, state: State) -> bool:
+    def is_dominated(self, state: State) -> bool:
         """Whether a free force will explain what the effects still to come cannot, say the scores.
 
         Either one beside the model's effects, or one in the place of all of them. Problems
@@ -188,11 +188,14 @@ class _Search(Models):
         """
         if not state.candidate.effects or is_large(state.candidate.fit):
             return False
-        most = RASH * max((s.gain for s in state.scan.best()), default=0.0) + NEAR_MARGIN
+        most = (
+            SCORE_UNDERESTIMATE * max((s.gain for s in state.scan.best()), default=0.0)
+            + NEAR_MARGIN
+        )
         more = self.most - len(state.candidate.effects)
         if state.unknown.log_evidence > more * most:
             return True
-        return not self.is_large and self.force_worth() - self.worth(state.candidate) > most
+        return not self.is_large and self.force_gain() - self.worth(state.candidate) > most
 
     def may_be_named(self, state: State) -> bool:
         """Whether a search around a model may end with a name, white or not.
@@ -202,12 +205,12 @@ class _Search(Models):
         if state.is_white or self.is_large:
             return True
         return (
-            self.worth(state.candidate) > self.force_worth() and state.unknown.log_evidence < SHORT
+            self.worth(state.candidate) > self.force_gain() and state.unknown.log_evidence < SHORT
         )
 
-    def worth_a_refit(self, scan: Scan, least: float = 0.0) -> list[Score]:
+    def refit_candidates(self, scan: Scan, least: float = 0.0) -> list[Score]:
         """Effects that promise something, but for those that have proved to be wrong here."""
-        return [s for s in worth_a_refit(scan, least) if not self.is_contradicted(s.effect)]
+        return [s for s in refit_candidates(scan, least) if not self.is_contradicted(s.effect)]
 
     def is_contradicted(self, effect: Effect) -> bool:
         """Whether an effect alone loses more than there is to gain, by what a free force gains.
@@ -231,7 +234,7 @@ class _Search(Models):
         evidence = tempered_evidence(candidate, self.repetition())
         return evidence - self.cost * len(candidate.effects)
 
-    def force_worth(self) -> float:
+    def force_gain(self) -> float:
         """What a free force in place of all effects would be worth, as far as scores tell."""
         base = self.states[frozenset()]
         return self.worth(base.candidate) + base.unknown.log_evidence
@@ -252,7 +255,7 @@ class _Search(Models):
         chosen = state.candidate
         if self.is_large or len(chosen.effects) < 2:
             return state
-        if self.force_worth() > self.worth(chosen) + SHORT:
+        if self.force_gain() > self.worth(chosen) + SHORT:
             return state
         for effect in chosen.effects:
             if any(p.is_shape and not p.circular for p in effect.parameters):
@@ -304,7 +307,7 @@ class _Search(Models):
         """
         best = max((self.worth(c) for c in candidates), default=0.0)
         models = {frozenset(c.ids): c for c in candidates}
-        if self.is_large or self.force_worth() > best + SHORT:
+        if self.is_large or self.force_gain() > best + SHORT:
             best = np.inf
         near = [key for key, c in models.items() if self.worth(c) > best - SHORT]
         for key in near:
@@ -337,7 +340,7 @@ class _Search(Models):
                 for joint in others:
                     if len(joint) > 1 and joint[0].effect.family == effect.family:
                         self.fit_more(rest, joint)
-            for score in in_place_of(effect, self.worth_a_refit(found)):
+            for score in in_place_of(effect, self.refit_candidates(found)):
                 if self.may_go_on() and not is_redundant(rest, score.effect):
                     self.fit_one(rest, found, score)
                     if not score.effect.has_size:

@@ -15,16 +15,18 @@ from bayesimpact.diagnosis.scan import Scan
 from bayesimpact.diagnosis.scores import Score
 from bayesimpact.model.effects.effect import Effect
 
-WORTH_A_REFIT = 4.0  # expected gain in log likelihood, nats
+LEAST_GAIN = 4.0  # expected gain in log likelihood, nats
 NEAR_BEST = 0.5  # of the best expected gain, less a margin: below that no refit makes a rival
 NEAR_MARGIN = 10.0  # nats
 FAR = 50.0  # nats; beyond four times that, the floor grows with the root of the best gain only
-LEAP = 8.0  # expected gain from which on effects that are on or off are always fitted, nats
-RASH = 1.5  # by how much a score may underrate what a refit gains
+DISCONTINUOUS = (
+    8.0  # expected gain from which on effects that are on or off are always fitted, nats
+)
+SCORE_UNDERESTIMATE = 1.5  # by how much a score may underrate what a refit gains
 JOINT = 3  # effects of one family that are tried in one step
 
 
-def worth_a_refit(scan: Scan, least: float = 0.0) -> list[Score]:
+def refit_candidates(scan: Scan, least: float = 0.0) -> list[Score]:
     """Effects whose score promises something (`least`, nats), and not far less than the best one.
 
     The larger the misfit, the less a score tells. Where something can be gained at all, effects
@@ -32,12 +34,12 @@ def worth_a_refit(scan: Scan, least: float = 0.0) -> list[Score]:
     """
     scores = scan.best()
     most = max((s.gain for s in scores), default=0.0)
-    floor = max(least, WORTH_A_REFIT, min(NEAR_BEST * most, np.sqrt(FAR * most)) - NEAR_MARGIN)
-    leaps = most > LEAP
-    return [s for s in scores if s.gain > floor or (leaps and _is_a_leap(s.effect))]
+    floor = max(least, LEAST_GAIN, min(NEAR_BEST * most, np.sqrt(FAR * most)) - NEAR_MARGIN)
+    leaps = most > DISCONTINUOUS
+    return [s for s in scores if s.gain > floor or (leaps and _is_discontinuous(s.effect))]
 
 
-def _is_a_leap(effect: Effect) -> bool:
+def _is_discontinuous(effect: Effect) -> bool:
     return not effect.has_size or effect.prefer is not None
 
 
@@ -83,5 +85,5 @@ def in_place_of(effect: Effect, scores: Sequence[Score]) -> list[Score]:
         s
         for s in scores
         if s.effect.id != effect.id
-        and (s.gain > least or (_is_a_leap(s.effect) and _are_alike(s.effect, effect)))
+        and (s.gain > least or (_is_discontinuous(s.effect) and _are_alike(s.effect, effect)))
     ]

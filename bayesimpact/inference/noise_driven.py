@@ -19,7 +19,7 @@ from bayesimpact.data.campaign import Smoothing
 from bayesimpact.data.recording import Recording
 from bayesimpact.inference.noise import Noise
 from bayesimpact.model.measurement import gain
-from bayesimpact.response.swings import rough_period
+from bayesimpact.response.half_cycles import rough_period
 
 Array = NDArray[np.float64]
 

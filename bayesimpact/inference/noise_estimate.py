@@ -28,7 +28,7 @@ from bayesimpact.errors import InputError
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.noise_driven import driven_noise
 from bayesimpact.response.displacement import displacement_of
-from bayesimpact.response.swings import rough_period
+from bayesimpact.response.half_cycles import rough_period
 
 Array = NDArray[np.float64]
 Windows = NDArray[np.int64]

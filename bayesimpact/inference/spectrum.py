@@ -24,7 +24,7 @@ from bayesimpact.data.gaps import runs
 from bayesimpact.data.recording import Recording
 from bayesimpact.inference.noise import Noise
 from bayesimpact.model.measurement import gain
-from bayesimpact.response.swings import rough_period
+from bayesimpact.response.half_cycles import rough_period
 
 Array = NDArray[np.float64]
 isotonic_regression: Any = optimize.isotonic_regression
@@ -130,7 +130,7 @@ def smoothed_noise(recordings: Sequence[Recording], smoothing: Smoothing) -> Noi
 
     Frequency and decay of the swings are those that leave the least.
     """
-    found = [(r, s) for r in recordings if (s := _half_swings(r)) is not None]
+    found = [(r, s) for r in recordings if (s := _half_cycles(r)) is not None]
     swings = [_passband(s, smoothing, r.interval) for r, s in found]
     swings = [one for one in swings if one.numbers.shape[1] > MOTION]
     if not swings:
@@ -168,7 +168,7 @@ class _Swings:
     white: Array
 
 
-def _half_swings(recording: Recording) -> tuple[float, Array, Array] | None:
+def _half_cycles(recording: Recording) -> tuple[float, Array, Array] | None:
     """Duration, s, windows (W, n) about the lower turning points, and times (n,) from there, s."""
     centred = recording.samples - np.median(recording.samples)
     below = centred < 0

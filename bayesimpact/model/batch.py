@@ -15,7 +15,7 @@ from bayesimpact.model.blocks import Sink
 from bayesimpact.model.compiled import compiled, inner
 from bayesimpact.model.driven import run_driven
 from bayesimpact.model.kernel import run
-from bayesimpact.model.tables import Shelf, shelf
+from bayesimpact.model.tables import ResponseTables, response_tables
 from bayesimpact.model.threads import SHARES_PER_THREAD, available
 
 Floats = NDArray[np.float64]
@@ -52,8 +52,8 @@ def gather(q: Floats, theta: Floats, columns: Ints, constants: Floats) -> None:
 
 @inner()
 def run_any(
-    q: Floats, mass: float, interval: float, n: int, sink: Sink, mine: Shelf, waves: Floats,
-    wave: int,
+    q: Floats, mass: float, interval: float, n: int, sink: Sink, mine: ResponseTables,
+    waves: Floats, wave: int,
 ) -> tuple[float, int, int]:  # fmt: skip
     """Simulate a recording of n samples, whose input begins at waves[wave]; -1: it has none."""
     if wave >= 0:
@@ -77,7 +77,7 @@ def work(
     q = np.empty(11)
     nothing = np.empty(0)
     no_events = np.empty((0, 2))
-    mine = shelf()
+    mine = response_tables()
     for b in range(rows[0], rows[1]):
         for r in range(items[0], items[1]):
             gather(q, theta[b], columns[r], constants[r])
@@ -122,5 +122,5 @@ def single(
 ) -> tuple[float, int, int]:  # fmt: skip
     """Simulate one recording into `out`, `speeds` and `events` (see `Sink`); as `kernel.run`."""
     sink = Sink(no_data, out, speeds, events, 0, 1.0)
-    done: tuple[float, int, int] = run(q, mass, interval, out.size, sink, shelf())
+    done: tuple[float, int, int] = run(q, mass, interval, out.size, sink, response_tables())
     return done

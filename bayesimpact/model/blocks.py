@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.model.compiled import inner
 from bayesimpact.model.flow import advance, advance_forced, forced_response, impulse_response
-from bayesimpact.model.scaled import Scaled
+from bayesimpact.model.normalized import NormalizedParameters
 from bayesimpact.model.tables import LENGTH
 
 Floats = NDArray[np.float64]
@@ -152,8 +152,8 @@ def pass_plain(
 
 @inner()
 def pass_samples(
-    sink: Sink, tables: Floats, side: int, motion: Scaled, b: float, K: float, rest: float,
-    t: float, u: float, v: float, i: int, end: int,
+    sink: Sink, tables: Floats, side: int, motion: NormalizedParameters, b: float, K: float,
+    rest: float, t: float, u: float, v: float, i: int, end: int,
 ) -> float:  # fmt: skip
     """Write or compare samples i..end-1 of any stretch with state (u, v) at time t <= i.
 

@@ -1,7 +1,7 @@
 """Exact derivatives of the base oscillator's recordings, through the impacts.
 
 With respect to all eleven q of a recording (see `simulate`); arguments as in `simulate`. First the
-event loop finds the events, then one pass carries the sensitivities from block to block (`sweep`).
+event loop finds the events, then `sensitivity_pass` carries the derivatives from block to block.
 Derivatives with respect to q that are constants (columns -1) are left 0.
 """
 
@@ -26,10 +26,10 @@ from bayesimpact.model.basis import FORCED, PLAIN
 from bayesimpact.model.batch import Floats, Ints, Span, gather, run_any
 from bayesimpact.model.blocks import Sink
 from bayesimpact.model.compiled import compiled, inner
-from bayesimpact.model.driven_sweep import sweep_driven
-from bayesimpact.model.scaled import OK, OVERFLOW, A
-from bayesimpact.model.sweep import Lanes, desk, sweep
-from bayesimpact.model.tables import Shelf, shelf
+from bayesimpact.model.driven_sensitivity_pass import driven_sensitivity_pass
+from bayesimpact.model.normalized import OK, OVERFLOW, A
+from bayesimpact.model.sensitivity_pass import Columns, sensitivity_pass, workspace
+from bayesimpact.model.tables import ResponseTables, response_tables
 from bayesimpact.model.threads import in_shares
 
 #: Events for which there is room at first; a recording with more is run once more.
@@ -37,7 +37,7 @@ EVENTS = 256
 
 
 @inner()
-def wanted(active: Lanes, columns: Ints, forced: bool) -> Lanes:
+def wanted(active: Columns, columns: Ints, forced: bool) -> Columns:
     """Return those q of one recording, columns (11,), whose derivatives are wanted, in `active`.
 
     The force's are only there with the basis for it.
@@ -52,8 +52,8 @@ def wanted(active: Lanes, columns: Ints, forced: bool) -> Lanes:
 
 @compiled()
 def find_events(
-    q: Floats, mass: float, interval: float, n: int, no_data: Floats, events: Floats, mine: Shelf,
-    waves: Floats, wave: int,
+    q: Floats, mass: float, interval: float, n: int, no_data: Floats, events: Floats,
+    mine: ResponseTables, waves: Floats, wave: int,
 ) -> tuple[Floats, int]:  # fmt: skip
     """Return (events, code): all events of one recording, in `events` if there is room."""
     nothing = np.empty(0)
@@ -81,7 +81,7 @@ def work(
     unused = np.empty((12, 12))
     active = np.empty(11, dtype=np.uint64)
     first_events = np.empty((EVENTS, 2))
-    mine, room = shelf(), desk(size, samples.size > 0)
+    mine, room = response_tables(), workspace(size, samples.size > 0)
     for b in range(rows[0], rows[1]):
         for r in range(items[0], items[1]):
             gather(q, theta[b], columns[r], constants[r])
@@ -100,12 +100,12 @@ def work(
             )
             if code == OK:
                 if wave >= 0:
-                    sweep_driven(
+                    driven_sensitivity_pass(
                         q, mass, intervals[r], waves[wave : wave + n], events, columns[r], data,
                         own, slopes, gram,
                     )  # fmt: skip
                 else:
-                    sweep(
+                    sensitivity_pass(
                         q, mass, intervals[r], n, orders[r], events,
                         wanted(active, columns[r], size > PLAIN), data, own, slopes, gram, room,
                     )  # fmt: skip

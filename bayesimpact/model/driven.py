@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from bayesimpact.model.blocks import Sink
 from bayesimpact.model.compiled import compiled, inner
 from bayesimpact.model.flow import impulse_response, second_response
-from bayesimpact.model.scaled import (
+from bayesimpact.model.normalized import (
     K2,
     OFFSET,
     OK,

@@ -14,7 +14,7 @@ import math
 
 from bayesimpact.model.compiled import compiled
 from bayesimpact.model.flow import advance, advance_forced, forced_response, impulse_response
-from bayesimpact.model.scaled import Scaled
+from bayesimpact.model.normalized import NormalizedParameters
 
 #: Iterations after which a search gives up (never seen; bisection alone needs about 60).
 MAX_ITERATIONS = 200
@@ -167,8 +167,8 @@ def next_crossing_forced(
 
 @compiled()
 def next_event(
-    motion: Scaled, contact: bool, b: float, K: float, rest: float, t: float, u: float, v: float,
-    horizon: float,
+    motion: NormalizedParameters, contact: bool, b: float, K: float, rest: float, t: float,
+    u: float, v: float, horizon: float,
 ) -> tuple[float, float]:  # fmt: skip
     """Return (wait, y' then) of the next event after time t; inf if none, nan on failure.
 

@@ -10,7 +10,7 @@ import numpy as np
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError, SimulationError
-from bayesimpact.model import scaled
+from bayesimpact.model import normalized
 from bayesimpact.model.effects import EFFECTS, Effect
 from bayesimpact.model.oscillator import Oscillator, build_oscillator
 from bayesimpact.model.parameters import bare_name, is_added
@@ -138,8 +138,8 @@ def _check(
         raise InputError(f"simulate, {missing[0]}", "nothing", "a number")
     names = ("c1", "k1", "c2", "g", "k2", "y0", "v0")
     q = np.array([*(values[name] for name in names), 0.0, 0.0, 0.0, values["offset"]])
-    code = int(scaled.check(q, mass, blank.interval, blank.samples.size))
-    if code != scaled.OK:
+    code = int(normalized.check(q, mass, blank.interval, blank.samples.size))
+    if code != normalized.OK:
         raise InputError("simulate", CODES[code], "see the docstring of `simulate`")
 
 

@@ -15,15 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.model.added.crossing import first_event, suspicious
-from bayesimpact.model.added.dense import LONGEST_STRIDE, fill_in, reading
-from bayesimpact.model.added.flows import RENEWED, first_step, flow_from, next_step, stride_of
-from bayesimpact.model.added.memory import keep_memory, relax
-from bayesimpact.model.added.method import quarters
-from bayesimpact.model.added.resonator import ROWS
-from bayesimpact.model.added.rest import hold
-from bayesimpact.model.added.second import added_reading, listens, respond
-from bayesimpact.model.added.situation import (
+from bayesimpact.model.added.contact_state import (
     HEADING,
     LEAVE,
     NONE,
@@ -35,8 +27,7 @@ from bayesimpact.model.added.situation import (
     set_directions,
     settle,
 )
-from bayesimpact.model.added.step import push, step
-from bayesimpact.model.added.world import (
+from bayesimpact.model.added.context import (
     C1,
     C2,
     CONTACT_MASS,
@@ -51,9 +42,18 @@ from bayesimpact.model.added.world import (
     SECOND_FREQUENCY,
     SECOND_GAIN,
     WORK_COLUMNS,
+    Context,
     G,
-    World,
 )
+from bayesimpact.model.added.crossing import first_event, suspicious
+from bayesimpact.model.added.dense import LONGEST_STRIDE, fill_in, reading
+from bayesimpact.model.added.flows import RENEWED, first_step, flow_from, next_step, stride_of
+from bayesimpact.model.added.memory import keep_memory, relax
+from bayesimpact.model.added.method import quarters
+from bayesimpact.model.added.resonator import ROWS
+from bayesimpact.model.added.rest import hold
+from bayesimpact.model.added.second import added_reading, listens, respond
+from bayesimpact.model.added.step import added_force, step
 from bayesimpact.model.arguments import Inputs
 from bayesimpact.model.callback import floats_at, integers_at
 from bayesimpact.model.compiled import compiled, inner, typed
@@ -85,8 +85,8 @@ def admissible(q: Any, mass: Any) -> Any:
 def cruise(y: Any, v: Any, n0: Any, j: Any, stride: Any, end: Any, flow: Any, w: Any) -> Any:
     """Strides from sample j - 1 to before `end` without an event.
 
-    Returns displacement, velocity, push and next sample; whether an event ended it, and then
-    displacement, velocity and push at the end of the stride that contains it.
+    Returns displacement, velocity, added_force and next sample; whether an event ended it, and then
+    displacement, velocity and added_force at the end of the stride that contains it.
     """
     h, event, second = stride * w.interval, False, listens(w)
     at = quarters(h, flow.b, flow.K, flow.inverse)
@@ -117,7 +117,7 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
     flow, longest = flow_from(y, v, t, w)
     start, event, second = t, typed(NONE), listens(w)
     ramp = first_step(y, v, t, longest, flow, w)
-    n0 = 0.0 if flow.plain else push(y, v, t, NOW, flow, w)
+    n0 = 0.0 if flow.plain else added_force(y, v, t, NOW, flow, w)
     y1, v1, n1 = y, v, n0
     stride = stride_of(longest, w)
     at = quarters(longest, flow.b, flow.K, flow.inverse)
@@ -181,7 +181,7 @@ def first_reading(y: Any, v: Any, w: Any) -> Any:
         return added_reading(y, v, 0.0, w)
     set_directions(y, v, 0.0, w)
     flow, _ = flow_from(y, v, 0.0, w)
-    force = 0.0 if flow.plain else push(y, v, 0.0, NOW, flow, w)
+    force = 0.0 if flow.plain else added_force(y, v, 0.0, NOW, flow, w)
     return reading(y, v, force, flow, w) + added_reading(y, v, 0.0, w)
 
 
@@ -215,7 +215,7 @@ def integrate(
         return BAD_PARAMETERS
     s, acting, work, tables, keys = room
     s[:], acting[:], work[:], keys[:] = 0.0, 0, 0.0, np.nan
-    w = World(
+    w = Context(
         mass, interval, out.size, order, floats_at(out.ctypes.data), floats_at(tables.ctypes.data),
         floats_at(keys.ctypes.data), laws.shape[0], floats_at(q.ctypes.data), q.ctypes.data,
         integers_at(laws.ctypes.data), integers_at(acting.ctypes.data),

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from bayesimpact.model.blocks import Sink, pass_samples
 from bayesimpact.model.compiled import inner, typed
 from bayesimpact.model.events import next_event
-from bayesimpact.model.quick import fast_lane
-from bayesimpact.model.scaled import (
+from bayesimpact.model.normalized import (
     OK,
     OVERFLOW,
     SEARCH_FAILED,
@@ -28,7 +27,8 @@ from bayesimpact.model.scaled import (
     has_stop,
     scale,
 )  # fmt: skip
-from bayesimpact.model.tables import SLOW, Shelf, prepare
+from bayesimpact.model.return_time_prediction import return_time_prediction
+from bayesimpact.model.tables import SLOW, ResponseTables, prepare
 
 Floats = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ EVENTS_PER_SAMPLE = 50
 
 @inner()
 def run(
-    q: Floats, mass: float, interval: float, n: int, sink: Sink, shelf: Shelf
+    q: Floats, mass: float, interval: float, n: int, sink: Sink, response_tables: ResponseTables
 ) -> tuple[float, int, int]:
     """Simulate one recording; return (sum of squared residuals, events, code).
 
@@ -48,7 +48,7 @@ def run(
     q : (11,) parameters, SI units (see `scaled`)
     mass, interval, n : kg, s, samples
     sink : what to compare with, or to fill
-    shelf : tables, kept from call to call
+    response_tables : tables, kept from call to call
     """
     code = check(q, mass, interval, n)
     if code != OK:
@@ -56,21 +56,21 @@ def run(
     motion = scale(q, mass, interval)
     stop, contact = has_stop(q), begins_in_contact(q)
     forced = motion.force != 0.0
-    prepare(shelf, 0, motion.b_flight, motion.K_flight, motion.w, forced)
+    prepare(response_tables, 0, motion.b_flight, motion.K_flight, motion.w, forced)
     quick = stop and not forced and 2.0 * motion.b_flight + math.sqrt(motion.K_flight) < SLOW
     if stop:
-        prepare(shelf, 1, motion.b_contact, motion.K_contact, motion.w, forced)
+        prepare(response_tables, 1, motion.b_contact, motion.K_contact, motion.w, forced)
         quick = quick and 2.0 * motion.b_contact + math.sqrt(motion.K_contact) < SLOW
 
     limit = EVENTS_AT_LEAST + EVENTS_PER_SAMPLE * n
     t, y, v = 0.0, q[Y0], q[V0] * interval
     total = 0.0
     count = i = typed(0)
-    shelf.history[:] = 0.0
+    response_tables.history[:] = 0.0
     while True:
         if quick and count > 0:
-            contact, t, v, i, count, passed = fast_lane(
-                shelf, sink, motion, n, limit, contact, t, v, i, count
+            contact, t, v, i, count, passed = return_time_prediction(
+                response_tables, sink, motion, n, limit, contact, t, v, i, count
             )
             total += passed
         if contact:
@@ -83,7 +83,9 @@ def run(
             if math.isnan(wait):
                 return math.inf, count, SEARCH_FAILED
         end = n if t + wait >= n else math.ceil(t + wait)
-        total += pass_samples(sink, shelf.tables, side, motion, b, K, rest, t, y - rest, v, i, end)
+        total += pass_samples(
+            sink, response_tables.tables, side, motion, b, K, rest, t, y - rest, v, i, end
+        )
         i = end
         if i >= n:
             break

@@ -13,7 +13,7 @@ from bayesimpact.model.basis import D_, E_, F_, G_, H_, ONE, S_
 from bayesimpact.model.compiled import inner
 
 Floats = NDArray[np.float64]
-Lanes = NDArray[np.uint64]
+Columns = NDArray[np.uint64]
 
 
 @inner()
@@ -77,7 +77,7 @@ def forced_moments(
 
 @inner(fastmath={"contract"})
 def write_rows(
-    stack: Floats, slot: int, active: Lanes, tables: Floats, side: int, shift: float, u: float,
+    stack: Floats, slot: int, active: Columns, tables: Floats, side: int, shift: float, u: float,
     m: float, fs: float, fc: float, values: Floats, jacobian: Floats,
 ) -> None:  # fmt: skip
     """Write the values (n,) and the rows of J (n, 11) of one block."""

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.model.added.world import (
+from bayesimpact.model.added.context import (
     CONTACT_ONLY,
     JUMP_AT_SURFACE,
     JUMP_AT_TURN,

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 
 from bayesimpact.errors import InputError, SimulationError
 from bayesimpact.model import batch as compiled_batch
-from bayesimpact.model import scaled
+from bayesimpact.model import normalized
 from bayesimpact.model.arguments import (
     Inputs,
     ModelArguments,
@@ -33,23 +33,23 @@ from bayesimpact.model.arguments import (
     no_samples,
 )
 from bayesimpact.model.batch import Floats, Ints
-from bayesimpact.model.scaled import Q
+from bayesimpact.model.normalized import Q
 
 #: What a failure code means.
 CODES: Mapping[int, str] = MappingProxyType(
     {
-        scaled.OK: "ok",
-        scaled.NOT_FINITE: "a parameter is not finite",
-        scaled.BAD_MASS: "the mass is not positive",
-        scaled.BAD_STIFFNESS: "k1 is not positive",
-        scaled.BAD_DAMPING: "c1 is negative",
-        scaled.BAD_CONTACT: "c2 or k2 is negative",
-        scaled.BAD_GAP: "the gap is not a number, or minus infinity",
-        scaled.BAD_FREQUENCY: "the forcing frequency is negative",
-        scaled.BAD_SAMPLING: "the interval is not positive, or there are no samples",
-        scaled.TOO_MANY_EVENTS: "too many impacts for the number of samples",
-        scaled.SEARCH_FAILED: "the search for the next event did not converge",
-        scaled.OVERFLOW: "the motion overflows",
+        normalized.OK: "ok",
+        normalized.NOT_FINITE: "a parameter is not finite",
+        normalized.BAD_MASS: "the mass is not positive",
+        normalized.BAD_STIFFNESS: "k1 is not positive",
+        normalized.BAD_DAMPING: "c1 is negative",
+        normalized.BAD_CONTACT: "c2 or k2 is negative",
+        normalized.BAD_GAP: "the gap is not a number, or minus infinity",
+        normalized.BAD_FREQUENCY: "the forcing frequency is negative",
+        normalized.BAD_SAMPLING: "the interval is not positive, or there are no samples",
+        normalized.TOO_MANY_EVENTS: "too many impacts for the number of samples",
+        normalized.SEARCH_FAILED: "the search for the next event did not converge",
+        normalized.OVERFLOW: "the motion overflows",
     }
 )
 
@@ -120,7 +120,7 @@ def trajectory(q: ArrayLike, mass: float, interval: float, out: Floats) -> int:
     """Write the displacement (without the offset) of one recording into `out` (n,); return the
     code.
 
-    q : (11,) parameters in the order of `scaled.Q`, SI units; interval in s; out in m.
+    q : (11,) parameters in the order of `normalized.Q`, SI units; interval in s; out in m.
     """
     values = np.array(q, dtype=np.float64)
     if values.shape != (11,):
@@ -192,19 +192,19 @@ def simulate(
         raise InputError("n", repr(n), "a whole number of samples, at least 1")
     mass, interval = _number("mass", mass), _number("interval", interval)
     displacement, velocity = np.empty(int(n)), np.empty(int(n))
-    code = int(scaled.check(q, mass, interval, int(n)))
-    if code != scaled.OK:
+    code = int(normalized.check(q, mass, interval, int(n)))
+    if code != normalized.OK:
         raise InputError("simulate", CODES[code], "see the docstring of `simulate`")
     events = np.empty((1024, 2))
     _, count, code = compiled_batch.single(
         q, mass, interval, floats("data", (), 1), displacement, velocity, events
     )
-    if count > len(events) and code == scaled.OK:
+    if count > len(events) and code == normalized.OK:
         events = np.empty((count, 2))
         _, count, code = compiled_batch.single(
             q, mass, interval, floats("data", (), 1), displacement, velocity, events
         )
-    if code != scaled.OK:
+    if code != normalized.OK:
         raise SimulationError(CODES[code])
     velocity /= interval
     events = events[:count] * (interval, 1.0 / interval)

@@ -30,7 +30,7 @@ UNFORCED = -1.0
 SLOW = 0.25
 
 
-class Shelf(NamedTuple):
+class ResponseTables(NamedTuple):
     """What is kept from recording to recording, for flight and contact.
 
     tables (2, ROWS, LENGTH + 1), series (2, 2, TERMS) : of the regimes last met
@@ -45,9 +45,9 @@ class Shelf(NamedTuple):
 
 
 @compiled()
-def shelf() -> Shelf:
-    """Return an empty shelf."""
-    return Shelf(
+def response_tables() -> ResponseTables:
+    """Return empty tables."""
+    return ResponseTables(
         np.empty((2, ROWS, LENGTH + 1)),
         np.empty((2, 2, TERMS)),
         np.full((2, 3), np.nan),
@@ -56,13 +56,15 @@ def shelf() -> Shelf:
 
 
 @compiled()
-def prepare(shelf: Shelf, side: int, b: float, K: float, w: float, forced: bool) -> None:
+def prepare(
+    response_tables: ResponseTables, side: int, b: float, K: float, w: float, forced: bool
+) -> None:
     """Fill the tables and series of one regime, unless they hold it already."""
-    keys = shelf.keys
+    keys = response_tables.keys
     force = w if forced else UNFORCED
     if keys[side, 0] != b or keys[side, 1] != K or keys[side, 2] != force:
-        fill(shelf.tables[side], b, K, w, forced)
-        fill_series(shelf.series[side], b, K)
+        fill(response_tables.tables[side], b, K, w, forced)
+        fill_series(response_tables.series[side], b, K)
         keys[side, 0], keys[side, 1], keys[side, 2] = b, K, force
 
 

@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from bayesimpact.errors import InputError
 from bayesimpact.response import local
+from bayesimpact.response.half_cycles import HalfCycles, half_cycles, rough_period
 from bayesimpact.response.rest import rest_position
-from bayesimpact.response.swings import HalfSwings, half_swings, rough_period
 
 Floats = NDArray[np.float64]
 Estimator = Literal["half", "centred"]
@@ -119,7 +119,7 @@ def backbone(
     period = rough_period(signal)
     level = local.noise_level(signal, period) if noise is None else float(noise)
     zero = rest_position(signal, period, level) if rest is None else float(rest)
-    swings = half_swings(signal, zero, period, level)
+    swings = half_cycles(signal, zero, period, level)
     pick = _halves if estimator == "half" else _centred
     upper, lower = (_branch(*pick(swings, s), interval, average, damping) for s in (1, -1))
     return Backbone(upper, lower, zero, level)
@@ -140,13 +140,13 @@ def _checked(samples: ArrayLike, interval: float, average: int, noise: float | N
     return signal
 
 
-def _halves(swings: HalfSwings, side: int) -> tuple[Floats, Floats, Floats]:
+def _halves(swings: HalfCycles, side: int) -> tuple[Floats, Floats, Floats]:
     """Times, full periods and amplitudes (in samples) of the half swings of one side, Eq. 1."""
     mine = swings.side == side
     return swings.peaks[mine], 2 * swings.durations[mine], swings.amplitudes[mine]
 
 
-def _centred(swings: HalfSwings, side: int) -> tuple[Floats, Floats, Floats]:
+def _centred(swings: HalfCycles, side: int) -> tuple[Floats, Floats, Floats]:
     """The same for whole cycles centred on an upper half swing."""
     k = np.flatnonzero(swings.side == 1)
     k = k[(k > 0) & (k < swings.side.size - 1)]

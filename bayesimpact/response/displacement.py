@@ -20,7 +20,7 @@ from scipy.interpolate import CubicSpline
 
 from bayesimpact.data.recording import Recording
 from bayesimpact.response import local
-from bayesimpact.response.swings import HalfSwings, half_swings, rough_period
+from bayesimpact.response.half_cycles import HalfCycles, half_cycles, rough_period
 
 Floats = NDArray[np.float64]
 
@@ -63,7 +63,7 @@ def displacement(samples: Floats, interval: float, order: int) -> Displacement:
     if order == 0:
         return Displacement(samples, None, noise)
     bias = _bias(samples, period, noise)
-    swings = half_swings(samples, bias, period, noise)
+    swings = half_cycles(samples, bias, period, noise)
     rate = samples - bias
     if order == 2:
         still = swings.peaks[swings.side > 0]  # the stop is on the side of negative acceleration
@@ -76,7 +76,7 @@ def _bias(samples: Floats, period: float, noise: float) -> float:
     """Mean over whole cycles: a derivative of a motion that stays in place has none."""
     bias = float(samples.mean())
     for _ in range(3):
-        swings: HalfSwings = half_swings(samples, bias, period, noise)
+        swings: HalfCycles = half_cycles(samples, bias, period, noise)
         whole = 2 * (swings.side.size // 2)
         if whole == 0:
             break

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.recording import Recording
-from bayesimpact.response.swings import rough_period
+from bayesimpact.response.half_cycles import rough_period
 
 Floats = NDArray[np.float64]
 

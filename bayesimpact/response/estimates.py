@@ -22,6 +22,7 @@ from bayesimpact.response import local
 from bayesimpact.response.contact import Contact, Free, fit_contact
 from bayesimpact.response.driven import estimate_driven
 from bayesimpact.response.flight import Flight
+from bayesimpact.response.half_cycles import rough_period
 from bayesimpact.response.observe import (
     Observed,
     look,
@@ -32,7 +33,6 @@ from bayesimpact.response.observe import (
 )
 from bayesimpact.response.preloaded import estimate_preloaded, is_preloaded
 from bayesimpact.response.release import Oscillator, release
-from bayesimpact.response.swings import rough_period
 
 MEANS = 100.0  # the mean of a velocity or an acceleration is as good as that of so many samples
 

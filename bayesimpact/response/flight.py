@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.response.half_cycles import turning_points
 from bayesimpact.response.squares import least
-from bayesimpact.response.swings import turning_points
 
 Floats = NDArray[np.float64]
 Arc = tuple[int, int]

@@ -14,8 +14,8 @@ from bayesimpact.response.contact import Contact, Cycles
 from bayesimpact.response.cycles import cycle
 from bayesimpact.response.displacement import displacement_of
 from bayesimpact.response.flight import Arc, Flight, lower_arcs, solve_flight, waves_of
+from bayesimpact.response.half_cycles import half_cycles, rough_period
 from bayesimpact.response.rest import rest_position
-from bayesimpact.response.swings import half_swings, rough_period
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -122,7 +122,7 @@ def observe_decay(observed: Observed) -> Flight | None:
     """The oscillator without a stop, from all samples; None without an oscillation."""
     rates, weights = [], []
     for r, samples in enumerate(observed.samples):
-        swings = half_swings(samples, observed.rests[r], observed.periods[r], observed.noises[r])
+        swings = half_cycles(samples, observed.rests[r], observed.periods[r], observed.noises[r])
         if swings.side.size < 3:
             continue
         # Least squares over the whole recording sees the large swings most.

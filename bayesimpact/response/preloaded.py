@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.response.contact import Contact, Cycles, capped, misfits, typical_variance
 from bayesimpact.response.cycles import cycle
+from bayesimpact.response.half_cycles import half_cycles
 from bayesimpact.response.observe import Observed, observe_cycles, observe_flights, with_arcs
 from bayesimpact.response.squares import least
-from bayesimpact.response.swings import half_swings
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -29,7 +29,7 @@ def is_preloaded(observed: Observed) -> bool:
     upper: list[float] = []
     lower: list[float] = []
     for r, samples in enumerate(observed.samples):
-        swings = half_swings(samples, observed.rests[r], observed.periods[r], observed.noises[r])
+        swings = half_cycles(samples, observed.rests[r], observed.periods[r], observed.noises[r])
         for side, ratios in ((1, upper), (-1, lower)):
             length = swings.durations[swings.side == side]
             if length.size >= 5:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.response import local
 from bayesimpact.response.flight import lower_arcs, solve_flight
-from bayesimpact.response.swings import turning_points
+from bayesimpact.response.half_cycles import turning_points
 
 Floats = NDArray[np.float64]
 

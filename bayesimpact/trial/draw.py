@@ -11,15 +11,15 @@ from __future__ import annotations
 import numpy as np
 
 from bayesimpact.errors import InputError
-from bayesimpact.trial.benches import BENCHES, Design, draw_bench, log_uniform
 from bayesimpact.trial.drawn import Drawn
 from bayesimpact.trial.faults import PLANTS, plant_fault
 from bayesimpact.trial.faults_rig import OTHER_RIG, another_rig
-from bayesimpact.trial.plants import CATALOGUE_PLANTS
+from bayesimpact.trial.planted_effects import PLANTED_EFFECTS
 from bayesimpact.trial.rig import Effects, make_campaign
-from bayesimpact.trial.ruler import Ruler, clean_readings, true_parameters
+from bayesimpact.trial.rig_designs import RIG_DESIGNS, Design, draw_rig_design, log_uniform
+from bayesimpact.trial.sensitivity import Sensitivity, clean_readings, true_parameters
 from bayesimpact.trial.settings import Settings
-from bayesimpact.trial.sizing import Sized, Unsuitable, outside, pair, plant_of, single
+from bayesimpact.trial.sizing import Sized, Unsuitable, outside, pair, planted_effect_of, single
 from bayesimpact.trial.strong_draw import draw_strong
 
 Rng = np.random.Generator
@@ -56,15 +56,15 @@ def draw(settings: Settings, seed: int) -> Drawn:
 def _attempt(settings: Settings, seed: int, kind: str, turn: int, rng: Rng) -> Drawn:
     ids = _effects(settings, kind, turn, rng)
     bench = str(rng.choice(_possible(settings, ids)))
-    design = draw_bench(bench, str(rng.choice(_noises(settings, ids))), rng)
+    design = draw_rig_design(bench, str(rng.choice(_noises(settings, ids))), rng)
     strengths = [log_uniform(rng, settings.strength) for _ in ids]
     found: tuple[Sized, ...] = ()
     if kind in ("single", "fault_single"):
-        found = (single(Ruler(design, rng), ids[0], strengths[0], settings.strength[0], rng),)
+        found = (single(Sensitivity(design, rng), ids[0], strengths[0], settings.strength[0], rng),)
     elif kind == "pair":
-        found = pair(Ruler(design, rng), ids, strengths, settings.strength[0], rng)
+        found = pair(Sensitivity(design, rng), ids, strengths, settings.strength[0], rng)
     elif kind == "outside":
-        found = (outside(Ruler(design, rng), ids[0], strengths[0], rng),)
+        found = (outside(Sensitivity(design, rng), ids[0], strengths[0], rng),)
     drawn = _recorded(settings, seed, kind, design, found, rng)
     if kind not in ("fault", "fault_single"):
         return drawn
@@ -76,7 +76,7 @@ def _attempt(settings: Settings, seed: int, kind: str, turn: int, rng: Rng) -> D
 
 def _faults(settings: Settings, ids: tuple[str, ...]) -> list[str]:
     """Faults that some rig shows on which these effects can stand."""
-    cases = max(BENCHES[name].cases for name in _possible(settings, ids))
+    cases = max(RIG_DESIGNS[name].cases for name in _possible(settings, ids))
     known = [k for k, plant in PLANTS.items() if cases >= (2 if k == "case" else plant.stop)]
     return [*known, OTHER_RIG]
 
@@ -111,8 +111,8 @@ def _effects(settings: Settings, kind: str, turn: int, rng: Rng) -> tuple[str, .
 
 
 def _compatible(first: str, second: str) -> bool:
-    slot = CATALOGUE_PLANTS[first].slot
-    return not slot or slot != CATALOGUE_PLANTS[second].slot
+    slot = PLANTED_EFFECTS[first].slot
+    return not slot or slot != PLANTED_EFFECTS[second].slot
 
 
 def _possible(settings: Settings, ids: tuple[str, ...]) -> list[str]:
@@ -124,11 +124,14 @@ def _possible(settings: Settings, ids: tuple[str, ...]) -> list[str]:
 
 
 def _showing(settings: Settings, ids: tuple[str, ...]) -> list[str]:
-    sizes = {n: (BENCHES[n].cases, BENCHES[n].releases) for n in settings.benches}
+    sizes = {n: (RIG_DESIGNS[n].cases, RIG_DESIGNS[n].releases) for n in settings.benches}
     return [
         name
         for name, (cases, releases) in sizes.items()
-        if all(plant_of(e).fits(cases, releases * max(cases, 1), BENCHES[name].angle) for e in ids)
+        if all(
+            planted_effect_of(e).fits(cases, releases * max(cases, 1), RIG_DESIGNS[name].angle)
+            for e in ids
+        )
     ]
 
 

@@ -15,14 +15,14 @@ import numpy as np
 from bayesimpact.data.campaign import Campaign, Smoothing
 from bayesimpact.data.recording import Recording
 from bayesimpact.model.measurement import smooth
-from bayesimpact.trial.benches import log_uniform
+from bayesimpact.trial.rig_designs import log_uniform
 
 Rng = np.random.Generator
 Place = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class FaultPlant:
+class PlantedFault:
     """One kind of fault.
 
     Attributes
@@ -137,18 +137,18 @@ def clock(r: Recording, noise: float, rng: Rng) -> tuple[Recording, Place, float
     return replace(r, interval=r.interval * by), (0.0, r.duration), by
 
 
-PLANTS: Mapping[str, FaultPlant] = {
-    "spikes": FaultPlant("recording_spikes", spikes),
-    "held": FaultPlant("recording_held", held),
-    "slip": FaultPlant("recording_slip", slip),
-    "clipped": FaultPlant("recording_clipped", clipped),
-    "start": FaultPlant("recording_start", start),
-    "noise": FaultPlant("recording_noise", louder),
-    "reversed": FaultPlant("recording_reversed", reversed_sign, False, True),
-    "gain": FaultPlant("recording_gain", gain, False, True),
-    "clock": FaultPlant("recording_clock", clock, False, True),
-    "case": FaultPlant("recording_case", reversed_sign, False, True),
-    "duplicate": FaultPlant("recording_duplicate", reversed_sign, False),
+PLANTS: Mapping[str, PlantedFault] = {
+    "spikes": PlantedFault("recording_spikes", spikes),
+    "held": PlantedFault("recording_held", held),
+    "slip": PlantedFault("recording_slip", slip),
+    "clipped": PlantedFault("recording_clipped", clipped),
+    "start": PlantedFault("recording_start", start),
+    "noise": PlantedFault("recording_noise", louder),
+    "reversed": PlantedFault("recording_reversed", reversed_sign, False, True),
+    "gain": PlantedFault("recording_gain", gain, False, True),
+    "clock": PlantedFault("recording_clock", clock, False, True),
+    "case": PlantedFault("recording_case", reversed_sign, False, True),
+    "duplicate": PlantedFault("recording_duplicate", reversed_sign, False),
 }
 """Kinds of faults by a word. Labels and duplicates change the campaign, see `plant_fault`."""
 

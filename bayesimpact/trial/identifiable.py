@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.trial.benches import Design
 from bayesimpact.trial.rig import Effects, Parameters
-from bayesimpact.trial.ruler import clean_readings
-from bayesimpact.trial.strong_plants import Chosen
+from bayesimpact.trial.rig_designs import Design
+from bayesimpact.trial.sensitivity import clean_readings
+from bayesimpact.trial.strong_effects import Chosen
 
 Array = NDArray[np.float64]
 Columns = list[Array]

@@ -22,12 +22,12 @@ from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.scan import scan
 from bayesimpact.diagnosis.thresholds import ALPHA, DECISIVE
 from bayesimpact.model.effects import EFFECTS
-from bayesimpact.trial.benches import Design
 from bayesimpact.trial.bundle import PAPER_HEIGHTS, PAPER_RIG
-from bayesimpact.trial.plants import CATALOGUE_PLANTS
+from bayesimpact.trial.planted_effects import PLANTED_EFFECTS
 from bayesimpact.trial.rig import Release
 from bayesimpact.trial.rig_chain import Chain
-from bayesimpact.trial.ruler import Ruler, clean_readings, misfit
+from bayesimpact.trial.rig_designs import Design
+from bayesimpact.trial.sensitivity import Sensitivity, clean_readings, misfit
 from bayesimpact.trial.sizing import LIMIT, Unsuitable, sized
 from bayesimpact.trial.summary import rate
 
@@ -85,9 +85,9 @@ def bundled_design(recordings: int = 9) -> Design:
     return Design("paper", "white", PAPER_RIG, tuple(releases), 1000.0, 6.0, chain, Measurement())
 
 
-def critical_score(ruler: Ruler, rng: np.random.Generator) -> float:
+def critical_score(sensitivity: Sensitivity, rng: np.random.Generator) -> float:
     """Score at which the corrected test of one more size answers, under the law of all scores."""
-    found = scan(ruler.fit, EFFECTS, campaign_scales(ruler.fit), rng=rng)
+    found = scan(sensitivity.fit, EFFECTS, campaign_scales(sensitivity.fit), rng=rng)
     information = found.projection.information
     scale = np.sqrt(np.diag(information))
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
@@ -96,20 +96,20 @@ def critical_score(ruler: Ruler, rng: np.random.Generator) -> float:
     return float(np.quantile(np.abs(draws).max(axis=1), 1 - ALPHA / FAMILIES))
 
 
-def power(ruler: Ruler, effect: str, rng: np.random.Generator) -> Power | None:
+def power(sensitivity: Sensitivity, effect: str, rng: np.random.Generator) -> Power | None:
     """Detection limit of one effect and its distance from the nearest rival.
 
     None for effects without a size, and those that this design cannot show.
     """
-    form = CATALOGUE_PLANTS[effect].form(ruler.design, rng)
+    form = PLANTED_EFFECTS[effect].form(sensitivity.design, rng)
     if form.start == 0:
         return None
     try:
-        small, large = (sized(ruler, effect, form, s) for s in (1.0, 2.0))
+        small, large = (sized(sensitivity, effect, form, s) for s in (1.0, 2.0))
     except Unsuitable:
         return None
     exponent = np.log(large.score / small.score) / np.log(large.size / small.size)
-    left, nearest = ruler.distinct(small.response, besides=effect)
+    left, nearest = sensitivity.distinct(small.response, besides=effect)
     limit = small.size * (LIMIT / small.score) ** (1 / exponent)
     name = next(iter(form.build(small.size)))
     return Power(effect, name, float(limit), float(exponent), left / small.score, nearest)
@@ -133,7 +133,7 @@ def limits_by_recordings(
     whole = bundled_design(max(counts))
     table: dict[str, dict[int, float]] = {}
     for one in effects:
-        form = CATALOGUE_PLANTS[one.effect].form(bundled_design(), rng)
+        form = PLANTED_EFFECTS[one.effect].form(bundled_design(), rng)
         if any(isinstance(v, Mapping) for v in form.build(0.0).values()):
             continue  # another thing with every number of recordings
         reference = clean_readings(whole, form.reference) if form.reference else None
@@ -153,9 +153,9 @@ def power_table(
     rng: np.random.Generator, counts: Sequence[int] = (3, 6, 9, 18, 27)
 ) -> dict[str, Any]:
     """The content of power.json, theory only."""
-    ruler = Ruler(bundled_design(), rng)
-    critical = critical_score(ruler, rng)
-    found = [p for p in (power(ruler, e, rng) for e in CATALOGUE_PLANTS) if p is not None]
+    sensitivity = Sensitivity(bundled_design(), rng)
+    critical = critical_score(sensitivity, rng)
+    found = [p for p in (power(sensitivity, e, rng) for e in PLANTED_EFFECTS) if p is not None]
     rows = {}
     for one in found:
         detected, named = one.detected(STRENGTHS, critical), one.named(STRENGTHS, critical)

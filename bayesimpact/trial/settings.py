@@ -9,24 +9,24 @@ from typing import Any
 
 from bayesimpact.errors import InputError
 from bayesimpact.model.effects import UNTRIED
-from bayesimpact.trial.benches import BENCHES, NOISES
-from bayesimpact.trial.plants import CATALOGUE_PLANTS
-from bayesimpact.trial.plants_outside import OUTSIDE_PLANTS
-from bayesimpact.trial.strong_plants import CATALOGUE_STRONG, STRONG_OUTSIDE
-from bayesimpact.trial.strong_rigs import STRONG_BENCHES
+from bayesimpact.trial.planted_effects import PLANTED_EFFECTS
+from bayesimpact.trial.planted_outside import OUTSIDE_EFFECTS
+from bayesimpact.trial.rig_designs import NOISES, RIG_DESIGNS
+from bayesimpact.trial.strong_effects import CATALOGUE_STRONG, STRONG_OUTSIDE
+from bayesimpact.trial.strong_rigs import STRONG_RIGS
 
 REGIMES = ("weak", "strong")
 KINDS = ("control", "single", "pair", "outside")
 DEFAULT_STRENGTH = (1.5, 6.0)  # times the detection limit
-DEFAULT_BENCHES = tuple(name for name in BENCHES if name != "small")
-PLANTED = tuple(e for e in CATALOGUE_PLANTS if e not in UNTRIED)
+DEFAULT_BENCHES = tuple(name for name in RIG_DESIGNS if name != "small")
+PLANTED = tuple(e for e in PLANTED_EFFECTS if e not in UNTRIED)
 DEFAULT_MISFIT = (3.0, 300.0)  # base misfit over the noise, as real recordings have it
 STRONG_KINDS = ("several", "several_outside")
 STRONG_DEFAULTS: Mapping[str, Any] = {
     "kinds": ("several", "several", "several_outside"),
     "effects": tuple(CATALOGUE_STRONG),
     "outside": tuple(STRONG_OUTSIDE),
-    "benches": tuple(STRONG_BENCHES),
+    "benches": tuple(STRONG_RIGS),
     "noises": ("white", "ar1"),
     "rest": 0.25,
 }
@@ -54,7 +54,7 @@ class Settings:
 
     kinds: tuple[str, ...] = KINDS
     effects: tuple[str, ...] = PLANTED
-    outside: tuple[str, ...] = tuple(OUTSIDE_PLANTS)
+    outside: tuple[str, ...] = tuple(OUTSIDE_EFFECTS)
     strength: tuple[float, float] = DEFAULT_STRENGTH
     benches: tuple[str, ...] = DEFAULT_BENCHES
     noises: tuple[str, ...] = NOISES
@@ -70,9 +70,9 @@ class Settings:
         strong = self.regime == "strong"
         known = {
             "kinds": STRONG_KINDS if strong else (*KINDS, "fault", "fault_single"),
-            "effects": tuple(CATALOGUE_STRONG if strong else CATALOGUE_PLANTS),
-            "outside": tuple(STRONG_OUTSIDE if strong else OUTSIDE_PLANTS),
-            "benches": tuple(STRONG_BENCHES if strong else BENCHES),
+            "effects": tuple(CATALOGUE_STRONG if strong else PLANTED_EFFECTS),
+            "outside": tuple(STRONG_OUTSIDE if strong else OUTSIDE_EFFECTS),
+            "benches": tuple(STRONG_RIGS if strong else RIG_DESIGNS),
             "noises": ("white", "ar1") if strong else NOISES,
         }
         for name, accepted in known.items():

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.errors import BayesimpactError
-from bayesimpact.trial.plants import CATALOGUE_PLANTS, Form, Plant
-from bayesimpact.trial.plants_outside import OUTSIDE_PLANTS
+from bayesimpact.trial.planted_effects import PLANTED_EFFECTS, Form, PlantedEffect
+from bayesimpact.trial.planted_outside import OUTSIDE_EFFECTS
 from bayesimpact.trial.rig import Parameters
-from bayesimpact.trial.ruler import Ruler
+from bayesimpact.trial.sensitivity import Sensitivity
 
 Array = NDArray[np.float64]
 Rng = np.random.Generator
@@ -57,69 +57,69 @@ class Sized:
     strength: float
     score: float
     form: Form
-    plant: Plant
+    plant: PlantedEffect
     distinct: float | None = None
     nearest: str | None = None
 
 
-def plant_of(effect: str) -> Plant:
+def planted_effect_of(effect: str) -> PlantedEffect:
     """How an effect of the catalogue, or a force outside it, is planted."""
-    return CATALOGUE_PLANTS.get(effect) or OUTSIDE_PLANTS[effect]
+    return PLANTED_EFFECTS.get(effect) or OUTSIDE_EFFECTS[effect]
 
 
-def placed(ruler: Ruler, effect: str, form: Form, size: float) -> Placed:
+def placed(sensitivity: Sensitivity, effect: str, form: Form, size: float) -> Placed:
     """The effect at a given size."""
-    response = ruler.response({effect: form.build(size)}, form.reference)
+    response = sensitivity.response({effect: form.build(size)}, form.reference)
     return Placed(size, float(np.linalg.norm(response)), response)
 
 
-def sized(ruler: Ruler, effect: str, form: Form, strength: float) -> Placed:
+def sized(sensitivity: Sensitivity, effect: str, form: Form, strength: float) -> Placed:
     """The effect at `strength` detection limits; at its only size when it is on or off."""
-    size = solve(lambda s: placed(ruler, effect, form, s).score, form, LIMIT * strength)
-    return placed(ruler, effect, form, size)
+    size = solve(lambda s: placed(sensitivity, effect, form, s).score, form, LIMIT * strength)
+    return placed(sensitivity, effect, form, size)
 
 
-def single(ruler: Ruler, effect: str, strength: float, least: float, rng: Rng) -> Sized:
+def single(sensitivity: Sensitivity, effect: str, strength: float, least: float, rng: Rng) -> Sized:
     """One effect of `strength` detection limits; one that is on or off has at least `least`."""
-    plant = plant_of(effect)
-    form = plant.form(ruler.design, rng)
-    found = sized(ruler, effect, form, strength)
+    plant = planted_effect_of(effect)
+    form = plant.form(sensitivity.design, rng)
+    found = sized(sensitivity, effect, form, strength)
     if found.score < LIMIT * least * (1 - CLOSE) and not plant.by_noise:
         raise Unsuitable(f"{effect} stands out by {found.score:.1f} standard errors only")
-    apart = ruler.distinct(found.response, besides=effect)
+    apart = sensitivity.distinct(found.response, besides=effect)
     numbers = form.build(found.size)
     return Sized(effect, numbers, found.score / LIMIT, found.score, form, plant, *apart)
 
 
-def outside(ruler: Ruler, effect: str, strength: float, rng: Rng) -> Sized:
+def outside(sensitivity: Sensitivity, effect: str, strength: float, rng: Rng) -> Sized:
     """A force outside the catalogue, `strength` limits away from the nearest single entry of it."""
-    plant = plant_of(effect)
-    form = plant.form(ruler.design, rng)
+    plant = planted_effect_of(effect)
+    form = plant.form(sensitivity.design, rng)
 
     def score(size: float) -> float:
-        return ruler.distinct(placed(ruler, effect, form, size).response)[0]
+        return sensitivity.distinct(placed(sensitivity, effect, form, size).response)[0]
 
-    found = placed(ruler, effect, form, solve(score, form, LIMIT * strength))
-    left, nearest = ruler.distinct(found.response)
+    found = placed(sensitivity, effect, form, solve(score, form, LIMIT * strength))
+    left, nearest = sensitivity.distinct(found.response)
     numbers = form.build(found.size)
     return Sized(effect, numbers, left / LIMIT, found.score, form, plant, left, nearest)
 
 
 def pair(
-    ruler: Ruler, ids: Sequence[str], strengths: Sequence[float], least: float, rng: Rng
+    sensitivity: Sensitivity, ids: Sequence[str], strengths: Sequence[float], least: float, rng: Rng
 ) -> tuple[Sized, ...]:
     """Two effects, each `strength` limits above what the other one could imitate of it."""
-    plants = [plant_of(e) for e in ids]
-    forms = [plant.form(ruler.design, rng) for plant in plants]
+    plants = [planted_effect_of(e) for e in ids]
+    forms = [plant.form(sensitivity.design, rng) for plant in plants]
     both = list(zip(ids, forms, strict=True))
-    found = [sized(ruler, effect, form, 1.0) for effect, form in both]
+    found = [sized(sensitivity, effect, form, 1.0) for effect, form in both]
     own = _own_share(found, ids)
     for i, (effect, form) in enumerate(both):
         if form.start > 0:
             size = found[i].size * LIMIT * strengths[i] / (own * found[i].score)
             if size > form.largest:
                 raise Unsuitable(f"{effect} would have to be unphysically large")
-            found[i] = placed(ruler, effect, form, size)
+            found[i] = placed(sensitivity, effect, form, size)
     own = _own_share(found, ids)
     for one, (effect, _), plant in zip(found, both, plants, strict=True):
         if one.score * own < 0.7 * LIMIT * least and not plant.by_noise:

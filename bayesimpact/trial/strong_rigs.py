@@ -14,39 +14,39 @@ from math import sqrt
 import numpy as np
 
 from bayesimpact.data.campaign import Measurement
-from bayesimpact.trial.benches import Bench, Design, Range, draw_bench
 from bayesimpact.trial.rig_chain import Chain
+from bayesimpact.trial.rig_designs import Design, Range, RigDesign, draw_rig_design
 
 _DAMPING = (2e-3, 2e-2)
 _CONTACT_DAMPING = (0.01, 0.08)
 _NOISE = (2e-5, 1e-2)  # of the largest release
 
-STRONG_BENCHES: Mapping[str, Bench] = {
-    "one_stop": Bench(
+STRONG_RIGS: Mapping[str, RigDesign] = {
+    "one_stop": RigDesign(
         (0.2, 1.0), (4.0, 10.0), _DAMPING, (3.0, 12.0), _CONTACT_DAMPING, (3e-3, 1e-2),
         (0.1, 0.4), 1, 3, 1000.0, (20.0, 35.0), _NOISE,
     ),
-    "soft_stops": Bench(
+    "soft_stops": RigDesign(
         (0.8, 3.0), (0.8, 2.0), _DAMPING, (1.0, 4.0), _CONTACT_DAMPING, (0.02, 0.05),
         (0.1, 0.4), 2, 2, 400.0, (15.0, 25.0), _NOISE,
     ),
-    "three_stops": Bench(
+    "three_stops": RigDesign(
         (0.3, 0.8), (5.0, 8.0), _DAMPING, (3.0, 8.0), _CONTACT_DAMPING, (4e-3, 8e-3),
         (0.1, 0.3), 3, 1, 1000.0, (20.0, 30.0), _NOISE,
     ),
-    "decays": Bench(
+    "decays": RigDesign(
         (0.2, 1.0), (3.0, 10.0), _DAMPING, (0.0, 0.0), _CONTACT_DAMPING, (3e-3, 1e-2),
         (0.1, 0.3), 0, 3, 500.0, (25.0, 40.0), _NOISE,
     ),
-    "one_decay": Bench(
+    "one_decay": RigDesign(
         (0.2, 1.0), (1.0, 4.0), _DAMPING, (0.0, 0.0), _CONTACT_DAMPING, (5e-3, 5e-2),
         (0.1, 0.3), 0, 1, 250.0, (40.0, 70.0), _NOISE,
     ),
-    "pendulums": Bench(
+    "pendulums": RigDesign(
         (0.01, 0.2), (0.5, 1.5), (5e-4, 8e-3), (0.0, 0.0), _CONTACT_DAMPING, (0.3, 1.2),
         (0.1, 0.3), 0, 2, 100.0, (25.0, 40.0), _NOISE,
     ),
-    "one_pendulum": Bench(
+    "one_pendulum": RigDesign(
         (0.01, 0.2), (0.5, 1.5), (5e-4, 8e-3), (0.0, 0.0), _CONTACT_DAMPING, (0.3, 1.2),
         (0.1, 0.3), 0, 1, 100.0, (40.0, 70.0), _NOISE,
     ),
@@ -72,7 +72,7 @@ def is_pendulum(bench: str) -> bool:
 def draw_rig(bench: str, noise_kind: str, rng: np.random.Generator) -> Design:
     """A rig, its releases and rest readings; what noise there is will be set by `with_noise`."""
     kind = "white" if is_pendulum(bench) else noise_kind
-    design = draw_bench(bench, kind, rng, STRONG_BENCHES)
+    design = draw_rig_design(bench, kind, rng, STRONG_RIGS)
     if not is_pendulum(bench):
         return design
     return replace(design, noise_kind="encoder")
@@ -82,7 +82,7 @@ def noise_range(design: Design) -> Range:
     """Smallest and largest standard deviation of the noise that the probe may have, m or rad."""
     if is_pendulum(design.bench):
         return STEPS[0] * ENCODER_SD, STEPS[1] * ENCODER_SD
-    low, high = STRONG_BENCHES[design.bench].noise
+    low, high = STRONG_RIGS[design.bench].noise
     return low * design.amplitude, high * design.amplitude
 
 

@@ -26,7 +26,7 @@ import systems
 
 from bayesimpact.model.derivatives import find_events, trajectories_and_derivatives
 from bayesimpact.model.simulate import simulate
-from bayesimpact.model.tables import shelf
+from bayesimpact.model.tables import response_tables
 
 SEED = 7
 
@@ -49,7 +49,7 @@ def measure(system: systems.System) -> Accuracy:
         twin = naive.twin(q, mass, naive.mp.mpf(interval) * every, (n - 1) // every + 1)
     motion = simulate(**system.arguments)
     events, code = find_events(
-        q, mass, interval, n, np.empty(0), np.empty((64, 2)), shelf(), np.empty(0), -1
+        q, mass, interval, n, np.empty(0), np.empty((64, 2)), response_tables(), np.empty(0), -1
     )
     assert code == 0
     scale = float(max(abs(y) for y in twin.displacement)) or 1.0

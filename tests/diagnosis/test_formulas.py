@@ -15,7 +15,7 @@ from bayesimpact.diagnosis.decision import Decision
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.force import missing_drift, missing_force
 from bayesimpact.diagnosis.formula_list import formula_text
-from bayesimpact.diagnosis.formula_refits import worth_a_refit
+from bayesimpact.diagnosis.formula_refits import refit_candidates
 from bayesimpact.diagnosis.formula_words import formula_entries, found_file
 from bayesimpact.diagnosis.formulas import Answer, joined, with_formulas
 from bayesimpact.diagnosis.learned import LEARNED
@@ -181,5 +181,5 @@ def test_refitted_are_formulas_of_different_kinds_few_of_which_only_add() -> Non
     order = [(0,), (0, 1), (0, 2), (3,), (4,), (3, 4), (5,)]
     ranked = [Subset(t, (1.0,) * len(t), 50.0 - i) for i, t in enumerate(order)]
     ranked.append(Subset((1, 2), (1.0, 1.0), -20.0))
-    found = [s.terms for s in worth_a_refit(ranked, terms)]
+    found = [s.terms for s in refit_candidates(ranked, terms)]
     assert found == [(0,), (0, 1), (3,), (5,)]

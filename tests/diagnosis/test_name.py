@@ -11,7 +11,7 @@ from effect_rigs import BY_ID
 
 from bayesimpact.diagnosis.decision import decide, in_its_place, ordered
 from bayesimpact.diagnosis.naming import Naming, State
-from bayesimpact.diagnosis.promising import worth_a_refit
+from bayesimpact.diagnosis.promising import refit_candidates
 from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.thresholds import ALPHA, DECISIVE, EXCESS, largest_log_odds
 
@@ -282,7 +282,7 @@ def scores(*gains: float, effect: str = FRICTION):
 
 def test_what_is_worth_a_refit():
     def kept(*gains: float) -> list[float]:
-        return [s.gain for s in worth_a_refit(scores(*gains))]
+        return [s.gain for s in refit_candidates(scores(*gains))]
 
     assert kept(100.0, 41.0, 39.0, 3.0) == [100.0, 41.0]
     assert kept(6.0, 4.5, 3.9) == [6.0, 4.5]
@@ -292,8 +292,8 @@ def test_what_is_worth_a_refit():
 
 def test_what_is_on_or_off_is_fitted_wherever_something_is_to_be_gained():
     for effect in ("contact_no_tension", "obstacle_mass"):
-        assert [s.gain for s in worth_a_refit(scores(9.0, 0.1, effect=effect))] == [9.0, 0.1]
-        assert [s.gain for s in worth_a_refit(scores(7.0, 0.1, effect=effect))] == [7.0]
+        assert [s.gain for s in refit_candidates(scores(9.0, 0.1, effect=effect))] == [9.0, 0.1]
+        assert [s.gain for s in refit_candidates(scores(7.0, 0.1, effect=effect))] == [7.0]
 
 
 def test_many_effects_that_imitate_one_force_in_contact_are_unknown():

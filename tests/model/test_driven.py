@@ -27,7 +27,7 @@ INTERVAL = 2e-3
 
 def _force(kind: str, n: int = 400) -> np.ndarray:
     t = np.arange(n) * INTERVAL
-    if kind == "sweep":
+    if kind == "sensitivity_pass":
         return 1.5 * np.sin(2 * np.pi * (2.0 * t + 6.0 * t**2))
     if kind == "steps":
         return 4.0 * (np.floor(t / 0.15) % 2)
@@ -50,7 +50,7 @@ def _theta(oscillator: Oscillator, **more: float) -> np.ndarray:
     return np.array([known[n] if n in known else known[n.split("[")[0]] for n in names])
 
 
-@pytest.mark.parametrize("kind", ["sweep", "steps", "noise"])
+@pytest.mark.parametrize("kind", ["sensitivity_pass", "steps", "noise"])
 @pytest.mark.parametrize("stop", [False, True])
 def test_against_an_independent_integrator(kind: str, stop: bool) -> None:
     force = _force(kind)
@@ -85,7 +85,7 @@ LAWS: dict[str, tuple[dict[str, float], Law, bool]] = {
 
 @pytest.mark.parametrize("effect", ["spring_cubic", "quadratic_drag"])
 @pytest.mark.parametrize("stop", [False, True])
-@pytest.mark.parametrize("kind", ["sweep", "noise"])
+@pytest.mark.parametrize("kind", ["sensitivity_pass", "noise"])
 def test_with_an_added_force(effect: str, stop: bool, kind: str) -> None:
     own, law, corner = LAWS[effect]
     _compare(effect, own, law, stop=stop, kind=kind, corner=corner)
@@ -145,7 +145,7 @@ def test_both_simulators_agree(stop: bool) -> None:
 
 @pytest.mark.parametrize("stop", [False, True])
 def test_derivatives(stop: bool) -> None:
-    force = _force("sweep")
+    force = _force("sensitivity_pass")
     oscillator = _oscillator(force, stop=stop)
     theta = _theta(oscillator, offset=2e-4)
     columns, constants = oscillator.layout.columns[:, :11], oscillator.layout.constants[:, :11]
@@ -184,7 +184,7 @@ def test_products_of_derivatives() -> None:
 
 
 def test_a_free_decay_beside_a_driven_recording() -> None:
-    force = _force("sweep")
+    force = _force("sensitivity_pass")
     free = Recording("b", "1", np.zeros(300), INTERVAL)
     driven = _oscillator(force, stop=True).campaign.recordings[0]
     both = build_oscillator(Campaign("rig", VALUES["mass"], (free, driven)))
@@ -196,7 +196,7 @@ def test_a_free_decay_beside_a_driven_recording() -> None:
 
 
 def test_the_gain_is_an_unknown_only_where_it_is_free() -> None:
-    force = _force("sweep")
+    force = _force("sensitivity_pass")
     known, free = (_oscillator(force, stop=False, free=free) for free in (False, True))
     assert "input_gain" in free.layout.names and "input_gain" not in known.layout.names
     (one,) = known.predict(_theta(known))

@@ -16,7 +16,7 @@ import pytest
 import systems
 
 from bayesimpact.model.derivatives import find_events
-from bayesimpact.model.tables import shelf
+from bayesimpact.model.tables import response_tables
 
 TOLERANCE = 1e-11
 
@@ -25,7 +25,15 @@ def worst_excess(system: systems.System) -> tuple[float, int]:
     """Largest breach of a regime, relative to the amplitude; and the number of events."""
     q, mass = system.q, system.mass
     events, code = find_events(
-        q, mass, system.interval, system.n, np.empty(0), np.empty((64, 2)), shelf(), np.empty(0), -1
+        q,
+        mass,
+        system.interval,
+        system.n,
+        np.empty(0),
+        np.empty((64, 2)),
+        response_tables(),
+        np.empty(0),
+        -1,
     )
     assert code == 0, system
     w1 = math.sqrt(q[1] / mass)

@@ -10,7 +10,7 @@ import pytest
 import systems
 
 from bayesimpact.errors import InputError, SimulationError
-from bayesimpact.model import scaled
+from bayesimpact.model import normalized
 from bayesimpact.model.simulate import (
     CODES,
     Q,
@@ -161,7 +161,7 @@ def test_starts():
     def q(**changed):
         return np.array([{**RIG, "A": 0.0, "phase": 0.0, **changed}.get(name, 0.0) for name in Q])
 
-    inside = scaled.begins_in_contact
+    inside = normalized.begins_in_contact
     assert not inside(q(y0=-1e-3)) and inside(q(y0=1.2e-3))
     assert inside(q(y0=1.1e-3, v0=1e-9)) and not inside(q(y0=1.1e-3, v0=-1e-9))
     assert not inside(q(y0=1.1e-3))  # at the stop, at rest: the spring pulls away

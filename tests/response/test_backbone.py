@@ -10,8 +10,8 @@ from rigs import PAPER, paper_motion
 from bayesimpact.errors import InputError
 from bayesimpact.response.backbone import Backbone, backbone
 from bayesimpact.response.bilinear import bilinear_backbone
+from bayesimpact.response.half_cycles import half_cycles, rough_period
 from bayesimpact.response.rest import rest_position
-from bayesimpact.response.swings import half_swings, rough_period
 
 RATIO = PAPER["c1"] / (2 * np.sqrt(PAPER["k1"] * PAPER["mass"]))
 FREE = np.sqrt(PAPER["k1"] / PAPER["mass"]) * np.sqrt(1 - RATIO**2) / (2 * np.pi)
@@ -101,7 +101,7 @@ def test_noise_makes_no_double_crossings(interval: float, n: int) -> None:
     sigma = 6e-5
     clean = backbone(paper_motion(n, interval), interval)
     b = backbone(noisy(paper_motion(n, interval), sigma), interval)
-    swings = half_swings(noisy(paper_motion(n, interval), sigma), 0.0, 0.157 / interval, sigma)
+    swings = half_cycles(noisy(paper_motion(n, interval), sigma), 0.0, 0.157 / interval, sigma)
     assert np.all(np.diff(swings.side) != 0)
     count = int(np.sum(clean.upper.amplitude > 7 * sigma)) - 1
     assert b.upper.times.size >= count > 10
@@ -118,7 +118,7 @@ def test_swings_stop_where_the_noise_takes_over() -> None:
 def test_impacts_between_the_samples_end_the_backbone() -> None:
     """Contacts of 2 ms at 200 Hz: where one is overlooked, two lower half swings look like one."""
     motion = paper_motion(1200, 5e-3, g=0.0, k2=1e6, c2=0.0)
-    swings = half_swings(motion, 0.0, 31.0, 1e-7)
+    swings = half_cycles(motion, 0.0, 31.0, 1e-7)
     below = swings.durations[swings.side < 0]
     free = 0.5 / FREE / 5e-3
     assert below.max() < 1.5 * free

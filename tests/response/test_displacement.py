@@ -8,7 +8,7 @@ import small_rig
 
 from bayesimpact.response.displacement import displacement
 from bayesimpact.response.estimates import estimate
-from bayesimpact.response.swings import rough_period
+from bayesimpact.response.half_cycles import rough_period
 from bayesimpact.trial.rig import motion
 
 NOISE = {1: 2e-4, 2: 2e-2}

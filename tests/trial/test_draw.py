@@ -11,15 +11,15 @@ import pytest
 from bayesimpact.data.campaign import Smoothing
 from bayesimpact.errors import InputError
 from bayesimpact.model.effects import EFFECTS
-from bayesimpact.trial.benches import BENCHES, NOISES, depth, draw_bench
 from bayesimpact.trial.blind import campaign_files, sealed_text
 from bayesimpact.trial.draw import draw
-from bayesimpact.trial.plants import CATALOGUE_PLANTS, Form
-from bayesimpact.trial.plants_outside import OUTSIDE_PLANTS
+from bayesimpact.trial.planted_effects import PLANTED_EFFECTS, Form
+from bayesimpact.trial.planted_outside import OUTSIDE_EFFECTS
 from bayesimpact.trial.rig import Release, motion, record
 from bayesimpact.trial.rig_catalogue import CATALOGUE
+from bayesimpact.trial.rig_designs import NOISES, RIG_DESIGNS, depth, draw_rig_design
 from bayesimpact.trial.rig_outside import OUTSIDE
-from bayesimpact.trial.ruler import Ruler, clean_readings, true_parameters
+from bayesimpact.trial.sensitivity import Sensitivity, clean_readings, true_parameters
 from bayesimpact.trial.settings import Settings
 from bayesimpact.trial.sizing import Unsuitable, outside, pair, single, solve
 
@@ -27,28 +27,28 @@ SMALL = Settings(benches=("small",), noises=("white",))
 
 
 @pytest.fixture(scope="module")
-def ruler() -> Ruler:
+def sensitivity() -> Sensitivity:
     rng = np.random.default_rng(2)
-    design = draw_bench("small", "white", rng)
-    return Ruler(replace(design, duration=1.2, releases=design.releases[::2]), rng)
+    design = draw_rig_design("small", "white", rng)
+    return Sensitivity(replace(design, duration=1.2, releases=design.releases[::2]), rng)
 
 
 def test_every_effect_can_be_planted() -> None:
     """And under the ids that the catalogue of the package uses."""
-    assert set(CATALOGUE_PLANTS) == set(CATALOGUE) - {"noise_correlated"}
-    assert set(OUTSIDE_PLANTS) == set(OUTSIDE) - {"resonator"}  # which is base_motion
-    assert {e.id for e in EFFECTS} - {"noise_correlated"} <= set(CATALOGUE_PLANTS)
+    assert set(PLANTED_EFFECTS) == set(CATALOGUE) - {"noise_correlated"}
+    assert set(OUTSIDE_EFFECTS) == set(OUTSIDE) - {"resonator"}  # which is base_motion
+    assert {e.id for e in EFFECTS} - {"noise_correlated"} <= set(PLANTED_EFFECTS)
     for first, second in ((a, b) for a in EFFECTS for b in EFFECTS if a.id < b.id):
         if first.excludes(second):  # no model can hold both
-            slot = CATALOGUE_PLANTS[first.id].slot
-            assert slot and slot == CATALOGUE_PLANTS[second.id].slot
+            slot = PLANTED_EFFECTS[first.id].slot
+            assert slot and slot == PLANTED_EFFECTS[second.id].slot
 
 
-@pytest.mark.parametrize("effect", [*CATALOGUE_PLANTS, *OUTSIDE_PLANTS])
+@pytest.mark.parametrize("effect", [*PLANTED_EFFECTS, *OUTSIDE_EFFECTS])
 def test_forms_are_what_the_rig_takes(effect: str) -> None:
     rng = np.random.default_rng(4)
-    design = draw_bench("small", "white", rng)
-    plant = CATALOGUE_PLANTS.get(effect) or OUTSIDE_PLANTS[effect]
+    design = draw_rig_design("small", "white", rng)
+    plant = PLANTED_EFFECTS.get(effect) or OUTSIDE_EFFECTS[effect]
     form = plant.form(design, rng)
     release = design.releases[0]
     planted = {effect: form.build(form.start)}
@@ -57,13 +57,13 @@ def test_forms_are_what_the_rig_takes(effect: str) -> None:
     assert form.start < form.largest
 
 
-@pytest.mark.parametrize("bench", BENCHES)
+@pytest.mark.parametrize("bench", RIG_DESIGNS)
 @pytest.mark.parametrize("noise", NOISES)
 def test_benches(bench: str, noise: str) -> None:
     for seed in range(5):
-        design = draw_bench(bench, noise, np.random.default_rng(seed))
+        design = draw_rig_design(bench, noise, np.random.default_rng(seed))
         rig = design.rig
-        assert len(design.releases) == max(len(rig.k2), 1) * BENCHES[bench].releases
+        assert len(design.releases) == max(len(rig.k2), 1) * RIG_DESIGNS[bench].releases
         assert len({r.name for r in design.releases}) == len(design.releases)
         assert all(r.y0 < 0 for r in design.releases)
         lowest = min(abs(r.y0) for r in design.releases)
@@ -80,7 +80,7 @@ def test_benches(bench: str, noise: str) -> None:
 
 def test_deepest_indentation() -> None:
     """By energy; the rig without damping gets there."""
-    design = draw_bench("small", "white", np.random.default_rng(0))
+    design = draw_rig_design("small", "white", np.random.default_rng(0))
     rig = replace(design.rig, c1=0.0, c2=0.0)
     start = Release("a", "1", -design.amplitude)
     moved = motion(rig, start, rate=20_000.0, duration=0.25)
@@ -123,7 +123,7 @@ def clean_of(settings: Settings, seed: int) -> dict[str, float]:
     """True base parameters of a first attempt."""
     rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
     bench, noise = str(rng.choice(settings.benches)), str(rng.choice(settings.noises))
-    return true_parameters(draw_bench(bench, noise, rng))
+    return true_parameters(draw_rig_design(bench, noise, rng))
 
 
 def test_files_hold_the_recordings(tmp_path) -> None:
@@ -139,12 +139,12 @@ def test_files_hold_the_recordings(tmp_path) -> None:
         assert (mine.name, mine.case) == (read.name, read.case)
 
 
-def test_a_score_is_the_misfit_that_a_refit_leaves(ruler: Ruler) -> None:
+def test_a_score_is_the_misfit_that_a_refit_leaves(sensitivity: Sensitivity) -> None:
     """Against least squares by SciPy, with the rig itself as the base model."""
     from scipy.optimize import least_squares
 
-    design, strength = ruler.design, 3.0
-    sized = single(ruler, "spring_cubic", strength, 1.0, np.random.default_rng(1))
+    design, strength = sensitivity.design, 3.0
+    sized = single(sensitivity, "spring_cubic", strength, 1.0, np.random.default_rng(1))
     assert sized.strength == pytest.approx(strength, rel=0.05)
     target = clean_readings(design, {"spring_cubic": sized.numbers})
     truth = true_parameters(design)
@@ -171,37 +171,39 @@ def test_a_score_is_the_misfit_that_a_refit_leaves(ruler: Ruler) -> None:
     assert score == pytest.approx(sized.score, rel=2e-3)
 
 
-def test_pairs_stand_out_beside_each_other(ruler: Ruler) -> None:
+def test_pairs_stand_out_beside_each_other(sensitivity: Sensitivity) -> None:
     ids = ("sensor_drift", "quadratic_drag")
-    found = pair(ruler, ids, [2.0, 4.0], 1.0, np.random.default_rng(1))
-    alone = [ruler.response({one.effect: one.numbers}) for one in found]
+    found = pair(sensitivity, ids, [2.0, 4.0], 1.0, np.random.default_rng(1))
+    alone = [sensitivity.response({one.effect: one.numbers}) for one in found]
     for one, other, strength in ((0, 1, 2.0), (1, 0, 4.0)):
         unit = alone[other] / np.linalg.norm(alone[other])
         left = alone[one] - unit * (unit @ alone[one])
         assert np.linalg.norm(left) == pytest.approx(5 * strength, rel=0.15)
     with pytest.raises(Unsuitable, match="look alike"):
-        pair(ruler, ("sensor_drift", "sensor_drift"), [2.0, 2.0], 1.0, np.random.default_rng(1))
+        pair(
+            sensitivity, ("sensor_drift", "sensor_drift"), [2.0, 2.0], 1.0, np.random.default_rng(1)
+        )
 
 
-def test_outside_forces_are_sized_by_their_distance(ruler: Ruler) -> None:
-    sized = outside(ruler, "detent", 2.0, np.random.default_rng(1))
+def test_outside_forces_are_sized_by_their_distance(sensitivity: Sensitivity) -> None:
+    sized = outside(sensitivity, "detent", 2.0, np.random.default_rng(1))
     assert sized.distinct == pytest.approx(10.0, rel=0.05)
     assert sized.score >= sized.distinct and sized.form.place is not None
 
 
-def test_an_effect_is_no_distance_from_itself(ruler: Ruler) -> None:
-    sized = single(ruler, "sensor_quadratic", 2.0, 1.0, np.random.default_rng(1))
-    response = ruler.response({"sensor_quadratic": sized.numbers})
-    left, nearest = ruler.distinct(response)
+def test_an_effect_is_no_distance_from_itself(sensitivity: Sensitivity) -> None:
+    sized = single(sensitivity, "sensor_quadratic", 2.0, 1.0, np.random.default_rng(1))
+    response = sensitivity.response({"sensor_quadratic": sized.numbers})
+    left, nearest = sensitivity.distinct(response)
     assert nearest == "sensor_quadratic" and left < 0.02 * sized.score
     assert sized.distinct is not None and sized.distinct > left and sized.nearest != nearest
 
 
-def test_the_wrong_sign_imitates_nothing(ruler: Ruler) -> None:
+def test_the_wrong_sign_imitates_nothing(sensitivity: Sensitivity) -> None:
     """Friction cannot give energy."""
-    form = CATALOGUE_PLANTS["coulomb_friction"].form(ruler.design, np.random.default_rng(0))
-    response = ruler.response({"coulomb_friction": form.build(form.start)})
-    rival = next(r for r in ruler._catalogue() if r.effect == "coulomb_friction")
+    form = PLANTED_EFFECTS["coulomb_friction"].form(sensitivity.design, np.random.default_rng(0))
+    response = sensitivity.response({"coulomb_friction": form.build(form.start)})
+    rival = next(r for r in sensitivity._catalogue() if r.effect == "coulomb_friction")
     whole = float(np.linalg.norm(response))
     assert rival.left(response) < 0.2 * whole
     assert rival.left(-response) == pytest.approx(whole)

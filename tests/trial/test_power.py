@@ -7,7 +7,6 @@ import pytest
 
 from bayesimpact.diagnosis.naming import DECISIVE
 from bayesimpact.report.figures.power import limits_figure, power_figure
-from bayesimpact.trial.benches import draw_bench
 from bayesimpact.trial.power import (
     STRENGTHS,
     Power,
@@ -18,7 +17,8 @@ from bayesimpact.trial.power import (
     power_text,
     reaching,
 )
-from bayesimpact.trial.ruler import Ruler
+from bayesimpact.trial.rig_designs import draw_rig_design
+from bayesimpact.trial.sensitivity import Sensitivity
 
 ONE = Power("spring_cubic", "stiffness", 100.0, 1.0, 0.5, "spring_quadratic")
 CRITICAL = 3.8
@@ -52,17 +52,17 @@ def test_where_a_curve_reaches_ninety_per_cent() -> None:
 def test_the_critical_score() -> None:
     """Above that of one test, below Bonferroni's for three hundred; alarms at its rate."""
     rng = np.random.default_rng(1)
-    ruler = Ruler(draw_bench("small", "white", rng), rng)
-    assert 3.0 < critical_score(ruler, rng) < 4.8
-    found = power(ruler, "sensor_drift", rng)
+    sensitivity = Sensitivity(draw_rig_design("small", "white", rng), rng)
+    assert 3.0 < critical_score(sensitivity, rng) < 4.8
+    found = power(sensitivity, "sensor_drift", rng)
     assert (
         found is not None
         and found.size_name == "rate"
         and found.exponent == pytest.approx(1, abs=0.05)
     )
-    response = ruler.response({"sensor_drift": {"rate": found.limit}})
+    response = sensitivity.response({"sensor_drift": {"rate": found.limit}})
     assert np.linalg.norm(response) == pytest.approx(5.0, rel=0.02)
-    assert power(ruler, "contact_no_tension", rng) is None
+    assert power(sensitivity, "contact_no_tension", rng) is None
 
 
 def test_the_bundled_design() -> None:

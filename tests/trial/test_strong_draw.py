@@ -11,16 +11,16 @@ import pytest
 from bayesimpact.data.read import load_campaign
 from bayesimpact.errors import InputError
 from bayesimpact.inference.identify import identify
-from bayesimpact.trial.benches import draw_bench
 from bayesimpact.trial.blind import campaign_files, sealed_text
 from bayesimpact.trial.draw import draw
 from bayesimpact.trial.drawn import Drawn
 from bayesimpact.trial.identifiable import left_of, stand_outs
 from bayesimpact.trial.rig import Rig
-from bayesimpact.trial.ruler import Ruler
+from bayesimpact.trial.rig_designs import draw_rig_design
+from bayesimpact.trial.sensitivity import Sensitivity
 from bayesimpact.trial.settings import Settings, settings_from, strong_settings
 from bayesimpact.trial.strong_draw import LEAST, _ids, _rivals
-from bayesimpact.trial.strong_plants import (
+from bayesimpact.trial.strong_effects import (
     CATALOGUE_STRONG,
     SORTS,
     STRONG_OUTSIDE,
@@ -32,7 +32,7 @@ from bayesimpact.trial.strong_rigs import (
     ENCODER_SD,
     GROUPS,
     STEPS,
-    STRONG_BENCHES,
+    STRONG_RIGS,
     draw_rig,
     noise_range,
     with_noise,
@@ -54,7 +54,7 @@ def decay() -> Drawn:
 
 
 def test_every_sort_and_group_is_of_known_things() -> None:
-    assert {b for names in GROUPS.values() for b in names} == set(STRONG_BENCHES)
+    assert {b for names in GROUPS.values() for b in names} == set(STRONG_RIGS)
     assert set(CATALOGUE_STRONG) <= set(SORT_OF) and "pendulum_sine" in CATALOGUE_STRONG
     assert not set(CATALOGUE_STRONG) & set(STRONG_OUTSIDE)
     assert len(SORT_OF) == sum(map(len, SORTS.values()))  # an effect is of one sort
@@ -108,7 +108,7 @@ def test_noise_of_an_encoder_has_the_size_it_says() -> None:
     assert (other.chain.noise, other.noise_kind) == (2e-5, "ar1") and other.chain.correlation > 0
 
 
-@pytest.mark.parametrize("bench", STRONG_BENCHES)
+@pytest.mark.parametrize("bench", STRONG_RIGS)
 @pytest.mark.parametrize("kind", ["several", "several_outside"])
 def test_never_two_of_a_sort(bench: str, kind: str) -> None:
     settings = strong_settings()
@@ -156,7 +156,7 @@ def test_what_no_column_can_imitate() -> None:
 @pytest.fixture(scope="module")
 def small():
     rng = np.random.default_rng(2)
-    design = draw_bench("small", "white", rng)
+    design = draw_rig_design("small", "white", rng)
     return replace(design, duration=0.7, releases=design.releases[::2])
 
 
@@ -168,9 +168,9 @@ def _small(design, effect: str, size: float, seed: int = 0) -> Chosen:
 @pytest.mark.parametrize("effect", ["spring_cubic", "contact_damping_per_case"])
 def test_a_small_effect_stands_out_by_what_a_refit_leaves(small, effect: str) -> None:
     """Against the base model fitted in full to what the rig records."""
-    ruler = Ruler(small, np.random.default_rng(0))
+    sensitivity = Sensitivity(small, np.random.default_rng(0))
     one = _small(small, effect, 3.0)
-    left = ruler.response({effect: one.form.build(one.size)})
+    left = sensitivity.response({effect: one.form.build(one.size)})
     (own,) = stand_outs(small, [one])
     assert own / small.chain.noise == pytest.approx(np.linalg.norm(left), rel=0.03)
 

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from bayesimpact.model.added.method import quarters
-from bayesimpact.model.added.situation import (
+from bayesimpact.model.added.contact_state import (
     GAP,
     HEADING,
     LEAVE,
@@ -22,8 +21,9 @@ from bayesimpact.model.added.situation import (
     one_sided,
     passed,
 )
+from bayesimpact.model.added.context import AHEAD, NOW
+from bayesimpact.model.added.method import quarters
 from bayesimpact.model.added.step import step
-from bayesimpact.model.added.world import AHEAD, NOW
 from bayesimpact.model.compiled import inner, typed
 
 TRIALS = 80
@@ -57,7 +57,7 @@ def value_and_slope(
 ) -> Any:
     """An event's function, its slope along the trajectory by a difference over `short`, and y''.
 
-    n is `push` there.
+    n is `added_force` there.
     """
     value = event_value(event, y, v, t, column, w)
     a = flow.inverse * n - 2.0 * flow.b * v - flow.K * (y - flow.rest)
@@ -100,9 +100,9 @@ def locate(
     flow: Any,
     w: Any,
 ) -> Any:
-    """Length of the step from (y, v) to the event inside (0, h], and state and push there.
+    """Length of the step from (y, v) to the event inside (0, h], and state and `added_force` there.
 
-    (y1, v1) is the state after h, where the event's function is negative, and n1 the push.
+    (y1, v1) is the state after h, where the event's function is negative, and n1 the added_force.
     """
     now, column, short = typed(NOW), AHEAD if flow.memory else NOW, 1e-6 * h
     f0, d0, _ = value_and_slope(event, y, v, t, n0, now, short, flow, w)
@@ -148,7 +148,7 @@ def turn_matters(y: Any, v: Any, y1: Any, v1: Any, h: Any, flow: Any, w: Any) ->
 
 
 @inner()
-def foresee_push(
+def foresee_force(
     y: Any, v: Any, n0: Any, y1: Any, v1: Any, n1: Any, t1: Any, h: Any, flow: Any, w: Any
 ) -> Any:
     """Whether the reaction, negative at both ends of a step, is positive within: SOON, else NEVER.
@@ -175,7 +175,7 @@ def suspicious(
     y: Any, v: Any, n0: Any, y1: Any, v1: Any, n1: Any, t1: Any, h: Any, flow: Any, w: Any
 ) -> Any:
     """True when a step of length h from (y, v) to (y1, v1) at t1 contains an event."""
-    foresee_push(y, v, n0, y1, v1, n1, t1, h, flow, w)
+    foresee_force(y, v, n0, y1, v1, n1, t1, h, flow, w)
     column = AHEAD if flow.memory else NOW
     return (
         turn_matters(y, v, y1, v1, h, flow, w) or passed(y1, v1, t1, column, NONE, flow, w) != NONE
@@ -195,9 +195,9 @@ def first_event(
     flow: Any,
     w: Any,
 ) -> Any:
-    """Earliest event of a step that ends at (y1, v1) with the push n1, or NONE.
+    """Earliest event of a step that ends at (y1, v1) with `added_force` n1, or NONE.
 
-    Returns the event, the time to it, and displacement, velocity and push there.
+    Returns the event, the time to it, and displacement, velocity and added_force there.
     """
     column = AHEAD if flow.memory else NOW
     event, length = NONE, h
@@ -206,7 +206,7 @@ def first_event(
         length, y1, v1, n1 = locate(event, y, v, t, n0, h, y1, v1, n1, flow, w)
     for _ in range(ROUNDS):
         if length < h and event != LEAVE:
-            foresee_push(y, v, n0, y1, v1, n1, t + length, length, flow, w)
+            foresee_force(y, v, n0, y1, v1, n1, t + length, length, flow, w)
         found = passed(y1, v1, t + length, column, event, flow, w)
         if found == NONE:
             break

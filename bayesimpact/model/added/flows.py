@@ -6,19 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from bayesimpact.model.added.dense import LONGEST_STRIDE
-from bayesimpact.model.added.memory import split_memory
-from bayesimpact.model.added.resonator import (
-    BODIES,
-    OBSTACLE,
-    acts,
-    body,
-    fastest_body,
-    share_of_frame,
-)
-from bayesimpact.model.added.second import listens
-from bayesimpact.model.added.situation import GAP, MODE, SIDES, SLIDING, TOUCHING, surface_value
-from bayesimpact.model.added.world import (
+from bayesimpact.model.added.contact_state import GAP, MODE, SIDES, SLIDING, TOUCHING, surface_value
+from bayesimpact.model.added.context import (
     C1,
     C2,
     CONTACT_MASS,
@@ -50,6 +39,17 @@ from bayesimpact.model.added.world import (
     law_value,
     strength,
 )
+from bayesimpact.model.added.dense import LONGEST_STRIDE
+from bayesimpact.model.added.memory import split_memory
+from bayesimpact.model.added.resonator import (
+    BODIES,
+    OBSTACLE,
+    acts,
+    body,
+    fastest_body,
+    share_of_frame,
+)
+from bayesimpact.model.added.second import listens
 from bayesimpact.model.compiled import inner
 
 MAX_ANGLE = 0.125  # longest step times natural frequency, rad
@@ -302,7 +302,7 @@ def not_beyond(left: Any, h: Any, w: Any) -> Any:
 def next_step(
     y: Any, v: Any, t: Any, n0: Any, j: Any, aligned: Any, longest: Any, flow: Any, w: Any
 ) -> Any:
-    """Length of the next step, and whether it ends on a sample; n0 is `push` at its start.
+    """Length of the next step, and whether it ends on a sample; n0 is `added_force` at its start.
 
     Near a touch that is not smooth the steps follow from the motion alone, not from the samples, so
     that they change smoothly with the parameters.

@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from bayesimpact.model.added.contact_state import JOINT
+from bayesimpact.model.added.context import AHEAD, NOW, WORK_COLUMNS
 from bayesimpact.model.added.resonator import FRAME, OBSTACLE, acts, body, row
-from bayesimpact.model.added.situation import JOINT
-from bayesimpact.model.added.world import AHEAD, NOW, WORK_COLUMNS
 from bayesimpact.model.compiled import compiled, inner
 
 TERMS = 16  # over at most half a radian: the rest is below 1e-17

@@ -11,27 +11,27 @@ from typing import Any
 
 import numpy as np
 
-from bayesimpact.model.added.method import stage
-from bayesimpact.model.added.resonator import (
-    begin_step,
-    keep_bodies,
-    kick_bodies,
-    relax_bodies,
-    remember_bodies,
-)
-from bayesimpact.model.added.world import (
+from bayesimpact.model.added.context import (
     AHEAD,
     ALPHA,
     FADE,
-    KICK,
     LAMBDA,
     LAW_COLUMNS,
     LAW_RATE,
     NOW,
+    STATE_RATE,
     WORK_COLUMNS,
     X_U,
     X_V,
     law_value,
+)
+from bayesimpact.model.added.method import stage
+from bayesimpact.model.added.resonator import (
+    begin_step,
+    body_rates,
+    keep_bodies,
+    relax_bodies,
+    remember_bodies,
 )
 from bayesimpact.model.compiled import inner
 
@@ -62,17 +62,17 @@ def split_memory(y: Any, v: Any, t: Any, flow: Any, w: Any) -> Any:
 
 @inner()
 def begin_memory(y: Any, v: Any, t: Any, n: Any, h: Any, flow: Any, w: Any) -> Any:
-    """Decay over a quarter of a step of length h, and the kicks at its start."""
+    """Decay over a quarter of a step of length h, and the rates at its start."""
     for law in range(w.size):
         at = WORK_COLUMNS * law
         w.work[at + FADE] = np.exp(-0.25 * h * w.work[at + LAMBDA])
     begin_step(h, w)
-    kick(0, y, v, t, NOW, n, flow, w)
+    state_rate(0, y, v, t, NOW, n, flow, w)
 
 
 @inner()
-def kick(number: Any, y: Any, v: Any, t: Any, column: Any, n: Any, flow: Any, w: Any) -> Any:
-    """What moves zeta at a stage beside its decay; n is `push` there."""
+def state_rate(number: Any, y: Any, v: Any, t: Any, column: Any, n: Any, flow: Any, w: Any) -> Any:
+    """What moves zeta at a stage beside its decay; n is `added_force` there."""
     work = w.work
     for law in range(w.size):
         if w.laws[LAW_COLUMNS * law + LAW_RATE] != 0:
@@ -80,8 +80,8 @@ def kick(number: Any, y: Any, v: Any, t: Any, column: Any, n: Any, flow: Any, w:
             z = work[at + column]
             rate = law_value(law, LAW_RATE, y, v, t, z, flow.gap, flow.touching, w)
             linear = work[at + ALPHA] * v - work[at + LAMBDA] * z
-            work[at + KICK + number] = rate - linear - work[at + X_V] * n * flow.inverse
-    kick_bodies(number, y, v, flow, w)
+            work[at + STATE_RATE + number] = rate - linear - work[at + X_V] * n * flow.inverse
+    body_rates(number, y, v, flow, w)
 
 
 @inner()
@@ -93,7 +93,7 @@ def remember(
     for law in range(w.size):
         if w.laws[LAW_COLUMNS * law + LAW_RATE] != 0:
             at = WORK_COLUMNS * law
-            e1, x_u, x_v, k = work[at + FADE], work[at + X_U], work[at + X_V], at + KICK
+            e1, x_u, x_v, k = work[at + FADE], work[at + X_U], work[at + X_V], at + STATE_RATE
             e2 = e1 * e1
             e3, e4 = e2 * e1, e2 * e2
             decay = e1 if number <= 2 else (e2 if number == 3 else (e3 if number == 4 else e4))

@@ -20,21 +20,21 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from bayesimpact.model.added.method import stage
-from bayesimpact.model.added.world import (
+from bayesimpact.model.added.context import (
     AHEAD,
     FADE,
     FRAME_DAMPING,
     FRAME_FREQUENCY,
     FRAME_RATIO,
-    KICK,
     NOW,
     OBSTACLE_DAMPING,
     OBSTACLE_FREQUENCY,
     OBSTACLE_MASS,
     STAGE,
+    STATE_RATE,
     WORK_COLUMNS,
 )
+from bayesimpact.model.added.method import stage
 from bayesimpact.model.compiled import inner
 from bayesimpact.model.flow import impulse_response
 
@@ -83,7 +83,7 @@ def own_force(which: Any, column: Any, w: Any) -> Any:
 
 
 @inner()
-def bodies_push(column: Any, touching: Any, w: Any) -> Any:
+def bodies_force(column: Any, touching: Any, w: Any) -> Any:
     """Sum of `own_force` over the bodies that act."""
     total = 0.0
     for which in range(BODIES):
@@ -123,7 +123,7 @@ def begin_step(h: Any, w: Any) -> Any:
 
 
 @inner()
-def kick_bodies(number: Any, y: Any, v: Any, flow: Any, w: Any) -> Any:
+def body_rates(number: Any, y: Any, v: Any, flow: Any, w: Any) -> Any:
     """What P contributes to x'' at a stage."""
     for which in range(BODIES):
         m2, W, drag = body(which, w)
@@ -131,7 +131,7 @@ def kick_bodies(number: Any, y: Any, v: Any, flow: Any, w: Any) -> Any:
             continue
         follows = acts(which, flow.touching == 1.0, w)
         place = y - flow.gap if which == OBSTACLE else y
-        w.work[row(which, w) + KICK + number] = (W * place + drag * v) if follows else 0.0
+        w.work[row(which, w) + STATE_RATE + number] = (W * place + drag * v) if follows else 0.0
 
 
 @inner()
@@ -146,7 +146,13 @@ def remember_bodies(number: Any, column: Any, h: Any, w: Any) -> Any:
         speed = at + WORK_COLUMNS
         quarter = 1 if number <= 2 else min(number - 1, 4)
         M, N = work[at + FADE + quarter - 1], work[speed + FADE + quarter - 1]
-        x, rate, k, f, g = work[at + NOW], work[speed + NOW], at + KICK, at + FADE, speed + FADE
+        x, rate, k, f, g = (
+            work[at + NOW],
+            work[speed + NOW],
+            at + STATE_RATE,
+            at + FADE,
+            speed + FADE,
+        )
         work[at + column] = stage(
             number, N * x + M * (rate + drag * x), 0.0,
             h * work[f], h * work[f + 1], h * work[f + 2], h * work[f + 3],

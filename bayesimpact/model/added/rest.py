@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from bayesimpact.model.added.contact_state import SLIDING, holding_force, static_force
+from bayesimpact.model.added.context import AHEAD, FORCE, NOW
 from bayesimpact.model.added.flows import flow_from
 from bayesimpact.model.added.memory import keep_memory, relax_one
 from bayesimpact.model.added.resonator import fastest_body, relax_bodies
 from bayesimpact.model.added.second import added_reading, listens, respond_at_rest
-from bayesimpact.model.added.situation import SLIDING, holding_force, static_force
-from bayesimpact.model.added.world import AHEAD, FORCE, NOW
 from bayesimpact.model.compiled import inner
 
 

@@ -13,14 +13,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from bayesimpact.model.added.resonator import (
-    OBSTACLE,
-    body,
-    body_force,
-    share_of_frame,
-    shift_bodies,
-)
-from bayesimpact.model.added.situation import (
+from bayesimpact.model.added.contact_state import (
     GAP,
     HOP,
     MODE,
@@ -30,7 +23,7 @@ from bayesimpact.model.added.situation import (
     laws_force,
     reaction,
 )
-from bayesimpact.model.added.world import (
+from bayesimpact.model.added.context import (
     AHEAD,
     C1,
     C2,
@@ -46,6 +39,13 @@ from bayesimpact.model.added.world import (
     STAGE,
     WORK_COLUMNS,
     law_value,
+)
+from bayesimpact.model.added.resonator import (
+    OBSTACLE,
+    body,
+    body_force,
+    share_of_frame,
+    shift_bodies,
 )
 from bayesimpact.model.compiled import compiled, inner
 from bayesimpact.model.flow import impulse_response

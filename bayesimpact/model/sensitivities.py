@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from bayesimpact.model.basis import D_, E_, F_, G_, H_, ONE, P_, PLAIN, PR, S_, UC, US, X_, XR
 from bayesimpact.model.compiled import inner
-from bayesimpact.model.scaled import C1, C2, K1, K2, OFFSET, PHASE, A, G, W
+from bayesimpact.model.normalized import C1, C2, K1, K2, OFFSET, PHASE, A, G, W
 
 Floats = NDArray[np.float64]
-Lanes = NDArray[np.uint64]
+Columns = NDArray[np.uint64]
 
 RESIDUAL = 11
 
@@ -46,7 +46,7 @@ def fill_slopes(slopes: Floats, q: Floats, mass: float, interval: float) -> None
 
 @inner(forceinline=True, fastmath={"contract"})
 def fill_coefficients(
-    stack: Floats, slot: int, active: Lanes, slopes: Floats, side: int, beta: float, K: float,
+    stack: Floats, slot: int, active: Columns, slopes: Floats, side: int, beta: float, K: float,
     u: float, v: float, dy: Floats, dv: Floats,
 ) -> None:  # fmt: skip
     """Write the PLAIN coefficients of the motion from (u, v), relative to the rest."""
@@ -65,7 +65,7 @@ def fill_coefficients(
 
 @inner()
 def fill_forced_coefficients(
-    stack: Floats, slot: int, active: Lanes, slopes: Floats, side: int, q: Floats, mass: float,
+    stack: Floats, slot: int, active: Columns, slopes: Floats, side: int, q: Floats, mass: float,
     interval: float, t: float,
 ) -> tuple[float, float]:  # fmt: skip
     """Write the other coefficients; return the force's sine and cosine part (per mass) at t."""
@@ -91,7 +91,7 @@ def fill_forced_coefficients(
 
 @inner()
 def fill_reading(
-    stack: Floats, here: int, slot: int, active: Lanes, order: int, interval: float, beta: float,
+    stack: Floats, here: int, slot: int, active: Columns, order: int, interval: float, beta: float,
     K: float, w: float,
 ) -> None:  # fmt: skip
     """Write into `slot` the coefficients of the order-th time derivative of those in `here`.
@@ -124,7 +124,7 @@ def fill_reading(
 
 @inner(forceinline=True, fastmath={"contract"})
 def carry(
-    stack: Floats, slot: int, active: Lanes, beta: float, K: float, S: float, D: float, G: float,
+    stack: Floats, slot: int, active: Columns, beta: float, K: float, S: float, D: float, G: float,
     H: float, dy: Floats, dv: Floats,
 ) -> None:  # fmt: skip
     """Bring (dy, dv) to the time at which the PLAIN basis is 1, S, D, G, H."""
@@ -139,7 +139,7 @@ def carry(
 
 @inner(forceinline=True, fastmath={"contract"})
 def carry_forced(
-    stack: Floats, slot: int, active: Lanes, value: Floats, rate: Floats, dy: Floats, dv: Floats
+    stack: Floats, slot: int, active: Columns, value: Floats, rate: Floats, dy: Floats, dv: Floats
 ) -> None:
     """Add to (dy, dv) what the rest of the basis brings, given its values and rates of change."""
     for i in active:
@@ -153,7 +153,7 @@ def multiply(
     stack: Floats,
     products: Floats,
     slot: int,
-    active: Lanes,
+    active: Columns,
     prefixes: Floats,
     side: int,
     count: int,
@@ -193,7 +193,7 @@ def dot(a: Floats, b: Floats) -> float:
 
 @inner()
 def add_products(
-    gram: Floats, stack: Floats, products: Floats, moments: Floats, slots: int, active: Lanes,
+    gram: Floats, stack: Floats, products: Floats, moments: Floats, slots: int, active: Columns,
     samples: int,
 ) -> int:  # fmt: skip
     """Add the slots' products of J with J and with the residual to `gram` (12, 12).

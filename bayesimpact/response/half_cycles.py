@@ -18,7 +18,7 @@ ALIKE = 0.2  # of the power of the strongest line
 
 
 @dataclass(frozen=True, eq=False)
-class HalfSwings:
+class HalfCycles:
     """Consecutive complete half swings about a level; positions are in samples.
 
     Attributes
@@ -99,7 +99,7 @@ def turning_points(samples: Floats, period: float, noise: float) -> tuple[Ints, 
     return index[keep].astype(np.intp), sign[keep]
 
 
-def half_swings(samples: Floats, level: float, period: float, noise: float) -> HalfSwings:
+def half_cycles(samples: Floats, level: float, period: float, noise: float) -> HalfCycles:
     """Complete half swings about `level`, until the motion is lost in the noise.
 
     A crossing counts when the signal goes from four standard deviations of the noise on one side
@@ -133,11 +133,11 @@ def half_swings(samples: Floats, level: float, period: float, noise: float) -> H
     lost = amplitudes < max(6 * noise, 1.5 * threshold)
     lost |= _merged(signal, turning_points(signal, period, noise), first, last, side, amplitudes)
     count = int(np.argmax(lost)) if lost.any() else lost.size
-    return HalfSwings(positions[: count + 1], side[:count], peaks[:count], amplitudes[:count])
+    return HalfCycles(positions[: count + 1], side[:count], peaks[:count], amplitudes[:count])
 
 
-def _none() -> HalfSwings:
-    return HalfSwings(np.empty(0), np.empty(0, dtype=int), np.empty(0), np.empty(0))
+def _none() -> HalfCycles:
+    return HalfCycles(np.empty(0), np.empty(0, dtype=int), np.empty(0), np.empty(0))
 
 
 def _middle_change(signal: Floats, before: int, after: int) -> int:

@@ -28,9 +28,9 @@ from bayesimpact.inference.prior import LogUniform, Normal, Prior
 from bayesimpact.inference.priors import Priors
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.oscillator import build_oscillator
-from bayesimpact.trial.benches import Design
 from bayesimpact.trial.rig import Effects, record
 from bayesimpact.trial.rig_chain import Probe, measure
+from bayesimpact.trial.rig_designs import Design
 from bayesimpact.trial.rig_motion import sampling
 
 Array = NDArray[np.float64]
@@ -89,7 +89,7 @@ class Rival:
         return float(np.linalg.norm(response - self.basis @ share))
 
 
-class Ruler:
+class Sensitivity:
     """Measures planted effects against what one design can detect."""
 
     def __init__(self, design: Design, rng: np.random.Generator) -> None:

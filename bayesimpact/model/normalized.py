@@ -34,7 +34,7 @@ SEARCH_FAILED = 10
 OVERFLOW = 11
 
 
-class Scaled(NamedTuple):
+class NormalizedParameters(NamedTuple):
     """Rates per sampling interval: b = c / (2 m) and K = k / m of both regimes, the rest of
     contact, m, the gap and the offset, m, and the force per mass: force sin(w t + phase).
     """
@@ -75,12 +75,12 @@ def check(q: Floats, mass: float, interval: float, n: int) -> int:
 
 
 @compiled()
-def scale(q: Floats, mass: float, interval: float) -> Scaled:
+def scale(q: Floats, mass: float, interval: float) -> NormalizedParameters:
     """Count time in sampling intervals."""
     per_mass = interval * interval / mass
     half = 0.5 * interval / mass
     stiffness = q[K1] + q[K2]
-    return Scaled(
+    return NormalizedParameters(
         half * q[C1],
         per_mass * q[K1],
         half * (q[C1] + q[C2]),

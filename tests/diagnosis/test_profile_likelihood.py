@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from effect_rigs import BY_ID
 
-from bayesimpact.diagnosis.valley import CLOSE, _Profile, followed, valley
+from bayesimpact.diagnosis.profile_likelihood import CLOSE, _Profile, followed, valley
 from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.likelihood import Linearisation
 from bayesimpact.inference.mode import find_mode

@@ -7,8 +7,8 @@ from math import pi
 
 import numpy as np
 
-from bayesimpact.trial.benches import Design
-from bayesimpact.trial.plants import Form, Plant, one_number, sign_of
+from bayesimpact.trial.planted_effects import Form, PlantedEffect, one_number, sign_of
+from bayesimpact.trial.rig_designs import Design
 
 Rng = np.random.Generator
 
@@ -79,18 +79,18 @@ def _knock(design: Design, rng: Rng) -> Form:
 
 _ANYWHERE = ("free", "everywhere")
 
-OUTSIDE_PLANTS: Mapping[str, Plant] = {
-    "detent": Plant(("free",), _detent),
-    "friction_pad": Plant(("free",), _friction_pad),
-    "damping_bump": Plant(("free",), _bump),
-    "eddy_brake": Plant(("free",), _brake),
-    "damping_drift": Plant(_ANYWHERE, one_number("rate", lambda d: 3 / d.duration)),
-    "contact_friction": Plant(
+OUTSIDE_EFFECTS: Mapping[str, PlantedEffect] = {
+    "detent": PlantedEffect(("free",), _detent),
+    "friction_pad": PlantedEffect(("free",), _friction_pad),
+    "damping_bump": PlantedEffect(("free",), _bump),
+    "eddy_brake": PlantedEffect(("free",), _brake),
+    "damping_drift": PlantedEffect(_ANYWHERE, one_number("rate", lambda d: 3 / d.duration)),
+    "contact_friction": PlantedEffect(
         ("contact",), one_number("force", lambda d: 0.1 * d.contact_stiffness * d.indentation), 1
     ),
-    "contact_preload": Plant(
+    "contact_preload": PlantedEffect(
         ("contact",), one_number("force", lambda d: 0.1 * d.contact_stiffness * d.indentation), 1
     ),
-    "knock": Plant(_ANYWHERE, _knock),
+    "knock": PlantedEffect(_ANYWHERE, _knock),
 }
 """Every force outside the catalogue that may be planted; a resonator is base_motion."""

@@ -24,7 +24,9 @@ from bayesimpact.model import basis
 from bayesimpact.model.basis import fill_basis, fill_basis_series, fill_table, plain_basis
 from bayesimpact.model.blocks import reading_of
 from bayesimpact.model.compiled import inner, typed
-from bayesimpact.model.lanes import (
+from bayesimpact.model.moments import forced_moments, plain_moments, prefix_grams, write_rows
+from bayesimpact.model.normalized import C2, OFFSET, V0, Y0, G, begins_in_contact, scale
+from bayesimpact.model.sensitivities import (
     RESIDUAL,
     add_products,
     carry,
@@ -35,19 +37,17 @@ from bayesimpact.model.lanes import (
     fill_slopes,
     multiply,
 )  # fmt: skip
-from bayesimpact.model.moments import forced_moments, plain_moments, prefix_grams, write_rows
-from bayesimpact.model.scaled import C2, OFFSET, V0, Y0, G, begins_in_contact, scale
 from bayesimpact.model.tables import LENGTH, SLOW, TERMS
 
 Floats = NDArray[np.float64]
-Lanes = NDArray[np.uint64]
+Columns = NDArray[np.uint64]
 
 #: Blocks whose coefficients are kept before their products are added up.
 BLOCKS = 64
 
 
-class Desk(NamedTuple):
-    """Room for `sweep`, kept from recording to recording.
+class Workspace(NamedTuple):
+    """Room for `sensitivity_pass`, kept from recording to recording.
 
     tables (2, basis, LENGTH), series (2, 3, TERMS), prefixes (2, LENGTH + 1, basis, basis),
     keys (2, 3) : of both regimes
@@ -71,10 +71,10 @@ class Desk(NamedTuple):
 
 
 @inner()
-def desk(size: int, with_grams: bool) -> Desk:
-    """Return an empty desk for a basis of `size`."""
+def workspace(size: int, with_grams: bool) -> Workspace:
+    """Return an empty workspace for a basis of `size`."""
     lengths = LENGTH + 1 if with_grams else 0
-    return Desk(
+    return Workspace(
         np.empty((2, size, LENGTH)),
         np.empty((2, 3, TERMS)),
         np.empty((2, lengths, size, size)),
@@ -90,7 +90,7 @@ def desk(size: int, with_grams: bool) -> Desk:
 
 
 @inner()
-def refill(room: Desk, side: int, b: float, K: float, w: float) -> None:
+def refill(room: Workspace, side: int, b: float, K: float, w: float) -> None:
     """Fill tables, series and prefix sums of one regime."""
     forced = room.tables.shape[1] > basis.PLAIN
     fill_table(room.tables[side], room.point[0], room.point[1], b, K, w, forced)
@@ -101,9 +101,9 @@ def refill(room: Desk, side: int, b: float, K: float, w: float) -> None:
 
 
 @inner(fastmath={"contract"})
-def sweep(
-    q: Floats, mass: float, interval: float, n: int, order: int, events: Floats, active: Lanes,
-    data: Floats, values: Floats, jacobian: Floats, gram: Floats, room: Desk,
+def sensitivity_pass(
+    q: Floats, mass: float, interval: float, n: int, order: int, events: Floats, active: Columns,
+    data: Floats, values: Floats, jacobian: Floats, gram: Floats, room: Workspace,
 ) -> None:  # fmt: skip
     """Pass over one recording; add to `gram` (12, 12) if `data` has samples, else fill the others.
 

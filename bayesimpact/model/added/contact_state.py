@@ -13,14 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from bayesimpact.model.added.resonator import (
-    FRAME,
-    OBSTACLE,
-    begin_bodies,
-    body_force,
-    share_of_frame,
-)
-from bayesimpact.model.added.world import (
+from bayesimpact.model.added.context import (
     ADHESION,
     AHEAD,
     C1,
@@ -52,6 +45,13 @@ from bayesimpact.model.added.world import (
     G,
     forcing,
     law_value,
+)
+from bayesimpact.model.added.resonator import (
+    FRAME,
+    OBSTACLE,
+    begin_bodies,
+    body_force,
+    share_of_frame,
 )
 from bayesimpact.model.callback import call_law
 from bayesimpact.model.compiled import inner
@@ -152,9 +152,9 @@ def begin(w: Any) -> Any:
     s[SLIDING] = np.sign(v)
     if y > s[GAP]:
         s[MODE] = TOUCHING
-        push = reaction(y, v, 0.0, NOW, w)
-        s[PUSHED] = ONCE if push > 0.0 else NEVER
-        if one_sided(q) and push <= -q[ADHESION]:
+        added_force = reaction(y, v, 0.0, NOW, w)
+        s[PUSHED] = ONCE if added_force > 0.0 else NEVER
+        if one_sided(q) and added_force <= -q[ADHESION]:
             s[MODE] = SEPARATED
     set_sides(y, v, 0.0, w)
     if v == 0.0:

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesimpact.model.effects import UNTRIED
-from bayesimpact.trial.benches import Design, Range, log_uniform
-from bayesimpact.trial.plants import CATALOGUE_PLANTS, Form, Plant
-from bayesimpact.trial.plants_outside import OUTSIDE_PLANTS
+from bayesimpact.trial.planted_effects import PLANTED_EFFECTS, Form, PlantedEffect
+from bayesimpact.trial.planted_outside import OUTSIDE_EFFECTS
+from bayesimpact.trial.rig_designs import Design, Range, log_uniform
 
 Rng = np.random.Generator
 
@@ -75,23 +75,23 @@ def _bump(design: Design, rng: Rng) -> Form:
     )
 
 
-PENDULUM = Plant(("free",), _pendulum)
+PENDULUM = PlantedEffect(("free",), _pendulum)
 
-STRONG_OUTSIDE: Mapping[str, Plant] = {
+STRONG_OUTSIDE: Mapping[str, PlantedEffect] = {
     **{
-        name: OUTSIDE_PLANTS[name]
+        name: OUTSIDE_EFFECTS[name]
         for name in ("detent", "friction_pad", "damping_bump", "eddy_brake", "damping_drift",
                      "contact_friction", "contact_preload", "knock")
     },
-    "contact_bump": Plant(("contact",), _bump, 1),
+    "contact_bump": PlantedEffect(("contact",), _bump, 1),
 }  # fmt: skip
 """Forces that no effect of the catalogue describes, nor one that is about to join it."""
 
-CATALOGUE_STRONG: Mapping[str, Plant] = {
-    name: PENDULUM if name == "pendulum_sine" else CATALOGUE_PLANTS[name]
+CATALOGUE_STRONG: Mapping[str, PlantedEffect] = {
+    name: PENDULUM if name == "pendulum_sine" else PLANTED_EFFECTS[name]
     for sort in SORTS.values()
     for name in sort
-    if name == "pendulum_sine" or (name in CATALOGUE_PLANTS and name not in UNTRIED)
+    if name == "pendulum_sine" or (name in PLANTED_EFFECTS and name not in UNTRIED)
 }
 """Effects of the catalogue that can be planted, by their id."""
 
@@ -103,7 +103,7 @@ class Chosen:
     effect: str
     form: Form
     size: float
-    plant: Plant
+    plant: PlantedEffect
     outside: bool
 
 

@@ -13,8 +13,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from bayesimpact.trial.benches import Design, log_uniform
 from bayesimpact.trial.rig import Effects, Parameters
+from bayesimpact.trial.rig_designs import Design, log_uniform
 
 Rng = np.random.Generator
 
@@ -40,7 +40,7 @@ class Form:
 
 
 @dataclass(frozen=True)
-class Plant:
+class PlantedEffect:
     """How an effect is drawn.
 
     Attributes
@@ -267,77 +267,79 @@ def _smoothing(design: Design, rng: Rng) -> Form:
     return Form(lambda size: {"window": window, "order": 2}, 0.0)
 
 
-CATALOGUE_PLANTS: Mapping[str, Plant] = {
-    "contact_damping_indentation": Plant(
+PLANTED_EFFECTS: Mapping[str, PlantedEffect] = {
+    "contact_damping_indentation": PlantedEffect(
         ("contact",), one_number("coefficient", lambda d: d.contact_stiffness / d.speed), 1
     ),
-    "contact_damping_speed": Plant(
+    "contact_damping_speed": PlantedEffect(
         ("contact",),
         one_number("coefficient", lambda d: d.contact_stiffness * d.indentation / d.speed**2),
         1,
     ),
-    "contact_damping_per_case": Plant(("contact",), _per_case, 2, slot="c2"),
-    "contact_hardening": Plant(
+    "contact_damping_per_case": PlantedEffect(("contact",), _per_case, 2, slot="c2"),
+    "contact_hardening": PlantedEffect(
         ("contact",),
         one_number(
             "stiffness", lambda d: 0.3 * d.contact_stiffness / d.indentation**2, signed=True
         ),
         1,
     ),
-    "contact_power_law": Plant(("contact",), _exponent, 1),
-    "contact_second_stage": Plant(("contact",), _second_stage, 1),
-    "hunt_crossley": Plant(("contact",), _hunt_crossley, 1, slot="c2"),
-    "contact_no_tension": Plant(("contact",), lambda d, r: Form(lambda s: {}, 0.0), 1, slot="end"),
-    "contact_relaxation": Plant(("contact",), _relaxation, 1),
-    "obstacle_mass": Plant(("contact",), _obstacle_mass, 1, slot="end"),
-    "adhesion": Plant(("contact",), _adhesion, 1, slot="end"),
-    "obstacle_restitution": Plant(("contact",), _restitution, 1),
-    "obstacle_mode": Plant(("contact",), _obstacle_mode, 1),
-    "base_motion": Plant(("everywhere", "free", "contact"), _base_motion),
-    "second_mode": Plant(("contact",), _second_mode, 1),
-    "gap_wear": Plant(
+    "contact_power_law": PlantedEffect(("contact",), _exponent, 1),
+    "contact_second_stage": PlantedEffect(("contact",), _second_stage, 1),
+    "hunt_crossley": PlantedEffect(("contact",), _hunt_crossley, 1, slot="c2"),
+    "contact_no_tension": PlantedEffect(
+        ("contact",), lambda d, r: Form(lambda s: {}, 0.0), 1, slot="end"
+    ),
+    "contact_relaxation": PlantedEffect(("contact",), _relaxation, 1),
+    "obstacle_mass": PlantedEffect(("contact",), _obstacle_mass, 1, slot="end"),
+    "adhesion": PlantedEffect(("contact",), _adhesion, 1, slot="end"),
+    "obstacle_restitution": PlantedEffect(("contact",), _restitution, 1),
+    "obstacle_mode": PlantedEffect(("contact",), _obstacle_mode, 1),
+    "base_motion": PlantedEffect(("everywhere", "free", "contact"), _base_motion),
+    "second_mode": PlantedEffect(("contact",), _second_mode, 1),
+    "gap_wear": PlantedEffect(
         ("contact",), one_number("step", lambda d: 0.1 * d.indentation), 1, slot="wear"
     ),
-    "gap_per_recording": Plant(("contact",), _gaps, 1, 2, slot="g"),
-    "coulomb_friction": Plant(
+    "gap_per_recording": PlantedEffect(("contact",), _gaps, 1, 2, slot="g"),
+    "coulomb_friction": PlantedEffect(
         ("free",), one_number("force", lambda d: 0.1 * d.rig.k1 * d.amplitude)
     ),
-    "quadratic_drag": Plant(
+    "quadratic_drag": PlantedEffect(
         ("free",), one_number("coefficient", lambda d: 10 * d.rig.c1 / d.speed)
     ),
-    "spring_quadratic": Plant(
+    "spring_quadratic": PlantedEffect(
         ("free",), one_number("stiffness", lambda d: 0.3 * d.rig.k1 / d.amplitude, signed=True)
     ),
-    "spring_cubic": Plant(
+    "spring_cubic": PlantedEffect(
         ("free",), one_number("stiffness", lambda d: 0.3 * d.rig.k1 / d.amplitude**2, signed=True)
     ),
-    "stiffness_drift": Plant(
+    "stiffness_drift": PlantedEffect(
         ("free",), one_number("rate", lambda d: 0.3 / d.duration, signed=True), slot="k1"
     ),
-    "harmonic_forcing": Plant(("everywhere", "free"), _forcing),
-    "opposite_stop": Plant(("free",), _opposite_stop, obstacles=1),
-    "spring_piecewise": Plant(("free",), _spring_piecewise, obstacles=1),
-    "sensor_drift": Plant(
+    "harmonic_forcing": PlantedEffect(("everywhere", "free"), _forcing),
+    "opposite_stop": PlantedEffect(("free",), _opposite_stop, obstacles=1),
+    "spring_piecewise": PlantedEffect(("free",), _spring_piecewise, obstacles=1),
+    "sensor_drift": PlantedEffect(
         ("measurement",), one_number("rate", lambda d: 0.3 * d.amplitude / d.duration, signed=True)
     ),
-    "sensor_quadratic": Plant(
+    "sensor_quadratic": PlantedEffect(
         ("measurement",), one_number("gain", lambda d: 0.3 / d.amplitude, signed=True)
     ),
-    "sensor_cubic": Plant(
+    "sensor_cubic": PlantedEffect(
         ("measurement",), one_number("gain", lambda d: 0.3 / d.amplitude**2, signed=True)
     ),
-    "sensor_hum": Plant(("measurement",), _hum),
-    "pendulum_sine": Plant(("free",), lambda d, r: Form(lambda s: {}, 0.0), angle=True),
-    "pendulum_with_spring": Plant(
+    "sensor_hum": PlantedEffect(("measurement",), _hum),
+    "pendulum_sine": PlantedEffect(("free",), lambda d, r: Form(lambda s: {}, 0.0), angle=True),
+    "pendulum_with_spring": PlantedEffect(
         ("free",), one_number("stiffness", lambda d: d.rig.k1), angle=True
     ),
-    "spring_quintic": Plant(
+    "spring_quintic": PlantedEffect(
         ("free",), one_number("stiffness", lambda d: 0.3 * d.rig.k1 / d.amplitude**4, signed=True)
     ),
-    "power_damping": Plant(("free",), _power_damping),
-    "structural_damping": Plant(("free",), one_number("loss", lambda d: 0.1), obstacles=1),
-    "hysteresis_bouc_wen": Plant(("free",), _bouc_wen),
-    "presliding_friction": Plant(("free",), _presliding),
-    "smoothing": Plant(("measurement",), _smoothing, slot="smoothing", by_noise=True),
+    "power_damping": PlantedEffect(("free",), _power_damping),
+    "structural_damping": PlantedEffect(("free",), one_number("loss", lambda d: 0.1), obstacles=1),
+    "hysteresis_bouc_wen": PlantedEffect(("free",), _bouc_wen),
+    "presliding_friction": PlantedEffect(("free",), _presliding),
+    "smoothing": PlantedEffect(("measurement",), _smoothing, slot="smoothing", by_noise=True),
 }
 """Every effect of the catalogue that may be planted, by its id."""

@@ -7,8 +7,8 @@ import pytest
 import small_rig
 from effect_rigs import BY_ID
 
-from bayesimpact.diagnosis.certificate import Certificate, certificate, simulated
 from bayesimpact.diagnosis.loop import diagnose_fit
+from bayesimpact.diagnosis.parametric_bootstrap import Certificate, certificate, simulated
 from bayesimpact.inference.identify import identify
 
 FEW = [BY_ID[i] for i in ("coulomb_friction", "quadratic_drag", "gap_wear")]

@@ -1,7 +1,8 @@
 """Rigs of many kinds, drawn at random: what a trial hides its effects in.
 
-A bench is a range of oscillators, obstacles, probes and sampling rates; `draw_bench` picks one,
-with releases, rest readings, noise, rounding and, where the noise kind says so, a declared filter.
+A bench is a range of oscillators, obstacles, probes and sampling rates; `draw_rig_design` picks
+one, with releases, rest readings, noise, rounding and, where the noise kind says so, a declared
+filter.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ NOISES = ("white", "ar1", "smoothed")
 
 
 @dataclass(frozen=True)
-class Bench:
+class RigDesign:
     """Ranges that a rig is drawn from; logarithmically uniform.
 
     Attributes
@@ -64,44 +65,44 @@ _DAMPING = (2e-3, 1e-2)
 _GAP = (0.1, 0.3)
 _NOISE = (4e-4, 2e-3)
 
-BENCHES: Mapping[str, Bench] = {
-    "paper": Bench(
+RIG_DESIGNS: Mapping[str, RigDesign] = {
+    "paper": RigDesign(
         (0.503, 0.503), (6.38, 6.38), _DAMPING, (6.0, 6.0), _CONTACT_DAMPING, (6.2e-3, 6.8e-3),
         _GAP, 3, 3, 1000.0, (38.3, 38.3), (4e-4, 1.6e-3), fixed=PAPER_RIG,
     ),
-    "soft": Bench(
+    "soft": RigDesign(
         (0.8, 3.0), (0.8, 2.0), _DAMPING, (1.0, 3.0), _CONTACT_DAMPING, (0.02, 0.05),
         _GAP, 2, 3, 400.0, (15.0, 25.0), _NOISE,
     ),
-    "stiff": Bench(
+    "stiff": RigDesign(
         (0.03, 0.2), (15.0, 30.0), _DAMPING, (15.0, 50.0), _CONTACT_DAMPING, (1e-3, 4e-3),
         _GAP, 3, 2, 5000.0, (25.0, 40.0), _NOISE,
     ),
-    "fast": Bench(
+    "fast": RigDesign(
         (0.01, 0.05), (40.0, 80.0), _DAMPING, (5.0, 15.0), _CONTACT_DAMPING, (3e-4, 1e-3),
         _GAP, 2, 2, 20000.0, (25.0, 40.0), _NOISE,
     ),
-    "slow": Bench(
+    "slow": RigDesign(
         (1.0, 5.0), (1.0, 3.0), _DAMPING, (3.0, 8.0), _CONTACT_DAMPING, (5e-3, 2e-2),
         _GAP, 2, 3, 200.0, (25.0, 45.0), _NOISE,
     ),
-    "one": Bench(
+    "one": RigDesign(
         (0.2, 1.0), (4.0, 10.0), _DAMPING, (4.0, 12.0), _CONTACT_DAMPING, (3e-3, 1e-2),
         _GAP, 1, 4, 1000.0, (25.0, 40.0), _NOISE,
     ),
-    "five": Bench(
+    "five": RigDesign(
         (0.2, 1.0), (4.0, 10.0), _DAMPING, (3.0, 12.0), _CONTACT_DAMPING, (3e-3, 1e-2),
         _GAP, 5, 2, 1000.0, (20.0, 30.0), _NOISE,
     ),
-    "plain": Bench(
+    "plain": RigDesign(
         (0.2, 1.0), (3.0, 10.0), _DAMPING, (0.0, 0.0), _CONTACT_DAMPING, (3e-3, 1e-2),
         _GAP, 0, 4, 500.0, (30.0, 50.0), _NOISE,
     ),
-    "torsion": Bench(
+    "torsion": RigDesign(
         (0.01, 0.1), (0.4, 2.0), _DAMPING, (0.0, 0.0), _CONTACT_DAMPING, (0.03, 0.5),
         _GAP, 0, 4, 100.0, (25.0, 45.0), _NOISE, angle=True,
     ),
-    "small": Bench(
+    "small": RigDesign(
         (0.4, 0.6), (5.0, 7.0), _DAMPING, (4.0, 8.0), _CONTACT_DAMPING, (5e-3, 7e-3),
         _GAP, 2, 2, 500.0, (12.0, 16.0), _NOISE,
     ),
@@ -133,7 +134,7 @@ class Design:
     @property
     def quantity(self) -> Quantity:
         """What the probe records."""
-        return "angle" if BENCHES[self.bench].angle else "displacement"
+        return "angle" if RIG_DESIGNS[self.bench].angle else "displacement"
 
     @property
     def amplitude(self) -> float:
@@ -179,8 +180,11 @@ def log_uniform(rng: np.random.Generator, limits: Range) -> float:
     return exp(rng.uniform(log(limits[0]), log(limits[1])))
 
 
-def draw_bench(
-    name: str, noise_kind: str, rng: np.random.Generator, benches: Mapping[str, Bench] = BENCHES
+def draw_rig_design(
+    name: str,
+    noise_kind: str,
+    rng: np.random.Generator,
+    benches: Mapping[str, RigDesign] = RIG_DESIGNS,
 ) -> Design:
     """Draw a rig of the kind `name` of `benches` with noise of the kind `noise_kind`."""
     bench = benches[name]
@@ -193,7 +197,7 @@ def draw_bench(
     return Design(name, noise_kind, rig, releases, bench.rate, duration, chain, measurement)
 
 
-def _rig(bench: Bench, amplitude: float, rng: np.random.Generator) -> Rig:
+def _rig(bench: RigDesign, amplitude: float, rng: np.random.Generator) -> Rig:
     mass = log_uniform(rng, bench.mass)
     k1 = mass * (2 * pi * log_uniform(rng, bench.frequency)) ** 2
     c1 = 2 * log_uniform(rng, bench.damping) * sqrt(k1 * mass)
@@ -206,7 +210,7 @@ def _rig(bench: Bench, amplitude: float, rng: np.random.Generator) -> Rig:
 
 
 def _releases(
-    bench: Bench, rig: Rig, amplitude: float, rng: np.random.Generator
+    bench: RigDesign, rig: Rig, amplitude: float, rng: np.random.Generator
 ) -> tuple[Release, ...]:
     """Releases by hand from the far side, the highest first, from almost rest."""
     speed = amplitude * sqrt(rig.k1 / rig.mass)
@@ -226,7 +230,7 @@ def _releases(
 
 
 def _chain(
-    bench: Bench,
+    bench: RigDesign,
     kind: str,
     rig: Rig,
     releases: tuple[Release, ...],

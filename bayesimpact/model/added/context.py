@@ -21,14 +21,14 @@ LAW_FIRST, LAW_PACE, LAW_GRAIN, LAW_TURN, LAW_TRAVEL, LAW_COLUMNS = range(4, 10)
 CONTACT_ONLY, KINK_AT_TURN, ROUGH_AT_TOUCH, POLYNOMIAL, PLACED = 1, 2, 4, 8, 16
 JUMP_AT_TURN, JUMP_AT_SURFACE = 32, 64
 # columns of the work array, one row per law and two per body of `resonator`: a law's state at the
-# start of a step, at a stage and at the end; the kicks of six stages; exp(-lambda h / 4), lambda,
+# start of a step, at a stage and at the end; the rates of six stages; exp(-lambda h / 4), lambda,
 # alpha, x_u, x_v; where the motion last turned, and which way it goes since, for a state that
 # follows the path (the state there stands in NOW, STAGE and AHEAD)
-NOW, STAGE, AHEAD, KICK = 0, 1, 2, 3
+NOW, STAGE, AHEAD, STATE_RATE = 0, 1, 2, 3
 FADE, LAMBDA, ALPHA, X_U, X_V, TURNED, WAY, WORK_COLUMNS = range(9, 17)
 
 
-class World(NamedTuple):
+class Context(NamedTuple):
     """What stays the same throughout a recording; arrays as pointers, see `callback.floats_at`."""
 
     mass: Any  # kg

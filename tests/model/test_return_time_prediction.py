@@ -1,4 +1,4 @@
-"""The fast lane takes an answer only if it is the first crossing; else the general search does."""
+"""Prediction takes an answer only if it is the first crossing; else the general search does."""
 
 from __future__ import annotations
 
@@ -7,29 +7,31 @@ import math
 import numpy as np
 import pytest
 
-from bayesimpact.model import events, quick
+from bayesimpact.model import events, return_time_prediction
 from bayesimpact.model.blocks import Sink
 from bayesimpact.model.flow import advance, impulse_response
-from bayesimpact.model.scaled import Scaled
-from bayesimpact.model.tables import prepare, shelf
+from bayesimpact.model.normalized import NormalizedParameters
+from bayesimpact.model.tables import prepare, response_tables
 
 # rates per interval: flight of 157 samples per period, contact of 57, gap 1.1 mm
 FLIGHT, CONTACT = (1e-6, 0.0016), (1e-3, 0.012)
 GAP = 1.1e-3
 REST = GAP * (1 - FLIGHT[1] / CONTACT[1])
-MOTION = Scaled(*FLIGHT, *CONTACT, REST, GAP, 0.0, 0.0, 0.0, 0.0)
+MOTION = NormalizedParameters(*FLIGHT, *CONTACT, REST, GAP, 0.0, 0.0, 0.0, 0.0)
 
 
 def lane(v, guess, limit, contact=False):
-    """Run the fast lane from the stop with a made-up expectation of the first stretch."""
-    mine = shelf()
+    """Predict from the stop with a made-up expectation of the first stretch."""
+    mine = response_tables()
     prepare(mine, 0, *FLIGHT, 0.0, False)
     prepare(mine, 1, *CONTACT, 0.0, False)
     mine.history[:] = 0.0
     mine.history[int(contact), 0], mine.history[int(contact), 4] = guess, 1.0
     nothing, found = np.empty(0), np.zeros((limit, 2))
     sink = Sink(nothing, nothing, nothing, found, 0, 1.0)
-    *_, count, _ = quick.fast_lane(mine, sink, MOTION, 100_000, limit, contact, 0.0, v, 0, 0)
+    *_, count, _ = return_time_prediction.return_time_prediction(
+        mine, sink, MOTION, 100_000, limit, contact, 0.0, v, 0, 0
+    )
     return found[:count]
 
 

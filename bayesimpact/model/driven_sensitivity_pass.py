@@ -3,7 +3,7 @@
 The derivatives of displacement and velocity obey the motion's own equation, driven by what a
 parameter changes of the forces; their responses are the integrals in `driven.Responses`. All of
 c1 ... A (the first eight of q) are carried side by side; through an event they follow the saltation
-rule of `sweep`. The input is continuous, so nothing is added there.
+rule of `sensitivity_pass`. The input is continuous, so nothing is added there.
 """
 
 from __future__ import annotations
@@ -15,20 +15,34 @@ from numpy.typing import NDArray
 
 from bayesimpact.model.compiled import inner, typed
 from bayesimpact.model.driven import Responses, advance_driven, responses
-from bayesimpact.model.scaled import C1, C2, K1, K2, OFFSET, V0, Y0, A, G, begins_in_contact, scale
+from bayesimpact.model.normalized import (
+    C1,
+    C2,
+    K1,
+    K2,
+    OFFSET,
+    V0,
+    Y0,
+    A,
+    G,
+    begins_in_contact,
+    scale,
+)
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-LANES = 8
+COLUMNS = 8
 RESIDUAL = 11
 
 
 @inner()
-def fill_lanes(slopes: Floats, wanted: Floats, q: Floats, mass: float, interval: float) -> None:
-    """Fill `slopes` (2, 3, LANES): derivatives of beta, K and p of flight and contact.
+def fill_sensitivities(
+    slopes: Floats, wanted: Floats, q: Floats, mass: float, interval: float
+) -> None:
+    """Fill `slopes` (2, 3, COLUMNS): derivatives of beta, K and p of flight and contact.
 
-    wanted : (LANES,) 1.0 or 0.0
+    wanted : (COLUMNS,) 1.0 or 0.0
     """
     per_mass = interval * interval / mass
     slopes[:] = 0.0
@@ -39,7 +53,7 @@ def fill_lanes(slopes: Floats, wanted: Floats, q: Floats, mass: float, interval:
     if q[G] < math.inf:
         slopes[1, 2, K2] = per_mass * q[G]
         slopes[1, 2, G] = per_mass * q[K2]
-    for i in range(LANES):
+    for i in range(COLUMNS):
         slopes[:, :, i] *= wanted[i]
 
 
@@ -58,7 +72,7 @@ def carry_driven(
     by_K = -H * y - G_ * m - p * after.P - r * after.Q
     rate_by_K = -turned * y - H * m - p * G_ - r * after.P
     C, KS = D + beta * S, K * S
-    for i in range(LANES):
+    for i in range(COLUMNS):
         a, b, c = slopes[side, 0, i], slopes[side, 1, i], slopes[side, 2, i]
         y_i, v_i = dy[i], dv[i]
         dy[i] = C * y_i + S * v_i + (a * by_beta + b * by_K + c * B)
@@ -75,11 +89,11 @@ def record(
     """Write sample i, or add its products to `gram` (12, 12); `row` (12,) is room for them."""
     if data.size == 0:
         values[i] = y + offset
-        for k in range(LANES):
+        for k in range(COLUMNS):
             jacobian[i, k] = dy[k]
         jacobian[i, OFFSET] = row[OFFSET]
         return
-    for k in range(LANES):
+    for k in range(COLUMNS):
         row[k] = dy[k]
     row[RESIDUAL] = data[i] - offset - y
     for k in range(RESIDUAL + 1):
@@ -89,7 +103,7 @@ def record(
 
 
 @inner()
-def sweep_driven(
+def driven_sensitivity_pass(
     q: Floats, mass: float, interval: float, wave: Floats, events: Floats, columns: Ints,
     data: Floats, values: Floats, jacobian: Floats, gram: Floats,
 ) -> None:  # fmt: skip
@@ -103,12 +117,12 @@ def sweep_driven(
     contact = begins_in_contact(q)
     per_mass = interval * interval / mass
     hold = per_mass * q[K2] * q[G] if q[G] < math.inf else 0.0
-    wanted, row = np.zeros(LANES), np.zeros(RESIDUAL + 1)
-    dy, dv, slopes = np.zeros(LANES), np.zeros(LANES), np.empty((2, 3, LANES))
-    for k in range(LANES):
+    wanted, row = np.zeros(COLUMNS), np.zeros(RESIDUAL + 1)
+    dy, dv, slopes = np.zeros(COLUMNS), np.zeros(COLUMNS), np.empty((2, 3, COLUMNS))
+    for k in range(COLUMNS):
         wanted[k] = 1.0 if columns[k] >= 0 else 0.0
     row[OFFSET] = 1.0 if columns[OFFSET] >= 0 else 0.0
-    fill_lanes(slopes, wanted, q, mass, interval)
+    fill_sensitivities(slopes, wanted, q, mass, interval)
     dy[Y0], dv[V0] = wanted[Y0], interval * wanted[V0]
     free = responses(2.0 * motion.b_flight, motion.K_flight, 1.0)
     touching = responses(2.0 * motion.b_contact, motion.K_contact, 1.0)
@@ -129,7 +143,7 @@ def sweep_driven(
             p = q[A] * (now + rise * t) + level
             carry_driven(after, slopes, side, y, v, p, r, now_A + rise_A * t, rise_A, dy, dv)
             jump = (q[C2] if contact else -q[C2]) * interval / mass
-            for k in range(LANES):
+            for k in range(COLUMNS):
                 dv[k] += jump * dy[k]
             dv[G] -= jump * wanted[G]
             t, y, v = events[e, 0] - i, motion.gap, events[e, 1]

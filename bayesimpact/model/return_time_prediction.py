@@ -1,4 +1,4 @@
-"""The fast lane: one stretch after the other without exp, sin or cos.
+"""Events by return-time prediction: one stretch after the other without exp, sin or cos.
 
 For unforced regimes that are slow against the sampling. A stretch begins at the stop and moves away
 from it. How long it lasts is guessed from how long the regime lasted the last times; from the
@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from bayesimpact.model.blocks import Sink, pass_plain, reading_of
 from bayesimpact.model.compiled import compiled, inner
 from bayesimpact.model.flow import advance
-from bayesimpact.model.scaled import Scaled
-from bayesimpact.model.tables import LENGTH, Shelf, nearby
+from bayesimpact.model.normalized import NormalizedParameters
+from bayesimpact.model.tables import LENGTH, ResponseTables, nearby
 
 Floats = NDArray[np.float64]
 
@@ -82,17 +82,21 @@ def remember(history: Floats, side: int, wait: float) -> None:
 
 
 @compiled(fastmath={"contract"})
-def fast_lane(
-    shelf: Shelf, sink: Sink, motion: Scaled, n: int, limit: int,
+def return_time_prediction(
+    response_tables: ResponseTables, sink: Sink, motion: NormalizedParameters, n: int, limit: int,
     contact: bool, t: float, v: float, i: int, count: int,
 ) -> tuple[bool, float, float, int, int, float]:  # fmt: skip
-    """Carry the motion from an event at (t, gap, v) to the last event that the fast lane settles.
+    """Carry the motion from an event at (t, gap, v) to the last event that prediction settles.
 
     i is the first sample at or after t, `count` the events so far, `limit` how many there may be;
-    shelf.history is 0 at the start of a recording.
+    response_tables.history is 0 at the start of a recording.
     Returns (contact, t, v, i, count) there and the sum of squares of the samples passed.
     """
-    tables, series, history = shelf.tables, shelf.series, shelf.history
+    tables, series, history = (
+        response_tables.tables,
+        response_tables.series,
+        response_tables.history,
+    )
     data, out, speeds, events = sink.data, sink.out, sink.speeds, sink.events
     b_flight, K_flight, b_contact, K_contact = motion[:4]
     gap, rest_contact, offset = motion.gap, motion.rest, motion.offset
