@@ -70,7 +70,7 @@ def draw(rng: np.random.Generator, n: int = 60) -> System:
 
 
 def draw_fine(rng: np.random.Generator) -> System:
-    """Draw an unforced system, sampled finely, so that return times are predicted, for up to 12 periods."""
+    """Draw an unforced system, so finely sampled that return times are predicted; 12 periods."""
     coarse = draw(rng)
     q, mass = coarse.q, coarse.mass
     q[7:10] = 0.0
