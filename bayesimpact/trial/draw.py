@@ -11,12 +11,12 @@ from __future__ import annotations
 import numpy as np
 
 from bayesimpact.errors import InputError
+from bayesimpact.trial.designs import RIG_DESIGNS, Design, draw_rig_design, log_uniform
 from bayesimpact.trial.drawn import Drawn
 from bayesimpact.trial.faults import PLANTS, plant_fault
 from bayesimpact.trial.faults_rig import OTHER_RIG, another_rig
 from bayesimpact.trial.planted_effects import PLANTED_EFFECTS
 from bayesimpact.trial.rig import Effects, make_campaign
-from bayesimpact.trial.rig_designs import RIG_DESIGNS, Design, draw_rig_design, log_uniform
 from bayesimpact.trial.sensitivity import Sensitivity, clean_readings, true_parameters
 from bayesimpact.trial.settings import Settings
 from bayesimpact.trial.sizing import Sized, Unsuitable, outside, pair, planted_effect_of, single

@@ -15,7 +15,7 @@ import numpy as np
 from bayesimpact.data.campaign import Campaign, Smoothing
 from bayesimpact.data.recording import Recording
 from bayesimpact.model.measurement import smooth
-from bayesimpact.trial.rig_designs import log_uniform
+from bayesimpact.trial.designs import log_uniform
 
 Rng = np.random.Generator
 Place = tuple[float, float]

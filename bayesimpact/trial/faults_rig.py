@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.trial.designs import Design, log_uniform
 from bayesimpact.trial.rig import Effects, Rig, record
-from bayesimpact.trial.rig_designs import Design, log_uniform
 
 OTHER_RIG = "other_rig"
 SIZES = {"k1": (0.003, 0.15), "k2": (0.03, 0.5), "c1": (0.3, 3.0)}

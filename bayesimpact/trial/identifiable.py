@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.trial.designs import Design
 from bayesimpact.trial.rig import Effects, Parameters
-from bayesimpact.trial.rig_designs import Design
 from bayesimpact.trial.sensitivity import clean_readings
 from bayesimpact.trial.strong_effects import Chosen
 

@@ -13,8 +13,8 @@ from types import MappingProxyType
 
 import numpy as np
 
+from bayesimpact.trial.designs import Design, log_uniform
 from bayesimpact.trial.rig import Effects, Parameters
-from bayesimpact.trial.rig_designs import Design, log_uniform
 
 Rng = np.random.Generator
 

@@ -7,8 +7,8 @@ from math import pi
 
 import numpy as np
 
+from bayesimpact.trial.designs import Design
 from bayesimpact.trial.planted_effects import Form, PlantedEffect, one_number, sign_of
-from bayesimpact.trial.rig_designs import Design
 
 Rng = np.random.Generator
 

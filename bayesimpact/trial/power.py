@@ -23,10 +23,10 @@ from bayesimpact.diagnosis.scan import scan
 from bayesimpact.diagnosis.thresholds import ALPHA, DECISIVE
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.trial.bundle import PAPER_HEIGHTS, PAPER_RIG
+from bayesimpact.trial.designs import Design
 from bayesimpact.trial.planted_effects import PLANTED_EFFECTS
 from bayesimpact.trial.rig import Release
 from bayesimpact.trial.rig_chain import Chain
-from bayesimpact.trial.rig_designs import Design
 from bayesimpact.trial.sensitivity import Sensitivity, clean_readings, misfit
 from bayesimpact.trial.sizing import LIMIT, Unsuitable, sized
 from bayesimpact.trial.summary import rate

@@ -28,9 +28,9 @@ from bayesimpact.inference.prior import LogUniform, Normal, Prior
 from bayesimpact.inference.priors import Priors
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.oscillator import build_oscillator
+from bayesimpact.trial.designs import Design
 from bayesimpact.trial.rig import Effects, record
 from bayesimpact.trial.rig_chain import Probe, measure
-from bayesimpact.trial.rig_designs import Design
 from bayesimpact.trial.rig_motion import sampling
 
 Array = NDArray[np.float64]

@@ -9,9 +9,9 @@ from typing import Any
 
 from bayesimpact.errors import InputError
 from bayesimpact.model.effects import UNTRIED
+from bayesimpact.trial.designs import NOISES, RIG_DESIGNS
 from bayesimpact.trial.planted_effects import PLANTED_EFFECTS
 from bayesimpact.trial.planted_outside import OUTSIDE_EFFECTS
-from bayesimpact.trial.rig_designs import NOISES, RIG_DESIGNS
 from bayesimpact.trial.strong_effects import CATALOGUE_STRONG, STRONG_OUTSIDE
 from bayesimpact.trial.strong_rigs import STRONG_RIGS
 

@@ -21,10 +21,10 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import BayesimpactError, InputError
 from bayesimpact.inference.identify import identify
+from bayesimpact.trial.designs import Design, log_uniform
 from bayesimpact.trial.drawn import Drawn
 from bayesimpact.trial.identifiable import stand_outs
 from bayesimpact.trial.rig import record
-from bayesimpact.trial.rig_designs import Design, log_uniform
 from bayesimpact.trial.sensitivity import clean_readings, true_parameters
 from bayesimpact.trial.settings import Settings
 from bayesimpact.trial.sizing import LIMIT, Unsuitable

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesimpact.model.effects import UNTRIED
+from bayesimpact.trial.designs import Design, Range, log_uniform
 from bayesimpact.trial.planted_effects import PLANTED_EFFECTS, Form, PlantedEffect
 from bayesimpact.trial.planted_outside import OUTSIDE_EFFECTS
-from bayesimpact.trial.rig_designs import Design, Range, log_uniform
 
 Rng = np.random.Generator
 

@@ -14,8 +14,8 @@ from math import sqrt
 import numpy as np
 
 from bayesimpact.data.campaign import Measurement
+from bayesimpact.trial.designs import Design, Range, RigDesign, draw_rig_design
 from bayesimpact.trial.rig_chain import Chain
-from bayesimpact.trial.rig_designs import Design, Range, RigDesign, draw_rig_design
 
 _DAMPING = (2e-3, 2e-2)
 _CONTACT_DAMPING = (0.01, 0.08)

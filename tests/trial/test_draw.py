@@ -12,12 +12,12 @@ from bayesimpact.data.campaign import Smoothing
 from bayesimpact.errors import InputError
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.trial.blind import campaign_files, sealed_text
+from bayesimpact.trial.designs import NOISES, RIG_DESIGNS, depth, draw_rig_design
 from bayesimpact.trial.draw import draw
 from bayesimpact.trial.planted_effects import PLANTED_EFFECTS, Form
 from bayesimpact.trial.planted_outside import OUTSIDE_EFFECTS
 from bayesimpact.trial.rig import Release, motion, record
 from bayesimpact.trial.rig_catalogue import CATALOGUE
-from bayesimpact.trial.rig_designs import NOISES, RIG_DESIGNS, depth, draw_rig_design
 from bayesimpact.trial.rig_outside import OUTSIDE
 from bayesimpact.trial.sensitivity import Sensitivity, clean_readings, true_parameters
 from bayesimpact.trial.settings import Settings

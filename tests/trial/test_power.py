@@ -7,6 +7,7 @@ import pytest
 
 from bayesimpact.diagnosis.naming import DECISIVE
 from bayesimpact.report.figures.power import limits_figure, power_figure
+from bayesimpact.trial.designs import draw_rig_design
 from bayesimpact.trial.power import (
     STRENGTHS,
     Power,
@@ -17,7 +18,6 @@ from bayesimpact.trial.power import (
     power_text,
     reaching,
 )
-from bayesimpact.trial.rig_designs import draw_rig_design
 from bayesimpact.trial.sensitivity import Sensitivity
 
 ONE = Power("spring_cubic", "stiffness", 100.0, 1.0, 0.5, "spring_quadratic")

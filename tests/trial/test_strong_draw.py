@@ -12,11 +12,11 @@ from bayesimpact.data.read import load_campaign
 from bayesimpact.errors import InputError
 from bayesimpact.inference.identify import identify
 from bayesimpact.trial.blind import campaign_files, sealed_text
+from bayesimpact.trial.designs import draw_rig_design
 from bayesimpact.trial.draw import draw
 from bayesimpact.trial.drawn import Drawn
 from bayesimpact.trial.identifiable import left_of, stand_outs
 from bayesimpact.trial.rig import Rig
-from bayesimpact.trial.rig_designs import draw_rig_design
 from bayesimpact.trial.sensitivity import Sensitivity
 from bayesimpact.trial.settings import Settings, settings_from, strong_settings
 from bayesimpact.trial.strong_draw import LEAST, _ids, _rivals
