@@ -14,7 +14,7 @@ from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.force import missing_drift, missing_force
 from bayesimpact.diagnosis.naming import State, is_large, leaves_something
 from bayesimpact.diagnosis.own_band import shakes_in_own_band
-from bayesimpact.diagnosis.profile_likelihood import followed
+from bayesimpact.diagnosis.profile_likelihood import profiled
 from bayesimpact.diagnosis.refit import Candidate, exchanged, refit, without
 from bayesimpact.diagnosis.scan import Scan, scan
 from bayesimpact.diagnosis.scores import Score
@@ -44,7 +44,7 @@ class Models:
         self.states: dict[frozenset[str], State] = {}
         self.begun: set[tuple[object, ...]] = set()
         self.dropped: set[tuple[frozenset[str], str]] = set()
-        self.followed: set[frozenset[str]] = set()
+        self.profiled: set[frozenset[str]] = set()
         self.refits = 0
         self.repeated: tuple[Candidate, float] | None = None
 
@@ -63,7 +63,7 @@ class Models:
     def examine(self, candidate: Candidate) -> State:
         """Whether anything is missing from a candidate.
 
-        One that is left in a valley, and may lack no more than the rest of it, is finished first.
+        One whose climb gave up on a ridge, and may lack no more than its rest, is finished first.
         """
         candidate = self.keep(candidate)
         held = self.states.get(frozenset(candidate.ids))
@@ -144,11 +144,11 @@ class Models:
             self.keep(exchanged(candidate, old, new, self.scales))
 
     def finished(self, candidate: Candidate) -> Candidate:
-        """A model whose climb gave up, at the lowest point of its valley."""
+        """A model whose climb gave up, at the highest point of its profile likelihood."""
         key = frozenset(candidate.ids)
-        if key not in self.followed:
-            self.followed.add(key)
-            self.progress("following the valley of " + " + ".join(candidate.ids))
-            fit = followed(candidate.fit)
+        if key not in self.profiled:
+            self.profiled.add(key)
+            self.progress("profile likelihood of " + " + ".join(candidate.ids))
+            fit = profiled(candidate.fit)
             self.keep(Candidate(candidate.effects, fit, model_evidence(fit)))
         return self.tried[key]

@@ -1,4 +1,4 @@
-"""Along a narrow, bent valley to its lowest point.
+"""The profile likelihood of a shape parameter, to its highest point.
 
 A Maxwell branch that relaxes within the contact looks like a dashpot; its stiffness, its time and
 the contact damping then trade against each other along a curve that leaves the response the same to
@@ -31,14 +31,14 @@ CLOSE = 0.02  # in that logarithm: how near the mode is found
 ENOUGH = 0.02  # nats: or so little above it
 FARTHEST = 5.0  # that the shape is followed, in its logarithm
 MOST = 12  # moves, and as many more of Brent's method
-ITERATIONS = 20  # of a climb beside the valley
+ITERATIONS = 20  # of a climb with the shape held
 
 
-def valley(fit: Fit) -> int | None:
+def profiled_shape(fit: Fit) -> int | None:
     """Position of the shape parameter (a time constant, a depth) that an unfinished climb moves on.
 
     The one that the undamped step would change by the largest factor; None without any. Frequencies
-    have side minima, not valleys.
+    have side minima, no ridge.
     """
     effects: Sequence[Effect] = fit.target.oscillator.effects
     step = np.abs(fit.covariance @ gradient(fit))
@@ -51,12 +51,12 @@ def valley(fit: Fit) -> int | None:
     return max(found, key=lambda i: found[i], default=None)
 
 
-def followed(fit: Fit) -> Fit:
-    """The fit that a search along its valley reaches; never a worse one.
+def profiled(fit: Fit) -> Fit:
+    """The fit that a search along its profile likelihood reaches; never a worse one.
 
-    Converged only where the valley rises again on both sides.
+    Converged only where the likelihood falls again on both sides.
     """
-    column = valley(fit)
+    column = profiled_shape(fit)
     if column is None or not np.isfinite(fit.log_posterior):
         return fit
     profile = _Profile(column, fit)
@@ -93,7 +93,7 @@ class _Profile:
         return -self.fits[x].log_posterior
 
     def predicted(self, before: Fit, x: float) -> Array:
-        """Where the valley through a fit passes with the shape at exp(x): along its regression.
+        """Where the ridge through a fit passes with the shape at exp(x): along its regression.
 
         Positive parameters move by their logarithms, and at most as the square of the shape.
         """

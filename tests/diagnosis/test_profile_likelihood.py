@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from effect_rigs import BY_ID
 
-from bayesimpact.diagnosis.profile_likelihood import CLOSE, _Profile, followed, valley
+from bayesimpact.diagnosis.profile_likelihood import CLOSE, _Profile, profiled, profiled_shape
 from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.likelihood import Linearisation
 from bayesimpact.inference.mode import find_mode
@@ -80,13 +80,13 @@ def unfinished() -> Fit:
 
 
 def test_the_valley_is_that_of_the_time_constant():
-    assert NAMES[valley(unfinished())] == "contact_relaxation.time"
+    assert NAMES[profiled_shape(unfinished())] == "contact_relaxation.time"
 
 
 def test_the_lowest_point_of_a_bent_valley_is_found():
     begun = unfinished()
     assert not begun.converged and begun.mode[2] < 0.5 * TIME
-    found = followed(begun)
+    found = profiled(begun)
     assert found.converged and found.log_posterior > begun.log_posterior
     best = find_mode(problem(), np.array([1.0, STIFFNESS, TIME, 1e-3]), max_iterations=500)
     assert best.converged
@@ -119,7 +119,7 @@ def test_a_model_without_shapes_has_no_valley():
     fit.target.likelihood.oscillator.effects = ()
     names = ("c2", "k1", "c1", "sigma")
     fit.target.likelihood.oscillator.layout.names = names
-    assert followed(fit) is fit
+    assert profiled(fit) is fit
 
 
 def test_a_valley_that_never_rises_has_no_lowest_point(monkeypatch):
@@ -135,6 +135,6 @@ def test_a_valley_that_never_rises_has_no_lowest_point(monkeypatch):
         return -self.fits.setdefault(x, fit).log_posterior
 
     monkeypatch.setattr(_Profile, "__call__", forever_down)
-    assert not followed(begun).converged
+    assert not profiled(begun).converged
     monkeypatch.setattr(_Profile, "__call__", bowl)
-    assert followed(begun).converged
+    assert profiled(begun).converged

@@ -81,7 +81,7 @@ class Table:
         ids = [i for i in candidate.ids if i != old.id] + [new.id]
         return self.candidate(ids, self.gain(ids))
 
-    def followed(self, fit):
+    def profiled(self, fit):
         self.finished.append(frozenset(fit.ids))
         return SimpleNamespace(
             **vars(fit)
@@ -120,7 +120,7 @@ def run(monkeypatch):
         monkeypatch.setattr(models, "shakes_in_own_band", lambda fit, remains: False)
         monkeypatch.setattr(models, "leaves_something", lambda fit: False)
         monkeypatch.setattr(models, "scan", table.scan)
-        monkeypatch.setattr(models, "followed", table.followed)
+        monkeypatch.setattr(models, "profiled", table.profiled)
         for module in (search, models):
             monkeypatch.setattr(module, "model_evidence", lambda fit: fit.gain)
         monkeypatch.setattr(search, "missing_contact", table.contact)
