@@ -98,7 +98,10 @@ def compiled_callback(signature: Any) -> Callable[[Callable[..., Any]], Any]:
 def _stamped(made: Any, function: Callable[..., Any]) -> Any:
     cache_file = getattr(made._cache, "_cache_file", None)
     if cache_file is not None:
-        cache_file._source_stamp = source_stamp(Path(function.__code__.co_filename))
+        stamp = source_stamp(Path(function.__code__.co_filename))
+        cache_file._source_stamp = stamp
+        # compared before anything is unpickled: an older index may hold classes that are gone
+        cache_file._version = f"{numba.__version__} {stamp}"
     return made
 
 

@@ -1,5 +1,6 @@
 """The stamp of a compiled function covers every file that it depends on, and no other."""
 
+import pickle
 from pathlib import Path
 
 import numba
@@ -72,3 +73,14 @@ def test_the_outermost_compilation_is_announced_once() -> None:
     assert len(said) == 2
     above(1)  # compiles anew, for integers, and nobody listens
     assert len(said) == 2
+
+
+def test_a_cache_of_older_sources_is_never_unpickled(tmp_path: Path) -> None:
+    """It may hold classes that are gone: pulling a new version must not end in a traceback."""
+    cache_file = compiled.compiled()(half)._cache._cache_file
+    cache_file._index_path = str(tmp_path / "index.nbi")
+    missing = b"cbayesimpact.model.tables\nGone\n."  # protocol 0: a global of that name
+    older = pickle.dumps(numba.__version__), pickle.dumps(f"{numba.__version__} older")
+    for version in older:
+        (tmp_path / "index.nbi").write_bytes(version + missing)
+        assert cache_file._load_index() == {}
