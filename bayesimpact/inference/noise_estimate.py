@@ -213,6 +213,9 @@ def _restricted_ml(remainder: _Remainder) -> Noise:
     kept = values
     for _ in range(3):  # outlier test and estimate in turn
         kept = values[_undisturbed(values, _covariance(remainder.basis, rho))]
+        if not kept.any():  # most windows do not leave a step of the readings: it is their noise
+            error = float(np.sqrt(0.5 / values.size))
+            return Noise(0.0, None, 0.0, error, 0.0, "polynomial remainders")
         rho, best = _best_correlation(kept, remainder.basis)
     white = _log_likelihood(kept, np.eye(kept.shape[1]))
     error = _correlation_error(kept, remainder.basis, rho)

@@ -113,3 +113,16 @@ def test_a_stated_noise_level_is_taken():
 def test_recordings_too_short_are_refused():
     with pytest.raises(InputError, match="30 samples"):
         raw_noise([Recording("a", "", np.sin(np.arange(30.0)), 1e-3)])
+
+
+def test_a_motion_that_ends_below_the_step_of_its_readings():
+    """Most windows are constant: the noise is the step's, and nothing is divided by it."""
+    t = np.arange(12_000) * 1e-3
+    motion = 0.3 * np.exp(-2.0 * t) * np.cos(6.0 * t)
+    step = 1.5e-3
+    readings = step * np.round(motion / step)
+    recording = Recording("a", "", readings, 1e-3, quantity="angle")
+    with np.errstate(all="raise"):
+        noise = raw_noise([recording])
+    assert noise.level == pytest.approx(step / np.sqrt(12), rel=1e-6)
+    assert noise.source == "the step of the readings" and noise.level_error > 0.0

@@ -65,12 +65,12 @@ def fit_alone(campaign: Campaign, recording: Recording, noise: Noise) -> Alone |
     names = NAMES if campaign.stop else NAMES[:2]
     at = [fit.target.oscillator.layout.index(_name(n, recording.case)) for n in names]
     values = fit.mode[at]
-    inflated = fit.covariance[np.ix_(at, at)] * max(chi2, 1.0)
-    if not np.isfinite(inflated).all():
+    known = fit.covariance[np.ix_(at, at)]  # at the noise level that the fit left, misfit or not
+    if not np.isfinite(known).all():
         return None
     positive = values > 0.0
     scale = np.where(positive, values, 1.0)
-    covariance = inflated / np.outer(scale, scale)
+    covariance = known / np.outer(scale, scale)
     lost = ~positive | (np.diag(covariance) > UNKNOWN**2)
     covariance[lost, :] = 0.0
     covariance[:, lost] = 0.0

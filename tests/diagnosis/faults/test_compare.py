@@ -12,6 +12,7 @@ from bayesimpact.data.bundled import bundled_campaign
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.read import load_campaign
 from bayesimpact.data.recording import Recording
+from bayesimpact.diagnosis.faults.alone import fit_alone
 from bayesimpact.diagnosis.faults.compare import Compared, base_failed, compare_recordings
 from bayesimpact.inference.identify import identify
 from bayesimpact.trial.bundle import PAPER_RIG, paper_releases
@@ -70,6 +71,15 @@ def test_a_gain(paper: Campaign) -> None:
 def test_a_unit(paper: Campaign) -> None:
     found = only(changed(paper, scaled(1e3)))
     assert (found.fault.id, found.fault.remedy) == ("recording_gain", "scale = 0.001")
+
+
+def test_errors_of_a_recording_alone_do_not_depend_on_its_unit(paper: Campaign) -> None:
+    """Its noise is as many times larger as its motion: the noise that its fit leaves tells."""
+    noise = identify(paper, rng=np.random.default_rng(0), search=False).noise
+    one, other = (fit_alone(paper, scaled(by)(paper.recordings[ODD]), noise) for by in (1.0, 1e3))
+    assert one is not None and other is not None
+    first, second = (np.sqrt(np.diag(a.covariance)) for a in (one, other))
+    np.testing.assert_allclose(first, second, rtol=0.1)
 
 
 def test_a_clock(paper: Campaign) -> None:
