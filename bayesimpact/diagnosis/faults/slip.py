@@ -26,6 +26,7 @@ from bayesimpact.inference.noise import Noise
 Array = NDArray[np.float64]
 
 PLACE = 0.5 * float(chi2.isf(1e-3, 1))  # nats: less likely places than this are no candidates
+NEAR = 2  # samples beside these places: where many are lost, the score is not linear
 EDGE = 8  # samples at either end, after which a shift is told from the start values
 
 
@@ -88,20 +89,20 @@ def _from_here_on(x: Array) -> Array:
     return np.asarray(np.cumsum(x[::-1], axis=0)[::-1])
 
 
-def put_right(recording: Recording, place: int, samples: int) -> Recording:
-    """The recording with readings from `place` on where they belong in time.
+def put_right(recording: Recording, between: tuple[int, int], samples: int) -> Recording:
+    """The recording with readings after a slip where they belong in time.
 
-    Lost samples leave a gap, samples written twice go.
+    The slip lies `between` two samples, first and last-plus-one: those are set aside. Lost samples
+    leave a gap, samples written twice go.
     """
+    first, end = max(between[0], 0), min(between[1], recording.samples.size)
     x = recording.samples
     used = np.ones(x.size, bool) if recording.used is None else recording.used
-    if samples < 0:
-        end = place - samples
-        x, used = (np.concatenate([a[:place], a[end:]]) for a in (x, used))
-        return replace(recording, samples=x, used=used)
-    x = np.concatenate([x[:place], np.full(samples, x[place]), x[place:]])
-    used = np.concatenate([used[:place], np.ones(samples, bool), used[place:]])
-    return without(replace(recording, samples=x, used=used), [(place, place + samples)])
+    after = end + max(-samples, 0)
+    gap = max(samples, 0)
+    x = np.concatenate([x[:end], np.full(gap, x[end - 1]), x[after:]])
+    used = np.concatenate([used[:end], np.ones(gap, bool), used[after:]])
+    return without(replace(recording, samples=x, used=used), [(first, end + gap)])
 
 
 def find_shift(campaign: Campaign, recording: Recording, noise: Noise) -> tuple[Shift, Fit] | None:
@@ -110,9 +111,10 @@ def find_shift(campaign: Campaign, recording: Recording, noise: Noise) -> tuple[
     shift = None if own is None or recording.input is not None else likeliest_shift(own)
     if shift is None:
         return None
+    between = shift.earliest - NEAR, shift.latest + NEAR
     tried = []
     for samples in {round(shift.samples) + by for by in (-1, 0, 1)} - {0}:
-        fit = own_fit(campaign, put_right(recording, shift.place, samples), noise)
+        fit = own_fit(campaign, put_right(recording, between, samples), noise)
         if fit is not None and np.isfinite(fit.reduced_chi2):
             tried.append((fit.reduced_chi2, samples, fit))
     if not tried:

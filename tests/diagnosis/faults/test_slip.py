@@ -38,15 +38,18 @@ def lost(recording: Recording, count: int) -> Recording:
 
 def test_readings_are_put_where_they_belong(campaign: Campaign) -> None:
     (whole,) = campaign.recordings
-    again = put_right(lost(whole, 4), PLACE, 4)
+    between = PLACE - 2, PLACE + 3
+    again = put_right(lost(whole, 4), between, 4)
     assert again.used is not None
-    assert np.flatnonzero(~again.used).tolist() == [PLACE, PLACE + 1, PLACE + 2, PLACE + 3]
+    assert np.flatnonzero(~again.used).tolist() == list(range(PLACE - 2, PLACE + 7))
     np.testing.assert_array_equal(again.samples[again.used], whole.samples[again.used])
-    twice = put_right(lost(whole, -4), PLACE, -4)
-    np.testing.assert_array_equal(twice.samples, whole.samples)
+    twice = put_right(lost(whole, -4), between, -4)
+    assert twice.used is not None and twice.samples.size == whole.samples.size
+    assert np.flatnonzero(~twice.used).tolist() == list(range(PLACE - 2, PLACE + 3))
+    np.testing.assert_array_equal(twice.samples[twice.used], whole.samples[twice.used])
 
 
-@pytest.mark.parametrize("count", [-4, -1, 1, 2, 6])
+@pytest.mark.parametrize("count", [-4, -1, 1, 2, 6, 14])
 def test_the_count_and_the_place(campaign: Campaign, noise: Noise, count: int) -> None:
     spoiled = lost(campaign.recordings[0], count)
     found = find_shift(campaign, spoiled, noise)
