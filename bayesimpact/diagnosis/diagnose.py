@@ -107,7 +107,9 @@ def diagnose(
     elif certain is not cleaned and not proved and found.verdict not in OPEN:
         alone = physics(cleaned)
         found = alone if is_settled(alone) else found
-    return _without_late_spikes(found, campaign, physics, rng=rng)
+    found = _without_late_spikes(found, campaign, physics, rng=rng)
+    undecided = found.corrected is not None and found.corrected.is_open
+    return replace(found, verdict="ambiguous") if undecided and is_settled(found) else found
 
 
 def promised_gains(fit: Fit, effects: Sequence[Effect], *, rng: np.random.Generator) -> Array:

@@ -19,6 +19,7 @@ from bayesimpact.diagnosis.faults.compare import (
     misfits,
 )
 from bayesimpact.diagnosis.faults.outliers import residual_spikes, spikes_set_aside
+from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.inference.identify import Identification, identify
 
 Step = tuple[Compared, ...]
@@ -46,6 +47,14 @@ class Corrected:
         kept = self.identification.fit.target.oscillator.campaign.keep_faults
         own = () if kept else tuple(f for f in self.own if f.action != "notice")
         return (*own, *(c.fault for c in self.compared))
+
+    @property
+    def is_open(self) -> bool:
+        """Whether another explanation of what comparing showed is about as likely.
+
+        Of two recordings of a stop that differ neither is the faulty one.
+        """
+        return any(_others(c) for c in self.compared)
 
 
 def cleaned_campaign(campaign: Campaign, *, rng: np.random.Generator, search: bool) -> Corrected:
@@ -130,13 +139,19 @@ def fault_entries(corrected: Corrected) -> list[dict[str, Any]]:
     ]
 
 
+def _others(compared: Compared) -> tuple[tuple[str, float], ...]:
+    """Other explanations that are not out of the question."""
+    return tuple((name, p) for name, p in compared.alternatives if p > np.exp(-DECISIVE))
+
+
 def _sentence(fault: Fault, compared: Compared | None) -> str:
     """What is wrong, and what correcting it changes."""
     words = f"Recording {fault.recording}: {fault.statement}."
     if compared is None or not np.isfinite(compared.before):
         return words
     change = f"from {compared.before:.3g} to {compared.after:.3g}"
-    return f"{words} Without it the base model's reduced chi2 goes {change}."
+    others = "".join(f" Or {name} ({100 * p:.2g} %)." for name, p in _others(compared))
+    return f"{words} Without it the base model's reduced chi2 goes {change}.{others}"
 
 
 def _entry(fault: Fault, compared: Compared | None) -> dict[str, Any]:

@@ -122,7 +122,7 @@ def summary(
             f"rms.{slowly}{cost}{remains}{faults}"
         )
     titles = " and ".join(e.title for e in effects)
-    if verdict == "ambiguous":
+    if verdict == "ambiguous" and alternatives:
         others = ", ".join(alternatives)
         return (
             f"Something is missing {place}; the likeliest is {titles}, but the recordings cannot "

@@ -34,7 +34,7 @@ VERDICTS = {
     "adequate": "Nothing is missing",
     "named": "What is missing is named",
     "partly": "Part of what is missing is named; something unexplained remains",
-    "ambiguous": "Several effects fit alike",
+    "ambiguous": "Several explanations fit alike",
     "unknown": "The missing physics is outside the catalogue",
 }
 REGIMES = {

@@ -166,6 +166,25 @@ def test_a_proved_fault_is_not_searched_without(
     assert len(asked) == searches
 
 
+def test_recordings_that_may_be_the_faulty_one_are_all_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    compared = module.comparisons
+
+    def tossed(before: Corrected, as_read: Campaign) -> tuple[Step, ...]:
+        others = (("recording_gain, c", 0.5), ("recording_clock, a", 0.002))
+        steps = compared(before, as_read)
+        return tuple(tuple(replace(c, alternatives=others) for c in step) for step in steps)
+
+    monkeypatch.setattr(module, "comparisons", tossed)
+    found = faulty(lambda samples: 1.05 * samples)
+    content = written(found)
+    assert content["verdict"] == "ambiguous"
+    assert content["effects"][0]["probability"] == pytest.approx(0.498)
+    assert "Or recording_gain, c (50 %)." in content["summary"]
+    assert "recording_clock" not in content["summary"]
+
+
 def test_a_recording_in_another_unit_is_not_loud() -> None:
     campaign = small_rig.record(63)
     assert loud_recordings(campaign.recordings) == []
