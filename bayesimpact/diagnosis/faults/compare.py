@@ -102,7 +102,8 @@ def compare_recordings(identification: Identification) -> tuple[Compared, ...]:
     signs, campaign, chi2 = _signs(campaign, alone, noise, fit.reduced_chi2)
     slips, campaign, chi2 = _slips(campaign, alone, fit.target.likelihood, chi2)
     differing: list[Compared] = []
-    while len(differing) < int(SHARE * len(campaign.recordings)):
+    allowed = int(SHARE * len(campaign.recordings))
+    while len(differing) < allowed:
         step = _next(campaign, alone, noise, chi2)
         if step is None:
             break

@@ -16,7 +16,7 @@ from bayesimpact.diagnosis.faults.alone import fit_alone
 from bayesimpact.diagnosis.faults.compare import Compared, base_failed, compare_recordings
 from bayesimpact.inference.identify import identify
 from bayesimpact.trial.bundle import PAPER_RIG, paper_releases
-from bayesimpact.trial.rig import record
+from bayesimpact.trial.rig import Rig, record
 from bayesimpact.trial.rig_chain import Chain
 
 SECONDS = 2.0
@@ -117,15 +117,18 @@ def test_a_stop_on_the_other_side_of_all(paper: Campaign) -> None:
     assert not base_failed(right.fit)
 
 
+def from_rig(rig: Rig, number: int) -> Change:
+    rng = np.random.default_rng(7)
+    release = paper_releases(rng)[number]
+    samples = record(rig, release, {}, Chain(5e-6), rate=1000.0, duration=SECONDS, rng=rng)
+    return lambda r: replace(r, samples=samples)
+
+
 @pytest.mark.parametrize(("what", "by"), [("k1", 1.008), ("k2", 1.05)])
 def test_another_rig(paper: Campaign, what: str, by: float) -> None:
-    values = {"k1": PAPER_RIG.k1, "c1": PAPER_RIG.c1, "k2": PAPER_RIG.k2["2"]}
-    other = {"k2": {**PAPER_RIG.k2, "2": by * values["k2"]}} if what == "k2" else {}
-    rig = replace(PAPER_RIG, **(other or {what: by * values[what]}))
-    rng = np.random.default_rng(7)
-    release = paper_releases(rng)[3]
-    samples = record(rig, release, {}, Chain(5e-6), rate=1000.0, duration=SECONDS, rng=rng)
-    (found,) = compared(changed(paper, lambda r: replace(r, samples=samples)))
+    k2 = {**PAPER_RIG.k2, "2": by * PAPER_RIG.k2["2"]}
+    rig = replace(PAPER_RIG, **({"k2": k2} if what == "k2" else {what: by * PAPER_RIG.k1}))
+    (found,) = compared(changed(paper, from_rig(rig, ODD)))
     assert found.after < 1.05 < found.before
     name = found.fault.recording
     # two recordings tell of one stop: which of them is the other one is a toss
@@ -135,6 +138,15 @@ def test_another_rig(paper: Campaign, what: str, by: float) -> None:
     share = by if name == "case2_a" else 1 / by
     assert found.fault.size == pytest.approx(100 * (share - 1), rel=0.05)
     assert name not in [r.name for r in found.campaign.recordings]
+
+
+def test_two_of_six_from_other_rigs(paper: Campaign) -> None:
+    """A third of the recordings as they were given, not of those that are left."""
+    softer, stiffer = (replace(PAPER_RIG, k1=by * PAPER_RIG.k1) for by in (0.97, 1.03))
+    both = changed(changed(paper, from_rig(softer, ODD), ODD), from_rig(stiffer, 1), 1)
+    found = compared(both)
+    assert {f.fault.recording for f in found} == {"case2_a", "case1_b"}
+    assert {f.fault.id for f in found} == {"recording_other_rig"}
 
 
 @pytest.mark.parametrize("count", [2, -3])
