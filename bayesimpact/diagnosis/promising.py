@@ -19,9 +19,7 @@ LEAST_GAIN = 4.0  # expected gain in log likelihood, nats
 NEAR_BEST = 0.5  # of the best expected gain, less a margin: below that no refit makes a rival
 NEAR_MARGIN = 10.0  # nats
 FAR = 50.0  # nats; beyond four times that, the floor grows with the root of the best gain only
-DISCONTINUOUS = (
-    8.0  # expected gain from which on effects that are on or off are always fitted, nats
-)
+DISCONTINUOUS = 8.0  # nats expected, from which on effects that are on or off are always fitted
 SCORE_UNDERESTIMATE = 1.5  # by how much a score may underrate what a refit gains
 JOINT = 3  # effects of one family that are tried in one step
 

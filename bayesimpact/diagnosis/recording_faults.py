@@ -50,7 +50,7 @@ class Corrected:
 
     @property
     def is_open(self) -> bool:
-        """Whether another explanation of what comparing showed is about as likely.
+        """Whether another explanation of what comparing showed is not out of the question.
 
         Of two recordings of a stop that differ neither is the faulty one.
         """

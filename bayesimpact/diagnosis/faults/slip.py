@@ -77,10 +77,8 @@ def likeliest_shift(fit: Fit) -> Shift | None:
     if nats[best] < 0.5 * chi2.isf(FALSE_ALARM / score.size, 1):
         return None
     near_best = np.flatnonzero(nats > nats[best] - PLACE)
-    first, spacing = round(start / recording.interval), count / score.size
-    earliest, place, latest = (
-        first + round(spacing * int(i)) for i in (near_best[0], best, near_best[-1])
-    )
+    first = round(start / recording.interval)
+    earliest, place, latest = (first + int(i) for i in (near_best[0], best, near_best[-1]))
     return Shift(place, earliest, latest, float(slope[best] / size[best]), float(nats[best]))
 
 
@@ -115,7 +113,7 @@ def find_shift(campaign: Campaign, recording: Recording, noise: Noise) -> tuple[
     tried = []
     for samples in {round(shift.samples) + by for by in (-1, 0, 1)} - {0}:
         fit = own_fit(campaign, put_right(recording, between, samples), noise)
-        if fit is not None and np.isfinite(fit.reduced_chi2):
+        if fit is not None:
             tried.append((fit.reduced_chi2, samples, fit))
     if not tried:
         return None

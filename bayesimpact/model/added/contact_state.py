@@ -142,7 +142,7 @@ def passed(y: Any, v: Any, t: Any, column: Any, known: Any, flow: Any, w: Any) -
 
 @inner()
 def begin(w: Any) -> Any:
-    """Motion and situation at t = 0 from the slots: (y, v)."""
+    """Motion and contact state at t = 0 from the slots: (y, v)."""
     q, s = w.q, w.s
     y, v = q[Y0], q[V0]
     begin_bodies(y, v, w)

@@ -44,7 +44,7 @@ class Context(NamedTuple):
     laws: Any  # (L, LAW_COLUMNS)
     acting: Any  # (L,) the laws that act in the present kind of motion come first
     work: Any  # (L + resonator.ROWS, WORK_COLUMNS)
-    s: Any  # what holds between events, see `situation`
+    s: Any  # what holds between events, see `contact_state`
     wave: Any  # (n,) measured input at the samples, N
     driven: Any  # True when there is one
     peak: Any  # its largest size, N

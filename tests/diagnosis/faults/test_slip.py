@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from bayesimpact.data.bundled import bundled_campaign
-from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.campaign import Campaign, Smoothing
 from bayesimpact.data.read import load_campaign
 from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.faults.alone import own_fit
 from bayesimpact.diagnosis.faults.slip import find_shift, likeliest_shift, put_right
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.noise import Noise
+from bayesimpact.model.measurement import smooth
 
 COUNT = 1500
 PLACE = 700
@@ -93,3 +94,20 @@ def test_nothing_is_found_where_nothing_is_missing(campaign: Campaign, noise: No
         fresh = fit.predicted[0] + noise.level * rng.standard_normal(fit.predicted[0].size)
         again = own_fit(campaign, replace(campaign.recordings[0], samples=fresh), noise)
         assert again is not None and likeliest_shift(again) is None
+
+
+def test_the_place_behind_a_filter(campaign: Campaign) -> None:
+    """A filter's ends are left out: places count from the recording's first sample all the same."""
+    filtering = Smoothing("savgol", 31, 2)
+    (whole,) = campaign.recordings
+    smoothed = replace(whole, samples=smooth(whole.samples, filtering, whole.interval))
+    measurement = replace(campaign.measurement, smoothing=filtering)
+    behind = replace(campaign, measurement=measurement, recordings=(smoothed,))
+    noise = identify(behind, rng=np.random.default_rng(0), search=False).noise
+    fit = own_fit(behind, lost(smoothed, 2), noise)
+    assert fit is not None
+    shift = likeliest_shift(fit)
+    assert shift is not None and shift.place == pytest.approx(PLACE, abs=2)
+    found = find_shift(behind, lost(smoothed, 2), noise)
+    assert found is not None and found[0].samples == 2
+    assert found[1].reduced_chi2 < 1.15
