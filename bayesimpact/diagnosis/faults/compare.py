@@ -164,7 +164,10 @@ def _slips(
         if shifted is None or shifted[1].reduced_chi2 > least[i]:
             continue
         fault = slip_fault(recordings[i], shifted[0])
-        one = applied(recordings[i], [fault])[0]
+        try:
+            one = applied(recordings[i], [fault])[0]
+        except ValueError:  # neither part is long enough to go on with
+            continue
         campaign = replace(
             campaign,
             recordings=tuple(one if r.name == one.name else r for r in campaign.recordings),

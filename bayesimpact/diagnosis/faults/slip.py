@@ -92,6 +92,8 @@ def put_right(recording: Recording, between: tuple[int, int], samples: int) -> R
 
     The slip lies `between` two samples, first and last-plus-one: those are set aside. Lost samples
     leave a gap, samples written twice go.
+
+    Raises `ValueError` when less than a fifth of the samples would be left.
     """
     first, end = max(between[0], 0), min(between[1], recording.samples.size)
     x = recording.samples
@@ -112,7 +114,11 @@ def find_shift(campaign: Campaign, recording: Recording, noise: Noise) -> tuple[
     between = shift.earliest - NEAR, shift.latest + NEAR
     tried = []
     for samples in {round(shift.samples) + by for by in (-1, 0, 1)} - {0}:
-        fit = own_fit(campaign, put_right(recording, between, samples), noise)
+        try:
+            again = put_right(recording, between, samples)
+        except ValueError:  # it may lie nearly anywhere: what is left would not show it
+            return None
+        fit = own_fit(campaign, again, noise)
         if fit is not None:
             tried.append((fit.reduced_chi2, samples, fit))
     if not tried:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import small_rig
 
 from bayesimpact.data.bundled import bundled_campaign
 from bayesimpact.data.campaign import Campaign, Smoothing
@@ -94,6 +95,18 @@ def test_nothing_is_found_where_nothing_is_missing(campaign: Campaign, noise: No
         fresh = fit.predicted[0] + noise.level * rng.standard_normal(fit.predicted[0].size)
         again = own_fit(campaign, replace(campaign.recordings[0], samples=fresh), noise)
         assert again is not None and likeliest_shift(again) is None
+
+
+def test_a_shift_that_may_begin_anywhere_is_no_slip() -> None:
+    """Dry friction runs late little by little: no place is likelier than another by much."""
+    creeping = small_rig.record(3, {"coulomb_friction": {"force": 0.01}}, duration=1.5)
+    noise = identify(creeping, rng=np.random.default_rng(0), search=False).noise
+    recording = creeping.recordings[1]
+    fit = own_fit(creeping, recording, noise)
+    assert fit is not None
+    shift = likeliest_shift(fit)
+    assert shift is not None and shift.latest - shift.earliest > 0.8 * recording.samples.size
+    assert find_shift(creeping, recording, noise) is None
 
 
 def test_the_place_behind_a_filter(campaign: Campaign) -> None:
