@@ -15,6 +15,9 @@ from bayesimpact.data.frozen import Picklable
 from bayesimpact.data.html import html_table
 from bayesimpact.data.recording import Recording
 
+SECOND_STOP = "opposite_stop"
+"""The effect that `stop = "two-sided"` declares: a stop on the side away from the first."""
+
 
 @dataclass(frozen=True)
 class Smoothing:
@@ -88,6 +91,7 @@ class Campaign(Picklable):
     keep_faults : campaign.toml says that faults found in the recordings stay in (`faults = "keep"`)
     skipped : recording -> why it is left out
     notes : what was set aside in the recordings and why, in words, for reports
+    declared : ids of effects that are known to act: they belong to the base model
     """
 
     name: str
@@ -102,10 +106,12 @@ class Campaign(Picklable):
     keep_faults: bool = False
     skipped: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     notes: tuple[str, ...] = ()
+    declared: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         """One line."""
         stop = f"cases {', '.join(self.cases)}" if self.stop else "no stop"
+        stop += ", two-sided" if SECOND_STOP in self.declared else ""
         return f"<Campaign {self.name!r}: {len(self.recordings)} recordings, {stop}>"
 
     def _repr_html_(self) -> str:

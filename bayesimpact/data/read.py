@@ -14,11 +14,11 @@ from types import MappingProxyType
 from typing import Any
 
 from bayesimpact.data import bounds
-from bayesimpact.data.campaign import Beam, Campaign, Measurement, Smoothing
+from bayesimpact.data.campaign import SECOND_STOP, Beam, Campaign, Measurement, Smoothing
 from bayesimpact.data.entries import filled_in
 from bayesimpact.data.foreign import file_bytes, is_foreign, read_foreign
 from bayesimpact.data.gaps import excluded_spans
-from bayesimpact.data.input_column import check_quantities, input_of, with_input
+from bayesimpact.data.input_column import check_decays, check_quantities, input_of, with_input
 from bayesimpact.data.period import rough_period
 from bayesimpact.data.prior_bounds import check_prior, parameter_ranges
 from bayesimpact.data.quantity import Quantity, check_quantity, unit_of, with_article
@@ -95,9 +95,9 @@ def build_campaign(
         where = f"{file}, recording {number} ({entry.file})"
         if entry.skip is not None:
             continue
-        _check_entry(where, entry, table.stop, recordings)
+        _check_entry(where, entry, bool(table.stop), recordings)
         source, samples = read(entry, where)
-        recordings.append(_recording(source, where, entry, table.stop, samples))
+        recordings.append(_recording(source, where, entry, bool(table.stop), samples))
     skipped = {e.name or Path(e.file).stem: e.skip for e in table.recording if e.skip}
     table = table.model_copy(update={"recording": [e for e in table.recording if e.skip is None]})
     if not recordings:
@@ -107,13 +107,14 @@ def build_campaign(
         name=table.name,
         mass=table.mass_kg,
         recordings=tuple(recordings),
-        stop=table.stop,
+        stop=bool(table.stop),
         measurement=_measurement(file, table, recordings),
         priors=MappingProxyType(_priors(file, table, recordings)),
         beams=MappingProxyType(_beams(file, table)),
         keep_faults=table.faults == "keep",
         skipped=MappingProxyType(skipped),
         notes=tuple(f"{name} is skipped ({reason})" for name, reason in skipped.items()),
+        declared=(SECOND_STOP,) if table.stop == "two-sided" else (),
     )
 
 
@@ -278,6 +279,8 @@ def _check_together(where: str, table: CampaignTable, recordings: list[Recording
                 f"motion {kind}, as the first recording's {first.quantity}, throughout",
             )
     check_quantities(where, recordings)
+    if table.stop == "two-sided":
+        check_decays(where, recordings)
     if table.mass_uncertainty_kg >= table.mass_kg:
         found = f"{table.mass_uncertainty_kg:g} kg"
         accepted = f"less than the mass, {table.mass_kg:g} kg"
@@ -361,7 +364,7 @@ def _beams(where: str, table: CampaignTable) -> dict[str, Beam]:
 def _priors(
     where: str, table: CampaignTable, recordings: list[Recording]
 ) -> dict[str, MappingProxyType[str, Any]]:
-    names = _prior_names(table.stop, recordings)
+    names = _prior_names(bool(table.stop), recordings)
     ranges = parameter_ranges(table.mass_kg, recordings)
     for name, prior in table.priors.items():
         if name not in names and not _EFFECT_PARAMETER.fullmatch(name):

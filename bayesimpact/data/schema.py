@@ -8,7 +8,7 @@ from __future__ import annotations
 from difflib import get_close_matches
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from bayesimpact.data import bounds
 from bayesimpact.data.quantity import QUANTITIES, UNITS, Quantity
@@ -224,6 +224,13 @@ PriorTable = Annotated[
 ]
 
 
+def _no_number(value: Any) -> Any:
+    """The value; 1 and 0 equal true and false, and are not meant."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        raise ValueError("a number")
+    return value
+
+
 class CampaignTable(_Table):
     """The whole of campaign.toml."""
 
@@ -233,7 +240,9 @@ class CampaignTable(_Table):
         f"{bounds.MASS[0]:g} to {bounds.MASS[1]:g}"
     )
     mass_uncertainty_kg: NotNegative = Field(0.0, description="a number, 0 or more, kg")
-    stop: bool = Field(True, description="true or false, without quotes")
+    stop: Annotated[Literal[True, False, "one-sided", "two-sided"], BeforeValidator(_no_number)] = (
+        Field(True, description='true or false, or "one-sided" or "two-sided" in quotes')
+    )
     recording: list[RecordingTable] = Field(
         min_length=1, description='one or more [[recording]], each with file = "..."'
     )

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from bayesimpact.data.campaign import Beam, Campaign, Measurement, Smoothing
+from bayesimpact.data.campaign import SECOND_STOP, Beam, Campaign, Measurement, Smoothing
 from bayesimpact.data.gaps import excluded, runs
 from bayesimpact.data.input import Input
 from bayesimpact.data.recording import Recording
@@ -37,7 +37,8 @@ def write_campaign(
     if campaign.measurement.mass_sd:
         sd = float(campaign.measurement.mass_sd * campaign.mass)
         lines.append(f"mass_uncertainty_kg = {_toml(sd)}")
-    lines.append(f"stop = {_toml(campaign.stop)}")
+    stop = "two-sided" if SECOND_STOP in campaign.declared else campaign.stop
+    lines.append(f"stop = {_toml(stop)}")
     if campaign.keep_faults:
         lines.append('faults = "keep"')
     for number, recording in enumerate(campaign.recordings, 1):

@@ -145,7 +145,13 @@ def rivalry(d: Diagnosis) -> Rivalry:
     return Rivalry(
         d.verdict,
         tuple(
-            Hypothesis(c.effects, c.fit.names, c.fit.mode, c.fit.covariance, d.naming.log_odds(c))
+            Hypothesis(
+                c.fit.target.oscillator.acting,
+                c.fit.names,
+                c.fit.mode,
+                c.fit.covariance,
+                d.naming.log_odds(c),
+            )
             for c in chosen
         ),
         chosen[0].fit.target.likelihood.noise.with_smoothing(oscillator.smoothing),

@@ -54,12 +54,13 @@ def directions(fit: Fit, effects: Iterable[Effect], scales: Scales) -> tuple[Dir
 
     Effects with a phase are left to `periodic`, which scans frequencies.
     """
-    have = {e.id for e in fit.target.oscillator.effects}
+    acting = fit.target.oscillator.acting
+    have = {e.id for e in acting}
     found = []
     for effect in effects:
         if effect.id in have or is_periodic(effect):
             continue
-        if not all(map(effect.stands_beside, fit.target.oscillator.effects)):
+        if not all(map(effect.stands_beside, acting)):
             continue
         if not effect.admissible(scales):
             continue

@@ -30,7 +30,7 @@ def model_evidence(fit: Fit) -> float:
 def structure(fit: Fit) -> float:
     """What `log_evidence` must gain for phases, and for values that share a spread, nats."""
     gain = 0.0
-    for effect in fit.target.oscillator.effects:
+    for effect in fit.target.oscillator.acting:
         for parameter in effect.parameters:
             own = f"{effect.id}.{parameter.name}"
             at = np.array([i for i, n in enumerate(fit.names) if n.split("[")[0] == own], np.int64)

@@ -273,7 +273,7 @@ def whitened_one(fit: Fit, r: int, values: Array, sigma: Array) -> Array:
 
 def with_law(oscillator: Oscillator, effect: Effect) -> NDArray[np.int64]:
     assert effect.law is not None
-    first = len(SLOTS) + sum(len(e.parameters) for e in oscillator.effects if e.law is not None)
+    first = len(SLOTS) + sum(len(e.parameters) for e in oscillator.acting if e.law is not None)
     row = np.array([law_row(effect.law, first)], dtype=np.int64)
     return np.concatenate([oscillator.laws, row])
 

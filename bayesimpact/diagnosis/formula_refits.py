@@ -108,7 +108,7 @@ def refitted(question: Question, subset: Subset) -> Candidate | None:
     shift = scores.shift - scores.absorbed[:, at] @ sizes
     for name, by in zip(scores.names, shift, strict=True):
         predicted[names.index(name)] += by
-    steps = step_sizes(names, effects, question.scales, ())
+    steps = step_sizes(names, target.oscillator.acting, question.scales, ())
     sd = 1.0 / np.sqrt(np.diag(scores.problem.information)[at])
     for term, size, error in zip(terms, sizes, sd, strict=True):
         predicted[names.index(f"{effect_id(term)}.size")] = size

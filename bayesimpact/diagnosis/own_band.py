@@ -35,7 +35,7 @@ def shakes_in_own_band(fit: Fit, remains: bool) -> bool:
 
 def _lines(fit: Fit) -> list[tuple[Effect, float]]:
     """Periodic effects of a model and their frequencies, Hz."""
-    effects = [e for e in fit.target.oscillator.effects if is_periodic(e)]
+    effects = [e for e in fit.target.oscillator.acting if is_periodic(e)]
     return [(e, fit.value(f"{e.id}.frequency")) for e in effects]
 
 

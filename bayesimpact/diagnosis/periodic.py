@@ -45,7 +45,7 @@ def periodic_scores(fit: Fit, effects: Sequence[Effect], scales: Scales) -> tupl
 
     Their p-values are corrected for the number of frequencies.
     """
-    have = {e.id for e in fit.target.oscillator.effects}
+    have = {e.id for e in fit.target.oscillator.acting}
     found = []
     for effect in effects:
         if effect.id in have or not is_periodic(effect) or not effect.admissible(scales):

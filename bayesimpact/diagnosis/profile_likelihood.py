@@ -40,7 +40,7 @@ def profiled_shape(fit: Fit) -> int | None:
     The one that the undamped step would change by the largest factor; None without any. Frequencies
     have side minima, no ridge.
     """
-    effects: Sequence[Effect] = fit.target.oscillator.effects
+    effects: Sequence[Effect] = fit.target.oscillator.acting
     step = np.abs(fit.covariance @ gradient(fit))
     found = {}
     for i, name in enumerate(fit.names):

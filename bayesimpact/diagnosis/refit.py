@@ -75,7 +75,9 @@ def refit(fit: Fit, scores: Sequence[Score], scales: Scales) -> Candidate:
     unshifted = transfer(fit, target.oscillator.layout, effects, scales, shapes)
     predicted = unshifted.copy()
     _shift(fit, names, predicted, scores)
-    steps = difference_steps(fit, target, step_sizes(names, effects, scales, scores))
+    steps = difference_steps(
+        fit, target, step_sizes(names, target.oscillator.acting, scales, scores)
+    )
     start = best_start(target, unshifted, predicted, steps)
     options: dict[str, Any] = {"steps": steps, "tolerance": TOLERANCE, "max_iterations": ITERATIONS}
     found = find_mode(target, start, **options)
@@ -91,7 +93,7 @@ def refit(fit: Fit, scores: Sequence[Score], scales: Scales) -> Candidate:
 def by_growing_horizon(target: Target, start: Array, steps: Array) -> Fit:
     """The mode that ever longer stretches lead to, shapes of effects held at first."""
     o = target.oscillator
-    added = [(i, owner(o.effects, n)[1]) for i, n in enumerate(o.layout.names) if is_added(n)]
+    added = [(i, owner(o.acting, n)[1]) for i, n in enumerate(o.layout.names) if is_added(n)]
     held = [i for i, parameter in added if parameter.is_shape]
     return growing_horizon(
         target, start, steps=steps, held=held, tolerance=TOLERANCE, max_iterations=ITERATIONS
@@ -142,7 +144,7 @@ def _refitted(candidate: Candidate, effects: tuple[Effect, ...], scales: Scales)
     target = extend(candidate.fit, effects, scales)
     layout = target.oscillator.layout
     start = transfer(candidate.fit, layout, effects, scales, {})
-    sizes = step_sizes(layout.names, effects, scales, ())
+    sizes = step_sizes(layout.names, target.oscillator.acting, scales, ())
     steps = difference_steps(candidate.fit, target, sizes)
     found = find_mode(target, start, steps=steps, tolerance=TOLERANCE, max_iterations=ITERATIONS)
     if not np.isfinite(found.log_posterior):  # an effect that is gone had kept the motion bounded
@@ -161,7 +163,7 @@ def at_null(target: Target, theta: Array) -> Array:
     null = theta.copy()
     for i, name in enumerate(o.layout.names):
         if is_added(name):
-            parameter = owner(o.effects, name)[1]
+            parameter = owner(o.acting, name)[1]
             if parameter.null is not None and not parameter.is_shape:
                 null[i] = parameter.null
     return null

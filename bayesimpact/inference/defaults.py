@@ -94,7 +94,7 @@ def _default(
 
 def _owner(oscillator: Oscillator, name: str) -> tuple[Effect, EffectParameter]:
     effect_id, rest = name.split(".", 1)
-    for effect in oscillator.effects:
+    for effect in oscillator.acting:
         if effect.id == effect_id:
             return effect, effect.parameter(rest.split("[")[0])
     raise KeyError(name)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.inference.declared import climbed, is_same_mode, search_declared
 from bayesimpact.inference.defaults import default_priors
 from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.horizon import growing_horizon
@@ -33,6 +34,7 @@ from bayesimpact.model.parameters import BASE_SLOTS
 from bayesimpact.model.simulate import sums_of_squares
 from bayesimpact.model.threads import linear_algebra_alone
 from bayesimpact.response.estimates import Estimates, estimate
+from bayesimpact.response.rough import rough_estimates
 
 Array = NDArray[np.float64]
 
@@ -75,10 +77,7 @@ class Identification:
     @property
     def agree(self) -> bool:
         """True when guess and search ended within 0.1 standard deviations of each other."""
-        if self.from_search is None:
-            return True
-        distance = np.abs(self.from_search.mode - self.from_guess.mode) / self.fit.sd
-        return bool(np.all(distance < 0.1))
+        return self.from_search is None or is_same_mode(self.from_search, self.from_guess)
 
 
 @linear_algebra_alone()
@@ -96,9 +95,11 @@ def identify(
 
     Raises `InputError` when a recording shows no oscillation.
     """
-    estimates = estimate(campaign)
+    estimates = rough_estimates(campaign) if campaign.declared else estimate(campaign)
     given, noise = noise is not None, noise or estimate_noise(campaign)
     oscillator = build_oscillator(campaign, sigma_per_recording=sigma_per_recording)
+    if oscillator.acting:
+        return _with_declared(oscillator, estimates, noise, given, rng, callback)
     priors = default_priors(oscillator, estimates, noise)
     guess = initial_theta(oscillator, estimates, noise)
     target = Target(Likelihood(oscillator, noise), priors)
@@ -123,6 +124,25 @@ def identify(
         noise = refined
         best = find_mode(Target(Likelihood(oscillator, noise), priors), best.mode)
     return Identification(best, estimates, noise, result, from_guess, from_search)
+
+
+def _with_declared(
+    oscillator: Oscillator,
+    estimates: Estimates,
+    noise: Noise,
+    given: bool,
+    rng: np.random.Generator,
+    callback: Callable[[Generation], None] | None,
+) -> Identification:
+    """The mode of a base model with declared effects, on which two searches agree."""
+    result, (best, other) = search_declared(
+        oscillator, estimates, noise, rng=rng, callback=callback
+    )
+    refined = noise if given else refined_noise(best)
+    fit = best
+    if refined is not noise:
+        fit = climbed(replace(best.target, likelihood=Likelihood(oscillator, refined)), best)
+    return Identification(fit, estimates, refined, result, other, best)
 
 
 def _climbed(target: Target, start: Array) -> Fit:

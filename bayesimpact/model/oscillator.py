@@ -25,6 +25,7 @@ from bayesimpact.model.parameters import (
     WITHOUT,
     Layout,
     build_layout,
+    declared_effects,
     instance_name,
 )
 
@@ -38,7 +39,7 @@ class Oscillator:
 
     Attributes
     ----------
-    campaign, effects : what is simulated
+    campaign, effects : what is simulated: the effects come beside those that the campaign declares
     layout : names of the unknowns and where they enter
     smoothing : filter of the measuring chain through which simulations pass, or None
     """
@@ -51,6 +52,11 @@ class Oscillator:
     def __getstate__(self) -> dict[str, Any]:
         """For pickle: addresses of compiled laws mean nothing in another process."""
         return {name: value for name, value in self.__dict__.items() if name != "laws"}
+
+    @cached_property
+    def acting(self) -> tuple[Effect, ...]:
+        """All effects: those that the campaign declares, then the added ones."""
+        return (*declared_effects(self.campaign), *self.effects)
 
     @cached_property
     def counts(self) -> NDArray[np.int64]:
@@ -100,7 +106,7 @@ class Oscillator:
     def laws(self) -> NDArray[np.int64]:
         """Table of force laws for the general simulator, (L, LAW_ROW)."""
         rows, first = [], len(SLOTS)
-        for effect in self.effects:
+        for effect in self.acting:
             if effect.law is not None:
                 rows.append(law_row(effect.law, first))
                 first += len(effect.parameters)
@@ -121,7 +127,7 @@ class Oscillator:
     def sensors(self) -> tuple[tuple[Effect, NDArray[np.int64]], ...]:
         """Effects of the probe with the (R, n_p) positions of their parameters in theta."""
         found = []
-        for effect in self.effects:
+        for effect in self.acting:
             if effect.observe is not None:
                 rows = [
                     [

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.quantity import reading_unit
 from bayesimpact.errors import InputError
-from bayesimpact.model.effects.effect import Effect, EffectParameter
+from bayesimpact.model.effects.effect import Effect, EffectParameter, catalogued
 
 BASE_SLOTS = ("c1", "k1", "c2", "g", "k2", "y0", "v0", "A", "w", "phase", "offset")
 ADDED_SLOTS = (
@@ -94,14 +94,21 @@ class Layout:
         return np.where(self.columns >= 0, values, self.constants)
 
 
+def declared_effects(campaign: Campaign) -> tuple[Effect, ...]:
+    """Effects of the catalogue that belong to a campaign's base model."""
+    found = (catalogued(id) for id in campaign.declared)
+    return tuple(effect for effect in found if effect is not None)
+
+
 def build_layout(
     campaign: Campaign, effects: Sequence[Effect] = (), *, sigma_per_recording: bool = False
 ) -> Layout:
-    """Unknowns of `campaign` under the base model with `effects` added.
+    """Unknowns of `campaign` under the base model, with what it declares, and `effects` added.
 
     Raises `InputError` when two effects claim the same slot or an effect needs an obstacle and
     there is none.
     """
+    effects = (*declared_effects(campaign), *effects)
     binds = _binds(campaign, effects)
     table: list[Parameter] = []
     position: dict[str, int] = {}

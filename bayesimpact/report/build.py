@@ -136,7 +136,7 @@ def _results(
         recordings=recording_results(fit),
         rows=build_rows(fit, draws, chain, beside),
         effects=tuple(
-            EffectSummary(e.id, e.title, e.equation, e.statement) for e in oscillator.effects
+            EffectSummary(e.id, e.title, e.equation, e.statement) for e in oscillator.acting
         ),
         noise=Noise(noise.kind, noise.level, noise.level_error, noise.correlation, noise.source),
         chain=chain,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.campaign import SECOND_STOP, Campaign
 from bayesimpact.data.period import rough_period
 from bayesimpact.data.recording import Recording
 from bayesimpact.inference.noise import Noise
@@ -31,6 +31,8 @@ def campaign_text(campaign: Campaign, noise: Noise | None) -> str:
     angle = campaign.angular
     quantities = dict.fromkeys(r.quantity.replace("_", " ") for r in campaign.recordings)
     stop = f"stop, cases {', '.join(campaign.cases)}" if campaign.stop else "no stop"
+    if SECOND_STOP in campaign.declared:
+        stop = f"a stop on either side, cases {', '.join(campaign.cases)}"
     blocks = [
         f"{campaign.name}\n"
         f"{'inertia' if angle else 'mass'} {campaign.mass:g} {'kg m2' if angle else 'kg'}, {stop}, "

@@ -38,7 +38,7 @@ def build_rows(
     """One row per parameter; `draws` (S, d), or None for the Laplace approximation."""
     campaign = fit.target.oscillator.campaign
     angle = campaign.angular
-    titles = {e.id: e.title for e in fit.target.oscillator.effects}
+    titles = {e.id: e.title for e in fit.target.oscillator.acting}
     rows = []
     for i, parameter in enumerate(fit.target.oscillator.layout.parameters):
         mode, sd = float(fit.mode[i]), float(fit.sd[i])

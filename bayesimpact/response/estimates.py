@@ -81,6 +81,11 @@ class Estimates(Picklable):
             named |= {f"{kind}[{name}]": value for name, value in table.items()}
         return named
 
+    def with_unknown_errors(self) -> Estimates:
+        """The same values, of which nobody knows how good they are."""
+        unknown = {name: float("inf") for name in self.values}
+        return replace(self, sd=MappingProxyType(unknown))
+
 
 def estimate(campaign: Campaign) -> Estimates:
     """Estimate all parameters of a campaign from its recordings.
@@ -157,8 +162,7 @@ def _driven(campaign: Campaign) -> Estimates:
         impacts=MappingProxyType({r.name: n for r, n in zip(recordings, impacts, strict=True)}),
         input_gain=found.gain if free else None,
     )
-    unknown = MappingProxyType({name: float("inf") for name in estimates.values})
-    return replace(estimates, sd=unknown)
+    return estimates.with_unknown_errors()
 
 
 def _free(mass: float, flight: Flight) -> Free:

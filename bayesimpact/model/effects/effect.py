@@ -246,8 +246,8 @@ class Effect(Picklable):
 
     def __reduce_ex__(self, protocol: Any) -> Any:
         """Pickle an effect of the catalogue by its id: its functions cannot be pickled."""
-        if _catalogued(self.id) is self:
-            return _catalogued, (self.id,)
+        if catalogued(self.id) is self:
+            return catalogued, (self.id,)
         return super().__reduce_ex__(protocol)
 
     def admissible(self, scales: Scales) -> bool:
@@ -285,7 +285,7 @@ class Effect(Picklable):
         raise KeyError(f"{self.id} has no parameter {name!r}")
 
 
-def _catalogued(id: str) -> Effect | None:
+def catalogued(id: str) -> Effect | None:
     """The catalogue's effect of that id; None when there is none."""
     name = f"{__package__}.{id}"
     if not id.isidentifier() or find_spec(name) is None:

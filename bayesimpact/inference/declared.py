@@ -1,0 +1,193 @@
+"""The mode of a base model that holds effects of the catalogue: a stop on either side, say.
+
+No quick estimate knows of these effects, so a global search decides where the climb begins: it
+runs on the first cycles, with the general simulator, over the physical parameters and those of the
+effects. Start values come from the first samples and the tail of every recording. Searches are
+repeated until two ends of climbs, the best one among them, agree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.inference.defaults import default_priors
+from bayesimpact.inference.fit import Fit, Target
+from bayesimpact.inference.horizon import growing_horizon
+from bayesimpact.inference.likelihood import Likelihood
+from bayesimpact.inference.mode import find_mode
+from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.priors import Priors
+from bayesimpact.inference.search import Generation, SearchResult, metropolis_differential_evolution
+from bayesimpact.model.effects.effect import EffectParameter, Scales
+from bayesimpact.model.oscillator import Oscillator
+from bayesimpact.model.parameters import is_added
+from bayesimpact.response.estimates import Estimates
+
+Array = NDArray[np.float64]
+
+CYCLES = 6.0  # length of the window, in cycles of the quick estimate
+SAMPLES = 300  # of each recording in it
+BUDGET = 600  # evaluations per parameter
+SEARCHES = 5  # at most
+MOST = 200  # iterations: where the mass is never free, ridges are long
+AGREE = 0.1  # standard deviations between two climbs to one mode
+WIDE = 20.0  # a base parameter lies within this factor of its estimate, which knew of no effect
+SIZES = (1e-2, 1e4)  # of an effect, in its physical scale
+STEP = 1e-6  # of a parameter's reach: first step for differences, refined as errors become known
+
+
+def campaign_sizes(campaign: Campaign, estimates: Estimates) -> Scales:
+    """Physical sizes of a campaign from its quick estimates alone."""
+    rate = float(np.sqrt(estimates.k1 / campaign.mass))
+    reach = max(r.motion(rate) for r in campaign.recordings)
+    stiffness = float(np.mean([*estimates.k2.values()])) if estimates.k2 else 0.0
+    gap = estimates.g if campaign.stop else 0.0
+    return Scales(
+        mass=campaign.mass,
+        stiffness=estimates.k1,
+        damping=estimates.c1,
+        contact_stiffness=stiffness,
+        contact_damping=estimates.c2,
+        amplitude=reach,
+        speed=reach * rate,
+        indentation=max(reach - gap, 0.0) if campaign.stop else 0.0,
+        impact_speed=reach * rate if campaign.stop else 0.0,
+        duration=max(r.duration for r in campaign.recordings),
+        interval=min(r.interval for r in campaign.recordings),
+        impacts=max(estimates.impacts.values()),
+        gap=gap,
+        cases=len(campaign.cases),
+        recordings=len(campaign.recordings),
+        angle=campaign.angular,
+        reading=max(float(np.ptp(r.samples)) for r in campaign.recordings),
+        mixed=campaign.mixed,
+    )
+
+
+def search_declared(
+    oscillator: Oscillator,
+    estimates: Estimates,
+    noise: Noise,
+    *,
+    rng: np.random.Generator,
+    evaluations: int | None = None,
+    callback: Callable[[Generation], None] | None = None,
+) -> tuple[SearchResult, tuple[Fit, Fit]]:
+    """The search that leads highest, and the two best ends; they agree, or the budget was spent.
+
+    `evaluations` are those of one search.
+    """
+    campaign = oscillator.campaign
+    scales = campaign_sizes(campaign, estimates)
+    target = Target(
+        Likelihood(oscillator, noise), default_priors(oscillator, estimates, noise, scales)
+    )
+    first = _first_cycles(oscillator, target.priors, estimates, noise, scales)
+    ends: list[tuple[Fit, SearchResult]] = []
+    while len(ends) < 2 or not (len(ends) == SEARCHES or is_same_mode(ends[0][0], ends[1][0])):
+        result = metropolis_differential_evolution(
+            first, first.lower, first.upper, rng=rng,
+            evaluations=evaluations or BUDGET * first.lower.size, callback=callback,
+        )  # fmt: skip
+        start = first.complete(result.best[None])[0]
+        ends.append(
+            (growing_horizon(target, start, steps=first.steps, max_iterations=MOST), result)
+        )
+        ends.sort(key=lambda end: -np.nan_to_num(end[0].log_posterior, nan=-np.inf))
+    (best, result), (second, _) = ends[:2]
+    return result, (best, second)
+
+
+def is_same_mode(one: Fit, other: Fit) -> bool:
+    """True when two climbs ended within a tenth of a standard deviation of each other."""
+    return bool(np.all(np.abs(one.mode - other.mode) < AGREE * one.sd))
+
+
+def climbed(target: Target, fit: Fit) -> Fit:
+    """The mode of another posterior of the same parameters, from a fit's."""
+    return find_mode(target, fit.mode, steps=np.maximum(0.05 * fit.sd, 1e-300))
+
+
+class FirstCycles:
+    """Objective (N / 2) log S of the physical parameters, for the first cycles.
+
+    Attributes
+    ----------
+    lower, upper : (p,) bounds; logarithms of positive parameters
+    steps : (d,) for differences
+    """
+
+    def __init__(
+        self, short: Oscillator, guess: Array, lower: Array, upper: Array, weights: Array
+    ) -> None:
+        self.short, self.guess, self.weights = short, guess, weights
+        self.physical = short.layout.roles("physical", "effect")
+        self.logarithmic = lower[self.physical] > 0.0
+        self.lower, self.upper = self._coded(lower), self._coded(upper)
+        self.steps = STEP * np.maximum(np.maximum(np.abs(guess), np.abs(upper) * 1e-3), 1e-12)
+
+    def _coded(self, theta: Array) -> Array:
+        values = theta[self.physical]
+        return np.where(self.logarithmic, np.log(np.maximum(values, 1e-300)), values)
+
+    def complete(self, x: Array) -> Array:
+        """Parameter vectors (B, d) for search coordinates (B, p)."""
+        theta = np.repeat(self.guess[None], x.shape[0], axis=0)
+        powers = np.exp(np.where(self.logarithmic, x, 0.0))
+        theta[:, self.physical] = np.where(self.logarithmic, powers, x)
+        return theta
+
+    def __call__(self, x: Array) -> Array:
+        """Values (B,) at search coordinates (B, p)."""
+        predicted = self.short.predict(self.complete(x))
+        total, count = np.zeros(x.shape[0]), 0
+        pairs = zip(self.short.campaign.recordings, predicted, self.weights, strict=True)
+        for recording, rows, weight in pairs:
+            residual = recording.samples - rows
+            if recording.used is not None:
+                residual = residual[:, recording.used]
+            total += weight * np.sum(residual**2, axis=1)
+            count += residual.shape[1]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            value = 0.5 * count * np.log(total)
+        return np.where(np.isfinite(value), value, np.inf)
+
+
+def _first_cycles(
+    oscillator: Oscillator, priors: Priors, estimates: Estimates, noise: Noise, scales: Scales
+) -> FirstCycles:
+    layout, campaign = oscillator.layout, oscillator.campaign
+    owners = {
+        f"{e.id}.{p.name}": p for e in oscillator.acting for p in e.parameters if p.fixed is None
+    }
+    guess, lower, upper = (np.zeros(layout.size) for _ in range(3))
+    for i, parameter in enumerate(layout.parameters):
+        bare = parameter.name.split("[")[0]
+        if is_added(parameter.name):
+            guess[i], lower[i], upper[i] = _range(owners[bare], scales)
+        else:
+            guess[i] = estimates.values.get(parameter.name, noise.level)
+            lower[i], upper[i] = guess[i] / WIDE, guess[i] * WIDE
+            if bare == "g":
+                lower[i], upper[i] = -0.2 * scales.amplitude, scales.amplitude
+    lower, upper = np.maximum(lower, priors.lower), np.minimum(upper, priors.upper)
+    duration = CYCLES * 2 * np.pi / np.sqrt(estimates.k1 / campaign.mass)
+    short = campaign.excerpt(duration).thinned(duration / SAMPLES)
+    weights = np.array([noise.scales[r.order] for r in campaign.recordings]) ** -2.0
+    return FirstCycles(replace(oscillator, campaign=short), guess, lower, upper, weights)
+
+
+def _range(parameter: EffectParameter, scales: Scales) -> tuple[float, float, float]:
+    """Guess and bounds for an effect's parameter."""
+    scale = parameter.scale(scales)
+    if parameter.grid is not None:
+        grid = parameter.grid(scales)
+        return scale, 0.5 * float(grid.min()), 1.5 * float(grid.max())
+    if parameter.lower >= 0.0:
+        return scale, SIZES[0] * scale, SIZES[1] * scale
+    return parameter.null or 0.0, -SIZES[1] * scale, SIZES[1] * scale
