@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 SHORT = 0.3  # of a period: up to here a cubic bridges a gap
+PERIODS = 3.0  # that have to come before a long gap to tell what a recording does
 NEAR = 6  # samples on either side that tell its ends
 LEAST = 0.2  # of a recording's samples that have to be left
 GAP = 2.5  # typical intervals between two stamps: more is a gap
@@ -55,6 +56,27 @@ def without(recording: Recording, spans: Iterable[tuple[int, int]]) -> Recording
     if used.sum() < max(LEAST * used.size, 2):
         raise ValueError(f"{int(used.sum())} of {used.size} samples left")
     return replace(recording, samples=bridged(recording.samples, used), used=used)
+
+
+def before_gap(recording: Recording) -> Recording:
+    """The recording up to its first gap that is too long for a cubic, where that is long enough.
+
+    What stands in a long gap is no motion, and neither swings nor turning points may be read there.
+    """
+    if recording.used is None:
+        return recording
+    used, samples = recording.used, recording.samples
+    period = _period(samples, used) or np.inf
+    for first, end in runs(~used):
+        if first > 0 and end - first > max(SHORT * period, 2.0):
+            return recording.part(0, first) if first >= PERIODS * period else recording
+    return recording
+
+
+def _period(samples: Array, used: Mask) -> float | None:
+    """Rough period of the longest run of samples that count, in samples."""
+    longest = max(runs(used), key=lambda run: run[1] - run[0], default=(0, 0))
+    return rough_period(samples[slice(*longest)], 1.0)
 
 
 def excluded_spans(where: str, recording: Recording, spans: Sequence[Sequence[float]]) -> Recording:
@@ -110,8 +132,7 @@ def bridged(samples: Array, used: Mask) -> Array:
     good = np.flatnonzero(used)
     place = np.arange(samples.size)
     filled = np.where(used, samples, np.interp(place, good, samples[good]))
-    longest = max(runs(used), key=lambda run: run[1] - run[0], default=(0, 0))
-    period = rough_period(samples[slice(*longest)], 1.0)
+    period = _period(samples, used)
     for first, end in runs(~used):
         if first == 0 or end == samples.size:
             continue

@@ -1,6 +1,7 @@
 """The whole way: faults of the recordings and missing physics, told from one another.
 
-1. What recordings show of themselves is set aside, and the base model fitted.
+1. What recordings show of themselves is set aside, and the base model fitted, through the filter
+   that the noise proves if it does.
 2. What comparing them shows is corrected, step by step, as long as a step gains more than any
    effect promises. Where physics then leaves something, once more without these corrections, unless
    one gained more than all effects together promise.
@@ -33,7 +34,7 @@ from bayesimpact.diagnosis.recording_faults import (
     without_spikes,
 )
 from bayesimpact.diagnosis.scan import scan
-from bayesimpact.diagnosis.smoothing import SAVITZKY_GOLAY, proved_smoothing, whole_campaign
+from bayesimpact.diagnosis.smoothing import SAVITZKY_GOLAY, whole_campaign
 from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification, identify
@@ -181,17 +182,15 @@ def _of_corrected(
     """The diagnosis of a campaign whose faults are set aside or corrected."""
     for fault in corrected.faults:
         progress(f"set aside or corrected: {fault.recording}: {fault.statement} ({fault.id})")
-    identification = corrected.identification
-    campaign = identification.fit.target.oscillator.campaign
-    filtered = proved_smoothing(campaign)
-    if filtered is None:
-        found = diagnose_fit(identification, rng=rng, effects=effects, progress=progress)
-    else:
-        progress("the noise spectrum proves a filter: fitting through it")
-        measurement = replace(campaign.measurement, smoothing=filtered.smoothing)
-        through = identify(replace(campaign, measurement=measurement), rng=rng, search=False)
-        found = diagnose_fit(through, rng=rng, effects=effects, progress=progress)
-        found = with_smoothing(found, identification, filtered)
+    through = corrected.identification
+    if corrected.filtered is not None:
+        progress("the noise spectrum proves a filter: fitted through it")
+    found = diagnose_fit(through, rng=rng, effects=effects, progress=progress)
+    if corrected.filtered is not None:
+        campaign = through.fit.target.oscillator.campaign
+        measurement = replace(campaign.measurement, smoothing=None)
+        plain = identify(replace(campaign, measurement=measurement), rng=rng, search=False)
+        found = with_smoothing(found, plain, corrected.filtered)
     if not corrected.faults:
         return replace(found, corrected=corrected)
     return replace(found, verdict=BESIDE[found.verdict], corrected=corrected)
@@ -204,7 +203,6 @@ def with_smoothing(
     return replace(
         found,
         verdict=BESIDE[found.verdict],
-        identification=replace(found.identification, search=identification.search),
         before=identification.fit,
         effects=(SAVITZKY_GOLAY, *found.effects),
         location=found.location or whole_campaign(identification),

@@ -19,8 +19,10 @@ from bayesimpact.diagnosis.faults.compare import (
     misfits,
 )
 from bayesimpact.diagnosis.faults.outliers import residual_spikes, spikes_set_aside
+from bayesimpact.diagnosis.smoothing import proved_smoothing
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.inference.identify import Identification, identify
+from bayesimpact.inference.spectrum import Fingerprint
 
 Step = tuple[Compared, ...]
 
@@ -31,15 +33,17 @@ class Corrected:
 
     Attributes
     ----------
-    identification : of the base model on the corrected campaign
+    identification : of the base model on the corrected campaign, through the filter
     own : faults found in the recordings themselves, notices among them
     compared : faults found against the fit or by comparing recordings, in the order of their
         correction
+    filtered : the filter that the noise spectrum proves and campaign.toml does not declare
     """
 
     identification: Identification
     own: tuple[Fault, ...] = ()
     compared: tuple[Compared, ...] = ()
+    filtered: Fingerprint | None = None
 
     @property
     def faults(self) -> tuple[Fault, ...]:
@@ -67,7 +71,8 @@ def cleaned_campaign(campaign: Campaign, *, rng: np.random.Generator, search: bo
     InputError : a recording shows no oscillation
     """
     cleaned, own = set_aside(campaign)
-    found = Corrected(identify(cleaned, rng=rng, search=search), own)
+    cleaned, filtered = _through_filter(cleaned, None)
+    found = Corrected(identify(cleaned, rng=rng, search=search), own, filtered=filtered)
     fit = found.identification.fit
     spikes = () if campaign.keep_faults or base_failed(fit) else residual_spikes(fit)
     if not spikes:
@@ -116,8 +121,24 @@ def with_step(
     before: Corrected, step: Step, *, rng: np.random.Generator, search: bool
 ) -> Corrected:
     """The same with a step of `comparisons` corrected, after all before it."""
-    identification = identify(step[-1].campaign, rng=rng, search=search)
-    return Corrected(identification, before.own, (*before.compared, *step))
+    campaign, filtered = _through_filter(step[-1].campaign, before.filtered)
+    identification = identify(campaign, rng=rng, search=search)
+    return Corrected(identification, before.own, (*before.compared, *step), filtered)
+
+
+def _through_filter(
+    campaign: Campaign, known: Fingerprint | None
+) -> tuple[Campaign, Fingerprint | None]:
+    """The campaign with the filter that it proves, unless that is known already, and which it is.
+
+    Noise behind a filter is taken for another one without it, and what recordings differ by is
+    weighed against that.
+    """
+    filtered = known or proved_smoothing(campaign)
+    if filtered is None:
+        return campaign, None
+    measurement = replace(campaign.measurement, smoothing=filtered.smoothing)
+    return replace(campaign, measurement=measurement), filtered
 
 
 def as_effects(corrected: Corrected) -> list[dict[str, Any]]:

@@ -17,6 +17,7 @@ import numpy as np
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.frozen import Picklable
+from bayesimpact.data.gaps import before_gap
 from bayesimpact.errors import InputError
 from bayesimpact.response import local
 from bayesimpact.response.contact import Contact, Free, fit_contact
@@ -100,6 +101,7 @@ def estimate(campaign: Campaign) -> Estimates:
     """
     if any(r.input is not None for r in campaign.recordings):
         return _driven(campaign)
+    campaign = replace(campaign, recordings=tuple(map(before_gap, campaign.recordings)))
     observed = look(campaign)
     if campaign.stop:
         observed, flight = observe_flights(observed)

@@ -8,12 +8,14 @@ shortest half swing asks for.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.gaps import before_gap
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 from bayesimpact.response import local
@@ -33,6 +35,7 @@ def rough_estimates(campaign: Campaign) -> Estimates:
     ------
     InputError : the recordings show no oscillation above the noise
     """
+    campaign = replace(campaign, recordings=tuple(map(before_gap, campaign.recordings)))
     swings = [_half_cycles(r) for r in campaign.recordings]
     seconds = np.concatenate(
         [s.durations * r.interval for s, r in zip(swings, campaign.recordings, strict=True)]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import small_rig
@@ -62,3 +64,19 @@ def test_a_declared_filter_is_not_looked_for():
     assert proved_smoothing(recorded(6, smoothing)).smoothing == smoothing
     declared = Measurement(smoothing=smoothing)
     assert proved_smoothing(recorded(6, smoothing, declared)) is None
+
+
+def test_another_rig_behind_a_filter_is_found_before_any_physics() -> None:
+    """What recordings differ by is weighed against the noise behind the filter that they prove."""
+    filtering = Smoothing("savgol", window=15, polyorder=2)
+    sound = recorded(6, filtering)
+    stiffer = replace(small_rig.RIG, k1=1.003 * small_rig.RIG.k1)
+    chain = Chain(noise=small_rig.NOISE, offsets=small_rig.OFFSETS, smoothing=filtering)
+    other = small_rig.record(6, chain=chain, rig=stiffer, duration=1.5).recordings[1]
+    mixed = replace(sound, recordings=(sound.recordings[0], other, sound.recordings[2]))
+    found = run(mixed)
+    assert found.verdict == "named" and [e.id for e in found.effects] == ["smoothing"]
+    assert found.corrected is not None
+    (fault,) = found.corrected.faults
+    assert (fault.id, fault.recording) == ("recording_other_rig", "b")
+    assert not found.naming.tried[0].ids

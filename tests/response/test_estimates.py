@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from rigs import PAPER, Rig, paper_motion, random_rig
 from scipy.signal import savgol_filter
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.gaps import without
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 from bayesimpact.response.estimates import Estimates, estimate
@@ -263,3 +265,20 @@ def test_a_plain_oscillator_passes_its_rest() -> None:
     found = estimate(Campaign("rig", 0.503, (recording,), stop=False))
     assert found.k1 == pytest.approx(0.503 * (2 * np.pi * 6.4) ** 2, rel=0.01)
     assert abs(found.offset["a"]) < 1e-3
+
+
+def test_what_stands_in_a_long_gap_is_no_motion(many: Found) -> None:
+    """The estimates of a campaign with a quarter of one recording set aside are as good."""
+    holed: Found = []
+    for rig, _ in many[:20]:
+        last = rig.campaign.recordings[-1]
+        size = last.samples.size
+        gap = without(last, [(int(0.3 * size), int(0.55 * size))])
+        campaign = replace(rig.campaign, recordings=(*rig.campaign.recordings[:-1], gap))
+        holed.append((rig, estimate(campaign)))
+    worse = [
+        rig
+        for (rig, found), (_, before) in zip(holed, many[:20], strict=True)
+        if wrong(rig, found) - wrong(rig, before)
+    ]
+    assert len(worse) <= 1

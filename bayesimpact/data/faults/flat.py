@@ -20,8 +20,8 @@ class Flat:
     ----------
     first, end : first and last-plus-one sample
     value : the reading
-    slope : the gentler of the mean slopes on either side, per sample, absolute
-    jump : the larger of the steps into the run and out of it, absolute
+    slope : the gentler of the slopes with which readings enter and leave, per sample, absolute
+    jump : the larger of the steps into the run and out of it, absolute, over the steps beyond
     """
 
     first: int
@@ -55,15 +55,37 @@ def flats(samples: Array, least: int) -> list[Flat]:
         slopes, jumps = [], []
         if first > 0:
             k = min(NEIGHBOURS, first)
-            slopes.append(abs(samples[first] - samples[first - k]) / k)
-            jumps.append(abs(samples[first] - samples[first - 1]))
+            slopes.append(_slope_at_end(samples[first - k : first + 1]))
+            jumps.append(_jump_at_end(samples[first - k : first + 1]))
         if end < samples.size:
             k = min(NEIGHBOURS, samples.size - end)
-            slopes.append(abs(samples[end - 1 + k] - samples[end - 1]) / k)
-            jumps.append(abs(samples[end] - samples[end - 1]))
+            slopes.append(_slope_at_end(samples[end - 1 : end + k][::-1]))
+            jumps.append(_jump_at_end(samples[end - 1 : end + k][::-1]))
         slope, jump = float(min(slopes, default=0.0)), float(max(jumps, default=0.0))
         found.append(Flat(first, end, float(samples[first]), slope, jump))
     return found
+
+
+def _slope_at_end(samples: Array) -> float:
+    """Size of the slope at the last of a few samples, the first of a run.
+
+    The smaller one of the mean and of what the differences before the last, which the run has cut
+    short, lead to: a motion slows down towards its turning point, where rounded readings repeat by
+    nature.
+    """
+    steps = np.diff(samples)
+    mean = abs(float(steps.mean()))
+    if steps.size < NEIGHBOURS:
+        return mean
+    whole = steps[:-1]
+    at_end = float(np.polyfit(np.arange(whole.size) - whole.size - 0.5, whole, 1)[1])
+    return min(mean, abs(at_end))
+
+
+def _jump_at_end(samples: Array) -> float:
+    """How much larger the last step of a few samples is than those before it."""
+    steps = np.diff(samples)
+    return abs(float(steps[-1])) - (abs(float(steps[:-1].mean())) if steps.size > 1 else 0.0)
 
 
 def reading_step(samples: Array) -> float:

@@ -75,6 +75,11 @@ def foretell(samples: Array, form: tuple[int, int], gap: int = 0, place: float =
     return Foretold(*result)
 
 
+def rounding_error(form: tuple[int, int], place: float, step: float) -> float:
+    """What readings rounded to a step may make of a prediction at `place`, at most."""
+    return 0.5 * step * float(np.abs(_weights(*form, place)[0]).sum())
+
+
 def best_form(samples: Array, period: float | None) -> tuple[int, int]:
     """The form whose predictions of the next sample are off least, by the bulk."""
     longest = max(5.0, SHARE * (period or samples.size))

@@ -14,8 +14,8 @@ from bayesimpact.data.faults.fault import (
     file_time,
     gaussian_threshold,
 )
-from bayesimpact.data.faults.flat import equal_share
-from bayesimpact.data.faults.local import best_form, foretell, robust_sd
+from bayesimpact.data.faults.flat import equal_share, last_digit
+from bayesimpact.data.faults.local import best_form, foretell, robust_sd, rounding_error
 from bayesimpact.data.gaps import runs
 from bayesimpact.data.period import rough_period
 from bayesimpact.data.recording import Recording
@@ -37,9 +37,9 @@ def find_slips(recording: Recording) -> list[Fault]:
     The statistic is the distance of the two extrapolations half way between two samples, over the
     bulk of such distances. A corner keeps the displacement and may only shift it by its change of
     slope times a few samples; besides, three times the 99th percentile over the recording has to be
-    passed, which is what corners of the motion reach. Where both sides do meet once a few samples
-    beside the place are left out, those were a spike. The remedy keeps the longest part without a
-    slip: how many samples are missing need then not be known.
+    passed, which is what corners of the motion reach, and what rounding may do to both. Where both
+    sides do meet once a few samples beside the place are left out, those were a spike. The remedy
+    keeps the longest part without a slip: how many samples are missing need then not be known.
     """
     x = recording.samples
     form = best_form(x, rough_period(x, 1.0))
@@ -55,7 +55,9 @@ def find_slips(recording: Recording) -> list[Fault]:
     least = gaussian_threshold(x.size)
     bend = np.abs(sides.slope_after - sides.slope_before)
     usual = float(np.percentile(jump, USUAL))
-    strong = (jump > max(least * level, BEYOND * usual)) & (jump > BENDS * np.nan_to_num(bend))
+    rounded = 2.0 * rounding_error(form, -0.5, last_digit(x))
+    least_jump = max(least * level, BEYOND * usual, rounded)
+    strong = (jump > least_jump) & (jump > BENDS * np.nan_to_num(bend))
     places = [
         p
         for p in _peaks(jump, strong, form[1])

@@ -13,7 +13,8 @@ from bayesimpact.data.faults.fault import (
     gaussian_threshold,
     times_of,
 )
-from bayesimpact.data.faults.local import best_form, foretell, robust_sd
+from bayesimpact.data.faults.flat import last_digit
+from bayesimpact.data.faults.local import best_form, foretell, robust_sd, rounding_error
 from bayesimpact.data.gaps import excluded
 from bayesimpact.data.period import rough_period
 from bayesimpact.data.recording import Recording
@@ -100,7 +101,13 @@ def _of_width(
         return []
     # where the motion is bent within few samples it lies inside both extrapolations
     bent = outside & (statistic < np.abs(bend) * (width + 1))
-    strong = (statistic > max(least * level, BEYOND * usual)) & (differ < AGREE * statistic) & ~bent
+    step = last_digit(x)
+    rounded = 0.5 * step + rounding_error(form, width - 1.0, step)
+    strong = (
+        (statistic > max(least * level, BEYOND * usual, rounded))
+        & (differ < AGREE * statistic)
+        & ~bent
+    )
     return [
         (float(statistic[i] / level), float(deviation[0, i]), (int(i), int(i + width)))
         for i in np.flatnonzero(strong)
