@@ -91,7 +91,7 @@ class Campaign(Picklable):
     keep_faults : campaign.toml says that faults found in the recordings stay in (`faults = "keep"`)
     skipped : recording -> why it is left out
     notes : what was set aside in the recordings and why, in words, for reports
-    declared : ids of effects that are known to act: they belong to the base model
+    declared : ids of effects that are known to act and belong to the base model
     """
 
     name: str
