@@ -53,6 +53,7 @@ def campaign_scales(fit: Fit) -> Scales:
         angle=o.campaign.angular,
         reading=float(max(np.max(np.abs(x)) for x in readings)),
         mixed=o.campaign.mixed,
+        driven=any(r.input is not None for r in o.campaign.recordings),
     )
 
 

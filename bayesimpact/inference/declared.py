@@ -66,6 +66,7 @@ def campaign_sizes(campaign: Campaign, estimates: Estimates) -> Scales:
         angle=campaign.angular,
         reading=max(float(np.ptp(r.samples)) for r in campaign.recordings),
         mixed=campaign.mixed,
+        driven=any(r.input is not None for r in campaign.recordings),
     )
 
 

@@ -39,6 +39,7 @@ class Scales:
     angle : the recordings are of an angle, rad
     reading : largest reading from rest in its own unit; 0 for that of displacements, `amplitude`
     mixed : the recordings are of several quantities
+    driven : a recording has a measured input
     """
 
     mass: float
@@ -59,6 +60,7 @@ class Scales:
     angle: bool = False
     reading: float = 0.0
     mixed: bool = False
+    driven: bool = False
 
     @property
     def largest_reading(self) -> float:

@@ -49,6 +49,7 @@ CONTRACT = {
     "sensor_cubic": ["gain"],
     "sensor_hum": ["amplitude", "frequency", "phase[recording]"],
     "smoothing": ["time_constant"],
+    "input_delay": ["time"],
     "pendulum_sine": [],
     "pendulum_with_spring": ["stiffness"],
     "spring_quintic": ["stiffness"],
@@ -174,8 +175,8 @@ def test_shapes_have_grids_within_their_bounds():
 
 def test_admissible_only_where_it_could_show():
     scales = TestRig().scales()
-    assert {e.id for e in EFFECTS if not e.admissible(scales)} == OF_ANGLES
-    scales = replace(scales, angle=True)
+    assert {e.id for e in EFFECTS if not e.admissible(scales)} == {*OF_ANGLES, "input_delay"}
+    scales = replace(scales, angle=True, driven=True)
     assert all(effect.admissible(scales) for effect in EFFECTS)
     silent = replace(scales, impacts=0)
     assert {e.id for e in EFFECTS if e.admissible(silent)} == {
