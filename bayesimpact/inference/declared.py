@@ -176,7 +176,9 @@ def _first_cycles(
             lower[i], upper[i] = guess[i] / WIDE, guess[i] * WIDE
             if bare == "g":
                 lower[i], upper[i] = -0.2 * scales.amplitude, scales.amplitude
-    lower, upper = np.maximum(lower, priors.lower), np.minimum(upper, priors.upper)
+    beyond = (lower >= priors.upper) | (upper <= priors.lower)  # a stated prior that knows better
+    lower = np.where(beyond, priors.lower, np.maximum(lower, priors.lower))
+    upper = np.where(beyond, priors.upper, np.minimum(upper, priors.upper))
     duration = CYCLES * 2 * np.pi / np.sqrt(estimates.k1 / campaign.mass)
     short = campaign.excerpt(duration).thinned(duration / SAMPLES)
     weights = np.array([noise.scales[r.order] for r in campaign.recordings]) ** -2.0

@@ -99,7 +99,10 @@ def identify(
     given, noise = noise is not None, noise or estimate_noise(campaign)
     oscillator = build_oscillator(campaign, sigma_per_recording=sigma_per_recording)
     if oscillator.acting:
-        return _with_declared(oscillator, estimates, noise, given, rng, callback)
+        return _with_declared(
+            oscillator, estimates, noise, given, rng=rng, evaluations=evaluations,
+            callback=callback,
+        )  # fmt: skip
     priors = default_priors(oscillator, estimates, noise)
     guess = initial_theta(oscillator, estimates, noise)
     target = Target(Likelihood(oscillator, noise), priors)
@@ -131,12 +134,14 @@ def _with_declared(
     estimates: Estimates,
     noise: Noise,
     given: bool,
+    *,
     rng: np.random.Generator,
+    evaluations: int | None,
     callback: Callable[[Generation], None] | None,
 ) -> Identification:
     """The mode of a base model with declared effects, on which two searches agree."""
     result, (best, other) = search_declared(
-        oscillator, estimates, noise, rng=rng, callback=callback
+        oscillator, estimates, noise, rng=rng, evaluations=evaluations, callback=callback
     )
     refined = noise if given else refined_noise(best)
     fit = best
