@@ -90,7 +90,7 @@ def listed(
         alike = _alike(classes[subset], subset, terms)
         rows.append(_row(question, subset, (found, sizes), naming.log_odds(candidate), alike))
     for head in heads[: 2 * LISTED]:
-        if not {head.best, *head.alike} & fitted.keys():
+        if head.best.log_odds > 0.0 and not {head.best, *head.alike} & fitted.keys():
             own = [terms[k] for k in head.best.terms]
             alike = _alike(head, head.best, terms)
             odds = head.best.log_odds + offset

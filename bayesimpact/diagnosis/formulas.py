@@ -76,8 +76,7 @@ def with_formulas(
     ranked = subsets(scores.problem)
     classes = term_classes(scores.problem.information, scores.problem.price)
     heads = formula_classes(ranked, scores.terms, classes)
-    heads = [h for h in heads if h.best.log_odds > 0.0]
-    if not heads:
+    if not any(h.best.log_odds > 0.0 for h in heads):
         return answer
     question = Question(answer.after, answer.naming.prior_cost, scores, scales)
     fitted: dict[Subset, Candidate] = {}

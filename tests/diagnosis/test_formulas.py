@@ -183,3 +183,21 @@ def test_refitted_are_formulas_of_different_kinds_few_of_which_only_add() -> Non
     ranked.append(Subset((1, 2), (1.0, 1.0), -20.0))
     found = [s.terms for s in refit_candidates(ranked, terms)]
     assert found == [(0,), (0, 1), (3,), (5,)]
+
+
+def test_a_fitted_formula_that_only_its_numbers_on_the_grid_made_unlikely_is_listed(
+    detent: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first one alone is likely on the grid: fitting another ended in a traceback."""
+    before, _, scales = detent
+    scored = formulas.subsets
+
+    def shifted(problem: Any) -> list[Subset]:
+        ranked = scored(problem)
+        by = ranked[0].log_odds - 1e-6
+        return [replace(s, log_odds=s.log_odds - by) for s in ranked]
+
+    monkeypatch.setattr(formulas, "subsets", shifted)
+    found = asked(before, scales)
+    assert found.formulas is not None
+    assert len(found.formulas.ranked) > 1
