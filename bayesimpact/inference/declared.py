@@ -65,8 +65,6 @@ def campaign_sizes(campaign: Campaign, estimates: Estimates) -> Scales:
         recordings=len(campaign.recordings),
         angle=campaign.angular,
         reading=max(float(np.ptp(r.samples)) for r in campaign.recordings),
-        mixed=campaign.mixed,
-        driven=any(r.input is not None for r in campaign.recordings),
     )
 
 
@@ -123,10 +121,8 @@ class FirstCycles:
     steps : (d,) for differences
     """
 
-    def __init__(
-        self, short: Oscillator, guess: Array, lower: Array, upper: Array, weights: Array
-    ) -> None:
-        self.short, self.guess, self.weights = short, guess, weights
+    def __init__(self, short: Oscillator, guess: Array, lower: Array, upper: Array) -> None:
+        self.short, self.guess = short, guess
         self.physical = short.layout.roles("physical", "effect")
         self.logarithmic = lower[self.physical] > 0.0
         self.lower, self.upper = self._coded(lower), self._coded(upper)
@@ -147,12 +143,11 @@ class FirstCycles:
         """Values (B,) at search coordinates (B, p)."""
         predicted = self.short.predict(self.complete(x))
         total, count = np.zeros(x.shape[0]), 0
-        pairs = zip(self.short.campaign.recordings, predicted, self.weights, strict=True)
-        for recording, rows, weight in pairs:
+        for recording, rows in zip(self.short.campaign.recordings, predicted, strict=True):
             residual = recording.samples - rows
             if recording.used is not None:
                 residual = residual[:, recording.used]
-            total += weight * np.sum(residual**2, axis=1)
+            total += np.sum(residual**2, axis=1)
             count += residual.shape[1]
         with np.errstate(divide="ignore", invalid="ignore"):
             value = 0.5 * count * np.log(total)
@@ -181,8 +176,7 @@ def _first_cycles(
     upper = np.where(beyond, priors.upper, np.minimum(upper, priors.upper))
     duration = CYCLES * 2 * np.pi / np.sqrt(estimates.k1 / campaign.mass)
     short = campaign.excerpt(duration).thinned(duration / SAMPLES)
-    weights = np.array([noise.scales[r.order] for r in campaign.recordings]) ** -2.0
-    return FirstCycles(replace(oscillator, campaign=short), guess, lower, upper, weights)
+    return FirstCycles(replace(oscillator, campaign=short), guess, lower, upper)
 
 
 def _range(parameter: EffectParameter, scales: Scales) -> tuple[float, float, float]:

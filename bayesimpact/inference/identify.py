@@ -93,6 +93,7 @@ def identify(
 ) -> Identification:
     """Mode of the base model's posterior for a campaign, nothing given.
 
+    Where the campaign declares effects the global search is made even without `search`.
     Raises `InputError` when a recording shows no oscillation.
     """
     estimates = rough_estimates(campaign) if campaign.declared else estimate(campaign)

@@ -95,9 +95,14 @@ class Layout:
 
 
 def declared_effects(campaign: Campaign) -> tuple[Effect, ...]:
-    """Effects of the catalogue that belong to a campaign's base model."""
-    found = (catalogued(id) for id in campaign.declared)
-    return tuple(effect for effect in found if effect is not None)
+    """Effects of a campaign's base model; `InputError` for an id not in the catalogue."""
+    found = []
+    for id in campaign.declared:
+        effect = catalogued(id)
+        if effect is None:
+            raise InputError(f"campaign {campaign.name!r}, declared", id, "an id of the catalogue")
+        found.append(effect)
+    return tuple(found)
 
 
 def build_layout(

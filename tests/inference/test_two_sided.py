@@ -15,6 +15,7 @@ from bayesimpact.data.read import load_campaign
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.errors import InputError
 from bayesimpact.inference.identify import identify
+from bayesimpact.model.parameters import build_layout
 
 SECOND = {"stiffness": 4000.0, "gap": 1.5e-3}
 STIFF = {"stiffness": 1100.0, "gap": 0.7e-3}
@@ -80,6 +81,12 @@ def test_campaign_toml_declares_it(tmp_path: Path) -> None:
         file.write_text(text.replace('"two-sided"', wrong), encoding="utf-8")
         with pytest.raises(InputError, match="key stop: found"):
             load_campaign(tmp_path)
+
+
+def test_an_unknown_effect_cannot_be_declared() -> None:
+    campaign = replace(recorded(SECOND, small_rig.RIG), declared=("oposite_stop",))
+    with pytest.raises(InputError, match="declared: found oposite_stop"):
+        build_layout(campaign)
 
 
 def test_only_decays_of_a_displacement_have_two_stops(tmp_path: Path) -> None:
