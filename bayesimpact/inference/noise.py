@@ -21,6 +21,7 @@ gaps, less what the filter carried into it, is transformed on its own.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,7 @@ from bayesimpact.model.measurement import edge, gain
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+SPECTRA = 64  # kept: recordings of so many lengths, and stretches between gaps
 LEAST_STRETCH = 16  # samples between two gaps: fewer say nothing of a filter's passband
 
 
@@ -219,13 +221,7 @@ class Noise:
 
     def _spectrum(self, n: int, interval: float, ends: bool = True) -> Array:
         inner = self._interior(n, interval) if ends else slice(0, n)
-        frequency: Array = np.fft.rfftfreq(inner.stop - inner.start, interval).astype(np.float64)
-        filtered = gain(self.smoothing, interval, frequency) ** 2
-        beyond = np.flatnonzero(filtered < 0.5)
-        frequency = frequency[: beyond[0]] if beyond.size else frequency[:-1]
-        rho, angle = self.correlation, 2 * np.pi * frequency * interval
-        raw = (1 - rho**2) / (1 - 2 * rho * np.cos(angle) + rho**2)
-        return np.asarray(filtered[: frequency.size] * raw)
+        return _passed(self.correlation, self.smoothing, inner.stop - inner.start, interval)
 
     def _band_size(self, n: int, interval: float) -> int:
         return int(self._spectrum(n, interval).size)
@@ -243,6 +239,23 @@ class Noise:
         return np.concatenate(
             [head, coefficients[..., 1:].real, coefficients[..., 1:].imag], axis=-1
         )
+
+
+@lru_cache(maxsize=SPECTRA)
+def _passed(correlation: float, smoothing: Smoothing | None, count: int, interval: float) -> Array:
+    """Power of the noise in the band that the filter lets through, relative to white noise, (m,).
+
+    Every residual and derivative of a fit asks for it anew.
+    """
+    frequency: Array = np.fft.rfftfreq(count, interval).astype(np.float64)
+    filtered = gain(smoothing, interval, frequency) ** 2
+    beyond = np.flatnonzero(filtered < 0.5)
+    frequency = frequency[: beyond[0]] if beyond.size else frequency[:-1]
+    angle = 2 * np.pi * frequency * interval
+    raw = (1 - correlation**2) / (1 - 2 * correlation * np.cos(angle) + correlation**2)
+    found: Array = np.asarray(filtered[: frequency.size] * raw)
+    found.setflags(write=False)
+    return found
 
 
 def _signal(white: Array, count: int, m: int) -> Array:

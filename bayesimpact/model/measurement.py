@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Smoothing
 
 Array = NDArray[np.float64]
+
+FILTERS = 64  # whose weights are kept: predictions ask for them anew every time
 
 
 def smooth(samples: Array, smoothing: Smoothing | None, interval: float) -> Array:
@@ -30,18 +34,38 @@ def smooth(samples: Array, smoothing: Smoothing | None, interval: float) -> Arra
 
 
 def _savgol(samples: Array, window: int, order: int) -> Array:
-    from scipy import signal
+    from scipy.ndimage import convolve1d
 
-    # SciPy fits the end windows with LAPACK, which refuses NaN, and whose last bit depends on the
-    # number of rows; a resumed sampler needs the same bits
-    filtered = signal.savgol_filter(samples, window, order, axis=-1, mode="constant")
-    half = window // 2
-    place = np.linspace(-1.0, 1.0, window)
-    basis = np.linalg.qr(np.vander(place, order + 1))[0]
-    ends = np.einsum("hk,wk->hw", basis[:half], basis)
+    # SciPy's savgol_filter fits the end windows with LAPACK, which refuses NaN, and whose last bit
+    # depends on the number of rows; a resumed sampler needs the same bits
+    filtered = convolve1d(samples, _taps(window, order), axis=-1, mode="constant")
+    half, ends = window // 2, _end_weights(window, order)
     for read, out in ((samples, filtered), (samples[..., ::-1], filtered[..., ::-1])):
         out[..., :half] = np.einsum("...w,hw->...h", read[..., :window], ends)
     return np.asarray(filtered, dtype=np.float64)
+
+
+@lru_cache(maxsize=FILTERS)
+def _taps(window: int, order: int) -> Array:
+    """Weights (window,) of the samples in the middle."""
+    from scipy.signal import savgol_coeffs
+
+    return _kept(savgol_coeffs(window, order))
+
+
+@lru_cache(maxsize=FILTERS)
+def _end_weights(window: int, order: int) -> Array:
+    """Weights (window // 2, window) of the samples at an end."""
+    half = window // 2
+    basis = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, window), order + 1))[0]
+    return _kept(np.einsum("hk,wk->hw", basis[:half], basis))
+
+
+def _kept(values: Array) -> Array:
+    """An array that may be shared: nobody writes into it."""
+    found = np.asarray(values, dtype=np.float64)
+    found.setflags(write=False)
+    return found
 
 
 def gain(smoothing: Smoothing | None, interval: float, frequency: Array) -> Array:
@@ -52,8 +76,7 @@ def gain(smoothing: Smoothing | None, interval: float, frequency: Array) -> Arra
 
     angle = 2 * np.pi * frequency * interval
     if smoothing.kind == "savgol":
-        taps = signal.savgol_coeffs(smoothing.window, smoothing.polyorder)
-        _, response = signal.freqz(taps, worN=angle)
+        _, response = signal.freqz(_taps(smoothing.window, smoothing.polyorder), worN=angle)
     else:
         decay = np.exp(-interval / smoothing.time_constant)
         _, response = signal.freqz([1.0 - decay], [1.0, -decay], worN=angle)
