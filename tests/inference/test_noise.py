@@ -151,3 +151,19 @@ def test_the_highest_frequency_known_is_the_filters_half_power_one(smoothing):
     kept, lost = gain(smoothing, INTERVAL, near) ** 2
     assert kept >= 0.5 > lost
     assert Noise(0.3).highest(n, INTERVAL) == 0.5 / INTERVAL
+
+
+def test_lengths_that_transform_slowly_are_shortened_by_less_than_half_a_percent() -> None:
+    smoothing = Smoothing("savgol", window=21, polyorder=2)
+    noise = Noise(smoothing=smoothing)
+    for n in (331, 5567, 6001, 6007, 10007):  # prime, or prime less the filter's reach
+        white = np.zeros(noise.size(n, 1e-3))
+        signal, start = noise.in_time(white, n, 1e-3)
+        kept, whole = signal.size, n - 2 * (smoothing.window // 2)
+        assert whole * (1 - 1 / 256) <= kept <= whole
+        assert start == pytest.approx(smoothing.window // 2 * 1e-3)
+        assert max(p for p in range(2, kept) if kept % p == 0 and is_prime(p)) < 64
+
+
+def is_prime(number: int) -> bool:
+    return all(number % factor for factor in range(2, int(number**0.5) + 1))
