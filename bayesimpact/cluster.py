@@ -23,6 +23,19 @@ def one_thread_each() -> None:
         os.environ[name] = "1"
 
 
+@contextmanager
+def safe_path() -> Iterator[None]:
+    """Processes started meanwhile do not have the working folder on their path."""
+    before = os.environ.get("PYTHONSAFEPATH")
+    os.environ["PYTHONSAFEPATH"] = "1"
+    try:
+        yield
+    finally:
+        del os.environ["PYTHONSAFEPATH"]
+        if before is not None:
+            os.environ["PYTHONSAFEPATH"] = before
+
+
 Spread = Callable[[Callable[..., Any], Iterator[tuple[Key, Job]]], Iterator[tuple[Key, Any]]]
 
 
@@ -43,7 +56,10 @@ def executor(workers: int, scheduler: str | None) -> Iterator[Spread]:
         return
     one = dict.fromkeys(THREADS, "1")
     with (
-        local(n_workers=workers, threads_per_worker=1, dashboard_address=None, env=one) as cluster,
+        safe_path(),  # a worker that was lost is started again
+        local(
+            n_workers=workers, threads_per_worker=1, dashboard_address="127.0.0.1:0", env=one
+        ) as cluster,
         make(cluster) as client,
     ):
         yield _on(client)

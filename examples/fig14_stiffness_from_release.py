@@ -1,6 +1,6 @@
 """Fig. 14: from how far must the mass be released to read k2 off the backbone?
 
-The further, the less the flight through the gap counts, and the nearer the first upper half swing
+The further, the less the flight through the gap counts, and the nearer the first upper half cycle
 comes to half a period of the oscillator with the beam. Damping on the beam keeps it from ever
 getting there: the four published readings are 3 to 10 % low.
 """

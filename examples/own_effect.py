@@ -24,7 +24,7 @@ def force(y, v, d, t, z, touching, p, q):
 
 
 def widths(s):
-    """The widths that are tried, from the sizes of a campaign: a tenth to a half of the swing."""
+    """The widths that are tried, from the sizes of a campaign: shares of the amplitude."""
     return [s.amplitude * share for share in (0.1, 0.2, 0.3, 0.5)]
 
 

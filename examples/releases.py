@@ -13,7 +13,7 @@ SAMPLES_PER_PERIOD = 1000
 def read_stiffness(
     release: float, *, mass: float, c1: float, k1: float, c2: float, g: float, k2: float
 ) -> float:
-    """k2 = m (pi / T)^2 - k1 with T the first half swing above rest, N/m.
+    """k2 = m (pi / T)^2 - k1 with T the first half cycle above rest, N/m.
 
     The mass is released at rest, `release` m away from the beam. SI units.
     """

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from campaigns import write
+from small_fleet import write_fleet
 
 from bayesimpact.report.archive import save_results
 
@@ -25,6 +26,8 @@ PLANTED = (
         "numba",
         "csv",
         "hashlib",
+        "threading",
+        "signal",
     ),
     *("bayesimpact", "sitecustomize", "usercustomize", "click", "jinja2", "arviz", "scipy"),
 )
@@ -70,3 +73,20 @@ def test_modules_beside_the_recordings_are_never_imported(tmp_path: Path, diagno
         assert not marker.exists(), marker.read_text()
     assert (results / "report.html").stat().st_size > 10_000
     assert not (here / "cache").exists() and not (campaign / "cache").exists()
+
+
+def test_workers_import_nothing_from_the_working_folder(tmp_path: Path) -> None:
+    """Dask's are new processes, started in the working folder."""
+    marker, here = tmp_path / "marker", tmp_path / "here"
+    fleet = write_fleet(tmp_path / "fleet", 2)
+    trap(here, marker)
+    command = str(Path(sys.executable).with_name("bayesimpact"))
+    environment = {k: v for k, v in os.environ.items() if not k.startswith("PYTHON")}
+    out = tmp_path / "out"
+    arguments = ["fleet", str(fleet), "--workers", "2", "--quiet", "--out", str(out)]
+    done = subprocess.run(
+        [command, *arguments], cwd=here, env=environment, capture_output=True, text=True
+    )
+    assert not marker.exists(), marker.read_text()
+    assert done.returncode == 0, done.stderr
+    assert len((out / "fleet.csv").read_text().splitlines()) == 3

@@ -61,7 +61,7 @@ def without(recording: Recording, spans: Iterable[tuple[int, int]]) -> Recording
 def before_gap(recording: Recording) -> Recording:
     """The recording up to its first gap that is too long for a cubic, where that is long enough.
 
-    What stands in a long gap is no motion, and neither swings nor turning points may be read there.
+    What stands in a long gap is no motion, and neither cycles nor turning points may be read there.
     """
     if recording.used is None:
         return recording

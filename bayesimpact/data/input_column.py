@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from bayesimpact.data.foreign import read_input
 from bayesimpact.data.input import Input, checked
-from bayesimpact.data.quantity import with_article
 from bayesimpact.data.recording import Recording
 from bayesimpact.data.schema import RecordingTable
 from bayesimpact.data.table import Table
@@ -58,21 +57,3 @@ def input_of(where: str, entry: RecordingTable, values: NDArray[np.float64] | No
     samples = given.scale * (values - values.mean() if given.remove_mean else values)
     made = Input(samples, given.kind, given.gain == "free", given.hold == "band_limited")
     return checked(where, made)
-
-
-def check_decays(where: str, recordings: Sequence[Recording]) -> None:
-    """Refuse two stops where a search has no start values: with an input, or of a derivative.
-
-    Raises
-    ------
-    InputError
-        names the first such recording.
-    """
-    for recording in recordings:
-        if recording.input is not None or recording.order > 0:
-            driven = "" if recording.input is None else " with an input"
-            raise InputError(
-                f"{where}, key stop",
-                f"{recording.name}, {with_article(recording.quantity)}{driven}",
-                "free decays of a displacement or an angle with two stops",
-            )

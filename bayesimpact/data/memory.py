@@ -221,11 +221,11 @@ def _check_speed(where: str, table: Table) -> None:
     order = order_of(table.quantity)
     if period is None or is_angular(table.quantity) or order == 2:
         return  # an impact's peak acceleration says nothing of the speed
-    swing = float(np.max(np.abs(table.samples - np.median(table.samples))))
-    speed = swing * (2.0 * np.pi / period) ** (1 - order)
+    amplitude = float(np.max(np.abs(table.samples - np.median(table.samples))))
+    speed = amplitude * (2.0 * np.pi / period) ** (1 - order)
     if speed > FASTEST:
         unit = unit_of(table.quantity)
-        found = f"{swing:.3g} {unit} at {1 / period:.3g} Hz, a speed of {speed:.3g} m/s"
+        found = f"{amplitude:.3g} {unit} at {1 / period:.3g} Hz, a speed of {speed:.3g} m/s"
         accepted = f"the unit of the samples ({', '.join(UNITS)}), and speeds below {FASTEST:g} m/s"
         raise InputError(f"{where}, key unit", found, accepted)
 

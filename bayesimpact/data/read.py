@@ -18,7 +18,7 @@ from bayesimpact.data.campaign import SECOND_STOP, Beam, Campaign, Measurement, 
 from bayesimpact.data.entries import filled_in
 from bayesimpact.data.foreign import file_bytes, is_foreign, read_foreign
 from bayesimpact.data.gaps import excluded_spans
-from bayesimpact.data.input_column import check_decays, check_quantities, input_of, with_input
+from bayesimpact.data.input_column import check_quantities, input_of, with_input
 from bayesimpact.data.period import rough_period
 from bayesimpact.data.prior_bounds import check_prior, parameter_ranges
 from bayesimpact.data.quantity import Quantity, check_quantity, unit_of, with_article
@@ -279,8 +279,6 @@ def _check_together(where: str, table: CampaignTable, recordings: list[Recording
                 f"motion {kind}, as the first recording's {first.quantity}, throughout",
             )
     check_quantities(where, recordings)
-    if table.stop == "two-sided":
-        check_decays(where, recordings)
     if table.mass_uncertainty_kg >= table.mass_kg:
         found = f"{table.mass_uncertainty_kg:g} kg"
         accepted = f"less than the mass, {table.mass_kg:g} kg"

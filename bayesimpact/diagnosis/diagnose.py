@@ -5,8 +5,9 @@
 2. What comparing them shows is corrected, step by step, as long as a step gains more than any
    effect promises. Where physics then leaves something, once more without these corrections, unless
    one gained more than all effects together promise.
-3. Physics is searched. Where that ends in doubt, once more with the other steps corrected: the
-   simpler of two answers that explain everything stays.
+3. Physics is searched. Where that ends in doubt, the recordings are compared beside it, and it is
+   searched once more with the other steps corrected: the simpler of two answers that explain
+   everything stays.
 4. Spikes may only show against a fit with that physics: then once more without them.
 """
 
@@ -30,6 +31,7 @@ from bayesimpact.diagnosis.recording_faults import (
     Step,
     cleaned_campaign,
     comparisons,
+    shared_effects,
     with_step,
     without_spikes,
 )
@@ -100,6 +102,10 @@ def diagnose(
         proved = proved or exceeds(doubtful[0], fit, float(promised.sum()))
         certain = with_step(certain, doubtful.pop(0), rng=rng, search=search)
     found = physics(certain)
+    beside = [e for e in found.effects if e in found.after.target.oscillator.effects]
+    if shared_effects(beside) and is_doubtful(found):
+        say("comparing the recordings beside what is missing")
+        doubtful = list(comparisons(certain, campaign, beside, found.after)) or doubtful
     if doubtful and is_doubtful(found):
         corrected = certain
         for step in doubtful:

@@ -64,7 +64,7 @@ def directions(fit: Fit, effects: Iterable[Effect], scales: Scales) -> tuple[Dir
             continue
         if not effect.admissible(scales):
             continue
-        for shapes in _grid(effect, scales):
+        for shapes in shape_points(effect, scales):
             direction = _direction(fit, effect, scales, shapes)
             if direction is not None:
                 found.append(direction)
@@ -88,7 +88,8 @@ def whitened(target: Target, values: Sequence[Array], sigma: Array) -> tuple[Arr
     return tuple(noise.whiten(v, r.interval, r.used, r.order) / s for v, r, s in rows)
 
 
-def _grid(effect: Effect, scales: Scales) -> list[dict[str, float]]:
+def shape_points(effect: Effect, scales: Scales) -> list[dict[str, float]]:
+    """The points of an effect's shape grid, `<effect>.<parameter>` -> value."""
     shapes = [p for p in effect.parameters if p.is_shape]
     axes = [p.grid(scales) if p.grid else np.array([p.scale(scales)]) for p in shapes]
     keys = [f"{effect.id}.{p.name}" for p in shapes]

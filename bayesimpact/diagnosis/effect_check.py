@@ -30,7 +30,7 @@ NULL = 1e-12  # m, rounding
 STEPS = 1e-8  # m: what the simulator's own steps may leave; the catalogue stays below 1e-9
 DRAWS = 40
 MIDDLE = (0.1, 0.9)  # of the priors
-ENERGY = 1e-7  # share of a swing that rounding and steps may add to it
+ENERGY = 1e-7  # share of a cycle that rounding and steps may add to it
 SMALL, SMOOTH = 1e-3, 0.02  # step of a derivative over the scale; how far two steps may disagree
 
 
@@ -130,11 +130,11 @@ def _energy(effect: Effect) -> Answer:
     theta = _theta(oscillator, _values(effect, _typical), c1=0.0, c2=0.0)
     turns = [_lower_turns(y) for y in oscillator.predict(theta)]
     if min(t.size for t in turns) < 3:
-        return "failed", "no swings without other damping, or numbers that are not finite"
-    swings = [t / t[0] for t in turns]
-    most = max(float(np.diff(s).max()) for s in swings)
-    least = min(float(np.diff(s).min()) for s in swings)
-    said = f"a swing grows by {most:.1e} of it at most, and shrinks by {-least:.1e}"
+        return "failed", "no cycles without other damping, or numbers that are not finite"
+    energies = [t / t[0] for t in turns]
+    most = max(float(np.diff(s).max()) for s in energies)
+    least = min(float(np.diff(s).min()) for s in energies)
+    said = f"a cycle grows by {most:.1e} of it at most, and shrinks by {-least:.1e}"
     if effect.energy == "conserves":
         return _verdict(max(most, -least) < ENERGY), said
     loses = -least > ENERGY or not effect.has_size

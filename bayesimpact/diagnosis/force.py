@@ -4,7 +4,7 @@ The unexplained force is a(y) + b(y) v with B-spline coefficients of independent
 coefficient's response is simulated, whitened and projected off everything the model fits, so what
 remains of the misfit is explained by force, not by displacement errors that an earlier force left
 behind. A second form, a(t) y + b(t) v, catches stiffness and damping that change with time; a third
-one, a(d) + b(d) v in contact alone, what begins with a jump at the touch. In the linearised problem
+one, a(d) + b(d) v in contact alone, what begins with a jump at impact. In the linearised problem
 the coefficients' posterior and the evidence are closed forms; the prior widths and the number of
 knots maximise the evidence.
 """

@@ -108,10 +108,11 @@ def _place(
     effects: tuple[Effect, ...],
 ) -> Location:
     points = trajectory_points(base)
-    total = max(sum(float(w.sum()) for w in weights), 1e-300)
     gaps = base.target.oscillator.layout.slots(base.mode)[:, _GAP]
-    beyond = [w[y >= g].sum() for w, (y, _), g in zip(weights, points, gaps, strict=True)]
-    contact_share = min(1.0, float(sum(beyond) / total))  # sums of parts may round above 1
+    within = [y >= g for (y, _), g in zip(points, gaps, strict=True)]
+    beyond = sum(float(w[c].sum()) for w, c in zip(weights, within, strict=True))
+    below = sum(float(w[~c].sum()) for w, c in zip(weights, within, strict=True))
+    contact_share = beyond / max(beyond + below, 1e-300)
     seen = regime_seen(contact_share)
     regime = effects[0].regime if effects else seen
     gain = gain_by_time(base, better)
@@ -120,7 +121,7 @@ def _place(
     inside = np.concatenate(chosen)
     place = _ranges(y, v, np.where(inside, w, 0.0))
     held = inside & _between(y, place[0]) & _between(v, place[1])
-    share = float(w[held].sum() / total)
+    share = float(w[held].sum()) / max(beyond + below, 1e-300)
     if force is not None and not force.reach:
         share = force.share_within(*place[0])
     rms = float(np.sqrt(np.mean(w[held]))) if held.any() else 0.0

@@ -5,26 +5,36 @@ Of two ends of climbs to one model the better one is kept.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.force import missing_drift, missing_force
+from bayesimpact.diagnosis.likely_sets import LikelySets
 from bayesimpact.diagnosis.naming import State, is_large, leaves_something
 from bayesimpact.diagnosis.own_band import shakes_in_own_band
 from bayesimpact.diagnosis.profile_likelihood import profiled
-from bayesimpact.diagnosis.refit import Candidate, exchanged, refit, without
+from bayesimpact.diagnosis.promising import is_redundant
+from bayesimpact.diagnosis.refit import Candidate, exchanged, fit_from, refit, without
 from bayesimpact.diagnosis.scan import Scan, scan
 from bayesimpact.diagnosis.scores import Score
 from bayesimpact.inference.progress import Refit
 from bayesimpact.model.effects.effect import Effect, Scales
 
 STARTS = 2  # points of an effect's shape grid from which it is fitted
+ASKED = 4  # effects of the equation of motion that are tried beside a model with a large misfit
 SHORT = 60.0  # by how much a climb that gave up may have fallen short, nats
 MORE = 2.0  # nats by which a score must promise more than a model has reached to fit it again
 SAME = 0.05  # nats; two climbs to one mode differ by less
+
+BUDGET = 150  # refits
+# s of computing, ten minutes of two cores: no refit begins later; an answer that says so is worth
+# more than none. Not of the clock: what else a machine does must not change an answer.
+PATIENCE = 1200.0
 
 Progress = Callable[[str], None]
 
@@ -38,8 +48,10 @@ class Models:
         scales: Scales,
         rng: np.random.Generator,
         progress: Progress,
+        clock: Callable[[], float] = time.process_time,
     ) -> None:
         self.effects, self.scales, self.rng, self.progress = effects, scales, rng, progress
+        self.clock, self.end = clock, clock() + PATIENCE
         self.tried: dict[frozenset[str], Candidate] = {}
         self.states: dict[frozenset[str], State] = {}
         self.begun: set[tuple[object, ...]] = set()
@@ -101,6 +113,14 @@ class Models:
                 self.start(candidate, [start])
         return self.tried[key]
 
+    def fitted(self, state: State, scores: Sequence[Score]) -> list[Candidate]:
+        """Models with one more effect each."""
+        return [
+            self.fit_one(state.candidate, state.scan, score)
+            for score in scores
+            if not is_redundant(state.candidate, score.effect) and self.may_go_on()
+        ]
+
     def fit_more(self, candidate: Candidate, scores: Sequence[Score]) -> Candidate:
         """The candidate's model with all of these effects, from where the scores point to."""
         key = frozenset((*candidate.ids, *(s.effect.id for s in scores)))
@@ -116,6 +136,41 @@ class Models:
             self.begun.add(begun)
             self.tell("fitting " + " + ".join((*candidate.ids, *(s.effect.id for s in scores))))
             self.keep(refit(candidate.fit, scores, self.scales))
+
+    def fit_sets(self, candidate: Candidate, most: int) -> list[Candidate]:
+        """Models that the equation of motion asks for along the measured motion.
+
+        Larger ones up to the first whose misfit is not large: there scores tell more.
+        """
+        found = []
+        for chosen in self.sets.best(most) if self.may_go_on() else ():
+            self.tell("fitting " + " + ".join(e.id for e in chosen.effects))
+            found.append(
+                self.keep(fit_from(candidate.fit, chosen.effects, chosen.values, self.scales))
+            )
+            if not (is_large(found[-1].fit) and self.may_go_on()):
+                break
+        return found
+
+    @cached_property
+    def sets(self) -> LikelySets:
+        """Sets of effects that the equation of motion asks for beside the base model."""
+        base = self.states[frozenset()].candidate
+        return LikelySets(base.fit, self.effects, self.scales)
+
+    def asked_beside(self, candidate: Candidate, scores: Sequence[Score]) -> list[Score]:
+        """Scores on a model; of one with a large misfit without effects that the equation of motion
+        sees and does not ask for first.
+        """
+        if not is_large(candidate.fit):
+            return list(scores)
+        gains = self.sets.gains(candidate.ids)
+        first = sorted(gains, key=lambda i: -gains[i])[:ASKED]
+        return [s for s in scores if s.effect.id in first or s.effect.id not in gains]
+
+    def may_go_on(self) -> bool:
+        """Whether the budget allows for more refits."""
+        return self.refits < BUDGET and self.clock() < self.end
 
     def tell(self, words: str) -> None:
         """Count a refit, and say which."""

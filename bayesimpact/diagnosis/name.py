@@ -25,6 +25,7 @@ from bayesimpact.diagnosis.promising import (
     SCORE_UNDERESTIMATE,
     families,
     in_place_of,
+    is_discontinuous,
     is_redundant,
     refit_candidates,
 )
@@ -48,10 +49,6 @@ LOST = 30.0  # by how much an effect alone must fall behind the base model to be
 BEAM = 3  # models that are extended while the best one is not white
 PAIRS = 4  # refitted at the first step
 EXCHANGES = 3  # rounds of leaving out and exchanging effects
-BUDGET = 150  # refits
-# s of computing, ten minutes of two cores: no refit begins later; an answer that says so is worth
-# more than none. Not of the clock: what else a machine does must not change an answer.
-PATIENCE = 1200.0
 
 
 def name(
@@ -78,7 +75,9 @@ def name(
     """
     search = _Search(effects, scales, rng, progress or (lambda message: None), clock)
     state = base = search.examine(base_candidate(fit))
-    beam = [base]
+    if search.is_large:
+        state = search.asked_for(base)
+    beam = [state]
     while not state.is_white and len(state.candidate.effects) < search.most and search.may_go_on():
         promising = [s for s in beam if not search.is_dominated(s)]
         better = search.best_first(state, [c for s in promising for c in search.extended(s)])
@@ -97,17 +96,6 @@ def name(
 class _Search(Models):
     """Which models to fit next, and what they are worth."""
 
-    def __init__(
-        self,
-        effects: Sequence[Effect],
-        scales: Scales,
-        rng: np.random.Generator,
-        progress: Progress,
-        clock: Callable[[], float],
-    ) -> None:
-        super().__init__(effects, scales, rng, progress)
-        self.clock, self.end = clock, clock() + PATIENCE
-
     @property
     def cost(self) -> float:
         """Nats per added effect, for multiplicity."""
@@ -122,6 +110,11 @@ class _Search(Models):
     def most(self) -> int:
         """Effects of a model."""
         return MOST_LARGE if self.is_large else MOST_EFFECTS
+
+    def asked_for(self, base: State) -> State:
+        """The likeliest model that the equation of motion asks for along the measured motion."""
+        found = [base.candidate, *self.fit_sets(base.candidate, self.most)]
+        return self.examine(max(found, key=self.promise))
 
     def best_first(self, state: State, found: Sequence[Candidate]) -> list[Candidate]:
         """Extensions of a model, the next one to examine first."""
@@ -140,13 +133,13 @@ class _Search(Models):
 
         Only those that may overtake the best model so far, as far as scores tell.
         """
-        behind = max(map(self.worth, self.tried.values())) - self.worth(state.candidate)
+        behind = max(map(self.log_odds, self.tried.values())) - self.log_odds(state.candidate)
         scores = self.refit_candidates(state.scan, behind / SCORE_UNDERESTIMATE)
-        found = [
-            self.fit_one(state.candidate, state.scan, score)
-            for score in scores
-            if not is_redundant(state.candidate, score.effect) and self.may_go_on()
-        ]
+        scores = self.asked_beside(state.candidate, scores)
+        late = is_large(state.candidate.fit)  # what is on or off is tried where nothing else gains
+        found = self.fitted(state, [s for s in scores if not (late and is_discontinuous(s.effect))])
+        if late and all(self.promise(c) <= self.promise(state.candidate) for c in found):
+            found += self.fitted(state, [s for s in scores if is_discontinuous(s.effect)])
         if not self.may_go_on():
             return found
         if not state.candidate.effects:
@@ -155,7 +148,7 @@ class _Search(Models):
                 expected = state.candidate.log_evidence + pair.gain
                 if expected > best_single + self.cost:
                     found.append(self.fit_more(state.candidate, pair.scores))
-        if is_large(state.candidate.fit):
+        if is_large(state.candidate.fit) and not self.sets.terms:
             found += [self.fit_more(state.candidate, j) for j in families(state.scan)]
         return found
 
@@ -176,10 +169,6 @@ class _Search(Models):
         kept = [c for c in rest if c.log_evidence > -np.inf and len(c.effects) == 1]
         return kept[: BEAM - 1]
 
-    def may_go_on(self) -> bool:
-        """Whether the budget allows for more refits."""
-        return self.refits < BUDGET and self.clock() < self.end
-
     def is_dominated(self, state: State) -> bool:
         """Whether a free force will explain what the effects still to come cannot, say the scores.
 
@@ -195,7 +184,7 @@ class _Search(Models):
         more = self.most - len(state.candidate.effects)
         if state.unknown.log_evidence > more * most:
             return True
-        return not self.is_large and self.force_gain() - self.worth(state.candidate) > most
+        return not self.is_large and self.force_gain() - self.log_odds(state.candidate) > most
 
     def may_be_named(self, state: State) -> bool:
         """Whether a search around a model may end with a name, white or not.
@@ -205,7 +194,8 @@ class _Search(Models):
         if state.is_white or self.is_large:
             return True
         return (
-            self.worth(state.candidate) > self.force_gain() and state.unknown.log_evidence < SHORT
+            self.log_odds(state.candidate) > self.force_gain()
+            and state.unknown.log_evidence < SHORT
         )
 
     def refit_candidates(self, scan: Scan, least: float = 0.0) -> list[Score]:
@@ -220,7 +210,7 @@ class _Search(Models):
         alone, base = self.tried.get(frozenset([effect.id])), self.states[frozenset()]
         if alone is None or alone.log_evidence == -np.inf:
             return False
-        lost = self.worth(base.candidate) - self.worth(alone)
+        lost = self.log_odds(base.candidate) - self.log_odds(alone)
         return lost > max(LOST, base.unknown.log_evidence)
 
     def promise(self, candidate: Candidate) -> float:
@@ -229,7 +219,7 @@ class _Search(Models):
         """
         return candidate.log_evidence - self.cost * len(candidate.effects)
 
-    def worth(self, candidate: Candidate) -> float:
+    def log_odds(self, candidate: Candidate) -> float:
         """Log posterior odds up to a constant, each independent sample counted once."""
         evidence = tempered_evidence(candidate, self.repetition())
         return evidence - self.cost * len(candidate.effects)
@@ -237,7 +227,7 @@ class _Search(Models):
     def force_gain(self) -> float:
         """What a free force in place of all effects would be worth, as far as scores tell."""
         base = self.states[frozenset()]
-        return self.worth(base.candidate) + base.unknown.log_evidence
+        return self.log_odds(base.candidate) + base.unknown.log_evidence
 
     def repetition(self) -> float:
         """Samples per independent one in the residual of the best model so far."""
@@ -255,7 +245,7 @@ class _Search(Models):
         chosen = state.candidate
         if self.is_large or len(chosen.effects) < 2:
             return state
-        if self.force_gain() > self.worth(chosen) + SHORT:
+        if self.force_gain() > self.log_odds(chosen) + SHORT:
             return state
         for effect in chosen.effects:
             if any(p.is_shape and not p.circular for p in effect.parameters):
@@ -275,8 +265,8 @@ class _Search(Models):
         """
         while len(state.candidate.effects) > 1:
             smaller = [self.drop(state.candidate, e) for e in state.candidate.effects]
-            best = max(smaller, key=self.worth)
-            lost = self.worth(state.candidate) - self.worth(best)
+            best = max(smaller, key=self.log_odds)
+            lost = self.log_odds(state.candidate) - self.log_odds(best)
             complete = state.is_white and not self.examine(best).is_white
             if lost >= DECISIVE or (lost > 0 and complete):
                 return state
@@ -305,49 +295,50 @@ class _Search(Models):
 
         Unless a free force wins anyhow, or the misfit is large: then the next step repairs it.
         """
-        best = max((self.worth(c) for c in candidates), default=0.0)
+        best = max((self.log_odds(c) for c in candidates), default=0.0)
         models = {frozenset(c.ids): c for c in candidates}
         if self.is_large or self.force_gain() > best + SHORT:
             best = np.inf
-        near = [key for key, c in models.items() if self.worth(c) > best - SHORT]
+        near = [key for key, c in models.items() if self.log_odds(c) > best - SHORT]
         for key in near:
             if len(near) > 1 and not models[key].fit.converged:
                 models[key] = self.finished(models[key])
-        return sorted(models.values(), key=self.worth, reverse=True)
+        return sorted(models.values(), key=self.log_odds, reverse=True)
 
     def near(self, state: State) -> list[Candidate]:
         """The chosen model and those of at most its size that it does not beat decisively."""
-        least = self.worth(state.candidate) - DECISIVE
+        least = self.log_odds(state.candidate) - DECISIVE
         return [
             c
             for c in self.ranked(list(self.tried.values()))
-            if self.worth(c) >= least and len(c.effects) <= len(state.candidate.effects)
+            if self.log_odds(c) >= least and len(c.effects) <= len(state.candidate.effects)
         ]
 
     def exchange(self, chosen: Candidate) -> None:
-        """Put every other effect in the place of each chosen one (for pairs and triples).
+        """Put every other effect in the place of each chosen one.
 
         Where the misfit was large, several of its own family together too: two damping laws make a
-        third one.
+        third one. Where it was not, all single effects have been fitted beside the base model.
         """
-        if len(chosen.effects) < 2:
+        if len(chosen.effects) < 2 and not self.is_large:
             return
         for effect in chosen.effects:
             rest = self.drop(chosen, effect)
             found = self.scanned(rest, self.effects)
-            if self.is_large:
+            if self.is_large and not self.sets.terms:
                 others = [[s for s in j if s.effect.id != effect.id] for j in families(found)]
                 for joint in others:
                     if len(joint) > 1 and joint[0].effect.family == effect.family:
                         self.fit_more(rest, joint)
-            for score in in_place_of(effect, self.refit_candidates(found)):
+            scores = self.asked_beside(rest, self.refit_candidates(found))
+            for score in in_place_of(effect, scores, is_large(rest.fit)):
                 if self.may_go_on() and not is_redundant(rest, score.effect):
                     self.fit_one(rest, found, score)
                     if not score.effect.has_size:
                         self.exchange_on_off(chosen, effect, score.effect)
 
     def naming(self, base: State, chosen: State) -> Naming:
-        tried = tuple(sorted(self.tried.values(), key=self.worth, reverse=True))
+        tried = tuple(sorted(self.tried.values(), key=self.log_odds, reverse=True))
         if self.may_be_named(chosen):
             best = self.best(len(chosen.candidate.effects))
             if set(best.ids) != set(chosen.candidate.ids):
@@ -372,7 +363,7 @@ class _Search(Models):
         smaller = {e.id: self.drop(chosen, e) for e in chosen.effects}
         for part in smaller.values():
             self.examine(part)
-        tried = tuple(sorted(self.tried.values(), key=self.worth, reverse=True))
+        tried = tuple(sorted(self.tried.values(), key=self.log_odds, reverse=True))
         found = replace(found, tried=tried, states=dict(self.states))
         parts = [chosen]
         needed = [e for e in ordered(found, chosen.effects) if may_be_needed(found, e)]

@@ -17,7 +17,7 @@ OWN_BAND = 0.1  # of the spectrum's peak
 
 
 def shakes_in_own_band(fit: Fit, remains: bool) -> bool:
-    """True when the model has a harmonic force or a hum where the motion swings anyway.
+    """True when the model has a harmonic force or a hum at a frequency of the motion itself.
 
     There a decaying motion and a steady one differ only by phase, and the steady one passes for any
     slow change of frequency or damping: over the whole band where something `remains`. A force,
@@ -25,7 +25,7 @@ def shakes_in_own_band(fit: Fit, remains: bool) -> bool:
     short to tell both frequencies apart.
     """
     return any(
-        _swings(recording, frequency)
+        _moves_at(recording, frequency)
         if remains
         else effect.observe is None and _is_unresolved(recording, frequency)
         for effect, frequency in _lines(fit)
@@ -51,7 +51,7 @@ def _spectrum(recording: Recording) -> Array:
     return np.abs(np.fft.rfft(samples - samples.mean()))
 
 
-def _swings(recording: Recording, frequency: float) -> bool:
+def _moves_at(recording: Recording, frequency: float) -> bool:
     """Whether a recording has a good part of its spectrum's peak at a frequency, Hz."""
     spectrum = _spectrum(recording)
     at = frequency * recording.samples.size * recording.interval

@@ -35,7 +35,9 @@ Array = NDArray[np.float64]
 RESPONSE_REACH = 2.0  # forcing is looked for up to so many times the natural frequency in contact,
 FLIGHT_REACH = 4.0  # or in free flight
 HUM_PERIODS = 5.0  # in the longest recording, at least: slower ones pass for a drift
-SWINGING = 2.0  # times the natural frequency: below, the parameters may absorb nearly all of a hum
+NEAR_RESONANCE = (
+    2.0  # times the natural frequency: below, the parameters may absorb nearly all of a hum
+)
 ABSORBED = 1e-6  # of a line's power: what is left of so much tells nothing but rounding
 LEAST_GAIN = 0.1  # of a filter: hums that it lets through so far leak into the band below
 
@@ -128,7 +130,7 @@ def _blocks(fit: Fit, r: int, effect: Effect, grid: Array, above: Array, scales:
         shaken = force_responses(fit, r, grid, scales)
         return joined(blocks_in_parts(fit, r, grid, shaken))
     waves = partial(hums, fit, r)
-    slow = grid < SWINGING * scales.natural_frequency
+    slow = grid < NEAR_RESONANCE * scales.natural_frequency
     sums = [line_blocks(fit, r, grid[~slow])] if np.sum(~slow) > 1 else []
     near = grid[slow] if sums else grid
     return joined(

@@ -34,10 +34,11 @@ def refit_candidates(scan: Scan, least: float = 0.0) -> list[Score]:
     most = max((s.gain for s in scores), default=0.0)
     floor = max(least, LEAST_GAIN, min(NEAR_BEST * most, np.sqrt(FAR * most)) - NEAR_MARGIN)
     leaps = most > DISCONTINUOUS
-    return [s for s in scores if s.gain > floor or (leaps and _is_discontinuous(s.effect))]
+    return [s for s in scores if s.gain > floor or (leaps and is_discontinuous(s.effect))]
 
 
-def _is_discontinuous(effect: Effect) -> bool:
+def is_discontinuous(effect: Effect) -> bool:
+    """Whether an effect does not begin at the base model: its score has no first order."""
     return not effect.has_size or effect.prefer is not None
 
 
@@ -70,12 +71,13 @@ def families(scan: Scan) -> list[list[Score]]:
     return [held[:JOINT] for held in by_family.values() if len(held) > 1]
 
 
-def in_place_of(effect: Effect, scores: Sequence[Score]) -> list[Score]:
-    """Effects that might do what one does, by their `scores` on a model without it.
+def in_place_of(effect: Effect, scores: Sequence[Score], large: bool) -> list[Score]:
+    """Effects that might do what one does, by their `scores` on a model without it; `large` is its
+    misfit.
 
     What explains less than half of its signal to first order cannot come near it. Effects that do
     not begin at the base model have no first order; they stand for one of their own family, or of
-    the contact.
+    the contact: where the misfit is large for no other.
     """
     own = max((s.gain for s in scores if s.effect.id == effect.id), default=0.0)
     least = NEAR_BEST * own - NEAR_MARGIN
@@ -83,5 +85,9 @@ def in_place_of(effect: Effect, scores: Sequence[Score]) -> list[Score]:
         s
         for s in scores
         if s.effect.id != effect.id
-        and (s.gain > least or (_is_discontinuous(s.effect) and _are_alike(s.effect, effect)))
+        and (
+            _are_alike(s.effect, effect)
+            if is_discontinuous(s.effect) and (large or s.gain <= least)
+            else s.gain > least
+        )
     ]

@@ -12,6 +12,7 @@ import numpy as np
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.faults.fault import Fault, fault_document
 from bayesimpact.data.faults.find import set_aside
+from bayesimpact.diagnosis.faults.alone import SharedModel
 from bayesimpact.diagnosis.faults.compare import (
     Compared,
     base_failed,
@@ -21,8 +22,11 @@ from bayesimpact.diagnosis.faults.compare import (
 from bayesimpact.diagnosis.faults.outliers import residual_spikes, spikes_set_aside
 from bayesimpact.diagnosis.smoothing import proved_smoothing
 from bayesimpact.diagnosis.thresholds import DECISIVE
+from bayesimpact.formula.law import is_formula
+from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification, identify
 from bayesimpact.inference.spectrum import Fingerprint
+from bayesimpact.model.effects.effect import Effect
 
 Step = tuple[Compared, ...]
 
@@ -105,16 +109,38 @@ def _as_read(fault: Fault, campaign: Campaign, as_read: Campaign) -> Fault:
     return replace(fault, spans=tuple((a + cut, b + cut) for a, b in fault.spans))
 
 
-def comparisons(before: Corrected, as_read: Campaign) -> tuple[Step, ...]:
-    """Faults that comparing the recordings shows, what is corrected together in a step."""
-    campaign = before.identification.fit.target.oscillator.campaign
+def comparisons(
+    before: Corrected, as_read: Campaign, beside: Sequence[Effect] = (), fit: Fit | None = None
+) -> tuple[Step, ...]:
+    """Faults that comparing the recordings shows, what is corrected together in a step.
+
+    They are compared by the base model and those effects `beside` it that hold for all recordings
+    alike; `fit` knows where their parameters begin.
+    """
+    base, noise = before.identification.fit, before.identification.noise
+    campaign = base.target.oscillator.campaign
     if campaign.keep_faults:
+        return ()
+    effects = shared_effects(beside)
+    values = {} if fit is None else {n: fit.value(n) for n in fit.target.oscillator.layout.names}
+    model = SharedModel(noise, effects, values)
+    whole = model.fitted(campaign) if effects else base
+    if whole is None:
         return ()
     found = [
         replace(one, fault=_as_read(one.fault, campaign, as_read))
-        for one in compare_recordings(before.identification)
+        for one in compare_recordings(whole, model)
     ]
     return tuple(tuple(step) for _, step in groupby(found, key=lambda one: one.after))
+
+
+def shared_effects(effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Effects of the catalogue without a parameter of every recording's own."""
+    return tuple(
+        e
+        for e in effects
+        if not is_formula(e) and all(p.scope != "recording" for p in e.parameters)
+    )
 
 
 def with_step(
@@ -172,7 +198,7 @@ def _sentence(fault: Fault, compared: Compared | None) -> str:
         return words
     change = f"from {compared.before:.3g} to {compared.after:.3g}"
     others = "".join(f" Or {name} ({100 * p:.2g} %)." for name, p in _others(compared))
-    return f"{words} Without it the base model's reduced chi2 goes {change}.{others}"
+    return f"{words} Without it the reduced chi2 goes {change}.{others}"
 
 
 def _entry(fault: Fault, compared: Compared | None) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -88,6 +88,24 @@ def refit(fit: Fit, scores: Sequence[Score], scales: Scales) -> Candidate:
         if not (np.array_equal(start, other) or gained):
             found = better(found, find_mode(target, other, **options))
     return Candidate(effects, found, model_evidence(found))
+
+
+def fit_from(
+    fit: Fit, effects: Sequence[Effect], values: Mapping[str, float], scales: Scales
+) -> Candidate:
+    """Fit a base model with effects from given values of parameters, over growing stretches."""
+    target = extend(fit, effects, scales)
+    layout, acting = target.oscillator.layout, target.oscillator.acting
+    start = transfer(fit, layout, effects, scales, values)
+    for i, parameter in enumerate(layout.parameters):
+        if parameter.name in values:
+            low = max(parameter.lower, target.priors.lower[i])
+            start[i] = np.clip(
+                values[parameter.name], low, min(parameter.upper, target.priors.upper[i])
+            )
+    steps = difference_steps(fit, target, step_sizes(layout.names, acting, scales, ()))
+    found = by_growing_horizon(target, start, steps)
+    return Candidate(tuple(effects), found, model_evidence(found))
 
 
 def by_growing_horizon(target: Target, start: Array, steps: Array) -> Fit:

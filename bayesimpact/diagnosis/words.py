@@ -69,10 +69,16 @@ def failure(fit: Fit) -> str:
     """A sentence where the base model leaves more than half of the signal; else empty."""
     if not base_failed(fit):
         return ""
+    reasons = ["a wrong sign, unit or clock of the recordings"]
+    inputs = [r.input for r in fit.target.oscillator.campaign.recordings if r.input is not None]
+    if inputs:
+        wrong = "sign, delay or kind" if all(i.free for i in inputs) else "sign, scale or kind"
+        hint = "" if all(i.free for i in inputs) else ' (gain = "free" lets the scale be found)'
+        reasons.append(f"a wrong {wrong} of the input{hint}")
+    reasons.append("a stop that is not there or not declared")
     return (
-        "The base fit failed: it leaves more than half of the signal. Likely reasons are a wrong "
-        "sign, unit or clock of the recordings, a stop that is not there or not declared, or "
-        "strong physics outside the base model. "
+        "The base fit failed: it leaves more than half of the signal. Likely reasons are "
+        f"{', '.join(reasons)}, or strong physics outside the base model. "
     )
 
 

@@ -33,7 +33,7 @@ def force(y, v, d, t, z, touching, p, q):  # type: ignore[no-untyped-def]
     inside = 1.0
     x = y - p[5] * p[1]
     if p[4] == 1.0:
-        x = d - p[1]  # called in contact only: a force that jumps at the touch is there at d = 0
+        x = d - p[1]  # called in contact only: a force that jumps at impact is there at d = 0
         if p[1] > 0.0 and z <= 0.0:
             inside = 0.0
     elif p[4] == 2.0:

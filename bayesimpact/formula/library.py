@@ -2,7 +2,7 @@
 
 Some 350 terms. What the base model has already (k1 y, c1 v, k2 d, c2 v in contact, a constant) is
 left out. Shape parameters stand on grids: places where the mass has been, widths of a sixteenth to
-a quarter of the swing; a refit sets them free.
+a quarter of the amplitude; a refit sets them free.
 """
 
 from __future__ import annotations

@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 
 TRIES = 12  # dampings, each eight times the last one
 BENT_AT = 0.1  # of a step: where its second derivative is taken
+SHARE = 0.05  # of the standard deviation: steps for differences
+SHORTER = 0.1  # of that, where steps of that size led nowhere: the model bends or jumps within them
 ROUGH = np.log(4.0)  # steps that were off by more give derivatives for one step only
 
 
@@ -69,6 +71,7 @@ class Climb:
         self.frozen = slopes is not None
         self.stale = False  # the derivatives are those of an earlier theta
         self.roughly = steps is not None and not self.frozen  # good enough far from the mode
+        self.share = SHARE
         self.iterations = 0
         self.noise = layout.roles("noise")
         free = layout.roles("physical", "effect", "nuisance")
@@ -115,7 +118,7 @@ class Climb:
             spread = marginal_sd(matrix[np.ix_(self.moving, self.moving)])
             steps = self.steps.copy()
             better = told & np.isfinite(spread) & (spread > 0)
-            steps[self.moving[better]] = 0.05 * spread[better]
+            steps[self.moving[better]] = self.share * spread[better]
             if np.max(np.abs(np.log(steps / self.steps))) > ROUGH:
                 self.renew()
             self.steps = steps
@@ -136,9 +139,20 @@ class Climb:
         """New derivatives at the next step."""
         self.slopes = None
 
+    @property
+    def can_shorten(self) -> bool:
+        """Whether differences over shorter steps are left to try."""
+        return self.steps is not None and not self.frozen and self.share == SHARE
+
     def refine(self) -> None:
         """From now on derivatives to second order of their steps."""
         self.roughly = False
+        self.renew()
+
+    def shorten(self) -> None:
+        """From now on differences over shorter steps."""
+        if self.steps is not None:
+            self.share, self.steps = self.share * SHORTER, self.steps * SHORTER
         self.renew()
 
     def descend(

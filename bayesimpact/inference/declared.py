@@ -3,7 +3,8 @@
 No quick estimate knows of these effects, so a global search decides where the climb begins: it
 runs on the first cycles, with the general simulator, over the physical parameters and those of the
 effects. Start values come from the first samples and the tail of every recording. Searches are
-repeated until two ends of climbs, the best one among them, agree.
+repeated until two ends of climbs, the best one among them, agree. Of a driven recording the search
+looks at the cycles of its largest motion, and reads their start off the samples.
 """
 
 from __future__ import annotations
@@ -17,16 +18,16 @@ from numpy.typing import NDArray
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.inference.defaults import default_priors
 from bayesimpact.inference.fit import Fit, Target
-from bayesimpact.inference.horizon import growing_horizon
+from bayesimpact.inference.horizon import best_climb
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.inference.noise import Noise
-from bayesimpact.inference.priors import Priors
 from bayesimpact.inference.search import Generation, SearchResult, metropolis_differential_evolution
 from bayesimpact.model.effects.effect import EffectParameter, Scales
 from bayesimpact.model.oscillator import Oscillator
 from bayesimpact.model.parameters import is_added
 from bayesimpact.response.estimates import Estimates
+from bayesimpact.response.rough import first_state
 
 Array = NDArray[np.float64]
 
@@ -86,7 +87,8 @@ def search_declared(
     target = Target(
         Likelihood(oscillator, noise), default_priors(oscillator, estimates, noise, scales)
     )
-    first = _first_cycles(oscillator, target.priors, estimates, noise, scales)
+    guess, *bounds = _bounds(target, estimates, noise, scales)
+    first = FirstCycles(target, guess, *bounds)
     ends: list[tuple[Fit, SearchResult]] = []
     while len(ends) < 2 or not (len(ends) == SEARCHES or is_same_mode(ends[0][0], ends[1][0])):
         result = metropolis_differential_evolution(
@@ -94,9 +96,8 @@ def search_declared(
             evaluations=evaluations or BUDGET * first.lower.size, callback=callback,
         )  # fmt: skip
         start = first.complete(result.best[None])[0]
-        ends.append(
-            (growing_horizon(target, start, steps=first.steps, max_iterations=MOST), result)
-        )
+        start[first.elsewhere] = guess[first.elsewhere]
+        ends.append((best_climb(target, start, steps=first.steps, max_iterations=MOST), result))
         ends.sort(key=lambda end: -np.nan_to_num(end[0].log_posterior, nan=-np.inf))
     (best, result), (second, _) = ends[:2]
     return result, (best, second)
@@ -119,11 +120,18 @@ class FirstCycles:
     ----------
     lower, upper : (p,) bounds; logarithms of positive parameters
     steps : (d,) for differences
+    levels : (R,) noise of the recordings over that of the first one's quantity
+    elsewhere : places in theta of states in which an excerpt, not its recording, begins
     """
 
-    def __init__(self, short: Oscillator, guess: Array, lower: Array, upper: Array) -> None:
-        self.short, self.guess = short, guess
-        self.physical = short.layout.roles("physical", "effect")
+    def __init__(self, target: Target, guess: Array, lower: Array, upper: Array) -> None:
+        self.levels = target.likelihood.scales
+        layout, campaign = target.oscillator.layout, target.oscillator.campaign
+        period = 2 * np.pi / np.sqrt(guess[layout.index("k1")] / campaign.mass)
+        short = campaign.excerpt(CYCLES * period).thinned(CYCLES * period / SAMPLES)
+        self.short = replace(target.oscillator, campaign=short)
+        self.guess, self.elsewhere = _at_excerpt(self.short, guess, period)
+        self.physical = layout.roles("physical", "effect")
         self.logarithmic = lower[self.physical] > 0.0
         self.lower, self.upper = self._coded(lower), self._coded(upper)
         self.steps = STEP * np.maximum(np.maximum(np.abs(guess), np.abs(upper) * 1e-3), 1e-12)
@@ -143,8 +151,9 @@ class FirstCycles:
         """Values (B,) at search coordinates (B, p)."""
         predicted = self.short.predict(self.complete(x))
         total, count = np.zeros(x.shape[0]), 0
-        for recording, rows in zip(self.short.campaign.recordings, predicted, strict=True):
-            residual = recording.samples - rows
+        recordings = self.short.campaign.recordings
+        for recording, rows, level in zip(recordings, predicted, self.levels, strict=True):
+            residual = (recording.samples - rows) / level
             if recording.used is not None:
                 residual = residual[:, recording.used]
             total += np.sum(residual**2, axis=1)
@@ -154,12 +163,29 @@ class FirstCycles:
         return np.where(np.isfinite(value), value, np.inf)
 
 
-def _first_cycles(
-    oscillator: Oscillator, priors: Priors, estimates: Estimates, noise: Noise, scales: Scales
-) -> FirstCycles:
-    layout, campaign = oscillator.layout, oscillator.campaign
+def _at_excerpt(short: Oscillator, guess: Array, period: float) -> tuple[Array, list[int]]:
+    """The guess (d,) with the states in which excerpts of driven recordings begin; their places."""
+    moved, places = guess.copy(), []
+    index = short.layout.index
+    for r in short.campaign.recordings:
+        if r.input is not None:
+            own = [index(f"y0[{r.name}]"), index(f"v0[{r.name}]")]
+            samples = r.samples - guess[index(f"offset[{r.name}]")]
+            moved[own] = first_state(samples, r.interval, period / r.interval)
+            places += own
+    return moved, places
+
+
+def _bounds(
+    target: Target, estimates: Estimates, noise: Noise, scales: Scales
+) -> tuple[Array, Array, Array]:
+    """Guess and bounds of the search, (d,) each."""
+    layout, priors = target.oscillator.layout, target.priors
     owners = {
-        f"{e.id}.{p.name}": p for e in oscillator.acting for p in e.parameters if p.fixed is None
+        f"{e.id}.{p.name}": p
+        for e in target.oscillator.acting
+        for p in e.parameters
+        if p.fixed is None
     }
     guess, lower, upper = (np.zeros(layout.size) for _ in range(3))
     for i, parameter in enumerate(layout.parameters):
@@ -168,15 +194,13 @@ def _first_cycles(
             guess[i], lower[i], upper[i] = _range(owners[bare], scales)
         else:
             guess[i] = estimates.values.get(parameter.name, noise.level)
-            lower[i], upper[i] = guess[i] / WIDE, guess[i] * WIDE
+            lower[i], upper[i] = sorted((guess[i] / WIDE, guess[i] * WIDE))
             if bare == "g":
                 lower[i], upper[i] = -0.2 * scales.amplitude, scales.amplitude
     beyond = (lower >= priors.upper) | (upper <= priors.lower)  # a stated prior that knows better
     lower = np.where(beyond, priors.lower, np.maximum(lower, priors.lower))
     upper = np.where(beyond, priors.upper, np.minimum(upper, priors.upper))
-    duration = CYCLES * 2 * np.pi / np.sqrt(estimates.k1 / campaign.mass)
-    short = campaign.excerpt(duration).thinned(duration / SAMPLES)
-    return FirstCycles(replace(oscillator, campaign=short), guess, lower, upper)
+    return guess, lower, upper
 
 
 def _range(parameter: EffectParameter, scales: Scales) -> tuple[float, float, float]:

@@ -38,7 +38,7 @@ class Box:
         share = (slices + rng.random((size, d))) / size
         return np.minimum(self.lower + share * (self.upper - self.lower), self.upper)
 
-    def fold(self, x: Array) -> Array:
+    def reflect(self, x: Array) -> Array:
         """Points (n, d) with what lies outside mirrored at the bounds, as often as it takes."""
         width = self.upper - self.lower
         turn = np.mod((x - self.lower) / width, 2)
@@ -95,7 +95,7 @@ def generation(
     """One generation at a temperature; `pull` scales the attraction to the leaders."""
     x, f = state.x, state.f
     factor, rate = draw_factors(state.memory, len(x), rng)
-    mutant = box.fold(mutate(x, f, state.archive, factor, pull, rng))
+    mutant = box.reflect(mutate(x, f, state.archive, factor, pull, rng))
     trial = cross(x, mutant, rate, rng)
     f_trial = evaluate(objective, trial)
     accepted = accept(f, f_trial, temperature, rng)

@@ -1,7 +1,7 @@
 """Fits that begin with the beginning of the recordings and then take in ever more of them.
 
-Over many swings a small error of frequency adds up to whole cycles, and the misfit has a side
-minimum for each: a climb with the whole recordings ends in one of them. Over few swings the misfit
+Over many cycles a small error of frequency adds up to whole cycles, and the misfit has a side
+minimum for each: a climb with the whole recordings ends in one of them. Over few cycles the misfit
 is smooth, and what they tell brings the next, longer stretch within reach (Ribeiro, Tiels,
 Umenberger, Schoen and Aguirre 2020, Automatica 121:109158, on the smoothness of the misfit over the
 length of a simulation).
@@ -51,6 +51,20 @@ def growing_horizon(
         )  # fmt: skip
         theta = there.mode if np.isfinite(there.log_posterior) else theta
     return find_mode(target, theta, steps=steps, tolerance=tolerance, max_iterations=max_iterations)
+
+
+def best_climb(
+    target: Target, start: Array, *, steps: Array | None = None, max_iterations: int = 60
+) -> Fit:
+    """The mode over growing horizons or, where an input drives a recording, at once if better.
+
+    The first stretch of an input may tell nothing, and a driven motion forgets how it began.
+    """
+    grown = growing_horizon(target, start, steps=steps, max_iterations=max_iterations)
+    if target.oscillator.inputs is None:
+        return grown
+    direct = find_mode(target, start, steps=steps, max_iterations=max_iterations)
+    return max(direct, grown, key=lambda fit: fit.log_posterior)
 
 
 def stretches(campaign: Campaign, k1: float) -> list[float]:

@@ -19,7 +19,7 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.inference.declared import climbed, is_same_mode, search_declared
 from bayesimpact.inference.defaults import default_priors
 from bayesimpact.inference.fit import Fit, Target
-from bayesimpact.inference.horizon import growing_horizon
+from bayesimpact.inference.horizon import best_climb
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.inference.noise import Noise
@@ -107,14 +107,14 @@ def identify(
     priors = default_priors(oscillator, estimates, noise)
     guess = initial_theta(oscillator, estimates, noise)
     target = Target(Likelihood(oscillator, noise), priors)
-    from_guess = _climbed(target, guess)
+    from_guess = best_climb(target, guess)
     result = from_search = None
     if search:
         result, start = global_search(
             oscillator, priors, guess, rng=rng, evaluations=evaluations, callback=callback,
             scales=target.likelihood.scales,
         )  # fmt: skip
-        from_search = _climbed(target, start)
+        from_search = best_climb(target, start)
     ends = [fit for fit in (from_guess, from_search) if fit is not None]
     best = max(ends, key=lambda fit: fit.log_posterior)
     if (smooth := without_onsets(best)) is not campaign:
@@ -144,22 +144,15 @@ def _with_declared(
     result, (best, other) = search_declared(
         oscillator, estimates, noise, rng=rng, evaluations=evaluations, callback=callback
     )
+    if (smooth := without_onsets(best)) is not oscillator.campaign:
+        oscillator = replace(oscillator, campaign=smooth)
+        target = replace(best.target, likelihood=Likelihood(oscillator, noise))
+        best, other = climbed(target, best), climbed(target, other)
     refined = noise if given else refined_noise(best)
     fit = best
     if refined is not noise:
         fit = climbed(replace(best.target, likelihood=Likelihood(oscillator, refined)), best)
     return Identification(fit, estimates, refined, result, other, best)
-
-
-def _climbed(target: Target, start: Array) -> Fit:
-    """The mode over growing horizons or, where an input drives a recording, at once if better.
-
-    The first stretch of an input may tell nothing, and a driven motion forgets how it began.
-    """
-    grown = growing_horizon(target, start)
-    if target.oscillator.inputs is None:
-        return grown
-    return max(find_mode(target, start), grown, key=lambda fit: fit.log_posterior)
 
 
 def initial_theta(oscillator: Oscillator, estimates: Estimates, noise: Noise) -> Array:

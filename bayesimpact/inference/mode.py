@@ -22,6 +22,7 @@ from bayesimpact.inference.likelihood import Linearisation
 
 Array = NDArray[np.float64]
 
+FIRST_DAMPING = 1e-3  # of the scaled normal equations
 NEAR = 1.0  # size of a step, standard deviations, from which on derivatives are to second order
 SLOW = 0.5  # of the last step's size: above that, old derivatives are renewed
 STALLED = 4.0  # tolerances: a gain that such a step would have brought, or less
@@ -43,15 +44,17 @@ def find_mode(
     """Climb from `start` (d,) to the nearest mode.
 
     `steps` (d,) are difference steps for models without exact derivatives; they are refreshed to a
-    twentieth of the standard deviations as these become known. `slopes` are derivatives that hold
-    near enough all the way (the chord method), where they are known and new ones would be dear.
-    Parameters `held` stay where they start. The noise levels in `start` are ignored. Stops when a
-    step is below `tolerance` standard deviations, or when new derivatives twice gain no more than a
-    few such steps would (or than `LITTLE`, where differences promised more: not converged then).
+    twentieth of the standard deviations as these become known, to a tenth of that where a climb
+    ends short: correlated parameters move a motion by many standard deviations of its noise.
+    `slopes` are derivatives that hold near enough all the way (the chord method), where they are
+    known and new ones would be dear. Parameters `held` stay where they start. The noise levels in
+    `start` are ignored. Stops when a step is below `tolerance` standard deviations, or when new
+    derivatives twice gain no more than a few such steps would (or than `LITTLE`, where differences
+    promised more: not converged then).
     """
     climb = Climb(target, steps, slopes, held)
     here = climb.evaluate(start)
-    damping, converged, last, stalls = 1e-3, False, np.inf, 0
+    damping, converged, last, stalls = FIRST_DAMPING, False, np.inf, 0
     while climb.iterations < max_iterations and not converged:
         slope = climb.linear(here)
         if not slope.is_finite:
@@ -74,10 +77,15 @@ def find_mode(
         elif not (climb.stale or converged):
             creeps = steps is not None and size > DOUBTFUL and gain < LITTLE
             stalls = stalls + 1 if creeps or gain < 0.5 * (STALLED * tolerance) ** 2 else 0
-            if climb.roughly and (stalls == STALLS or not moved):
+            if stalls < STALLS and moved:
+                continue
+            stalls = 0
+            if climb.roughly:
                 climb.refine()
-                stalls = 0
-            elif stalls == STALLS or not moved:
+            elif size > STALLED * tolerance and climb.can_shorten:
+                climb.shorten()
+                damping = FIRST_DAMPING
+            else:
                 converged = moved and size < DOUBTFUL
                 break
     return climb.fit(here, converged)

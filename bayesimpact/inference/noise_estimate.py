@@ -3,7 +3,7 @@
 A recording is cut into windows so short that any oscillation is a polynomial of degree five in
 them; what the polynomials leave is noise. Level and correlation maximise the likelihood of exactly
 these remainders (restricted maximum likelihood, Patterson and Thompson 1971), so no degrees of
-freedom are counted twice. Where there is a stop, only swings on its free side count: impacts are
+freedom are counted twice. Where there is a stop, only cycles on its free side count: impacts are
 kinks that no polynomial follows. Windows that something else disturbs stand out and are left aside.
 A steady hum is no noise: its sine is fitted to the remainders of all windows and taken off.
 """
@@ -146,7 +146,7 @@ def _remainder(
         return np.concatenate(rows)
 
     values = left(side)
-    if side and values.size < LEAST_NUMBERS:  # hardly any free swing: windows at the stop too
+    if side and values.size < LEAST_NUMBERS:  # hardly any free cycle: windows at the stop too
         values = left(False)
     return _Remainder(values, basis) if values.shape[0] >= 4 else None
 

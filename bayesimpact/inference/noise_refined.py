@@ -4,7 +4,7 @@ Short windows say little about strongly correlated noise, and an error in its co
 error in the noise where the motion is. A fit takes the motion out of the recordings; what it may
 have left out of the physics moves the mass below a few times the contact's natural frequency. The
 periodogram of its residuals above that is noise whatever the model lacks (Whittle 1953), but for
-the lines of a hum. Behind a filter, half swings tell the level of the noise and nothing of its
+the lines of a hum. Behind a filter, half cycles tell the level of the noise and nothing of its
 colour: what the filter let pass of it is compared with what it makes of white noise.
 """
 

@@ -3,8 +3,8 @@
 A Savitzky-Golay filter leaves its signature in the noise: nulls at frequencies that depend on
 window and order only. Above the frequencies of the motion the periodogram is noise, so filters are
 compared by the Whittle likelihood of its ordinates (Whittle 1953), against every spectrum without
-side lobes. The level is estimated where the information is, in the passband, from swings on the
-free side: a half swing is a sinusoid whatever the obstacle.
+side lobes. The level is estimated where the information is, in the passband, from half cycles on
+the free side: a half cycle is a sinusoid whatever the obstacle.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ LINE_REACH = 17  # ordinates over which the noise has one level
 LINE = 7.0  # nats beyond the largest of as many ordinates of noise
 LEAST_FIT = 1e-4  # p-value of the scatter about the filter's spectrum
 FLOORS = (-30.0, 10.0)  # log of a white floor over the passband: none, and nothing else
-STRONG = 0.3  # of the largest variance: combinations of a half swing that the filter let pass
-LONGEST = 1024  # samples of a half swing that are used, for eigenvectors in a second
-MOTION = 3  # unknowns of a half swing at a given frequency and decay
+STRONG = 0.3  # of the largest variance: combinations of a half cycle that the filter let pass
+LONGEST = 1024  # samples of a half cycle that are used, for eigenvectors in a second
+MOTION = 3  # unknowns of a half cycle at a given frequency and decay
 
 Spectra = list[tuple[Array, Array, float]]  # frequencies Hz, ordinates, sampling interval s
 
@@ -126,39 +126,39 @@ def nulls(smoothing: Smoothing, interval: float, count: int = 3) -> tuple[float,
 
 
 def smoothed_noise(recordings: Sequence[Recording], smoothing: Smoothing) -> Noise:
-    """Raw noise level behind a known filter, from half swings on the free side.
+    """Raw noise level behind a known filter, from half cycles on the free side.
 
-    Frequency and decay of the swings are those that leave the least.
+    Frequency and decay of the half cycles are those that leave the least.
     """
     found = [(r, s) for r in recordings if (s := _half_cycles(r)) is not None]
-    swings = [_passband(s, smoothing, r.interval) for r, s in found]
-    swings = [one for one in swings if one.numbers.shape[1] > MOTION]
-    if not swings:
-        raise ValueError("too few half swings for a noise estimate")
+    halves = [_passband(s, smoothing, r.interval) for r, s in found]
+    halves = [one for one in halves if one.numbers.shape[1] > MOTION]
+    if not halves:
+        raise ValueError("too few half cycles for a noise estimate")
 
     def energy(x: Array) -> float:
-        return sum(_left(one, x)[0] for one in swings)
+        return sum(_left(one, x)[0] for one in halves)
 
-    # windows end where the motion crosses its median, on the free side: the whole swing is longer
-    first = 0.9 * np.pi / max(one.duration for one in swings)
+    # windows end where the motion crosses its median, on the free side: the whole cycle is longer
+    first = 0.9 * np.pi / max(one.duration for one in halves)
     start = first * np.array([[1.0, 0.0], [0.9, 0.0], [1.0, 0.01]])
     options = {"initial_simplex": start, "xatol": 1e-7 * first, "fatol": np.inf, "maxiter": 400}
     best = _minimize(energy, start[0], method="Nelder-Mead", options=options).x
-    parts = [_left(one, best) for one in swings]
+    parts = [_left(one, best) for one in halves]
     freedom = sum(f for _, f in parts)
     level = float(np.sqrt(sum(e for e, _ in parts) / freedom))
-    return Noise(0.0, smoothing, level, float(np.sqrt(0.5 / freedom)), 0.0, "half swings")
+    return Noise(0.0, smoothing, level, float(np.sqrt(0.5 / freedom)), 0.0, "half cycles")
 
 
 @dataclass(frozen=True, eq=False)
-class _Swings:
-    """Half swings of a recording as white numbers in a filter's passband.
+class _HalfCycles:
+    """Half cycles of a recording as white numbers in a filter's passband.
 
     Attributes
     ----------
-    duration : of a half swing, s
+    duration : of a half cycle, s
     numbers : (W, m), of variance that of the raw noise
-    times : (n,) of a half swing's samples from its middle, s
+    times : (n,) of a half cycle's samples from its middle, s
     white : (n, m), samples to numbers
     """
 
@@ -178,7 +178,7 @@ def _half_cycles(recording: Recording) -> tuple[float, Array, Array] | None:
         return None
     half_period = float(np.median([s for s in spans if s > 0.5 * max(spans)]))
     length = min(int(half_period), LONGEST)
-    starts = _swings(recording, length)
+    starts = _free_halves(recording, length)
     if length < 8 or not starts:
         return None
     steps = np.arange(length, dtype=np.float64) - 0.5 * (length - 1)
@@ -187,32 +187,34 @@ def _half_cycles(recording: Recording) -> tuple[float, Array, Array] | None:
     return (half_period - 1.0) * recording.interval, rows, times
 
 
-def _passband(swings: tuple[float, Array, Array], smoothing: Smoothing, interval: float) -> _Swings:
-    """What the filter lets pass of half swings, its power divided out."""
-    duration, rows, times = swings
+def _passband(
+    halves: tuple[float, Array, Array], smoothing: Smoothing, interval: float
+) -> _HalfCycles:
+    """What the filter lets pass of half cycles, its power divided out."""
+    duration, rows, times = halves
     values, vectors = np.linalg.eigh(_covariance(smoothing, interval, times.size))
     strong = values > STRONG * values[-1]
     white = vectors[:, strong] / np.sqrt(values[strong])
-    return _Swings(duration, (rows - rows.mean(axis=1, keepdims=True)) @ white, times, white)
+    return _HalfCycles(duration, (rows - rows.mean(axis=1, keepdims=True)) @ white, times, white)
 
 
-def _left(swings: _Swings, x: Array) -> tuple[float, int]:
-    """Energy and degrees of freedom that decaying sinusoids leave of half swings.
+def _left(halves: _HalfCycles, x: Array) -> tuple[float, int]:
+    """Energy and degrees of freedom that decaying sinusoids leave of half cycles.
 
     x: angular frequency, rad/s, and decay rate, 1/s.
     """
-    times = swings.times
+    times = halves.times
     decay = np.exp(-x[1] * times)
     motion = [np.ones(times.size), decay * np.cos(x[0] * times), decay * np.sin(x[0] * times)]
-    basis = np.linalg.qr(swings.white.T @ np.column_stack(motion))[0]
-    energy = np.sum((swings.numbers - (swings.numbers @ basis) @ basis.T) ** 2, axis=1)
-    freedom = swings.numbers.shape[1] - MOTION
+    basis = np.linalg.qr(halves.white.T @ np.column_stack(motion))[0]
+    energy = np.sum((halves.numbers - (halves.numbers @ basis) @ basis.T) ** 2, axis=1)
+    freedom = halves.numbers.shape[1] - MOTION
     scale = np.median(energy) / stats.chi2.median(freedom)
     kept = energy <= scale * stats.chi2.ppf(0.999, freedom)
     return float(energy[kept].sum()), int(kept.sum()) * freedom
 
 
-def _swings(recording: Recording, length: int) -> list[int]:
+def _free_halves(recording: Recording, length: int) -> list[int]:
     """Starts of windows centred on the turning points of the free (lower) side."""
     samples, used = recording.samples, recording.used
     centred = samples - np.median(samples)

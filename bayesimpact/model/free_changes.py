@@ -1,6 +1,6 @@
 """Two independent free changes of a simulated motion, from which small forces can be superposed.
 
-They are differences of simulations, so they carry every law and every contact, jumps at the touch
+They are differences of simulations, so they carry every law and every contact, jumps at impact
 included. As they decay they drown in rounding: others take over, stretch by stretch.
 """
 

@@ -25,7 +25,7 @@ from bayesimpact.model.added.contact_state import (
     heading,
     resolve,
     set_directions,
-    settle,
+    update_contact,
 )
 from bayesimpact.model.added.context import (
     C1,
@@ -106,7 +106,7 @@ def cruise(y: Any, v: Any, n0: Any, j: Any, stride: Any, end: Any, flow: Any, w:
         y, v, n0 = y1, v1, n1
         if flow.memory:
             keep_memory(w)
-        settle(y, v, t + h, w)
+        update_contact(y, v, t + h, w)
     return y, v, n0, j, event, y1, v1, n1
 
 
@@ -162,7 +162,7 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
         if flow.memory:
             keep_memory(w)
         if event != LEAVE:
-            settle(y, v, t, w)
+            update_contact(y, v, t, w)
         if event != NONE:
             break
     if flow.touching == 0.0 and not flow.memory:

@@ -9,8 +9,6 @@ where forces do so nearly the same that their differences drown in its errors.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,14 +18,12 @@ from bayesimpact.model.added.context import (
     JUMP_AT_TURN,
     LAW_FIRST,
     LAW_FLAGS,
-    LAW_FORCE,
     LAW_RATE,
     LAW_TRAVEL,
 )
-from bayesimpact.model.callback import call_law
-from bayesimpact.model.compiled import compiled
 from bayesimpact.model.oscillator import Oscillator
 from bayesimpact.model.parameters import SLOTS
+from bayesimpact.model.path_forces import add_forces
 from bayesimpact.model.superposition import Motion, answers, motion_along
 from bayesimpact.model.threads import in_shares
 
@@ -112,29 +108,15 @@ def _changes(oscillator: Oscillator, r: int, q: Array) -> Array:
 
 def _forces(motion: Motion, q: Array, laws: Index) -> Array:
     """By how much the laws' forces along a motion differ from those of the first slots, (K, n)."""
-    out = np.zeros((q.shape[0] - 1, motion.y.size))
+    out = np.zeros((q.shape[0], motion.y.size))
     for law, (first, end) in zip(laws, _spans(q.shape[1], laws), strict=True):
         rows = np.flatnonzero((q[:, first:end] != q[0, first:end]).any(axis=1))
+        known = np.zeros((1, motion.y.size))
+        add_forces(law, motion.y, motion.v, motion.d, motion.t, q[:1], np.zeros(1, np.int64), known)
 
         def add(low: int, high: int, law: Index = law, rows: Index = rows) -> None:
-            _add_forces(law, motion.y, motion.v, motion.d, motion.t, q, rows[low:high], out)
+            add_forces(law, motion.y, motion.v, motion.d, motion.t, q, rows[low:high], out)
 
         in_shares(add, rows.size)
-    return out
-
-
-@compiled(nogil=True)
-def _add_forces(
-    law: Any, y: Any, v: Any, d: Any, t: Any, q: Any, rows: Any, out: Any
-) -> None:  # fmt: skip
-    """Add to `out` (K, n) a law's force for some rows of q (1 + K, Q), less that for the first."""
-    base, size, place = q.ctypes.data, 8 * q.shape[1], 8 * law[LAW_FIRST]
-    for i in range(y.size):
-        touching = 1.0 if d[i] > 0.0 else 0.0
-        known = call_law(law[LAW_FORCE], y[i], v[i], d[i], t[i], 0.0, touching, base + place, base)
-        for row in rows:
-            own = base + row * size
-            out[row - 1, i] += (
-                call_law(law[LAW_FORCE], y[i], v[i], d[i], t[i], 0.0, touching, own + place, own)
-                - known
-            )
+        out[rows] -= known
+    return out[1:]

@@ -20,7 +20,7 @@ _PROBABILITY = 0.9  # of the bands of `response.check`
 
 
 def backbone_summary(posterior: Posterior, rng: np.random.Generator) -> BackboneSummary | None:
-    """Bands, fraction inside and p-value per case; None when no recording has a complete swing.
+    """Bands, fraction inside and p-value per case; None when no recording has a complete cycle.
 
     Recordings with a measured input are left out: what shows in them is not the free motion.
     Damping ratios are those of Eq. 5, as in Fig. 13 of Tian et al. The p-values of the recordings
@@ -101,18 +101,18 @@ def branch_curve(recording: str, case: str, check: BackboneCheck, side: str) -> 
     """Frequency and damping of one side with their bands, where frequencies can be compared."""
     branch = getattr(check.backbone, side)
     frequency, damping = check.bands[f"{side} frequency"], check.bands[f"{side} damping ratio"]
-    swings = frequency.at.astype(int)
-    ratio = np.full(swings.size, np.nan)
-    ratio_band = np.full((swings.size, 3), np.nan)
-    _, here, there = np.intersect1d(swings, damping.at.astype(int), return_indices=True)
+    cycles = frequency.at.astype(int)
+    ratio = np.full(cycles.size, np.nan)
+    ratio_band = np.full((cycles.size, 3), np.nan)
+    _, here, there = np.intersect1d(cycles, damping.at.astype(int), return_indices=True)
     ratio[here] = damping.recorded[there]
     ratio_band[here] = _stacked(damping.low, damping.median, damping.high)[there]
     return Curve(
         recording=recording,
         case=case,
         branch=side,
-        times=branch.times[swings],
-        amplitude=branch.amplitude[swings],
+        times=branch.times[cycles],
+        amplitude=branch.amplitude[cycles],
         frequency=frequency.recorded,
         damping_ratio=ratio,
         frequency_band=_stacked(frequency.low, frequency.median, frequency.high),

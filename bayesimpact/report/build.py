@@ -161,7 +161,7 @@ def _results(
         diagnosis_arrays=diagnosis[1] or {},
         notes=campaign.notes,
     )
-    return checks.judged(summary)
+    return checks.assessed(summary)
 
 
 def recording_results(fit: Fit) -> tuple[RecordingResult, ...]:

@@ -49,7 +49,7 @@ DIAGNOSIS = {
         "noise. Middle: reduced χ² of each recording, the grey stripe likewise."
     ),
     "bands": (
-        "Backbone and damping before and after: recorded minus median of simulated swings, in "
+        "Backbone and damping before and after: recorded minus median of simulated cycles, in "
         "half-widths of the 90 % band (grey). Left: frequency against amplitude. Right: damping "
         "ratio against time."
     ),
@@ -158,7 +158,7 @@ def _backbone(results: Results) -> str:
 
 def _damping(results: Results) -> str:
     return (
-        "Damping ratio (Eq. 5: averaged from the first swing to the time shown). Above: dots "
+        "Damping ratio (Eq. 5: averaged from the first cycle to the time shown). Above: dots "
         "recorded, bands simulated, one curve per release. Below: how far recorded ratios lie from "
         "the median of simulated ones, in half-widths of the band."
     )

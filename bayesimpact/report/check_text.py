@@ -96,8 +96,8 @@ def _recordings_block(campaign: Campaign) -> str:
     for r in campaign.recordings:
         scale, _ = _shown(r)
         period = rough_period(r.samples, r.interval)
-        swing = np.abs(r.samples - np.median(r.samples)).max() * scale
-        numbers = [1 / r.interval, r.start, r.duration, period, r.samples[0] * scale, swing]
+        amplitude = np.abs(r.samples - np.median(r.samples)).max() * scale
+        numbers = [1 / r.interval, r.start, r.duration, period, r.samples[0] * scale, amplitude]
         row = [r.name, r.case or "-", str(r.samples.size), *(f"{x:.4g}" for x in numbers)]
         rows.append([*row, envelope_bars(r)])
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]

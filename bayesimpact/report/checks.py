@@ -10,7 +10,7 @@ from bayesimpact.report.results import Check, Results
 from bayesimpact.report.units import chi2, display, number, p_value, p_words, significant, typeset
 from bayesimpact.report.whiteness import whiteness
 
-__all__ = ["amount", "judge", "judged", "model_name", "whiteness"]
+__all__ = ["amount", "assess", "assessed", "model_name", "whiteness"]
 
 EXCESS = 1.2  # residual over noise from which a model does not describe the recordings
 SURE, SUSPICIOUS = 5.0, 3.0  # standard errors of the reduced chi2
@@ -19,14 +19,14 @@ MISFIT = "Misfit against the independent noise estimate"
 SD_RATIO = (0.8, 1.25)  # of posterior to Laplace standard deviations
 
 
-def judged(results: Results) -> Results:
+def assessed(results: Results) -> Results:
     """The same results with verdict, headline and checklist."""
-    verdict = judge(results.reduced_chi2, results.chi2_z)
+    verdict = assess(results.reduced_chi2, results.chi2_z)
     results = replace(results, verdict=verdict)
     return replace(results, headline=headline(results), checks=checklist(results))
 
 
-def judge(reduced_chi2: float, z: float) -> str:
+def assess(reduced_chi2: float, z: float) -> str:
     """Verdict on the misfit against the noise estimated from the recordings alone.
 
     Parameters

@@ -138,7 +138,7 @@ class Curve:
     recording, case : whose
     branch : "upper" (towards the stop) or "lower"
     times, amplitude, frequency, damping_ratio : (k,) as recorded; s, m, Hz, 1
-    frequency_band, damping_band : (k, 3) lower end, median and upper end at the same swings
+    frequency_band, damping_band : (k, 3) lower end, median and upper end at the same cycles
     """
 
     recording: str
@@ -243,7 +243,7 @@ class Results:
     recordings, rows : what was measured; what was found
     effects : added to the base oscillator
     noise, chain : of the measurement
-    verdict : "adequate", "slight", "inadequate" or "overestimated" (see `checks.judge`)
+    verdict : "adequate", "slight", "inadequate" or "overestimated" (see `checks.assess`)
     headline : the verdict in words
     reduced_chi2, chi2_z : misfit of all recordings against the independent noise level, and its
         distance from 1 in standard errors

@@ -25,7 +25,7 @@ Damping = Literal["reference", "local"]
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """One side of the backbone, one entry per swing, in the order of time.
+    """One side of the backbone, one entry per cycle, in the order of time.
 
     Attributes
     ----------
@@ -72,10 +72,10 @@ def backbone(
 
     Two estimators of the frequency:
 
-    "half" (Tian et al., Eq. 1): f = 1 / (2 T) with T the half swing above (below) rest. This is the
+    "half" (Tian et al., Eq. 1): f = 1 / (2 T) with T the half cycle above (below) rest. This is the
     paper's, and what the quick estimates need: the lower branch knows nothing of the stop.
 
-    "centred": the frequency of the whole cycle, from the half swing above rest and half of each of
+    "centred": the frequency of the whole cycle, from the half cycle above rest and half of each of
     its neighbours below. The upper branch pairs it with the upper extreme, the lower branch with
     the geometric mean of the two lower extremes around it. Amplitude and period then belong to the
     same instant and the decay cancels to first order: choose this to compare with
@@ -84,11 +84,11 @@ def backbone(
     Two damping ratios:
 
     "reference" (Eq. 5): (ln a_0 - ln a) / (w (t - t_0)), counted from the first extreme of the
-    branch, where it is NaN. It averages over all swings since then, so it depends on that first
+    branch, where it is NaN. It averages over all cycles since then, so it depends on that first
     extreme, and late values still carry the first impacts.
 
     "local": from the logarithmic decrement d to the next extreme of the branch,
-    d / sqrt(4 pi^2 + d^2); NaN for the last swing.
+    d / sqrt(4 pi^2 + d^2); NaN for the last cycle.
 
     Parameters
     ----------
@@ -97,13 +97,13 @@ def backbone(
     rest : reading at rest; None estimates it from the recording
     average : order N of the moving average over frequencies and times (Eq. 2); the amplitude is
         then the envelope, straight between the extremes, at the averaged time (Eq. 3)
-    noise : standard deviation of the noise, in the unit of the samples; None estimates it. Swings
+    noise : standard deviation of the noise, in the unit of the samples; None estimates it. Cycles
         below six times this are not used
     estimator, damping : see above
 
     Returns
     -------
-    Backbone; a branch is empty when the motion has no complete swing on its side.
+    Backbone; a branch is empty when the motion has no complete cycle on its side.
 
     Raises
     ------
@@ -119,9 +119,9 @@ def backbone(
     period = rough_period(signal)
     level = local.noise_level(signal, period) if noise is None else float(noise)
     zero = rest_position(signal, period, level) if rest is None else float(rest)
-    swings = half_cycles(signal, zero, period, level)
+    halves = half_cycles(signal, zero, period, level)
     pick = _halves if estimator == "half" else _centred
-    upper, lower = (_branch(*pick(swings, s), interval, average, damping) for s in (1, -1))
+    upper, lower = (_branch(*pick(halves, s), interval, average, damping) for s in (1, -1))
     return Backbone(upper, lower, zero, level)
 
 
@@ -140,20 +140,20 @@ def _checked(samples: ArrayLike, interval: float, average: int, noise: float | N
     return signal
 
 
-def _halves(swings: HalfCycles, side: int) -> tuple[Floats, Floats, Floats]:
-    """Times, full periods and amplitudes (in samples) of the half swings of one side, Eq. 1."""
-    mine = swings.side == side
-    return swings.peaks[mine], 2 * swings.durations[mine], swings.amplitudes[mine]
+def _halves(halves: HalfCycles, side: int) -> tuple[Floats, Floats, Floats]:
+    """Times, full periods and amplitudes (in samples) of the half cycles of one side, Eq. 1."""
+    mine = halves.side == side
+    return halves.peaks[mine], 2 * halves.durations[mine], halves.amplitudes[mine]
 
 
-def _centred(swings: HalfCycles, side: int) -> tuple[Floats, Floats, Floats]:
-    """The same for whole cycles centred on an upper half swing."""
-    k = np.flatnonzero(swings.side == 1)
-    k = k[(k > 0) & (k < swings.side.size - 1)]
-    d, a = swings.durations, swings.amplitudes
+def _centred(halves: HalfCycles, side: int) -> tuple[Floats, Floats, Floats]:
+    """The same for whole cycles centred on an upper half cycle."""
+    k = np.flatnonzero(halves.side == 1)
+    k = k[(k > 0) & (k < halves.side.size - 1)]
+    d, a = halves.durations, halves.amplitudes
     period = 0.5 * d[k - 1] + d[k] + 0.5 * d[k + 1]
     amplitude = a[k] if side == 1 else np.sqrt(a[k - 1] * a[k + 1])
-    return swings.peaks[k], period, amplitude
+    return halves.peaks[k], period, amplitude
 
 
 def _branch(

@@ -84,7 +84,7 @@ def bilinear_backbone(
 
 
 def contact_stiffness(mass: float, k1: float, g: float, amplitude: float, above: float) -> float:
-    """Stiffness of the stop from one upper half swing: inverts `upper_frequency`.
+    """Stiffness of the stop from one upper half cycle: inverts `upper_frequency`.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def contact_stiffness(mass: float, k1: float, g: float, amplitude: float, above:
 
     Returns
     -------
-    k2 in N/m; 0 when the half swing is not shorter than a free one, infinity when it is shorter
+    k2 in N/m; 0 when the half cycle is not shorter than a free one, infinity when it is shorter
     than the flight to the stop and back.
     """
     w1 = np.sqrt(k1 / mass)

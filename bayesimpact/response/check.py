@@ -2,7 +2,7 @@
 
 The same extractor runs on the recording and on simulated recordings (noise included), so that its
 bias is in both and cancels. The backbone discards the phase and most of the noise: it is no
-likelihood, but it shows in which swing and on which side a model goes wrong.
+likelihood, but it shows in which cycle and on which side a model goes wrong.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Band:
 
     Attributes
     ----------
-    at : swing number counted from 0, or amplitude in m
+    at : cycle number counted from 0, or amplitude in m
     recorded : the recording's curve
     low, median, high : 5 %, 50 % and 95 % quantiles of the simulations
     inside : fraction of the recorded points between `low` and `high`; NaN without points
@@ -97,8 +97,8 @@ def check_backbone(
     samples : (n,) recording, m
     draws : (D, n) simulated recordings with noise and, where the chain has one, its filter; D >= 19
     interval : s
-    against : align the curves by swing number, or by amplitude (frequency and damping ratio only;
-        amplitudes stay aligned by swing)
+    against : align the curves by cycle number, or by amplitude (frequency and damping ratio only;
+        amplitudes stay aligned by cycle)
     rest, average, noise, estimator, damping : as for `backbone`; noise None takes the recording's
         for all
 

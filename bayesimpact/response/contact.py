@@ -114,7 +114,7 @@ def fit_contact(
     Parameters
     ----------
     cycles : of all recordings
-    free : the free oscillator; it is refined within its standard errors, because where no swing is
+    free : the free oscillator; it is refined within its standard errors, because where no cycle is
         free the cycles tell c1 and c2 apart better than the flights do
     cases : number of obstacles
     start : an earlier estimate to start from; None looks on a grid

@@ -1,7 +1,7 @@
 """The displacement behind a velocity or an acceleration, as start values and pictures need it.
 
 Integrating a reading adds up its noise and its offset to a drift that soon exceeds the motion. A
-high-pass filter that removes it removes the wandering of the swings' middle as well, by which the
+high-pass filter that removes it removes the wandering of the cycles' middle as well, by which the
 gap shows. But the motion itself says where its drift is zero: wherever the mass is free, the
 acceleration vanishes where the displacement does, and is largest, on the side without a stop, where
 the velocity vanishes. The integral is anchored at these places, once or twice a cycle, and the
@@ -63,24 +63,24 @@ def displacement(samples: Floats, interval: float, order: int) -> Displacement:
     if order == 0:
         return Displacement(samples, None, noise)
     bias = _bias(samples, period, noise)
-    swings = half_cycles(samples, bias, period, noise)
+    halves = half_cycles(samples, bias, period, noise)
     rate = samples - bias
     if order == 2:
-        still = swings.peaks[swings.side > 0]  # the stop is on the side of negative acceleration
+        still = halves.peaks[halves.side > 0]  # the stop is on the side of negative acceleration
         rate = _integral(rate, interval, still, period)
-        return Displacement(_integral(rate, interval, swings.crossings, period), bias, noise)
-    return Displacement(_integral(rate, interval, swings.peaks, period, AVERAGED), bias, noise)
+        return Displacement(_integral(rate, interval, halves.crossings, period), bias, noise)
+    return Displacement(_integral(rate, interval, halves.peaks, period, AVERAGED), bias, noise)
 
 
 def _bias(samples: Floats, period: float, noise: float) -> float:
     """Mean over whole cycles: a derivative of a motion that stays in place has none."""
     bias = float(samples.mean())
     for _ in range(3):
-        swings: HalfCycles = half_cycles(samples, bias, period, noise)
-        whole = 2 * (swings.side.size // 2)
+        halves: HalfCycles = half_cycles(samples, bias, period, noise)
+        whole = 2 * (halves.side.size // 2)
         if whole == 0:
             break
-        first, last = swings.crossings[0], swings.crossings[whole]
+        first, last = halves.crossings[0], halves.crossings[whole]
         bias = float(samples[int(np.ceil(first)) : int(np.floor(last)) + 1].mean())
     return bias
 

@@ -1,14 +1,8 @@
 """Quick estimates where recordings have a measured input: the equation of motion in weak form.
 
-The equation is multiplied by a smooth bump phi that vanishes outside a short stretch, integrated
-over it, and the derivatives are moved onto the bump by parts (modulating functions: Shinbrot 1957,
-Trans. ASME 79:1579):
-
-    int m phi'' y - c1 phi' y + k1 phi y + k2 phi w - c2 phi' w = int phi u,     w = max(y - g, 0)
-
-for (y - g)' = w' in contact. So no reading is differentiated, initial conditions do not enter, and
-all unknowns but the gap are found by linear least squares over many stretches; the reading at which
-a recording touches the stop is scanned, for each by itself.
+Initial conditions do not enter there, and all unknowns but the gap are found by linear least
+squares over many stretches; the reading at which a recording touches the stop is scanned, for each
+by itself.
 """
 
 from __future__ import annotations
@@ -20,14 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
-from bayesimpact.data.recording import Recording
 from bayesimpact.response.half_cycles import rough_period
+from bayesimpact.response.weak_form import Rows, products, rows_of
 
 Floats = NDArray[np.float64]
 
-POWER = 6  # of the bump (1 - x^2)^POWER: smooth enough for sums over samples to be integrals
 FREE, STOPPED = 0.6, 0.2  # half width of the bump, natural periods, without and with a stop
-LEAST_HALF = 4  # samples
 ROUNDS = 3
 PLACES = 41  # of the stop that are tried at once, between these quantiles of the readings
 LOW, HIGH = 0.02, 0.98
@@ -57,21 +49,6 @@ class Driven:
     v0: Floats
 
 
-@dataclass(frozen=True, eq=False)
-class _Rows:
-    """Stretches of one recording: weights on samples, and products that do not depend on the gap.
-
-    phi, slope : (w,) weights of int phi x and of int phi' x
-    base : (n, 4) int phi y, -int phi' y, int phi u, int phi; target (n,) -int m phi'' y
-    """
-
-    phi: Floats
-    slope: Floats
-    base: Floats
-    target: Floats
-    hop: int
-
-
 def estimate_driven(campaign: Campaign) -> Driven:
     """Estimates from all recordings of a campaign, free decays among them."""
     recordings = campaign.recordings
@@ -79,7 +56,7 @@ def estimate_driven(campaign: Campaign) -> Driven:
     touch = np.full(len(recordings), np.inf)
     for _ in range(ROUNDS):  # the width of the bumps follows the natural period
         width = (STOPPED if campaign.stop else FREE) * natural
-        rows = [_rows(r, campaign.mass, width) for r in recordings]
+        rows = [rows_of(r, campaign.mass, width) for r in recordings]
         if campaign.stop:
             touch = np.array([_touch(campaign, r, own) for r, own in enumerate(rows)])
         found = _solve(campaign, rows, touch)
@@ -88,47 +65,10 @@ def estimate_driven(campaign: Campaign) -> Driven:
     return _made_usable(campaign, found, stiffness)
 
 
-def bump(half: int) -> tuple[Floats, Floats, Floats]:
-    """phi, phi' and phi'' at 2 half + 1 samples, the sample as unit of time."""
-    x = np.linspace(-1.0, 1.0, 2 * half + 1)
-    inside = 1.0 - x * x
-    phi = inside**POWER
-    slope = -2.0 * POWER * x * inside ** (POWER - 1) / half
-    bend = 4.0 * POWER * (POWER - 1) * x * x * inside ** (POWER - 2)
-    return phi, slope, (bend - 2.0 * POWER * inside ** (POWER - 1)) / half**2
-
-
-def _rows(recording: Recording, mass: float, width: float) -> _Rows:
-    dt, most = recording.interval, (recording.samples.size - 1) // 4
-    half = max(min(round(width / dt), most), min(LEAST_HALF, most))
-    phi, slope, bend = bump(half)
-    phi, slope, bend = phi * dt, slope, bend / dt
-    hop = max(1, half // 2)
-    y = _products(recording.samples, hop, phi, -slope, bend)
-    push = np.zeros(y.shape[0])
-    if recording.input is not None:
-        # of a line between samples, to second order: the triangle's variance is dt^2 / 6
-        held = phi + dt * dt * bend / 12.0
-        push = _products(recording.input.force(mass, dt), hop, held)[:, 0]
-    whole = np.full(push.size, phi.sum())
-    kept = np.ones(push.size, dtype=bool)
-    if recording.used is not None:
-        kept = _products(np.where(recording.used, 0.0, 1.0), hop, np.ones(phi.size))[:, 0] == 0.0
-    weight = np.where(kept, 1.0, 0.0)
-    base = np.column_stack([y[:, 0], y[:, 1], push, whole]) * weight[:, None]
-    return _Rows(phi, -slope, base, -mass * y[:, 2] * weight, hop)
-
-
-def _products(x: Floats, hop: int, *weights: Floats) -> Floats:
-    """Sums of weights (w,) times x over windows that start `hop` samples apart, (n, weights)."""
-    windows = np.lib.stride_tricks.sliding_window_view(x, weights[0].size)[::hop]
-    return np.asarray(windows @ np.column_stack(weights))
-
-
 def _system(
-    campaign: Campaign, chosen: Sequence[int], rows: Sequence[_Rows], touch: Floats
+    campaign: Campaign, chosen: Sequence[int], rows: Sequence[Rows], touch: Floats
 ) -> tuple[Floats, Floats]:
-    """Matrix and right-hand side of the recordings `chosen`, whose rows and readings at the touch
+    """Matrix and right-hand side of the recordings `chosen`, whose rows and readings at impact
     these are; unknowns k1, c1, gain, [c2, k2 of every case], k1 times offsets.
 
     Where no gain is free, its column is 0.
@@ -147,7 +87,7 @@ def _system(
             target = target + own.base[:, 2]
         if np.isfinite(touch[i]):
             inside = np.maximum(recording.samples - touch[i], 0.0)
-            touched = _products(inside, own.hop, own.phi, own.slope)
+            touched = products(inside, own.hop, own.phi, own.slope)
             touched[own.base[:, 3] == 0.0] = 0.0
             block[:, 3] = touched[:, 1]
             block[:, 4 + cases.index(recording.case)] = touched[:, 0]
@@ -167,7 +107,7 @@ def _least_squares(matrix: Floats, right: Floats) -> tuple[Floats, float]:
     return np.where(size > 0.0, solution / np.where(size > 0.0, size, 1.0), 0.0), float(left @ left)
 
 
-def _touch(campaign: Campaign, r: int, own: _Rows) -> float:
+def _touch(campaign: Campaign, r: int, own: Rows) -> float:
     """Reading at which a recording, by itself, touches the stop; inf where none is seen."""
 
     def left(touch: float) -> float:
@@ -186,7 +126,7 @@ def _touch(campaign: Campaign, r: int, own: _Rows) -> float:
     return best
 
 
-def _solve(campaign: Campaign, rows: Sequence[_Rows], touch: Floats) -> Driven:
+def _solve(campaign: Campaign, rows: Sequence[Rows], touch: Floats) -> Driven:
     """Estimates without the initial motion."""
     solution, _ = _least_squares(*_system(campaign, range(len(rows)), rows, touch))
     k1, c1, gain = (float(x) for x in solution[:3])

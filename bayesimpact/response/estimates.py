@@ -186,7 +186,7 @@ def _collect(
     c1, k1, sd = free.c1, free.k1, {"c1": free.sd_c1, "k1": free.sd_k1}
     g, c2, k2 = float("inf"), 0.0, {}
     if contact is not None:
-        # The joint fit knows more where hardly a swing is free, and no less elsewhere.
+        # The joint fit knows more where hardly a cycle is free, and no less elsewhere.
         c1, k1 = contact.c1, contact.k1
         g, c2 = contact.g, contact.c2
         known = contact.k2[contact.touched]

@@ -1,4 +1,4 @@
-"""The half swings of a decaying signal: where it turns, where it rests, where it passes rest."""
+"""The half cycles of a decaying signal: where it turns, where it rests, where it passes rest."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ALIKE = 0.2  # of the power of the strongest line
 
 @dataclass(frozen=True, eq=False)
 class HalfCycles:
-    """Consecutive complete half swings about a level; positions are in samples.
+    """Consecutive complete half cycles about a level; positions are in samples.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class HalfCycles:
 
     @property
     def durations(self) -> Floats:
-        """(k,) time between the crossings of each half swing, samples."""
+        """(k,) time between the crossings of each half cycle, samples."""
         return np.diff(self.crossings)
 
 
@@ -55,7 +55,7 @@ def rough_period(samples: Floats, order: int = 0) -> float:
         settled = float(np.average(active, weights=fade))
     points = 1 << int(np.ceil(np.log2(4 * active.size)))
     power = np.abs(np.fft.rfft((active - settled) * fade, points)) ** 2
-    # A stop moves the middle of the swings as they decay: in the velocity this drift counts little,
+    # A stop moves the middle of the cycles as they decay: in the velocity this drift counts little,
     # but white noise would count more than the motion, so its floor goes first.
     floor = float(np.median(power[power.size // 2 :]))
     power = np.maximum(power - 30 * floor, 0.0)
@@ -100,7 +100,7 @@ def turning_points(samples: Floats, period: float, noise: float) -> tuple[Ints, 
 
 
 def half_cycles(samples: Floats, level: float, period: float, noise: float) -> HalfCycles:
-    """Complete half swings about `level`, until the motion is lost in the noise.
+    """Complete half cycles about `level`, until the motion is lost in the noise.
 
     A crossing counts when the signal goes from four standard deviations of the noise on one side
     to four on the other (a Schmitt trigger), so that noise near zero makes no double crossings.
@@ -156,7 +156,7 @@ def _merged(
     side: NDArray[np.int_],
     amplitudes: Floats,
 ) -> NDArray[np.bool_]:
-    """Half swings that hold a further swing, to the other side, too short or small to be seen.
+    """Half cycles that hold a further cycle, to the other side, too short or small to be seen.
 
     The signal then comes back more than half of its way to the level in between.
     """

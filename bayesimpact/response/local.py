@@ -1,7 +1,7 @@
 """Local polynomial fits on equally spaced samples: crossings and extremes below the noise.
 
 Every fit uses the widest window of a ladder whose polynomial leaves nothing but noise, so that the
-window shrinks by itself where the motion has a kink (the touch of the stop) and grows where only
+window shrinks by itself where the motion has a kink (the impact on the stop) and grows where only
 noise limits it. Where no window passes, the cubic spline through the samples decides.
 """
 
@@ -109,12 +109,12 @@ def crossings(samples: Floats, centres: Ints, caps: Floats, noise: float) -> Flo
 def extremes(
     samples: Floats, first: Ints, last: Ints, sign: NDArray[np.int_], noise: float
 ) -> tuple[Floats, Floats]:
-    """The largest excursion inside each half swing.
+    """The largest excursion inside each half cycle.
 
     Parameters
     ----------
     samples : (n,) signal
-    first, last : (k,) first and last sample of each half swing, inclusive
+    first, last : (k,) first and last sample of each half cycle, inclusive
     sign : (k,) +1 to look for a maximum, -1 for a minimum
     noise : standard deviation of the noise
 

@@ -122,12 +122,12 @@ def observe_decay(observed: Observed) -> Flight | None:
     """The oscillator without a stop, from all samples; None without an oscillation."""
     rates, weights = [], []
     for r, samples in enumerate(observed.samples):
-        swings = half_cycles(samples, observed.rests[r], observed.periods[r], observed.noises[r])
-        if swings.side.size < 3:
+        halves = half_cycles(samples, observed.rests[r], observed.periods[r], observed.noises[r])
+        if halves.side.size < 3:
             continue
-        # Least squares over the whole recording sees the large swings most.
-        weight = float(np.sum(swings.amplitudes**2))
-        period = 2 * float(np.average(swings.durations, weights=swings.amplitudes**2))
+        # Least squares over the whole recording sees the large cycles most.
+        weight = float(np.sum(halves.amplitudes**2))
+        period = 2 * float(np.average(halves.durations, weights=halves.amplitudes**2))
         rates.append(2 * np.pi / (period * observed.intervals[r]))
         weights.append(weight)
     if not rates:

@@ -1,7 +1,7 @@
 """Quick estimates for a preloaded stop (g < 0): the mass rests against it.
 
 Mirrored at rest such a rig is an ordinary one: what was "on the stop" is its free motion, with
-stiffness k1 + k2 and damping c1 + c2, and swings that leave the stop meet something softer, by k2
+stiffness k1 + k2 and damping c1 + c2, and cycles that leave the stop meet something softer, by k2
 and c2, at the distance h = -g k1 / (k1 + k2) from rest. So flights and cycles of the mirrored
 recordings are read like any other; only the rest reading and the meaning of the numbers differ.
 """
@@ -25,13 +25,13 @@ Ints = NDArray[np.intp]
 
 
 def is_preloaded(observed: Observed) -> bool:
-    """Whether the swings away from the stop, and only those, get shorter with the decay."""
+    """Whether the cycles away from the stop, and only those, get shorter with the decay."""
     upper: list[float] = []
     lower: list[float] = []
     for r, samples in enumerate(observed.samples):
-        swings = half_cycles(samples, observed.rests[r], observed.periods[r], observed.noises[r])
+        halves = half_cycles(samples, observed.rests[r], observed.periods[r], observed.noises[r])
         for side, ratios in ((1, upper), (-1, lower)):
-            length = swings.durations[swings.side == side]
+            length = halves.durations[halves.side == side]
             if length.size >= 5:
                 ratios.append(float(np.log(length[:2].mean() / np.median(length[-3:]))))
     if not upper or not lower:
@@ -62,7 +62,7 @@ class _Mirror:
 
 
 def estimate_preloaded(campaign: Campaign, observed: Observed) -> Preloaded | None:
-    """Estimate a preloaded rig; None when no swing leaves the stop or the fit fails.
+    """Estimate a preloaded rig; None when no cycle leaves the stop or the fit fails.
 
     Parameters
     ----------

@@ -17,9 +17,9 @@ def rest_position(samples: Floats, period: float, noise: float) -> float:
 
     A free decay turns at r + a, r - a q, r + a q^2, ...: three successive extremes give its centre
     r exactly (Shanks' transformation). While the mass hits the stop the centre wanders with the
-    amplitude; it stays once the swings no longer reach it. So the centres of the last swings count,
+    amplitude; it stays once the cycles no longer reach it. So the centres of the last cycles count,
     as far back as they agree and the motion between them is a decaying sine. A recording that ends
-    before the impacts do has no such swings: there the lower half swings, free flights all of them,
+    before the impacts do has no such cycles: there the lower half cycles, free flights all of them,
     give r as the reading where their curvature would vanish.
 
     Parameters
@@ -28,7 +28,7 @@ def rest_position(samples: Floats, period: float, noise: float) -> float:
     period : rough period, samples
     noise : standard deviation of the noise
     """
-    centres, spans, where = swing_centres(samples, period, noise)
+    centres, spans, where = cycle_centres(samples, period, noise)
     if centres.size < 2:
         return float(np.median(samples))
     count, value = _plateau(centres, spans, 0.6 * noise * np.sqrt(6 / max(period, 6)))
@@ -45,7 +45,7 @@ def rest_position(samples: Floats, period: float, noise: float) -> float:
     return value if count else float(np.median(samples))
 
 
-def swing_centres(samples: Floats, period: float, noise: float) -> tuple[Floats, Floats, Floats]:
+def cycle_centres(samples: Floats, period: float, noise: float) -> tuple[Floats, Floats, Floats]:
     """Centre and amplitude of the motion about every inner turning point.
 
     Returns

@@ -80,9 +80,14 @@ CONCEALED_EFFECTS: Mapping[str, Mapping[str, float]] = {
 """What `data/concealed` hides: damping that grows with indentation speed, a bolt that wears."""
 
 
-def concealed_campaign() -> Campaign:
+CONCEALED_SEED = 20231104
+"""The median of 25 draws by the distance of the answer from the truth:
+tests/benchmarks/typical_draw.py."""
+
+
+def concealed_campaign(seed: int = CONCEALED_SEED) -> Campaign:
     """The campaign again, from a rig with two effects that the paper suspects of its own."""
-    rng = np.random.default_rng(20231101)
+    rng = np.random.default_rng(seed)
     releases = paper_releases(rng)
     offsets = {release.name: float(10e-6 * rng.standard_normal()) for release in releases}
     return make_campaign(

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayesimpact.errors import InputError
+from bayesimpact.errors import InputError, SimulationError
 from bayesimpact.trial.designs import RIG_DESIGNS, Design, draw_rig_design, log_uniform
 from bayesimpact.trial.drawn import Drawn
 from bayesimpact.trial.faults import PLANTS, plant_fault
@@ -46,7 +46,7 @@ def draw(settings: Settings, seed: int) -> Drawn:
         rng = np.random.default_rng(child)
         try:
             return _attempt(settings, seed, kind, turn, rng)
-        except Unsuitable as error:
+        except (SimulationError, Unsuitable) as error:
             reason = str(error)
     raise Unsuitable(
         f"seed {seed}, {kind}: {ATTEMPTS} draws in vain, the last one because {reason}"

@@ -234,13 +234,13 @@ def _power_damping(design: Design, rng: Rng) -> Form:
 
 
 def _bouc_wen(design: Design, rng: Rng) -> Form:
-    """A loop as wide as the swing."""
+    """A loop as wide as the amplitude."""
     decay, k1 = log_uniform(rng, (1.0, 5.0)) / design.amplitude, design.rig.k1
     return Form(lambda size: {"stiffness": size, "decay": decay}, 1e-4 * k1, largest=k1)
 
 
 def _presliding(design: Design, rng: Rng) -> Form:
-    """It slides over most of the swing."""
+    """It slides over most of the amplitude."""
     way = design.amplitude * log_uniform(rng, (0.01, 0.1))
     force = design.rig.k1 * design.amplitude
     return Form(

@@ -97,9 +97,9 @@ class Site:
     name, case : of the recording
     y0, v0 : at the first sample, m and m/s
     unilateral : contact ends when the obstacle's reaction falls to zero, not at the gap
-    obstacle_mass : picked up at touch, kg
+    obstacle_mass : picked up at impact, kg
     adhesion : pull that an obstacle with `unilateral` stands before it lets go, N
-    restitution : share of the speed that is left after the instant of a touch
+    restitution : share of the speed that is left after the instant of an impact
     gap_step : growth of the gap at the end of every contact, m
     """
 

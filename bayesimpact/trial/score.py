@@ -81,7 +81,7 @@ def _outcome(
         outcome = judge_fault(truth["fault"], named_faults)
         return outcome if outcome != "named" or set(physics) == planted else "fault alone"
     if not truth["kind"].startswith("several"):
-        return judge(truth["kind"], [p["id"] for p in truth["planted"]], verdict, named)
+        return outcome_of(truth["kind"], [p["id"] for p in truth["planted"]], verdict, named)
     there = [p["id"] for p in truth["planted"] if not p["outside"]]
     outside = len(there) < len(truth["planted"])
     if truth["rest_s"] and "recording_start" in named:  # there, and said to be there
@@ -89,7 +89,7 @@ def _outcome(
     return judge_several(there, outside, verdict, named)
 
 
-def judge(kind: str, planted: list[str], verdict: str, named: list[str]) -> str:
+def outcome_of(kind: str, planted: list[str], verdict: str, named: list[str]) -> str:
     """The outcome in two words."""
     if kind == "control":
         return "quiet" if verdict == "adequate" else "false alarm"

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.recording import Recording
-from bayesimpact.errors import BayesimpactError, InputError
+from bayesimpact.errors import BayesimpactError, InputError, SimulationError
 from bayesimpact.inference.identify import identify
 from bayesimpact.trial.designs import Design, log_uniform
 from bayesimpact.trial.drawn import Drawn
@@ -71,6 +71,8 @@ def draw_strong(settings: Settings, seed: int) -> Drawn:
             return _attempt(settings, seed, kind, group, thrown, np.random.default_rng(child))
         except Unsuitable as error:
             thrown[str(error)] += 1
+        except SimulationError:
+            thrown["a motion that the rig cannot follow"] += 1
     raise Unsuitable(f"seed {seed}, {kind}: {ATTEMPTS} draws in vain, {dict(thrown)}")
 
 

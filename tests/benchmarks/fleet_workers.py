@@ -10,6 +10,7 @@ fleet_workers.json.
 from __future__ import annotations
 
 import resource
+import subprocess
 import sys
 import tempfile
 import time
@@ -19,7 +20,6 @@ from typing import Any
 from record import keep
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from kills import run
 from small_fleet import write_fleet
 
 
@@ -43,9 +43,10 @@ def measure(campaigns: int) -> dict[str, Any]:
 
 def _timed(arguments: list[str]) -> tuple[float, float]:
     began, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
-    code, said = run(arguments)
-    if code not in (0, 3):
-        raise RuntimeError(said)
+    command = [str(Path(sys.executable).with_name("bayesimpact")), *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode not in (0, 3):
+        raise RuntimeError(done.stderr)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     return time.perf_counter() - began, spent

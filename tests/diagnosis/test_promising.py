@@ -16,9 +16,9 @@ def score(effect: str, gain: float) -> Score:
     return Score(BY_ID[effect], {}, 0.0, 1.0, none, none, 0.0, none, 1.0, gain, ())
 
 
-def stand_ins(effect: str, **gains: float) -> set[str]:
+def stand_ins(effect: str, large: bool = False, **gains: float) -> set[str]:
     scores = [score(e, g) for e, g in gains.items()]
-    return {s.effect.id for s in in_place_of(BY_ID[effect], scores)}
+    return {s.effect.id for s in in_place_of(BY_ID[effect], scores, large)}
 
 
 def test_what_explains_less_than_half_cannot_stand_for_an_effect():
@@ -40,6 +40,12 @@ def test_what_explains_less_than_half_cannot_stand_for_an_effect():
 def test_what_is_on_or_off_stands_for_its_family_or_for_the_contact(effect, leap, kept):
     gains = {effect: 1000.0, leap: 0.0}
     assert (leap in stand_ins(effect, **gains)) == kept
+
+
+def test_where_the_misfit_is_large_the_score_of_what_is_on_or_off_says_nothing():
+    gains = {"coulomb_friction": 1000.0, "pendulum_sine": 2000.0}
+    assert stand_ins("coulomb_friction", **gains) == {"pendulum_sine"}
+    assert stand_ins("coulomb_friction", large=True, **gains) == set()
 
 
 def test_an_effect_without_parameters_is_contained_in_what_refines_it():

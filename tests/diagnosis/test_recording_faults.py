@@ -126,7 +126,7 @@ def test_doubtful_faults_come_after_certain_ones_and_physics(
     """A wrong case label is certain; a probe that is not linear must not become another rig."""
     compared = module.comparisons
 
-    def and_another_rig(before: Corrected, as_read: Campaign) -> tuple[Step, ...]:
+    def and_another_rig(before: Corrected, as_read: Campaign, *beside: object) -> tuple[Step, ...]:
         (label,) = compared(before, as_read)
         known = label[-1]
         without = replace(known.campaign, recordings=known.campaign.recordings[:-1])
@@ -144,6 +144,23 @@ def test_doubtful_faults_come_after_certain_ones_and_physics(
     assert found.corrected is not None
     assert [f.id for f in found.corrected.faults] == ["recording_case"]
     assert [e.id for e in found.effects] == ["sensor_quadratic"]
+
+
+def test_a_gain_shows_beside_the_physics_that_hides_it() -> None:
+    """To the base model every recording has a gap of its own; beside the spring only one."""
+    heights = (-6.5e-3, -5.8e-3, -5.2e-3, -4.6e-3, -4e-3, -3.5e-3)
+    releases = [Release(n, "1", y) for n, y in zip("abcdef", heights, strict=True)]
+    campaign = small_rig.record(64, {"spring_quadratic": {"stiffness": 2e3}}, releases=releases)
+    recordings = list(campaign.recordings)
+    recordings[2] = replace(recordings[2], samples=1.01 * recordings[2].samples)
+    campaign = replace(campaign, recordings=tuple(recordings))
+    catalogue = (BY_ID["spring_quadratic"], *CATALOGUE)
+    found = diagnose(campaign, rng=np.random.default_rng(0), effects=catalogue, search=False)
+    assert found.corrected is not None
+    (fault,) = found.corrected.faults
+    assert (fault.id, fault.recording) == ("recording_gain", "c")
+    assert fault.size == pytest.approx(1.0, abs=0.1)
+    assert found.verdict == "named" and [e.id for e in found.effects] == ["spring_quadratic"]
 
 
 @pytest.mark.parametrize(("effects", "searches"), [(3, 1), (10**7, 2)])
@@ -171,7 +188,7 @@ def test_recordings_that_may_be_the_faulty_one_are_all_told(
 ) -> None:
     compared = module.comparisons
 
-    def tossed(before: Corrected, as_read: Campaign) -> tuple[Step, ...]:
+    def tossed(before: Corrected, as_read: Campaign, *beside: object) -> tuple[Step, ...]:
         others = (("recording_gain, c", 0.5), ("recording_clock, a", 0.002))
         steps = compared(before, as_read)
         return tuple(tuple(replace(c, alternatives=others) for c in step) for step in steps)

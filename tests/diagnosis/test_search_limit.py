@@ -10,7 +10,8 @@ from effect_rigs import BY_ID
 
 from bayesimpact.diagnosis.decision import decide
 from bayesimpact.diagnosis.extend import campaign_scales
-from bayesimpact.diagnosis.name import PATIENCE, name
+from bayesimpact.diagnosis.models import PATIENCE
+from bayesimpact.diagnosis.name import name
 from bayesimpact.inference.identify import identify
 
 CATALOGUE = [BY_ID[i] for i in ("coulomb_friction", "quadratic_drag", "spring_cubic")]
@@ -33,7 +34,7 @@ def test_without_time_nothing_is_fitted_and_nothing_named() -> None:
 
 
 def test_with_time_for_some_what_was_found_stays_but_is_not_called_needed() -> None:
-    found = searched(looks=4)
+    found = searched(looks=2)
     assert not found.finished and len(found.tried) > 1
     assert decide(found).verdict in ("unknown", "ambiguous")
 

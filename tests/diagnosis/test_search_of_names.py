@@ -30,7 +30,8 @@ class Table:
     one from a larger model. `unfinished` has what is gained beyond where a climb gave up,
     `once` where a model's first fit ends. `force` is the evidence of a free force in place of all
     effects, to which `beside` adds where there are effects that it may stand beside. `chi2` is
-    that of every fit.
+    that of every fit. `asked` are the sets that the equation of motion asks for, `seen` what it
+    gains by an effect.
     """
 
     def __init__(
@@ -43,8 +44,10 @@ class Table:
         once: dict[str, float] | None = None,
         beside: float = 0.0,
         chi2: float = 1.0,
+        asked: tuple[str, ...] = (),
+        seen: dict[str, float] | None = None,
     ) -> None:
-        self.beside, self.chi2 = beside, chi2
+        self.beside, self.chi2, self.asked, self.seen = beside, chi2, asked, seen or {}
         self.once = {frozenset(k.split()): v for k, v in (once or {}).items()}
         self.in_contact = in_contact
         self.gains = {frozenset(): 0.0} | {frozenset(k.split()): v for k, v in gains.items()}
@@ -72,6 +75,17 @@ class Table:
         self.fitted.append(key := frozenset(ids))
         reached = self.forward.get(key, self.gain(ids))
         return self.candidate(ids, self.once.pop(key, reached))
+
+    def fit_from(self, fit, effects, values, scales) -> Candidate:
+        self.fitted.append(frozenset(e.id for e in effects))
+        return self.candidate([e.id for e in effects], self.gain(self.fitted[-1]))
+
+    def sets(self, fit, effects, scales):
+        found = [
+            SimpleNamespace(effects=[BY_ID[i] for i in s.split()], values={}) for s in self.asked
+        ]
+        gains = lambda ids: {i: v for i, v in self.seen.items() if i not in ids}  # noqa: E731
+        return SimpleNamespace(terms=self.seen, best=lambda most: found, gains=gains)
 
     def without(self, candidate, effect, scales) -> Candidate:
         ids = [i for i in candidate.ids if i != effect.id]
@@ -117,6 +131,8 @@ def run(monkeypatch):
         monkeypatch.setattr(models, "refit", table.refit)
         monkeypatch.setattr(models, "without", table.without)
         monkeypatch.setattr(models, "exchanged", table.exchanged)
+        monkeypatch.setattr(models, "fit_from", table.fit_from)
+        monkeypatch.setattr(models, "LikelySets", table.sets)
         monkeypatch.setattr(models, "shakes_in_own_band", lambda fit, remains: False)
         monkeypatch.setattr(models, "leaves_something", lambda fit: False)
         monkeypatch.setattr(models, "scan", table.scan)
@@ -156,6 +172,37 @@ def test_where_the_misfit_is_large_what_gains_most_per_effect_comes_first(run):
     assert chosen(run(table)) == {A, B, C}
     first_step = [{A, B}, *({e} for e in (A, B, C, D, S))]
     assert next(ids for ids in table.fitted if ids not in first_step) in ({A, C}, {B, C})
+
+
+def test_where_the_misfit_is_large_the_search_begins_with_what_the_equation_asks_for(run):
+    gains = {A: 10.0, B: 10.0, f"{A} {B}": 400.0, C: 390.0, f"{A} {B} {C}": ENOUGH}
+    table = Table(
+        gains, chi2=100.0, asked=(C, f"{A} {B} {C}"), seen={A: 1.0, B: 2.0, C: 3.0, D: 0.5}
+    )
+    assert chosen(run(table)) == {A, B, C}
+    assert table.fitted[:2] == [{C}, {A, B, C}]
+    small = Table(gains, asked=(f"{A} {B} {C}",))
+    run(small)
+    assert small.fitted[0] != {A, B, C}
+
+
+def test_beside_a_large_misfit_what_the_equation_asks_for_last_is_not_tried(run, monkeypatch):
+    monkeypatch.setattr(models, "ASKED", 1)
+    gains = {A: 300.0, f"{A} {B}": ENOUGH, f"{A} {C}": 400.0, f"{A} {D}": 400.0}
+    table = Table(gains, chi2=100.0, asked=(A,), seen={B: 9.0, C: 1.0})
+    assert chosen(run(table)) == {A, B}
+    assert frozenset({A, C}) not in table.fitted
+    assert {frozenset({A, B}), frozenset({A, D})} <= set(table.fitted)
+
+
+def test_beside_a_large_misfit_what_is_on_or_off_comes_last(run):
+    effects = (*EFFECTS, BY_ID[N])
+    gains = {A: 300.0, f"{A} {B}": ENOUGH, f"{A} {N}": 400.0}
+    table = Table(gains, chi2=100.0, asked=(A,), seen={B: 9.0})
+    assert chosen(run(table, effects)) == {A, B}
+    assert frozenset({A, N}) not in table.fitted
+    alone = Table({A: 300.0, f"{A} {N}": ENOUGH}, chi2=100.0, asked=(A,))
+    assert chosen(run(alone, effects)) == {A, N}
 
 
 def test_the_best_single_effect_ends_the_search(run):

@@ -9,7 +9,13 @@ import small_rig
 from effect_rigs import BY_ID
 
 from bayesimpact.diagnosis.remainder import Remainder
-from bayesimpact.diagnosis.words import parameter_shifts, remaining, statement, summary
+from bayesimpact.diagnosis.words import (
+    failure,
+    parameter_shifts,
+    remaining,
+    statement,
+    summary,
+)
 
 
 def entry(median: float, half: float) -> dict[str, object]:
@@ -36,6 +42,23 @@ def test_what_remains_is_said_in_units():
     assert "130 µm rms" in said and "2.2 % of the signal" in said and "11 times" in said
     assert "obstacle" in said and "gap wear" in said
     assert remaining(None) == "" and "0.00013 rad" in remaining(left, "rad")
+
+
+def fit_of(rms: float, *inputs: object):
+    recordings = tuple(SimpleNamespace(input=i) for i in inputs)
+    campaign = SimpleNamespace(recordings=recordings)
+    target = SimpleNamespace(oscillator=SimpleNamespace(campaign=campaign))
+    return SimpleNamespace(rms=rms, signal=1.0, target=target)
+
+
+def test_a_failed_base_fit_says_what_may_be_wrong():
+    known, free = SimpleNamespace(free=False), SimpleNamespace(free=True)
+    assert failure(fit_of(0.4, known)) == ""
+    assert "sign, unit or clock" in failure(fit_of(0.6, None))
+    assert "input" not in failure(fit_of(0.6, None))
+    assert 'gain = "free"' in failure(fit_of(0.6, None, known))
+    said = failure(fit_of(0.6, free))
+    assert "sign, delay or kind of the input" in said and "gain" not in said
 
 
 def place(regime: str):

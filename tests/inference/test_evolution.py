@@ -36,16 +36,16 @@ def memory(f: float = 0.5, cr: float = 0.5) -> Memory:
 def test_fold_keeps_what_is_inside_and_mirrors_the_rest() -> None:
     box = Box(np.array([-1.0, 100.0]), np.array([1.0, 104.0]))
     inside = np.array([[-1.0, 104.0], [0.1, 101.7], [1.0, 100.0]])
-    np.testing.assert_array_equal(box.fold(inside), inside)
+    np.testing.assert_array_equal(box.reflect(inside), inside)
     outside = np.array([[1.25, 99.0], [-1.5, 105.5], [5.5, 114.0]])  # the last: more than once
-    np.testing.assert_allclose(box.fold(outside), [[0.75, 101.0], [-0.5, 102.5], [0.5, 102.0]])
+    np.testing.assert_allclose(box.reflect(outside), [[0.75, 101.0], [-0.5, 102.5], [0.5, 102.0]])
 
 
 def test_a_walk_with_folding_stays_uniform_to_the_edges() -> None:
     rng = np.random.default_rng(1)
     x = rng.random((4000, 3))
     for _ in range(60):
-        x = UNIT.fold(x + 0.3 * rng.normal(size=x.shape))
+        x = UNIT.reflect(x + 0.3 * rng.normal(size=x.shape))
     assert ((x >= 0) & (x <= 1)).all()
     share = np.histogram(x, bins=np.linspace(0, 1, 41))[0] / x.size
     assert np.abs(share * 40 - 1).max() < 5 * np.sqrt(40 / x.size)  # clipping puts 8 x at an edge

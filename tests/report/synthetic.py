@@ -94,7 +94,7 @@ def make_results(
     seed: int = 1,
     **changes: Any,
 ) -> Results:
-    """Results of `count` recordings of `cases` obstacles, judged."""
+    """Results of `count` recordings of `cases` obstacles, assessed."""
     rng = np.random.default_rng(seed)
     labels = [str(i + 1) for i in range(cases)] if stop else [""]
     names = [f"run_{i}" for i in range(count)]
@@ -139,7 +139,7 @@ def make_results(
         provenance=Provenance("bayesimpact sample rig", 7, "2026-01-02T03:04:05+00:00", "ab" * 32,
                               {"python": "3.11", "numpy": "2.0"}, 12.0),
     )  # fmt: skip
-    return checks.judged(replace(made, **changes))
+    return checks.assessed(replace(made, **changes))
 
 
 def with_chain(results: Results, chain: Chain) -> Results:

@@ -13,7 +13,7 @@ from synthetic import make_results
 from bayesimpact.data.campaign import Smoothing
 from bayesimpact.inference.noise import Noise
 from bayesimpact.model.measurement import smooth
-from bayesimpact.report.checks import judge, judged
+from bayesimpact.report.checks import assess, assessed
 from bayesimpact.report.results import EffectSummary
 from bayesimpact.report.whiteness import flat_spectrum, whiteness
 
@@ -34,7 +34,7 @@ from bayesimpact.report.whiteness import flat_spectrum, whiteness
     ],
 )
 def test_verdict(chi2: float, z: float, verdict: str) -> None:
-    assert judge(chi2, z) == verdict
+    assert assess(chi2, z) == verdict
 
 
 def test_adequate_in_words() -> None:
@@ -57,9 +57,9 @@ def test_a_linear_oscillator_that_does_not_fit_is_said_so_first() -> None:
 
 def test_effects_are_named_in_the_verdict() -> None:
     added = replace(make_results(1, stop=False), effects=(EffectSummary("a", "drag", ""),))
-    assert judged(added).headline.startswith("An oscillator with drag describes")
+    assert assessed(added).headline.startswith("An oscillator with drag describes")
     effects = tuple(EffectSummary(i, t, "") for i, t in (("a", "dry friction"), ("b", "drag")))
-    results = judged(replace(make_results(excess=3.0), effects=effects))
+    results = assessed(replace(make_results(excess=3.0), effects=effects))
     assert results.headline.startswith(
         "The impact oscillator with dry friction and drag does not fit"
     )
@@ -68,7 +68,7 @@ def test_effects_are_named_in_the_verdict() -> None:
 def test_after_a_diagnosis_nobody_is_sent_to_diagnose() -> None:
     for results in (make_results(2, stop=False, excess=3.0), make_results(3, n=6000, excess=1.1)):
         assert "bayesimpact diagnose" in results.headline
-        after = judged(replace(results, diagnosis={"verdict": "unknown", "summary": ""}))
+        after = assessed(replace(results, diagnosis={"verdict": "unknown", "summary": ""}))
         assert "bayesimpact diagnose" not in after.headline
         assert ("Something else remains." in after.headline) == (after.verdict == "inadequate")
 
@@ -85,9 +85,9 @@ def test_what_went_wrong_in_the_computation_is_said() -> None:
     results = make_results(converged=False)
     assert "has not converged: the intervals are provisional" in results.headline
     assert results.search is not None
-    apart = judged(replace(results, search=replace(results.search, agree=False, distance=8.0)))
+    apart = assessed(replace(results, search=replace(results.search, agree=False, distance=8.0)))
     assert "ended in different places" in apart.headline
-    stuck = judged(replace(apart, fit_converged=False))
+    stuck = assessed(replace(apart, fit_converged=False))
     assert "did not come to rest" in stuck.headline
     assert [c.title for c in stuck.failed] == [
         "The climb to the mode came to rest",
@@ -100,7 +100,7 @@ def test_backbone_outside_its_band_fails() -> None:
     results = make_results()
     assert results.backbone is not None
     low = replace(results.backbone, p_values=np.array([0.4, 0.3, 0.0009]))
-    failed = judged(replace(results, backbone=low)).failed
+    failed = assessed(replace(results, backbone=low)).failed
     assert [c.title for c in failed] == ["Recorded backbones lie where simulated ones do"]
     assert failed[0].finding == (
         "case 1: 91 % inside, p = 0.40; case 2: 91 % inside, p = 0.30; all: 91 % inside, p < 0.001"
@@ -111,7 +111,7 @@ def test_posterior_that_is_not_gaussian_is_a_note() -> None:
     results = make_results()
     wide = replace(results.rows[1], posterior_sd=2 * results.rows[1].sd)
     rows = (results.rows[0], wide, *results.rows[2:])
-    (check,) = [c for c in judged(replace(results, rows=rows)).checks if "curvature" in c.title]
+    (check,) = [c for c in assessed(replace(results, rows=rows)).checks if "curvature" in c.title]
     assert check.status == "note" and "1.00 to 2.00; furthest from 1: k1" in check.finding
 
 

@@ -13,7 +13,7 @@ import pytest
 from diagnosed import DIAGNOSIS
 from synthetic import NOISE, make_results, row, with_chain
 
-from bayesimpact.report.checks import judged
+from bayesimpact.report.checks import assessed
 from bayesimpact.report.html import render
 from bayesimpact.report.results import Chain, EffectSummary, Results
 
@@ -192,7 +192,7 @@ def test_fifty_recordings_are_all_in_the_table() -> None:
 
 def test_effects_and_model() -> None:
     effect = EffectSummary("coulomb_friction", "dry friction", "F sign(v), sticking")
-    results = judged(replace(make_results(), effects=(effect,)))
+    results = assessed(replace(make_results(), effects=(effect,)))
     text = page(results)[1].text
     assert "dry friction ( coulomb_friction ): F sign(v), sticking" in text
     assert "with dry friction describes" in text

@@ -89,7 +89,7 @@ def test_half_estimator_reads_both_sides_of_the_exact_backbone() -> None:
     exact = bilinear_backbone(
         PAPER["mass"], PAPER["k1"], PAPER["g"], PAPER["k2"], np.linspace(1e-3, 7e-3, 4000)
     )
-    # Damping in between costs the upper side a little: 1 % of amplitude per half swing.
+    # Damping in between costs the upper side a little: 1 % of amplitude per half cycle.
     expected = np.interp(b.upper.amplitude, exact.upper_amplitude, exact.upper_frequency)
     assert b.upper.frequency == pytest.approx(expected, rel=0.01)
     assert b.upper.frequency.max() > 2 * FREE
@@ -101,8 +101,8 @@ def test_noise_makes_no_double_crossings(interval: float, n: int) -> None:
     sigma = 6e-5
     clean = backbone(paper_motion(n, interval), interval)
     b = backbone(noisy(paper_motion(n, interval), sigma), interval)
-    swings = half_cycles(noisy(paper_motion(n, interval), sigma), 0.0, 0.157 / interval, sigma)
-    assert np.all(np.diff(swings.side) != 0)
+    halves = half_cycles(noisy(paper_motion(n, interval), sigma), 0.0, 0.157 / interval, sigma)
+    assert np.all(np.diff(halves.side) != 0)
     count = int(np.sum(clean.upper.amplitude > 7 * sigma)) - 1
     assert b.upper.times.size >= count > 10
     assert b.upper.times[:count] == pytest.approx(clean.upper.times[:count], abs=0.02)
@@ -116,18 +116,18 @@ def test_swings_stop_where_the_noise_takes_over() -> None:
 
 
 def test_impacts_between_the_samples_end_the_backbone() -> None:
-    """Contacts of 2 ms at 200 Hz: where one is overlooked, two lower half swings look like one."""
+    """Contacts of 2 ms at 200 Hz: where one is overlooked, two lower half cycles look like one."""
     motion = paper_motion(1200, 5e-3, g=0.0, k2=1e6, c2=0.0)
-    swings = half_cycles(motion, 0.0, 31.0, 1e-7)
-    below = swings.durations[swings.side < 0]
+    halves = half_cycles(motion, 0.0, 31.0, 1e-7)
+    below = halves.durations[halves.side < 0]
     free = 0.5 / FREE / 5e-3
     assert below.max() < 1.5 * free
     seen = np.flatnonzero(motion > 4e-7)
-    assert seen[-1] > swings.crossings[-1] + 10 * free
+    assert seen[-1] > halves.crossings[-1] + 10 * free
 
 
 def test_moving_average_reduces_the_scatter() -> None:
-    """Eq. 2. Neighbouring half swings share no crossing on one side: scatter falls by sqrt(N)."""
+    """Eq. 2. Neighbouring half cycles share no crossing on one side: scatter falls by sqrt(N)."""
     motion = paper_motion(20_000, c1=1e-3, k2=0.0, c2=0.0, g=1.0)
     single = backbone(noisy(motion, 5e-5), 1e-3)
     average = backbone(noisy(motion, 5e-5), 1e-3, average=9)

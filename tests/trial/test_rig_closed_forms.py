@@ -7,6 +7,8 @@ from math import cos, exp, pi, sqrt
 import numpy as np
 import pytest
 
+from bayesimpact.errors import SimulationError
+from bayesimpact.trial import rig_motion
 from bayesimpact.trial.bundle import PAPER_RIG
 from bayesimpact.trial.rig import Release, Rig, motion
 
@@ -71,6 +73,14 @@ def test_detent_pulls_towards_its_place():
     assert 0.5e-3 < y < 1e-3
     x = y - 1e-3
     assert 800 * y + 4000 * x * exp(-((x / 1e-3) ** 2)) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_law_too_stiff_for_the_integrator_is_given_up(monkeypatch):
+    monkeypatch.setattr(rig_motion, "_STEPS", 500)
+    stiff = {"contact_relaxation": {"stiffness": 5e4, "time": 1e-5}}
+    with pytest.raises(SimulationError, match="too stiff"):
+        motion(PAPER_RIG, RELEASE, stiff, rate=1000, duration=0.5)
+    motion(PAPER_RIG, RELEASE, rate=1000, duration=0.5)
 
 
 def test_a_loose_body_is_a_moving_frame_in_other_numbers():

@@ -314,7 +314,7 @@ def test_forcing_from_rest_is_transient_plus_steady_motion():
 
 
 def test_touching_obstacle_shares_its_momentum():
-    """v+ = m v/(m + m2) at touch; at release the mass keeps its velocity, the obstacle is gone."""
+    """v+ = m v/(m + m2) at impact; at release the mass keeps its velocity, the obstacle is gone."""
     mass = 0.05
     run = motion(
         LOSSLESS,

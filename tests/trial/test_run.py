@@ -189,7 +189,7 @@ def test_a_scheduler_by_its_address() -> None:
 
     with (
         distributed.LocalCluster(
-            n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+            n_workers=1, threads_per_worker=1, processes=False, dashboard_address="127.0.0.1:0"
         ) as cluster,
         executor(1, cluster.scheduler_address) as spread,
     ):

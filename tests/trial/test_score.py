@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from bayesimpact.trial.score import flat, judge, place, score, sizes
+from bayesimpact.trial.score import flat, outcome_of, place, score, sizes
 from bayesimpact.trial.summary import confusion, rate, rate_in_groups, summarise
 from bayesimpact.trial.table import summary_text
 
@@ -76,7 +76,7 @@ def answered(**changes: object) -> dict:
 def test_outcomes(
     kind: str, planted: list[str], verdict: str, named: list[str], outcome: str
 ) -> None:
-    assert judge(kind, planted, verdict, named) == outcome
+    assert outcome_of(kind, planted, verdict, named) == outcome
 
 
 def test_a_right_name() -> None:

@@ -8,7 +8,7 @@ import pytest
 from test_score import ANSWER
 
 from bayesimpact.trial.line import trial_line
-from bayesimpact.trial.score import judge, score
+from bayesimpact.trial.score import outcome_of, score
 from bayesimpact.trial.score_strong import inconsistent, judge_several, worse
 from bayesimpact.trial.summary import summarise
 from bayesimpact.trial.summary_strong import selection
@@ -47,10 +47,10 @@ def test_outcomes(outside: bool, verdict: str, named: list[str], outcome: str) -
 
 
 def test_partly_in_the_weak_regime() -> None:
-    assert judge("pair", AB, "partly", ["spring_cubic"]) == "partly"
-    assert judge("single", AB[:1], "partly", ["spring_cubic"]) == "wrong name"
-    assert judge("outside", ["detent"], "partly", ["spring_cubic"]) == "wrong name"
-    assert judge("control", [], "partly", ["spring_cubic"]) == "false alarm"
+    assert outcome_of("pair", AB, "partly", ["spring_cubic"]) == "partly"
+    assert outcome_of("single", AB[:1], "partly", ["spring_cubic"]) == "wrong name"
+    assert outcome_of("outside", ["detent"], "partly", ["spring_cubic"]) == "wrong name"
+    assert outcome_of("control", [], "partly", ["spring_cubic"]) == "false alarm"
 
 
 def planted(effect: str, outside: bool = False) -> dict:

@@ -220,7 +220,9 @@ def _window(
             else (math.floor((wanted.end - start) / interval + margin) + 1)
         )
     else:
-        spacing = float(np.nanmedian(np.diff(times))) if size > 1 else 0.0
+        steps = np.diff(times)
+        steps = steps[np.isfinite(steps)]
+        spacing = float(np.median(steps)) if steps.size else 0.0
         slack = margin * abs(spacing)
         inside = np.ones(size, dtype=bool)
         if wanted.start is not None:

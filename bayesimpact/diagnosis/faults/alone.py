@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.recording import Recording
+from bayesimpact.diagnosis.extend import campaign_scales
+from bayesimpact.diagnosis.refit import fit_from
 from bayesimpact.errors import BayesimpactError
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.noise import Noise
+from bayesimpact.model.effects.effect import Effect
 
 Array = NDArray[np.float64]
 
@@ -30,12 +35,41 @@ class Alone:
     log : (p,) logarithms of c1, k1 and, with a stop, c2, g, k2
     covariance : (p, p) of these
     reduced_chi2 : of the fit to this recording alone
+    amplitude : half of what its readings span, in their unit
     """
 
     recording: str
     log: Array
     covariance: Array
     reduced_chi2: float
+    amplitude: float
+
+
+@dataclass(frozen=True, eq=False)
+class SharedModel:
+    """What recordings are fitted with before they are compared.
+
+    Attributes
+    ----------
+    noise : as the campaign shows it
+    effects : of the catalogue, beside the base model, that hold for all recordings alike
+    values : parameter -> value, where their fits begin
+    """
+
+    noise: Noise
+    effects: tuple[Effect, ...] = ()
+    values: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+
+    def fitted(self, campaign: Campaign) -> Fit | None:
+        """The mode for a campaign; None where it allows no fit."""
+        rng = np.random.default_rng(0)
+        try:
+            fit = identify(campaign, rng=rng, noise=self.noise, search=False).fit
+            if self.effects:
+                fit = fit_from(fit, self.effects, self.values, campaign_scales(fit)).fit
+        except (BayesimpactError, ValueError, np.linalg.LinAlgError):
+            return None
+        return fit if np.isfinite(fit.reduced_chi2) else None
 
 
 def inverted(recording: Recording) -> Recording:
@@ -43,22 +77,17 @@ def inverted(recording: Recording) -> Recording:
     return replace(recording, samples=-recording.samples)
 
 
-def own_fit(campaign: Campaign, recording: Recording, noise: Noise) -> Fit | None:
-    """The base model fitted to one recording; None where it allows no fit."""
-    one = replace(campaign, recordings=(recording,))
-    try:
-        fit = identify(one, rng=np.random.default_rng(0), noise=noise, search=False).fit
-    except (BayesimpactError, ValueError, np.linalg.LinAlgError):
-        return None
-    return fit if np.isfinite(fit.reduced_chi2) else None
+def own_fit(campaign: Campaign, recording: Recording, model: SharedModel) -> Fit | None:
+    """The model fitted to one recording; None where it allows no fit."""
+    return model.fitted(replace(campaign, recordings=(recording,)))
 
 
-def fit_alone(campaign: Campaign, recording: Recording, noise: Noise) -> Alone | None:
+def fit_alone(campaign: Campaign, recording: Recording, model: SharedModel) -> Alone | None:
     """The parameters that one recording shows; None where it allows no fit.
 
     A gap that is not positive has no logarithm: it counts as not measured.
     """
-    fit = own_fit(campaign, recording, noise)
+    fit = own_fit(campaign, recording, model)
     if fit is None:
         return None
     chi2 = fit.reduced_chi2
@@ -75,7 +104,8 @@ def fit_alone(campaign: Campaign, recording: Recording, noise: Noise) -> Alone |
     covariance[lost, :] = 0.0
     covariance[:, lost] = 0.0
     covariance[lost, lost] = 1e6
-    return Alone(recording.name, np.log(scale), covariance, chi2)
+    amplitude = float(np.ptp(recording.samples)) / 2
+    return Alone(recording.name, np.log(scale), covariance, chi2, amplitude)
 
 
 def _name(name: str, case: str) -> str:

@@ -20,25 +20,21 @@ from numpy.typing import NDArray
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.faults.fault import Fault
 from bayesimpact.data.faults.find import applied
-from bayesimpact.diagnosis.faults.alone import Alone, fit_alone, inverted
+from bayesimpact.diagnosis.faults.alone import Alone, SharedModel, fit_alone, inverted
 from bayesimpact.diagnosis.faults.correct import as_fault, corrected
 from bayesimpact.diagnosis.faults.slip import find_shift, slip_fault
 from bayesimpact.diagnosis.faults.together import (
+    CERTAIN,
     Hypothesis,
     Weighed,
+    hypotheses,
     weigh_all,
 )
-from bayesimpact.errors import BayesimpactError
 from bayesimpact.inference.fit import Fit
-from bayesimpact.inference.identify import Identification, identify
-from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.noise import Noise
 
 Array = NDArray[np.float64]
 
-THRESHOLD = 12.0
-"""Log odds of a fault over none: its scatter is estimated from few recordings, whose tails are
-heavier than Gaussian; 12 nats are 4.9 standard deviations beyond the price of one unknown."""
 MISFIT = 4.0  # reduced chi-squared of a recording alone from which on the other sign is tried
 REVERSED = 0.25  # of that misfit, at most, for the other sign to be believed
 SIGNIFICANT = 4.0  # standard errors of a reduced chi-squared that call for a comparison
@@ -55,7 +51,7 @@ class Compared:
     ----------
     fault : what it is
     campaign : with this fault, and those found before it, corrected
-    before, after : reduced chi-squared of the base model without and with this correction
+    before, after : reduced chi-squared of the shared model without and with this correction
     alternatives : other explanations with their probabilities, the likeliest first
     """
 
@@ -89,33 +85,32 @@ def largest_by_chance(chi2: Array, sizes: Array, noise: Noise) -> Array:
     return np.asarray(max(usual, 1e-300) * (1.0 + SIGNIFICANT * np.sqrt(2 / sizes)))
 
 
-def compare_recordings(identification: Identification) -> tuple[Compared, ...]:
+def compare_recordings(fit: Fit, model: SharedModel) -> tuple[Compared, ...]:
     """Faults by comparison of a campaign's recordings, the most certain first; () when all agree.
 
-    Nothing is compared where the base fit is adequate in every recording.
+    Nothing is compared where `fit`, the `model`'s to the campaign, is adequate in every recording.
     """
-    fit = identification.fit
     if not misfits(fit):
         return ()
-    campaign, noise = fit.target.oscillator.campaign, identification.noise
-    alone = {r.name: fit_alone(campaign, r, noise) for r in campaign.recordings}
-    signs, campaign, chi2 = _signs(campaign, alone, noise, fit.reduced_chi2)
-    slips, campaign, chi2 = _slips(campaign, alone, fit.target.likelihood, chi2)
+    campaign = fit.target.oscillator.campaign
+    alone = {r.name: fit_alone(campaign, r, model) for r in campaign.recordings}
+    signs, campaign, chi2 = _signs(campaign, alone, model, fit.reduced_chi2)
+    slips, campaign, chi2 = _slips(campaign, alone, model, fit, chi2)
     differing: list[Compared] = []
     allowed = int(SHARE * len(campaign.recordings))
     while len(differing) < allowed:
-        step = _next(campaign, alone, noise, chi2)
+        step = _next(campaign, alone, model, chi2, allowed - len(differing))
         if step is None:
             break
         differing.append(step)
         name, campaign, chi2 = step.fault.recording, step.campaign, step.after
         changed = [r for r in campaign.recordings if r.name == name]
-        alone[name] = fit_alone(campaign, changed[0], noise) if changed else None
+        alone[name] = fit_alone(campaign, changed[0], model) if changed else None
     return (*signs, *slips, *differing)
 
 
 def _signs(
-    campaign: Campaign, alone: dict[str, Alone | None], noise: Noise, chi2: float
+    campaign: Campaign, alone: dict[str, Alone | None], model: SharedModel, chi2: float
 ) -> tuple[list[Compared], Campaign, float]:
     """Recordings that only fit with the other sign, corrected; `alone` is brought up to date."""
     found: list[Compared] = []
@@ -127,7 +122,7 @@ def _signs(
         misfit = np.inf if own is None else own.reduced_chi2
         if misfit < MISFIT:
             continue
-        other = fit_alone(campaign, inverted(recording), noise)
+        other = fit_alone(campaign, inverted(recording), model)
         if other is not None and other.reduced_chi2 < REVERSED * misfit:
             alone[recording.name] = other
             size = recording.samples.size
@@ -137,30 +132,34 @@ def _signs(
         recording = campaign.recordings[i]
         guess = Weighed(Hypothesis("recording_reversed", i), nats)
         campaign = corrected(campaign, i, guess)
-        fault = as_fault(recording, guess, nats, THRESHOLD)
+        fault = as_fault(recording, guess, nats, CERTAIN)
         if len(turned) == len(campaign.recordings):
             words = "the stop lies on the negative side in every recording"
             fault = replace(fault, statement=words)
         found.append(Compared(fault, campaign, chi2, chi2))
     if found:
-        after = _chi2(campaign, noise)
+        after = _chi2(campaign, model)
         found = [replace(f, after=after) for f in found]
         chi2 = after
     return found, campaign, chi2
 
 
 def _slips(
-    campaign: Campaign, alone: dict[str, Alone | None], likelihood: Likelihood, chi2: float
+    campaign: Campaign,
+    alone: dict[str, Alone | None],
+    model: SharedModel,
+    fit: Fit,
+    chi2: float,
 ) -> tuple[list[Compared], Campaign, float]:
     """Recordings that fit once samples are where they belong; `alone` is brought up to date."""
     found: list[Compared] = []
-    noise, recordings = likelihood.noise, campaign.recordings
+    recordings = campaign.recordings
     misfit = np.array(
         [np.inf if (a := alone[r.name]) is None else a.reduced_chi2 for r in recordings]
     )
-    least = largest_by_chance(misfit, likelihood.sizes, noise)
+    least = largest_by_chance(misfit, fit.target.likelihood.sizes, model.noise)
     for i in np.flatnonzero(misfit > least):
-        shifted = find_shift(campaign, recordings[i], noise)
+        shifted = find_shift(campaign, recordings[i], model)
         if shifted is None or shifted[1].reduced_chi2 > least[i]:
             continue
         fault = slip_fault(recordings[i], shifted[0])
@@ -172,34 +171,37 @@ def _slips(
             campaign,
             recordings=tuple(one if r.name == one.name else r for r in campaign.recordings),
         )
-        alone[one.name] = fit_alone(campaign, one, noise)
-        after = _chi2(campaign, noise)
+        alone[one.name] = fit_alone(campaign, one, model)
+        after = _chi2(campaign, model)
         found.append(Compared(fault, campaign, chi2, after))
         chi2 = after
     return found, campaign, chi2
 
 
 def _next(
-    campaign: Campaign, alone: dict[str, Alone | None], noise: Noise, chi2: float
+    campaign: Campaign, alone: dict[str, Alone | None], model: SharedModel, chi2: float, most: int
 ) -> Compared | None:
-    """The likeliest fault of what is left, corrected; None when there is none to believe."""
+    """The likeliest fault of what is left, corrected; None when there is none to believe.
+
+    Up to `most` recordings may be faulty.
+    """
     known = [(i, a) for i, r in enumerate(campaign.recordings) if (a := alone[r.name]) is not None]
     if len(known) < LEAST:
         return None
     own = [a for _, a in known]
     cases = [campaign.recordings[i].case for i, _ in known]
-    none, ranked = weigh_all(own, cases, campaign.stop)
-    prior = -np.log(len(ranked))
+    none, ranked, needed = weigh_all(own, cases, campaign.stop, most)
+    prior = -np.log(len(hypotheses(cases, campaign.stop)) - 1)
     best = ranked[0]
     odds = best.log_evidence - none.log_evidence + prior
-    if odds < THRESHOLD:
+    if odds < needed:
         return None
     number = known[best.hypothesis.recording][0]
     after = corrected(campaign, number, best)
-    value = _chi2(after, noise)
-    if gain(chi2, value, campaign) <= THRESHOLD:
+    value = _chi2(after, model)
+    if gain(chi2, value, campaign) <= needed:
         return None
-    fault = as_fault(campaign.recordings[number], best, odds, THRESHOLD)
+    fault = as_fault(campaign.recordings[number], best, odds, needed)
     return Compared(fault, after, chi2, value, _alternatives(ranked, own))
 
 
@@ -217,13 +219,10 @@ def _alternatives(ranked: Sequence[Weighed], own: Sequence[Alone]) -> tuple[tupl
     return tuple(names)
 
 
-def _chi2(campaign: Campaign, noise: Noise) -> float:
-    """Reduced chi-squared of the base model's mode for a campaign; infinite where it has none."""
-    try:
-        fit = identify(campaign, rng=np.random.default_rng(0), noise=noise, search=False).fit
-    except (BayesimpactError, ValueError, np.linalg.LinAlgError):
-        return float("inf")
-    return fit.reduced_chi2
+def _chi2(campaign: Campaign, model: SharedModel) -> float:
+    """Reduced chi-squared of the model's mode for a campaign; infinite where it has none."""
+    fit = model.fitted(campaign)
+    return float("inf") if fit is None else fit.reduced_chi2
 
 
 def gain(before: float, after: float, campaign: Campaign) -> float:

@@ -19,9 +19,8 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.faults.fault import FALSE_ALARM, Fault, file_time
 from bayesimpact.data.gaps import without
 from bayesimpact.data.recording import Recording
-from bayesimpact.diagnosis.faults.alone import own_fit
+from bayesimpact.diagnosis.faults.alone import SharedModel, own_fit
 from bayesimpact.inference.fit import Fit
-from bayesimpact.inference.noise import Noise
 
 Array = NDArray[np.float64]
 
@@ -105,9 +104,11 @@ def put_right(recording: Recording, between: tuple[int, int], samples: int) -> R
     return without(replace(recording, samples=x, used=used), [(first, end + gap)])
 
 
-def find_shift(campaign: Campaign, recording: Recording, noise: Noise) -> tuple[Shift, Fit] | None:
+def find_shift(
+    campaign: Campaign, recording: Recording, model: SharedModel
+) -> tuple[Shift, Fit] | None:
     """The shift of a recording, in whole samples, and the fit to it with that put right."""
-    own = own_fit(campaign, recording, noise)
+    own = own_fit(campaign, recording, model)
     shift = None if own is None or recording.input is not None else likeliest_shift(own)
     if shift is None:
         return None
@@ -118,7 +119,7 @@ def find_shift(campaign: Campaign, recording: Recording, noise: Noise) -> tuple[
             again = put_right(recording, between, samples)
         except ValueError:  # it may lie nearly anywhere: what is left would not show it
             return None
-        fit = own_fit(campaign, again, noise)
+        fit = own_fit(campaign, again, model)
         if fit is not None:
             tried.append((fit.reduced_chi2, samples, fit))
     if not tried:

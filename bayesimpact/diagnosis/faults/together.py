@@ -1,28 +1,33 @@
-"""Do the recordings agree? Their own parameters as data of a linear model in logarithms.
+"""Which fault of which recording do the recordings' own parameters speak for?
 
-    log theta_r = log theta + log k2[case of r] + what a hypothesis allows recording r + error_r
-
-The errors are those of the single fits and a scatter common to all, taken robustly from the
-recordings themselves: physics that the model lacks makes recordings differ, and is no fault of one.
-A probe's gain moves the gap alone (the motion scales with the displacement), a clock moves k1 and
-k2 by twice and c1 and c2 by once its logarithm: every hypothesis is a direction.
+Every hypothesis is a direction of one recording's logarithms (see `hierarchical`), or another
+label: a probe's gain moves the gap alone (the motion scales with the displacement), a clock moves
+k1 and k2 by twice and c1 and c2 by once its logarithm.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from bayesimpact.diagnosis.faults.alone import Alone
+from bayesimpact.diagnosis.faults.hierarchical import Freed, Spread
+from bayesimpact.diagnosis.thresholds import DECISIVE
 
 Array = NDArray[np.float64]
 
 WIDTH = {"recording_gain": 1.0, "recording_clock": 0.05, "recording_other_rig": 0.5}
 """Prior standard deviation of the logarithm of what a hypothesis frees."""
+
+CERTAIN = 12.0
+"""Log odds of a fault over none where the single fits' errors alone are taken for what makes
+recordings differ: tails heavier than Gaussian are common, and 12 nats are 4.9 standard deviations
+beyond the price of one unknown. Where trends and scatter are allowed for, `DECISIVE` odds do."""
+
+LIKELIEST = 12  # faults whose evidence is summed over all widths
 
 AGREE = 1e-3  # chance of larger differences, from which on errors alone explain them
 
@@ -79,82 +84,70 @@ def hypotheses(cases: Sequence[str], stop: bool) -> list[Hypothesis]:
     return found
 
 
-def scatter(alone: Sequence[Alone], cases: Sequence[str]) -> Array:
-    """Variance (p,) by which the recordings' logarithms differ beyond their errors, robustly."""
-    logs = np.array([a.log for a in alone])
-    errors = np.array([np.diag(a.covariance) for a in alone])
-    result = np.zeros(logs.shape[1])
-    for p in range(logs.shape[1]):
-        measured = errors[:, p] < 10.0
-        groups = list(cases) if p == 4 else [""] * len(alone)
-        off = []
-        for group in dict.fromkeys(groups):
-            own = [i for i, g in enumerate(groups) if g == group and measured[i]]
-            if len(own) > 1:
-                middle = np.median(logs[own, p])
-                # a median of n values already follows them: n / (n - 1) of the variance is left
-                off += list(np.abs(logs[own, p] - middle) * np.sqrt(len(own) / (len(own) - 1)))
-        if len(off) >= 3:
-            total = (np.median(off) / 0.6745) ** 2
-            result[p] = max(total - float(np.median(errors[measured, p])), 0.0)
-    return result
-
-
-def weigh(
-    alone: Sequence[Alone], cases: Sequence[str], hypothesis: Hypothesis, extra: Array
-) -> Weighed:
-    """Log evidence of a hypothesis: generalised least squares with flat priors of what is shared.
-
-    `extra` (p,) is the scatter. Only differences between hypotheses mean anything.
-    """
-    labels = list(cases)
-    if hypothesis.case is not None:
-        labels[hypothesis.recording] = hypothesis.case
-    known = list(dict.fromkeys(cases))
-    size = alone[0].log.size
-    shared = 4 if size == 5 else size
-    columns = shared + (len(known) if size == 5 else 0) + bool(hypothesis.direction)
-    matrix, right = np.zeros((columns, columns)), np.zeros(columns)
-    constant = 0.0
-    for r, one in enumerate(alone):
-        design = np.zeros((size, columns))
-        design[range(shared), range(shared)] = 1.0
-        if size == 5:
-            design[4, shared + known.index(labels[r])] = 1.0
-        if hypothesis.direction and r == hypothesis.recording:
-            design[:, -1] = hypothesis.direction
-        weight = np.linalg.inv(one.covariance + np.diag(extra))
-        matrix += design.T @ weight @ design
-        right += design.T @ weight @ one.log
-        constant += float(one.log @ weight @ one.log)
-    matrix += 1e-9 * np.eye(columns)
-    if hypothesis.direction:
-        matrix[-1, -1] += 1.0 / WIDTH[hypothesis.id] ** 2
-    solution = np.linalg.solve(matrix, right)
-    misfit = constant - float(right @ solution)
-    numbers = sum(int(np.sum(np.diag(one.covariance) < 10.0)) for one in alone)
-    agreement = float(stats.chi2.sf(misfit, max(numbers - columns, 1)))
-    value = -0.5 * misfit
-    value -= 0.5 * float(np.linalg.slogdet(matrix)[1])
-    if not hypothesis.direction:
-        return Weighed(hypothesis, value, agreement)
-    value -= float(np.log(WIDTH[hypothesis.id]))
-    sd = float(np.sqrt(np.linalg.inv(matrix)[-1, -1]))
-    return Weighed(hypothesis, value, agreement, float(solution[-1]), sd)
-
-
 def weigh_all(
-    alone: Sequence[Alone], cases: Sequence[str], stop: bool
-) -> tuple[Weighed, list[Weighed]]:
-    """No fault, and every fault, the likeliest first.
+    alone: Sequence[Alone], cases: Sequence[str], stop: bool, most: int
+) -> tuple[Weighed, list[Weighed], float]:
+    """No fault; faults, the likeliest first; the log odds that one needs over none.
 
-    Scatter comes in only where the recordings differ by more than their errors even under the
-    likeliest fault: it hides what the correlations of their parameters tell.
+    Trends and scatter come in only where the recordings differ by more than their errors even under
+    the likeliest faults of up to `most` of them: they hide what the correlations of their
+    parameters tell.
     """
-    every = hypotheses(cases, stop)
-    for extra in (np.zeros(alone[0].log.size), scatter(alone, cases)):
-        weighed = [weigh(alone, cases, h, extra) for h in every]
-        ranked = sorted(weighed[1:], key=lambda w: -w.log_evidence)
-        if max(weighed[0].agreement, ranked[0].agreement) > AGREE:
-            break
-    return weighed[0], ranked
+    none, *every = hypotheses(cases, stop)
+    recordings = Recordings(alone, cases)
+    base = recordings.weighed([none], exact=True)
+    ranked = _ranked([recordings.weighed([h], exact=True) for h in every])
+    chosen = [ranked[0]]
+    while max(base.agreement, chosen[-1].agreement) <= AGREE and len(chosen) < most:
+        known = [w.hypothesis for w in chosen]
+        faulty = {h.recording for h in known}
+        others = [h for h in every if h.recording not in faulty]
+        chosen.append(_ranked([recordings.weighed([*known, h], exact=True) for h in others])[0])
+    if max(base.agreement, chosen[-1].agreement) > AGREE:
+        first, *others = (w.hypothesis for w in chosen)
+        joint = recordings.weighed([*others, first], exact=True)
+        best = replace(joint, log_evidence=ranked[0].log_evidence)
+        return base, [best, *ranked[1:]], CERTAIN
+    likely = sorted(every, key=lambda h: -recordings.roughly(h))[:LIKELIEST]
+    ranked = _ranked([recordings.weighed([h], exact=False) for h in likely])
+    return recordings.weighed([none], exact=False), ranked, DECISIVE
+
+
+def _ranked(found: Sequence[Weighed]) -> list[Weighed]:
+    return sorted(found, key=lambda w: -w.log_evidence)
+
+
+class Recordings:
+    """The recordings' own parameters, and what hypotheses make of them."""
+
+    def __init__(self, alone: Sequence[Alone], cases: Sequence[str]) -> None:
+        self.alone, self.cases = alone, cases
+
+    def weighed(self, faults: Sequence[Hypothesis], *, exact: bool) -> Weighed:
+        """Evidence of several faults together, and what the last of them frees."""
+        spread, freed = self._spread(faults, exact=exact), self._freed(faults)
+        value, share, at = spread.evidence(freed)
+        agreement = spread.agreement(freed, share, at)
+        if not faults[-1].direction:
+            return Weighed(faults[-1], value, agreement)
+        return Weighed(faults[-1], value, agreement, *spread.estimate(freed, share, at))
+
+    def roughly(self, fault: Hypothesis) -> float:
+        """Its evidence where trends may be of any size and nothing scatters."""
+        return self._spread([fault], exact=False).roughly(self._freed([fault]))
+
+    def _spread(self, faults: Sequence[Hypothesis], *, exact: bool) -> Spread:
+        labels = list(self.cases)
+        for fault in faults:
+            if fault.case is not None:
+                labels[fault.recording] = fault.case
+        return Spread(self.alone, labels, exact=exact)
+
+    def _freed(self, faults: Sequence[Hypothesis]) -> list[Freed]:
+        found = []
+        for fault in faults:
+            if fault.direction:
+                direction = np.zeros((len(self.alone), len(fault.direction)))
+                direction[fault.recording] = fault.direction
+                found.append((direction, WIDTH[fault.id]))
+        return found

@@ -291,7 +291,7 @@ def heading(v: Any, w: Any) -> Any:
 
 
 @inner(forceinline=True)
-def settle(y: Any, v: Any, t: Any, w: Any) -> Any:
+def update_contact(y: Any, v: Any, t: Any, w: Any) -> Any:
     """What changes without a change of force: the obstacle has pushed; the mass fell back."""
     s = w.s
     if s[MODE] == SEPARATED and y < s[GAP]:

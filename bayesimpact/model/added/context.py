@@ -67,7 +67,7 @@ class Flow(NamedTuple):
     placed: Any  # True when no added force depends on the velocity
     forced: Any  # True when the slots' force acts
     turns: Any  # True when a force has a kink or jump at v = 0
-    rough: Any  # True when a force is not smooth at the touch
+    rough: Any  # True when a force is not smooth at impact
     first_at_turn: Any  # shortest step where the motion turns, over the usual one
     bodies: Any  # True when a body of `resonator` acts
     joint: Any  # True when nothing else is added, so that `joint` is exact

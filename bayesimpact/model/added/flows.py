@@ -57,18 +57,18 @@ MAX_ANGLE_PLAIN = 0.6  # the same where nothing is added: exact, but one turning
 MAX_ANGLE_PACE = 0.32  # the same for an explicit dependence on time
 FINER = 2.4  # of a body on a spring of its own: it is not small, as other added forces are
 LONGER = 1.28  # where no force depends on the velocity: the method for these is the more accurate
-SHORTER = 0.5  # where a force that does is not smooth at the touch
-GRAINS = 1.1  # that a step may pass at the swing's highest speed
+SHORTER = 0.5  # where a force that does is not smooth at impact
+GRAINS = 1.1  # that a step may pass at the cycle's highest speed
 ROUND_UP = 0.3  # of a sample: steps end on samples, and may be that much longer for it
-RENEWED = 64  # longest steps after which a flow is chosen anew: the swing may have grown
+RENEWED = 64  # longest steps after which a flow is chosen anew: the amplitude may have grown
 MOST_CUTS = 4096  # steps per sample at most
 MOST_HOPS = 64  # per sample, of an exact flow with a body too fast to be seen
 FOLDED = 0.1  # a law's stiffness above this share of the linear one is counted into the flow
 LEAST = 0.25  # of the linear stiffness, which the flow keeps
-REACH = np.sqrt(0.75)  # where a cubic spring's secant has its mean stiffness, over the swing
+REACH = np.sqrt(0.75)  # where a cubic spring's secant has its mean stiffness, over the amplitude
 RAMP = 0.3  # first step of a contact over the time constant of a law's state
-# where a force is not smooth at the touch: shortest step over the longest; then, for times in units
-# of the longest step, step over the 3/4th power of the time since the touch, or to the release
+# where a force is not smooth at impact: shortest step over the longest; then, for times in units
+# of the longest step, step over the 3/4th power of the time since the impact, or to the release
 FIRST, SINCE, UNTIL = 1.0 / 80.0, 0.46, 0.27
 # the same where it is not smooth at a turning point; not much longer there than the time itself
 SINCE_TURN, UNTIL_TURN, MOST_SINCE, MOST_UNTIL = 0.8, 0.46, 1.0, 0.5
@@ -77,8 +77,8 @@ ENDS_ON_TURNS = KINK_AT_TURN | JUMP_AT_TURN
 # they are the usual ones, and by how much they are shortened and lengthened at most
 SLIGHT, LEAST_GAIN, MOST_GAIN = 0.07, 0.4, 3.2
 OUTSIDE = 0.04  # of a force that does not depend on the motion: nothing feeds its errors back
-DRIVEN = 4.0  # times its static deflection: a swing that an input is expected to cause
-OFF_TURN, OFF_PASSAGE = np.cos(np.pi / 8), np.sin(np.pi / 8)  # of the swing's four points
+DRIVEN = 4.0  # times its static deflection: an amplitude that an input is expected to cause
+OFF_TURN, OFF_PASSAGE = np.cos(np.pi / 8), np.sin(np.pi / 8)  # of the cycle's four points
 
 
 @inner()
@@ -119,7 +119,7 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
     slope, level, pace = 0.0, 0.0, abs(q[OMEGA]) if q[FORCE] != 0.0 else 0.0
     pace, grain = max(pace, FINER * bodies), np.inf
     if count > 0:
-        slope, level = fold(y, v, t, mass, damping, stiffness, force, count, w)
+        slope, level = linearize(y, v, t, mass, damping, stiffness, force, count, w)
         for k in range(count):
             law = w.acting[k]
             contact, z = 1.0 if touching else 0.0, w.work[WORK_COLUMNS * law + NOW]
@@ -167,9 +167,9 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
 def gain(y: Any, v: Any, t: Any, pace: Any, longest: Any, flow: Any, w: Any) -> Any:
     """Length of the steps over the usual one: longer where what is added to the flow is weak.
 
-    Its size is the largest at four points of a swing, a quarter of it apart, each at another time
-    (phase, where there is a pace), over the linear force of the swing or, if that is larger, of the
-    release: the error of a step grows with it, and with the step's sixth power.
+    Its size is the largest at four points of a cycle, a quarter of it apart, each at another time
+    (phase, where there is a pace), over the linear force at the amplitude or, if that is larger, at
+    the release: the error of a step grows with it, and with the step's sixth power.
     """
     q, w0, largest = w.q, np.sqrt(flow.K), 0.0
     speed = np.sqrt(flow.K * (y - flow.rest) ** 2 + v * v)
@@ -224,7 +224,7 @@ def left_out(y: Any, v: Any, t: Any, flow: Any, w: Any) -> Any:
 
 
 @inner()
-def fold(
+def linearize(
     y: Any,
     v: Any,
     t: Any,
@@ -237,7 +237,7 @@ def fold(
 ) -> Any:
     """Stiffness and force at y = 0 of the laws: what of them is counted into the linear flow.
 
-    The secant over the swing of a steady law that has no features; of others what lies just ahead
+    The secant over the cycle of a steady law that has no features; of others what lies just ahead
     (on this side of the law's surface), if it is stiff: exact for springs with gaps.
     """
     touching = 1.0 if w.s[MODE] == TOUCHING else 0.0
@@ -250,8 +250,8 @@ def fold(
     ahead = 0.5 * MAX_ANGLE / np.sqrt(stiffness / mass)
     shift = ahead * (v + 0.5 * ahead * total / mass)
     rest, slope, level = force / stiffness, 0.0, 0.0
-    swing = REACH * np.sqrt((y - rest) * (y - rest) + v * v * mass / stiffness)
-    low, high = rest - swing, rest + swing
+    amplitude = REACH * np.sqrt((y - rest) * (y - rest) + v * v * mass / stiffness)
+    low, high = rest - amplitude, rest + amplitude
     if touching == 1.0:
         low = max(low, gap)
     for k in range(count):
@@ -311,7 +311,7 @@ def next_step(
     left = j * w.interval - t
     if flow.rough:
         if v != 0.0:
-            away = (y - flow.gap) / v  # time since the touch, or minus the time to the release
+            away = (y - flow.gap) / v  # time since the impact, or minus the time to the release
             root = np.sqrt(abs(away) / longest)
             share = (SINCE if away >= 0.0 else UNTIL) * (LONGER if flow.placed else 1.0)
             longest *= min(1.0, max(FIRST, share * root * np.sqrt(root)))

@@ -6,7 +6,7 @@ Energy: dissipates for lam > 0, power -lam d v^2.
 Valid: compliant contacts in which the damping material is engaged gradually; not for a dashpot
 that is already moving at first touch.
 Its absence shows as contact damping that grows with the depth of an impact; the force is
-continuous at touch.
+continuous at impact.
 Source: Hunt and Crossley 1975, J. Appl. Mech. 42:440, Eq. 9 with n = 1; lam = 3 (1 - e) k2 / (2
 v) for a restitution e near 1.
 Status: loss per impact checked against the closed form for a light damping; compiled law against

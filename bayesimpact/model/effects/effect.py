@@ -157,7 +157,7 @@ class Law:
         `v` (-1, 1; 0 before it first moves), from `z`, the state where it turned. Zero at a
         recording's first sample; steps end on turning points
     surface : a smooth function of y or d whose zero is a kink of the force; steps end on it. (A
-        force may jump at the touch, being evaluated in contact only, and where a flag below says
+        force may jump at impact, being evaluated in contact only, and where a flag below says
         so; other jumps cost accuracy.)
     pace : fastest rate at which the force depends on time explicitly, rad/s; steps resolve it
     kink_at_turn : the force has a kink at v = 0; steps end on turning points
@@ -168,7 +168,7 @@ class Law:
         law then has no use of its own, is the direction of the motion: -1, 1, or 0 at rest
     jump_at_surface : the force jumps at its surface; z is the side: the sign of `surface`
     polynomial : between its kinks the force is a polynomial of low degree of y and v, and of sines
-        of time no faster than `pace`: it has no features that a look at four points of a swing
+        of time no faster than `pace`: it has no features that a look at four points of a cycle
         misses, so steps may be longer where it is weak
     grain : length, m, below which the force does look like a polynomial (a spline's knots lie that
         far apart): a step passes about one of them

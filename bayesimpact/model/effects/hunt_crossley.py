@@ -5,10 +5,10 @@ without unit, chi in s/m.
 At its null: it has none, for c2 is gone: models are compared by their evidence. n = 1 is
 contact_damping_indentation without a dashpot, chi = 0 contact_power_law without one.
 Energy: dissipates k2 chi d^n v^2; for small chi the restitution is 1 - 2 chi v / 3.
-Valid: bodies that meet without an impulse at the touch, restitution near one; k2 is the secant
+Valid: bodies that meet without an impulse at impact, restitution near one; k2 is the secant
 stiffness at 1 mm. It pulls for an instant where chi v < -1 on the way out. Where a unilateral
 obstacle is left at d < 0 the law is continued as an odd function of d.
-Its absence shows as a contact damping that is nothing at the touch and grows with the depth, and as
+Its absence shows as a contact damping that is nothing at impact and grows with the depth, and as
 contact times that depend on the impact speed.
 Source: Hunt and Crossley 1975, J. Appl. Mech. 42:440.
 Status: speed after an impact checked against the closed form; compiled law against two independent

@@ -46,7 +46,7 @@ def travel(
 def first_at_turn(
     y: float, v: float, d: float, t: float, z: float, touching: float, p: Numbers, q: Numbers
 ) -> float:
-    """Shortest step at a turning point over the usual one: 1 for loops as wide as the swing."""
+    """Shortest step at a turning point over the usual one: 1 for loops as wide as the amplitude."""
     return min(1.0, math.sqrt(3.0 / (p[1] * abs(y)))) if p[1] * abs(y) > 3.0 else 1.0
 
 

@@ -1,17 +1,17 @@
-"""The obstacle has a mass: it is picked up at touch and left when its force vanishes.
+"""The obstacle has a mass: it is picked up at impact and left when its force vanishes.
 
-Equation: v+ = m v / (m + m2) at touch; in contact the moving mass is m + m2; contact ends when m2
+Equation: v+ = m v / (m + m2) at impact; in contact the moving mass is m + m2; contact ends when m2
 y'' + c2 v + k2 d = 0; m2 in kg (for angles kg m2). Every touch finds the obstacle at rest at y =
 g.
 At its null: m2 = 0 is contact_no_tension, which is simpler and preferred.
-Energy: dissipates m m2 v^2 / (2 (m + m2)) at touch; what the obstacle carries off at release is
+Energy: dissipates m m2 v^2 / (2 (m + m2)) at impact; what the obstacle carries off at release is
 lost too.
 Valid: an obstacle whose own vibration dies out between impacts, m2 below about a tenth of m
 (0.243 rho A L for the tip of a uniform cantilever); not for an obstacle that rings.
 Its absence shows as a constant restitution: the same relative loss at every impact, whatever its
 speed.
 Source: Goldsmith 1960, Impact, chapter 1 (perfectly inelastic impact).
-Status: momentum at touch checked in closed form; compiled against two independent integrators.
+Status: momentum at impact checked in closed form; compiled against two independent integrators.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ EFFECT = Effect(
     family="contact inertia or memory",
     title="mass of the obstacle",
     equation=(
-        "v+ = m v / (m + m2) at touch, mass m + m2 in contact, free when m2 y'' + c2 v + k2 d = 0"
+        "v+ = m v / (m + m2) at impact, mass m + m2 in contact, free when m2 y'' + c2 v + k2 d = 0"
     ),
     regime="entry",
     energy="dissipates",

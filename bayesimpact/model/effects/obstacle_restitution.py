@@ -1,9 +1,9 @@
-"""A loss in the instant of the touch: the mass goes on with a share of its speed.
+"""A loss in the instant of impact: the mass goes on with a share of its speed.
 
 Equation: v+ = r v at every touch from outside, r without unit; the contact then goes on as in the
 base model.
 At its null: r = 1 is the base model.
-Energy: dissipates (1 - r^2) m v^2 / 2 at touch.
+Energy: dissipates (1 - r^2) m v^2 / 2 at impact.
 Valid: a thin hard layer or a light part that is hit before the obstacle yields, much faster than
 the contact; not where what is hit moves along (obstacle_mass).
 Its absence shows as a constant restitution: the same relative loss at every impact, whatever its
@@ -22,12 +22,12 @@ from bayesimpact.model.effects.effect import Effect, EffectParameter
 EFFECT = Effect(
     id="obstacle_restitution",
     family="contact inertia or memory",
-    title="loss in the instant of the touch",
-    equation="v+ = r v at touch",
+    title="loss in the instant of impact",
+    equation="v+ = r v at impact",
     regime="entry",
     energy="dissipates",
     statement=(
-        "The mass loses {size} of its speed in the instant of the touch ({share} of its energy)."
+        "The mass loses {size} of its speed in the instant of impact ({share} of its energy)."
     ),
     parameters=(
         EffectParameter("coefficient", "-", scale=lambda s: 0.05, lower=0.0, upper=1.0, null=1.0),

@@ -40,7 +40,7 @@ EFFECT = Effect(
     regime="free",
     energy="conserves",
     statement=(
-        "Large swings meet a second stop on the other side; it adds up to {size} "
+        "Large amplitudes meet a second stop on the other side; it adds up to {size} "
         "({share} of the peak elastic force)."
     ),
     parameters=(

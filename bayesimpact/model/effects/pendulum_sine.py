@@ -36,7 +36,7 @@ def grain(
 
 
 def size(p: Numbers, s: Scales) -> Size:
-    """What the sine lacks of the angle at the largest swing."""
+    """What the sine lacks of the angle at the largest amplitude."""
     missing = s.amplitude - math.sin(s.amplitude)
     return s.stiffness * missing, "N", missing / s.amplitude
 

@@ -4,13 +4,13 @@ Equation: force z, z' = s v (1 - z / F sign v) with s = F / x; F in N, x in m (f
 x is the way on which the friction builds up. z depends on the path alone, and is 0 at a recording's
 first sample.
 At its null: F = 0 is the base model; x then means nothing. x -> 0 is coulomb_friction, which is
-simpler and preferred; for x as large as the swing it is hysteresis_bouc_wen, the same law in other
-numbers.
+simpler and preferred; for x as large as the amplitude it is hysteresis_bouc_wen, the same law in
+other numbers.
 Energy: dissipates; nearly 4 F (A - x) in a cycle of an amplitude A far above x.
 Valid: bearings, guides and clamped joints; static and sliding friction equal, no creep under a
 load at rest, no Stribeck effect.
 Its absence shows as dry friction at large amplitude, and as a spring s beside k1 and a decay that
-goes on once the swing is not larger than x.
+goes on once the amplitude is not larger than x.
 Source: Dahl 1968, Aerospace Corporation report TOR-0158(3107-18)-1; Dahl 1976, AIAA Journal
 14:1675.
 Status: the path and its work checked in closed form; compiled law against two

@@ -26,7 +26,7 @@ from bayesimpact.model.effects.effect import Effect, EffectParameter, Numbers, S
 
 
 def size(p: Numbers, s: Scales) -> Size:
-    """Largest displacement of the mode: static when it is faster than a contact, else a swing."""
+    """Largest displacement of the mode: static where faster than a contact, else after one."""
     omega = 2.0 * math.pi * p[0]
     peak = abs(p[2]) * s.contact_force / (omega * max(omega, s.contact_rate))
     return peak, "m", peak / s.indentation

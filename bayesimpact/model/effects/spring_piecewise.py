@@ -44,7 +44,7 @@ EFFECT = Effect(
     regime="free",
     energy="dissipates",
     statement=(
-        "Large swings meet a second spring and damper on the other side; they add up to {size} "
+        "Large amplitudes meet a second spring and damper on the other side; they add up to {size} "
         "({share} of the peak elastic force)."
     ),
     parameters=(

@@ -5,7 +5,7 @@ At its null: kq = 0 is the base model.
 Energy: conserves; potential kq y^3 / 3.
 Valid: moderate asymmetry (curved or preloaded leaf springs), |kq y| well below k1; of either
 sign.
-Its absence shows as a swing whose centre moves by -kq a^2 / (2 k1) with amplitude a, and a second
+Its absence shows as a cycle whose centre moves by -kq a^2 / (2 k1) with amplitude a, and a second
 harmonic.
 Source: Nayfeh and Mook 1979, Nonlinear Oscillations, chapter 2.
 Status: energy conserved to rounding; compiled law against two independent integrators.

@@ -4,8 +4,8 @@ Equation: k5 y^5, k5 in N/m5 (for angles N m/rad5).
 At its null: k5 = 0 is the base model.
 Energy: conserves; potential k5 y^6 / 6.
 Valid: the next term beyond spring_cubic of a symmetric spring, or the first of one whose cubic
-term vanishes (magnetic springs, buckled guides); for k5 < 0 the swing must stay below (k1 / -k5)
-^(1/4).
+term vanishes (magnetic springs, buckled guides); for k5 < 0 the amplitude must stay below
+(k1 / -k5)^(1/4).
 Its absence shows as a frequency that hardly changes at small amplitude and strongly at large:
 dw / w = 5 k5 a^4 / (16 k1), while a cubic spring's grows with a^2.
 Source: Nayfeh and Mook 1979, Nonlinear Oscillations, chapter 2; Kovacic and Brennan 2011, The

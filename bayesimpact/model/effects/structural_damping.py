@@ -8,7 +8,7 @@ Valid: h well below one; joints, composites and metals over many decades of freq
 factor of a complex stiffness is eta = 2 h / pi.
 Its absence shows as a decay that is exponential as that of c1 is, but equally fast against every
 stiffness: next to c1 it is seen by the obstacle, where the frequency is another and the loss the
-same, and by the shape of the swing.
+same, and by the shape of the cycle.
 Source: Kimball and Lovell 1927, Phys. Rev. 30:948; Reid 1956, J. R. Aeronaut. Soc. 60:283 (this
 law); Crandall 1970, J. Sound Vib. 11:3.
 Status: ratio of successive amplitudes checked in closed form; compiled law against two independent

@@ -1,4 +1,4 @@
-"""Backbone and damping before and after: how far recorded swings lie from simulated ones."""
+"""Backbone and damping before and after: how far recorded cycles lie from simulated ones."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def _figure(results: Results, before: BackboneSummary, after: BackboneSummary) -
     panels = figure.subplots(2, 2, sharex="col", sharey=True)
     sides = (("base model", before), ("with what was added", after))
     for row, (words, summary) in zip(panels, sides, strict=True):
-        _swings(row, summary, position(results).scale)
+        _cycles(row, summary, position(results).scale)
         inside = f"{100 * summary.inside[-1]:.0f} % inside, {p_words(summary.p_values[-1])}"
         row[0].set_title(f"frequency, {words}: {inside}", loc="left")
         row[1].set_title(f"damping ratio, {words}", loc="left")
@@ -47,7 +47,7 @@ def _figure(results: Results, before: BackboneSummary, after: BackboneSummary) -
     return figure
 
 
-def _swings(row: np.ndarray, summary: BackboneSummary, scale: float) -> None:
+def _cycles(row: np.ndarray, summary: BackboneSummary, scale: float) -> None:
     for axis in row:
         axis.axhspan(-1.0, 1.0, color="#E4E4E4", lw=0, zorder=0)
         axis.grid()

@@ -12,7 +12,7 @@ from bayesimpact.data.bundled import bundled_campaign
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.read import load_campaign
 from bayesimpact.data.recording import Recording
-from bayesimpact.diagnosis.faults.alone import fit_alone
+from bayesimpact.diagnosis.faults.alone import SharedModel, fit_alone
 from bayesimpact.diagnosis.faults.compare import Compared, base_failed, compare_recordings
 from bayesimpact.inference.identify import identify
 from bayesimpact.trial.bundle import PAPER_RIG, paper_releases
@@ -39,7 +39,8 @@ def changed(campaign: Campaign, change: Change, *numbers: int) -> Campaign:
 
 
 def compared(campaign: Campaign) -> tuple[Compared, ...]:
-    return compare_recordings(identify(campaign, rng=np.random.default_rng(0), search=False))
+    found = identify(campaign, rng=np.random.default_rng(0), search=False)
+    return compare_recordings(found.fit, SharedModel(found.noise))
 
 
 def only(campaign: Campaign) -> Compared:
@@ -76,7 +77,9 @@ def test_a_unit(paper: Campaign) -> None:
 def test_errors_of_a_recording_alone_do_not_depend_on_its_unit(paper: Campaign) -> None:
     """Its noise is as many times larger as its motion: the noise that its fit leaves tells."""
     noise = identify(paper, rng=np.random.default_rng(0), search=False).noise
-    one, other = (fit_alone(paper, scaled(by)(paper.recordings[ODD]), noise) for by in (1.0, 1e3))
+    one, other = (
+        fit_alone(paper, scaled(by)(paper.recordings[ODD]), SharedModel(noise)) for by in (1.0, 1e3)
+    )
     assert one is not None and other is not None
     first, second = (np.sqrt(np.diag(a.covariance)) for a in (one, other))
     np.testing.assert_allclose(first, second, rtol=0.1)
@@ -110,7 +113,7 @@ def test_a_stop_on_the_other_side_of_all(paper: Campaign) -> None:
     campaign = changed(paper, scaled(-1.0), *range(6))
     identification = identify(campaign, rng=np.random.default_rng(0), search=False)
     assert base_failed(identification.fit)
-    found = compare_recordings(identification)
+    found = compare_recordings(identification.fit, SharedModel(identification.noise))
     assert len(found) == 6
     assert all("stop lies on the negative side" in f.fault.statement for f in found)
     right = identify(found[-1].campaign, rng=np.random.default_rng(0), search=False)

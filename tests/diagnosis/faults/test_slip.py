@@ -12,7 +12,7 @@ from bayesimpact.data.bundled import bundled_campaign
 from bayesimpact.data.campaign import Campaign, Smoothing
 from bayesimpact.data.read import load_campaign
 from bayesimpact.data.recording import Recording
-from bayesimpact.diagnosis.faults.alone import own_fit
+from bayesimpact.diagnosis.faults.alone import SharedModel, own_fit
 from bayesimpact.diagnosis.faults.slip import find_shift, likeliest_shift, put_right
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.noise import Noise
@@ -54,7 +54,7 @@ def test_readings_are_put_where_they_belong(campaign: Campaign) -> None:
 @pytest.mark.parametrize("count", [-4, -1, 1, 2, 6, 14])
 def test_the_count_and_the_place(campaign: Campaign, noise: Noise, count: int) -> None:
     spoiled = lost(campaign.recordings[0], count)
-    found = find_shift(campaign, spoiled, noise)
+    found = find_shift(campaign, spoiled, SharedModel(noise))
     assert found is not None
     shift, fit = found
     assert shift.samples == count
@@ -63,7 +63,7 @@ def test_the_count_and_the_place(campaign: Campaign, noise: Noise, count: int) -
 
 
 def own_misfit(campaign: Campaign, recording: Recording, noise: Noise) -> float:
-    fit = own_fit(campaign, recording, noise)
+    fit = own_fit(campaign, recording, SharedModel(noise))
     assert fit is not None
     return fit.reduced_chi2
 
@@ -71,11 +71,11 @@ def own_misfit(campaign: Campaign, recording: Recording, noise: Noise) -> float:
 def test_the_score_is_what_a_fit_with_the_shift_gains(campaign: Campaign, noise: Noise) -> None:
     """In the linear regime: a tenth of a sample."""
     (sound,) = campaign.recordings
-    before = own_fit(campaign, sound, noise)
+    before = own_fit(campaign, sound, SharedModel(noise))
     assert before is not None
     late = np.where(np.arange(sound.samples.size) < PLACE, 0.0, 0.1)
     moved = sound.samples + late * np.gradient(before.predicted[0])
-    fit = own_fit(campaign, replace(sound, samples=moved), noise)
+    fit = own_fit(campaign, replace(sound, samples=moved), SharedModel(noise))
     assert fit is not None
     shift = likeliest_shift(fit)
     assert shift is not None
@@ -88,12 +88,14 @@ def test_the_score_is_what_a_fit_with_the_shift_gains(campaign: Campaign, noise:
 
 def test_nothing_is_found_where_nothing_is_missing(campaign: Campaign, noise: Noise) -> None:
     """White noise about the fit exceeds the threshold once in a million recordings."""
-    fit = own_fit(campaign, campaign.recordings[0], noise)
+    fit = own_fit(campaign, campaign.recordings[0], SharedModel(noise))
     assert fit is not None and likeliest_shift(fit) is None
     rng = np.random.default_rng(5)
     for _ in range(10):
         fresh = fit.predicted[0] + noise.level * rng.standard_normal(fit.predicted[0].size)
-        again = own_fit(campaign, replace(campaign.recordings[0], samples=fresh), noise)
+        again = own_fit(
+            campaign, replace(campaign.recordings[0], samples=fresh), SharedModel(noise)
+        )
         assert again is not None and likeliest_shift(again) is None
 
 
@@ -102,11 +104,11 @@ def test_a_shift_that_may_begin_anywhere_is_no_slip() -> None:
     creeping = small_rig.record(3, {"coulomb_friction": {"force": 0.01}}, duration=1.5)
     noise = identify(creeping, rng=np.random.default_rng(0), search=False).noise
     recording = creeping.recordings[1]
-    fit = own_fit(creeping, recording, noise)
+    fit = own_fit(creeping, recording, SharedModel(noise))
     assert fit is not None
     shift = likeliest_shift(fit)
     assert shift is not None and shift.latest - shift.earliest > 0.8 * recording.samples.size
-    assert find_shift(creeping, recording, noise) is None
+    assert find_shift(creeping, recording, SharedModel(noise)) is None
 
 
 def test_the_place_behind_a_filter(campaign: Campaign) -> None:
@@ -117,10 +119,10 @@ def test_the_place_behind_a_filter(campaign: Campaign) -> None:
     measurement = replace(campaign.measurement, smoothing=filtering)
     behind = replace(campaign, measurement=measurement, recordings=(smoothed,))
     noise = identify(behind, rng=np.random.default_rng(0), search=False).noise
-    fit = own_fit(behind, lost(smoothed, 2), noise)
+    fit = own_fit(behind, lost(smoothed, 2), SharedModel(noise))
     assert fit is not None
     shift = likeliest_shift(fit)
     assert shift is not None and shift.place == pytest.approx(PLACE, abs=2)
-    found = find_shift(behind, lost(smoothed, 2), noise)
+    found = find_shift(behind, lost(smoothed, 2), SharedModel(noise))
     assert found is not None and found[0].samples == 2
     assert found[1].reduced_chi2 < 1.15

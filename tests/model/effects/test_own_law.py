@@ -147,7 +147,7 @@ def test_a_force_that_sets_in_at_the_touch():
     """A preloaded obstacle: its force jumps where contact begins, and where it ends."""
     own, values = effect(Law(preload_force, where="contact"), 0.4)
     touching = lambda y: 0.4 if y > RIG.g else 0.0  # noqa: E731
-    # right of the touch the reference is on the side of contact from its first stage on
+    # right of the impact the reference is on the side of contact from its first stage on
     theirs = reference(lambda y, v, z: touching(y + 1e-13 * np.sign(v)))
     assert np.abs(moved([own], values, RIG) - theirs).max() < 1e-8
     assert np.abs(theirs - moved([], {}, RIG)).max() > 1e-5

@@ -1,0 +1,163 @@
+"""Sets of effects that the equation of motion along the measured motion asks for.
+
+All sets come from the normal equations of `equation_error`: a beam of the best ones is extended by
+one effect at a time. A set counts by what its least squares leave of the stretches, with the price
+of every unknown (Schwarz 1978) and of every effect.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.diagnosis.equation_error import Path, Term, base_columns, measured_paths, terms_of
+from bayesimpact.inference.fit import Fit
+from bayesimpact.model.effects.effect import Effect, Scales
+
+Array = NDArray[np.float64]
+
+Chosen = tuple[int, ...]
+
+BEAM = 40  # sets of a size that are extended
+
+
+@dataclass(frozen=True, eq=False)
+class EffectSet:
+    """Effects with the parameters that the equation of motion asks for.
+
+    Attributes
+    ----------
+    terms : one for every effect
+    values : parameter -> value: sizes and shapes of the effects, the base model's, y0 and v0
+    log_odds : over the base model, as far as this problem tells
+    """
+
+    terms: tuple[Term, ...]
+    values: Mapping[str, float]
+    log_odds: float
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """The effects."""
+        return tuple(term.effect for term in self.terms)
+
+
+def _completed(chosen: EffectSet, fit: Fit, paths: Sequence[Path]) -> EffectSet:
+    """With the gap, of which only the change is known, and the measured first states."""
+    values = dict(chosen.values)
+    if "g" in values:
+        values["g"] += fit.value("g")
+    for recording, path in zip(fit.target.oscillator.campaign.recordings, paths, strict=True):
+        values |= {f"y0[{recording.name}]": path.y[0], f"v0[{recording.name}]": path.v[0]}
+    return replace(chosen, values=values)
+
+
+class LikelySets:
+    """Sets of effects for a fit of the base model, by the equation of motion.
+
+    Holds the normal equations of base model and terms, all columns scaled to norm one. There are no
+    terms, and so no sets, where a reading is no displacement, or where effects are declared.
+    """
+
+    def __init__(self, fit: Fit, effects: Sequence[Effect], scales: Scales) -> None:
+        o = fit.target.oscillator
+        self.fit, self.paths = fit, measured_paths(fit)
+        columns, targets, self.names = base_columns(fit, self.paths)
+        base, target = np.concatenate(columns), np.concatenate(targets)
+        seen = () if o.acting or o.orders.any() else effects
+        self.terms = terms_of(fit, seen, scales, self.paths)
+        self.cost = float(np.log(2 * len(effects)))
+        self.rows = max(sum(int(p.rows.kept.sum()) - 1 for p in self.paths), 1)
+        blocks = [np.concatenate(term.columns) for term in self.terms]
+        self.first = np.cumsum([base.shape[1], *(b.shape[1] for b in blocks)])
+        every = np.column_stack([base, *blocks])
+        size = np.linalg.norm(every, axis=0)
+        self.size = np.where(size > 0, size, 1.0)
+        scaled = every / self.size
+        self.matrix, self.right = scaled.T @ scaled, scaled.T @ target
+        self.whole = float(target @ target)
+        self.base = [i for i in range(base.shape[1]) if size[i] > 0]
+
+    def columns(self, chosen: Sequence[int]) -> list[int]:
+        """Of the base model and of the terms `chosen`."""
+        own = [i for t in chosen for i in range(self.first[t], self.first[t + 1])]
+        return [*self.base, *own]
+
+    def solve(self, chosen: Sequence[int]) -> tuple[Array, float]:
+        """Scaled unknowns of a set, and the log of what it leaves per stretch, at least 0."""
+        at = self.columns(chosen)
+        part = self.matrix[np.ix_(at, at)] + 1e-12 * np.eye(len(at))
+        x = np.linalg.solve(part, self.right[at])
+        left = self.whole - float(x @ self.right[at])
+        return np.asarray(x), float(np.log(max(left / self.rows, 1.0)))
+
+    def log_odds(self, chosen: Sequence[int]) -> float:
+        """Of a set over no unknown at all; minus infinity for a stiffness k1, or a size that cannot
+        be, below zero.
+        """
+        x, left = self.solve(chosen)
+        unknowns = x.size - len(self.base)
+        signs = [s for t in chosen for s in self.terms[t].one_sided]
+        if x[0] <= 0.0 or np.any(x[len(self.base) :][signs] <= 0.0):
+            return -np.inf
+        price = 0.5 * unknowns * float(np.log(self.rows)) + self.cost * len(chosen)
+        return -0.5 * self.rows * left - price
+
+    def best(self, most: int) -> list[EffectSet]:
+        """The likeliest sets of one, two, ... effects; each is likelier than all smaller ones."""
+        beam: list[Chosen] = [()]
+        reached = none = self.log_odds(())
+        found = []
+        for _ in range(most):
+            level: dict[frozenset[str], tuple[float, Chosen]] = {}
+            for chosen in beam:
+                for t in self._beside(chosen):
+                    ids = frozenset(self.terms[i].effect.id for i in (*chosen, t))
+                    odds = self.log_odds((*chosen, t))
+                    if odds > level.get(ids, (-np.inf, ()))[0]:
+                        level[ids] = odds, (*chosen, t)
+            ranked = sorted(level.values(), key=lambda one: -one[0])[:BEAM]
+            if not ranked or ranked[0][0] <= reached:
+                break
+            reached, beam = ranked[0][0], [chosen for _, chosen in ranked]
+            found.append(self._set(beam[0], reached - none))
+        return [_completed(one, self.fit, self.paths) for one in found]
+
+    def gains(self, ids: Collection[str]) -> dict[str, float]:
+        """By how much every other effect that has a term would make a set likelier, nats."""
+        held = self._shaped([t for t in ids if any(x.effect.id == t for x in self.terms)])
+        before, found = self.log_odds(held), dict[str, float]()
+        for t in self._beside(held):
+            own = self.terms[t].effect.id
+            gain = self.log_odds((*held, t)) - before
+            found[own] = max(found.get(own, -np.inf), gain)
+        return found
+
+    def _shaped(self, ids: Sequence[str]) -> Chosen:
+        """The terms of a set of effects, each at its likeliest shape beside the others."""
+        own = {i: [t for t, x in enumerate(self.terms) if x.effect.id == i] for i in ids}
+        chosen = {i: own[i][0] for i in ids}
+        for i in (*ids, *ids):
+            rest = [t for other, t in chosen.items() if other != i]
+            chosen[i] = max(own[i], key=lambda t: self.log_odds((*rest, t)))
+        return tuple(chosen.values())
+
+    def _beside(self, chosen: Sequence[int]) -> list[int]:
+        """Terms that a set may take in."""
+        held = [self.terms[i].effect for i in chosen]
+        ids = {e.id for e in held}
+        return [
+            t
+            for t, term in enumerate(self.terms)
+            if term.effect.id not in ids and all(term.effect.stands_beside(e) for e in held)
+        ]
+
+    def _set(self, chosen: Sequence[int], odds: float) -> EffectSet:
+        x = self.solve(chosen)[0] / self.size[self.columns(chosen)]
+        terms = tuple(self.terms[t] for t in chosen)
+        names = [*(self.names[i] for i in self.base), *(n for t in terms for n in t.names)]
+        values = dict(zip(names, map(float, x), strict=True))
+        return EffectSet(terms, values | {n: v for t in terms for n, v in t.shapes.items()}, odds)

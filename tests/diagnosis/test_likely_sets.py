@@ -1,0 +1,158 @@
+"""Sets of effects that the equation of motion asks for along the measured motion."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import small_rig
+from driven_twin import driven_motion
+from effect_rigs import BY_ID
+
+from bayesimpact.data.campaign import SECOND_STOP, Campaign
+from bayesimpact.data.input import Input
+from bayesimpact.data.recording import Recording
+from bayesimpact.diagnosis.equation_error import Path, measured_paths, terms_of, without_rest
+from bayesimpact.diagnosis.extend import campaign_scales
+from bayesimpact.diagnosis.likely_sets import EffectSet, LikelySets
+from bayesimpact.diagnosis.refit import fit_from
+from bayesimpact.diagnosis.size import force_along
+from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.identify import identify
+from bayesimpact.model.effects import SEARCHED
+from bayesimpact.model.parameters import SLOTS
+from bayesimpact.trial.rig import Effects
+
+FREE = {
+    "spring_cubic": {"stiffness": 4e6},
+    "quadratic_drag": {"coefficient": 3.0},
+    "coulomb_friction": {"force": 0.02},
+}
+STOPPED = {
+    "opposite_stop": {"gap": 3e-3, "stiffness": 600.0},
+    "contact_damping_indentation": {"coefficient": 4000.0},
+}
+
+
+def fitted(campaign: Campaign) -> Fit:
+    return identify(campaign, rng=np.random.default_rng(0), search=False).fit
+
+
+def decays(seed: int, effects: Effects) -> Campaign:
+    return small_rig.record(
+        seed, effects, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES, duration=6.0
+    )
+
+
+def sets_of(fit: Fit) -> list[EffectSet]:
+    return LikelySets(fit, SEARCHED, campaign_scales(fit)).best(5)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_three_strong_effects_are_asked_for(seed: int) -> None:
+    fit = fitted(decays(seed, FREE))
+    assert fit.reduced_chi2 > 1000
+    found = sets_of(fit)
+    (three,) = (s for s in found if len(s.effects) == 3)
+    assert {e.id for e in three.effects} == set(FREE)
+    for effect, numbers in FREE.items():
+        for name, value in numbers.items():
+            assert three.values[f"{effect}.{name}"] == pytest.approx(value, rel=0.05)
+    assert three.values["k1"] == pytest.approx(small_rig.PLAIN.k1, rel=1e-3)
+    assert [s.log_odds for s in found] == sorted(s.log_odds for s in found)
+    candidate = fit_from(fit, three.effects, three.values, campaign_scales(fit))
+    assert candidate.fit.converged and candidate.fit.reduced_chi2 < 1.1
+
+
+def test_with_a_stop() -> None:
+    fit = fitted(small_rig.record(1, STOPPED, duration=4.0))
+    assert fit.reduced_chi2 > 9
+    found = sets_of(fit)[-1]  # with others that repair what sparse samples of impacts do
+    assert {e.id for e in found.effects} > set(STOPPED)
+    candidate = fit_from(fit, found.effects, found.values, campaign_scales(fit))
+    assert candidate.fit.reduced_chi2 < 1.2
+
+
+def test_driven_with_an_unknown_gain() -> None:
+    n, interval = 3000, 2e-3
+    rng = np.random.default_rng(3)
+    force = 2.0 * np.convolve(rng.standard_normal(n), np.ones(5) / 5, "same")
+    values = {"mass": 0.5, "c1": 0.6, "k1": 800.0, "y0": 0.0, "v0": 0.0}
+    motion, _ = driven_motion(values, force, interval, lambda y, v, touching: 2e7 * y**3)
+    samples = motion + 5e-6 * rng.standard_normal(n)
+    recording = Recording("one", "", samples, interval, input=Input(force / 2.5, free=True))
+    fit = fitted(Campaign("rig", 0.5, (recording,), stop=False))
+    assert fit.reduced_chi2 > 9
+    first = sets_of(fit)[0]
+    assert [e.id for e in first.effects] == ["spring_cubic"]
+    assert first.values["spring_cubic.stiffness"] == pytest.approx(2e7, rel=0.02)
+    assert first.values["input_gain"] == pytest.approx(2.5, rel=0.01)
+
+
+def test_nothing_is_asked_for_where_nothing_is_missing() -> None:
+    assert sets_of(fitted(decays(1, {}))) == []
+
+
+def test_only_displacements_of_a_plain_base_model() -> None:
+    velocity = small_rig.record(
+        1, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES, quantity="velocity"
+    )
+    assert sets_of(fitted(velocity)) == []
+    fit = fitted(small_rig.record(1))
+    declared = replace(fit.target.oscillator.campaign, declared=(SECOND_STOP,))
+    oscillator = replace(fit.target.oscillator, campaign=declared)
+    likelihood = replace(fit.target.likelihood, oscillator=oscillator)
+    assert sets_of(replace(fit, target=replace(fit.target, likelihood=likelihood))) == []
+
+
+@pytest.mark.parametrize(
+    "effect_id", ["spring_cubic", "quadratic_drag", "opposite_stop", "contact_hardening"]
+)
+def test_columns_are_the_law_along_the_path(effect_id: str) -> None:
+    """By the plain Python law, sample for sample."""
+    fit = fitted(small_rig.record(1))
+    scales, effect = campaign_scales(fit), BY_ID[effect_id]
+    paths = measured_paths(fit)
+    term = terms_of(fit, [effect], scales, paths)[0]
+    slots = fit.target.oscillator.layout.slots(fit.mode)
+    shapes = [term.shapes[f"{effect_id}.{p.name}"] for p in effect.parameters if p.is_shape]
+    assert effect.law is not None
+    for path, q, columns in zip(paths, slots, term.columns, strict=True):
+        force = force_along(effect.law, path.y, path.v, path.t, [1.0, *shapes], q)
+        expected = without_rest(path, path.rows.integrals(force)[:, None])
+        np.testing.assert_allclose(columns, expected, rtol=1e-6, atol=1e-9 * np.abs(expected).max())
+
+
+def test_errors_of_stretches_are_white() -> None:
+    """Of noise alone, whatever part of it is set aside: variance one, neighbours uncorrelated."""
+    campaign = small_rig.record(1, duration=12.0)
+    used = np.ones(campaign.recordings[0].samples.size, dtype=bool)
+    used[3000:3010] = False
+    recordings = (replace(campaign.recordings[0], used=used), *campaign.recordings[1:])
+    fit = fitted(replace(campaign, recordings=recordings))
+    paths = measured_paths(fit)
+    assert not paths[0].rows.kept.all()
+    rng, level = np.random.default_rng(0), fit.target.likelihood.noise.level
+    white = np.concatenate([whitened_noise(path, level, rng) for path in paths for _ in range(20)])
+    assert white.var() == pytest.approx(1.0, abs=5 * np.sqrt(2 / white.size))
+    assert abs(np.mean(white[1:] * white[:-1])) < 5 / np.sqrt(white.size)
+
+
+def whitened_noise(path: Path, level: float, rng: np.random.Generator) -> np.ndarray:
+    noise = level * rng.standard_normal(path.y.size)
+    windows = np.lib.stride_tricks.sliding_window_view(noise, path.operator.size)
+    errors = windows[:: path.rows.hop] @ path.operator
+    return path.whiten(np.where(path.rows.kept, errors, 0.0)[:, None])[path.rows.kept, 0]
+
+
+def test_velocities_by_local_quartics() -> None:
+    fit = fitted(small_rig.record(1))
+    slots = fit.target.oscillator.layout.slots(fit.mode)
+    for path, y, q in zip(measured_paths(fit), fit.displacements, slots, strict=True):
+        assert np.abs(path.y - y).max() < 4 * small_rig.NOISE
+        speed = np.gradient(y, path.t)
+        inner = slice(20, -20)
+        off = np.abs(path.v - speed)[inner]
+        assert np.median(off) < 5e-3 * np.abs(speed).max()
+        assert np.array_equal(path.d > 0, path.y > q[SLOTS.index("g")])
