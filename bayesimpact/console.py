@@ -13,6 +13,7 @@ from bayesimpact.data.lock import locked
 from bayesimpact.errors import (
     BayesimpactError,
     InputError,
+    interruption_kept,
     system_words,
     terminated_like_ctrl_c,
 )
@@ -36,7 +37,8 @@ class Commands(click.Group):
         """
         with terminated_like_ctrl_c():
             try:
-                return super().invoke(ctx)
+                with interruption_kept():
+                    return super().invoke(ctx)
             except InputError as error:
                 _end(ctx, f"bayesimpact: {error}", BAD_INPUT)
             except BayesimpactError as error:

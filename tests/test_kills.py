@@ -13,6 +13,8 @@ from small_rig import RELEASES, record
 
 from bayesimpact.trial.rig_files import write_campaign
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[str], Path, int]:

@@ -18,6 +18,7 @@ from small_rig import record
 from bayesimpact.cli import main
 from bayesimpact.data.lock import locked
 from bayesimpact.data.read import load_campaign
+from bayesimpact.errors import interruption_kept
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.posterior import _fingerprint
 from bayesimpact.trial.rig_files import write_campaign
@@ -145,6 +146,17 @@ def test_sigterm_is_like_ctrl_c_and_says_how_to_go_on(campaign: Path, tmp_path: 
     last = error.splitlines()[-1]
     assert last.startswith("bayesimpact: interrupted") and "Traceback" not in error
     assert f"bayesimpact sample {campaign} --out {tmp_path} --seed 0 --resume" in last
+
+
+def test_an_interruption_outlives_a_clean_up_that_fails() -> None:
+    """A progress bar interrupted while it took its lock ended in AttributeError, exit code 1."""
+    with pytest.raises(KeyboardInterrupt), interruption_kept():
+        try:
+            raise KeyboardInterrupt
+        finally:
+            raise AttributeError("no lock to release")
+    with pytest.raises(AttributeError), interruption_kept():
+        raise AttributeError("no interruption")
 
 
 def test_a_comment_in_the_campaign_does_not_matter_and_a_case_does(tmp_path: Path) -> None:

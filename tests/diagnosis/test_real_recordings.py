@@ -12,6 +12,8 @@ import pytest
 
 from bayesimpact.diagnosis.loop import Diagnosis
 
+pytestmark = pytest.mark.long
+
 HERE = Path(__file__).resolve()
 REAL = Path(os.environ.get("BAYESIMPACT_RECORDINGS", HERE.parents[3] / "shared" / "recordings"))
 

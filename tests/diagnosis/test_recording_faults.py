@@ -146,6 +146,7 @@ def test_doubtful_faults_come_after_certain_ones_and_physics(
     assert [e.id for e in found.effects] == ["sensor_quadratic"]
 
 
+@pytest.mark.long
 def test_a_gain_shows_beside_the_physics_that_hides_it() -> None:
     """To the base model every recording has a gap of its own; beside the spring only one."""
     heights = (-6.5e-3, -5.8e-3, -5.2e-3, -4.6e-3, -4e-3, -3.5e-3)

@@ -10,6 +10,8 @@ from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.smoothing import whole_campaign
 from bayesimpact.trial.rig_chain import Chain
 
+pytestmark = pytest.mark.long
+
 NOISE = {"velocity": 2e-4, "acceleration": 2e-2}
 TRUE = 400.0
 

@@ -22,6 +22,8 @@ from bayesimpact.fleet.plan import Plan, Session, load_plan
 from bayesimpact.fleet.table import columns
 from bayesimpact.fleet.write import fleet_results
 
+pytestmark = pytest.mark.long
+
 SESSIONS = 7
 JOB = run.campaign_job
 GROWTH = 1e-5  # m, of the gap from session to session

@@ -72,6 +72,7 @@ def paper_campaign(
     return Campaign("paper", PAPER["mass"], tuple(recordings))
 
 
+@pytest.mark.long
 def test_many_random_rigs(many: Found) -> None:
     """One of 200 rigs drawn like this missed one parameter (c2) when the test was written."""
     counts = failures(many)

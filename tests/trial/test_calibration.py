@@ -12,6 +12,8 @@ from bayesimpact.trial.sbc import MODELS, Replicate, replicate, verdicts
 from bayesimpact.trial.settings import Settings
 from bayesimpact.trial.uniformity import band, critical_tail, grid, smallest_tail
 
+pytestmark = pytest.mark.long
+
 
 def test_tails_against_plain_counting() -> None:
     values = np.array([0.02, 0.03, 0.5, 0.9])

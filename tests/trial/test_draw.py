@@ -23,6 +23,8 @@ from bayesimpact.trial.sensitivity import Sensitivity, clean_readings, true_para
 from bayesimpact.trial.settings import Settings
 from bayesimpact.trial.sizing import Unsuitable, outside, pair, single, solve
 
+pytestmark = pytest.mark.long
+
 SMALL = Settings(benches=("small",), noises=("white",))
 
 

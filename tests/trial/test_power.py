@@ -20,6 +20,8 @@ from bayesimpact.trial.power import (
 )
 from bayesimpact.trial.sensitivity import Sensitivity
 
+pytestmark = pytest.mark.long
+
 ONE = Power("spring_cubic", "stiffness", 100.0, 1.0, 0.5, "spring_quadratic")
 CRITICAL = 3.8
 

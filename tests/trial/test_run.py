@@ -20,6 +20,8 @@ from bayesimpact.trial.blind import finite, open_seal, seal, sealed_text
 from bayesimpact.trial.run import run_trials
 from bayesimpact.trial.settings import Settings, settings_from
 
+pytestmark = pytest.mark.long
+
 CONTROLS = Settings(kinds=("control",), benches=("small",), noises=("white",))
 SEEDS = range(3, 6)
 

@@ -38,6 +38,8 @@ from bayesimpact.trial.strong_rigs import (
     with_noise,
 )
 
+pytestmark = pytest.mark.long
+
 PENDULUM = strong_settings(kinds=("several",), benches=("one_pendulum",), rest=0.0)
 DECAY = replace(PENDULUM, benches=("one_decay",))
 SORT_OF = {effect: sort for sort, names in SORTS.items() for effect in names}

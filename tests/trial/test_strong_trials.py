@@ -12,6 +12,8 @@ from bayesimpact.trial.settings import strong_settings
 from bayesimpact.trial.stamp import stamped
 from bayesimpact.trial.table import summary_text
 
+pytestmark = pytest.mark.long
+
 SETTINGS = strong_settings(
     kinds=("several",),
     effects=("pendulum_sine", "coulomb_friction", "quadratic_drag"),

@@ -14,6 +14,8 @@ from bayesimpact.trial.settings import Settings
 from bayesimpact.trial.summary import summarise
 from bayesimpact.trial.table import summary_text
 
+pytestmark = pytest.mark.long
+
 # Two of each kind, of those that cost little. Seed s draws kinds[s % 4]; sizes are far above the
 # limits, for this rig is short and tells less than the paper's.
 SETTINGS = Settings(

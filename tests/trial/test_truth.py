@@ -25,6 +25,8 @@ from bayesimpact.trial.bundle import main as make_bundle
 from bayesimpact.trial.rig_files import TRUTH_FILE
 from bayesimpact.trial.truth import compared, open_truth
 
+pytestmark = pytest.mark.long
+
 PACKAGE = Path(bayesimpact.__file__).parent
 SECONDS = 1.2
 _opened: list[str] | None = None
