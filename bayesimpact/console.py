@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
+from bayesimpact.data.files import clear_unfinished
 from bayesimpact.data.lock import locked
 from bayesimpact.errors import (
     BayesimpactError,
@@ -140,6 +141,7 @@ def made_folder(out: Path, go_on: str = "") -> Path:
     try:
         out.mkdir(parents=True, exist_ok=True)
         ctx.with_resource(locked(out))
+        clear_unfinished(out)
     except OSError as error:
         reason = error.strerror or str(error)
         raise InputError(f"--out {out}", reason.lower(), "a folder that can be written") from None

@@ -13,6 +13,7 @@ import numpy as np
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.faults.find import set_aside
+from bayesimpact.data.files import write_text
 from bayesimpact.design.document import next_document
 from bayesimpact.design.hypotheses import Rivalry, rivalry
 from bayesimpact.design.rank import proposals
@@ -28,7 +29,7 @@ from bayesimpact.inference.posterior import Posterior, sample
 from bayesimpact.inference.progress import progress_bar, refit_bar
 from bayesimpact.model.effects import EFFECTS, SEARCHED
 from bayesimpact.model.effects.effect import Effect
-from bayesimpact.report.archive import load_results, write_text
+from bayesimpact.report.archive import load_results
 from bayesimpact.report.build import versions
 from bayesimpact.report.diagnosis_arrays import diagnosis_arrays
 from bayesimpact.report.figures.save import reason

@@ -31,6 +31,7 @@ def counted(source, target, **more):
     rename(source, target, **more)
 os.replace = counted
 from bayesimpact.cli import main
+from bayesimpact.data.files import atomic
 from bayesimpact.report.figures import save
 def saved(name, figure, folder):
     figure.set_layout_engine("none")
@@ -38,7 +39,7 @@ def saved(name, figure, folder):
     figure.savefig(stream, format="png", dpi=12)
     folder.mkdir(parents=True, exist_ok=True)
     for ending in ("png", "pdf"):
-        with save.atomic(folder / f"{save.file_name(name)}.{ending}") as temporary:
+        with atomic(folder / f"{save.file_name(name)}.{ending}") as temporary:
             temporary.write_bytes(stream.getvalue())
     return stream.getvalue()
 save._saved = saved
@@ -94,7 +95,7 @@ def state(out: Path) -> dict[str, str]:
     """What must be the same, bit for bit, however often a run was killed: digests by name.
 
     Of figures and pages, which bear dates, only that they are there. Hidden files are left out:
-    the lock, and what a killed process had not yet moved to its place.
+    the lock, and what is being written.
     """
     files = (f for f in sorted(out.rglob("*")) if f.is_file() and not f.name.startswith("."))
     return {str(f.relative_to(out)): hashlib.sha256(_content(f)).hexdigest() for f in files}

@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from kills import killed_and_resumed, run, state
+from kills import killed_and_resumed, run, state, unfinished
 from small_rig import RELEASES, record
 
 from bayesimpact.trial.rig_files import write_campaign
@@ -35,3 +35,4 @@ def test_killed_at_a_write(
     assert writes > 10
     assert killed_and_resumed(arguments, tmp_path, write=round(share * writes))
     assert state(tmp_path) == state(out)
+    assert unfinished(tmp_path) == []

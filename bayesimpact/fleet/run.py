@@ -21,10 +21,10 @@ from typing import Any
 
 from bayesimpact.cluster import executor
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.files import write_bytes, write_text
 from bayesimpact.data.read import load_campaign
 from bayesimpact.errors import BayesimpactError, InputError
 from bayesimpact.fleet.plan import Plan, Session
-from bayesimpact.report.archive import write_bytes, write_text
 from bayesimpact.report.figures.save import file_name
 from bayesimpact.workflow import Outcome, diagnose_campaign, fit_campaign, sample_campaign
 

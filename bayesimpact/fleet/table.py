@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from bayesimpact.data.files import write_bytes, write_text
 from bayesimpact.fleet.plan import Plan
 from bayesimpact.fleet.run import Row
-from bayesimpact.report.archive import write_bytes, write_text
 
 FOUND = ("failed", "converged", "verdict", "effects", "reduced_chi2")
 

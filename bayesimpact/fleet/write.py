@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
+from bayesimpact.data.files import write_text
 from bayesimpact.fleet.compare import compare
 from bayesimpact.fleet.page import headline, write_page
 from bayesimpact.fleet.plan import Plan
 from bayesimpact.fleet.run import Step, run_fleet
 from bayesimpact.fleet.table import columns, write_table
-from bayesimpact.report.archive import write_text
 
 SCHEMA = "bayesimpact/fleet/1"
 

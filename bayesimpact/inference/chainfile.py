@@ -20,11 +20,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.data.files import atomic, clear_unfinished
 from bayesimpact.errors import InputError
 
 _START = "start.npz"
 _BLOCK = "block-{:06d}.npz"
-_UNFINISHED = ".unfinished"
 _DAMAGE = (OSError, ValueError, EOFError, KeyError, NotImplementedError, RuntimeError,
            zipfile.BadZipFile, zlib.error)  # fmt: skip
 
@@ -33,12 +33,10 @@ def write_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
     """Writes an npz file of plain arrays that is either there in full or not at all."""
     if any(array.dtype.hasobject for array in arrays.values()):
         raise TypeError("object arrays would need pickles")
-    unfinished = path.with_name(path.name + _UNFINISHED)
-    with open(unfinished, "wb") as stream:
+    with atomic(path) as temporary, open(temporary, "wb") as stream:
         np.savez(stream, **arrays)
         stream.flush()
         os.fsync(stream.fileno())
-    os.replace(unfinished, path)
 
 
 def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
@@ -88,8 +86,7 @@ class ChainFolder:
         (self.folder / _START).unlink(missing_ok=True)
         for path in self.folder.glob("block-*.npz"):
             path.unlink()
-        for path in self.folder.glob("*" + _UNFINISHED):
-            path.unlink()
+        clear_unfinished(self.folder)
         self.run = identity(settings, arrays)
         text = np.array(json.dumps(dict(settings), sort_keys=True))
         write_arrays(self.folder / _START, {**arrays, "settings": text})

@@ -1,8 +1,7 @@
 """The files of DIR: `results.nc` for the report, `fit.json` for people and scripts.
 
-Every file is written beside its place and moved there when complete, so an interrupted run leaves
-the old one; NetCDF is put together in memory, for its library ends the process where a disk is
-full. Nothing is pickled. (`posterior.nc` is ArviZ's: see `archive_arviz`.)
+NetCDF is put together in memory, for its library ends the process where a disk is full. Nothing is
+pickled. (`posterior.nc` is ArviZ's: see `archive_arviz`.)
 """
 
 from __future__ import annotations
@@ -10,15 +9,12 @@ from __future__ import annotations
 import io
 import json
 import math
-import os
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from bayesimpact.data.files import write_bytes, write_text
 from bayesimpact.errors import InputError
 from bayesimpact.report.codec import decode, encode
 from bayesimpact.report.results import Results, Row
@@ -27,39 +23,6 @@ RESULTS_FILE = "results.nc"
 FIT_FILE = "fit.json"
 FORMAT = "bayesimpact/results/1"
 FIT_SCHEMA = "bayesimpact/fit/1"
-
-
-@contextmanager
-def atomic(path: Path) -> Iterator[Path]:
-    """A temporary file in the same folder; it takes the place of `path` when the block succeeds."""
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=path.suffix)
-    os.close(handle)
-    temporary = Path(name)
-    try:
-        yield temporary
-        temporary.chmod(0o666 & ~_umask())
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a text file in one go; what UTF-8 cannot say (bytes of a foreign path) becomes a ?."""
-    write_bytes(path, text.encode("utf-8", "replace"))
-
-
-def write_bytes(path: Path, content: bytes | memoryview) -> None:
-    """Write a file in one go, down to the disk."""
-    with atomic(path) as temporary, open(temporary, "wb") as stream:
-        stream.write(content)
-        stream.flush()
-        os.fsync(stream.fileno())
 
 
 def save_results(results: Results, folder: Path) -> None:

@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.data.files import write_bytes
 from bayesimpact.errors import InputError
 from bayesimpact.inference.convergence import quiet_arviz
-from bayesimpact.report.archive import write_bytes
 
 DRAW_GROUPS = ("posterior", "log_likelihood", "posterior_predictive", "sample_stats")
 DATA_GROUPS = ("observed_data", "constant_data")

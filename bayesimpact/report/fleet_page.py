@@ -9,7 +9,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from bayesimpact.report.archive import write_text
+from bayesimpact.data.files import write_text
 from bayesimpact.report.figures.save import save_figures
 from bayesimpact.report.figures.series import Panel, series_figure
 from bayesimpact.report.html import TEMPLATES, environment

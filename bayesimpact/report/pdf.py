@@ -8,8 +8,8 @@ import subprocess
 import tempfile
 from pathlib import Path
 
+from bayesimpact.data.files import atomic
 from bayesimpact.errors import BayesimpactError, InputError
-from bayesimpact.report.archive import atomic
 
 BROWSERS = (
     *("chromium", "chromium-browser", "google-chrome", "google-chrome-stable"),

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from bayesimpact.data.files import write_text
 from bayesimpact.inference.identify import Identification
 from bayesimpact.inference.posterior import Posterior
 from bayesimpact.report import archive_arviz
-from bayesimpact.report.archive import load_results, save_results, write_text
+from bayesimpact.report.archive import load_results, save_results
 from bayesimpact.report.build import results_from_fit, results_from_posterior
 from bayesimpact.report.figures.save import reason
 from bayesimpact.report.figures.shares import save_all

@@ -88,7 +88,8 @@ def trial(
     diagnosis. One trial again, bit for bit: the same options with --number 1 and its seed.
     """
     one_thread_each()
-    from bayesimpact.trial.run import run_trials, write
+    from bayesimpact.data.files import write_text
+    from bayesimpact.trial.run import run_trials
     from bayesimpact.trial.settings import Settings, strong_settings
     from bayesimpact.trial.stamp import stamped
     from bayesimpact.trial.table import summary_text
@@ -120,9 +121,9 @@ def trial(
     )
     bars.close()
     summary = stamped(results, settings, range(seed, seed + number))
-    write(out / "summary.json", _json(summary))
+    write_text(out / "summary.json", _json(summary))
     text = summary_text(summary)
-    write(out / "summary.txt", text)
+    write_text(out / "summary.txt", text)
     if not quiet:
         click.echo(text, nl=False)
 

@@ -16,7 +16,6 @@ where it stopped.
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import traceback
 from collections.abc import Callable, Mapping, Sequence
@@ -24,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from bayesimpact.cluster import executor
+from bayesimpact.data.files import write_text
 from bayesimpact.errors import InputError
 from bayesimpact.trial.blind import answer, campaign_files, open_seal, seal, sealed_text
 from bayesimpact.trial.draw import draw
@@ -112,7 +112,7 @@ class Store:
             )
         for name in ("sealed", "campaigns", "trials"):
             (out / name).mkdir(parents=True, exist_ok=True)
-        write(known, json.dumps(settings.document(), indent=1) + "\n")
+        write_text(known, json.dumps(settings.document(), indent=1) + "\n")
 
     def is_finished(self, seed: int) -> bool:
         """Whether the trial has been scored or has failed."""
@@ -128,11 +128,11 @@ class Store:
         if "failed" in drawn:
             self._finish(seed, {"failed": drawn["failed"], "stage": "drawing"})
             return
-        write(self._truth(seed), drawn["truth"])
+        write_text(self._truth(seed), drawn["truth"])
         folder = self._campaign(seed)
         folder.mkdir(exist_ok=True)
         for name in sorted(drawn["files"], key=lambda n: n == "campaign.toml"):
-            write(folder / name, drawn["files"][name])
+            write_text(folder / name, drawn["files"][name])
 
     def publish(self, seeds: Sequence[int]) -> str:
         """Write seals.txt; its SHA-256 seals all truths at once."""
@@ -143,7 +143,7 @@ class Store:
                 if known.setdefault(seed, digest) != digest:
                     raise InputError(f"{self._truth(seed)}", f"SHA-256 {digest}", known[seed])
         text = "".join(f"{known[seed]}  sealed/{seed}.json\n" for seed in sorted(known))
-        write(self.out / "seals.txt", text)
+        write_text(self.out / "seals.txt", text)
         return seal(text)
 
     def seals(self) -> dict[int, str]:
@@ -180,7 +180,7 @@ class Store:
 
     def _finish(self, seed: int, result: Mapping[str, Any]) -> None:
         content = {"schema": "bayesimpact/trial/1", "seed": seed, **result}
-        write(self._result(seed), json.dumps(content, indent=1, allow_nan=False) + "\n")
+        write_text(self._result(seed), json.dumps(content, indent=1, allow_nan=False) + "\n")
         self._log(content)
 
     def mend_log(self) -> None:
@@ -212,10 +212,3 @@ class Store:
 
     def _result(self, seed: int) -> Path:
         return self.out / "trials" / f"{seed}.json"
-
-
-def write(file: Path, text: str) -> None:
-    """Write a file in one piece: whoever looks sees the old one or the new one."""
-    part = file.with_name(file.name + ".part")
-    part.write_text(text, encoding="utf-8", newline="\n")
-    os.replace(part, file)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from sampling import Interrupted, assert_same, interrupt, small
 
-import bayesimpact.inference.chainfile as chainfile
+import bayesimpact.data.files as files
 import bayesimpact.inference.run as run_module
 from bayesimpact.errors import InputError
 from bayesimpact.inference.sample import sample_posterior
@@ -56,11 +56,11 @@ def test_killed_while_writing(tmp_path, monkeypatch, uninterrupted):
             raise KeyboardInterrupt
         rename(source, destination)
 
-    monkeypatch.setattr(chainfile.os, "replace", killed)
+    monkeypatch.setattr(files.os, "replace", killed)
     with pytest.raises(KeyboardInterrupt):
         small(Interrupted(), folder=tmp_path)
     monkeypatch.undo()
-    assert list(tmp_path.glob("*.unfinished"))
+    assert len(list(tmp_path.glob("*.npz"))) == 4
     assert_same(small(Interrupted(), folder=tmp_path, resume=True), uninterrupted)
 
 

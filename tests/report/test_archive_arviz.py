@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import bayesimpact.report.archive as archive
+import bayesimpact.data.files as files
 from bayesimpact.errors import InputError
 from bayesimpact.inference.convergence import quiet_arviz
 from bayesimpact.report.archive_arviz import (
@@ -156,7 +156,7 @@ def test_an_interrupted_write_leaves_the_old_file(tmp_path, monkeypatch):
     def interrupted(source, destination):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(archive.os, "replace", interrupted)
+    monkeypatch.setattr(files.os, "replace", interrupted)
     with pytest.raises(KeyboardInterrupt):
         write_posterior(path, inference(5))
     monkeypatch.undo()

@@ -11,14 +11,9 @@ import numpy as np
 import pytest
 from synthetic import make_results
 
+from bayesimpact.data.files import atomic
 from bayesimpact.errors import InputError
-from bayesimpact.report.archive import (
-    FIT_FILE,
-    RESULTS_FILE,
-    atomic,
-    load_results,
-    save_results,
-)
+from bayesimpact.report.archive import FIT_FILE, RESULTS_FILE, load_results, save_results
 from bayesimpact.report.codec import decode, encode
 from bayesimpact.report.results import Draws, Results
 

@@ -13,6 +13,7 @@ from click.testing import CliRunner
 
 from bayesimpact.cli import main
 from bayesimpact.cluster import executor
+from bayesimpact.data.files import UNFINISHED
 from bayesimpact.data.lock import locked
 from bayesimpact.errors import InputError
 from bayesimpact.trial import run
@@ -104,7 +105,7 @@ def test_a_killed_run_goes_on(
         run_trials(quick, SEEDS, killed)
     finished = (killed / "trials" / "3.json").stat().st_mtime_ns
     assert not (killed / "trials" / "4.json").exists()
-    (killed / "trials" / "4.json.part").write_text("half a fi")
+    (killed / "trials" / f"{UNFINISHED}4.json").write_text("half a fi")
     drawn: list[int] = []
     monkeypatch.setattr(run, "draw_job", lambda s, seed: drawn.append(seed) or quick_draw(s, seed))
     steps: list[tuple[str, int]] = []
@@ -112,7 +113,7 @@ def test_a_killed_run_goes_on(
     assert drawn == [] and len(shown) == 4
     assert steps == [("drawing", 3), ("diagnosing", 1), ("diagnosing", 1), ("diagnosing", 1)]
     assert (killed / "trials" / "3.json").stat().st_mtime_ns == finished
-    assert {k: v for k, v in tree(killed).items() if "part" not in k} == tree(whole)
+    assert {k: v for k, v in tree(killed).items() if UNFINISHED not in k} == tree(whole)
 
 
 @pytest.mark.parametrize("victim", ["_log", "_finish"])

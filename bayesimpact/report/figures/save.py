@@ -14,7 +14,7 @@ import matplotlib
 from matplotlib.figure import Figure
 from PIL import Image
 
-from bayesimpact.report.archive import atomic
+from bayesimpact.data.files import atomic
 from bayesimpact.report.figures.backbone import backbone_figures
 from bayesimpact.report.figures.corner import corner_figure
 from bayesimpact.report.figures.diagnosis import DRAWERS as DIAGNOSIS
