@@ -40,7 +40,7 @@ def alarm(settings: Settings, seed: int) -> dict[str, Any]:
     filtered = proved_smoothing(drawn.campaign) is not None
     return {
         "seed": seed,
-        "bench": drawn.truth["bench"],
+        "rig_kind": drawn.truth["rig_kind"],
         "noise": drawn.truth["noise_kind"],
         "scan_p": scanned.p_value,
         "force_p": force,
@@ -55,7 +55,7 @@ def false_alarms(rows: Sequence[Mapping[str, Any]], rng: np.random.Generator) ->
     """Alarms in all and by noise and rig; are the p-values uniform, or at least not too small?"""
     critical = critical_tail(len(rows), LEVEL, rng)
     result: dict[str, Any] = {"controls": len(rows), "alarms": _rate(rows)}
-    for key in ("noise", "bench"):
+    for key in ("noise", "rig_kind"):
         kinds = sorted({row[key] for row in rows})
         result[f"by_{key}"] = {k: _rate([r for r in rows if r[key] == k]) for k in kinds}
     for key in ("scan_p", "force_p", "drift_p"):

@@ -99,7 +99,7 @@ def trial(
         "effects": _listed(effects),
         "outside": _listed(outside),
         "strength": strength,
-        "benches": _listed(rig),
+        "rig_kinds": _listed(rig),
         "noises": _listed(noise),
         "misfit": misfit,
         "rest": rest,

@@ -1,8 +1,8 @@
 """Rigs of many kinds, drawn at random: what a trial hides its effects in.
 
-A bench is a range of oscillators, obstacles, probes and sampling rates; `draw_rig_design` picks
-one, with releases, rest readings, noise, rounding and, where the noise kind says so, a declared
-filter.
+A `RigDesign` is a range of oscillators, obstacles, probes and sampling rates; `draw_rig_design`
+picks one, with releases, rest readings, noise, rounding and, where the noise kind says so, a
+declared filter.
 """
 
 from __future__ import annotations
@@ -112,17 +112,17 @@ RIG_DESIGNS: Mapping[str, RigDesign] = {
 
 @dataclass(frozen=True)
 class Design:
-    """One drawn bench: everything about a campaign but the effects planted in it.
+    """One drawn rig: everything about a campaign but the effects planted in it.
 
     Attributes
     ----------
-    bench, noise_kind : what it was drawn from
+    rig_kind, noise_kind : what it was drawn from
     rig, releases : the oscillator, and how the recordings start
     rate, duration : Hz and s, of every recording
     chain, measurement : what the chain does, and what the campaign admits of it
     """
 
-    bench: str
+    rig_kind: str
     noise_kind: str
     rig: Rig
     releases: tuple[Release, ...]
@@ -134,7 +134,7 @@ class Design:
     @property
     def quantity(self) -> Quantity:
         """What the probe records."""
-        return "angle" if RIG_DESIGNS[self.bench].angle else "displacement"
+        return "angle" if RIG_DESIGNS[self.rig_kind].angle else "displacement"
 
     @property
     def amplitude(self) -> float:
@@ -184,39 +184,39 @@ def draw_rig_design(
     name: str,
     noise_kind: str,
     rng: np.random.Generator,
-    benches: Mapping[str, RigDesign] = RIG_DESIGNS,
+    designs: Mapping[str, RigDesign] = RIG_DESIGNS,
 ) -> Design:
-    """Draw a rig of the kind `name` of `benches` with noise of the kind `noise_kind`."""
-    bench = benches[name]
-    amplitude = log_uniform(rng, bench.amplitude)
-    rig = bench.fixed or _rig(bench, amplitude, rng)
-    releases = _releases(bench, rig, amplitude, rng)
+    """Draw a rig of the kind `name` of `designs` with noise of the kind `noise_kind`."""
+    ranges = designs[name]
+    amplitude = log_uniform(rng, ranges.amplitude)
+    rig = ranges.fixed or _rig(ranges, amplitude, rng)
+    releases = _releases(ranges, rig, amplitude, rng)
     frequency = sqrt(rig.k1 / rig.mass) / (2 * pi)
-    duration = round(log_uniform(rng, bench.cycles) / frequency * bench.rate) / bench.rate
-    chain, measurement = _chain(bench, noise_kind, rig, releases, amplitude, rng)
-    return Design(name, noise_kind, rig, releases, bench.rate, duration, chain, measurement)
+    duration = round(log_uniform(rng, ranges.cycles) / frequency * ranges.rate) / ranges.rate
+    chain, measurement = _chain(ranges, noise_kind, rig, releases, amplitude, rng)
+    return Design(name, noise_kind, rig, releases, ranges.rate, duration, chain, measurement)
 
 
-def _rig(bench: RigDesign, amplitude: float, rng: np.random.Generator) -> Rig:
-    mass = log_uniform(rng, bench.mass)
-    k1 = mass * (2 * pi * log_uniform(rng, bench.frequency)) ** 2
-    c1 = 2 * log_uniform(rng, bench.damping) * sqrt(k1 * mass)
-    if bench.cases == 0:
+def _rig(ranges: RigDesign, amplitude: float, rng: np.random.Generator) -> Rig:
+    mass = log_uniform(rng, ranges.mass)
+    k1 = mass * (2 * pi * log_uniform(rng, ranges.frequency)) ** 2
+    c1 = 2 * log_uniform(rng, ranges.damping) * sqrt(k1 * mass)
+    if ranges.cases == 0:
         return Rig(mass, c1, k1)
-    k2 = {str(i + 1): k1 * log_uniform(rng, bench.stiffening) for i in range(bench.cases)}
+    k2 = {str(i + 1): k1 * log_uniform(rng, ranges.stiffening) for i in range(ranges.cases)}
     mean = sum(k2.values()) / len(k2)
-    c2 = 2 * log_uniform(rng, bench.contact_damping) * sqrt(mean * mass)
-    return Rig(mass, c1, k1, c2, amplitude * log_uniform(rng, bench.gap), MappingProxyType(k2))
+    c2 = 2 * log_uniform(rng, ranges.contact_damping) * sqrt(mean * mass)
+    return Rig(mass, c1, k1, c2, amplitude * log_uniform(rng, ranges.gap), MappingProxyType(k2))
 
 
 def _releases(
-    bench: RigDesign, rig: Rig, amplitude: float, rng: np.random.Generator
+    ranges: RigDesign, rig: Rig, amplitude: float, rng: np.random.Generator
 ) -> tuple[Release, ...]:
     """Releases by hand from the far side, the highest first, from almost rest."""
     speed = amplitude * sqrt(rig.k1 / rig.mass)
     found = []
     for case in rig.k2 or {"": 0.0}:
-        heights = np.linspace(1.0, 0.6, bench.releases) if bench.releases > 1 else np.ones(1)
+        heights = np.linspace(1.0, 0.6, ranges.releases) if ranges.releases > 1 else np.ones(1)
         for i, share in enumerate(heights):
             found.append(
                 Release(
@@ -230,14 +230,14 @@ def _releases(
 
 
 def _chain(
-    bench: RigDesign,
+    ranges: RigDesign,
     kind: str,
     rig: Rig,
     releases: tuple[Release, ...],
     amplitude: float,
     rng: np.random.Generator,
 ) -> tuple[Chain, Measurement]:
-    noise = amplitude * log_uniform(rng, bench.noise)
+    noise = amplitude * log_uniform(rng, ranges.noise)
     offsets = {r.name: float(2 * noise * rng.standard_normal()) for r in releases}
     correlation = float(rng.uniform(0.2, 0.8))
     rounding = noise * log_uniform(rng, (0.02, 0.4))
@@ -245,7 +245,7 @@ def _chain(
         correlation = correlation if kind == "ar1" else 0.0
         return Chain(noise, correlation, offsets, None, rounding), Measurement()
     stiffest = rig.k1 + max(rig.k2.values(), default=0.0)
-    contact = pi / sqrt(stiffest / rig.mass) * bench.rate  # samples in half a period of contact
+    contact = pi / sqrt(stiffest / rig.mass) * ranges.rate  # samples in half a period of contact
     window = 2 * int(min(10.0, max(2.0, 0.35 * contact))) + 1
     smoothing = Smoothing("savgol", window, 2, declared_window=window)
     chain = Chain(noise, 0.0, offsets, smoothing, 0.1 * rounding)

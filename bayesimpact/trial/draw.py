@@ -55,8 +55,8 @@ def draw(settings: Settings, seed: int) -> Drawn:
 
 def _attempt(settings: Settings, seed: int, kind: str, turn: int, rng: Rng) -> Drawn:
     ids = _effects(settings, kind, turn, rng)
-    bench = str(rng.choice(_possible(settings, ids)))
-    design = draw_rig_design(bench, str(rng.choice(_noises(settings, ids))), rng)
+    rig_kind = str(rng.choice(_possible(settings, ids)))
+    design = draw_rig_design(rig_kind, str(rng.choice(_noises(settings, ids))), rng)
     strengths = [log_uniform(rng, settings.strength) for _ in ids]
     found: tuple[Sized, ...] = ()
     if kind in ("single", "fault_single"):
@@ -116,15 +116,17 @@ def _compatible(first: str, second: str) -> bool:
 
 
 def _possible(settings: Settings, ids: tuple[str, ...]) -> list[str]:
-    """Benches of the settings that can show all of these effects; there must be one."""
+    """Rigs of the settings that can show all of these effects; there must be one."""
     fits = _showing(settings, ids)
     if not fits:
-        raise InputError("trial, rig", ", ".join(settings.benches), f"a rig for {' + '.join(ids)}")
+        raise InputError(
+            "trial, rig", ", ".join(settings.rig_kinds), f"a rig for {' + '.join(ids)}"
+        )
     return fits
 
 
 def _showing(settings: Settings, ids: tuple[str, ...]) -> list[str]:
-    sizes = {n: (RIG_DESIGNS[n].cases, RIG_DESIGNS[n].releases) for n in settings.benches}
+    sizes = {n: (RIG_DESIGNS[n].cases, RIG_DESIGNS[n].releases) for n in settings.rig_kinds}
     return [
         name
         for name, (cases, releases) in sizes.items()
@@ -171,7 +173,7 @@ def _recorded(
         "seed": seed,
         "settings": settings.document(),
         "kind": kind,
-        "bench": design.bench,
+        "rig_kind": design.rig_kind,
         "noise_kind": design.noise_kind,
         "planted": [
             {

@@ -15,7 +15,7 @@ def trial_line(result: Mapping[str, Any]) -> str:
         if "fault" in truth:
             fault = f"{truth['fault']['id']} in {truth['fault']['recording']}"
             planted = f"{fault} + {planted}" if truth["planted"] else fault
-        text += f" {truth['kind']} | {truth['bench']}, {truth['noise_kind']}"
+        text += f" {truth['kind']} | {truth['rig_kind']}, {truth['noise_kind']}"
         if "misfit" in truth:
             text += f", misfit {truth['misfit']:.3g}"
         if truth.get("rest_s"):

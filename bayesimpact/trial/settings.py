@@ -18,7 +18,7 @@ from bayesimpact.trial.strong_rigs import STRONG_RIGS
 REGIMES = ("weak", "strong")
 KINDS = ("control", "single", "pair", "outside")
 DEFAULT_STRENGTH = (1.5, 6.0)  # times the detection limit
-DEFAULT_BENCHES = tuple(name for name in RIG_DESIGNS if name != "small")
+DEFAULT_RIG_KINDS = tuple(name for name in RIG_DESIGNS if name != "small")
 PLANTED = tuple(e for e in PLANTED_EFFECTS if e not in UNTRIED)
 DEFAULT_MISFIT = (3.0, 300.0)  # base misfit over the noise, as real recordings have it
 STRONG_KINDS = ("several", "several_outside")
@@ -26,7 +26,7 @@ STRONG_DEFAULTS: Mapping[str, Any] = {
     "kinds": ("several", "several", "several_outside"),
     "effects": tuple(CATALOGUE_STRONG),
     "outside": tuple(STRONG_OUTSIDE),
-    "benches": tuple(STRONG_RIGS),
+    "rig_kinds": tuple(STRONG_RIGS),
     "noises": ("white", "ar1"),
     "rest": 0.25,
 }
@@ -43,7 +43,7 @@ class Settings:
     effects : ids of the catalogue that may be planted, in turn
     outside : forces outside the catalogue, in turn
     strength : smallest and largest size, in detection limits (a limit is five standard errors)
-    benches : rigs, drawn at random
+    rig_kinds : rigs, drawn at random
     noises : kinds of noise, drawn at random
     search : whether the diagnosis runs its global search (and samples, where it writes a report)
     regime : weak (effects near the detection limit) or strong (several at once, a gross misfit)
@@ -56,7 +56,7 @@ class Settings:
     effects: tuple[str, ...] = PLANTED
     outside: tuple[str, ...] = tuple(OUTSIDE_EFFECTS)
     strength: tuple[float, float] = DEFAULT_STRENGTH
-    benches: tuple[str, ...] = DEFAULT_BENCHES
+    rig_kinds: tuple[str, ...] = DEFAULT_RIG_KINDS
     noises: tuple[str, ...] = NOISES
     search: bool = True
     regime: str = "weak"
@@ -72,7 +72,7 @@ class Settings:
             "kinds": STRONG_KINDS if strong else (*KINDS, "fault", "fault_single"),
             "effects": tuple(CATALOGUE_STRONG if strong else PLANTED_EFFECTS),
             "outside": tuple(STRONG_OUTSIDE if strong else OUTSIDE_EFFECTS),
-            "benches": tuple(STRONG_RIGS if strong else RIG_DESIGNS),
+            "rig_kinds": tuple(STRONG_RIGS if strong else RIG_DESIGNS),
             "noises": ("white", "ar1") if strong else NOISES,
         }
         for name, accepted in known.items():

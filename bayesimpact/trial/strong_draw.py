@@ -63,7 +63,7 @@ def draw_strong(settings: Settings, seed: int) -> Drawn:
     Unsuitable : no suitable draw in many attempts
     """
     kind = settings.kinds[seed % len(settings.kinds)]
-    groups = [g for g, names in GROUPS.items() if set(names) & set(settings.benches)]
+    groups = [g for g, names in GROUPS.items() if set(names) & set(settings.rig_kinds)]
     group = groups[seed // len(settings.kinds) % len(groups)]
     thrown: Counter[str] = Counter()
     for child in np.random.SeedSequence(seed).spawn(ATTEMPTS):
@@ -80,8 +80,8 @@ def _attempt(
     settings: Settings, seed: int, kind: str, group: str, thrown: Mapping[str, int], rng: Rng
 ) -> Drawn:
     resting = bool(rng.random() < settings.rest)
-    bench = str(rng.choice([b for b in GROUPS[group] if b in settings.benches]))
-    design = draw_rig(bench, str(rng.choice(settings.noises)), rng)
+    rig_kind = str(rng.choice([b for b in GROUPS[group] if b in settings.rig_kinds]))
+    design = draw_rig(rig_kind, str(rng.choice(settings.noises)), rng)
     if resting:  # let go from rest
         releases = tuple(replace(r, v0=0.0) for r in design.releases)
         design = replace(design, releases=releases)
@@ -120,7 +120,7 @@ def _attempt(
 def _ids(settings: Settings, kind: str, design: Design, resting: bool, rng: Rng) -> list[str]:
     """Effects of the trial: at most one of a sort, the force outside the catalogue last."""
     count = int(rng.integers(2, MOST + 1))
-    pendulum = is_pendulum(design.bench)
+    pendulum = is_pendulum(design.rig_kind)
     ids = ["pendulum_sine"] if pendulum else []
     outside = [e for e in _fit(settings.outside, STRONG_OUTSIDE, design, resting)]
     last = [str(rng.choice(outside))] if kind == "several_outside" else []
@@ -137,7 +137,9 @@ def _ids(settings: Settings, kind: str, design: Design, resting: bool, rng: Rng)
     needed = count - len(ids) - len(last)
     if len(sorts) < needed:
         found = ", ".join(settings.effects)
-        raise InputError("trial, effects", found, f"effects of {needed} sorts for {design.bench}")
+        raise InputError(
+            "trial, effects", found, f"effects of {needed} sorts for {design.rig_kind}"
+        )
     weights = np.array([WEIGHTS.get(sort, 1.0) for sort in sorts])
     if needed:
         picked = rng.choice(list(sorts), needed, replace=False, p=weights / weights.sum())
@@ -204,7 +206,7 @@ def _recorded(
 
 
 def _campaign(design: Design, samples: list[Array]) -> Campaign:
-    quantity = "angle" if is_pendulum(design.bench) else "displacement"
+    quantity = "angle" if is_pendulum(design.rig_kind) else "displacement"
     recordings = tuple(
         Recording(r.name, r.case, s, 1 / design.rate, quantity=quantity)  # type: ignore[arg-type]
         for r, s in zip(design.releases, samples, strict=True)
@@ -220,7 +222,7 @@ def _truth(
         "seed": seed,
         "settings": settings.document(),
         "kind": kind,
-        "bench": design.bench,
+        "rig_kind": design.rig_kind,
         "noise_kind": design.noise_kind,
         "planted": [
             {

@@ -64,25 +64,25 @@ DITHER = 0.2  # noise ahead of the encoder, in its steps
 ENCODER_SD = sqrt(1 / 12 + DITHER**2)  # of the reading's error, in steps: a uniform one and dither
 
 
-def is_pendulum(bench: str) -> bool:
+def is_pendulum(rig_kind: str) -> bool:
     """Whether the rig of this name is a pendulum, whose recordings are angles."""
-    return bench in GROUPS["pendulum"]
+    return rig_kind in GROUPS["pendulum"]
 
 
-def draw_rig(bench: str, noise_kind: str, rng: np.random.Generator) -> Design:
+def draw_rig(rig_kind: str, noise_kind: str, rng: np.random.Generator) -> Design:
     """A rig, its releases and rest readings; what noise there is will be set by `with_noise`."""
-    kind = "white" if is_pendulum(bench) else noise_kind
-    design = draw_rig_design(bench, kind, rng, STRONG_RIGS)
-    if not is_pendulum(bench):
+    kind = "white" if is_pendulum(rig_kind) else noise_kind
+    design = draw_rig_design(rig_kind, kind, rng, STRONG_RIGS)
+    if not is_pendulum(rig_kind):
         return design
     return replace(design, noise_kind="encoder")
 
 
 def noise_range(design: Design) -> Range:
     """Smallest and largest standard deviation of the noise that the probe may have, m or rad."""
-    if is_pendulum(design.bench):
+    if is_pendulum(design.rig_kind):
         return STEPS[0] * ENCODER_SD, STEPS[1] * ENCODER_SD
-    low, high = STRONG_RIGS[design.bench].noise
+    low, high = STRONG_RIGS[design.rig_kind].noise
     return low * design.amplitude, high * design.amplitude
 
 
@@ -90,7 +90,7 @@ def with_noise(design: Design, noise: float) -> Design:
     """The same rig with noise of this standard deviation in all, m or rad; an encoder's steps."""
     old = design.chain
     offsets = {name: value * noise / old.noise for name, value in old.offsets.items()}
-    if is_pendulum(design.bench):
+    if is_pendulum(design.rig_kind):
         step = noise / ENCODER_SD
         chain = Chain(DITHER * step, 0.0, offsets, None, step)
     else:

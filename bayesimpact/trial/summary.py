@@ -48,7 +48,7 @@ def summarise(results: Sequence[Result]) -> dict[str, Any]:
             if r["score"]["right"] and r["truth"]["planted"]
         ),
         "seconds": _quartiles(r["score"]["seconds"] for r in scored),
-        "by_bench": _by(scored, lambda r: r["truth"]["bench"]),
+        "by_rig_kind": _by(scored, lambda r: r["truth"]["rig_kind"]),
         "by_noise": _by(scored, lambda r: r["truth"]["noise_kind"]),
         "by_effect": _by_effect(scored),
         "confusion": confusion(scored),
@@ -145,5 +145,5 @@ def _by_effect(scored: Sequence[Result]) -> dict[str, Any]:
 def _miss(r: Result) -> dict[str, Any]:
     score = r["score"]
     keys = ("truth", "verdict", "named", "outcome", "truth_in_set", "strengths")
-    rig = {"bench": r["truth"]["bench"], "noise": r["truth"]["noise_kind"]}
+    rig = {"rig_kind": r["truth"]["rig_kind"], "noise": r["truth"]["noise_kind"]}
     return {"seed": r["seed"], **rig, **{k: score[k] for k in keys}}

@@ -37,7 +37,7 @@ def summary_text(summary: Mapping[str, Any]) -> str:
     lines += added_text(summary, _rate)
     for group, table in summary["coverage"].items():
         lines += _coverage(group, table)
-    lines += ["", *_by("rig", summary["by_bench"]), "", *_by("noise", summary["by_noise"])]
+    lines += ["", *_by("rig", summary["by_rig_kind"]), "", *_by("noise", summary["by_noise"])]
     lines += ["", *_effects(summary["by_effect"]), *_misses(summary)]
     return "\n".join(lines) + "\n"
 
@@ -95,7 +95,7 @@ def _misses(summary: Mapping[str, Any]) -> list[str]:
         strengths = " ".join(f"{s:.1f}" for s in m["strengths"])
         also = " (truth in the set)" if m["truth_in_set"] else ""
         lines.append(
-            f"seed {m['seed']}: {m['truth']} [{strengths}] on {m['bench']}, {m['noise']}: "
+            f"seed {m['seed']}: {m['truth']} [{strengths}] on {m['rig_kind']}, {m['noise']}: "
             f"{m['outcome']} {m['named']}{also}"
         )
     lines += [f"seed {seed}: failed" for seed in summary["failed"]]

@@ -46,7 +46,7 @@ COMMAND = [sys.executable, "-c", "from bayesimpact.cli import main; main()", "di
 def outside(effect: str, folder: Path) -> Path:
     """A campaign of the paper's rig on which a force outside the catalogue acts."""
     chosen = Settings(
-        kinds=("outside",), outside=(effect,), strength=STRENGTH, benches=("paper",),
+        kinds=("outside",), outside=(effect,), strength=STRENGTH, rig_kinds=("paper",),
         noises=("white",),
     )  # fmt: skip
     drawn = draw(chosen, SEED)

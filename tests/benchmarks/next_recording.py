@@ -48,7 +48,7 @@ SETTINGS = Settings(
     kinds=("single",),
     effects=EFFECTS,
     strength=(1.0, 1.8),
-    benches=("small",),
+    rig_kinds=("small",),
     noises=("white",),
     search=False,
 )

@@ -30,7 +30,7 @@ def row(result: dict[str, Any]) -> dict[str, Any]:
         truth = result["truth"]
         entry |= {
             "kind": truth["kind"],
-            "rig": truth["bench"],
+            "rig": truth["rig_kind"],
             "misfit": round(truth["misfit"], 2),
             "planted": [p["id"] for p in truth["planted"] if not p["outside"]],
             "outside": [p["id"] for p in truth["planted"] if p["outside"]],

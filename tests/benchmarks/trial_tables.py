@@ -36,7 +36,7 @@ def blind_table(name: str) -> str:
     first, last = t["seeds"]
     foot = (
         f"{t['trials']} trials, seeds {first} to {last}; sizes of {low:g} to {high:g} detection "
-        f"limits (a limit is five standard errors); {len(t['by_bench'])} rigs, "
+        f"limits (a limit is five standard errors); {len(t['by_rig_kind'])} rigs, "
         f"{len(t['by_noise'])} kinds of noise; median {t['seconds']['median']:.0f} s a diagnosis. "
         f"In brackets: 95 % interval. Commit {t['commit'][:7]}, {t['date']}."
     )
@@ -74,7 +74,7 @@ def single_table() -> str:
         runs = [stored(name) for name in names]
         settings = runs[0]["settings"]
         assert all(run["settings"] == settings for run in runs)
-        benches = settings["benches"]
+        rig_kinds = settings["rig_kinds"]
         said = [answer["outcome"] for run in runs for answer in run["answers"]]
         wrong = [run["confident_wrong_names"] for run in runs]
         missed = said.count("missed")
@@ -82,7 +82,7 @@ def single_table() -> str:
         rows.append(
             (
                 f"{settings['strength'][0]:g} limits",
-                f"{len(benches)} rigs" if len(benches) > 1 else f"the {benches[0]}'s",
+                f"{len(rig_kinds)} rigs" if len(rig_kinds) > 1 else f"the {rig_kinds[0]}'s",
                 together([run["right"]["single"] for run in runs]),
                 f"{undecided}",
                 f"{missed}",
@@ -132,8 +132,8 @@ def controls_table() -> str:
     ]  # fmt: skip
     first, last = t["seeds"]
     foot = (
-        f"All: {share(t['right']['control'])}; {len(t['by_bench'])} rigs, seeds {first} to {last}, "
-        f"commit {t['commit'][:7]}, {t['date']}. In brackets: 95 % interval."
+        f"All: {share(t['right']['control'])}; {len(t['by_rig_kind'])} rigs, seeds {first} to "
+        f"{last}, commit {t['commit'][:7]}, {t['date']}. In brackets: 95 % interval."
     )
     return grid(("nothing missing, noise", "called adequate"), rows, foot)
 
@@ -169,7 +169,7 @@ def strong_table() -> str:
     foot = (
         f"{len(every)} trials, seeds {first} to {last}: two to four effects, base misfit "
         f"{low:g} to {high:g} times the noise (median {chosen['misfit'][1]:.0f}), "
-        f"{len(t['by_bench'])} rigs; {chosen['resting']} begin before the release. "
+        f"{len(t['by_rig_kind'])} rigs; {chosen['resting']} begin before the release. "
         f"{chosen['kept']} of {chosen['draws']} draws were kept; thrown away: "
         f"{thrown or 'none'}. Median {t['seconds']['median']:.0f} s a diagnosis. In brackets: "
         f"95 % interval. Commit {t['commit'][:7]}, {t['date']}."

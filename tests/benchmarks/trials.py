@@ -23,7 +23,7 @@ def row(result: dict[str, Any]) -> dict[str, Any]:
     return {
         "seed": result["seed"],
         "kind": truth["kind"],
-        "rig": truth["bench"],
+        "rig": truth["rig_kind"],
         "noise": truth["noise_kind"],
         "planted": [p["id"] for p in truth["planted"]],
         "fault": (truth.get("fault") or {}).get("id"),

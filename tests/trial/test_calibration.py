@@ -108,7 +108,7 @@ def test_a_wrong_model_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_alarms_of_controls() -> None:
-    settings = Settings(kinds=("control",), benches=("small",), noises=("white",))
+    settings = Settings(kinds=("control",), rig_kinds=("small",), noises=("white",))
     rows = [alarm(settings, seed) for seed in range(3)]
     assert rows[1] == alarm(settings, 1)
     table = false_alarms(rows, np.random.default_rng(0))

@@ -25,7 +25,7 @@ from bayesimpact.trial.sizing import Unsuitable, outside, pair, single, solve
 
 pytestmark = pytest.mark.long
 
-SMALL = Settings(benches=("small",), noises=("white",))
+SMALL = Settings(rig_kinds=("small",), noises=("white",))
 
 
 @pytest.fixture(scope="module")
@@ -60,13 +60,13 @@ def test_forms_are_what_the_rig_takes(effect: str) -> None:
     assert form.start < form.largest
 
 
-@pytest.mark.parametrize("bench", RIG_DESIGNS)
+@pytest.mark.parametrize("rig_kind", RIG_DESIGNS)
 @pytest.mark.parametrize("noise", NOISES)
-def test_benches(bench: str, noise: str) -> None:
+def test_kinds_of_rigs(rig_kind: str, noise: str) -> None:
     for seed in range(5):
-        design = draw_rig_design(bench, noise, np.random.default_rng(seed))
+        design = draw_rig_design(rig_kind, noise, np.random.default_rng(seed))
         rig = design.rig
-        assert len(design.releases) == max(len(rig.k2), 1) * RIG_DESIGNS[bench].releases
+        assert len(design.releases) == max(len(rig.k2), 1) * RIG_DESIGNS[rig_kind].releases
         assert len({r.name for r in design.releases}) == len(design.releases)
         assert all(r.y0 < 0 for r in design.releases)
         lowest = min(abs(r.y0) for r in design.releases)
@@ -125,8 +125,8 @@ def test_the_same_seed_gives_the_same_bits() -> None:
 def clean_of(settings: Settings, seed: int) -> dict[str, float]:
     """True base parameters of a first attempt."""
     rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
-    bench, noise = str(rng.choice(settings.benches)), str(rng.choice(settings.noises))
-    return true_parameters(draw_rig_design(bench, noise, rng))
+    rig_kind, noise = str(rng.choice(settings.rig_kinds)), str(rng.choice(settings.noises))
+    return true_parameters(draw_rig_design(rig_kind, noise, rng))
 
 
 def test_files_hold_the_recordings(tmp_path) -> None:
@@ -224,6 +224,6 @@ def test_sizes_are_found_on_curves() -> None:
 
 
 def test_no_rig_for_the_effect() -> None:
-    settings = Settings(kinds=("single",), effects=("gap_wear",), benches=("plain",))
+    settings = Settings(kinds=("single",), effects=("gap_wear",), rig_kinds=("plain",))
     with pytest.raises(InputError, match="trial, rig"):
         draw(settings, 0)

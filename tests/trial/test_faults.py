@@ -14,12 +14,12 @@ from bayesimpact.trial.draw import draw
 from bayesimpact.trial.faults import PLANTS, judge_fault, plant_fault
 from bayesimpact.trial.settings import Settings
 
-SETTINGS = Settings(kinds=("fault",), benches=("small",), noises=("white",))
+SETTINGS = Settings(kinds=("fault",), rig_kinds=("small",), noises=("white",))
 
 
 @pytest.fixture(scope="module")
 def control():
-    return draw(Settings(kinds=("control",), benches=("small",), noises=("white",)), 1)
+    return draw(Settings(kinds=("control",), rig_kinds=("small",), noises=("white",)), 1)
 
 
 @pytest.mark.parametrize("kind", PLANTS)
@@ -70,7 +70,7 @@ def test_a_recording_of_another_rig_has_another_motion_and_the_rest_stays() -> N
     drawn = draw(SETTINGS, seed)
     fault = drawn.truth["fault"]
     assert fault["id"] == "recording_other_rig" and abs(fault["size"] - 1) >= 0.003
-    control = draw(Settings(kinds=("control",), benches=("small",), noises=("white",)), seed)
+    control = draw(Settings(kinds=("control",), rig_kinds=("small",), noises=("white",)), seed)
     noise = drawn.truth["noise_m"]
     for one, sound in zip(drawn.campaign.recordings, control.campaign.recordings, strict=True):
         changed = np.max(np.abs(one.samples - sound.samples)) > 10 * noise
@@ -79,7 +79,7 @@ def test_a_recording_of_another_rig_has_another_motion_and_the_rest_stays() -> N
 
 def test_a_fault_and_an_effect_stand_in_one_truth() -> None:
     settings = Settings(
-        kinds=("fault_single",), benches=("small",), noises=("white",), effects=("spring_cubic",)
+        kinds=("fault_single",), rig_kinds=("small",), noises=("white",), effects=("spring_cubic",)
     )
     truth = draw(settings, 0).truth
     assert truth["fault"]["id"] == "recording_spikes"
@@ -87,7 +87,7 @@ def test_a_fault_and_an_effect_stand_in_one_truth() -> None:
 
 
 def test_faults_beside_an_effect_are_those_that_its_rigs_can_show() -> None:
-    settings = replace(SETTINGS, benches=("paper", "torsion", "plain"))
+    settings = replace(SETTINGS, rig_kinds=("paper", "torsion", "plain"))
     assert draw_module._faults(settings, ()) == [*PLANTS, "other_rig"]
     beside = draw_module._faults(settings, ("pendulum_sine",))
     assert {"reversed", "gain", "clock", "case"}.isdisjoint(beside) and "duplicate" in beside

@@ -23,13 +23,13 @@ from bayesimpact.trial.settings import Settings, settings_from
 
 pytestmark = pytest.mark.long
 
-CONTROLS = Settings(kinds=("control",), benches=("small",), noises=("white",))
+CONTROLS = Settings(kinds=("control",), rig_kinds=("small",), noises=("white",))
 SEEDS = range(3, 6)
 
 
 def quick_draw(settings: Settings, seed: int) -> dict:
     """A truth without anything planted, and a campaign of two files."""
-    truth = {"seed": seed, "kind": "control", "bench": "small", "noise_kind": "white"}
+    truth = {"seed": seed, "kind": "control", "rig_kind": "small", "noise_kind": "white"}
     truth |= {"planted": [], "parameters": {}, "noise_rms_m": 1.0}
     files = {"campaign.toml": f"name = '{seed}'\n", "a.csv": "time_s,displacement_m\n"}
     return {"truth": sealed_text(truth), "files": files}
@@ -56,7 +56,7 @@ def quiet_answer(files: Mapping[str, str], search: bool, report: bool = False) -
 def quick(monkeypatch: pytest.MonkeyPatch) -> Settings:
     monkeypatch.setattr(run, "draw_job", quick_draw)
     monkeypatch.setattr(run, "answer_job", quiet_answer)
-    return Settings(kinds=("control",), benches=("small",), noises=("white",), search=False)
+    return Settings(kinds=("control",), rig_kinds=("small",), noises=("white",), search=False)
 
 
 def tree(folder: Path) -> dict[str, str]:
@@ -205,7 +205,7 @@ def test_a_scheduler_by_its_address() -> None:
         ("kinds", ("control", "triple")),
         ("effects", ("detent",)),
         ("outside", ()),
-        ("benches", ("paper", "huge")),
+        ("rig_kinds", ("paper", "huge")),
         ("noises", ("pink",)),
         ("strength", (2.0, 1.0)),
         ("strength", (0.0, 1.0)),

@@ -14,7 +14,7 @@ from bayesimpact.trial.table import summary_text
 
 TRUTH = {
     "kind": "single",
-    "bench": "small",
+    "rig_kind": "small",
     "noise_kind": "white",
     "noise_rms_m": 2e-6,
     "parameters": {"c1": 1.0, "k1": 100.0, "k2[1]": 500.0, "y0[a]": 0.1},

@@ -68,7 +68,7 @@ def truth(*effects: str, outside: str = "", **more: object) -> dict:
     found = [planted(e) for e in effects] + ([planted(outside, True)] if outside else [])
     return {
         "kind": "several_outside" if outside else "several",
-        "bench": "decays",
+        "rig_kind": "decays",
         "noise_kind": "white",
         "misfit": 40.0,
         "noise_rms_m": 2e-6,

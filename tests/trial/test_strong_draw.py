@@ -40,8 +40,8 @@ from bayesimpact.trial.strong_rigs import (
 
 pytestmark = pytest.mark.long
 
-PENDULUM = strong_settings(kinds=("several",), benches=("one_pendulum",), rest=0.0)
-DECAY = replace(PENDULUM, benches=("one_decay",))
+PENDULUM = strong_settings(kinds=("several",), rig_kinds=("one_pendulum",), rest=0.0)
+DECAY = replace(PENDULUM, rig_kinds=("one_decay",))
 SORT_OF = {effect: sort for sort, names in SORTS.items() for effect in names}
 
 
@@ -110,12 +110,12 @@ def test_noise_of_an_encoder_has_the_size_it_says() -> None:
     assert (other.chain.noise, other.noise_kind) == (2e-5, "ar1") and other.chain.correlation > 0
 
 
-@pytest.mark.parametrize("bench", STRONG_RIGS)
+@pytest.mark.parametrize("rig_kind", STRONG_RIGS)
 @pytest.mark.parametrize("kind", ["several", "several_outside"])
-def test_never_two_of_a_sort(bench: str, kind: str) -> None:
+def test_never_two_of_a_sort(rig_kind: str, kind: str) -> None:
     settings = strong_settings()
     rng = np.random.default_rng(5)
-    design = draw_rig(bench, "white", rng)
+    design = draw_rig(rig_kind, "white", rng)
     counts = set()
     for resting in (False, True):
         for _ in range(40):
@@ -125,7 +125,7 @@ def test_never_two_of_a_sort(bench: str, kind: str) -> None:
             sorts = [SORT_OF[e] for e in inside]
             assert len(set(sorts)) == len(sorts)
             assert len(ids) - len(inside) == (kind == "several_outside")
-            assert ("pendulum_sine" in ids) == (bench in GROUPS["pendulum"])
+            assert ("pendulum_sine" in ids) == (rig_kind in GROUPS["pendulum"])
             assert not resting or not set(ids) & set(TIMED)
     assert counts == {2, 3, 4}
 
@@ -204,7 +204,7 @@ def test_settings_of_the_regime() -> None:
     assert settings_from(old) == Settings()
     for wrong, place in (
         ({"kinds": ("single",)}, "kinds"),
-        ({"benches": ("paper",)}, "benches"),
+        ({"rig_kinds": ("paper",)}, "rig_kinds"),
         ({"misfit": (0.5, 3.0)}, "misfit"),
         ({"rest": 2.0}, "rest"),
     ):

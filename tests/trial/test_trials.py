@@ -28,7 +28,7 @@ SETTINGS = Settings(
     ),
     outside=("detent", "damping_bump", "friction_pad"),
     strength=(6.0, 10.0),
-    benches=("small",),
+    rig_kinds=("small",),
     noises=("white",),
     search=False,
 )
