@@ -15,6 +15,10 @@ Job = tuple[Any, ...]
 
 THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 AHEAD = 3  # jobs per worker that wait in the cluster
+UNWATCHED = {  # samples of workers' stacks and locks: nobody looks, and they took a tenth of the time
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.system-monitor.gil.enabled": False,
+}
 
 
 def one_thread_each() -> None:
@@ -45,6 +49,7 @@ def executor(workers: int, scheduler: str | None) -> Iterator[Spread]:
     if scheduler is None and workers <= 1:
         yield here
         return
+    import dask
     import distributed
 
     make: Any = distributed.Client  # its signatures carry no types
@@ -56,6 +61,7 @@ def executor(workers: int, scheduler: str | None) -> Iterator[Spread]:
         return
     one = dict.fromkeys(THREADS, "1")
     with (
+        dask.config.set(UNWATCHED),
         safe_path(),  # a worker that was lost is started again
         local(
             n_workers=workers, threads_per_worker=1, dashboard_address="127.0.0.1:0", env=one
