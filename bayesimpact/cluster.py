@@ -15,7 +15,7 @@ Job = tuple[Any, ...]
 
 THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 AHEAD = 3  # jobs per worker that wait in the cluster
-UNWATCHED = {  # samples of workers' stacks and locks: nobody looks, and they took a tenth of the time
+UNWATCHED = {  # samples of stacks and locks: nobody looks, and they took a tenth of the time
     "distributed.worker.profile.enabled": False,
     "distributed.admin.system-monitor.gil.enabled": False,
 }
