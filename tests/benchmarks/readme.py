@@ -13,6 +13,7 @@ if __name__ == "__main__":  # imports go by the tests' folder, not by this one
     sys.path[0] = str(Path(__file__).resolve().parents[1])
 
 from benchmarks.fault_tables import fault_table
+from benchmarks.robustness_tables import robustness_table
 from benchmarks.tables import HERE, grid, stored
 from benchmarks.trial_tables import (
     blind_table,
@@ -252,6 +253,7 @@ TABLES = {
     "next": next_table,
     "power": power_table,
     "sbc": sbc_table,
+    "robustness": robustness_table,
     "kernel": kernel_table,
     "peers": peers_table,
     "added": added_table,
