@@ -5,6 +5,9 @@ from __future__ import annotations
 import csv
 import json
 import shutil
+import subprocess
+import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -138,6 +141,37 @@ def test_a_cluster_gives_the_same_rows(
     plan = load_plan(folder / "fleet.toml")
     few = replace(plan, sessions=plan.sessions[:2])
     rows = run.run_fleet(few, tmp_path, workers=2)
+    assert_rows_of(done, rows)
+
+
+def test_a_cluster_whose_scheduler_is_another_process(
+    folder: Path, done: Path, tmp_path: Path
+) -> None:
+    """By its address; the workers share nothing with this process but the package."""
+    told = tmp_path / "scheduler.json"
+    dask = [sys.executable, "-P", "-m", "distributed.cli.dask_scheduler"]
+    worker = [sys.executable, "-P", "-m", "distributed.cli.dask_worker", "--no-dashboard"]
+    started = [
+        subprocess.Popen(
+            [*command, "--scheduler-file", str(told)], cwd=tmp_path, stderr=subprocess.PIPE
+        )
+        for command in ([*dask, "--port", "0", "--no-dashboard"], worker, worker)
+    ]
+    try:
+        while not (told.exists() and told.stat().st_size) and started[0].poll() is None:
+            time.sleep(0.1)
+        address = json.loads(told.read_text())["address"]
+        plan = load_plan(folder / "fleet.toml")
+        few = replace(plan, sessions=plan.sessions[:2])
+        assert_rows_of(done, run.run_fleet(few, tmp_path, scheduler=address))
+    finally:
+        for process in reversed(started):
+            process.terminate()
+            process.communicate()
+
+
+def assert_rows_of(done: Path, rows: list[dict]) -> None:
+    """Those of the first two weeks."""
     alone = [json.loads((done / "rows" / f"week{w}.json").read_text())["row"] for w in (0, 1)]
     for row, other in zip(rows, alone, strict=True):
         assert {**row, "parameters": None} == {**other, "parameters": None}
