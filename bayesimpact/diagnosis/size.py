@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 import numpy as np
@@ -15,6 +16,7 @@ from bayesimpact.model.parameters import SLOTS, instance_name, unit_for
 Array = NDArray[np.float64]
 _GAP = SLOTS.index("g")
 IN_CONTACT = ("contact", "entry", "exit")
+_SHARE = re.compile(r"\{share\} of ([^).]+)")  # in an effect's statement
 _SMALLER = (("mm", 1e-3), ("µm", 1e-6), ("nm", 1e-9))
 
 
@@ -66,8 +68,11 @@ def _values(fit: Fit) -> Mapping[str, float]:
 
 
 def yardstick(effect: Effect) -> str:
-    """What the share of an effect's size refers to, in words."""
-    if effect.law is None and effect.size is None:
+    """What the share of an effect's size refers to, in words: its own, where it defines a size."""
+    if effect.size is not None:
+        told = _SHARE.search(effect.statement)
+        return told[1] if told else ""
+    if effect.law is None:
         return "the amplitude"
     contact = effect.regime in IN_CONTACT
     return f"the peak elastic force of the {'obstacle' if contact else 'suspension'}"

@@ -12,6 +12,7 @@ import pytest
 from effect_rigs import BY_ID, TestRig
 
 import bayesimpact.model.effects as package
+from bayesimpact.diagnosis.size import yardstick
 from bayesimpact.errors import InputError
 from bayesimpact.inference.defaults import effect_prior
 from bayesimpact.model.effects import EFFECTS, Scales
@@ -251,3 +252,10 @@ def test_the_spread_of_contact_damping_is_told_as_a_share_of_its_mean():
     assert size is not None
     assert size((1.0, 3.0), None) == (2.0, "N s/m", 1.0)
     assert size((0.0, 0.0), None) == (0.0, "N s/m", 0.0)
+
+
+def test_a_share_is_of_what_the_effect_says_itself():
+    assert yardstick(BY_ID["gap_wear"]) == "the deepest indentation"
+    assert yardstick(BY_ID["contact_damping_per_case"]) == "their mean"
+    assert yardstick(BY_ID["contact_hardening"]) == "the peak elastic force of the obstacle"
+    assert all(yardstick(effect) for effect in EFFECTS)
