@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from bayesimpact.diagnosis.decision import in_its_place, may_be_needed, ordered
+from bayesimpact.diagnosis.discrepancy import discrepancy
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.force import missing_contact
 from bayesimpact.diagnosis.models import SHORT, STARTS, Models, Progress
@@ -360,6 +361,7 @@ class _Search(Models):
     def with_residuals(self, found: Naming) -> Naming:
         """What `decide` compares where something remains: models with a residual force."""
         chosen = found.chosen.candidate
+        found = replace(found, left=discrepancy(chosen.fit))
         smaller = {e.id: self.drop(chosen, e) for e in chosen.effects}
         for part in smaller.values():
             self.examine(part)

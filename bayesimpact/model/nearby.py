@@ -36,7 +36,9 @@ Flags = NDArray[np.bool_]
 PAYS = 40  # motions from which on superposition costs less than they do
 CHECKED = 3  # of them, by simulation
 BLOCK = 64  # forces at once, so that memory stays bounded
-_C1, _K1, _OFFSET = (SLOTS.index(name) for name in ("c1", "k1", "offset"))
+_C1, _K1, _C2, _GAP, _K2, _OFFSET = (
+    SLOTS.index(name) for name in ("c1", "k1", "c2", "g", "k2", "offset")
+)
 
 
 def readings_near(oscillator: Oscillator, r: int, theta: Array, error: float) -> Array:
@@ -107,14 +109,20 @@ def _changes(oscillator: Oscillator, r: int, q: Array) -> Array:
         return found
     for first in range(0, found.shape[0], BLOCK):
         rows = np.concatenate([q[:1], q[1 + first : 1 + first + BLOCK]])
-        found[first : first + BLOCK] = answers(motion, _forces(motion, rows, oscillator.laws))
+        found[first : first + BLOCK] = answers(motion, force_changes(motion, rows, oscillator.laws))
     return found
 
 
-def _forces(motion: Motion, q: Array, laws: Index) -> Array:
-    """By how much forces along a motion differ from those of the first slots, (K, n)."""
+def force_changes(motion: Motion, q: Array, laws: Index) -> Array:
+    """By how much forces along a motion, N, differ from those of the first of slots (1 + K, Q):
+    (K, n). Of the suspension, the obstacle and all laws, friction that may hold apart.
+    """
     change = q[:, [_K1, _C1]] - q[0, [_K1, _C1]]
     out = change @ np.stack([motion.y, motion.v])
+    if np.isfinite(motion.d).all():
+        touching = motion.d > 0
+        own = q[:, [_K2]] * (motion.y - q[:, [_GAP]]) + q[:, [_C2]] * motion.v
+        out += np.where(touching, own - own[0], 0.0)
     for law, (first, end) in zip(laws, _spans(q.shape[1], laws), strict=True):
         rows = np.flatnonzero((q[:, first:end] != q[0, first:end]).any(axis=1))
         if rows.size == 0:

@@ -116,7 +116,7 @@ def test_an_effect_outside_the_catalogue_is_unknown_and_learned(unknown):
     carried = physical_z(unknown.after, unknown.intervals.mean, sd)
     ignored = physical_z(unknown.before)
     assert max(map(abs, carried.values())) < 0.3 * max(map(abs, ignored.values()))
-    assert np.all(sd >= 0.999 * unknown.after.sd)
+    assert max(map(abs, carried.values())) < 3.0
 
 
 TOP = {
