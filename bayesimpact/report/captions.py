@@ -41,7 +41,7 @@ DIAGNOSIS = {
         "What the recordings rule out. Dots: 95 % upper limit of each effect's size; bars: a size "
         "that would stand out by five standard errors. Both over the size that would matter in "
         "practice, which is a tenth of the effect's prior scale (dashed): left of it an effect is "
-        "absent or negligible; orange dots mark effects of which the recordings cannot tell."
+        "absent or negligible; of those with orange dots the recordings cannot tell."
     ),
     "improvement": (
         "Before and after. Left: power of the whitened residual over that of the noise, estimated "
@@ -99,6 +99,12 @@ def _more(stem: str, results: Results) -> str:
     if stem != "force":
         return ""
     words = " The dashed line is the stop." if "gap" in arrays else ""
+    regime = (diagnosis.get("location") or {}).get("regime")
+    if regime in ("contact", "entry", "exit") and diagnosis.get("effects"):
+        words += (
+            " What was named acts in contact, and need not be darkest there: most of what it does "
+            "looks like a change of k2, c2 and g, which is why these are wrong without it."
+        )
     misfit = ((diagnosis.get("fit") or {}).get("before") or {}).get("reduced_chi2")
     if diagnosis.get("verdict") == "adequate":
         words += (
@@ -131,10 +137,15 @@ def _corner(results: Results) -> str:
     before = (
         " Orange: the posterior of the model without the added effects." if results.before else ""
     )
+    apart = (
+        " As if nothing were left unexplained: the tables' intervals carry that, and are wider."
+        if results.remains
+        else ""
+    )
     return (
         "Posterior of the parameters of interest: marginals on the diagonal with median ± half "
         "of the 90 % interval, pairs below with the contours of one and two standard deviations "
-        f"(39 % and 86 %). Δ: from the median that the title states.{some}{before}"
+        f"(39 % and 86 %). Δ: from the median that the title states.{some}{before}{apart}"
     )
 
 

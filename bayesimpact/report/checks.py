@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from bayesimpact.model.units import chi2, display, number, p_value, p_words, significant, typeset
 from bayesimpact.report.results import Check, Results
-from bayesimpact.report.units import chi2, display, number, p_value, p_words, significant, typeset
 from bayesimpact.report.whiteness import whiteness
 
 __all__ = ["amount", "assess", "assessed", "model_name", "whiteness"]

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from bayesimpact.model.units import display, typeset
 from bayesimpact.report.cycles import (
     before_predicted,
     contacts,
@@ -28,7 +29,6 @@ from bayesimpact.report.figures.style import response, response_word
 from bayesimpact.report.force_in_time import force_in_time
 from bayesimpact.report.results import Array, Results
 from bayesimpact.report.rows import Z90
-from bayesimpact.report.units import display, typeset
 
 FOLDER = Path(__file__).parent / "template"
 LIBRARY = FOLDER / "vendor" / "uPlot-1.6.32.iife.min.js"

@@ -8,20 +8,22 @@ from math import isfinite
 import numpy as np
 from markupsafe import Markup, escape
 
-from bayesimpact.report.results import Results, Row
-from bayesimpact.report.rows import Z90
-from bayesimpact.report.units import (
+from bayesimpact.model.units import (
     chi2,
     decimals,
     display,
+    interval_decimals,
     number,
     p_value,
     readable,
     reading,
     signed,
     significant,
+    span,
     typeset,
 )
+from bayesimpact.report.results import Results, Row
+from bayesimpact.report.rows import Z90
 
 
 @dataclass(frozen=True)
@@ -67,11 +69,6 @@ def symbol(name: str) -> Markup:
     return html + escape(bracket + key)
 
 
-def span(low: float, high: float, scale: float, places: int) -> str:
-    """Both ends of an interval."""
-    return f"{number(low * scale, places)} to {number(high * scale, places)}"
-
-
 def parameter_views(results: Results, rows: tuple[Row, ...]) -> list[ParameterView]:
     """Rows of the table of parameters; reference cells in the order of `reference_labels`."""
     labels = reference_labels(rows)
@@ -87,10 +84,10 @@ def _view(row: Row, labels: list[str]) -> ParameterView:
     low, high = row.ci90
     half = 0.5 * (high - low)
     shown = readable(row.unit, max(abs(row.median), half))
-    places = decimals(half * shown.scale)
-    total_places = decimals(0.5 * (row.total90[1] - row.total90[0]) * shown.scale)
+    places = interval_decimals(low * shown.scale, high * shown.scale)
+    total_places = interval_decimals(*(end * shown.scale for end in row.total90))
     ratio, ratio_low, ratio_high = row.ratio
-    ratio_places = decimals(0.5 * (ratio_high - ratio_low))
+    ratio_places = interval_decimals(ratio_low, ratio_high)
     return ParameterView(
         symbol=symbol(row.name),
         meaning=row.meaning,

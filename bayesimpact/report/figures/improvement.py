@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 
+from bayesimpact.report.change_view import NUISANCES
 from bayesimpact.report.diagnosis_view import gain_words
 from bayesimpact.report.figures.style import (
     AFTER,
@@ -26,7 +27,6 @@ from bayesimpact.report.figures.style import (
 from bayesimpact.report.results import Results
 from bayesimpact.report.rows import Z90
 
-NUISANCES = ("y0", "v0", "offset", "sigma")
 MOST = 16
 """Parameters shown; those that moved most."""
 _ROW = 0.24  # in

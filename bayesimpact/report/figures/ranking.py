@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from bayesimpact.model.units import quantity
 from bayesimpact.report.diagnosis_view import probability
 from bayesimpact.report.figures.style import (
     AFTER,
@@ -20,15 +21,15 @@ from bayesimpact.report.figures.style import (
     rows_axis,
     styled,
 )
+from bayesimpact.report.limit_view import not_found
 from bayesimpact.report.results import Results
-from bayesimpact.report.units import quantity
 
 MOST = 12
 """Models shown; the base model always is."""
 FREE_FORCE = "one free force"
 _ROW, _FRAME = 0.24, 1.05  # in
 _LINEAR = 10.0  # nats; beyond that the axis is logarithmic
-_ANSWERS = {"present": ORANGE, "negligible": GREY, "absent": AFTER, "cannot tell": ORANGE}
+_ANSWERS = {"negligible": GREY, "absent": AFTER, "cannot tell": ORANGE}
 
 
 def ranking_figures(results: Results) -> Mapping[str, Figure]:
@@ -39,7 +40,7 @@ def ranking_figures(results: Results) -> Mapping[str, Figure]:
     models = ranked(evidence, force=diagnosis.get("verdict") == "unknown")
     if len(models) > 1:
         figures["ranking"] = _ranking(models, chosen(diagnosis), evidence.get("decisive"))
-    limits = [x for x in diagnosis.get("limits", ()) if _known(x)]
+    limits = [x for x in not_found(diagnosis) if _known(x)]
     if limits:
         figures["limits"] = _limits(limits)
     return figures
