@@ -78,12 +78,23 @@ def parameter_shifts(
 def parameter_shift(old: Mapping[str, Any], new: Mapping[str, Any]) -> Shift | None:
     """Change of one parameter; None where its intervals before and after overlap."""
     (low, high), start = new["ci90"], old["median"]
-    if not start or (old["ci90"][0] <= high and old["ci90"][1] >= low):
+    overlap = old["ci90"][0] <= high and old["ci90"][1] >= low
+    if not start or overlap or not excludes(new, start):
         return None
     near, far = sorted((low, high), key=lambda end: abs(end - start))
     shares = [(value - start) / abs(start) for value in (new["median"], near, far)]
     wide = abs(shares[2]) > 2 * abs(shares[1])  # two digits of the median would mean nothing
     return Shift(shares[1], least=True) if wide else Shift(shares[0])
+
+
+def excludes(content: Mapping[str, Any], value: float) -> bool:
+    """True when a 90 % interval leaves a value out, on its wider side's width to either side.
+
+    An interval cut at a bound (a damping is not negative) leaves out what lies at the bound, though
+    nothing is likelier there.
+    """
+    (low, high), median = content["ci90"], content["median"]
+    return bool(abs(value - median) > max(high - median, median - low))
 
 
 def title_of(effect_id: str) -> str:

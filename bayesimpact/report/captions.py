@@ -12,13 +12,13 @@ DIAGNOSIS = {
     "story": (
         "The cycle in which what was added explains most. Above: the recording and both models. "
         "Middle: the same less the base model: were it right, the points would scatter about the "
-        "orange line; they follow the blue one. Grey area: contact."
+        "orange line; they follow the blue one."
     ),
     "force": (
         "The force that the base model leaves unexplained, on the left-hand side of the equation "
-        "of motion (positive resists motion towards the stop). Left: its posterior mean wherever "
-        "the mass has been; black lines enclose what exceeds its own 90 % band. Right: the same "
-        "split into a conservative part and a dissipative part, with 90 % bands. What "
+        "of motion (positive resists a motion to positive values). Left: its posterior mean "
+        "wherever the mass has been; black lines enclose what exceeds its own 90 % band. Right: "
+        "the same split into a conservative part and a dissipative part, with 90 % bands. What "
         "changes of the base parameters could imitate is taken out."
     ),
     "formula": (
@@ -60,8 +60,8 @@ DIAGNOSIS = {
         "Black: the best repeat of a recording; grey: a campaign of its own."
     ),
     "shifts": (
-        "How far the added physics moves the parameters, in standard deviations of the base model: "
-        "medians and 90 % intervals."
+        "How far the added physics moves the parameters, from what the base model has: medians and "
+        "90 % intervals."
     ),
 }
 """Captions of a diagnosis' figures."""
@@ -88,10 +88,13 @@ def _more(stem: str, results: Results) -> str:
     arrays, diagnosis = results.diagnosis_arrays, results.diagnosis or {}
     if stem == "gain" and "impact_gain" in arrays:
         return " Impacts are shown as far as half of the recordings have them."
-    if stem == "story" and "force_y" in arrays:
-        return (
+    if stem == "story":
+        contact = " Grey area: contact." if results.stop else ""
+        return contact + (
             " Below: the force that the base model lacks, as far as it depends on displacement "
             "and velocity, with its 90 % band."
+            if "force_y" in arrays
+            else ""
         )
     if stem == "improvement" and "held_out_recordings" in arrays:
         words = " Right: gain in the log score with which each recording is predicted from the"

@@ -7,7 +7,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from bayesimpact.diagnosis.words import parameter_shift
+from bayesimpact.diagnosis.words import excludes, parameter_shift
 from bayesimpact.model.units import (
     decimals,
     number,
@@ -57,7 +57,7 @@ def change_row(
         "change": change_words(before, after),
         "before": estimate(before, like=after),
         "after": estimate(after, like=before),
-        "shift": _deviations(moved) if _clear(before, after) else "",
+        "shift": _deviations(moved) if excludes(after, before["median"]) else "",
     }
 
 
@@ -66,15 +66,10 @@ def change_words(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
     old, shift = before["median"], parameter_shift(before, after)
     if not old:
         return "–"
-    if not _clear(before, after):
+    if not excludes(after, old):
         return "not clear"
     change = percent((_surely(before, after) - old) / abs(old))
     return f"at least {change}" if shift is not None and shift.least else change
-
-
-def _clear(before: Mapping[str, Any], after: Mapping[str, Any]) -> bool:
-    low, high = after["ci90"]
-    return not low <= before["median"] <= high
 
 
 def _surely(before: Mapping[str, Any], after: Mapping[str, Any]) -> float:

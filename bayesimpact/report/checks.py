@@ -79,7 +79,7 @@ def headline(results: Results) -> str:
             f"{significant(excess, 2)} times what noise of {noise} would leave. The values below "
             "describe the closest such oscillator, "
         ) + (
-            "and their intervals carry what remains. Something else remains."
+            "and their intervals carry what remains."
             if diagnosed
             else "and their intervals are too narrow to be believed. bayesimpact diagnose asks "
             "what is missing."

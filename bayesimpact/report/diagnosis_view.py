@@ -35,11 +35,11 @@ VERDICTS = {
     "unknown": "The missing physics is outside the catalogue",
 }
 REGIMES = {
-    "free": "free flight",
+    "free": "the suspension, wherever the mass moves",
     "contact": "contact with the stop",
     "entry": "the beginning of contact",
     "exit": "the end of contact",
-    "everywhere": "everywhere",
+    "everywhere": "the whole motion",
     "measurement": "the measuring chain",
 }
 _FIT_ROWS = {

@@ -23,7 +23,6 @@ from bayesimpact.model.units import (
     typeset,
 )
 from bayesimpact.report.results import Results, Row
-from bayesimpact.report.rows import Z90
 
 
 @dataclass(frozen=True)
@@ -156,11 +155,15 @@ def release_views(results: Results) -> list[dict[str, str]]:
         cells = {"name": r.name, "case": r.case}
         for key, (scale, _) in columns.items():
             row = results.row(f"{key}[{r.name}]")
-            half = 0.5 * (row.ci90[1] - row.ci90[0]) * scale
+            half = _half(row) * scale
             places = decimals(half)
             cells[key] = f"{number(row.median * scale, places)} ± {number(half, places)}"
         rows.append(cells)
     return rows
+
+
+def _half(row: Row) -> float:
+    return 0.5 * (row.ci90[1] - row.ci90[0])
 
 
 def release_columns(results: Results) -> dict[str, tuple[float, str]]:
@@ -169,7 +172,7 @@ def release_columns(results: Results) -> dict[str, tuple[float, str]]:
     for key in ("y0", "v0", "offset"):
         rows = [row for row in results.rows if row.name.startswith(f"{key}[")]
         if rows:
-            size = float(np.max([max(abs(row.median), Z90 * row.sd) for row in rows]))
+            size = float(np.max([max(abs(row.median), _half(row)) for row in rows]))
             shown = display(rows[0].unit, size)
             columns[key] = (shown.scale, typeset(shown.unit))
     return columns

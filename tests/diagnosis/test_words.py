@@ -37,10 +37,12 @@ def test_shifts_are_what_adding_does():
 def test_a_wide_interval_proves_its_nearer_end_only():
     """Once told: "c1 was 99 % too low" beside a 90 % interval of 0.45 to 14."""
     old = {"median": 0.025, "ci90": [0.0249, 0.0251]}
-    assert parameter_shift(old, {"median": 5.0, "ci90": [0.45, 14.0]}) == Shift(
+    assert parameter_shift(old, {"median": 2.0, "ci90": [0.45, 3.0]}) == Shift(
         pytest.approx(17.0), least=True
     )
-    assert parameter_shift(old, {"median": 5.0, "ci90": [0.024, 14.0]}) is None
+    # a normal law cut at zero: nothing is likelier than what its interval leaves out there
+    assert parameter_shift(old, {"median": 5.0, "ci90": [0.45, 14.0]}) is None
+    assert parameter_shift(old, {"median": 2.0, "ci90": [0.024, 3.0]}) is None
     said = summary(
         "partly", (BY_ID["coulomb_friction"],), ("",), place("free"), (),
         {"c1": Shift(17.0, least=True), "k1": Shift(0.058)}, "",

@@ -126,9 +126,16 @@ def test_shifts_are_in_deviations_of_the_base_model() -> None:
     old = {"unit": "N/m", "median": 100.0, "ci90": [100 - 1.6448536 * sd, 100 + 1.6448536 * sd]}
     new = {"unit": "N/m", "median": 90.0, "ci90": [88.0, 92.0]}
     tables = {"before": {"k1": old, "c1": old, "sigma": old}, "after": {"k1": new, "sigma": new}}
-    ((name, before, after),) = shifts(tables)
-    assert name == "k1" and before == pytest.approx([-1.6448536, 0, 1.6448536])
+    ((name, before, after),), unit = shifts(tables)
+    assert (
+        unit == "its standard deviations"
+        and name == "k1"
+        and before == pytest.approx([-1.6448536, 0, 1.6448536])
+    )
     assert after == pytest.approx([-6, -5, -4])
+    wide = tables | {"after": {"k1": new | {"ci90": [88.0, 3000.0]}}}
+    ((_, _, after),), unit = shifts(wide)
+    assert unit == "%" and after == pytest.approx([-12, -10, 2900])
 
 
 @pytest.mark.parametrize(("count", "cases"), [(1, 1), (2, 1), (50, 5)])

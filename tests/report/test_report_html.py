@@ -205,7 +205,7 @@ def test_diagnosis_tells_its_story_first() -> None:
     assert text.index("Dry friction is missing <here>.") < 300
     assert text.index("Diagnosis: what is missing is named") < text.index("Parameters Medians")
     for words in (
-        "free flight (93 % of what is unexplained)",
+        "the suspension, wherever the mass moves (93 % of what is unexplained)",
         "displacement \N{MINUS SIGN}6.0 to 3.0 mm",
         "Probability > 0.999; it changes the log evidence by +812.3.",
         "force = 160 (150 to 170) µN",

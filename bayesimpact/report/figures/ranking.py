@@ -95,11 +95,16 @@ def _ranking(
     axis.set_xscale("symlog", linthresh=_LINEAR)
     axis.set_xlim(-0.4, max(float(behind.max()), _LINEAR) * 1.4)
     axis.xaxis.set_major_formatter("{x:g}")
-    rows_axis(axis, [" + ".join(e) or "base model" for e, _ in models], above=1.1)
+    rows_axis(axis, [in_words(" + ".join(e)) or "base model" for e, _ in models], above=1.1)
     axis.set_xlabel("log odds behind the best model (nats)")
     axis.set_title("models tried, best first", loc="left")
     _beside(axis, "probability", [probability(float(w)) for w in weight])
     return figure
+
+
+def in_words(ids: str) -> str:
+    """Ids as labels: their titles are too long for an axis."""
+    return ids.replace("_", " ")
 
 
 def _beside(axis: Axes, title: str, cells: Sequence[str]) -> None:
@@ -142,7 +147,7 @@ def _limits(limits: Sequence[Mapping[str, Any]]) -> Figure:
 def _frame(axis: Axes, ordered: Sequence[Mapping[str, Any]]) -> None:
     """Names on the left, upper limits in their units on the right."""
     axis.set_xscale("log")
-    rows_axis(axis, [x["id"] for x in ordered])
+    rows_axis(axis, [in_words(x["id"]) for x in ordered])
     axis.set_xlabel("size over the size that would matter in practice")
     axis.set_title("effects that were not found", loc="left")
     _beside(axis, "95 % upper limit", [_size(x) for x in ordered])

@@ -110,7 +110,7 @@ def _motion(
 
 def _difference(axis: Axes, results: Results, t: Array, samples: Array, after: Array) -> None:
     """Both relative to the base model: what was added has to pass through the recorded points."""
-    shown = display(results.unit, max(results.rms, results.noise.level))
+    shown = display(results.unit, float(np.sqrt(np.mean(samples**2))))
     axis.plot(t, samples * shown.scale, "o", color=SKY, ms=3.5, mew=0, label="recorded")
     width = max(3, 2 * (t.size // 24) + 1)
     mean = np.convolve(samples, np.full(width, 1 / width), "valid") * shown.scale
