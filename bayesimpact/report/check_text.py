@@ -10,7 +10,6 @@ from bayesimpact.data.recording import Recording
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.noise_estimate import raw_noise
 from bayesimpact.model.parameters import build_layout
-from bayesimpact.model.units import quantity
 
 BARS = "▁▂▃▄▅▆▇█"
 COLUMNS = 40
@@ -54,8 +53,8 @@ def campaign_warnings(campaign: Campaign, noise: Noise | None) -> list[str]:
     stated = campaign.measurement.noise
     if stated is not None and noise is not None and not 1 / 1.5 < noise.level / stated < 1.5:
         warnings.append(
-            f"noise is stated as {quantity(stated, campaign.recordings[0].unit)}, the recordings "
-            f"show about {quantity(noise.level, campaign.recordings[0].unit)}"
+            f"noise is stated as {stated:.3g}, the recordings show about {noise.level:.3g} "
+            f"{campaign.recordings[0].unit}"
         )
     smoothing = campaign.measurement.smoothing
     if smoothing is not None and smoothing.declared_window > smoothing.window:
@@ -144,10 +143,9 @@ def _chain_block(campaign: Campaign, noise: Noise | None) -> str:
     measurement, unit = campaign.measurement, campaign.recordings[0].unit
     levels = []
     if noise is not None:
-        level = quantity(noise.level, unit)
-        levels.append(f"{level}, {noise.kind} (from the recordings alone)")
+        levels.append(f"{noise.level:.3g} {unit}, {noise.kind} (from the recordings alone)")
     if measurement.noise is not None:
-        levels.append(f"{quantity(measurement.noise, unit)} (stated)")
+        levels.append(f"{measurement.noise:.3g} {unit} (stated)")
     level = "; ".join(levels) or "estimated before the fit"
     smoothing = measurement.smoothing
     if smoothing is None:

@@ -15,7 +15,6 @@ from matplotlib.text import Text
 
 from bayesimpact.report.archive import load_results, save_results
 from bayesimpact.report.captions import caption
-from bayesimpact.report.figures import shares
 from bayesimpact.report.figures.improvement import shifts
 from bayesimpact.report.figures.ranking import FREE_FORCE, MOST, ranked
 from bayesimpact.report.figures.save import all_figures, png
@@ -144,11 +143,8 @@ def test_any_number_of_recordings(count: int, cases: int) -> None:
         assert png(figure).startswith(b"\x89PNG")
 
 
-@pytest.mark.long
-def test_report_is_drawn_again_from_stored_results(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(shares, "started", lambda folder: None)
+@pytest.mark.usefixtures("coarse_figures")
+def test_report_is_drawn_again_from_stored_results(tmp_path: Path) -> None:
     results = diagnosed(2, 1)
     save_results(results, tmp_path)
     loaded = load_results(tmp_path)
