@@ -12,27 +12,26 @@ from dataclasses import replace
 
 import numpy as np
 
-from bayesimpact.data.faults.quantised import find_quantised
+from bayesimpact.data.faults.flat import reading_step
 from bayesimpact.data.period import rough_period
 from bayesimpact.data.recording import Recording
 
-WITHIN = 1.5  # steps about the last reading: noise may cross the edge of a step
+WITHIN = 1.5  # steps about the last readings: noise may cross the edge of a step
+REPEATED = 0.5  # of neighbours equal: noise below a third of a step, which rounds nothing evenly
 
 
 def without_tail(recording: Recording) -> tuple[Recording, str]:
     """A free decay with all but the first reading of such a tail set aside, and a note; as it is,
     and "", where the tail is shorter than a free period.
     """
-    coarse = find_quantised(recording)
-    period = rough_period(recording.samples, 1.0)
-    if recording.input is not None or not coarse or period is None:
+    x, step = recording.samples, reading_step(recording.samples)
+    period = rough_period(x, 1.0)
+    if recording.input is not None or step == 0.0 or period is None:
         return recording, ""
-    x = recording.samples
-    moving = np.flatnonzero(
-        np.abs(x - np.median(x[-max(int(period), 1) :])) > WITHIN * coarse[0].size
-    )
-    first = int(moving[-1]) + 2 if moving.size else 0
-    if not 0 < first < x.size - period:
+    last = float(np.median(x[-max(int(period), 1) :]))
+    moving = np.flatnonzero(np.abs(x - last) > WITHIN * step)
+    first = int(moving[-1]) + 2 if moving.size else x.size
+    if first > x.size - period or np.mean(np.diff(x[first:]) == 0.0) < REPEATED:
         return recording, ""
     used = np.ones(x.size, dtype=bool) if recording.used is None else recording.used.copy()
     used[first:] = False

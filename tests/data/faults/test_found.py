@@ -309,3 +309,17 @@ def test_a_rest_behind_a_hum_is_found(paper: Campaign, rest: int) -> None:
     (notice,) = [f for f in find_faults(campaign) if f.action == "notice"]
     assert notice.id == "recording_hum" and "50.03 Hz" in notice.statement
     assert notice.size == pytest.approx(9e-5, rel=0.02)
+
+
+def test_a_swing_to_the_other_side_is_no_hand() -> None:
+    """Held on one side, let go: the first swing may read a little larger about a rest that is not
+    known yet.
+    """
+    t = np.arange(0.0, 40.0, 0.01)
+    free = 2.4 * np.exp(-0.02 * np.maximum(t - 1.0, 0.0)) * np.cos(3.2 * np.maximum(t - 1.0, 0.0))
+    samples = (
+        free + 0.15 * np.exp(-0.1 * t) + 1e-3 * np.random.default_rng(0).standard_normal(t.size)
+    )
+    fault = recording_faults(Recording("p", "", samples, 0.01, quantity="angle"))[0]
+    assert fault.id == "recording_start" and "at rest" in fault.statement
+    assert fault.end_s == pytest.approx(1.0, abs=0.12)
