@@ -37,7 +37,7 @@ SAME = 0.05  # nats; two climbs to one mode differ by less
 MOST_REFITS = 150
 # s of computing, ten minutes of two cores: no refit begins later; an answer that says so is worth
 # more than none. Not of the clock: what else a machine does must not change an answer.
-PATIENCE = 1200.0
+PATIENCE = 300.0
 
 Progress = Callable[[str], None]
 
