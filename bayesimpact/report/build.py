@@ -183,7 +183,7 @@ def recording_results(fit: Fit) -> tuple[RecordingResult, ...]:
                 input="" if recording.input is None else recording.input.kind,
                 predicted=np.asarray(predicted),
                 quantity=recording.quantity,
-                displacement=fit.displacements[r] if recording.order > 0 else np.zeros(0),
+                displacement=np.zeros(0) if recording.is_displacement else fit.displacements[r],
                 scale=float(likelihood.scales[r]),
                 sigma=float(fit.mode[likelihood.sigma_columns[r]] * likelihood.scales[r]),
                 noise_rms=_noise_rms(likelihood.noise, recording.interval) * likelihood.scales[r],
