@@ -65,6 +65,11 @@ class Input:
         self.__dict__.update(state)
         self.__post_init__()  # unpickled arrays can be written
 
+    @property
+    def label(self) -> str:
+        """Its kind and, where the motion in space is read, that."""
+        return self.kind + (", absolute" if self.absolute else "")
+
     def part(self, first: int, end: int) -> Input:
         """Samples first..end-1."""
         return replace(self, samples=self.samples[first:end])

@@ -180,7 +180,7 @@ def recording_results(fit: Fit) -> tuple[RecordingResult, ...]:
                 start=recording.start,
                 samples=np.asarray(recording.samples),
                 excluded=() if recording.used is None else tuple(runs(~recording.used)),
-                input="" if recording.input is None else recording.input.kind,
+                input="" if recording.input is None else recording.input.label,
                 predicted=np.asarray(predicted),
                 quantity=recording.quantity,
                 displacement=np.zeros(0) if recording.is_displacement else fit.displacements[r],

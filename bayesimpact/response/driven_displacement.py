@@ -30,6 +30,7 @@ Floats = NDArray[np.float64]
 CORNER = (0.0, 0.15, 0.3)  # of the natural frequency: slower than that is trend, per order
 BLOCKS = 30  # per radian of it, so that the smoother stays well conditioned at any sampling rate
 WIDTH, ROUNDS = 0.6, 3  # half width of the bumps for a first guess, natural periods
+SMALL = 0.4  # quantile of a force that is the spring's alone
 SETTLED = 0.01  # relative change in a round
 SLOPE = 1 / 16  # of a period: half of the window in which a velocity is differentiated
 
@@ -44,6 +45,7 @@ class Guess:
     gain : of the input
     gap, k2 : of the stop, m and N/m; where k2 is 0 and the gap finite there is a stop of which
         nothing is known yet
+    both : there is a stop on either side
     """
 
     mass: float
@@ -51,6 +53,7 @@ class Guess:
     gain: float
     gap: float = np.inf
     k2: float = 0.0
+    both: bool = False
 
     def settled(self, before: Guess) -> bool:
         """True where a round has changed little."""
@@ -99,17 +102,17 @@ def without_base(recording: Recording, gain: float) -> Recording:
     return replace(recording, samples=samples, input=replace(given, absolute=False))
 
 
-def seen_displacement(recording: Recording) -> Recording:
+def seen_displacement(recording: Recording, *, both: bool = False) -> Recording:
     """The displacement from the recording alone, whatever mass and gain of its input are.
 
-    Of a free decay by its own anchors, see `displacement`.
+    Of a free decay by its own anchors, see `displacement`. `both` says that there are two stops.
     """
     if recording.is_displacement:
         return recording
     if recording.input is None:
         quantity: Quantity = "angle" if recording.angular else "displacement"
         return replace(recording, samples=displacement_of(recording).samples, quantity=quantity)
-    guess = first_guess([recording], 1.0, stop=True, free=True)
+    guess = replace(first_guess([recording], 1.0, stop=True, free=True), both=both)
     return displacement_under(recording, guess, float(recording.samples.mean()))
 
 
@@ -146,6 +149,8 @@ def _place(recording: Recording, moving: Floats, guess: Guess) -> tuple[Floats, 
     place = force / guess.k1
     if not np.isfinite(guess.gap):
         return place, np.ones(place.size)
+    if guess.both:  # where the force is small, no stop has a part in it
+        return place, np.where(np.abs(place) < np.quantile(np.abs(place), SMALL), 1.0, 0.0)
     if guess.k2 == 0.0:  # on the side away from the stop it is the spring's alone
         return place, np.where(place < 0.0, 1.0, 0.0)
     touching = (force + guess.k2 * guess.gap) / (guess.k1 + guess.k2)
