@@ -235,17 +235,22 @@ def run_driven(
     y, v = q[Y0], q[V0] * interval
     total, count = 0.0, 0
     offset, order, rate = q[OFFSET], sink.order, sink.rate
+    compared, written = data.size > 0, out.size > 0
     for i in range(n):
-        flow, level = (touching, hold) if contact else (free, 0.0)
-        read = reading_driven(order, rate, flow.beta, flow.K, y, v, gain * wave.shown[i] + level)
-        read += offset + q[A] * wave.carried[i]
-        if data.size > 0:
-            residual = data[i] - read
-            total += residual * residual
-        elif out.size > 0:
-            out[i] = read
-            if speeds.size > 0:
-                speeds[i] = v
+        if compared or written:
+            beta, K, level = free.beta, free.K, 0.0
+            if contact:
+                beta, K, level = touching.beta, touching.K, hold
+            pushed = gain * wave.shown[i] + level
+            read = reading_driven(order, rate, beta, K, y, v, pushed)
+            read += offset + q[A] * wave.carried[i]
+            if compared:
+                residual = data[i] - read
+                total += residual * residual
+            else:
+                out[i] = read
+                if speeds.size > 0:
+                    speeds[i] = v
         if i == n - 1:
             break
         p = gain * held[i]

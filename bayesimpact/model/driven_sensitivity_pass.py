@@ -84,21 +84,25 @@ def carry_driven(
 
 @inner(forceinline=True, fastmath={"contract"})
 def fill_row(
-    row: Floats, order: int, rate: float, flow: Responses, slopes: Floats, side: int, y: float,
-    v: float, dy: Floats, dv: Floats,
+    row: Floats, order: int, rate: float, beta: float, K: float, slopes: Floats, side: int,
+    y: float, v: float, dy: Floats, dv: Floats, gain: Floats, at_once: float,
 ) -> None:  # fmt: skip
-    """Fill `row` (12,) with the derivatives of y, y' or y'' but for what the input adds at once."""
+    """Fill `row` (12,) with the derivatives of y, y' or y''.
+
+    at_once : what the input adds to the reading itself, per unit of its gain; `gain` (COLUMNS,) is
+        1.0 in its place. (One number stored alone would halt the products of the row after it.)
+    """
     if order == 0:
         for k in range(COLUMNS):
-            row[k] = dy[k]
+            row[k] = dy[k] + at_once * gain[k]
     elif order == 1:
         for k in range(COLUMNS):
-            row[k] = rate * dv[k]
+            row[k] = rate * dv[k] + at_once * gain[k]
     else:
         square = rate * rate
         for k in range(COLUMNS):
             changed = slopes[side, 2, k] - slopes[side, 0, k] * v - slopes[side, 1, k] * y
-            row[k] = square * (changed - flow.beta * dv[k] - flow.K * dy[k])
+            row[k] = square * (changed - beta * dv[k] - K * dy[k]) + at_once * gain[k]
 
 
 @inner()
@@ -141,6 +145,8 @@ def driven_sensitivity_pass(
     dy, dv, slopes = np.zeros(COLUMNS), np.zeros(COLUMNS), np.empty((2, 3, COLUMNS))
     for k in range(COLUMNS):
         wanted[k] = 1.0 if columns[k] >= 0 else 0.0
+    gain = np.zeros(COLUMNS)
+    gain[A] = wanted[A]
     row[OFFSET] = 1.0 if columns[OFFSET] >= 0 else 0.0
     fill_sensitivities(slopes, wanted, q, mass, interval)
     dy[Y0], dv[V0] = wanted[Y0], interval * wanted[V0]
@@ -149,13 +155,14 @@ def driven_sensitivity_pass(
     y, v, e = q[Y0], q[V0] * interval, typed(0)
     held, rate = wave.held, 1.0 / interval
     for i in range(held.size):
-        flow, side, level = (touching, 1, hold) if contact else (free, 0, 0.0)
-        fill_row(row, order, rate, flow, slopes, side, y, v, dy, dv)
-        # of an acceleration the input is a part, and a probe may move with the base
+        side, level, beta, K = 0, 0.0, free.beta, free.K
+        if contact:
+            side, level, beta, K = 1, hold, touching.beta, touching.K
+        # of an acceleration the input is a part, and a probe may see the base move
         pushed = per_mass * wave.shown[i]
         at_once = wave.carried[i] + (rate * rate * pushed if order == 2 else 0.0)
-        row[A] += at_once * wanted[A]
-        read = reading_driven(order, rate, flow.beta, flow.K, y, v, q[A] * pushed + level)
+        fill_row(row, order, rate, beta, K, slopes, side, y, v, dy, dv, gain, at_once)
+        read = reading_driven(order, rate, beta, K, y, v, q[A] * pushed + level)
         read += q[OFFSET] + q[A] * wave.carried[i]
         record(i, read, row, data, values, jacobian, gram)
         if i == held.size - 1:
