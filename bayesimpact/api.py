@@ -143,8 +143,8 @@ def summary(found: Identification | Posterior | Results | Diagnosis) -> DataFram
     """
     import pandas
 
+    from bayesimpact.model.units import readable
     from bayesimpact.report.results import Results
-    from bayesimpact.report.units import readable
 
     wider = found.intervals if isinstance(found, Diagnosis) else None
     if isinstance(found, Diagnosis):

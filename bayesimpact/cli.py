@@ -219,10 +219,10 @@ def diagnose(
     effects = catalogue_with(own or ())
     command = f"bayesimpact diagnose {campaign} --out {out} --seed {seed}"
     command += f" --effects {own}" if own else ""
-    again = command + " --quick" * quick + f" --certify {certify}" * bool(certify)
+    command += " --quick" * quick + f" --certify {certify}" * bool(certify)
     outcome = diagnose_campaign(
         loaded,
-        made_folder(out, again + " --resume" * (not quick)),
+        made_folder(out, command + " --resume" * (not quick)),
         seed=seed,
         quick=quick,
         certify=certify,

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 import small_rig
 from coarse_figures import draw_coarsely
 
+from bayesimpact.cli import main
 from bayesimpact.inference.identify import Identification, identify
 
 
@@ -14,6 +17,19 @@ from bayesimpact.inference.identify import Identification, identify
 def small() -> Identification:
     """The small rig, with nothing missing, and its fit."""
     return identify(small_rig.record(1), rng=np.random.default_rng(0), search=False)
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+    """Run a command in this process: exit code, standard output, standard error."""
+
+    def run(*arguments: object) -> tuple[int, str, str]:
+        with pytest.raises(SystemExit) as ended:
+            main([str(a) for a in arguments])
+        captured = capsys.readouterr()
+        return int(ended.value.code or 0), captured.out, captured.err
+
+    return run
 
 
 @pytest.fixture

@@ -12,7 +12,6 @@ import pytest
 from small_rig import record
 
 import bayesimpact as bi
-from bayesimpact.cli import main
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.inference.identify import Identification
@@ -22,17 +21,6 @@ from bayesimpact.report.figures.save import Drawn
 
 Run = Callable[..., tuple[int, str, str]]
 FEW = tuple(e for e in EFFECTS if e.id in ("spring_cubic", "spring_quintic", "quadratic_drag"))
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Run:
-    def run(*arguments: object) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as ended:
-            main([str(a) for a in arguments])
-        captured = capsys.readouterr()
-        return int(ended.value.code or 0), captured.out, captured.err
-
-    return run
 
 
 def contents(folder: Path) -> dict[Path, bytes]:

@@ -22,7 +22,7 @@ from bayesimpact.errors import InputError
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-SHORT = 0.3  # of a period: up to here a cubic bridges a gap
+BRIDGED = 0.3  # of a period: up to here a cubic bridges a gap
 PERIODS = 3.0  # that have to come before a long gap to tell what a recording does
 NEAR = 6  # samples on either side that tell its ends
 LEAST = 0.2  # of a recording's samples that have to be left
@@ -68,7 +68,7 @@ def before_gap(recording: Recording) -> Recording:
     used, samples = recording.used, recording.samples
     period = _period(samples, used) or np.inf
     for first, end in runs(~used):
-        if first > 0 and end - first > max(SHORT * period, 2.0):
+        if first > 0 and end - first > max(BRIDGED * period, 2.0):
             return recording.part(0, first) if first >= PERIODS * period else recording
     return recording
 
@@ -136,7 +136,7 @@ def bridged(samples: Array, used: Mask) -> Array:
     for first, end in runs(~used):
         if first == 0 or end == samples.size:
             continue
-        if period is None or end - first <= max(SHORT * period, 2.0):
+        if period is None or end - first <= max(BRIDGED * period, 2.0):
             filled[first:end] = _cubic(samples, good, first, end)
         else:
             filled[first:end] = _repeated(filled, first, end, period)

@@ -24,7 +24,7 @@ UNIFORM = pi / sqrt(3.0)
 """Standard deviation of a phase of which nothing is known."""
 STEP = 0.05
 """Difference steps, in standard deviations of the posterior: as in fits of added effects. Along a
-valley that is too much: no step moves a recording by more than about its noise, once in all.
+ridge that is too much: no step moves a recording by more than about its noise, once in all.
 """
 
 

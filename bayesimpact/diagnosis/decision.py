@@ -17,7 +17,9 @@ Let S be the likeliest set of effects that the search reached.
      residual force by these odds (as in 1), and
    - no other effect in its place, with such a force beside, comes within these odds of that, or
      above it where it has more parameters: what remains may be what tells two laws apart.
-   A search that ended by its limit must have fitted all of these.
+   A search that ended by its limit must have fitted all of these. And
+   - its size is apart from none at all by `APART` of its own standard deviations, with what the
+     remainder may have done to it in them (`discrepancy`).
    With needed effects the verdict is `partly`, without any it is `unknown`. Other effects of S stay
    in the fitted model, but are not named.
 
@@ -34,7 +36,7 @@ import numpy as np
 
 from bayesimpact.diagnosis.naming import Naming, State
 from bayesimpact.diagnosis.refit import Candidate
-from bayesimpact.diagnosis.thresholds import DECISIVE, DOUBT, EXCESS
+from bayesimpact.diagnosis.thresholds import APART, DECISIVE, DOUBT, EXCESS
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect
 
@@ -83,6 +85,8 @@ def decide(naming: Naming) -> Decision:
 def is_needed(naming: Naming, effect: Effect) -> bool:
     """Whether every likely hypothesis has an effect of the chosen model, although more remains."""
     if not (may_be_needed(naming, effect) and stands_out(naming, effect)):
+        return False
+    if naming.left is not None and naming.left.apart(effect) < APART:
         return False
     chosen = frozenset(naming.chosen.candidate.ids)
     if not (naming.finished or is_compared(naming, effect)):

@@ -22,7 +22,14 @@ from bayesimpact.diagnosis.size import size, size_in_words, yardstick
 from bayesimpact.diagnosis.smoothing import filter_parameters, filter_words
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.diagnosis.whiteness import whiteness_p
-from bayesimpact.diagnosis.words import failure, parameter_shifts, remaining, statement, summary
+from bayesimpact.diagnosis.words import (
+    failure,
+    left_open,
+    parameter_shifts,
+    remaining,
+    statement,
+    summary,
+)
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect
 from bayesimpact.model.parameters import bare_name, is_added, unit_for
@@ -57,7 +64,8 @@ def document(
     left = remainder(d.naming, d.after, d.remains)
     before = _parameters(d.before, intervals(d.before), draws_before)
     after = _parameters(d.after, d.intervals, draws_after if d.remains is None else None)
-    statements = tuple(_statement(d, e) for e in d.effects)
+    told = {} if d.remains is None else after
+    statements = tuple(_statement(d, e) + left_open(e, told) for e in d.effects)
     faulty = d.corrected.faults if d.corrected else ()
     alternatives = tuple(" + ".join(c.ids) or "nothing at all" for c in d.alternatives)
     return {

@@ -1,11 +1,9 @@
-"""Intervals of the parameters, with what stays unexplained carried into them.
+"""Intervals of a model's parameters, with what stays unexplained carried into them.
 
 Where a model leaves nothing, its posterior is near normal about the mode. Where something remains,
-a discrepancy is part of every hypothesis: a residual force with a posterior of its own (`force`),
-and noise of whatever colour the residual has. Had the force been modelled, the parameters would
-have moved by what they now absorb of it: a shift and an extra covariance, both closed forms in the
-linearised problem. Where the misfit is large, that problem gives the size of the shift but not its
-direction, and the shift is counted as uncertainty.
+a force of time is part of what the recordings are (`discrepancy`): it scatters the mode as noise
+does, and the part of it that a parameter can imitate, which no remainder shows, is as large as
+the part that remains (`hidden`). Medians stay at the mode, whose motion the figures show.
 """
 
 from __future__ import annotations
@@ -16,11 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from bayesimpact.diagnosis.directions import sigma_of
-from bayesimpact.diagnosis.naming import State, is_large
+from bayesimpact.diagnosis.discrepancy import discrepancy
 from bayesimpact.inference.fit import Fit
-
-LAGS_PER_ROOT = 3.0  # lags of the long-run covariance, times the root of the number of samples
 
 Array = NDArray[np.float64]
 
@@ -60,44 +55,10 @@ class Intervals:
         return found[0], found[1], found[2]
 
 
-def intervals(fit: Fit, state: State | None = None) -> Intervals:
-    """Intervals of a fit; `state` is the model whose remainder was examined, where one remains.
-
-    A fit that has the residual force among its effects carries it along already.
-    """
-    if state is None:
-        return _cut(fit, fit.mode, fit.covariance)
-    if fit is not state.candidate.fit:
-        return _cut(fit, fit.mode, sandwich(fit))
-    force = state.unknown
-    absorbed, spread = force.projection.absorbed, force.covariance
-    mean = fit.mode
-    if is_large(fit):
-        spread = spread + np.outer(force.mean, force.mean)
-    else:
-        mean = mean - absorbed @ force.mean
-    return _cut(fit, mean, sandwich(fit) + absorbed @ spread @ absorbed.T)
-
-
-def _cut(fit: Fit, mean: Array, covariance: Array) -> Intervals:
+def intervals(fit: Fit, *, remains: bool = False) -> Intervals:
+    """Intervals of a fit; `remains`: something beside the noise is left."""
+    mean, covariance = fit.mode, fit.covariance
+    if remains:
+        mean, covariance = discrepancy(fit).posterior
     bounds = np.array([(p.lower, p.upper) for p in fit.target.oscillator.layout.parameters])
     return Intervals(fit.names, mean, covariance, bounds[:, 0], bounds[:, 1])
-
-
-def sandwich(fit: Fit) -> Array:
-    """Covariance (d, d) of the mode under residuals of any colour, Bartlett weights over one
-    period (Huber 1967; Newey and West 1987).
-    """
-    middle = np.zeros((fit.mode.size, fit.mode.size))
-    sigma = sigma_of(fit)
-    for part, level in zip(fit.linearisation, sigma, strict=True):
-        scores = part.jacobian * part.residual[:, None] / level**2
-        where = np.ix_(part.columns, part.columns)
-        middle[where] += scores.T @ scores
-        lags = int(LAGS_PER_ROOT * np.sqrt(scores.shape[0]))
-        for lag in range(1, min(lags, scores.shape[0] - 1)):
-            cross = scores[:-lag].T @ scores[lag:]
-            middle[where] += (1 - lag / lags) * (cross + cross.T)
-    found = fit.covariance @ middle @ fit.covariance
-    wider = np.sqrt(np.maximum(np.diag(found) / np.diag(fit.covariance), 1.0))
-    return np.asarray(fit.covariance * np.outer(wider, wider))

@@ -148,7 +148,7 @@ def diagnose_fit(
         held,
         cases,
         limits(chosen.candidate.fit, chosen.scan, scales),
-        intervals(after, state),
+        intervals(after, remains=state is not None),
         state,
         scales,
         formulas=answer.formulas,
@@ -160,23 +160,24 @@ def extension(
 ) -> tuple[Fit, State | None]:
     """The fit that a verdict stands for, never worse than the base fit, and what it leaves.
 
-    Where something remains, a residual force beside the effects, or in the place of all, is taken
-    when it makes the model likelier.
+    Named effects are shown as the catalogue's model has them: beside a residual force, which may
+    take their place, their sizes mean nothing. Where nothing is named, the model that explains
+    most; with a residual force only where the misfit is small.
     """
     base, chosen = naming.base, naming.chosen
     if decision.verdict in ("adequate", "named", "ambiguous"):
         return chosen.candidate.fit, None
-    choices = [(chosen.candidate, chosen), (base.candidate, base)]
-    choices += [
-        (c, chosen) for ids, c in naming.residual.items() if ids == set(chosen.candidate.ids)
-    ]
-    if decision.verdict == "unknown" and not is_large(base.candidate.fit):
+    least = base.candidate.fit.reduced_chi2
+    if decision.verdict == "partly" and chosen.candidate.fit.reduced_chi2 <= least:
+        return chosen.candidate.fit, chosen
+    choices = [(c, naming.states.get(frozenset(c.ids), chosen)) for c in naming.tried]
+    if not is_large(base.candidate.fit):
+        choices += [(c, chosen) for c in naming.residual.values()]
         learned = naming.residual.get(frozenset())
         if learned is None or naming.unknown is not base.unknown:  # a force in contact alone
             say("learning the force")
             learned = with_force(base.candidate, naming.unknown, scales)
         choices.append((learned, base))
-    least = base.candidate.fit.reduced_chi2
     choices = [(c, s) for c, s in choices if c.fit.reduced_chi2 <= least]
-    candidate, state = max(choices, key=lambda choice: naming.log_odds(choice[0]))
+    candidate, state = max(choices, key=lambda choice: naming.promise(choice[0]))
     return candidate.fit, state

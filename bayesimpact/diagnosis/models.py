@@ -27,11 +27,14 @@ from bayesimpact.model.effects.effect import Effect, Scales
 
 STARTS = 2  # points of an effect's shape grid from which it is fitted
 ASKED = 4  # effects of the equation of motion that are tried beside a model with a large misfit
-SHORT = 60.0  # by how much a climb that gave up may have fallen short, nats
+# Nats by which a fit that ended unconverged may lie below its mode. Set by hand and generous: too
+# large a value finishes more fits, which costs seconds; too small a one loses a model.
+UNCONVERGED_SHORTFALL = 60.0
 MORE = 2.0  # nats by which a score must promise more than a model has reached to fit it again
 SAME = 0.05  # nats; two climbs to one mode differ by less
 
-BUDGET = 150  # refits
+# Set by hand: a diagnosis of the bundled campaign begins some 25, a large misfit up to this many.
+MOST_REFITS = 150
 # s of computing, ten minutes of two cores: no refit begins later; an answer that says so is worth
 # more than none. Not of the clock: what else a machine does must not change an answer.
 PATIENCE = 1200.0
@@ -75,7 +78,7 @@ class Models:
     def examine(self, candidate: Candidate) -> State:
         """Whether anything is missing from a candidate.
 
-        One whose climb gave up on a ridge, and may lack no more than its rest, is finished first.
+        One whose fit ended on a ridge, and may lack no more than its rest, is finished first.
         """
         candidate = self.keep(candidate)
         held = self.states.get(frozenset(candidate.ids))
@@ -87,8 +90,9 @@ class Models:
         drift = missing_drift(candidate.fit, self.scales, rng=self.rng)
         state = State(candidate, found, force, drift)
         self.states[frozenset(candidate.ids)] = state
-        gave_up = candidate.effects and not candidate.fit.converged
-        if gave_up and state.unknown.log_evidence < SHORT:  # else more is missing than that
+        unconverged = candidate.effects and not candidate.fit.converged
+        # else more is missing than an unfinished fit explains
+        if unconverged and state.unknown.log_evidence < UNCONVERGED_SHORTFALL:
             return self.examine(self.finished(candidate))
         return state
 
@@ -170,7 +174,7 @@ class Models:
 
     def may_go_on(self) -> bool:
         """Whether the budget allows for more refits."""
-        return self.refits < BUDGET and self.clock() < self.end
+        return self.refits < MOST_REFITS and self.clock() < self.end
 
     def tell(self, words: str) -> None:
         """Count a refit, and say which."""
@@ -178,7 +182,7 @@ class Models:
         self.progress(Refit(words, self.refits))
 
     def is_known(self, key: frozenset[str]) -> bool:
-        """Whether a model has its mode; a climb that gave up may do better from elsewhere."""
+        """Whether a model has its mode; an unconverged fit may do better from elsewhere."""
         return key in self.tried and self.tried[key].fit.converged
 
     def drop(self, candidate: Candidate, effect: Effect) -> Candidate:

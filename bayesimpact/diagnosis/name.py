@@ -15,9 +15,10 @@ from dataclasses import replace
 import numpy as np
 
 from bayesimpact.diagnosis.decision import in_its_place, may_be_needed, ordered
+from bayesimpact.diagnosis.discrepancy import discrepancy
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.force import missing_contact
-from bayesimpact.diagnosis.models import SHORT, STARTS, Models, Progress
+from bayesimpact.diagnosis.models import STARTS, UNCONVERGED_SHORTFALL, Models, Progress
 from bayesimpact.diagnosis.naming import Naming, State, is_large
 from bayesimpact.diagnosis.pairs import promising_pairs
 from bayesimpact.diagnosis.promising import (
@@ -44,8 +45,12 @@ from bayesimpact.model.effects.effect import Effect, Scales
 
 MOST_EFFECTS = 3
 MOST_LARGE = 5  # where the base misfit is large: several strong effects act at once
-MANY = 3  # effects from which on they may imitate a single force
-LOST = 30.0  # by how much an effect alone must fall behind the base model to be given up, nats
+# Effects from which on a single force in contact is fitted in their place: three sizes can follow
+# the shape of one law, which one or two seldom do.
+IMITATING_EFFECTS = 3
+# Nats by which an effect alone must fall behind the base model to be given up: more than five times
+# `DECISIVE`, for beside others it may still be right, and trying it costs one refit.
+CONTRADICTED = 30.0
 BEAM = 3  # models that are extended while the best one is not white
 PAIRS = 4  # refitted at the first step
 EXCHANGES = 3  # rounds of leaving out and exchanging effects
@@ -70,8 +75,8 @@ def name(
     are left out afterwards, and each that stays is exchanged for every other that might do what it
     does.
 
-    A search that has begun `BUDGET` refits or taken `PATIENCE` seconds by the `clock` begins no
-    more, and names nothing that it has not compared with all that might do the same.
+    A search that has begun `MOST_REFITS` refits or taken `PATIENCE` seconds by the `clock` begins
+    no more, and names nothing that it has not compared with all that might do the same.
     """
     search = _Search(effects, scales, rng, progress or (lambda message: None), clock)
     state = base = search.examine(base_candidate(fit))
@@ -195,7 +200,7 @@ class _Search(Models):
             return True
         return (
             self.log_odds(state.candidate) > self.force_gain()
-            and state.unknown.log_evidence < SHORT
+            and state.unknown.log_evidence < UNCONVERGED_SHORTFALL
         )
 
     def refit_candidates(self, scan: Scan, least: float = 0.0) -> list[Score]:
@@ -211,7 +216,7 @@ class _Search(Models):
         if alone is None or alone.log_evidence == -np.inf:
             return False
         lost = self.log_odds(base.candidate) - self.log_odds(alone)
-        return lost > max(LOST, base.unknown.log_evidence)
+        return lost > max(CONTRADICTED, base.unknown.log_evidence)
 
     def promise(self, candidate: Candidate) -> float:
         """What a model is worth on the way: every sample counts, for what remains may yet be
@@ -245,7 +250,7 @@ class _Search(Models):
         chosen = state.candidate
         if self.is_large or len(chosen.effects) < 2:
             return state
-        if self.force_gain() > self.log_odds(chosen) + SHORT:
+        if self.force_gain() > self.log_odds(chosen) + UNCONVERGED_SHORTFALL:
             return state
         for effect in chosen.effects:
             if any(p.is_shape and not p.circular for p in effect.parameters):
@@ -291,15 +296,15 @@ class _Search(Models):
         return self.ranked([c for c in self.tried.values() if len(c.effects) <= size])[0]
 
     def ranked(self, candidates: Sequence[Candidate]) -> list[Candidate]:
-        """Models, likeliest first. A climb that gave up decides nothing near the best one.
+        """Models, likeliest first. An unconverged fit decides nothing near the best one.
 
         Unless a free force wins anyhow, or the misfit is large: then the next step repairs it.
         """
         best = max((self.log_odds(c) for c in candidates), default=0.0)
         models = {frozenset(c.ids): c for c in candidates}
-        if self.is_large or self.force_gain() > best + SHORT:
+        if self.is_large or self.force_gain() > best + UNCONVERGED_SHORTFALL:
             best = np.inf
-        near = [key for key, c in models.items() if self.log_odds(c) > best - SHORT]
+        near = [key for key, c in models.items() if self.log_odds(c) > best - UNCONVERGED_SHORTFALL]
         for key in near:
             if len(near) > 1 and not models[key].fit.converged:
                 models[key] = self.finished(models[key])
@@ -345,7 +350,7 @@ class _Search(Models):
                 chosen = self.examine(best)
         contact = missing_contact(base.candidate.fit, self.scales, rng=self.rng)
         odds = -np.inf
-        many = len(chosen.candidate.effects) >= MANY and not self.is_large
+        many = len(chosen.candidate.effects) >= IMITATING_EFFECTS and not self.is_large
         if contact is not None and many:
             replaced = " + ".join(chosen.candidate.ids)
             self.progress(f"fitting a force in contact in place of {replaced}")
@@ -360,6 +365,7 @@ class _Search(Models):
     def with_residuals(self, found: Naming) -> Naming:
         """What `decide` compares where something remains: models with a residual force."""
         chosen = found.chosen.candidate
+        found = replace(found, left=discrepancy(chosen.fit))
         smaller = {e.id: self.drop(chosen, e) for e in chosen.effects}
         for part in smaller.values():
             self.examine(part)

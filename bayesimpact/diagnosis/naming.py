@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from bayesimpact.diagnosis.discrepancy import Discrepancy
 from bayesimpact.diagnosis.force import MissingForce
 from bayesimpact.diagnosis.refit import Candidate, tempered_evidence
 from bayesimpact.diagnosis.scan import Scan
@@ -74,6 +75,7 @@ class Naming:
     residual : models with a residual force beside their effects, fitted in full, by the ids of
         these effects; where something remains beside the chosen model
     finished : False when the budget ended the search
+    left : what the chosen model leaves, as a force of time; None where that is noise
     """
 
     base: State
@@ -86,6 +88,7 @@ class Naming:
     states: Mapping[frozenset[str], State] = field(default_factory=dict)
     residual: Mapping[frozenset[str], Candidate] = field(default_factory=dict)
     finished: bool = True
+    left: Discrepancy | None = None
 
     @property
     def unknown(self) -> MissingForce:
@@ -100,6 +103,10 @@ class Naming:
             - tempered_evidence(self.base.candidate, self.repetition)
             - self.prior_cost * len(candidate.effects)
         )
+
+    def promise(self, candidate: Candidate) -> float:
+        """Log posterior odds with every sample counted, up to a constant: how much is explained."""
+        return candidate.log_evidence - self.prior_cost * len(candidate.effects)
 
     def rivals(self) -> tuple[Candidate, ...]:
         """Models that lack a chosen effect and come within the decisive odds.

@@ -14,6 +14,7 @@ from bayesimpact.model.effects.effect import Effect
 Array = NDArray[np.float64]
 
 OWN_BAND = 0.1  # of the spectrum's peak
+SLOWEST = 3.0  # periods in the longest recording: scans begin at five, refits may wander
 
 
 def shakes_in_own_band(fit: Fit, remains: bool) -> bool:
@@ -22,8 +23,12 @@ def shakes_in_own_band(fit: Fit, remains: bool) -> bool:
     There a decaying motion and a steady one differ only by phase, and the steady one passes for any
     slow change of frequency or damping: over the whole band where something `remains`. A force,
     which has a motion of its own to begin with, passes for one always where the recordings are too
-    short to tell both frequencies apart.
+    short to tell both frequencies apart. A line too slow for any recording to show it come and go
+    passes for a drift.
     """
+    longest = max(r.duration for r in fit.target.oscillator.campaign.recordings)
+    if any(frequency * longest < SLOWEST for _, frequency in _lines(fit)):
+        return True
     return any(
         _moves_at(recording, frequency)
         if remains

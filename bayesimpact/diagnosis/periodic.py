@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 
 RESPONSE_REACH = 2.0  # forcing is looked for up to so many times the natural frequency in contact,
 FLIGHT_REACH = 4.0  # or in free flight
-HUM_PERIODS = 5.0  # in the longest recording, at least: slower ones pass for a drift
+LINE_PERIODS = 5.0  # in the longest recording, at least: slower ones pass for a drift
 NEAR_RESONANCE = (
     2.0  # times the natural frequency: below, the parameters may absorb nearly all of a hum
 )
@@ -66,8 +66,7 @@ def frequencies(fit: Fit, effect: Effect, scales: Scales) -> Array:
         stiffest = (scales.stiffness + scales.contact_stiffness) / scales.mass
         contact = RESPONSE_REACH * np.sqrt(stiffest) / (2 * np.pi)
         highest = min(0.9 * highest, max(contact, FLIGHT_REACH * scales.natural_frequency))
-        return np.arange(2 * spacing, highest, spacing)
-    return np.arange(HUM_PERIODS / scales.duration, highest, spacing)
+    return np.arange(LINE_PERIODS / scales.duration, highest, spacing)
 
 
 def highest_known(fit: Fit) -> float:

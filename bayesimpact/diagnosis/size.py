@@ -12,32 +12,18 @@ from bayesimpact.diagnosis.force import trajectory_points
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Law, Numbers, Scales, Size
 from bayesimpact.model.parameters import SLOTS, instance_name, unit_for
+from bayesimpact.model.units import two_digits
 
 Array = NDArray[np.float64]
 _GAP = SLOTS.index("g")
 IN_CONTACT = ("contact", "entry", "exit")
 _SHARE = re.compile(r"\{share\} of ([^).]+)")  # in an effect's statement
-_SMALLER = (("mm", 1e-3), ("µm", 1e-6), ("nm", 1e-9))
 
 
 def size_in_words(effect: Effect, before: Fit, after: Fit, scales: Scales) -> tuple[str, float]:
     """Size of an effect as text, and relative to what it should be held against."""
     value, unit, share = size(effect, before, after, scales)
-    return amount(value, unit_for(after.target.oscillator.campaign, effect, unit)), share
-
-
-def amount(value: float, unit: str) -> str:
-    """Two digits, and a length in a unit that suits it."""
-    if unit == "m":
-        for name, factor in _SMALLER:
-            if value >= factor:
-                return f"{two_digits(value / factor)} {name}"
-    return f"{two_digits(value)} {unit}"
-
-
-def two_digits(value: float) -> str:
-    """Two digits without an exponent."""
-    return f"{float(f'{value:.2g}'):g}"  # 430, not 4.3e+02
+    return two_digits(value, unit_for(after.target.oscillator.campaign, effect, unit)), share
 
 
 def size(effect: Effect, before: Fit, after: Fit, scales: Scales) -> Size:
@@ -68,9 +54,9 @@ def _values(fit: Fit) -> Mapping[str, float]:
 
 
 def yardstick(effect: Effect) -> str:
-    """What the share of an effect's size refers to, in words: its own, where it defines a size."""
-    if effect.size is not None:
-        told = _SHARE.search(effect.statement)
+    """What the share of an effect's size refers to, in the words of its own sentence."""
+    told = _SHARE.search(effect.statement)
+    if told or effect.size is not None:
         return told[1] if told else ""
     if effect.law is None:
         return "the amplitude"

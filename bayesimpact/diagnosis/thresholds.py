@@ -29,6 +29,11 @@ something remains. An effect that only imitates physics outside the catalogue, w
 cosine of 0.87 or less, leaves more than a quarter of it. Not calibrated on trials yet.
 """
 
+APART = 2.576
+"""Standard deviations of an effect's size from none at all, where something remains: its two-sided
+99 % interval holds no such effect, and so does no reported one.
+"""
+
 DOUBT = 3.0
 """Standard errors of the noise level: a misfit below is within what the level is uncertain by."""
 

@@ -10,14 +10,21 @@ from bayesimpact.diagnosis.extend import difference_steps, extend, transfer
 from bayesimpact.diagnosis.force import MissingForce, refinement
 from bayesimpact.diagnosis.learned import LEARNED, knots_of, refined_force
 from bayesimpact.diagnosis.naming import leaves_something
-from bayesimpact.diagnosis.refit import ITERATIONS, TOLERANCE, Candidate, best_start
-from bayesimpact.inference.fit import Fit
+from bayesimpact.diagnosis.refit import (
+    ITERATIONS,
+    TOLERANCE,
+    Candidate,
+    best_start,
+    residual_repetition,
+)
+from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.model.effects.effect import Effect, Scales
 
 Array = NDArray[np.float64]
 
 INTERVALS = (3, 7, 21, 42)  # between the knots; each divides a finer one
+LITTLE = 0.1  # nats of odds: a climb that gains less by a step decides nothing
 
 
 def learn_force(fit: Fit, force: MissingForce, scales: Scales) -> Fit:
@@ -39,8 +46,15 @@ def learn_force(fit: Fit, force: MissingForce, scales: Scales) -> Fit:
     floor = 1e-9 * np.repeat([scales.force, scales.force / scales.speed], force.knots)
     sizes = dict(zip(coefficient_names(force.knots), np.maximum(sd, floor), strict=True))
     steps = difference_steps(fit, target, sizes)
-    start = best_start(target, unshifted, start, steps)
-    return find_mode(target, start, steps=steps, tolerance=TOLERANCE, max_iterations=ITERATIONS)
+    return _climbed(target, best_start(target, unshifted, start, steps), steps, fit)
+
+
+def _climbed(target: Target, start: Array, steps: Array, before: Fit) -> Fit:
+    """The mode as near as odds ask for, which count each repeated sample of a residual once."""
+    return find_mode(
+        target, start, steps=steps, tolerance=TOLERANCE, max_iterations=ITERATIONS,
+        least_gain=LITTLE * residual_repetition(before),
+    )  # fmt: skip
 
 
 def with_force(candidate: Candidate, force: MissingForce, scales: Scales) -> Candidate:
@@ -83,8 +97,7 @@ def _refined(before: Fit, found: Fit, factor: int, scales: Scales) -> Fit:
     values[:, 1] = np.repeat(np.median(own[:, :, 1], axis=1), more)
     known |= dict(zip(coefficient_names(more), values, strict=True))
     start, sd = np.array([known[name] for name in target.oscillator.layout.names]).T
-    steps = 0.05 * np.maximum(sd, 1e-12 * np.abs(start))
-    return find_mode(target, start, steps=steps, tolerance=TOLERANCE, max_iterations=ITERATIONS)
+    return _climbed(target, start, 0.05 * np.maximum(sd, 1e-12 * np.abs(start)), found)
 
 
 def coefficient_names(knots: int) -> tuple[str, ...]:

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from bayesimpact.diagnosis.faults.compare import base_failed
 from bayesimpact.diagnosis.locate import Location
 from bayesimpact.diagnosis.remainder import Remainder
-from bayesimpact.diagnosis.size import amount, two_digits
 from bayesimpact.inference.fit import Fit
+from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.effects.effect import Effect
+from bayesimpact.model.units import span_of, two_digits
 
 SHARED = ("k2", "k1", "c1", "c2", "g")
+OPEN = 0.5  # half-width of a 90 % interval over the median: more than 0.5 leaves a size open
+FOLD = 10.0  # a change of more than ten times the value is told as a multiple, not in per cent
 
 _REGIMES = {
     "free": "in the suspension, wherever the mass moves",
@@ -26,42 +30,97 @@ _REGIMES = {
 
 def statement(effect: Effect, size: str, share: float) -> str:
     """One sentence on an effect: what it is and how large."""
-    return effect.statement.format(size=size, share=f"{100 * share:.2g} %")
+    return effect.statement.format(size=size, share=f"{two_digits(100 * share)} %")
+
+
+def left_open(effect: Effect, values: Mapping[str, Mapping[str, Any]]) -> str:
+    """A sentence where the interval of an effect's size is wide beside it; else empty.
+
+    `values` are parameters with medians and intervals. The first of an effect is its size.
+    """
+    own = [v for name, v in values.items() if name.startswith(f"{effect.id}.")]
+    if not own:
+        return ""
+    (low, high), median, unit = own[0]["ci90"], own[0]["median"], own[0]["unit"]
+    if 0.5 * (high - low) <= OPEN * abs(median):
+        return ""
+    name = effect.parameters[0].name.replace("_", " ")
+    return f" What remains leaves that open: its {name} may be {_span((low, high), unit)}."
+
+
+@dataclass(frozen=True)
+class Shift:
+    """How adding physics changed a parameter: `share` of its value before, towards `after`.
+
+    Where the interval after is wide, `share` is that of its end next to the value before, and
+    `least` is true: the change is at least that.
+    """
+
+    share: float
+    least: bool = False
 
 
 def parameter_shifts(
     before: Mapping[str, Mapping[str, Any]], after: Mapping[str, Mapping[str, Any]]
-) -> dict[str, float]:
-    """By how much the base fit had shared parameters too high, as shares of their values after.
-
-    Those whose intervals overlap tell nothing and are left out.
-    """
+) -> dict[str, Shift]:
+    """Changes of shared parameters that their intervals prove; the others are left out."""
     shifts = {}
     for name, old in before.items():
         new = after.get(name)
-        if new is None or name.split("[")[0] not in SHARED or not new["median"]:
+        if new is None or name.split("[")[0] not in SHARED:
             continue
-        apart = old["ci90"][0] > new["ci90"][1] or old["ci90"][1] < new["ci90"][0]
-        if apart:
-            shifts[name] = float((old["median"] - new["median"]) / abs(new["median"]))
+        shift = parameter_shift(old, new)
+        if shift is not None:
+            shifts[name] = shift
     return shifts
+
+
+def parameter_shift(old: Mapping[str, Any], new: Mapping[str, Any]) -> Shift | None:
+    """Change of one parameter; None where its intervals before and after overlap."""
+    (low, high), start = new["ci90"], old["median"]
+    overlap = old["ci90"][0] <= high and old["ci90"][1] >= low
+    if not start or overlap or not excludes(new, start):
+        return None
+    near, far = sorted((low, high), key=lambda end: abs(end - start))
+    shares = [(value - start) / abs(start) for value in (new["median"], near, far)]
+    wide = abs(shares[2]) > 2 * abs(shares[1])  # two digits of the median would mean nothing
+    return Shift(shares[1], least=True) if wide else Shift(shares[0])
+
+
+def excludes(content: Mapping[str, Any], value: float) -> bool:
+    """True when a 90 % interval leaves a value out, on its wider side's width to either side.
+
+    An interval cut at a bound (a damping is not negative) leaves out what lies at the bound, though
+    nothing is likelier there.
+    """
+    (low, high), median = content["ci90"], content["median"]
+    return bool(abs(value - median) > max(high - median, median - low))
+
+
+def title_of(effect_id: str) -> str:
+    """What an effect of the catalogue is called; an id in words for others."""
+    known = {e.id: e.title for e in EFFECTS}
+    return known.get(effect_id, effect_id.replace("_", " "))
+
+
+def titles_of(ids: str) -> str:
+    """Titles for ids joined by " + "; words stay what they are."""
+    return " and ".join(title_of(i) for i in ids.split(" + "))
 
 
 def remaining(left: Remainder | None, unit: str = "m") -> str:
     """What is left, in a sentence; empty where nothing is. `unit` is that of the readings."""
     if left is None:
         return ""
-    place = _REGIMES[left.regime]
-    guess = left.guess.replace("_", " ")
-    size = "smaller than the noise"
+    size = "less than the noise"
     if left.rms > 0.0:
         size = (
-            f"{amount(left.rms, unit)} rms, {two_digits(100 * left.share)} % of the signal and "
-            f"{two_digits(left.over_noise)} times the noise with it"
+            f"{two_digits(left.rms, unit)} rms ({two_digits(100 * left.share)} % of the signal; "
+            f"the residual is {two_digits(left.over_noise)} times the noise)"
         )
+    guess = f"; likeliest: {titles_of(left.guess)}" if left.guess else ""
     return (
-        f" Something remains: {size}, {place}; the next guess is {guess}. "
-        "The intervals allow for it."
+        f" Unexplained remains {size}, {_REGIMES[left.regime]}{guess}. The intervals allow for it."
     )
 
 
@@ -82,15 +141,24 @@ def failure(fit: Fit) -> str:
     )
 
 
-def _moved(shifts: Mapping[str, float]) -> str:
-    """What ignoring the missing physics did to the stiffest parameter, in per cent."""
+def _span(ends: Sequence[float], unit: str) -> str:
+    return span_of(ends, unit).replace("\N{NO-BREAK SPACE}", " ")
+
+
+def _moved(shifts: Mapping[str, Shift], cause: str) -> str:
+    """What the added physics does to the obstacle's stiffness, or to what it moves most surely."""
     chosen = [n for n in shifts if n.startswith("k2")] or list(shifts)
     if not chosen:
         return ""
-    worst = max(chosen, key=lambda n: abs(shifts[n]))
-    share = 100 * shifts[worst]
-    direction = "high" if share > 0 else "low"
-    return f" Without it {worst} was {two_digits(abs(share))} % too {direction}."
+    sure = [n for n in chosen if not shifts[n].least] or chosen
+    worst = max(sure, key=lambda n: abs(shifts[n].share))
+    shift = shifts[worst]
+    verb = "raises" if shift.share > 0 else "lowers"
+    least = "at least " if shift.least else ""
+    size = f"by {least}{two_digits(100 * abs(shift.share))} %"
+    if shift.share > FOLD:
+        size = f"to {least}{two_digits(1 + shift.share)} times its value"
+    return f" {cause} {verb} {worst} {size}."
 
 
 def summary(
@@ -99,7 +167,7 @@ def summary(
     statements: tuple[str, ...],
     location: Location | None,
     alternatives: tuple[str, ...],
-    shifts: Mapping[str, float],
+    shifts: Mapping[str, Shift],
     detectable: str,
     remains: str = "",
     *,
@@ -117,19 +185,20 @@ def summary(
         return f"{found} {detectable}".strip()
     if location is None:
         return f"Nothing is missing beside faults of the recordings:{faults} {detectable}".strip()
-    place, cost = _REGIMES[location.regime], _moved(shifts)
+    place = _REGIMES[location.regime]
     if verdict == "unknown" or (verdict == "partly" and not effects):
-        scale, length, force = (1.0, "rad", "N m") if angle else (1e3, "mm", "N")
-        low, high = (scale * x for x in location.displacement)
+        cost = _moved(shifts, "Fitting a force in its place")
+        force = two_digits(location.force_rms, "N m" if angle else "N")
         slowly = " It is a stiffness or damping that changes with time." if drifts else ""
         return (
-            f"Something is missing that the catalogue does not hold. It acts {place}, mostly "
-            f"between {low:.2f} and {high:.2f} {length}, with {location.force_rms:.2g} {force} "
-            f"rms.{slowly}{cost}{remains}{faults}"
+            f"Something is missing that the catalogue does not hold. It acts {place}, mostly at "
+            f"{_span(location.displacement, 'rad' if angle else 'm')}, with {force} rms.{slowly}"
+            f"{cost}{remains}{faults}"
         )
     titles = " and ".join(e.title for e in effects)
+    cost = _moved(shifts, "Adding it" if len(effects) == 1 else "Adding them")
     if verdict == "ambiguous" and alternatives:
-        others = ", ".join(alternatives)
+        others = " or ".join(titles_of(a) for a in alternatives)
         return (
             f"Something is missing {place}; the likeliest is {titles}, but the recordings cannot "
             f"tell it from {others}.{cost}{faults}"

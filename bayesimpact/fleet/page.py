@@ -14,10 +14,10 @@ from bayesimpact.fleet.compare import Comparison, Series, axes
 from bayesimpact.fleet.plan import Plan
 from bayesimpact.fleet.run import Row, done
 from bayesimpact.fleet.trend import Trend
+from bayesimpact.model.units import decimals, number, readable, typeset
 from bayesimpact.report.figures.save import file_name
 from bayesimpact.report.figures.series import Panel
 from bayesimpact.report.fleet_page import write_fleet_page
-from bayesimpact.report.units import decimals, number, readable, typeset
 from bayesimpact.report.write import REPORT_FILE
 
 

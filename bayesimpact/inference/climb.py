@@ -15,7 +15,6 @@ from bayesimpact.inference.fit import (
     inverse,
     likelihood_gradient,
     likelihood_information,
-    marginal_sd,
 )
 from bayesimpact.inference.likelihood import Linearisation
 
@@ -23,7 +22,7 @@ Array = NDArray[np.float64]
 
 TRIES = 12  # dampings, each eight times the last one
 BENT_AT = 0.1  # of a step: where its second derivative is taken
-SHARE = 0.05  # of the standard deviation: steps for differences
+SHARE = 0.05  # of the standard deviation by itself: steps for differences
 SHORTER = 0.1  # of that, where steps of that size led nowhere: the model bends or jumps within them
 ROUGH = np.log(4.0)  # steps that were off by more give derivatives for one step only
 
@@ -114,11 +113,10 @@ class Climb:
         known[self.noise] = 0.0
         matrix += np.diag(known)
         if self.steps is not None and not self.stale and np.isfinite(matrix).all():
-            told = np.diag(matrix)[self.moving] > 0
-            spread = marginal_sd(matrix[np.ix_(self.moving, self.moving)])
+            own = np.diag(matrix)[self.moving]
+            told = own > 0
             steps = self.steps.copy()
-            better = told & np.isfinite(spread) & (spread > 0)
-            steps[self.moving[better]] = self.share * spread[better]
+            steps[self.moving[told]] = self.share / np.sqrt(own[told])
             if np.max(np.abs(np.log(steps / self.steps))) > ROUGH:
                 self.renew()
             self.steps = steps

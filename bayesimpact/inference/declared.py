@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 
 CYCLES = 6.0  # length of the window, in cycles of the quick estimate
 SAMPLES = 300  # of each recording in it
-BUDGET = 600  # evaluations per parameter
+EVALUATIONS = 600  # evaluations per parameter
 SEARCHES = 5  # at most
 MOST = 200  # iterations: where the mass is never free, ridges are long
 AGREE = 0.1  # standard deviations between two climbs to one mode
@@ -94,7 +94,7 @@ def search_declared(
     while len(ends) < 2 or not (len(ends) == SEARCHES or is_same_mode(ends[0][0], ends[1][0])):
         result = metropolis_differential_evolution(
             first, first.lower, first.upper, rng=rng,
-            evaluations=evaluations or BUDGET * first.lower.size, callback=callback,
+            evaluations=evaluations or EVALUATIONS * first.lower.size, callback=callback,
         )  # fmt: skip
         start = first.complete(result.best[None])[0]
         start[first.elsewhere] = guess[first.elsewhere]

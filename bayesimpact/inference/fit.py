@@ -203,8 +203,3 @@ def inverse(matrix: Array) -> Array:
             return np.full(matrix.shape, np.nan)
         scaled = np.linalg.pinv(unit, rcond=1e-14, hermitian=True)
         return np.asarray(scaled / np.outer(scale, scale))
-
-
-def marginal_sd(matrix: Array) -> Array:
-    """Standard deviations that go with an information matrix."""
-    return np.asarray(np.sqrt(np.maximum(np.diag(inverse(matrix)), 0.0)))

@@ -40,17 +40,18 @@ def find_mode(
     held: Sequence[int] = (),
     tolerance: float = 1e-3,
     max_iterations: int = 60,
+    least_gain: float = 0.0,
 ) -> Fit:
     """Climb from `start` (d,) to the nearest mode.
 
-    `steps` (d,) are difference steps for models without exact derivatives; they are refreshed to a
-    twentieth of the standard deviations as these become known, to a tenth of that where a climb
-    ends short: correlated parameters move a motion by many standard deviations of its noise.
-    `slopes` are derivatives that hold near enough all the way (the chord method), where they are
-    known and new ones would be dear. Parameters `held` stay where they start. The noise levels in
-    `start` are ignored. Stops when a step is below `tolerance` standard deviations, or when new
-    derivatives twice gain no more than a few such steps would (or than `LITTLE`, where differences
-    promised more: not converged then).
+    `steps` (d,) are difference steps for models without exact derivatives. They are refreshed to a
+    twentieth of the standard deviations that each parameter would have if it alone were unknown, as
+    these become known, to a tenth of that where a climb ends short. `slopes` are derivatives that
+    hold near enough all the way (the chord method), where they are known and new ones would be
+    dear. Parameters `held` stay where they start. The noise levels in `start` are ignored. Stops
+    when a step is below `tolerance` standard deviations, or when new derivatives twice gain no more
+    than a few such steps would (or than `LITTLE`, where differences promised more: not converged
+    then). Where gains below `least_gain`, nats, decide nothing, two of them end a climb.
     """
     climb = Climb(target, steps, slopes, held)
     here = climb.evaluate(start)
@@ -76,9 +77,12 @@ def find_mode(
             climb.renew()
         elif not (climb.stale or converged):
             creeps = steps is not None and size > DOUBTFUL and gain < LITTLE
-            stalls = stalls + 1 if creeps or gain < 0.5 * (STALLED * tolerance) ** 2 else 0
+            creeps = creeps or gain < max(least_gain, 0.5 * (STALLED * tolerance) ** 2)
+            stalls = stalls + 1 if creeps else 0
             if stalls < STALLS and moved:
                 continue
+            if stalls and least_gain > LITTLE:
+                break
             stalls = 0
             if climb.roughly:
                 climb.refine()

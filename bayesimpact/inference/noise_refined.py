@@ -78,7 +78,7 @@ class Ordinates:
 def refined_noise(fit: Fit) -> Noise:
     """The fit's noise with correlation and level from its residuals above the motion.
 
-    The same noise when it is white, when the model misses grossly or when too little lies above the
+    The same noise when it is white, when the model misses by far or when too little lies above the
     motion.
     """
     noise = fit.target.likelihood.noise

@@ -13,7 +13,7 @@ from bayesimpact.model.batch import Floats, Ints
 from bayesimpact.model.compiled import compiled
 
 #: No recording is longer.
-MANY = 2**62
+LONGEST = 2**62
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +71,7 @@ def check_inputs(inputs: Inputs | None, model: ModelArguments) -> tuple[Floats, 
         found = f"{starts.size} starts"
         raise InputError("inputs", found, f"{model.counts.size}, one per recording")
     ends = starts + model.counts
-    if not within(starts, -1, MANY) or np.any(ends[starts >= 0] > values.shape[1]):
+    if not within(starts, -1, LONGEST) or np.any(ends[starts >= 0] > values.shape[1]):
         raise InputError("inputs", "an input beyond the values", f"within 0..{values.shape[1]}")
     return values, starts
 
@@ -107,7 +107,7 @@ def check_model(
     width = model.theta.shape[1]
     if not within(model.columns.reshape(-1), -1, width - 1):
         raise InputError("columns", "an index outside theta", f"-1 to {width - 1}")
-    if not within(model.counts, 1, MANY):
+    if not within(model.counts, 1, LONGEST):
         raise InputError("counts", "a recording without samples", "at least 1")
     if not within(model.orders, 0, 2):
         raise InputError("orders", "an unknown time derivative", "0, 1 or 2")
@@ -123,7 +123,7 @@ def check_samples(
         raise InputError(
             "starts", f"{first.size} values", f"{model.counts.size}, one per recording"
         )
-    if not (within(first, 0, MANY) and within(first + model.counts, 0, data.size)):
+    if not (within(first, 0, LONGEST) and within(first + model.counts, 0, data.size)):
         raise InputError("starts", "recordings beyond the samples", f"within 0..{data.size}")
     return data, first
 

@@ -3,8 +3,10 @@
 A residual force has tens of coefficients. To first order each adds a small force along the known
 motion, and what that does follows from the motion's free changes (`superposition`), where a
 simulation each would cost the most of a fit. Some are simulated all the same: they say whether
-superposition serves, which it does not where a law has a state of its own or the mass sticks, nor
-where forces do so nearly the same that their differences drown in its errors.
+superposition serves, which it does not where a law has a state of its own or the mass sticks.
+
+Stiffness, damping and all steady laws are superposed together or not at all: a sum of a residual
+force's coefficients does what k1 or c1 does, and only errors of one kind cancel in the difference.
 """
 
 from __future__ import annotations
@@ -34,7 +36,9 @@ Flags = NDArray[np.bool_]
 PAYS = 40  # motions from which on superposition costs less than they do
 CHECKED = 3  # of them, by simulation
 BLOCK = 64  # forces at once, so that memory stays bounded
-_OFFSET = SLOTS.index("offset")
+_C1, _K1, _C2, _GAP, _K2, _OFFSET = (
+    SLOTS.index(name) for name in ("c1", "k1", "c2", "g", "k2", "offset")
+)
 
 
 def readings_near(oscillator: Oscillator, r: int, theta: Array, error: float) -> Array:
@@ -45,36 +49,39 @@ def readings_near(oscillator: Oscillator, r: int, theta: Array, error: float) ->
     q = oscillator.layout.slots(theta)[:, r]
     q[:, _OFFSET] = 0.0
     pushed = _pushed(q, oscillator.laws)
-    if pushed.size == 0 or oscillator.campaign.stop:
+    if pushed.size < PAYS or oscillator.campaign.stop:
         return oscillator.predict_recording(r, theta)
     judges = pushed[np.linspace(0, pushed.size - 1, CHECKED + 2).astype(int)[1:-1]]
-    rest = np.setdiff1d(pushed, judges)
-    simulated = np.setdiff1d(np.arange(q.shape[0]), rest)
+    simulated = np.union1d(np.setdiff1d(np.arange(q.shape[0]), pushed), judges)
     motions = np.empty((q.shape[0], int(oscillator.counts[r])))
     motions[simulated] = oscillator.motions_of(np.full(simulated.size, r), q[simulated])
     if not np.isfinite(motions[0]).all():  # it ran away
         return oscillator.predict_recording(r, theta)
-    changes = _changes(oscillator, r, q[np.concatenate([[0], judges, rest])])
-    wrong = changes[:CHECKED] - (motions[judges] - motions[0])
+    superposed = motions[0] + _changes(oscillator, r, q[np.concatenate([[0], pushed])])
+    wrong = superposed[np.searchsorted(pushed, judges)] - motions[judges]
     if not np.all(np.linalg.norm(wrong, axis=1) <= error):
         return oscillator.predict_recording(r, theta)
-    motions[rest] = motions[0] + changes[CHECKED:]
+    motions[pushed] = superposed
     return oscillator.read(r, motions, theta)
 
 
 def _pushed(q: Array, laws: Index) -> Index:
-    """Which slots (B, Q) differ from the first by the force of one steady law alone.
+    """Which slots (B, Q) differ from the first by forces along the motion alone, ascending.
 
-    Only where there are so many of one law that superposition pays.
+    None where no law is both steady and has so many of them that superposition pays.
     """
     apart = q != q[0]
-    found = []
-    for (first, end), steady in zip(_spans(q.shape[1], laws), _is_steady(laws), strict=True):
-        inside = apart[:, first:end].any(axis=1)
-        alone = np.flatnonzero(inside & ~np.delete(apart, slice(first, end), axis=1).any(axis=1))
-        if steady and alone.size >= PAYS:
-            found.append(alone)
-    return np.concatenate(found) if found else np.zeros(0, dtype=np.int64)
+    spans = [
+        span
+        for span, steady in zip(_spans(q.shape[1], laws), _is_steady(laws), strict=True)
+        if steady
+    ]
+    if not any(apart[:, first:end].any(axis=1).sum() >= PAYS for first, end in spans):
+        return np.zeros(0, dtype=np.int64)
+    along = np.isin(np.arange(q.shape[1]), [_C1, _K1])
+    for first, end in spans:
+        along[first:end] = True
+    return np.flatnonzero(apart[:, along].any(axis=1) & ~apart[:, ~along].any(axis=1))
 
 
 def _spans(size: int, laws: Index) -> Index:
@@ -102,15 +109,24 @@ def _changes(oscillator: Oscillator, r: int, q: Array) -> Array:
         return found
     for first in range(0, found.shape[0], BLOCK):
         rows = np.concatenate([q[:1], q[1 + first : 1 + first + BLOCK]])
-        found[first : first + BLOCK] = answers(motion, _forces(motion, rows, oscillator.laws))
+        found[first : first + BLOCK] = answers(motion, force_changes(motion, rows, oscillator.laws))
     return found
 
 
-def _forces(motion: Motion, q: Array, laws: Index) -> Array:
-    """By how much the laws' forces along a motion differ from those of the first slots, (K, n)."""
-    out = np.zeros((q.shape[0], motion.y.size))
+def force_changes(motion: Motion, q: Array, laws: Index) -> Array:
+    """By how much forces along a motion, N, differ from those of the first of slots (1 + K, Q):
+    (K, n). Of the suspension, the obstacle and all laws, friction that may hold apart.
+    """
+    change = q[:, [_K1, _C1]] - q[0, [_K1, _C1]]
+    out = change @ np.stack([motion.y, motion.v])
+    if np.isfinite(motion.d).all():
+        touching = motion.d > 0
+        own = q[:, [_K2]] * (motion.y - q[:, [_GAP]]) + q[:, [_C2]] * motion.v
+        out += np.where(touching, own - own[0], 0.0)
     for law, (first, end) in zip(laws, _spans(q.shape[1], laws), strict=True):
         rows = np.flatnonzero((q[:, first:end] != q[0, first:end]).any(axis=1))
+        if rows.size == 0:
+            continue
         known = np.zeros((1, motion.y.size))
         add_forces(law, motion.y, motion.v, motion.d, motion.t, q[:1], np.zeros(1, np.int64), known)
 

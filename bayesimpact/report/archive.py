@@ -86,7 +86,9 @@ def fit_json(results: Results) -> str:
         "mass": results.mass,
         "verdict": results.verdict,
         "summary": results.headline,
-        "source": "draws" if results.kind == "posterior" else "curvature at the mode",
+        "source": "curvature at the mode, and what stays unexplained"
+        if results.remains
+        else ("draws" if results.kind == "posterior" else "curvature at the mode"),
         "parameters": {row.name: _row(row) for row in results.rows},
         "names": [row.name for row in results.rows],
         "covariance": results.covariance,

@@ -128,13 +128,14 @@ def _results(
     chain = Chain(_smoothing(oscillator.smoothing), m.mass_sd, m.clock_sd, m.gain_sd)
     beside = published_values(campaign) if references is None else references
     draws = None if posterior is None else posterior.draws
+    told, left = diagnosis[0] or {}, (diagnosis[0] or {}).get("remainder")
     summary = Results(
         name=campaign.name,
         mass=campaign.mass,
         stop=campaign.stop,
         quantity=campaign.recordings[0].quantity,
         recordings=recording_results(fit),
-        rows=build_rows(fit, draws, chain, beside),
+        rows=build_rows(fit, draws, chain, beside, told["parameters"]["after"] if left else None),
         effects=tuple(
             EffectSummary(e.id, e.title, e.equation, e.statement) for e in oscillator.acting
         ),

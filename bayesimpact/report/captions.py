@@ -12,13 +12,13 @@ DIAGNOSIS = {
     "story": (
         "The cycle in which what was added explains most. Above: the recording and both models. "
         "Middle: the same less the base model: were it right, the points would scatter about the "
-        "orange line; they follow the blue one. Grey area: contact."
+        "orange line; they follow the blue one."
     ),
     "force": (
         "The force that the base model leaves unexplained, on the left-hand side of the equation "
-        "of motion (positive resists motion towards the stop). Left: its posterior mean wherever "
-        "the mass has been; black lines enclose what exceeds its own 90 % band. Right: the same "
-        "split into a conservative part and a dissipative part, with 90 % bands. What "
+        "of motion (positive resists a motion to positive values). Left: its posterior mean "
+        "wherever the mass has been; black lines enclose what exceeds its own 90 % band. Right: "
+        "the same split into a conservative part and a dissipative part, with 90 % bands. What "
         "changes of the base parameters could imitate is taken out."
     ),
     "formula": (
@@ -41,7 +41,7 @@ DIAGNOSIS = {
         "What the recordings rule out. Dots: 95 % upper limit of each effect's size; bars: a size "
         "that would stand out by five standard errors. Both over the size that would matter in "
         "practice, which is a tenth of the effect's prior scale (dashed): left of it an effect is "
-        "absent or negligible; orange dots mark effects of which the recordings cannot tell."
+        "absent or negligible; of those with orange dots the recordings cannot tell."
     ),
     "improvement": (
         "Before and after. Left: power of the whitened residual over that of the noise, estimated "
@@ -60,8 +60,8 @@ DIAGNOSIS = {
         "Black: the best repeat of a recording; grey: a campaign of its own."
     ),
     "shifts": (
-        "How far the added physics moves the parameters, in standard deviations of the base model: "
-        "medians and 90 % intervals."
+        "How far the added physics moves the parameters, from what the base model has: medians and "
+        "90 % intervals."
     ),
 }
 """Captions of a diagnosis' figures."""
@@ -88,10 +88,13 @@ def _more(stem: str, results: Results) -> str:
     arrays, diagnosis = results.diagnosis_arrays, results.diagnosis or {}
     if stem == "gain" and "impact_gain" in arrays:
         return " Impacts are shown as far as half of the recordings have them."
-    if stem == "story" and "force_y" in arrays:
-        return (
+    if stem == "story":
+        contact = " Grey area: contact." if results.stop else ""
+        return contact + (
             " Below: the force that the base model lacks, as far as it depends on displacement "
             "and velocity, with its 90 % band."
+            if "force_y" in arrays
+            else ""
         )
     if stem == "improvement" and "held_out_recordings" in arrays:
         words = " Right: gain in the log score with which each recording is predicted from the"
@@ -99,6 +102,12 @@ def _more(stem: str, results: Results) -> str:
     if stem != "force":
         return ""
     words = " The dashed line is the stop." if "gap" in arrays else ""
+    regime = (diagnosis.get("location") or {}).get("regime")
+    if regime in ("contact", "entry", "exit") and diagnosis.get("effects"):
+        words += (
+            " What was named acts in contact, and need not be darkest there: most of what it does "
+            "looks like a change of k2, c2 and g, which is why these are wrong without it."
+        )
     misfit = ((diagnosis.get("fit") or {}).get("before") or {}).get("reduced_chi2")
     if diagnosis.get("verdict") == "adequate":
         words += (
@@ -131,10 +140,15 @@ def _corner(results: Results) -> str:
     before = (
         " Orange: the posterior of the model without the added effects." if results.before else ""
     )
+    apart = (
+        " As if nothing were left unexplained: the tables' intervals carry that, and are wider."
+        if results.remains
+        else ""
+    )
     return (
         "Posterior of the parameters of interest: marginals on the diagonal with median ± half "
         "of the 90 % interval, pairs below with the contours of one and two standard deviations "
-        f"(39 % and 86 %). Δ: from the median that the title states.{some}{before}"
+        f"(39 % and 86 %). Δ: from the median that the title states.{some}{before}{apart}"
     )
 
 

@@ -12,10 +12,10 @@ from bayesimpact.data.faults.fault import Fault
 from bayesimpact.data.gaps import runs
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
+from bayesimpact.model.units import reading
 from bayesimpact.report.figures.inline import inline
 from bayesimpact.report.figures.save import escaped
 from bayesimpact.report.figures.style import styled
-from bayesimpact.report.units import reading
 
 MOST = 60
 """Panels in one figure; what is beyond is named in the title."""

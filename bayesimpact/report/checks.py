@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from bayesimpact.model.units import chi2, display, number, p_value, p_words, significant, typeset
 from bayesimpact.report.results import Check, Results
-from bayesimpact.report.units import chi2, display, number, p_value, p_words, significant, typeset
 from bayesimpact.report.whiteness import whiteness
 
 __all__ = ["amount", "assess", "assessed", "model_name", "whiteness"]
@@ -79,7 +79,7 @@ def headline(results: Results) -> str:
             f"{significant(excess, 2)} times what noise of {noise} would leave. The values below "
             "describe the closest such oscillator, "
         ) + (
-            "and their intervals carry what remains. Something else remains."
+            "and their intervals carry what remains."
             if diagnosed
             else "and their intervals are too narrow to be believed. bayesimpact diagnose asks "
             "what is missing."

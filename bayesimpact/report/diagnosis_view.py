@@ -2,31 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from math import isfinite
 from typing import Any
 
-from markupsafe import Markup
-
-from bayesimpact.report.next_words import next_view
-from bayesimpact.report.results import Results
-from bayesimpact.report.rows import Z90
-from bayesimpact.report.tables import span, symbol
-from bayesimpact.report.units import (
+from bayesimpact.diagnosis.words import titles_of
+from bayesimpact.model.units import (
     chi2,
     decimals,
     number,
     p_value,
     p_words,
-    percent,
-    readable,
+    quantity,
     signed,
     significant,
+    span_of,
     typeset,
 )
-from bayesimpact.report.units import quantity as amount
-
-__all__ = ["amount"]
+from bayesimpact.report.change_view import NUISANCES, change_row, estimate
+from bayesimpact.report.limit_view import limit_row, not_found, seen
+from bayesimpact.report.next_words import next_view
+from bayesimpact.report.results import Results
+from bayesimpact.report.tables import symbol
 
 Rows = list[dict[str, Any]]
 
@@ -38,14 +35,13 @@ VERDICTS = {
     "unknown": "The missing physics is outside the catalogue",
 }
 REGIMES = {
-    "free": "free flight",
+    "free": "the suspension, wherever the mass moves",
     "contact": "contact with the stop",
     "entry": "the beginning of contact",
     "exit": "the end of contact",
-    "everywhere": "everywhere",
+    "everywhere": "the whole motion",
     "measurement": "the measuring chain",
 }
-NUISANCES = ("y0", "v0", "offset", "sigma")
 _FIT_ROWS = {
     "rms_m": ("residual rms", "m"),
     "reduced_chi2": ("reduced χ²", ""),
@@ -63,11 +59,14 @@ def diagnosis_view(results: Results) -> dict[str, Any] | None:
     return {
         "verdict": VERDICTS.get(diagnosis["verdict"], diagnosis["verdict"]),
         "changed": diagnosis["verdict"] != "adequate",
-        "location": _location(diagnosis.get("location"), length),
+        "location": _location(
+            diagnosis.get("location"), length, named=bool(diagnosis.get("effects"))
+        ),
         "effects": [_effect(effect) for effect in diagnosis.get("effects", [])],
         "alternatives": [
             {
                 "id": other["id"],
+                "titles": titles_of(other["id"]),
                 "probability": probability(other["probability"]),
                 "evidence": _plain(other["delta_log_evidence"], 1),
             }
@@ -81,17 +80,20 @@ def diagnosis_view(results: Results) -> dict[str, Any] | None:
         "fit": _fit(diagnosis.get("fit", {}), unit) + _backbones(results),
         "held_out": _held_out(diagnosis.get("fit", {})),
         "parameters": [
-            _shift(name, before[name], after[name])
+            change_row(name, before[name], after[name])
             for name in before
             if name in after and name.partition("[")[0] not in NUISANCES
         ],
-        "limits": [_limit(limit) for limit in diagnosis.get("limits", [])],
+        "limits": [limit_row(limit, remains=results.remains) for limit in not_found(diagnosis)],
+        "seen": seen(diagnosis),
         "next": next_view(diagnosis.get("next")),
     }
 
 
-def _location(location: Mapping[str, Any] | None, unit: str) -> list[tuple[str, str]]:
-    """Lines on the place, in words and ranges."""
+def _location(
+    location: Mapping[str, Any] | None, unit: str, *, named: bool
+) -> list[tuple[str, str]]:
+    """Lines on the place, in words and ranges; the force where no effect is named to tell it."""
     if not location:
         return []
     regime = str(location["regime"])
@@ -109,26 +111,17 @@ def _location(location: Mapping[str, Any] | None, unit: str) -> list[tuple[str, 
     for key in ("cases", "recordings"):
         if location.get(key):
             rows.append((key, ", ".join(str(x) for x in location[key])))
-    if location.get("force_rms_n") is not None:
-        rows.append(
-            ("force, rms", amount(location["force_rms_n"], "N m" if unit == "rad" else "N"))
-        )
+    if location.get("force_rms_n") is not None and not named:
+        force = quantity(location["force_rms_n"], "N m" if unit == "rad" else "N", 2)
+        rows.append(("force, rms", f"{force}, with what base parameters could imitate"))
     return rows
-
-
-def span_of(ends: Sequence[float], unit: str) -> str:
-    """A range with its unit."""
-    low, high = ends
-    shown = readable(unit, max(abs(low), abs(high)))
-    places = decimals((high - low) * shown.scale, 2)
-    return f"{span(low, high, shown.scale, places)} {typeset(shown.unit)}"
 
 
 def size_words(size: Mapping[str, Any] | None) -> str:
     """How large an effect is: "3.1 µm, 0.12 % of the deepest indentation"; "" where not known."""
     if not size or size.get("value") is None:
         return ""
-    words = amount(float(size["value"]), str(size.get("unit") or ""))
+    words = quantity(float(size["value"]), str(size.get("unit") or ""), 2)
     if size.get("percent") is not None:
         words += f", {significant(float(size['percent']), 2)}\N{NO-BREAK SPACE}%"
         words += f" of {size['of']}" if size.get("of") else ""
@@ -146,7 +139,7 @@ def remainder_rows(
         return []
     rows = []
     if remainder.get("rms_m") is not None:
-        rows.append(("rms", amount(float(remainder["rms_m"]), unit)))
+        rows.append(("rms", quantity(float(remainder["rms_m"]), unit, 2)))
     for key, words, after in (
         ("share_of_signal_percent", "of the signal", "\N{NO-BREAK SPACE}%"),
         ("over_noise", "over the noise", ""),
@@ -160,7 +153,7 @@ def remainder_rows(
     if remainder.get("recordings"):
         rows.append(("recordings", ", ".join(str(x) for x in remainder["recordings"])))
     if remainder.get("guess"):
-        rows.append(("likely", str(remainder["guess"])))
+        rows.append(("likely", titles_of(str(remainder["guess"]))))
     return rows
 
 
@@ -195,26 +188,13 @@ def _effect(effect: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def estimate(content: Mapping[str, Any], *, like: Mapping[str, Any] | None = None) -> str:
-    """Median with its 90 % interval and unit.
-
-    `like`: another estimate of the same parameter, told with the same digits.
-    """
-    low, high = content["ci90"]
-    half = 0.5 * (high - low)
-    shown = readable(content["unit"], max(abs(content["median"]), half))
-    wider = half if like is None else max(half, 0.5 * (like["ci90"][1] - like["ci90"][0]))
-    places = decimals(wider * shown.scale)
-    ends = span(low, high, shown.scale, places)
-    value = number(content["median"] * shown.scale, places)
-    return f"{value} ({ends}) {typeset(shown.unit)}".rstrip()
-
-
 def probability(p: float | None) -> str:
     """A probability for a table."""
     if p is None or not isfinite(p):
         return "–"
-    return "> 0.999" if p > 0.999 else p_value(p)
+    if p > 0.995:  # two digits would make it certain
+        return "> 0.999" if p > 0.999 else number(p, 3)
+    return p_value(p)
 
 
 def _plain(value: float | None, places: int) -> str:
@@ -239,7 +219,7 @@ def _merit(value: float | None, kind: str, unit: str) -> str:
     if value is None or not isfinite(value):
         return "–"
     if kind == "m":
-        return amount(value, unit)
+        return quantity(value, unit)
     if kind == "nats":
         return number(value, 0)
     return p_value(value) if kind == "p" else chi2(value)
@@ -260,8 +240,14 @@ def _held_out(fit: Mapping[str, Any]) -> str:
     if value is None or error is None or not isfinite(value) or gain.get("of") == 0:
         return ""
     words = f"On recordings held out, the log score changes by {gain_words(gain)} (standard error)"
-    improved = gain.get("improved", value > 2 * error)
-    return f"{words}: an improvement." if improved else f"{words}: no clear improvement."
+    if gain.get("improved", value > 2 * error):
+        return f"{words}: an improvement."
+    if value > 0 and gain.get("of") and gain.get("wins") == gain["of"]:
+        return (
+            f"{words}. All {gain['of']} are predicted better, but by amounts so different that the "
+            "total is uncertain."
+        )
+    return f"{words}: no clear improvement."
 
 
 def gain_words(gain: Mapping[str, Any]) -> str:
@@ -273,35 +259,3 @@ def gain_words(gain: Mapping[str, Any]) -> str:
         return signed(value, 1)
     places = decimals(error, 2)
     return f"{signed(value, places)} ± {number(error, places)}"
-
-
-def _shift(
-    name: str, before: Mapping[str, Any], after: Mapping[str, Any]
-) -> dict[str, str | Markup]:
-    """A parameter before and after, and the shift in standard deviations of before."""
-    sd = (before["ci90"][1] - before["ci90"][0]) / (2 * Z90)
-    moved = (after["median"] - before["median"]) / sd if sd > 0 else float("nan")
-    old = before["median"]
-    return {
-        "name": name,
-        "symbol": symbol(name),
-        "change": percent((after["median"] - old) / abs(old)) if old else "–",
-        "before": estimate(before, like=after),
-        "after": estimate(after, like=before),
-        "shift": signed(moved, 1) if abs(moved) < 1000 else f"{significant(moved, 2)}",
-    }
-
-
-def _limit(limit: Mapping[str, Any]) -> dict[str, str]:
-    """An effect that was not found and how large it could still be."""
-    unit, hidden = str(limit.get("unit", "")), limit.get("hidden_bias") or {}
-    upper, detection = limit.get("upper95"), limit.get("detection_limit")
-    bias = hidden.get("sd")
-    return {
-        "id": str(limit["id"]),
-        "parameter": str(limit.get("parameter", "")).replace("_", " "),
-        "upper": "–" if upper is None else amount(float(upper), unit),
-        "detection": "" if detection is None else amount(float(detection), unit),
-        "answer": str(limit.get("answer", "")),
-        "bias": "" if bias is None else f"{significant(abs(bias), 2)} sd of {hidden['parameter']}",
-    }

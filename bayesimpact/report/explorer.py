@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from bayesimpact.model.units import display, typeset
 from bayesimpact.report.cycles import (
     before_predicted,
     contacts,
@@ -26,9 +27,8 @@ from bayesimpact.report.figures.force_map import force_unit
 from bayesimpact.report.figures.recordings import shown_recordings
 from bayesimpact.report.figures.style import response, response_word
 from bayesimpact.report.force_in_time import force_in_time
-from bayesimpact.report.results import Array, Results
+from bayesimpact.report.results import Array, RecordingResult, Results
 from bayesimpact.report.rows import Z90
-from bayesimpact.report.units import display, typeset
 
 FOLDER = Path(__file__).parent / "template"
 LIBRARY = FOLDER / "vendor" / "uPlot-1.6.32.iife.min.js"
@@ -71,11 +71,9 @@ def explorer_data(results: Results) -> str:
     before = before_predicted(results)
     best = telling_cycle(results)
     force = force_unit(results, results.diagnosis_arrays) if _has_force(results) else None
-    residual = display(results.unit, max(results.rms, results.noise.level))
     content: dict[str, Any] = {
         "word": response_word(results),
         "unit": typeset(response(results).unit),
-        "residualUnit": typeset(residual.unit),
         "forceUnit": "" if force is None else typeset(force.unit),
         "models": ["model"] if before is None else ["base model", "with what was added"],
         "first": 0 if best is None or best.recording not in shown else shown.index(best.recording),
@@ -85,9 +83,8 @@ def explorer_data(results: Results) -> str:
         recording, size = results.recordings[r], min(results.recordings[r].samples.size, most)
         level = stop_level(results, recording)
         motion, touched = contacts(results, recording)
-        size_of = max(results.rms, results.noise.level) * recording.scale
-        unit = display(recording.unit, size_of)
         old = None if before is None else before[r]
+        unit = display(recording.unit, _residual_size(recording, old))
         item: dict[str, Any] = {
             "name": recording.name,
             "case": recording.case,
@@ -116,6 +113,13 @@ def explorer_data(results: Results) -> str:
         content["recordings"].append(item)
     text = json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c")
+
+
+def _residual_size(recording: RecordingResult, before: Array | None) -> float:
+    """Root mean square of the larger of the residuals that are shown, or the noise."""
+    left = recording.residual if before is None else recording.samples - before
+    rms = float(np.sqrt(np.mean(left**2)))
+    return max(rms, recording.noise_rms) if np.isfinite(rms) else recording.noise_rms
 
 
 def _has_force(results: Results) -> bool:

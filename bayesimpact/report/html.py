@@ -13,6 +13,7 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
+from bayesimpact.model.units import bound, reading, typeset
 from bayesimpact.report import explorer, tables, words
 from bayesimpact.report.captions import caption
 from bayesimpact.report.checks import MISFIT
@@ -21,7 +22,6 @@ from bayesimpact.report.figures.save import DPI
 from bayesimpact.report.policy import with_policy
 from bayesimpact.report.results import Results
 from bayesimpact.report.story import corrected, story_rows
-from bayesimpact.report.units import bound, reading, typeset
 
 TEMPLATES = Path(__file__).parent / "template"
 _VERDICT_CLASS = {"adequate": "good", "inadequate": "bad", "slight": "", "overestimated": ""}
@@ -112,7 +112,7 @@ def _context(results: Results, pictures: Mapping[str, bytes]) -> dict[str, Any]:
         "contents": _contents(results, groups),
         "parameters": parameters,
         "ratios": [v for v in parameters if v.ratio] if results.mass != 1.0 else [],
-        "centre": "median" if results.kind == "posterior" else "mode",
+        "centre": results.centre,
         "mass_symbol": "J" if results.angular else "m",
         "failed": [c for c in results.failed if c.title != MISFIT],
         "reference_labels": tables.reference_labels(interest),
@@ -154,11 +154,11 @@ def _contents(results: Results, groups: Mapping[str, list[Picture]]) -> list[tup
         ("parameters", "Parameters", True),
         ("checks", "Checks", True),
         ("recordings", "Recordings and fit", True),
+        ("releases", "Initial conditions", True),
         ("posterior", "Posterior", bool(groups["corner"])),
         ("backbone", "Backbone", bool(groups["backbone"])),
         ("search", "Search", bool(groups["search"])),
         ("sampler", "Sampler", results.sampler is not None),
-        ("releases", "Releases", True),
         ("model", "Model and priors", True),
         ("provenance", "Provenance", True),
     ]

@@ -6,9 +6,10 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from bayesimpact.report.diagnosis_view import NUISANCES
+from bayesimpact.model.units import MINUS, interval_decimals, number, quantity, readable
+from bayesimpact.report.change_view import NUISANCES, change_words
+from bayesimpact.report.limit_view import not_found
 from bayesimpact.report.results import Results, Row
-from bayesimpact.report.units import MINUS, decimals, number, percent, quantity, readable
 
 _SPECIAL = {c: f"\\{c}" for c in "&%$#_{}"} | {
     "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
@@ -27,7 +28,7 @@ def latex_tables(results: Results) -> str:
     diagnosis = results.diagnosis or {}
     if diagnosis.get("verdict") not in (None, "adequate"):
         blocks.append(_models(diagnosis))
-    limits = [x for x in diagnosis.get("limits", ()) if x.get("upper95") is not None]
+    limits = [x for x in not_found(diagnosis) if x.get("upper95") is not None]
     if limits:
         blocks.append(_limits(limits))
     head = f"% {escaped(results.name)}: tables by bayesimpact; needs \\usepackage{{booktabs}}\n"
@@ -64,7 +65,7 @@ def _table(caption: str, columns: str, head: Sequence[str], rows: Iterable[Seque
 
 
 def _parameters(results: Results) -> str:
-    centre = "median" if results.kind == "posterior" else "mode"
+    centre = results.centre
     rows = [_row(row) for row in results.select("physical", "effect")]
     caption = f"Parameters of {escaped(results.name)}: {centre} and 90\\,\\% interval."
     return _table(caption, "lrll", ("parameter", centre, r"90\,\% interval", "unit"), rows)
@@ -77,7 +78,7 @@ def _row(row: Row) -> tuple[str, ...]:
 def _cells(unit: str, median: float, ends: Sequence[float]) -> tuple[str, str, str]:
     low, high = ends
     shown = readable(unit, max(abs(median), 0.5 * (high - low)))
-    places = decimals(0.5 * (high - low) * shown.scale)
+    places = interval_decimals(low * shown.scale, high * shown.scale)
     numbers = [escaped(number(x * shown.scale, places)) for x in (median, low, high)]
     printed = escaped(quantity(1.0 / shown.scale, unit).partition("\N{NO-BREAK SPACE}")[2])
     return numbers[0], f"{numbers[1]} to {numbers[2]}", printed
@@ -92,8 +93,8 @@ def _models(diagnosis: Mapping[str, Any]) -> str:
             continue
         new = after[name]
         first, second = (_cells(x["unit"], x["median"], x["ci90"]) for x in (old, new))
-        change = percent(new["median"] / old["median"] - 1) if old["median"] else "–"
-        rows.append((symbol(name), *first[:2], *second, escaped(change)))
+        change = escaped(change_words(old, new))
+        rows.append((symbol(name), *first[:2], *second, change))
     if not rows:
         return ""
     ids = ", ".join(r"\texttt{" + escaped(e["id"]) + "}" for e in diagnosis.get("effects", ()))

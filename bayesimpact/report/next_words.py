@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from bayesimpact.report.units import decimals, number, quantity, significant
+from bayesimpact.model.units import decimals, number, quantity, significant
 
 Content = Mapping[str, Any]
 

@@ -296,6 +296,16 @@ class Results:
         return "fit" if self.draws is None else "posterior"
 
     @property
+    def remains(self) -> bool:
+        """True where a diagnosis leaves something unexplained, which the intervals then carry."""
+        return (self.diagnosis or {}).get("remainder") is not None
+
+    @property
+    def centre(self) -> str:
+        """What an interval stands about: "median" or "mode"."""
+        return "median" if self.draws is not None or self.remains else "mode"
+
+    @property
     def unit(self) -> str:
         """SI unit of the recordings (of the first, where they differ)."""
         return unit_of(cast(Quantity, self.quantity))

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields
+from typing import Any
 
 import numpy as np
 
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.prior import Prior
 from bayesimpact.model.parameters import Parameter
+from bayesimpact.model.units import dimensions, per_mass_unit, significant
 from bayesimpact.report.results import Array, Chain, Row
-from bayesimpact.report.units import dimensions, per_mass_unit, significant
 
 Z90 = 1.6448536269514722  # 95 % quantile of the standard normal distribution
 
@@ -33,9 +34,20 @@ _MEANINGS = {
 
 
 def build_rows(
-    fit: Fit, draws: Array | None, chain: Chain, references: Mapping[str, Mapping[str, float]]
+    fit: Fit,
+    draws: Array | None,
+    chain: Chain,
+    references: Mapping[str, Mapping[str, float]],
+    told: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> tuple[Row, ...]:
-    """One row per parameter; `draws` (S, d), or None for the Laplace approximation."""
+    """One row per parameter.
+
+    Parameters
+    ----------
+    draws : (S, d), or None for the Laplace approximation
+    told : medians and intervals that a diagnosis gives: they carry what stays unexplained, which
+        neither draws nor curvature know of
+    """
     campaign = fit.target.oscillator.campaign
     angle = campaign.angular
     titles = {e.id: e.title for e in fit.target.oscillator.acting}
@@ -48,6 +60,8 @@ def build_rows(
         else:
             low, median, high = (float(x) for x in np.percentile(draws[:, i], [5, 50, 95]))
             posterior_sd = float(np.std(draws[:, i]))
+        if told and parameter.name in told:
+            median, (low, high) = told[parameter.name]["median"], told[parameter.name]["ci90"]
         ci90 = (low, high)
         unit = scaling_unit(parameter)
         ratio_unit = per_mass_unit(unit, angle=angle)
@@ -89,7 +103,7 @@ def widened(
     """A 90 % interval widened by the uncertainties of mass, clock and gain, in quadrature.
 
     The three are independent of one another and of the statistical error; how much each counts
-    follows from the unit (`report.units`).
+    follows from the unit (`model.units`).
     """
     spread = dimensions(unit, angle=angle).spread(chain.mass_sd, chain.clock_sd, chain.gain_sd)
     systematic = Z90 * abs(median) * spread

@@ -7,21 +7,20 @@ from typing import Any
 
 from markupsafe import Markup
 
+from bayesimpact.diagnosis.words import title_of, titles_of
+from bayesimpact.model.units import percent, significant, span_of
+from bayesimpact.model.units import quantity as amount
+from bayesimpact.report.change_view import NUISANCES, estimate
 from bayesimpact.report.diagnosis_view import (
-    NUISANCES,
     REGIMES,
     VERDICTS,
-    amount,
-    estimate,
     gain_words,
     probability,
     remainder_rows,
     size_words,
-    span_of,
 )
 from bayesimpact.report.results import Results
 from bayesimpact.report.tables import symbol
-from bayesimpact.report.units import percent, significant
 
 MOST_NAMES = 4
 """Recordings called by name; more are counted."""
@@ -97,8 +96,8 @@ def _physics(diagnosis: Mapping[str, Any]) -> list[str | Markup]:
     ]
     others = diagnosis.get("alternatives", ()) if diagnosis["verdict"] == "ambiguous" else ()
     return lines + [
-        Markup("or <code>{}</code>, probability {}").format(
-            other["id"], probability(other.get("probability"))
+        Markup("or {}, probability {} <code>{}</code>").format(
+            titles_of(other["id"]), probability(other.get("probability")), other["id"]
         )
         for other in others
     ]
@@ -117,7 +116,7 @@ def _size(results: Results, diagnosis: Mapping[str, Any]) -> list[str | Markup]:
     force = (diagnosis.get("location") or {}).get("force_rms_n")
     if force and not lines:
         unit = "N m" if results.angular else "N"
-        lines.append(f"unexplained force there: {amount(force, unit)} rms")
+        lines.append(f"unexplained force there: {amount(force, unit, 2)} rms")
     return lines
 
 
@@ -187,5 +186,6 @@ def _hidden(diagnosis: Mapping[str, Any]) -> list[str | Markup]:
             )
         )
     if unsure:
-        lines.append(f"these recordings cannot tell: {', '.join(unsure)}")
+        told = ", ".join(title_of(i) for i in unsure)
+        lines.append(f"these recordings cannot tell: {told}")
     return lines

@@ -8,20 +8,21 @@ from math import isfinite
 import numpy as np
 from markupsafe import Markup, escape
 
-from bayesimpact.report.results import Results, Row
-from bayesimpact.report.rows import Z90
-from bayesimpact.report.units import (
+from bayesimpact.model.units import (
     chi2,
     decimals,
     display,
+    interval_decimals,
     number,
     p_value,
     readable,
     reading,
     signed,
     significant,
+    span,
     typeset,
 )
+from bayesimpact.report.results import Results, Row
 
 
 @dataclass(frozen=True)
@@ -67,11 +68,6 @@ def symbol(name: str) -> Markup:
     return html + escape(bracket + key)
 
 
-def span(low: float, high: float, scale: float, places: int) -> str:
-    """Both ends of an interval."""
-    return f"{number(low * scale, places)} to {number(high * scale, places)}"
-
-
 def parameter_views(results: Results, rows: tuple[Row, ...]) -> list[ParameterView]:
     """Rows of the table of parameters; reference cells in the order of `reference_labels`."""
     labels = reference_labels(rows)
@@ -87,10 +83,10 @@ def _view(row: Row, labels: list[str]) -> ParameterView:
     low, high = row.ci90
     half = 0.5 * (high - low)
     shown = readable(row.unit, max(abs(row.median), half))
-    places = decimals(half * shown.scale)
-    total_places = decimals(0.5 * (row.total90[1] - row.total90[0]) * shown.scale)
+    places = interval_decimals(low * shown.scale, high * shown.scale)
+    total_places = interval_decimals(*(end * shown.scale for end in row.total90))
     ratio, ratio_low, ratio_high = row.ratio
-    ratio_places = decimals(0.5 * (ratio_high - ratio_low))
+    ratio_places = interval_decimals(ratio_low, ratio_high)
     return ParameterView(
         symbol=symbol(row.name),
         meaning=row.meaning,
@@ -159,11 +155,15 @@ def release_views(results: Results) -> list[dict[str, str]]:
         cells = {"name": r.name, "case": r.case}
         for key, (scale, _) in columns.items():
             row = results.row(f"{key}[{r.name}]")
-            half = 0.5 * (row.ci90[1] - row.ci90[0]) * scale
+            half = _half(row) * scale
             places = decimals(half)
             cells[key] = f"{number(row.median * scale, places)} ± {number(half, places)}"
         rows.append(cells)
     return rows
+
+
+def _half(row: Row) -> float:
+    return 0.5 * (row.ci90[1] - row.ci90[0])
 
 
 def release_columns(results: Results) -> dict[str, tuple[float, str]]:
@@ -172,7 +172,7 @@ def release_columns(results: Results) -> dict[str, tuple[float, str]]:
     for key in ("y0", "v0", "offset"):
         rows = [row for row in results.rows if row.name.startswith(f"{key}[")]
         if rows:
-            size = float(np.max([max(abs(row.median), Z90 * row.sd) for row in rows]))
+            size = float(np.max([max(abs(row.median), _half(row)) for row in rows]))
             shown = display(rows[0].unit, size)
             columns[key] = (shown.scale, typeset(shown.unit))
     return columns

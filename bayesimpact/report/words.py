@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from bayesimpact.diagnosis.whiteness import LAGS
+from bayesimpact.model.units import chi2, number, significant, typeset
 from bayesimpact.report.checks import amount
 from bayesimpact.report.figures.recordings import MOST as MOST_RECORDINGS
 from bayesimpact.report.results import Results, Row
-from bayesimpact.report.units import chi2, number, significant, typeset
 
 
 def kind_words(results: Results) -> str:
@@ -50,6 +50,11 @@ def facts(results: Results) -> list[tuple[str, str]]:
 
 def parameter_words(results: Results) -> str:
     """What the table of parameters holds."""
+    if results.remains:
+        return (
+            "Medians and 90 % intervals that carry what stays unexplained: by how much it may have "
+            "moved the parameters is part of them."
+        )
     if results.kind == "posterior":
         words = "Medians and central 90 % intervals of the posterior."
     else:
@@ -212,8 +217,10 @@ def noise_words(results: Results) -> str:
     sigmas = results.select("noise")
     if sigmas:
         row = sigmas[0]
-        which = "In the fit" if len(sigmas) == 1 else f"In the fit, {row.name}"
-        words += f" {which} it is {_with_interval(row, results.unit)}."
+        which = "" if len(sigmas) == 1 else f", {row.name},"
+        # where the model misses, what a fit takes for noise is the misfit
+        verb = "The fit leaves" if results.verdict == "inadequate" else "In the fit it is"
+        words += f" {verb}{which} {_with_interval(row, results.unit)}."
     if results.chain.smoothing:
         words += (
             f" The recordings were smoothed ({results.chain.smoothing}); so are the simulations."

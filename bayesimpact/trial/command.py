@@ -21,7 +21,7 @@ OPTIONS: tuple[Callable[[Callable[..., None]], Callable[..., None]], ...] = (
                  help="How many trials; they have the seeds SEED, SEED + 1, ..."),
     click.option("--regime", type=click.Choice(["weak", "strong"]), default="weak",
                  show_default=True, help="weak: effects near the detection limit. strong: several "
-                 "at once and a gross misfit, as real recordings have them."),
+                 "at once and a large misfit, as real recordings have them."),
     click.option("--kinds", metavar="A,B", help="control, single, pair, outside; in turn. [all] "
                  "fault: a fault of a recording, fault_single: an effect as well. "
                  "strong: several, several_outside. [several twice]"),

@@ -17,7 +17,7 @@ from bayesimpact.trial.faults import PLANTS, plant_fault
 from bayesimpact.trial.faults_rig import OTHER_RIG, another_rig
 from bayesimpact.trial.planted_effects import PLANTED_EFFECTS
 from bayesimpact.trial.rig import Effects, make_campaign
-from bayesimpact.trial.sensitivity import Sensitivity, clean_readings, true_parameters
+from bayesimpact.trial.sensitivity import Sensitivity, clean_readings, truth_of_rig
 from bayesimpact.trial.settings import Settings
 from bayesimpact.trial.sizing import Sized, Unsuitable, outside, pair, planted_effect_of, single
 from bayesimpact.trial.strong_draw import draw_strong
@@ -169,12 +169,7 @@ def _recorded(
     clean = clean_readings(design, effects)
     noise = [r.samples - c for r, c in zip(campaign.recordings, clean, strict=True)]
     truth = {
-        "schema": "bayesimpact/trial-truth/1",
-        "seed": seed,
-        "settings": settings.document(),
-        "kind": kind,
-        "rig_kind": design.rig_kind,
-        "noise_kind": design.noise_kind,
+        **truth_of_rig(settings, seed, kind, design),
         "planted": [
             {
                 "id": one.effect,
@@ -188,13 +183,6 @@ def _recorded(
             }
             for one in found
         ],
-        "mass_kg": design.rig.mass,
-        "parameters": true_parameters(design),
-        "rate_hz": design.rate,
-        "duration_s": design.duration,
-        "noise_m": design.chain.noise,
-        "noise_correlation": design.chain.correlation,
-        "rounding_m": design.chain.rounding,
         "noise_rms_m": float(np.sqrt(np.mean(np.concatenate(noise) ** 2))),
     }
     return Drawn(campaign, truth)

@@ -1,7 +1,7 @@
 """Faults put into recordings of the independent rig, and whether an answer finds them.
 
-Sizes run from just visible to gross, logarithmically. A fault is put into one recording at random;
-everything else about the campaign is sound.
+Sizes run from just visible to plain to see, logarithmically. A fault is put into one recording at
+random; everything else about the campaign is sound.
 """
 
 from __future__ import annotations

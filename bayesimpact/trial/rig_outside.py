@@ -1,4 +1,4 @@
-"""Forces that the catalogue does not know: what an honest diagnosis has to call unknown.
+"""Forces that the catalogue does not know: what a diagnosis has to call unknown.
 
 Conventions as in the catalogue: forces in N on the left-hand side, SI units, frequencies in Hz.
 """

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,7 @@ from bayesimpact.trial.designs import Design
 from bayesimpact.trial.rig import Effects, record
 from bayesimpact.trial.rig_chain import Probe, measure
 from bayesimpact.trial.rig_motion import sampling
+from bayesimpact.trial.settings import Settings
 
 Array = NDArray[np.float64]
 
@@ -70,6 +72,25 @@ def true_parameters(design: Design) -> dict[str, float]:
         values[f"v0[{release.name}]"] = release.v0
         values[f"offset[{release.name}]"] = design.chain.offsets.get(release.name, 0.0)
     return values
+
+
+def truth_of_rig(settings: Settings, seed: int, kind: str, design: Design) -> dict[str, Any]:
+    """What every trial's truth says of its rig and recordings."""
+    return {
+        "schema": "bayesimpact/trial-truth/1",
+        "seed": seed,
+        "settings": settings.document(),
+        "kind": kind,
+        "rig_kind": design.rig_kind,
+        "noise_kind": design.noise_kind,
+        "mass_kg": design.rig.mass,
+        "parameters": true_parameters(design),
+        "rate_hz": design.rate,
+        "duration_s": design.duration,
+        "noise_m": design.chain.noise,
+        "noise_correlation": design.chain.correlation,
+        "rounding_m": design.chain.rounding,
+    }
 
 
 class Rival:

@@ -46,7 +46,7 @@ class Settings:
     rig_kinds : rigs, drawn at random
     noises : kinds of noise, drawn at random
     search : whether the diagnosis runs its global search (and samples, where it writes a report)
-    regime : weak (effects near the detection limit) or strong (several at once, a gross misfit)
+    regime : weak (effects near the detection limit) or strong (several at once, a large misfit)
     misfit : strong only: range of the base misfit, in standard deviations of the noise
     rest : strong only: share of trials whose recordings begin before the release
     report : whether the diagnosis goes the whole way of the command, report and figures included

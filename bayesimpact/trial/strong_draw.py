@@ -25,7 +25,7 @@ from bayesimpact.trial.designs import Design, log_uniform
 from bayesimpact.trial.drawn import Drawn
 from bayesimpact.trial.identifiable import stand_outs
 from bayesimpact.trial.rig import record
-from bayesimpact.trial.sensitivity import clean_readings, true_parameters
+from bayesimpact.trial.sensitivity import clean_readings, truth_of_rig
 from bayesimpact.trial.settings import Settings
 from bayesimpact.trial.sizing import LIMIT, Unsuitable
 from bayesimpact.trial.strong_effects import (
@@ -218,12 +218,7 @@ def _truth(
     settings: Settings, seed: int, kind: str, design: Design, found: list[Chosen]
 ) -> dict[str, Any]:
     return {
-        "schema": "bayesimpact/trial-truth/1",
-        "seed": seed,
-        "settings": settings.document(),
-        "kind": kind,
-        "rig_kind": design.rig_kind,
-        "noise_kind": design.noise_kind,
+        **truth_of_rig(settings, seed, kind, design),
         "planted": [
             {
                 "id": c.effect,
@@ -234,11 +229,4 @@ def _truth(
             }
             for c in found
         ],
-        "mass_kg": design.rig.mass,
-        "parameters": true_parameters(design),
-        "rate_hz": design.rate,
-        "duration_s": design.duration,
-        "noise_m": design.chain.noise,
-        "noise_correlation": design.chain.correlation,
-        "rounding_m": design.chain.rounding,
     }

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from bayesimpact.errors import InputError
+from bayesimpact.model.units import decimals, display, number, signed, significant, typeset
 from bayesimpact.report.rows import Z90
-from bayesimpact.report.units import decimals, display, number, signed, significant, typeset
 from bayesimpact.trial.rig_files import TRUTH_FILE
 
 NAMES = ("c1", "k1", "c2", "g", "k2")

@@ -116,7 +116,7 @@ def test_an_effect_outside_the_catalogue_is_unknown_and_learned(unknown):
     carried = physical_z(unknown.after, unknown.intervals.mean, sd)
     ignored = physical_z(unknown.before)
     assert max(map(abs, carried.values())) < 0.3 * max(map(abs, ignored.values()))
-    assert np.all(sd >= 0.999 * unknown.after.sd)
+    assert max(map(abs, carried.values())) < 3.0
 
 
 TOP = {
@@ -178,7 +178,9 @@ def test_the_document_of_a_named_effect(named):
     assert effect["probability"] > 0.99 and effect["delta_log_evidence"] > 50
     assert effect["location"]["regime"] == "contact"
     size = effect["size"]
-    assert set(size) == {"value", "unit", "percent", "of"} and "obstacle" in size["of"]
+    assert (
+        set(size) == {"value", "unit", "percent", "of"} and size["of"] == "the peak contact force"
+    )
     assert size["unit"] == "N" and 0 < size["percent"] < 20
     (name,) = effect["parameters"]
     entry = effect["parameters"][name]
@@ -212,7 +214,8 @@ def test_the_document_of_an_ambiguous_case_lists_the_rivals(named):
     content = written(replace(named, verdict="ambiguous", alternatives=rivals))
     ids = [a["id"] for a in content["alternatives"]]
     assert ids[:2] == ["spring_cubic", "coulomb_friction + sensor_drift"]
-    assert all(i in content["summary"] for i in ids[:2])
+    told = "cubic stiffness of the suspension or dry friction and drift of the probe's zero"
+    assert told in content["summary"]
     assert content["effects"][0]["id"] == "contact_hardening"
 
 

@@ -30,8 +30,8 @@ def test_a_certificate_of_what_stands_out():
     base = identify(campaign, rng=np.random.default_rng(0), search=False)
     found = diagnose_fit(base, rng=np.random.default_rng(0), effects=FEW)
     assert found.verdict == "named"
-    said = certificate(found, 3, rng=np.random.default_rng(0), effects=FEW)
-    assert said == Certificate(3, 0, 3, 3, 0)
+    said = certificate(found, 2, rng=np.random.default_rng(0), effects=FEW)
+    assert said == Certificate(2, 0, 2, 2, 0)
 
 
 def test_of_an_adequate_model_only_controls_are_repeated(small):

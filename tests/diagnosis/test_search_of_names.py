@@ -143,6 +143,7 @@ def run(monkeypatch):
         monkeypatch.setattr(search, "learn_force", lambda fit, force, scales: force.fit)
         monkeypatch.setattr(search, "with_force", lambda candidate, force, scales: candidate)
         monkeypatch.setattr(search, "residual_repetition", lambda fit: 1.0)
+        monkeypatch.setattr(search, "discrepancy", lambda fit: None)
         monkeypatch.setattr(search, "may_be_needed", lambda naming, effect: True)
         monkeypatch.setattr(search, "promising_pairs", lambda scan, count: ())
         for force in ("missing_force", "missing_drift"):

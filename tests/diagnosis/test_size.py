@@ -8,7 +8,8 @@ from effect_rigs import BY_ID, with_effect
 
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.force import trajectory_points
-from bayesimpact.diagnosis.size import amount, peak_force, size, size_in_words
+from bayesimpact.diagnosis.size import peak_force, size, size_in_words
+from bayesimpact.model.units import two_digits
 
 
 def test_peak_force_along_the_motion(small):
@@ -41,14 +42,14 @@ def test_a_size_is_a_force_and_its_share(small):
     fit = with_effect(small, "spring_cubic", stiffness=2e4)
     text, share = size_in_words(BY_ID["spring_cubic"], small.fit, fit, scales)
     peak = peak_force(BY_ID["spring_cubic"], fit)
-    assert text == f"{peak:.2g} N" and share == pytest.approx(peak / scales.force)
+    assert text == two_digits(peak, "N") and share == pytest.approx(peak / scales.force)
     hard = with_effect(small, "contact_hardening", stiffness=1e7)
     _, share = size_in_words(BY_ID["contact_hardening"], small.fit, hard, scales)
     peak = peak_force(BY_ID["contact_hardening"], hard)
     assert share == pytest.approx(peak / scales.contact_force)
     friction = with_effect(small, "coulomb_friction", force=2e-3)
     text, share = size_in_words(BY_ID["coulomb_friction"], small.fit, friction, scales)
-    assert text == "0.002 N" and share == pytest.approx(2e-3 / scales.force)
+    assert text == "2.0 mN" and share == pytest.approx(2e-3 / scales.force)
 
 
 @pytest.mark.parametrize("effect_id", BY_ID)
@@ -81,9 +82,3 @@ def test_the_measuring_chain_is_told_by_its_change_of_the_readings(small):
     largest = max(np.abs(y).max() for y, _ in trajectory_points(small.fit))
     assert unit == "m" and value == pytest.approx(0.5 * largest**2, rel=0.01)
     assert share == pytest.approx(value / scales.amplitude)
-
-
-def test_amounts_are_readable():
-    assert amount(0.00123, "m") == "1.2 mm" and amount(4.3e-7, "m") == "430 nm"
-    assert amount(2e-5, "m") == "20 µm" and amount(0.0, "m") == "0 m"
-    assert amount(0.0123, "N") == "0.012 N"

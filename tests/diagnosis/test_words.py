@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -10,7 +11,10 @@ from effect_rigs import BY_ID
 
 from bayesimpact.diagnosis.remainder import Remainder
 from bayesimpact.diagnosis.words import (
+    Shift,
     failure,
+    left_open,
+    parameter_shift,
     parameter_shifts,
     remaining,
     statement,
@@ -22,12 +26,41 @@ def entry(median: float, half: float) -> dict[str, object]:
     return {"median": median, "ci90": [median - half, median + half]}
 
 
-def test_shifts_are_what_ignoring_did():
+def test_shifts_are_what_adding_does():
     before = {"k1": entry(808.0, 1.0), "k2[1]": entry(5300.0, 10.0), "y0[a]": entry(1.0, 0.1)}
-    after = {"k1": entry(809.0, 1.0), "k2[1]": entry(5000.0, 10.0), "y0[a]": entry(2.0, 0.1)}
+    after = {"k1": entry(809.0, 1.0), "k2[1]": entry(5035.0, 10.0), "y0[a]": entry(2.0, 0.1)}
     shifts = parameter_shifts(before, after)  # k1 has not moved beyond its intervals
-    assert shifts == {"k2[1]": pytest.approx(0.06)}
+    assert shifts == {"k2[1]": Shift(pytest.approx(-0.05))}
     assert parameter_shifts({"g": entry(1.0, 0.1)}, {}) == {}
+
+
+def test_a_wide_interval_proves_its_nearer_end_only():
+    """Once told: "c1 was 99 % too low" beside a 90 % interval of 0.45 to 14."""
+    old = {"median": 0.025, "ci90": [0.0249, 0.0251]}
+    assert parameter_shift(old, {"median": 2.0, "ci90": [0.45, 3.0]}) == Shift(
+        pytest.approx(17.0), least=True
+    )
+    # a normal law cut at zero: nothing is likelier than what its interval leaves out there
+    assert parameter_shift(old, {"median": 5.0, "ci90": [0.45, 14.0]}) is None
+    assert parameter_shift(old, {"median": 2.0, "ci90": [0.024, 3.0]}) is None
+    said = summary(
+        "partly", (BY_ID["coulomb_friction"],), ("",), place("free"), (),
+        {"c1": Shift(17.0, least=True), "k1": Shift(0.058)}, "",
+    )  # fmt: skip
+    assert "Adding it raises k1 by 5.8 %" in said and "c1" not in said
+    said = summary("unknown", (), (), place("free"), (), {"c1": Shift(17.0, least=True)}, "")
+    assert "Fitting a force in its place raises c1 to at least 18 times its value" in said
+
+
+def test_a_size_that_is_left_open_says_so():
+    cubic, name = BY_ID["spring_cubic"], "spring_cubic.stiffness"
+    wide = {name: {"unit": "N m/rad3", "median": 6.1, "ci90": [-8.2, 20.6]}}
+    said = left_open(cubic, wide)
+    assert said == (
+        " What remains leaves that open: its stiffness may be \N{MINUS SIGN}8 to 21 N m/rad³."
+    )
+    assert left_open(cubic, {name: {"unit": "N/m3", "median": 6.1, "ci90": [5.0, 7.0]}}) == ""
+    assert left_open(BY_ID["pendulum_sine"], wide) == ""  # it has no size of its own
 
 
 @pytest.mark.parametrize("effect_id", BY_ID)
@@ -39,9 +72,10 @@ def test_every_effect_has_its_sentence(effect_id):
 def test_what_remains_is_said_in_units():
     left = Remainder(1.3e-4, 0.022, 11.2, "contact", (1e-3, 2e-3), ("a",), "gap_wear")
     said = remaining(left)
-    assert "130 µm rms" in said and "2.2 % of the signal" in said and "11 times" in said
-    assert "obstacle" in said and "gap wear" in said
-    assert remaining(None) == "" and "0.00013 rad" in remaining(left, "rad")
+    assert "0.13 mm rms" in said and "2.2 % of the signal" in said and "11 times" in said
+    assert "obstacle" in said and "likeliest: a gap that grows at every impact" in said
+    assert remaining(None) == "" and "130 µrad" in remaining(left, "rad")
+    assert "likeliest" not in remaining(replace(left, guess=""))
 
 
 def fit_of(rms: float, *inputs: object):
@@ -67,16 +101,21 @@ def place(regime: str):
 
 def test_the_paragraph():
     friction = (BY_ID["coulomb_friction"],)
-    shifts = {"k1": 0.2, "k2[1]": -0.082, "k2[2]": 0.03}
+    shifts = {"k1": Shift(0.2), "k2[1]": Shift(-0.082), "k2[2]": Shift(0.03)}
     said = summary("adequate", (), (), None, (), {}, "Limits.")
     assert said.startswith("Nothing is missing") and said.endswith("Limits.")
     said = summary("named", friction, ("It rubs.",), place("free"), (), shifts, "")
     assert "dry friction" in said and "It rubs." in said and "suspension" in said
-    assert "k2[1] was 8.2 % too low" in said
-    said = summary("ambiguous", friction, ("",), place("contact"), ("gap_wear",), shifts, "")
-    assert "gap_wear" in said and "cannot tell" in said and "obstacle" in said
-    said = summary("unknown", (), (), place("contact"), (), {"k1": 0.04}, "")
-    assert "-2.00 and 1.50 mm" in said and "0.012 N rms" in said and "k1 was 4 % too high" in said
+    assert "Adding it lowers k2[1] by 8.2 %" in said
+    said = summary("ambiguous", friction, ("",), place("contact"), ("gap_wear + own",), shifts, "")
+    assert (
+        "a gap that grows at every impact and own" in said
+        and "cannot tell" in said
+        and "obstacle" in said
+    )
+    said = summary("unknown", (), (), place("contact"), (), {"k1": Shift(0.04)}, "")
+    assert "\N{MINUS SIGN}2.0 to 1.5 mm" in said and "0.012 N rms" in said
+    assert "raises k1 by 4.0 %" in said
     said = summary("partly", friction, ("It rubs.",), place("free"), (), {}, "", " More.")
     assert said.startswith("Dry friction is needed by every likely model")
     assert "It rubs." in said and said.endswith(" More.")
@@ -84,7 +123,7 @@ def test_the_paragraph():
     assert said.startswith("Something is missing") and said.endswith(" A spike.")
     wide = SimpleNamespace(regime="free", displacement=(-0.3, 0.31), force_rms=0.012)
     said = summary("unknown", (), (), wide, (), {}, "", angle=True)
-    assert "-0.30 and 0.31 rad" in said and "0.012 N m rms" in said
+    assert "\N{MINUS SIGN}0.30 to 0.31 rad" in said and "0.012 N m rms" in said
 
 
 def test_recordings_keep_their_truth(small):

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from bayesimpact.model.units import per_mass_unit
 from bayesimpact.report import checks
 from bayesimpact.report.results import (
     BackboneSummary,
@@ -22,7 +23,6 @@ from bayesimpact.report.results import (
     SearchSummary,
 )
 from bayesimpact.report.rows import Z90, widened
-from bayesimpact.report.units import per_mass_unit
 
 NOISE = 5e-6
 MASS = 0.503

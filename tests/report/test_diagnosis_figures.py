@@ -15,7 +15,6 @@ from matplotlib.text import Text
 
 from bayesimpact.report.archive import load_results, save_results
 from bayesimpact.report.captions import caption
-from bayesimpact.report.figures import shares
 from bayesimpact.report.figures.improvement import shifts
 from bayesimpact.report.figures.ranking import FREE_FORCE, MOST, ranked
 from bayesimpact.report.figures.save import all_figures, png
@@ -126,9 +125,16 @@ def test_shifts_are_in_deviations_of_the_base_model() -> None:
     old = {"unit": "N/m", "median": 100.0, "ci90": [100 - 1.6448536 * sd, 100 + 1.6448536 * sd]}
     new = {"unit": "N/m", "median": 90.0, "ci90": [88.0, 92.0]}
     tables = {"before": {"k1": old, "c1": old, "sigma": old}, "after": {"k1": new, "sigma": new}}
-    ((name, before, after),) = shifts(tables)
-    assert name == "k1" and before == pytest.approx([-1.6448536, 0, 1.6448536])
+    ((name, before, after),), unit = shifts(tables)
+    assert (
+        unit == "its standard deviations"
+        and name == "k1"
+        and before == pytest.approx([-1.6448536, 0, 1.6448536])
+    )
     assert after == pytest.approx([-6, -5, -4])
+    wide = tables | {"after": {"k1": new | {"ci90": [88.0, 3000.0]}}}
+    ((_, _, after),), unit = shifts(wide)
+    assert unit == "%" and after == pytest.approx([-12, -10, 2900])
 
 
 @pytest.mark.parametrize(("count", "cases"), [(1, 1), (2, 1), (50, 5)])
@@ -137,11 +143,8 @@ def test_any_number_of_recordings(count: int, cases: int) -> None:
         assert png(figure).startswith(b"\x89PNG")
 
 
-@pytest.mark.long
-def test_report_is_drawn_again_from_stored_results(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(shares, "started", lambda folder: None)
+@pytest.mark.usefixtures("coarse_figures")
+def test_report_is_drawn_again_from_stored_results(tmp_path: Path) -> None:
     results = diagnosed(2, 1)
     save_results(results, tmp_path)
     loaded = load_results(tmp_path)

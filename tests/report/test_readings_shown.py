@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from synthetic import make_results
 
+from bayesimpact.model.units import display
 from bayesimpact.report.codec import decode, encode
 from bayesimpact.report.cycles import contacts, stop_level, touches
 from bayesimpact.report.explorer import explorer_data
 from bayesimpact.report.figures.style import position, response, response_word
 from bayesimpact.report.results import Results
 from bayesimpact.report.tables import recording_views, residual_unit
-from bayesimpact.report.units import display
 
 W = 2 * np.pi * 6.4
 

@@ -70,7 +70,7 @@ def test_after_a_diagnosis_nobody_is_sent_to_diagnose() -> None:
         assert "bayesimpact diagnose" in results.headline
         after = assessed(replace(results, diagnosis={"verdict": "unknown", "summary": ""}))
         assert "bayesimpact diagnose" not in after.headline
-        assert ("Something else remains." in after.headline) == (after.verdict == "inadequate")
+        assert ("carry what remains." in after.headline) == (after.verdict == "inadequate")
 
 
 def test_slight_misfit_warns_about_the_intervals() -> None:

@@ -205,18 +205,17 @@ def test_diagnosis_tells_its_story_first() -> None:
     assert text.index("Dry friction is missing <here>.") < 300
     assert text.index("Diagnosis: what is missing is named") < text.index("Parameters Medians")
     for words in (
-        "free flight (93 % of what is unexplained)",
+        "the suspension, wherever the mass moves (93 % of what is unexplained)",
         "displacement \N{MINUS SIGN}6.0 to 3.0 mm",
-        "force, rms 140 µN",
         "Probability > 0.999; it changes the log evidence by +812.3.",
         "force = 160 (150 to 170) µN",
-        "obstacle_mass 0.010 +770.0",
+        "mass of the obstacle 0.010 +770.0",
         "reduced χ² 1.170 1.002",
         "residual rms 5.40 µm 5.00 µm",
         "whiteness p < 0.001 0.40",
         "+320 ± 79 (standard error): an improvement.",
         f"{(808.556 - 808.6) / (0.005 / 1.6449):.1f}".replace("-", "\N{MINUS SIGN}"),
-        "quadratic_drag coefficient 100 µN s²/m²",
+        "quadratic drag coefficient 100 µN s²/m²",
     ):
         assert words in text, words
     assert source.count(base64.b64encode(PNG).decode()) == len(NAMES) + 1

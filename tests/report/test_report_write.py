@@ -22,6 +22,7 @@ from bayesimpact.report.archive import load_results
 from bayesimpact.report.archive_arviz import open_arviz, read_posterior
 from bayesimpact.report.backbones import backbone_summary
 from bayesimpact.report.build import results_from_fit, results_from_posterior
+from bayesimpact.report.figures.gaussian import gaussian_figures
 from bayesimpact.report.groups import inference_groups
 from bayesimpact.report.rows import Z90
 from bayesimpact.report.write import (
@@ -69,6 +70,21 @@ def test_fit_in_numbers(identification: Identification) -> None:
     assert results.chi2_z == pytest.approx((fit.reduced_chi2 - 1) / error)
     assert results.provenance.seed == 5 and "numpy" in results.provenance.versions
     assert results.search is not None and results.search.agree
+
+
+def test_what_remains_is_in_every_table(identification: Identification) -> None:
+    """Once the page told c1 as 5 (0 to 14) in one table and as 0.0205 (0.0205 to 0.0205) below."""
+    told = {"c1": {"unit": "N s/m", "median": 0.2, "ci90": [0.1, 0.4]}}
+    diagnosis = {"remainder": {"rms_m": 1e-6}, "parameters": {"before": {}, "after": told}}
+    results = results_from_fit(identification, diagnosis=diagnosis)
+    row = results.row("c1")
+    assert (row.median, row.ci90, results.centre) == (0.2, (0.1, 0.4), "median")
+    assert row.ratio[1:] == pytest.approx((0.1 / 0.503, 0.4 / 0.503))
+    assert row.mode == identification.fit.mode[0] and results.row("k1").ci90[0] > 800
+    arrays = {"before_chi2": np.ones(2)}
+    assert gaussian_figures(replace(results, diagnosis_arrays=arrays)) == {}
+    certain = results_from_fit(identification, diagnosis=diagnosis | {"remainder": None})
+    assert certain.row("c1").median == row.mode and certain.centre == "mode"
 
 
 def test_mass_widens_stiffness_and_not_lengths(identification: Identification) -> None:

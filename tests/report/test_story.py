@@ -8,6 +8,7 @@ from diagnosed import DIAGNOSIS, LIMITS, diagnosed, estimate
 from markupsafe import Markup
 from test_report_html import page
 
+from bayesimpact.report.diagnosis_view import diagnosis_view
 from bayesimpact.report.results import Results
 from bayesimpact.report.story import corrected, story_rows
 
@@ -29,7 +30,8 @@ def test_every_question_of_a_named_effect() -> None:
     story = told(diagnosed())
     assert list(story) == ["verdict", "place", "physics", "size", "improvement"]
     assert story["verdict"] == "What is missing is named"
-    assert "free flight" in story["place"] and "shows in run_0; case 1" not in story["place"]
+    assert "wherever the mass moves" in story["place"]
+    assert "shows in run_0; case 1" not in story["place"]
     assert "coulomb friction, probability > 0.999" in story["physics"]
     assert "force = 160 (150 to 170) µN" in story["size"]
     assert "5.40 µm → 5.00 µm" in story["improvement"] and "+320 ± 79" in story["improvement"]
@@ -66,8 +68,8 @@ def test_sizes_in_units_and_per_cent_and_what_remains() -> None:
     results = diagnosed(verdict="partly", effects=[effect], remainder=remainder, parameters=STIFF)
     story = told(results)
     assert "something unexplained remains" in story["verdict"]
-    assert "a gap that grows: 3.10 µm, 0.12 % of the deepest indentation" in story["size"]
-    assert "unexplained: 2.40 µm rms (0.11 % of the signal, 0.48 × the noise)" in story["remains"]
+    assert "a gap that grows: 3.1 µm, 0.12 % of the deepest indentation" in story["size"]
+    assert "unexplained: 2.4 µm rms (0.11 % of the signal, 0.48 × the noise)" in story["remains"]
     assert "the end of contact" in story["remains"] and "likely: a rattle" in story["remains"]
     source, parsed = page(results)
     assert "What remains unexplained" in parsed.text and "run_1" in parsed.text
@@ -84,7 +86,7 @@ def test_formulas_of_a_learned_force() -> None:
 
 def test_alternatives_are_told_when_several_fit_alike() -> None:
     story = told(diagnosed(verdict="ambiguous"))
-    assert "or obstacle_mass, probability 0.010" in story["physics"]
+    assert "or mass of the obstacle, probability 0.010 obstacle_mass" in story["physics"]
     assert "obstacle_mass" not in told(diagnosed())["physics"]
 
 
@@ -92,7 +94,7 @@ def test_nothing_missing_says_what_could_hide() -> None:
     story = told(diagnosed(verdict="adequate", location=None, effects=[], limits=LIMITS))
     assert list(story) == ["verdict", "could still hide"]
     assert "c1 by at most 3.2" in story["could still hide"]
-    assert "cannot tell: contact_relaxation" in story["could still hide"]
+    assert "cannot tell: relaxation of the obstacle" in story["could still hide"]
     source, _ = page(diagnosed(verdict="adequate", location=None, effects=[]))
     assert "corrected" not in source and "Before and after" not in source
 
@@ -114,3 +116,50 @@ def test_a_certificate_is_told_where_there_is_one() -> None:
     assert "of 20" in story["certificate"] and "1 raised an alarm" in story["certificate"]
     assert "18 were named the same" in story["certificate"]
     assert "certificate" not in told(diagnosed(certificate=None))
+
+
+REMAINDER = {"rms_m": 2e-6, "share_of_signal_percent": 0.1, "over_noise": 4.0, "regime": "free",
+             "displacement_m": [-1e-3, 1e-3], "recordings": ["run_0"],
+             "guess": "sensor_quadratic"}  # fmt: skip
+
+
+def test_a_wide_interval_tells_no_change_that_it_does_not_prove() -> None:
+    """Once told: "c1 0 (0 to 0), 5 (0 to 14), +19 000 %, 1.3e5 sd", and a change of k1 inside
+    the interval of k1.
+    """
+    unit = "N m s/rad"
+    both = {
+        "before": {
+            "c1": estimate(0.025223, 6e-5, unit),
+            "c2": estimate(0.025223, 6e-5, unit),
+            "k1": estimate(6.0888, 2e-4, "N m/rad"),
+        },
+        "after": {
+            "c1": {"unit": unit, "median": 4.8, "ci90": [0.447, 13.95]},
+            "c2": {"unit": unit, "median": 1.0, "ci90": [0.447, 1.6]},
+            "k1": estimate(6.04, 1.98, "N m/rad"),
+        },
+    }
+    results = diagnosed(verdict="partly", remainder=REMAINDER, parameters=both)
+    text = page(results)[1].text
+    assert "0.02522 (0.02516 to 0.02528) N m s/rad 4.8 (0.4 to 13.9) N m s/rad" in text
+    changes = {p["name"]: p["change"] for p in diagnosis_view(results)["parameters"]}  # type: ignore[index]
+    assert changes["c1"] == changes["k1"] == "not clear" and "19 000" not in text
+    assert changes["c2"].replace("\N{NO-BREAK SPACE}", " ") == "at least +1700 %"
+    assert "likely: quadratic characteristic of the probe" in told(results)["remains"]
+
+
+def test_what_is_still_seen_is_not_ruled_out() -> None:
+    seen = {**LIMITS[0], "id": "spring_cubic", "answer": "present"}
+    results = diagnosed(verdict="partly", remainder=REMAINDER, limits=[*LIMITS, seen])
+    text = page(results)[1].text
+    assert "would explain part of what is left: cubic stiffness of the suspension." in text
+    assert text.count("cubic stiffness of the suspension") == 1
+    assert "limits do not know of what remains" in text and "could move" not in text
+    assert "could move" in page(diagnosed(limits=LIMITS))[1].text
+
+
+def test_all_better_and_unsure_is_said_so() -> None:
+    gain = {"value": 47749.0, "se": 29764.0, "wins": 2, "of": 2, "improved": False}
+    text = page(diagnosed(fit={"before": {}, "after": {}, "held_out_gain": gain}))[1].text
+    assert "All 2 are predicted better" in text and "no clear improvement" not in text

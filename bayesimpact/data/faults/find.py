@@ -16,6 +16,7 @@ from bayesimpact.data.faults.quantised import find_quantised
 from bayesimpact.data.faults.slip import find_slips
 from bayesimpact.data.faults.spikes import find_spikes
 from bayesimpact.data.faults.start import find_start
+from bayesimpact.data.faults.tail import without_tail
 from bayesimpact.data.gaps import without
 from bayesimpact.data.recording import Recording
 
@@ -96,24 +97,28 @@ def set_aside(campaign: Campaign) -> tuple[Campaign, tuple[Fault, ...]]:
     """The campaign without the faults found in its recordings, and the faults.
 
     With `faults = "keep"` in campaign.toml the campaign stays as it is; faults are told all the
-    same. A campaign without faults is returned as it is. What was done stands in `Campaign.notes`,
-    which reports print.
+    same. What was done stands in `Campaign.notes`, which reports print; repeated readings of a
+    motion that has died away (`tail`) are no fault.
     """
     faults = find_faults(campaign)
-    if campaign.keep_faults or not any(f.action != "notice" for f in faults):
+    if campaign.keep_faults:
         return campaign, faults
-    kept = []
+    kept, tails = [], []
     for recording in campaign.recordings:
         own = [f for f in faults if f.recording == recording.name]
         if not any(f.action == "skip" for f in own):
-            kept.append(applied(recording, own)[0])
+            rest, note = without_tail(applied(recording, own)[0])
+            kept.append(rest)
+            tails += [note] if note else []
     hard = [f for f in faults if f.action != "notice"]
+    if not (hard or tails):
+        return campaign, faults
     skipped = {f.recording: f.statement for f in hard if f.action == "skip"}
     notes = tuple(f"{f.recording}, {f.statement}" for f in hard)
     cleaned = replace(
         campaign,
         recordings=tuple(kept),
         skipped={**campaign.skipped, **skipped},
-        notes=(*campaign.notes, *notes),
+        notes=(*campaign.notes, *notes, *tails),
     )
     return cleaned, faults

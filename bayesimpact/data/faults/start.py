@@ -22,7 +22,7 @@ PERIODS = 1.0  # of a hum, over which it is fitted first
 WIDE = 11  # samples of a running median: spikes of five do not show in it
 NARROW = 1 / 8  # of a period, at most: a wider one bends the motion
 UNCROSSED = 0.75  # of a period: a free motion passes its rest within half a period
-GROWTH = 1.3  # largest excursion over what came before it on the same side
+GROWTH = 1.3  # largest excursion over what came before it, on either side
 
 
 def find_start(recording: Recording) -> list[Fault]:
@@ -114,5 +114,5 @@ def _grown(centred: Array, peak: int, period: float) -> bool:
     way = side * centred[int(peak - UNCROSSED * period) : peak]
     if way.min() > -0.02 * height:
         return True
-    before = side * centred[: max(int(peak - 0.5 * period), 1)]
-    return bool(height > GROWTH * max(float(before.max()), 0.0))
+    before = np.abs(centred[: max(int(peak - 0.25 * period), 1)])  # a free swing has two sides
+    return bool(height > GROWTH * float(before.max()))

@@ -57,8 +57,8 @@ EFFECT = Effect(
     parameters=(
         EffectParameter(
             "coefficient",
-            "N",
-            # between the linear law's and the quadratic one's: the unit hangs on the exponent
+            "N at 1 m/s",  # for any exponent; its unit N (s/m)^n would depend on n
+            # between the linear law's and the quadratic one's
             scale=lambda s: 0.5 * s.damping_force / s.speed**1.5,
             lower=0.0,
         ),

@@ -12,6 +12,7 @@ from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from bayesimpact.model.units import p_words
 from bayesimpact.report.figures.style import (
     BLUE,
     ORANGE,
@@ -22,7 +23,6 @@ from bayesimpact.report.figures.style import (
     styled,
 )
 from bayesimpact.report.results import BackboneSummary, Curve, Results
-from bayesimpact.report.units import p_words
 
 PER_PAGE = 3
 MOST = 12

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
+from bayesimpact.model.units import p_words
 from bayesimpact.report.figures.backbone import (
     BRANCH_WORDS,
     branch_style,
@@ -15,7 +16,6 @@ from bayesimpact.report.figures.backbone import (
 )
 from bayesimpact.report.figures.style import label, new_figure, position, styled
 from bayesimpact.report.results import BackboneSummary, Results
-from bayesimpact.report.units import p_words
 
 
 def band_figures(results: Results) -> Mapping[str, Figure]:

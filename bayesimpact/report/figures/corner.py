@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
+from bayesimpact.model.units import decimals, display, number, typeset
 from bayesimpact.report.figures.clouds import LEVELS, Cloud, Law, Normal, plotted
 from bayesimpact.report.figures.style import (
     BLACK,
@@ -25,7 +26,6 @@ from bayesimpact.report.figures.style import (
     scaled,
     styled,
 )
-from bayesimpact.report.units import decimals, display, number, typeset
 
 __all__ = ["LEVELS", "Normal", "corner_figure"]
 

@@ -7,15 +7,19 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
+from bayesimpact.report.change_view import NUISANCES
 from bayesimpact.report.figures.corner import Normal, corner_figure
-from bayesimpact.report.figures.improvement import NUISANCES
 from bayesimpact.report.results import Results
 
 
 def gaussian_figures(results: Results) -> Mapping[str, Figure]:
-    """Corner plot of the normal laws at both modes; nothing where there are draws."""
+    """Corner plot of the normal laws at both modes.
+
+    Nothing where there are draws, nor where something stays unexplained: the curvature at the mode
+    knows nothing of that, and would contradict the tables.
+    """
     arrays, diagnosis = results.diagnosis_arrays, results.diagnosis or {}
-    if results.draws is not None or "before_chi2" not in arrays:
+    if results.draws is not None or results.remains or "before_chi2" not in arrays:
         return {}
     shown = results.select("physical", "effect")
     columns = [i for i, row in enumerate(results.rows) if row in shown]

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 
+from bayesimpact.report.change_view import NUISANCES
 from bayesimpact.report.diagnosis_view import gain_words
 from bayesimpact.report.figures.style import (
     AFTER,
@@ -26,9 +27,9 @@ from bayesimpact.report.figures.style import (
 from bayesimpact.report.results import Results
 from bayesimpact.report.rows import Z90
 
-NUISANCES = ("y0", "v0", "offset", "sigma")
 MOST = 16
 """Parameters shown; those that moved most."""
+FAR = 1000.0  # standard deviations: beyond, they tell a narrow interval, no large shift
 _ROW = 0.24  # in
 
 
@@ -38,9 +39,9 @@ def improvement_figures(results: Results) -> Mapping[str, Figure]:
     if "before_chi2" not in arrays:
         return {}
     figures = {"improvement": _improvement(results, arrays, diagnosis.get("fit") or {})}
-    moved = shifts(diagnosis.get("parameters") or {})
+    moved, unit = shifts(diagnosis.get("parameters") or {})
     if moved:
-        figures["shifts"] = _shifts(moved)
+        figures["shifts"] = _shifts(moved, unit)
     return figures
 
 
@@ -113,31 +114,41 @@ def _total(gain: Mapping[str, Any]) -> str:
     return f"{words} in all" if words else "by recording"
 
 
-def shifts(parameters: Mapping[str, Any]) -> list[tuple[str, Array, Array]]:
+def shifts(parameters: Mapping[str, Any]) -> tuple[list[tuple[str, Array, Array]], str]:
     """Parameters that both models have: name, and (low, median, high) before and after.
 
-    In standard deviations of the base model, from its median; most moved ones in the table's order.
+    From the median of the base model, most moved ones in the table's order; then the unit: standard
+    deviations of the base model, or where these say nothing any more per cent of its value.
     """
+    moved = _moved(parameters, per_cent=False)
+    if any(np.abs(after).max() > FAR for _, _, after in moved):
+        return _moved(parameters, per_cent=True), "%"
+    return moved, "its standard deviations"
+
+
+def _moved(parameters: Mapping[str, Any], *, per_cent: bool) -> list[tuple[str, Array, Array]]:
     before, after = parameters.get("before", {}), parameters.get("after", {})
     found = []
     for name, old in before.items():
         sd = (old["ci90"][1] - old["ci90"][0]) / (2 * Z90)
         if name not in after or name.partition("[")[0] in NUISANCES or not sd > 0:
             continue
-        new = after[name]
-        ends = [_scaled(x, old["median"], sd) for x in (old, new)]
+        new, one = after[name], 0.01 * abs(old["median"]) if per_cent else sd
+        if not one > 0:
+            continue
+        ends = [_scaled(x, old["median"], one) for x in (old, new)]
         found.append((name, ends[0], ends[1]))
     kept = sorted(found, key=lambda row: -abs(row[2][1]))[:MOST]
     return [row for row in found if row in kept] if len(found) > MOST else found
 
 
-def _scaled(estimate: Mapping[str, Any], centre: float, sd: float) -> Array:
+def _scaled(estimate: Mapping[str, Any], centre: float, one: float) -> Array:
     low, high = estimate["ci90"]
-    return (np.array([low, estimate["median"], high]) - centre) / sd
+    return (np.array([low, estimate["median"], high]) - centre) / one
 
 
 @styled
-def _shifts(moved: list[tuple[str, Array, Array]]) -> Figure:
+def _shifts(moved: list[tuple[str, Array, Array]], unit: str) -> Figure:
     figure = new_figure(0.42 * len(moved) + 1.2)
     axis = figure.subplots()
     for i, (_, before, after) in enumerate(moved):
@@ -146,7 +157,7 @@ def _shifts(moved: list[tuple[str, Array, Array]]) -> Figure:
             axis.plot(values[1], i + offset, "o", color=colour, ms=5)
     axis.axvline(0.0, color=GREY, lw=0.7)
     rows_axis(axis, [symbol(name) for name, *_ in moved])
-    axis.set_xlabel("shift from the base model (its standard deviations)")
+    axis.set_xlabel(f"shift from the base model ({unit})")
     axis.set_title("parameters and 90 % intervals", loc="left")
     handles = [
         Line2D([], [], color=colour, lw=3.0, label=words)

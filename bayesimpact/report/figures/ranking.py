@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from bayesimpact.model.units import quantity
 from bayesimpact.report.diagnosis_view import probability
 from bayesimpact.report.figures.style import (
     AFTER,
@@ -20,15 +21,15 @@ from bayesimpact.report.figures.style import (
     rows_axis,
     styled,
 )
+from bayesimpact.report.limit_view import not_found
 from bayesimpact.report.results import Results
-from bayesimpact.report.units import quantity
 
 MOST = 12
 """Models shown; the base model always is."""
 FREE_FORCE = "one free force"
 _ROW, _FRAME = 0.24, 1.05  # in
 _LINEAR = 10.0  # nats; beyond that the axis is logarithmic
-_ANSWERS = {"present": ORANGE, "negligible": GREY, "absent": AFTER, "cannot tell": ORANGE}
+_ANSWERS = {"negligible": GREY, "absent": AFTER, "cannot tell": ORANGE}
 
 
 def ranking_figures(results: Results) -> Mapping[str, Figure]:
@@ -39,7 +40,7 @@ def ranking_figures(results: Results) -> Mapping[str, Figure]:
     models = ranked(evidence, force=diagnosis.get("verdict") == "unknown")
     if len(models) > 1:
         figures["ranking"] = _ranking(models, chosen(diagnosis), evidence.get("decisive"))
-    limits = [x for x in diagnosis.get("limits", ()) if _known(x)]
+    limits = [x for x in not_found(diagnosis) if _known(x)]
     if limits:
         figures["limits"] = _limits(limits)
     return figures
@@ -94,11 +95,16 @@ def _ranking(
     axis.set_xscale("symlog", linthresh=_LINEAR)
     axis.set_xlim(-0.4, max(float(behind.max()), _LINEAR) * 1.4)
     axis.xaxis.set_major_formatter("{x:g}")
-    rows_axis(axis, [" + ".join(e) or "base model" for e, _ in models], above=1.1)
+    rows_axis(axis, [in_words(" + ".join(e)) or "base model" for e, _ in models], above=1.1)
     axis.set_xlabel("log odds behind the best model (nats)")
     axis.set_title("models tried, best first", loc="left")
     _beside(axis, "probability", [probability(float(w)) for w in weight])
     return figure
+
+
+def in_words(ids: str) -> str:
+    """Ids as labels: their titles are too long for an axis."""
+    return ids.replace("_", " ")
 
 
 def _beside(axis: Axes, title: str, cells: Sequence[str]) -> None:
@@ -141,7 +147,7 @@ def _limits(limits: Sequence[Mapping[str, Any]]) -> Figure:
 def _frame(axis: Axes, ordered: Sequence[Mapping[str, Any]]) -> None:
     """Names on the left, upper limits in their units on the right."""
     axis.set_xscale("log")
-    rows_axis(axis, [x["id"] for x in ordered])
+    rows_axis(axis, [in_words(x["id"]) for x in ordered])
     axis.set_xlabel("size over the size that would matter in practice")
     axis.set_title("effects that were not found", loc="left")
     _beside(axis, "95 % upper limit", [_size(x) for x in ordered])

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 
 from bayesimpact.data.period import rough_period
+from bayesimpact.model.units import display
 from bayesimpact.report.cycles import contacts, stop_level
 from bayesimpact.report.figures.style import (
     GREY,
@@ -25,7 +26,6 @@ from bayesimpact.report.figures.style import (
     styled,
 )
 from bayesimpact.report.results import RecordingResult, Results
-from bayesimpact.report.units import display
 
 MOST = 12
 """Recordings shown; a table in the report has all of them."""

@@ -84,7 +84,8 @@ def _corner(results: Results) -> dict[str, Figure]:
         before=results.before,
         truths=truths,
         truth_label=PUBLISHED,
-        estimates={r.name: (r.median, *r.ci90) for r in results.rows},
+        # where something remains, tables carry it and draws do not: their titles are their own
+        estimates=None if results.remains else {r.name: (r.median, *r.ci90) for r in results.rows},
     )
     return {"corner": figure}
 

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from bayesimpact.model.units import display, quantity, significant
 from bayesimpact.report.cycles import Cycle, before_predicted, contacts, telling_cycle
 from bayesimpact.report.figures.force_map import force_unit
 from bayesimpact.report.figures.style import (
@@ -25,9 +26,9 @@ from bayesimpact.report.figures.style import (
 from bayesimpact.report.force_in_time import force_in_time
 from bayesimpact.report.results import Results
 from bayesimpact.report.rows import Z90
-from bayesimpact.report.units import display, number
 
 _CONTACT = "#ECECEC"
+_PLAIN = 1000.0  # nats; beyond, odds say nothing that the residuals do not
 _MARGIN = 0.25  # of the cycle, before it
 
 
@@ -72,11 +73,23 @@ def _figure(results: Results, cycle: Cycle, before: Array) -> Figure:
         _force(panels[2], results, t, force[0][part], force[1][part])
     panels[-1].set_xlabel(label("time since the first sample", "s"))
     panels[0].set_title(
-        f"{best_gain(results)}: the extended model gains {number(cycle.gain, 1)} nats here",
+        f"{best_gain(results)}: {_gain(results, cycle, before)}",
         loc="left",
     )
     panels[0].set_xlim(t[0], t[-1])
     return figure
+
+
+def _gain(results: Results, cycle: Cycle, before: Array) -> str:
+    """What the extended model gains in the cycle; where that is plain to see, as residuals."""
+    if cycle.gain < _PLAIN:
+        return f"the extended model gains {significant(cycle.gain, 2)} nats here"
+    recording, part = results.recordings[cycle.recording], slice(cycle.first, cycle.last)
+    sizes = [
+        quantity(float(np.sqrt(np.mean((recording.samples - model)[part] ** 2))), recording.unit, 2)
+        for model in (before, recording.predicted)
+    ]
+    return f"residual {sizes[0]} rms, with what was added {sizes[1]}"
 
 
 def _legend(axis: Axes) -> None:
@@ -97,7 +110,7 @@ def _motion(
 
 def _difference(axis: Axes, results: Results, t: Array, samples: Array, after: Array) -> None:
     """Both relative to the base model: what was added has to pass through the recorded points."""
-    shown = display(results.unit, max(results.rms, results.noise.level))
+    shown = display(results.unit, float(np.sqrt(np.mean(samples**2))))
     axis.plot(t, samples * shown.scale, "o", color=SKY, ms=3.5, mew=0, label="recorded")
     width = max(3, 2 * (t.size // 24) + 1)
     mean = np.convolve(samples, np.full(width, 1 / width), "valid") * shown.scale

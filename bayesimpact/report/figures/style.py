@@ -13,8 +13,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from bayesimpact.model.units import Display, decimals, display, number, readable, reading, typeset
 from bayesimpact.report.results import RecordingResult, Results
-from bayesimpact.report.units import Display, decimals, display, number, readable, reading, typeset
 
 Array = NDArray[np.float64]
 P = ParamSpec("P")

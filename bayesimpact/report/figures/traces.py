@@ -5,6 +5,7 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from bayesimpact.model.units import typeset
 from bayesimpact.report.figures.style import (
     CYCLE,
     WIDTH,
@@ -15,7 +16,6 @@ from bayesimpact.report.figures.style import (
     symbol,
 )
 from bayesimpact.report.results import SamplerSummary
-from bayesimpact.report.units import typeset
 
 MOST = 14
 """Parameters shown."""

@@ -147,7 +147,8 @@ def test_priors_scale_with_the_rig(effect):
     for parameter in effect.parameters:
         unit = parameter.unit
         if (effect.id, parameter.name) == ("power_damping", "coefficient"):
-            unit = "N s1.5/m1.5"  # a force at 1 m/s: c at the middle of the exponents
+            assert unit == "N at 1 m/s"
+            unit = "N s1.5/m1.5"  # its scale: that of c at the middle of the exponents
         above, _, below = unit.partition("/")
         power = np.zeros(3)
         for part, sign in ((above, 1), (below, -1)):
@@ -257,5 +258,5 @@ def test_the_spread_of_contact_damping_is_told_as_a_share_of_its_mean():
 def test_a_share_is_of_what_the_effect_says_itself():
     assert yardstick(BY_ID["gap_wear"]) == "the deepest indentation"
     assert yardstick(BY_ID["contact_damping_per_case"]) == "their mean"
-    assert yardstick(BY_ID["contact_hardening"]) == "the peak elastic force of the obstacle"
+    assert yardstick(BY_ID["contact_hardening"]) == "the peak contact force"
     assert all(yardstick(effect) for effect in EFFECTS)

@@ -8,9 +8,7 @@ from scipy.integrate import solve_ivp
 
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.parameters import Parameter, angular
-from bayesimpact.report.results import Chain
-from bayesimpact.report.rows import Z90, scaling_unit, widened
-from bayesimpact.report.units import (
+from bayesimpact.model.units import (
     Dimensions,
     bound,
     decimals,
@@ -23,8 +21,12 @@ from bayesimpact.report.units import (
     quantity,
     readable,
     significant,
+    span_of,
     typeset,
+    without_zero,
 )
+from bayesimpact.report.results import Chain
+from bayesimpact.report.rows import Z90, scaling_unit, widened
 
 BASE = {"m": "kg", "c1": "N s/m", "k1": "N/m", "c2": "N s/m", "g": "m", "k2": "N/m"}
 VALUES = {"m": 0.503, "c1": 0.148, "k1": 808.556, "c2": 2.085, "g": 1.1e-3, "k2": 5350.0}
@@ -177,7 +179,26 @@ def test_no_line_ends_between_a_number_and_its_unit() -> None:
     assert words.count("\N{NO-BREAK SPACE}") == 3 and "4 recordings" in words
 
 
+def test_no_end_of_an_interval_is_rounded_to_zero() -> None:
+    assert span_of((0.447, 13.95), "N m s/rad").startswith("0.4 to 13.9")
+    assert without_zero(0, 0.447, 13.9) == 1 and without_zero(0, 0.0, 13.9) == 0
+    assert without_zero(0, 1e-9, 13.9) == 0  # that is next to nothing
+
+
+def test_a_unit_may_say_at_what_it_holds() -> None:
+    assert dimensions("N at 1 m/s") == dimensions("N")
+    assert per_mass_unit("N at 1 m/s") == "m/s2 at 1 m/s"
+    assert quantity(2.9e-3, "N at 1 m/s", 2).split() == ["2.9", "mN", "at", "1", "m/s"]
+
+
+def test_a_sentence_has_true_minus_signs() -> None:
+    assert bound("from -0.30 to 0.31, case-1 and 1-2") == (
+        "from \N{MINUS SIGN}0.30 to 0.31, case-1 and 1-2"
+    )
+
+
 def test_changes_in_per_cent() -> None:
+    assert percent(7.7e-6).split() == ["+0.0008", "%"]
     shown = [percent(x).replace("\N{NO-BREAK SPACE}", " ") for x in (-0.00173, 0.12, 0.0)]
     assert shown == ["\N{MINUS SIGN}0.17 %", "+12 %", "0 %"]
 

@@ -9,6 +9,7 @@ b times the clock's, c times the gain's. Angles translate: rad for m, kg m2 for 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import floor, isfinite, log10, sqrt
 
@@ -23,6 +24,7 @@ _BASE = {
     "-": (0.0, 0.0, 0.0),
 }
 _LEAST = {"N": 0.01, "rad": 0.1}  # smaller sizes get a prefix
+_REMARK = re.compile(r" (?:per|at) ")
 _SYMBOL = re.compile(r"([A-Za-z]+|1|-)(-?\d*)")
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _PREFIXES = {-9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
@@ -47,10 +49,10 @@ class Dimensions:
 def dimensions(unit: str, *, angle: bool = False) -> Dimensions:
     """Dimensions of a unit such as "N s2/m2"; ValueError for a symbol that is not known.
 
-    Words after "per" are ignored ("m per impact" is a length). With `angle`, "N m" is a torque,
-    "kg m2" an inertia and "rad" the displacement.
+    Words after "per" and "at" are ignored ("m per impact" is a length, "N at 1 m/s" a force). With
+    `angle`, "N m" is a torque, "kg m2" an inertia and "rad" the displacement.
     """
-    text = unit.split(" per ")[0]
+    text = _REMARK.split(unit)[0]
     if angle:
         text = text.replace("kg m2", "kg").replace("N m", "N").replace("rad", "m")
     total, sign = [0.0, 0.0, 0.0], 1.0
@@ -75,7 +77,8 @@ def per_mass_unit(unit: str, *, angle: bool = False) -> str:
     bottom = " ".join(_powered(symbol, -p) for symbol, p in powers if p < 0)
     if " " in bottom:
         bottom = f"({bottom})"
-    return f"{top or '1'}/{bottom}" if bottom else top or "1"
+    remark = unit[unit.index(" at ") :] if " at " in unit else ""
+    return (f"{top or '1'}/{bottom}" if bottom else top or "1") + remark
 
 
 def _powered(symbol: str, power: float) -> str:
@@ -186,6 +189,33 @@ def quantity(value: float, unit: str, digits: int = 3) -> str:
     return text.rstrip().replace(" ", "\N{NO-BREAK SPACE}")
 
 
+def span(low: float, high: float, scale: float, places: int) -> str:
+    """Both ends of an interval."""
+    return f"{number(low * scale, places)} to {number(high * scale, places)}"
+
+
+def without_zero(places: int, *values: float) -> int:
+    """Decimals, up to two more than asked for, with which no value is rounded to zero."""
+    for more in range(3):
+        if all(number(x, places + more).strip(f"{MINUS}0.") for x in values if x):
+            return places + more
+    return places  # it is next to nothing
+
+
+def interval_decimals(low: float, high: float) -> int:
+    """Decimals for a 90 % interval and its median."""
+    return without_zero(decimals(0.5 * (high - low)), low, high)
+
+
+def span_of(ends: Sequence[float], unit: str) -> str:
+    """A range with its unit."""
+    low, high = ends
+    shown = readable(unit, max(abs(low), abs(high)))
+    places = decimals((high - low) * shown.scale, 2)
+    places = without_zero(places, low * shown.scale, high * shown.scale)
+    return f"{span(low, high, shown.scale, places)} {typeset(shown.unit)}".rstrip()
+
+
 def signed(value: float, places: int) -> str:
     """A number with its sign."""
     text = number(value, places)
@@ -193,11 +223,13 @@ def signed(value: float, places: int) -> str:
 
 
 def percent(part: float) -> str:
-    """A change as a share with its sign: "−0.17 %"; two digits."""
+    """A change as a share with its sign: "−0.17 %"; two digits, below a hundredth of a % one."""
     if part == 0 or not isfinite(part):
         return f"{number(100 * part, 0)}\N{NO-BREAK SPACE}%"
-    sign = MINUS if part < 0 else "+"
-    return f"{sign}{significant(100 * abs(part), 2)}\N{NO-BREAK SPACE}%"
+    sign, size = MINUS if part < 0 else "+", 100 * abs(part)
+    # 0.0008 % beside 0.092 % can be compared at a glance, 7.7 × 10⁻⁴ % cannot
+    text = number(size, 4) if 5e-5 <= size < 1e-3 else significant(size, 2)
+    return f"{sign}{text}\N{NO-BREAK SPACE}%"
 
 
 def chi2(value: float) -> str:
@@ -205,17 +237,24 @@ def chi2(value: float) -> str:
     return number(value, 3) if abs(value) < 10 else significant(value, 3)
 
 
+_HYPHEN = re.compile(r"(?<![\w-])-(?=\d)")
 _BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:%|[numkM]?(?:m|N|s|g|rad)\b|µ[mNs]|Hz\b|kg\b))")
 
 
 def bound(text: str) -> str:
-    """A sentence in which no line ends between a number and its unit."""
-    return _BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", text)
+    """A sentence for print: true minus signs, and no line ends between a number and its unit."""
+    return _BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", _HYPHEN.sub(MINUS, text))
 
 
 def p_words(p: float) -> str:
     """A p-value in a sentence: "p = 0.35", "p < 0.001"."""
     return f"p {p_value(p)}" if p < 0.001 else f"p = {p_value(p)}"
+
+
+def two_digits(value: float, unit: str = "") -> str:
+    """A size in a sentence, with its unit where one is given: "3.2 mN", "0.11"."""
+    text = quantity(value, unit, 2) if unit else significant(value, 2)
+    return text.replace("\N{NO-BREAK SPACE}", " ")
 
 
 def p_value(p: float) -> str:

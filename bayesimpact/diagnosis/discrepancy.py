@@ -1,0 +1,234 @@
+"""What a model leaves beside the noise, as a force of time that no law of the motion has.
+
+Where something remains, a recording is its model's prediction, white noise and the response to a
+force f(t), piecewise linear on `KNOTS` knots a free period with independent normal values. To first
+order that is D c, with D superposed along the fitted motion, so that the residual, linear in a
+change x of the parameters, has the closed-form marginal likelihood
+
+    r ~ N(J x, w^2 (1 + k D D')),        k = (size at the knots / level of the noise)^2,
+
+with w and k at their maximum: the recordings say how large the force is (model error inside the
+likelihood: Kennedy and O'Hagan 2001, J. R. Stat. Soc. B 63:425; embedded as a force: Sargsyan, Najm
+and Ghanem 2015, Int. J. Chem. Kinet. 47:246).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from bayesimpact.diagnosis.force import whitened_one
+from bayesimpact.diagnosis.hidden import about, parameter_forces
+from bayesimpact.inference.fit import Fit, inverse
+from bayesimpact.model.effects.effect import Effect
+from bayesimpact.model.oscillator import build_oscillator
+from bayesimpact.model.parameters import BASE_SLOTS, SLOTS, WITHOUT, bare_name
+from bayesimpact.model.superposition import Motion, answers, motion_along
+
+Array = NDArray[np.float64]
+
+KNOTS = 8  # in a free period: a force at its own frequency, or in one contact, is resolved
+ENTRIES = 30_000_000  # of the largest matrix D that is held; longer recordings get fewer knots
+BLOCK = 64  # forces at once, so that memory stays bounded
+REACH = 40.0  # of ln k: from a force far below the noise to one far above it
+RMS = np.sqrt(2.0 / 3.0)  # of a force between knots of unit size
+ALIGNED = 1.0  # of what a parameter hides of a missing force, over what remains of it
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One recording.
+
+    Attributes
+    ----------
+    responses : D (n, K), whitened, noise = 1, turned such that their products are diagonal
+    squares : (K,) these products
+    vectors : (K, K), values at the knots of every turned response
+    """
+
+    responses: Array
+    squares: Array
+    vectors: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Discrepancy:
+    """A force of time beside a fit.
+
+    Attributes
+    ----------
+    fit : whose remainder it is
+    motions : per recording, along which it acts
+    parts : per recording
+    k : variance of its values at the knots, N2, over that of the noise as estimated, 1
+    level : of the noise beside it, over its estimate
+    log_likelihood : up to a constant of the fit, nats
+    values : at the knots of every recording, what the remainder says of them, (K,)
+    """
+
+    fit: Fit
+    motions: tuple[Motion, ...]
+    parts: tuple[Part, ...]
+    k: float
+    level: float
+    log_likelihood: float
+    values: tuple[Array, ...]
+
+    @property
+    def forces(self) -> tuple[Array, ...]:
+        """At the samples of every recording, (n,), N, the parameters as fitted."""
+        found = []
+        for values, motion in zip(self.values, self.motions, strict=True):
+            at = np.linspace(0.0, values.size - 1.0, motion.samples)
+            found.append(np.interp(at, np.arange(values.size), values))
+        return tuple(found)
+
+    @cached_property
+    def flat(self) -> float:
+        """k of a force as strong at all frequencies as this one is about those of the motion."""
+        strength = weight = 0.0
+        for force, motion in zip(self.forces, self.motions, strict=True):
+            y = motion.y[:: motion.factor]
+            own = about(np.abs(np.fft.rfft(y - y.mean())) ** 2, y)
+            strength += float(own @ np.abs(np.fft.rfft(force)) ** 2) / y.size**2
+            weight += float(own.sum())
+        knots = np.mean([values.size for values in self.values])
+        return float(knots * strength / weight / (RMS * self.level) ** 2)
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Covariance (d, d) of the fit's mode under noise and force; nowhere wider than priors.
+
+        The mode weighs the recordings as if all it leaves were white; of such an estimate the
+        scores' covariance takes the place of their information (Huber 1967; Godambe 1960), beside
+        the priors' own. The noise level keeps its own.
+        """
+        fit, prior = self.fit, _prior_information(self.fit)
+        level = fit.target.likelihood.noise.level
+        sigma = fit.mode[fit.target.likelihood.sigma_columns]
+        scores = np.diag(prior)
+        for part, lin, own in zip(self.parts, fit.linearisation, sigma, strict=True):
+            jacobian = lin.jacobian / level
+            along = part.responses.T @ jacobian
+            noise = (level * self.level / own) ** 2 * (level / own) ** 2
+            where = np.ix_(lin.columns, lin.columns)
+            scores[where] += noise * (jacobian.T @ jacobian + self.flat * along.T @ along)
+        covariance = fit.covariance @ scores @ fit.covariance
+        held = fit.target.oscillator.layout.roles("noise")
+        covariance[held], covariance[:, held] = 0.0, 0.0
+        covariance[held, held] = fit.sd[held] ** 2
+        return np.asarray(covariance)
+
+    @cached_property
+    def posterior(self) -> tuple[Array, Array]:
+        """Mean (d,) and covariance (d, d) of the parameters with all that the remainder may have
+        done to them (`hidden`).
+        """
+        fit, forces = self.fit, parameter_forces(self.fit, self.motions)
+        back, learned = forces.whole()
+        mean, scatter = back @ fit.mode, back @ self.covariance @ back.T
+        hidden = [forces.imitations(left) for left in (self.forces, learned)]
+        hidden.append(mean - fit.mode)  # given back, though the force may have it by right
+        return mean, scatter + np.diag(ALIGNED**2 * np.sum(np.square(hidden), axis=0))
+
+    def apart(self, effect: Effect) -> float:
+        """Standard deviations of an effect's size, its shape as fitted, from none at all: of the
+        largest one; infinite where it has no size.
+        """
+        layout, own = self.fit.target.oscillator.layout, f"{effect.id}."
+        at = [i for i, name in enumerate(layout.names) if name.startswith(own)]
+        kinds = [effect.parameter(bare_name(layout.names[i])) for i in at]
+        shapes = [i for i, kind in zip(at, kinds, strict=True) if kind.is_shape]
+        sizes = [(i, kind.null) for i, kind in zip(at, kinds, strict=True) if not kind.is_shape]
+        found = [np.inf] if not sizes or any(null is None for _, null in sizes) else []
+        for i, null in sizes if not found else ():
+            part = inverse(self.posterior[1][np.ix_([i, *shapes], [i, *shapes])])
+            found.append(abs(float(self.fit.mode[i]) - float(null or 0.0)) * part[0, 0] ** 0.5)
+        return float(max(found))
+
+
+def discrepancy(fit: Fit) -> Discrepancy:
+    """The force of time that the remainder of a fit asks for."""
+    period = 2 * np.pi * float(np.sqrt(fit.target.oscillator.campaign.mass / fit.value("k1")))
+    motions = tuple(_motion(fit, r) for r in range(len(fit.linearisation)))
+    parts = tuple(_part(fit, r, motion, period / KNOTS) for r, motion in enumerate(motions))
+    return Discrepancy(fit, motions, parts, *_sized(fit, parts))
+
+
+def _part(fit: Fit, r: int, motion: Motion, spacing: float) -> Part:
+    duration, n = float(motion.t[-1]), motion.samples
+    count = int(np.clip(np.ceil(duration / spacing), 1, max(ENTRIES // n, 2))) + 1
+    knots = np.linspace(0.0, duration, count)
+    raw = np.empty((count, n))
+    for first in range(0, count, BLOCK):
+        near = knots[first : first + BLOCK, None]
+        tents = np.maximum(1.0 - np.abs(motion.t - near) / knots[1], 0.0)
+        raw[first : first + BLOCK] = answers(motion, tents)
+    level = np.full(r + 1, fit.target.likelihood.noise.level)
+    white = whitened_one(fit, r, raw, level)
+    squares, vectors = np.linalg.eigh(white @ white.T)
+    return Part(white.T @ vectors, np.maximum(squares, 0.0), vectors)
+
+
+def _motion(fit: Fit, r: int) -> Motion:
+    """One recording's motion; that of the base oscillator where friction holds the mass."""
+    o, reach = fit.target.oscillator, float(np.abs(fit.displacements[r]).max())
+    q = o.layout.slots(fit.mode)[r]
+    try:
+        return motion_along(o, r, q, reach)
+    except np.linalg.LinAlgError:  # what it did before is forgotten
+        base = build_oscillator(o.campaign, (), smoothing=o.smoothing)
+        return motion_along(base, r, np.ascontiguousarray(_without_effects(q)), reach)
+
+
+def _without_effects(q: Array) -> Array:
+    idle = [WITHOUT.get(slot, 0.0) for slot in SLOTS[len(BASE_SLOTS) :]]
+    return np.concatenate([q[: len(BASE_SLOTS)], idle])
+
+
+def _prior_information(fit: Fit) -> Array:
+    """Of the priors at the mode, (d,); the noise level is held."""
+    information = fit.target.priors.information(fit.mode)
+    information[fit.target.oscillator.layout.roles("noise")] = 1.0
+    return np.asarray(information)
+
+
+def _sized(fit: Fit, parts: tuple[Part, ...]) -> tuple[float, float, float, tuple[Array, ...]]:
+    """The likeliest k, level of the noise and log likelihood, the parameters at their best; and
+    values at the knots, the parameters as fitted.
+    """
+    likelihood, size = fit.target.likelihood, fit.mode.size
+    total = float(likelihood.sizes.sum())
+    whole = np.zeros((size + 1, size + 1))  # products of J and, last, the residual
+    seen = []
+    for part, lin in zip(parts, fit.linearisation, strict=True):
+        at = np.append(lin.columns, size)
+        own = np.column_stack([lin.jacobian, lin.residual]) / likelihood.noise.level
+        whole[np.ix_(at, at)] += own.T @ own
+        seen.append((at, part.responses.T @ own))
+
+    def left(log_k: float) -> tuple[float, float]:
+        """Minus twice the log likelihood, and the noise's variance."""
+        found, volume, k = whole.copy(), 0.0, float(np.exp(log_k))
+        for (at, along), part in zip(seen, parts, strict=True):
+            weights = k / (1.0 + k * part.squares)
+            found[np.ix_(at, at)] -= along.T @ (weights[:, None] * along)
+            volume += float(np.log1p(k * part.squares).sum())
+        score = found[:-1, -1]
+        rest = float(found[-1, -1] - score @ inverse(found[:-1, :-1]) @ score)
+        variance = max(rest, 1e-300) / total
+        return total * float(np.log(variance)) + volume, variance
+
+    least = -np.log(max(float(part.squares.max()) for part in parts)) - 0.1 * REACH
+    best = minimize_scalar(lambda x: left(x)[0], bounds=(least, least + REACH), method="bounded")
+    value, variance = left(float(best.x))
+    k = float(np.exp(best.x))
+    values = tuple(
+        np.asarray(part.vectors @ (k / (1.0 + k * part.squares) * along[:, -1]))
+        for part, (_, along) in zip(parts, seen, strict=True)
+    )
+    return k, float(np.sqrt(variance)), -0.5 * value, values

@@ -1,0 +1,145 @@
+"""What remains as a function of time: its likelihood, its size, and what it does to parameters."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import small_rig
+from scipy import stats
+
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.diagnosis import discrepancy as module
+from bayesimpact.diagnosis.discrepancy import discrepancy
+from bayesimpact.diagnosis.extend import campaign_scales
+from bayesimpact.diagnosis.force import missing_force
+from bayesimpact.diagnosis.intervals import intervals
+from bayesimpact.diagnosis.refit import fit_from
+from bayesimpact.diagnosis.unknown import learn_force
+from bayesimpact.inference.identify import identify
+from bayesimpact.model.effects import EFFECTS
+from bayesimpact.model.free_changes import motions_beside
+
+NOISE = small_rig.NOISE
+
+
+def plain_fit(campaign: Campaign):
+    return identify(campaign, rng=np.random.default_rng(0), search=False).fit
+
+
+def shaken(seed: int, size: float, duration: float = 4.0) -> Campaign:
+    """A plain decay with a random force, linear between knots an eighth of a period apart, N."""
+    clean = small_rig.record(
+        seed, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES, duration=duration
+    )
+    fit = plain_fit(clean)
+    o, rng = fit.target.oscillator, np.random.default_rng(1000 + seed)
+    recordings = []
+    for r, recording in enumerate(clean.recordings):
+        t = recording.times
+        knots = np.linspace(0.0, t[-1], int(8 * t[-1] * 6.38) + 1)
+        wave = np.interp(t, knots, size * rng.standard_normal(knots.size))
+        q = o.layout.slots(fit.mode)[[r]]
+        moved, still = (
+            motions_beside(o, r, q, 0, waves=w[None])[0] for w in (wave, np.zeros_like(wave))
+        )
+        recordings.append(replace(recording, samples=recording.samples + moved - still))
+    return replace(clean, recordings=tuple(recordings))
+
+
+def test_the_likelihood_is_that_of_a_dense_covariance():
+    campaign = small_rig.record(
+        3, {"spring_cubic": {"stiffness": 1e5}}, rig=small_rig.PLAIN,
+        releases=small_rig.PLAIN_RELEASES[:1], duration=1.5,
+    )  # fmt: skip
+    found = discrepancy(plain_fit(campaign))
+    fit = found.fit
+    lin, part = fit.linearisation[0], found.parts[0]
+    level = fit.target.likelihood.noise.level
+    jacobian, residual = lin.jacobian / level, lin.residual / level
+
+    def value(k: float, level: float) -> float:
+        dense = level**2 * (np.eye(residual.size) + k * part.responses @ part.responses.T)
+        solve = np.linalg.inv(dense)
+        x = np.linalg.solve(jacobian.T @ solve @ jacobian, jacobian.T @ solve @ residual)
+        left = residual - jacobian @ x
+        return -0.5 * float(left @ solve @ left + np.linalg.slogdet(dense)[1])
+
+    best = value(found.k, found.level)
+    for k, w in ((1.3, 1.0), (0.75, 1.0), (1.0, 1.02), (1.0, 0.98)):
+        assert value(k * found.k, w * found.level) < best
+    other = value(4 * found.k, found.level) - best
+    again = module._sized(fit, found.parts)[2]
+    assert again == pytest.approx(found.log_likelihood)
+    assert other < -1.0
+
+
+@pytest.mark.parametrize("size", [2e-3, 2e-2])
+def test_a_random_force_is_sized_and_the_noise_beside_it_found(size):
+    found = discrepancy(plain_fit(shaken(1, size)))
+    knots = sum(part.squares.size for part in found.parts)
+    error = 3.0 / np.sqrt(2 * knots)  # of a standard deviation that so many values tell
+    assert np.sqrt(found.k) * found.level == pytest.approx(size, rel=error)
+    assert found.level == pytest.approx(1.0, abs=0.05)
+
+
+def test_where_nothing_remains_nothing_is_added(small):
+    found = discrepancy(small.fit)
+    mean, covariance = found.posterior
+    np.testing.assert_allclose(mean, small.fit.mode)
+    ratio = np.sqrt(np.diag(covariance)) / small.fit.sd
+    assert np.all((ratio > 0.9) & (ratio < 1.3)), ratio
+
+
+def test_intervals_hold_the_truth_under_a_random_force():
+    """Ordinary intervals do not: they count every sample of what the force left."""
+    truth = {"c1": small_rig.PLAIN.c1, "k1": small_rig.PLAIN.k1}
+    held, naive, count = 0, 0, 0
+    for seed in range(12):
+        fit = plain_fit(shaken(seed, 1e-2))
+        wide, narrow = intervals(fit, remains=True), intervals(fit)
+        for name, value in truth.items():
+            for found in (wide, narrow):
+                low, _, high = found.quantiles(name)
+                inside = low <= value <= high
+                held += inside and found is wide
+                naive += inside and found is narrow
+            count += 1
+    assert stats.binomtest(held, count, 0.9, alternative="less").pvalue > 1e-3, held
+    assert naive < 0.6 * count
+
+
+def test_what_a_learned_force_has_of_spring_and_damper_is_given_back():
+    """A force -a y - b v within a residual one, against k1 and c1 raised by a and b."""
+    campaign = small_rig.record(4, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES)
+    base = plain_fit(campaign)
+    scales = campaign_scales(base)
+    force = missing_force(base, scales, rng=np.random.default_rng(0))
+    fit = learn_force(base, force, scales)
+    names = fit.names
+    moved = fit.mode.copy()
+    knots = force.knots
+    y = force.low + force.spacing * np.arange(-1, knots - 1)  # Greville points of cubic splines
+    for i in range(knots):
+        moved[names.index(f"learned_force.a{i + 1}")] -= 20.0 * y[i]
+        moved[names.index(f"learned_force.b{i + 1}")] -= 0.05
+    moved[names.index("k1")] += 20.0
+    moved[names.index("c1")] += 0.05
+    shifted = replace(fit, mode=moved)
+    before, after = (discrepancy(f).posterior[0] for f in (fit, shifted))
+    for name, scale in (("k1", 20.0), ("c1", 0.05)):
+        assert after[names.index(name)] == pytest.approx(
+            before[names.index(name)], abs=1e-3 * scale
+        )
+
+
+def test_an_effect_that_is_not_there_is_not_apart():
+    campaign = shaken(7, 1e-2)
+    fit = plain_fit(campaign)
+    drift = next(e for e in EFFECTS if e.id == "stiffness_drift")
+    scales = campaign_scales(fit)
+    false = fit_from(fit, (drift,), {}, scales).fit
+    assert discrepancy(false).apart(drift) < 3.0
+    at = false.names.index("stiffness_drift.rate")
+    assert abs(false.mode[at]) / false.sd[at] > 3.0  # as far as independent samples tell
