@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from driven_rigs import driven_rig
 from driven_twin import driven_motion
 
 from bayesimpact.cli import main
@@ -66,3 +67,23 @@ def test_a_quick_diagnosis(
     assert found["verdict"] == "adequate"
     assert found["fit"]["after"]["reduced_chi2"] == pytest.approx(1.0, abs=0.3)
     _run(capsys, "report", tmp_path)
+
+
+@pytest.mark.usefixtures("coarse_figures")
+def test_an_accelerometer_on_a_mass_whose_base_moves(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rig = driven_rig(3, "acceleration", lambda y, v, touching: 3e6 * y**3)
+    rig.campaign.save(tmp_path / "rig")
+    assert "absolute = true" in (tmp_path / "rig" / "campaign.toml").read_text()
+    said = _run(capsys, "check", tmp_path / "rig", "--out", tmp_path / "check")
+    assert "recordings of acceleration" in said and "base_m, absolute" in said
+    _run(capsys, "diagnose", tmp_path / "rig", "--out", tmp_path / "out", "--quick")
+    found = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    assert [e["id"] for e in found["effects"]] == ["spring_cubic"]
+    median = found["effects"][0]["parameters"]["spring_cubic.stiffness"]["median"]
+    assert median == pytest.approx(3e6, rel=0.05)
+    assert found["parameters"]["after"]["offset[a]"]["unit"] == "m/s2"
+    assert found["parameters"]["after"]["y0[a]"]["unit"] == "m"
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "own motion is counted" in page and "only ratios to the mass" in page

@@ -34,9 +34,12 @@ class Input:
     of frequency f by sinc2(f / rate): a third is lost at a third of the sampling rate. Where the
     input passed an anti-aliasing filter, `band_limited` puts it back: below half the rate the force
     then is what it was (band-limited assumption: Pintelon and Schoukens 2012, System
-    Identification); the images above, which the mass hardly follows, stay. `base_m` and
-    `base_m_s2`: the recording is of the displacement relative to the base, and the force is minus
-    the mass times the base's acceleration.
+    Identification); the images above, which the mass hardly follows, stay. An acceleration holds
+    the force at its own instant, where a band-limited one is what its sample says. `base_m` and
+    `base_m_s2`: the force is minus the mass times the base's acceleration, and the recording is of
+    the motion relative to the base, unless `absolute` says otherwise: then the base's own motion is
+    added to the model's readings (an accelerometer on the mass reads the absolute acceleration).
+    Displacements, `g` and initial conditions count from the base in either case.
 
     Attributes
     ----------
@@ -44,12 +47,14 @@ class Input:
     kind : what was measured
     free : its gain is an unknown, `input_gain`; else it is 1
     band_limited : see above
+    absolute : the recording is of the motion in space, not relative to the base; only of a base
     """
 
     samples: Floats
     kind: Kind = "force_N"
     free: bool = False
     band_limited: bool = False
+    absolute: bool = False
 
     def __post_init__(self) -> None:
         samples = np.array(self.samples, dtype=np.float64)
@@ -60,29 +65,50 @@ class Input:
         self.__dict__.update(state)
         self.__post_init__()  # unpickled arrays can be written
 
+    @property
+    def label(self) -> str:
+        """Its kind and, where the motion in space is read, that."""
+        return self.kind + (", absolute" if self.absolute else "")
+
     def part(self, first: int, end: int) -> Input:
         """Samples first..end-1."""
         return replace(self, samples=self.samples[first:end])
 
     def force(self, mass: float, interval: float) -> Floats:
-        """The force on the mass at the samples, (n,), N, for a gain of 1.
-
-        The acceleration of a base whose displacement was recorded is the second derivative of the
-        interpolating spline of degree five.
-        """
-        force = self._force(mass, interval)
+        """The forces on the mass between which lines are drawn, (n,), N, for a gain of 1."""
+        force = self.shown(mass, interval)
         return sharpened(force) if self.band_limited else force
 
-    def _force(self, mass: float, interval: float) -> Floats:
-        if self.kind == "force_N":
+    def shown(self, mass: float, interval: float) -> Floats:
+        """The force on the mass at the samples themselves, (n,), N, for a gain of 1."""
+        return self.samples if self.kind == "force_N" else -mass * self.base(interval, 2)
+
+    def base(self, interval: float, order: int) -> Floats:
+        """The `order`-th time derivative of the base's displacement at the samples, (n,).
+
+        That of a recorded displacement is the derivative of the interpolating spline of degree
+        five. Raises ValueError for what would ask for an integral.
+        """
+        have = {"base_m": 0, "base_m_s2": 2}.get(self.kind, 3)
+        if order < have:
+            raise ValueError(f"derivative {order} of a {self.kind}")
+        if order == have:
             return self.samples
-        if self.kind == "base_m_s2":
-            return -mass * self.samples
         from scipy.interpolate import make_interp_spline
 
         times = np.arange(self.samples.size) * interval
         spline = make_interp_spline(times, self.samples, 5)
-        return np.asarray(-mass * spline.derivative(2)(times), dtype=np.float64)
+        return np.asarray(spline.derivative(order)(times), dtype=np.float64)
+
+    def carried(self, interval: float, order: int) -> Floats:
+        """What the base adds to readings of this derivative, (n,), for a gain of 1."""
+        return self.base(interval, order) if self.absolute else np.zeros(self.samples.size)
+
+    def waves(self, mass: float, interval: float, order: int) -> Floats:
+        """The input as simulators take it, (3, n): `force`, `shown` and `carried`."""
+        return np.stack(
+            [self.force(mass, interval), self.shown(mass, interval), self.carried(interval, order)]
+        )
 
 
 def sharpened(samples: Floats) -> Floats:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.data.foreign import read_input
 from bayesimpact.data.input import Input, checked
-from bayesimpact.data.recording import Recording
+from bayesimpact.data.quantity import Quantity, order_of, with_article
 from bayesimpact.data.schema import RecordingTable
 from bayesimpact.data.table import Table
 from bayesimpact.errors import InputError
@@ -37,23 +36,29 @@ def with_input(source: Path, entry: RecordingTable, data: bytes, table: Table) -
     return replace(table, input=other.samples[first - shift : end - shift])
 
 
-def check_quantities(where: str, recordings: Sequence[Recording]) -> None:
-    """Refuse inputs in a campaign where a probe reads a velocity or an acceleration."""
-    driven = [r.name for r in recordings if r.input is not None]
-    other = [r for r in recordings if r.order > 0]
-    if driven and other:
-        found = f"an input of {driven[0]}, and {other[0].name} of {other[0].quantity}"
-        accepted = "with an input, recordings of displacement or angle throughout"
-        raise InputError(f"{where}, key input", found, accepted)
+def input_of(
+    where: str, entry: RecordingTable, values: NDArray[np.float64] | None, quantity: Quantity
+) -> Input | None:
+    """The input of an entry from its column (n,), SI units; None without one.
 
+    quantity : what the entry's probe reads
 
-def input_of(where: str, entry: RecordingTable, values: NDArray[np.float64] | None) -> Input | None:
-    """The input of an entry from its column (n,), SI units; None without one."""
+    Raises
+    ------
+    InputError
+        for an input that cannot be used, or whose base does not tell what `absolute` asks for.
+    """
     given = entry.input
     if given is None or values is None:
         return None
     if given.scale == 0.0:
         raise InputError(f"{where}, input, key scale", "0", "a number other than 0")
+    known = {"force_N": (), "base_m_s2": (2,), "base_m": (0, 1, 2)}[given.kind]
+    if given.absolute and order_of(quantity) not in known:
+        found = f'true beside kind = "{given.kind}" and {with_article(quantity)}'
+        accepted = "a base_m, or an acceleration beside a base_m_s2; else false: relative to it"
+        raise InputError(f"{where}, input, key absolute", found, accepted)
     samples = given.scale * (values - values.mean() if given.remove_mean else values)
-    made = Input(samples, given.kind, given.gain == "free", given.hold == "band_limited")
+    band_limited = given.hold == "band_limited"
+    made = Input(samples, given.kind, given.gain == "free", band_limited, given.absolute)
     return checked(where, made)

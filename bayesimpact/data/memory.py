@@ -130,7 +130,7 @@ def _entry(where: str, given: object) -> dict[str, Any]:
             hold = "band_limited" if given.input.band_limited else "first_order"
             entry["input"] = {
                 "samples": given.input.samples, "kind": given.input.kind, "gain": gain,
-                "hold": hold,
+                "hold": hold, "absolute": given.input.absolute,
             }  # fmt: skip
     elif isinstance(given, Mapping):
         entry = {str(key): value for key, value in given.items()}

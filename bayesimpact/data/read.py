@@ -18,7 +18,7 @@ from bayesimpact.data.campaign import SECOND_STOP, Beam, Campaign, Measurement, 
 from bayesimpact.data.entries import filled_in
 from bayesimpact.data.foreign import file_bytes, is_foreign, read_foreign
 from bayesimpact.data.gaps import excluded_spans
-from bayesimpact.data.input_column import check_quantities, input_of, with_input
+from bayesimpact.data.input_column import input_of, with_input
 from bayesimpact.data.period import rough_period
 from bayesimpact.data.prior_bounds import check_prior, parameter_ranges
 from bayesimpact.data.quantity import Quantity, check_quantity, unit_of, with_article
@@ -236,6 +236,7 @@ def _recording(
         raise InputError(
             f"{where}, key {key}", f"no samples left ({asked})", f"times within the file's {span}"
         )
+    given = None if table.input is None else table.input[first:stop_at]
     factor = (-1.0 if entry.invert else 1.0) * (1.0 if entry.scale is None else entry.scale)
     recording = Recording(
         name=entry.name or Path(entry.file).stem,
@@ -245,7 +246,7 @@ def _recording(
         start=table.start + first * interval,
         quantity=table.quantity,
         used=None if table.used is None else table.used[first:stop_at],
-        input=input_of(where, entry, None if table.input is None else table.input[first:stop_at]),
+        input=input_of(where, entry, given, table.quantity),
     )
     key = "exclude_s" if entry.exclude_s else "resample"
     recording = excluded_spans(f"{where}, key {key}", recording, entry.exclude_s or ())
@@ -278,7 +279,6 @@ def _check_together(where: str, table: CampaignTable, recordings: list[Recording
                 with_article(recording.quantity),
                 f"motion {kind}, as the first recording's {first.quantity}, throughout",
             )
-    check_quantities(where, recordings)
     if table.mass_uncertainty_kg >= table.mass_kg:
         found = f"{table.mass_uncertainty_kg:g} kg"
         accepted = f"less than the mass, {table.mass_kg:g} kg"

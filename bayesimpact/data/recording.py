@@ -101,6 +101,11 @@ class Recording:
         return order_of(self.quantity)
 
     @property
+    def is_displacement(self) -> bool:
+        """True when the samples are displacements as the model has them, relative to a base."""
+        return self.order == 0 and not (self.input is not None and self.input.absolute)
+
+    @property
     def angular(self) -> bool:
         """True when the motion is about an axis."""
         return is_angular(self.quantity)

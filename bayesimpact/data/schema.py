@@ -59,6 +59,7 @@ class InputTable(_Table):
     hold: Literal["first_order", "band_limited"] = Field(
         "first_order", description='"first_order" (a line between samples) or "band_limited"'
     )
+    absolute: bool = Field(False, description="true or false, without quotes")
 
 
 class RecordingTable(_Table):

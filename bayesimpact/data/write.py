@@ -94,7 +94,8 @@ def _csv(recording: Recording, decimals: int | None) -> str:
 def _input(given: Input) -> dict[str, Any]:
     free = {"gain": "free"} if given.free else {}
     hold = {"hold": "band_limited"} if given.band_limited else {}
-    return {"column": INPUT_COLUMN, "kind": given.kind, **free, **hold}
+    absolute = {"absolute": True} if given.absolute else {}
+    return {"column": INPUT_COLUMN, "kind": given.kind, **free, **hold, **absolute}
 
 
 def _measurement(known: Measurement, quantity: str) -> list[str]:

@@ -28,7 +28,7 @@ def campaign_scales(fit: Fit) -> Scales:
     slots = o.layout.slots(fit.mode)
     c1, k1, c2, gap, k2 = slots[:, :5].T
     readings = [r.samples - b for r, b in zip(o.campaign.recordings, slots[:, 10], strict=True)]
-    moved = fit.displacements if o.orders.any() else readings
+    moved = readings if o.reads_displacements else fit.displacements
     reach = np.array([np.max(np.abs(y)) for y in moved])
     depth = np.array([np.max(y) for y in moved]) - gap
     speed = reach * np.sqrt(k1 / o.campaign.mass)

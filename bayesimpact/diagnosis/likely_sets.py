@@ -67,7 +67,7 @@ class LikelySets:
         self.fit, self.paths = fit, measured_paths(fit)
         columns, targets, self.names = base_columns(fit, self.paths)
         base, target = np.concatenate(columns), np.concatenate(targets)
-        seen = () if o.acting or o.orders.any() else effects
+        seen = () if o.acting or not o.reads_displacements else effects
         self.terms = terms_of(fit, seen, scales, self.paths)
         self.cost = float(np.log(2 * len(effects)))
         self.rows = max(sum(int(p.rows.kept.sum()) - 1 for p in self.paths), 1)

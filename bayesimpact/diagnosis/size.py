@@ -43,7 +43,7 @@ def size(effect: Effect, before: Fit, after: Fit, scales: Scales) -> Size:
     if effect.observe is not None:
         change = largest_change(effect, after)
         return change, "m", change / scales.largest_reading
-    derived = after.target.oscillator.orders.any()
+    derived = not after.target.oscillator.reads_displacements
     both = [f.displacements if derived else f.predicted for f in (after, before)]
     change = max(float(np.abs(a - b).max()) for a, b in zip(*both, strict=True))
     return change, "m", change / scales.amplitude

@@ -59,7 +59,7 @@ def whole_campaign(identification: Identification) -> Location:
     fit = identification.fit
     campaign = fit.target.oscillator.campaign
     recorded = [r.samples for r in campaign.recordings]
-    moved = fit.displacements if fit.target.oscillator.orders.any() else recorded
+    moved = recorded if fit.target.oscillator.reads_displacements else fit.displacements
     samples = np.concatenate(moved)
     pairs = zip(moved, campaign.recordings, strict=True)
     speed = max(float(np.max(np.abs(np.gradient(y, r.interval)))) for y, r in pairs)

@@ -26,6 +26,7 @@ from bayesimpact.inference.search import Generation, SearchResult, metropolis_di
 from bayesimpact.model.effects.effect import EffectParameter, Scales
 from bayesimpact.model.oscillator import Oscillator
 from bayesimpact.model.parameters import is_added
+from bayesimpact.response.driven_displacement import seen_displacement
 from bayesimpact.response.estimates import Estimates
 from bayesimpact.response.rough import first_state
 
@@ -170,7 +171,9 @@ def _at_excerpt(short: Oscillator, guess: Array, period: float) -> tuple[Array, 
     for r in short.campaign.recordings:
         if r.input is not None:
             own = [index(f"y0[{r.name}]"), index(f"v0[{r.name}]")]
-            samples = r.samples - guess[index(f"offset[{r.name}]")]
+            samples = seen_displacement(r, both=True).samples
+            if r.is_displacement:
+                samples = samples - guess[index(f"offset[{r.name}]")]
             moved[own] = first_state(samples, r.interval, period / r.interval)
             places += own
     return moved, places

@@ -133,7 +133,7 @@ class Fit:
         For displacements as the probe saw it, sensor effects and filter included.
         """
         o = self.target.oscillator
-        return o.displacements(self.mode) if o.orders.any() else self.readings
+        return self.readings if o.reads_displacements else o.displacements(self.mode)
 
     @cached_property
     def residuals(self) -> tuple[Array, ...]:

@@ -4,7 +4,7 @@ Polynomials over short windows follow a slow motion, driven or not. Where a wind
 samples spans more than a part of a period, what they leave is motion. The spectrum then tells the
 noise where the input has none: above its band. Nonlinear distortion may fall there too, and the
 recorder's own filter cuts noise; both show as a floor that is not flat, of which the loudest part
-is taken: no less than the noise is.
+is taken: no less than the noise is. Nor are the polynomials' remainders, and the lower one counts.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from bayesimpact.data.campaign import Smoothing
 from bayesimpact.data.recording import Recording
 from bayesimpact.inference.noise import Noise
 from bayesimpact.model.measurement import gain
+from bayesimpact.response.driven_displacement import seen_displacement
 from bayesimpact.response.half_cycles import rough_period
 
 Array = NDArray[np.float64]
@@ -49,16 +50,17 @@ def driven_noise(
         return replace(
             behind, correlation=0.0, smoothing=smoothing, level=float(level), is_bound=True
         )
-    fast = [r for r in recordings if rough_period(r.samples) < SHORTEST_PERIOD]
+    moved = ((r, seen_displacement(r).samples) for r in recordings)
+    fast = [r for r, y in moved if rough_period(y) < SHORTEST_PERIOD]
     if not fast:
         return remainders
     floors = [bands for r in fast if (bands := _gap(r)) is not None]
-    if not floors:
-        bound = "polynomial remainders, a bound: the motion is fast and the input leaves no gap"
-        return replace(remainders, correlation=0.0, source=bound, is_bound=True)
-    powers = np.concatenate(floors)
+    powers = np.concatenate(floors) if floors else np.full(1, np.inf)
     flat = float(powers.max()) <= FLAT * float(powers.min())
     power = float(np.mean(powers) if flat else powers.max())
+    if remainders.level**2 < power:  # impacts may fill the gap of a velocity or acceleration
+        bound = "polynomial remainders, a bound: the motion is fast and leaves no gap"
+        return replace(remainders, correlation=0.0, source=bound, is_bound=True)
     said = "" if flat else ", its loudest part"
     return Noise(
         level=float(np.sqrt(power)),

@@ -27,7 +27,7 @@ from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.noise_driven import driven_noise
-from bayesimpact.response.displacement import displacement_of
+from bayesimpact.response.driven_displacement import seen_displacement
 from bayesimpact.response.half_cycles import rough_period
 
 Array = NDArray[np.float64]
@@ -129,10 +129,7 @@ def _rises(before: Noise, after: Noise) -> bool:
 def _remainder(
     recordings: Sequence[Recording], hums: Sequence[Hum | None], per_period: float
 ) -> _Remainder | None:
-    lengths = [
-        int(np.clip(rough_period(r.samples, r.order) / per_period, SMALLEST, LARGEST))
-        for r in recordings
-    ]
+    lengths = [int(np.clip(_period(r) / per_period, SMALLEST, LARGEST)) for r in recordings]
     length = min(lengths)
     powers = np.vander(np.linspace(-1, 1, length), DEGREE + 1)
     basis = null_space(powers.T)
@@ -151,20 +148,30 @@ def _remainder(
     return _Remainder(values, basis) if values.shape[0] >= 4 else None
 
 
+def _period(recording: Recording) -> float:
+    """Rough period of the motion, in samples: under an input, that of the displacement."""
+    if recording.input is None:
+        return rough_period(recording.samples, recording.order)
+    return rough_period(seen_displacement(recording).samples)
+
+
 def _shapes(recording: Recording, hum: Hum | None) -> list[Array]:
     """Signals (n,) that no polynomial follows, known but for their sizes.
 
     A steady hum, whose amplitude and phase may drift by a line through the recording: an error of
-    the frequency, to first order. The roughness of a motion under an input: that of the input's
-    double integral and, by the damping, of the triple one.
+    the frequency, to first order. The roughness of a reading under an input: for a displacement
+    that of the input's double integral and, by the damping, of the triple one; for a derivative of
+    it, that of as many integrals fewer.
     """
     if recording.input is not None:
+        shown = recording.input.shown(1.0, recording.interval)
         u = recording.input.force(1.0, recording.interval)
         u = u - u.mean()
         once = np.concatenate([[0.0], np.cumsum(0.5 * (u[1:] + u[:-1]))])
         # exact for lines between samples
         twice = np.concatenate([[0.0], np.cumsum(once[:-1] + u[:-1] / 3 + u[1:] / 6)])
-        return [twice, np.cumsum(twice)]
+        integrals = [shown - shown.mean(), once, twice, np.cumsum(twice)]
+        return integrals[2 - recording.order :]
     if hum is None:
         return []
     times = recording.times
@@ -195,8 +202,7 @@ def _windows(recording: Recording, length: int, side: bool) -> Windows:
     """Samples of windows (count, length); with `side`, only of those on a stop's free side."""
     free = np.ones(recording.samples.size, dtype=bool)
     if side:
-        derived = recording.order > 0
-        moved = _centred(displacement_of(recording).samples if derived else recording.samples)
+        moved = _centred(seen_displacement(recording).samples)
         free = moved < -MARGIN * np.abs(moved).max()
     if recording.used is not None:
         free = free & recording.used

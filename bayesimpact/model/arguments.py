@@ -30,33 +30,49 @@ class ModelArguments:
 
 @dataclass(frozen=True, eq=False)
 class Inputs:
-    """Measured inputs of recordings.
+    """Measured inputs of recordings, for a gain of 1.
 
     Attributes
     ----------
-    values : (M,) forces at the samples, N, recordings one after the other
+    values : (3, M), recordings one after the other, see `driven.Wave`: forces at the samples, N,
+        between which the force on the mass is a line; the forces that accelerations hold, N; what
+        an input adds to the readings themselves. (M,): the first, which is then the second as well,
+        and nothing is added
     starts : (R,) where a recording's input begins in `values`, -1 for a recording without one
     """
 
     values: Floats
     starts: Ints
 
+    def __post_init__(self) -> None:
+        if self.values.ndim == 1:
+            plain = np.stack([self.values, self.values, np.zeros(self.values.size)])
+            object.__setattr__(self, "values", plain)
+
     def of(self, recordings: Ints) -> Inputs:
         """The same for these recordings (K,), in this order."""
         return Inputs(self.values, self.starts[recordings])
+
+    def of_motion(self) -> Inputs:
+        """The same without what is added to readings: for motions, which are relative to a base."""
+        if not self.values[2].any():
+            return self
+        return Inputs(self.values * [[1.0], [1.0], [0.0]], self.starts)
 
 
 def check_inputs(inputs: Inputs | None, model: ModelArguments) -> tuple[Floats, Ints]:
     """Values and starts, checked; raises InputError."""
     if inputs is None:
-        return floats("inputs", (), 1), ints("inputs", np.full(model.counts.size, -1), 1)
-    values, starts = floats("inputs", inputs.values, 1), ints("inputs", inputs.starts, 1)
+        return floats("inputs", np.empty((3, 0)), 2), ints(
+            "inputs", np.full(model.counts.size, -1), 1
+        )
+    values, starts = floats("inputs", inputs.values, 2), ints("inputs", inputs.starts, 1)
     if starts.size != model.counts.size:
         found = f"{starts.size} starts"
         raise InputError("inputs", found, f"{model.counts.size}, one per recording")
     ends = starts + model.counts
-    if not within(starts, -1, LONGEST) or np.any(ends[starts >= 0] > values.size):
-        raise InputError("inputs", "an input beyond the values", f"within 0..{values.size}")
+    if not within(starts, -1, LONGEST) or np.any(ends[starts >= 0] > values.shape[1]):
+        raise InputError("inputs", "an input beyond the values", f"within 0..{values.shape[1]}")
     return values, starts
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.model.blocks import Sink
 from bayesimpact.model.compiled import compiled, inner
-from bayesimpact.model.driven import run_driven
+from bayesimpact.model.driven import run_driven, wave_of
 from bayesimpact.model.kernel import run
 from bayesimpact.model.tables import ResponseTables, response_tables
 from bayesimpact.model.threads import SHARES_PER_THREAD, available
@@ -57,7 +57,7 @@ def run_any(
 ) -> tuple[float, int, int]:  # fmt: skip
     """Simulate a recording of n samples, whose input begins at waves[wave]; -1: it has none."""
     if wave >= 0:
-        done: tuple[float, int, int] = run_driven(q, mass, interval, waves[wave : wave + n], sink)
+        done: tuple[float, int, int] = run_driven(q, mass, interval, wave_of(waves, wave, n), sink)
     else:
         done = run(q, mass, interval, n, sink, mine)
     return done
@@ -72,7 +72,8 @@ def work(
     """Fill one share of `codes` (B, R), and of `sse` (B, R) or, without samples, `values` (B, N).
 
     starts : where a recording begins in `samples` or `values`
-    waves, first_wave : inputs, N, and where a recording's begins in them, see `run_any`
+    waves, first_wave : inputs (3, M), see `driven.Wave`, and where a recording's begins in them,
+        see `run_any`
     """
     q = np.empty(11)
     nothing = np.empty(0)

@@ -26,6 +26,7 @@ from bayesimpact.model.basis import FORCED, PLAIN
 from bayesimpact.model.batch import Floats, Ints, Span, gather, run_any
 from bayesimpact.model.blocks import Sink
 from bayesimpact.model.compiled import compiled, inner
+from bayesimpact.model.driven import wave_of
 from bayesimpact.model.driven_sensitivity_pass import driven_sensitivity_pass
 from bayesimpact.model.normalized import OK, OVERFLOW, A
 from bayesimpact.model.sensitivity_pass import Columns, sensitivity_pass, workspace
@@ -101,8 +102,8 @@ def work(
             if code == OK:
                 if wave >= 0:
                     driven_sensitivity_pass(
-                        q, mass, intervals[r], waves[wave : wave + n], events, columns[r], data,
-                        own, slopes, gram,
+                        q, mass, intervals[r], orders[r], wave_of(waves, wave, n), events,
+                        columns[r], data, own, slopes, gram,
                     )  # fmt: skip
                 else:
                     sensitivity_pass(

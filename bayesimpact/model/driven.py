@@ -10,9 +10,10 @@ form: with the impulse response S, D = S', and the responses B, R from rest to a
     y(s)  = D y0 + S (v0 + beta y0) + p B + r R
     y'(s) = D v0 - S K y0           + p S + r B
 
-(Duhamel integrals.) G = S * S and H = S * D (convolutions) and the integrals P of G and Q of P are
-minus the derivatives of these responses with respect to K and beta, see `driven_sweep`. Time is
-counted in sampling intervals, as in `kernel`; failures are codes.
+(Duhamel integrals), and y'' follows from the equation itself. G = S * S and H = S * D
+(convolutions) and the integrals P of G and Q of P are minus the derivatives of these responses with
+respect to K and beta, see `driven_sensitivity_pass`. Time is counted in sampling intervals, as in
+`kernel`; failures are codes.
 """
 
 from __future__ import annotations
@@ -69,6 +70,28 @@ class Responses(NamedTuple):
     Q: float
 
 
+class Wave(NamedTuple):
+    """The input of one recording for a gain of 1, one value per sample.
+
+    held (n,) : forces between which the force on the mass is a line, N
+    shown (n,) : the force at the samples, which an acceleration holds, N: other than `held` where
+        lines between the samples are no more than a way to the motion
+    carried (n,) : what the input adds to a reading, m/s^order: the base's own motion where a probe
+        reads the absolute one
+    """
+
+    held: Floats
+    shown: Floats
+    carried: Floats
+
+
+@inner()
+def wave_of(waves: Floats, first: int, n: int) -> Wave:
+    """The n samples from `first` on of `waves` (3, M)."""
+    end = first + n
+    return Wave(waves[0, first:end], waves[1, first:end], waves[2, first:end])
+
+
 @compiled()
 def responses(beta: float, K: float, t: float) -> Responses:
     """Responses after a time t >= 0; early ones as power series, where differences would cancel."""
@@ -107,6 +130,18 @@ def advance_driven(after: Responses, y: float, v: float, p: float, r: float) -> 
         after.D * y + after.S * (v + after.beta * y) + (p * after.B + r * after.R),
         after.D * v - after.S * (after.K * y) + (p * after.S + r * after.B),
     )
+
+
+@inner(forceinline=True, fastmath={"contract"})
+def reading_driven(
+    order: int, rate: float, beta: float, K: float, y: float, v: float, p: float
+) -> float:
+    """Return y, y' or y'' of a state under the force per mass p; `rate` intervals per second."""
+    if order == 0:
+        return y
+    if order == 1:
+        return rate * v
+    return rate * rate * (p - beta * v - K * y)
 
 
 @inner(forceinline=True)
@@ -171,7 +206,7 @@ def next_rise(
 
 @inner()
 def run_driven(
-    q: Floats, mass: float, interval: float, wave: Floats, sink: Sink
+    q: Floats, mass: float, interval: float, wave: Wave, sink: Sink
 ) -> tuple[float, int, int]:
     """Simulate one recording under q[A] times `wave`; return (sum of squares, events, code).
 
@@ -179,10 +214,10 @@ def run_driven(
     ----------
     q : (11,) parameters, SI units (see `scaled`); A is the gain of the input
     mass, interval : kg, s
-    wave : (n,) the input at the samples, N
+    wave : the input
     sink : what to compare with, or to fill
     """
-    n = wave.size
+    n, held = wave.held.size, wave.held
     code = check(q, mass, interval, n)
     if code != OK:
         return math.inf, 0, code
@@ -199,19 +234,27 @@ def run_driven(
     limit = EVENTS_AT_LEAST + EVENTS_PER_SAMPLE * n
     y, v = q[Y0], q[V0] * interval
     total, count = 0.0, 0
-    offset = q[OFFSET]
+    offset, order, rate = q[OFFSET], sink.order, sink.rate
+    compared, written = data.size > 0, out.size > 0
     for i in range(n):
-        if data.size > 0:
-            residual = data[i] - offset - y
-            total += residual * residual
-        elif out.size > 0:
-            out[i] = y + offset
-            if speeds.size > 0:
-                speeds[i] = v
+        if compared or written:
+            beta, K, level = free.beta, free.K, 0.0
+            if contact:
+                beta, K, level = touching.beta, touching.K, hold
+            pushed = gain * wave.shown[i] + level
+            read = reading_driven(order, rate, beta, K, y, v, pushed)
+            read += offset + q[A] * wave.carried[i]
+            if compared:
+                residual = data[i] - read
+                total += residual * residual
+            else:
+                out[i] = read
+                if speeds.size > 0:
+                    speeds[i] = v
         if i == n - 1:
             break
-        p = gain * wave[i]
-        r = gain * wave[i + 1] - p
+        p = gain * held[i]
+        r = gain * held[i + 1] - p
         if not stop:
             y, v = advance_driven(free, y, v, p, r)
             continue

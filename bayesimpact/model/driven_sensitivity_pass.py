@@ -3,7 +3,8 @@
 The derivatives of displacement and velocity obey the motion's own equation, driven by what a
 parameter changes of the forces; their responses are the integrals in `driven.Responses`. All of
 c1 ... A (the first eight of q) are carried side by side; through an event they follow the saltation
-rule of `sensitivity_pass`. The input is continuous, so nothing is added there.
+rule of `sensitivity_pass`. The input is continuous, so nothing is added there. Those of an
+acceleration follow from the equation of motion.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.model.compiled import inner, typed
-from bayesimpact.model.driven import Responses, advance_driven, responses
+from bayesimpact.model.driven import Responses, Wave, advance_driven, reading_driven, responses
 from bayesimpact.model.normalized import (
     C1,
     C2,
@@ -81,21 +82,43 @@ def carry_driven(
     dv[A] += now * S + rise * B
 
 
+@inner(forceinline=True, fastmath={"contract"})
+def fill_row(
+    row: Floats, order: int, rate: float, beta: float, K: float, slopes: Floats, side: int,
+    y: float, v: float, dy: Floats, dv: Floats, gain: Floats, at_once: float,
+) -> None:  # fmt: skip
+    """Fill `row` (12,) with the derivatives of y, y' or y''.
+
+    at_once : what the input adds to the reading itself, per unit of its gain; `gain` (COLUMNS,) is
+        1.0 in its place. (One number stored alone would halt the products of the row after it.)
+    """
+    if order == 0:
+        for k in range(COLUMNS):
+            row[k] = dy[k] + at_once * gain[k]
+    elif order == 1:
+        for k in range(COLUMNS):
+            row[k] = rate * dv[k] + at_once * gain[k]
+    else:
+        square = rate * rate
+        for k in range(COLUMNS):
+            changed = slopes[side, 2, k] - slopes[side, 0, k] * v - slopes[side, 1, k] * y
+            row[k] = square * (changed - beta * dv[k] - K * dy[k]) + at_once * gain[k]
+
+
 @inner()
 def record(
-    i: int, y: float, offset: float, dy: Floats, row: Floats, data: Floats, values: Floats,
-    jacobian: Floats, gram: Floats,
-) -> None:  # fmt: skip
-    """Write sample i, or add its products to `gram` (12, 12); `row` (12,) is room for them."""
+    i: int, read: float, row: Floats, data: Floats, values: Floats, jacobian: Floats, gram: Floats
+) -> None:
+    """Write sample i, which is read so, or add its products to `gram` (12, 12).
+
+    row : (12,) its derivatives, and room for the residual
+    """
     if data.size == 0:
-        values[i] = y + offset
-        for k in range(COLUMNS):
-            jacobian[i, k] = dy[k]
-        jacobian[i, OFFSET] = row[OFFSET]
+        values[i] = read
+        for k in range(RESIDUAL):
+            jacobian[i, k] = row[k]
         return
-    for k in range(COLUMNS):
-        row[k] = dy[k]
-    row[RESIDUAL] = data[i] - offset - y
+    row[RESIDUAL] = data[i] - read
     for k in range(RESIDUAL + 1):
         mine = row[k]
         for h in range(RESIDUAL + 1):
@@ -104,11 +127,12 @@ def record(
 
 @inner()
 def driven_sensitivity_pass(
-    q: Floats, mass: float, interval: float, wave: Floats, events: Floats, columns: Ints,
+    q: Floats, mass: float, interval: float, order: int, wave: Wave, events: Floats, columns: Ints,
     data: Floats, values: Floats, jacobian: Floats, gram: Floats,
 ) -> None:  # fmt: skip
     """Pass over one recording; add to `gram` (12, 12) if `data` has samples, else fill the others.
 
+    order : which time derivative of the displacement the samples are
     events : (k, 2) times and velocities of all events, in sampling intervals
     columns : (11,) -1 where a derivative is not wanted; it is left 0
     values, jacobian : (n,), (n, 11)
@@ -121,18 +145,30 @@ def driven_sensitivity_pass(
     dy, dv, slopes = np.zeros(COLUMNS), np.zeros(COLUMNS), np.empty((2, 3, COLUMNS))
     for k in range(COLUMNS):
         wanted[k] = 1.0 if columns[k] >= 0 else 0.0
+    gain = np.zeros(COLUMNS)
+    gain[A] = wanted[A]
     row[OFFSET] = 1.0 if columns[OFFSET] >= 0 else 0.0
     fill_sensitivities(slopes, wanted, q, mass, interval)
     dy[Y0], dv[V0] = wanted[Y0], interval * wanted[V0]
     free = responses(2.0 * motion.b_flight, motion.K_flight, 1.0)
     touching = responses(2.0 * motion.b_contact, motion.K_contact, 1.0)
     y, v, e = q[Y0], q[V0] * interval, typed(0)
-    for i in range(wave.size):
-        record(i, y, q[OFFSET], dy, row, data, values, jacobian, gram)
-        if i == wave.size - 1:
+    held, rate = wave.held, 1.0 / interval
+    for i in range(held.size):
+        side, level, beta, K = 0, 0.0, free.beta, free.K
+        if contact:
+            side, level, beta, K = 1, hold, touching.beta, touching.K
+        # of an acceleration the input is a part, and a probe may see the base move
+        pushed = per_mass * wave.shown[i]
+        at_once = wave.carried[i] + (rate * rate * pushed if order == 2 else 0.0)
+        fill_row(row, order, rate, beta, K, slopes, side, y, v, dy, dv, gain, at_once)
+        read = reading_driven(order, rate, beta, K, y, v, q[A] * pushed + level)
+        read += q[OFFSET] + q[A] * wave.carried[i]
+        record(i, read, row, data, values, jacobian, gram)
+        if i == held.size - 1:
             break
-        now = per_mass * wave[i]
-        rise = per_mass * wave[i + 1] - now
+        now = per_mass * held[i]
+        rise = per_mass * held[i + 1] - now
         r = q[A] * rise
         now_A, rise_A = now * wanted[A], rise * wanted[A]
         t = 0.0

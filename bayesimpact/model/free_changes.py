@@ -180,9 +180,11 @@ def motions_beside(
         if own is None:
             q = q.copy()
             q[:, _GAIN] = 1.0
-        else:
-            waves = waves / q[:, [_GAIN]] + own
-        inputs = Inputs(waves.reshape(-1), np.arange(q.shape[0]) * count)
+            inputs = Inputs(waves.reshape(-1), np.arange(q.shape[0]) * count)
+        else:  # the pushes act at the samples as well, and add nothing to readings of their own
+            acting = np.array([[1.0], [1.0], [0.0]])[..., None]
+            both = own[:, None] + acting * (waves / q[:, [_GAIN]])
+            inputs = Inputs(both.reshape(3, -1), np.arange(q.shape[0]) * count)
     return general_motions(
         q, oscillator.campaign.mass, np.full(q.shape[0], count),
         np.full(q.shape[0], float(oscillator.intervals[r]) / factor),
@@ -191,11 +193,16 @@ def motions_beside(
 
 
 def _measured_input(oscillator: Oscillator, r: int, factor: int) -> Array | None:
-    """Recording r's input at its points, (n,): linear between the samples; None without one."""
+    """Recording r's input at its points, (3, n) as in `Inputs`, for motions; None without one.
+
+    Linear between the samples.
+    """
     inputs = None if oscillator.inputs is None else oscillator.inputs.of(np.array([r]))
     if inputs is None or inputs.starts[0] < 0:
         return None
     first, count = int(inputs.starts[0]), int(oscillator.counts[r])
-    values = inputs.values[first : first + count]
+    values = inputs.of_motion().values[:, first : first + count]
     points = np.arange((count - 1) * factor + 1) / factor
-    return values if factor == 1 else np.asarray(np.interp(points, np.arange(count), values))
+    if factor == 1:
+        return values
+    return np.stack([np.interp(points, np.arange(count), row) for row in values])

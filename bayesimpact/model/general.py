@@ -46,7 +46,7 @@ from bayesimpact.model.added.context import (
     G,
 )
 from bayesimpact.model.added.crossing import first_event, suspicious
-from bayesimpact.model.added.dense import LONGEST_STRIDE, fill_in, reading
+from bayesimpact.model.added.dense import LONGEST_STRIDE, fill_in, input_reading, reading
 from bayesimpact.model.added.flows import RENEWED, first_step, flow_from, next_step, stride_of
 from bayesimpact.model.added.memory import keep_memory, relax
 from bayesimpact.model.added.method import quarters
@@ -99,7 +99,8 @@ def cruise(y: Any, v: Any, n0: Any, j: Any, stride: Any, end: Any, flow: Any, w:
         if event:
             break
         fill_in(j, j + stride - 1, t, True, at, flow, w, y, v, n0, h, y1, v1, n1)
-        w.out[j + stride - 1] = reading(y1, v1, n1, flow, w)
+        last = j + stride - 1
+        w.out[last] = reading(y1, v1, n1, flow, w) + input_reading(last, flow.inverse, w)
         if second:
             respond(y, v, t, n0, y1, v1, n1, h, j, j + stride, flow, w)
         j += stride
@@ -135,6 +136,7 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
             h, lands = next_step(y, v, t, n0, j, aligned, min(longest, ramp), flow, w)
             if not h > 0.0:  # an event on the sample itself
                 w.out[j] = reading(y, v, n0, flow, w) + added_reading(y, v, t, w)
+                w.out[j] += input_reading(j, flow.inverse, w)
                 t = j * w.interval
                 j += 1
                 continue
@@ -153,7 +155,8 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
         if reached > j + lands:
             fill_in(j, reached - lands, t, aligned, at, flow, w, y, v, n0, length, y1, v1, n1)
         if lands:
-            w.out[reached - 1] = reading(y1, v1, n1, flow, w)
+            last = reached - 1
+            w.out[last] = reading(y1, v1, n1, flow, w) + input_reading(last, flow.inverse, w)
         if second:
             respond(y, v, t, n0, y1, v1, n1, length, j, reached, flow, w)
         t = (reached - 1) * w.interval if lands else t + length
@@ -175,14 +178,16 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
 @inner()
 def first_reading(y: Any, v: Any, w: Any) -> Any:
     """What the probe reads at t = 0."""
+    at_once = input_reading(0, 0.0, w)
     if w.order < 2:
-        return y if w.order == 0 else v
+        return at_once + (y if w.order == 0 else v)
     if v == 0.0 and w.q[FRICTION] > 0.0 and w.s[SLIDING] == 0.0:
-        return added_reading(y, v, 0.0, w)
+        return at_once + added_reading(y, v, 0.0, w)
     set_directions(y, v, 0.0, w)
     flow, _ = flow_from(y, v, 0.0, w)
     force = 0.0 if flow.plain else added_force(y, v, 0.0, NOW, flow, w)
-    return reading(y, v, force, flow, w) + added_reading(y, v, 0.0, w)
+    at_once = input_reading(0, flow.inverse, w)
+    return reading(y, v, force, flow, w) + added_reading(y, v, 0.0, w) + at_once
 
 
 @inner(inline="always")
@@ -205,22 +210,23 @@ def walk(w: Any) -> Any:
 
 @inner(inline="always")
 def integrate(
-    q: Any, mass: Any, interval: Any, laws: Any, order: Any, out: Any, wave: Any, room: Any
+    q: Any, mass: Any, interval: Any, laws: Any, order: Any, out: Any, waves: Any, room: Any
 ) -> Any:
     """One trajectory, see `integrate_many`. The caller keeps `room`: w has only its addresses.
 
-    wave : (n,) measured input, or (0,)
+    waves : (3, n) measured input, see `driven.Wave`, or (3, 0)
     """
     if not admissible(q, mass):
         return BAD_PARAMETERS
     s, acting, work, tables, keys = room
     s[:], acting[:], work[:], keys[:] = 0.0, 0, 0.0, np.nan
+    wave, shown, carried = waves[0], waves[1], waves[2]
     w = Context(
         mass, interval, out.size, order, floats_at(out.ctypes.data), floats_at(tables.ctypes.data),
         floats_at(keys.ctypes.data), laws.shape[0], floats_at(q.ctypes.data), q.ctypes.data,
         integers_at(laws.ctypes.data), integers_at(acting.ctypes.data),
         floats_at(work.ctypes.data), floats_at(s.ctypes.data), floats_at(wave.ctypes.data),
-        wave.size > 1, largest(wave),
+        floats_at(shown.ctypes.data), floats_at(carried.ctypes.data), wave.size > 1, largest(wave),
     )  # fmt: skip
     code = walk(w)
     if code == OK and not np.all(np.isfinite(out)):
@@ -256,10 +262,11 @@ def _in_turn(
 ) -> Any:  # fmt: skip
     room = room_for(laws.shape[0])
     for k in range(q.shape[0]):
-        wave = waves[:0] if starts[k] < 0 else waves[starts[k] : starts[k] + counts[k]]
+        first, size = (0, 0) if starts[k] < 0 else (starts[k], counts[k])
         codes[k] = integrate(
-            q[k], mass, intervals[k], laws, orders[k], out[k, : counts[k]], wave, room
-        )
+            q[k], mass, intervals[k], laws, orders[k], out[k, : counts[k]],
+            waves[:, first : first + size], room,
+        )  # fmt: skip
 
 
 def integrate_many(
@@ -296,7 +303,7 @@ def integrate_many(
     codes = np.zeros(q.shape[0], dtype=np.int64)
     q = np.ascontiguousarray(q)
     orders = np.zeros_like(counts) if orders is None else np.ascontiguousarray(orders)
-    given = inputs or Inputs(np.empty(0), np.full(q.shape[0], -1, dtype=np.int64))
+    given = inputs or Inputs(np.empty((3, 0)), np.full(q.shape[0], -1, dtype=np.int64))
     waves, starts = np.ascontiguousarray(given.values), np.ascontiguousarray(given.starts)
 
     def run(first: int, end: int) -> None:

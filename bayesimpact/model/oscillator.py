@@ -79,13 +79,18 @@ class Oscillator:
         return np.array([r.order for r in self.campaign.recordings], dtype=np.int64)
 
     @cached_property
+    def reads_displacements(self) -> bool:
+        """True when every recording says where the oscillator is."""
+        return all(r.is_displacement for r in self.campaign.recordings)
+
+    @cached_property
     def samples(self) -> Array:
         """All recordings one after another, (N,), each in its own SI unit."""
         return np.concatenate([r.samples for r in self.campaign.recordings])
 
     @cached_property
     def inputs(self) -> Inputs | None:
-        """Measured forces on the mass, N, for a gain of 1; None when no recording has any."""
+        """Measured inputs for a gain of 1; None when no recording has any."""
         recordings = self.campaign.recordings
         if all(r.input is None for r in recordings):
             return None
@@ -93,9 +98,9 @@ class Oscillator:
         for r in recordings:
             starts.append(-1 if r.input is None else total)
             if r.input is not None:
-                parts.append(r.input.force(self.campaign.mass, r.interval))
+                parts.append(r.input.waves(self.campaign.mass, r.interval, r.order))
                 total += r.samples.size
-        return Inputs(np.concatenate(parts), np.array(starts, dtype=np.int64))
+        return Inputs(np.concatenate(parts, axis=1), np.array(starts, dtype=np.int64))
 
     @cached_property
     def is_whole(self) -> bool:
@@ -207,12 +212,16 @@ class Oscillator:
     ) -> Array:
         """True motions, a row per recording index and slot vector; NaN where it fails.
 
-        Displacements, m, or what the recording's probe reads of them; `orders` asks for others.
+        What the recording's probe reads of them: displacements, m, or derivatives, a base's motion
+        counted in where it reads the absolute one. `orders` asks for others, relative to the base.
         """
         q = np.ascontiguousarray(slots.reshape(recordings.size, -1))
-        orders = self.orders[recordings] if orders is None else orders
-        counts, intervals = self.counts[recordings], self.intervals[recordings]
         inputs = None if self.inputs is None else self.inputs.of(recordings)
+        if orders is None:
+            orders = self.orders[recordings]
+        elif inputs is not None:
+            inputs = inputs.of_motion()
+        counts, intervals = self.counts[recordings], self.intervals[recordings]
         if self.is_base:
             base = np.ascontiguousarray(q[:, : len(BASE_SLOTS)])
             return motions(base, self.campaign.mass, counts, intervals, orders, inputs)

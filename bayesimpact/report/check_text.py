@@ -118,7 +118,7 @@ def _inputs(campaign: Campaign) -> list[str]:
             unit = {"force_N": "N", "base_m": "m", "base_m_s2": "m/s2"}[r.input.kind]
             low, high = r.input.samples.min(), r.input.samples.max()
             lines.append(
-                f"input of {r.name}: {r.input.kind}, {low:.4g} to {high:.4g} {unit}, {gain}"
+                f"input of {r.name}: {r.input.label}, {low:.4g} to {high:.4g} {unit}, {gain}"
             )
     return lines
 

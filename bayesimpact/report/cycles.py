@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -88,7 +88,7 @@ def cycles(results: Results) -> list[Cycle]:
     for r, (recording, old) in enumerate(zip(results.recordings, before, strict=True)):
         y, level = contacts(results, recording)
         starts = touches(y, float(np.mean(y)) if level is None else level)
-        gain = (recording.samples - old) ** 2 - recording.residual**2
+        gain = replace(recording, predicted=old).residual ** 2 - recording.residual**2
         total = np.concatenate([[0.0], np.cumsum(gain / (2 * recording.noise_rms**2))])
         for k, (first, last) in enumerate(pairwise(starts)):
             leave = int(first)

@@ -30,7 +30,7 @@ class RecordingResult:
     quantity : what the probe reads
     displacement : (n,) of the model from the true rest, m; empty where the readings tell it
     scale : of its noise, over that of the first recording's quantity
-    input : kind of the measured input, "" for a free decay
+    input : label of the measured input, "" for a free decay
     """
 
     name: str

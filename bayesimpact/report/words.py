@@ -104,7 +104,7 @@ def _unstated(results: Results, mass: str) -> str:
 def ratio_words(results: Results) -> str:
     """Why ratios are given."""
     mass = "inertia" if results.angular else "mass"
-    if any(r.input for r in results.recordings) and not any(
+    if any(r.input == "force_N" for r in results.recordings) and not any(
         row.name == "input_gain" for row in results.rows
     ):
         return (
@@ -154,11 +154,17 @@ def input_words(results: Results) -> str:
         return ""
     shown = ", ".join(driven[:MOST_RECORDINGS])
     shown += f" and {len(driven) - MOST_RECORDINGS} more" if len(driven) > MOST_RECORDINGS else ""
-    return (
+    words = (
         " With a measured input, a line between samples unless campaign.toml says else: "
         f"{shown}. The backbone knows "
         "free decays only: they have no part in its check."
     )
+    if any(r.input.endswith("absolute") for r in results.recordings):
+        words += (
+            " Where campaign.toml says absolute, the base's own motion is counted into what the "
+            "model predicts of a reading; displacements are relative to the base."
+        )
+    return words
 
 
 def search_words(results: Results) -> str:

@@ -141,14 +141,13 @@ def _driven(campaign: Campaign) -> Estimates:
     known = found.k2[np.isfinite(found.k2)]
     usual = float(np.exp(np.mean(np.log(known)))) if known.size else found.k1
     k2 = np.where(np.isfinite(found.k2), found.k2, usual)
-    moved = [r.samples - o for r, o in zip(recordings, found.offset, strict=True)]
-    impacts = [int(np.sum((m[:-1] < found.gap) & (m[1:] >= found.gap))) for m in moved]
+    impacts = [int(np.sum((m[:-1] < found.gap) & (m[1:] >= found.gap))) for m in found.moved]
 
     def named(values: Iterable[float]) -> Mapping[str, float]:
         pairs = zip(recordings, values, strict=True)
         return MappingProxyType({r.name: float(value) for r, value in pairs})
 
-    noises = [local.noise_level(r.samples, rough_period(r.samples)) for r in recordings]
+    noises = [local.noise_level(r.samples, rough_period(r.samples, r.order)) for r in recordings]
     free = any(r.input is not None and r.input.free for r in recordings)
     estimates = Estimates(
         k1=found.k1,

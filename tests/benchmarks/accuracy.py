@@ -49,7 +49,15 @@ def measure(system: systems.System) -> Accuracy:
         twin = naive.twin(q, mass, naive.mp.mpf(interval) * every, (n - 1) // every + 1)
     motion = simulate(**system.arguments)
     events, code = find_events(
-        q, mass, interval, n, np.empty(0), np.empty((64, 2)), response_tables(), np.empty(0), -1
+        q,
+        mass,
+        interval,
+        n,
+        np.empty(0),
+        np.empty((64, 2)),
+        response_tables(),
+        np.empty((3, 0)),
+        -1,
     )
     assert code == 0
     scale = float(max(abs(y) for y in twin.displacement)) or 1.0

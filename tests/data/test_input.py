@@ -182,10 +182,54 @@ def test_an_input_that_never_changes_and_a_coarse_base() -> None:
             )
 
 
-def test_velocities_beside_an_input_are_refused() -> None:
+@pytest.mark.parametrize("unit", ["m/s", "m/s2", "mm/s", "g"])
+def test_velocities_and_accelerations_beside_an_input(unit: str, tmp_path: Path) -> None:
     entry: dict[str, Any] = {
-        "name": "a", "samples": decay(), "unit": "m/s", "sample_rate_hz": 500.0,
+        "name": "a", "samples": decay(), "unit": unit, "sample_rate_hz": 500.0,
         "input": {"samples": FORCE, "kind": "force_N"},
     }  # fmt: skip
-    with pytest.raises(InputError, match="velocity"):
+    made = bi.Campaign.from_arrays([entry], name="rig", mass_kg=0.5, stop=False)
+    made.save(tmp_path)
+    again = bi.load(tmp_path)
+    assert made.recordings[0].quantity == again.recordings[0].quantity != "displacement"
+    np.testing.assert_array_equal(again.recordings[0].samples, made.recordings[0].samples)
+
+
+ABSOLUTE = [("m", "base_m"), ("m/s", "base_m"), ("m/s2", "base_m"), ("g", "base_m_s2")]
+
+
+@pytest.mark.parametrize(("unit", "kind"), ABSOLUTE)
+def test_a_probe_that_reads_the_motion_in_space(unit: str, kind: str, tmp_path: Path) -> None:
+    base = {"samples": 1e-3 * FORCE, "kind": kind, "absolute": True}
+    entry = {"name": "a", "samples": decay(), "unit": unit, "sample_rate_hz": 500.0, "input": base}
+    made = bi.Campaign.from_arrays([entry], name="rig", mass_kg=0.5, stop=False)
+    made.save(tmp_path)
+    copied = bi.Campaign.from_arrays(made.recordings, name="rig", mass_kg=0.5, stop=False)
+    for campaign in (made, copied, bi.load(tmp_path)):
+        (recording,) = campaign.recordings
+        given = _only(campaign)[1]
+        assert given.absolute and not recording.is_displacement
+        added = given.carried(recording.interval, recording.order)
+        angle = np.arange(600) * 0.07
+        exact = {0: 3e-3 * np.sin(angle) + 5e-4, 1: 0.105 * np.cos(angle)}.get(recording.order)
+        if exact is None:
+            exact = -3.675 * np.sin(angle) if kind == "base_m" else 1e-3 * FORCE
+        np.testing.assert_allclose(added[10:-10], exact[10:-10], atol=2e-5)
+
+
+@pytest.mark.parametrize(
+    ("unit", "kind", "accepted"),
+    [("m/s2", "force_N", "base_m"), ("m", "base_m_s2", "acceleration"), ("m/s", "base_m_s2", "m")],
+)
+def test_a_motion_in_space_that_the_base_does_not_tell(unit: str, kind: str, accepted: str) -> None:
+    base = {"samples": FORCE, "kind": kind, "absolute": True}
+    entry = {"name": "a", "samples": decay(), "unit": unit, "sample_rate_hz": 500.0, "input": base}
+    with pytest.raises(InputError) as refusal:
         bi.Campaign.from_arrays([entry], name="rig", mass_kg=0.5, stop=False)
+    words = str(refusal.value)
+    assert "key absolute" in words and kind in words and accepted in words
+
+
+def test_a_key_absolute_of_another_type(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="key absolute"):
+        _load(tmp_path, 'input = { column = "force", kind = "base_m", absolute = "yes" }')

@@ -105,7 +105,7 @@ KEYS: dict[str, dict[str, tuple[str, str]]] = {
     },
     "InputTable": {
         key: (INPUT, "two columns")
-        for key in ("column", "kind", "scale", "gain", "remove_mean", "hold")
+        for key in ("column", "kind", "scale", "gain", "remove_mean", "hold", "absolute")
     },
     "MeasurementTable": {
         "noise_um": (TOP + ENTRY + CHAIN + "noise_um = 7.0\n", ""),

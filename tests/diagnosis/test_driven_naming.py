@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
+from driven_rigs import driven_rig
 from driven_twin import Law, driven_motion
 
 from bayesimpact.data.campaign import Campaign
@@ -58,3 +61,47 @@ def test_nothing_is_named_where_nothing_is_missing() -> None:
     campaign = _campaign(lambda y, v, touching: 0.0, stop=True, corner=False, gain=1.0)
     found = diagnose(campaign, rng=np.random.default_rng(0), search=False)
     assert found.verdict == "adequate"
+
+
+DERIVED: dict[str, tuple[int, str]] = {
+    "spring_cubic": (202, "acceleration"),  # noise, with a stop
+    "coulomb_friction": (204, "acceleration"),  # a sweep, without
+    "quadratic_drag": (207, "velocity"),  # a base, read in space, without
+}
+
+
+@pytest.mark.parametrize("effect", list(DERIVED))
+def test_a_concealed_effect_is_named_from_a_derivative(effect: str) -> None:
+    seed, quantity = DERIVED[effect]
+    rig = driven_rig(seed, quantity)
+    k1, mass, reach = rig.truth["k1"], rig.campaign.mass, 3e-3
+    sizes = {
+        "spring_cubic": 0.03 * k1 / reach**2,
+        "coulomb_friction": 0.01 * k1 * reach,
+        "quadratic_drag": 0.02 * mass / reach,
+    }
+    shapes: dict[str, Law] = {
+        "spring_cubic": lambda y, v, touching: y**3,
+        "coulomb_friction": lambda y, v, touching: float(np.sign(v)),
+        "quadratic_drag": lambda y, v, touching: abs(v) * v,
+    }
+    size, shape = sizes[effect], shapes[effect]
+
+    def law(y: float, v: float, touching: bool) -> float:
+        return size * shape(y, v, touching)
+
+    campaign = driven_rig(seed, quantity, law, corner=effect != "spring_cubic").campaign
+    found = diagnose(campaign, rng=np.random.default_rng(0), search=False)
+    assert (found.verdict, [e.id for e in found.effects]) == ("named", [effect])
+    (name,) = (n for n in found.after.names if n.startswith(effect))
+    sd = found.after.sd[found.after.names.index(name)]
+    assert abs(found.after.value(name) - size) < 4.0 * sd
+    assert found.before.reduced_chi2 > 2.0
+    assert found.after.reduced_chi2 == pytest.approx(1.0, abs=0.25)
+
+
+@pytest.mark.parametrize("quantity", ["velocity", "acceleration"])
+def test_nothing_is_named_from_a_derivative_where_nothing_is_missing(quantity: Any) -> None:
+    for seed in (200, 202, 203):
+        campaign = driven_rig(seed, quantity).campaign
+        assert diagnose(campaign, rng=np.random.default_rng(0), search=False).verdict == "adequate"

@@ -94,9 +94,10 @@ def test_the_search_ends_where_the_guess_does() -> None:
 
 
 def test_a_bump_is_the_derivative_of_its_own() -> None:
-    phi, slope, bend = bump(50)
+    phi, slope, bend, third = bump(50)
     np.testing.assert_allclose(np.gradient(phi)[1:-1], slope[1:-1], atol=2e-4)
     np.testing.assert_allclose(np.gradient(slope)[1:-1], bend[1:-1], atol=2e-4)
+    np.testing.assert_allclose(np.gradient(bend)[2:-2], third[2:-2], atol=2e-4)
     assert abs(slope.sum()) < 1e-12 and abs(bend.sum()) < 1e-9
 
 

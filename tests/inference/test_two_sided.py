@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import small_rig
-from driven_twin import driven_motion
+from driven_twin import QUANTITIES, driven_states
 from effect_rigs import BY_ID
 
 from bayesimpact.data.campaign import SECOND_STOP, Campaign
@@ -112,10 +113,18 @@ def test_an_unknown_effect_cannot_be_declared() -> None:
         build_layout(campaign)
 
 
-@pytest.mark.parametrize("kind", ["sweep", "noise"])
-def test_driven_against_both_stops(kind: str) -> None:
+@pytest.mark.parametrize(
+    ("kind", "quantity", "noise"),
+    [
+        ("sweep", "displacement", 5e-6),
+        ("noise", "displacement", 5e-6),
+        ("noise", "velocity", 2e-4),
+        ("sweep", "acceleration", 2e-2),
+    ],
+)
+def test_driven_against_both_stops(kind: str, quantity: Any, noise: float) -> None:
     """By DOP853, beginning at rest: the search looks where the motion is large."""
-    n, interval, noise = 1500, 2e-3, 5e-6
+    n, interval = 1500, 2e-3
     truth = {"c1": 0.6, "k1": 800.0, "c2": 2.0, "g": 1.1e-3, "k2": 5000.0}
     rng = np.random.default_rng(5)
     t = interval * np.arange(n)
@@ -127,10 +136,10 @@ def test_driven_against_both_stops(kind: str) -> None:
         return STIFF["stiffness"] * min(y + STIFF["gap"], 0.0)
 
     values = {"mass": 0.5, "y0": 0.0, "v0": 0.0, **truth}
-    motion, events = driven_motion(values, force, interval, second)
-    assert events > 8 and motion.min() < -1.5 * STIFF["gap"]
-    samples = motion + 2e-4 + noise * rng.standard_normal(n)
-    recording = Recording("one", "1", samples, interval, input=Input(force))
+    states, events = driven_states(values, force, interval, second)
+    assert events > 8 and states[0].min() < -1.5 * STIFF["gap"]
+    samples = states[QUANTITIES.index(quantity)] + 40 * noise + noise * rng.standard_normal(n)
+    recording = Recording("one", "1", samples, interval, quantity=quantity, input=Input(force))
     campaign = Campaign("rig", 0.5, (recording,), declared=(SECOND_STOP,))
     found = identify(campaign, rng=np.random.default_rng(0), search=False)
     fit = found.fit

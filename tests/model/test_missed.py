@@ -32,7 +32,7 @@ def worst_excess(system: systems.System) -> tuple[float, int]:
         np.empty(0),
         np.empty((64, 2)),
         response_tables(),
-        np.empty(0),
+        np.empty((3, 0)),
         -1,
     )
     assert code == 0, system

@@ -79,6 +79,16 @@ def test_the_cycle_that_tells_most_is_where_the_base_model_is_off() -> None:
     assert cycles(replace(results, diagnosis_arrays={})) == []
 
 
+def test_what_is_set_aside_gains_nothing_in_a_cycle() -> None:
+    results = compared()
+    best = telling_cycle(results)
+    assert best is not None
+    first, *rest = results.recordings
+    aside = replace(first, excluded=((best.first, best.last),))
+    again = telling_cycle(replace(results, recordings=(aside, *rest)))
+    assert again is None or (again.recording, again.number) != (best.recording, best.number)
+
+
 def test_force_in_time_is_the_map_along_the_motion() -> None:
     results = compared()
     arrays = results.diagnosis_arrays

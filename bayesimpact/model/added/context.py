@@ -45,7 +45,9 @@ class Context(NamedTuple):
     acting: Any  # (L,) the laws that act in the present kind of motion come first
     work: Any  # (L + resonator.ROWS, WORK_COLUMNS)
     s: Any  # what holds between events, see `contact_state`
-    wave: Any  # (n,) measured input at the samples, N
+    wave: Any  # (n,) measured input at the samples, N; as `driven.Wave` has it:
+    shown: Any  # (n,) what accelerations hold, N
+    carried: Any  # (n,) what it adds to readings
     driven: Any  # True when there is one
     peak: Any  # its largest size, N
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from bayesimpact.model.added.context import FORCE
 from bayesimpact.model.compiled import inner
 from bayesimpact.model.flow import impulse_response
 
@@ -24,6 +25,20 @@ def reading(y: Any, v: Any, n: Any, flow: Any, w: Any) -> Any:
     if w.order == 1:
         return v
     return flow.inverse * n - 2.0 * flow.b * v - flow.K * (y - flow.rest)
+
+
+@inner(forceinline=True)
+def input_reading(j: Any, inverse: Any, w: Any) -> Any:
+    """What the input adds to the reading of sample j, the motion under its lines apart.
+
+    inverse : 1 / moving mass, 1/kg; 0 where dry friction holds the mass
+    """
+    if not w.driven:
+        return 0.0
+    extra = w.carried[j]
+    if w.order == 2:
+        extra += inverse * (w.shown[j] - w.wave[j])
+    return w.q[FORCE] * extra
 
 
 @inner(forceinline=True)
@@ -71,6 +86,8 @@ def fill_in(
         if w.order > 0:
             added += p0 + x * p1
         w.out[first + i] = rest + D * u + S * m + added
+        if w.driven:
+            w.out[first + i] += input_reading(first + i, flow.inverse, w)
 
 
 @inner(forceinline=True)

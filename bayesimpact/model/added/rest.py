@@ -8,6 +8,7 @@ import numpy as np
 
 from bayesimpact.model.added.contact_state import SLIDING, holding_force, static_force
 from bayesimpact.model.added.context import AHEAD, FORCE, NOW
+from bayesimpact.model.added.dense import input_reading
 from bayesimpact.model.added.flows import flow_from
 from bayesimpact.model.added.memory import keep_memory, relax_one
 from bayesimpact.model.added.resonator import fastest_body, relax_bodies
@@ -53,7 +54,7 @@ def hold(y: Any, t: Any, j: Any, w: Any) -> Any:
         t += h
         if cuts == 1:
             t = j * w.interval
-            w.out[j] = shown + added_reading(y, 0.0, t, w)
+            w.out[j] = shown + added_reading(y, 0.0, t, w) + input_reading(j, 0.0, w)
             j += 1
     return t, j
 
