@@ -19,7 +19,7 @@ from bayesimpact.diagnosis.naming import State, is_large, leaves_something
 from bayesimpact.diagnosis.own_band import shakes_in_own_band
 from bayesimpact.diagnosis.profile_likelihood import profiled
 from bayesimpact.diagnosis.promising import is_redundant
-from bayesimpact.diagnosis.refit import Candidate, exchanged, fit_from, refit, without
+from bayesimpact.diagnosis.refit import Candidate, exchanged, fit_from, grown, refit, without
 from bayesimpact.diagnosis.scan import Scan, scan
 from bayesimpact.diagnosis.scores import Score
 from bayesimpact.inference.progress import Refit
@@ -150,12 +150,23 @@ class Models:
         found = []
         for chosen in self.sets.best(most) if self.may_go_on() else ():
             self.tell("fitting " + " + ".join(e.id for e in chosen.effects))
-            found.append(
-                self.keep(fit_from(candidate.fit, chosen.effects, chosen.values, self.scales))
-            )
+            start = fit_from(candidate.fit, chosen.effects, chosen.values, self.scales)
+            found.append(self.no_worse(self.keep(start)))
             if not (is_large(found[-1].fit) and self.may_go_on()):
                 break
         return found
+
+    def no_worse(self, candidate: Candidate) -> Candidate:
+        """A model that has reached no less than what it contains: a climb that began elsewhere and
+        ended lower begins again from there.
+        """
+        ids = set(candidate.ids)
+        parts = [c for c in self.tried.values() if set(c.ids) < ids]
+        best = max(parts, key=lambda c: c.fit.log_likelihood, default=candidate)
+        if not best.fit.log_likelihood > candidate.fit.log_likelihood + SAME:
+            return candidate
+        self.tell("fitting " + " + ".join(candidate.ids) + " once more")
+        return self.keep(grown(best, candidate.effects, self.scales))
 
     @cached_property
     def sets(self) -> LikelySets:

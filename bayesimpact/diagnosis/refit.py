@@ -148,6 +148,11 @@ def without(candidate: Candidate, effect: Effect, scales: Scales) -> Candidate:
     return _refitted(candidate, tuple(e for e in candidate.effects if e.id != effect.id), scales)
 
 
+def grown(candidate: Candidate, effects: tuple[Effect, ...], scales: Scales) -> Candidate:
+    """A larger model fitted from the candidate's mode."""
+    return _refitted(candidate, effects, scales)
+
+
 def exchanged(candidate: Candidate, old: Effect, new: Effect, scales: Scales) -> Candidate:
     """The candidate's model with an effect that has no size in the place of one of its own.
 
