@@ -356,6 +356,7 @@ def effects(ctx: click.Context, own: Path | None, seed: int, quiet: bool) -> Non
     With --check, a table of checks of your own: units, limit at the null value, sign of the energy,
     convergence of the steps, derivatives. Exit code 2 when one failed.
     """
+    from bayesimpact.model.effects import UNTRIED
     from bayesimpact.model.effects.catalogue import catalogue
 
     if own is not None:
@@ -368,7 +369,8 @@ def effects(ctx: click.Context, own: Path | None, seed: int, quiet: bool) -> Non
                 click.echo(f"{check.effect}  {check.name:<32} {check.result:<8} {check.detail}")
         ctx.exit(BAD_INPUT if any(check.result == "failed" for check in checks) else 0)
     for row in catalogue():
-        click.echo(f"{row.id}\n    {row.title}: {row.equation}   [{row.family}]")
+        asked = "   (looked for by `effects=` in Python only)" if row.id in UNTRIED else ""
+        click.echo(f"{row.id}{asked}\n    {row.title}: {row.equation}   [{row.family}]")
         for parameter in row.parameters:
             null = "" if parameter.null == "-" else f", vanishes at {parameter.null}"
             scope = "" if parameter.scope == "campaign" else f", one per {parameter.scope}"
