@@ -32,7 +32,7 @@ from bayesimpact.model.superposition import Motion, answers, motion_along
 Array = NDArray[np.float64]
 
 KNOTS = 8  # in a free period: a force at its own frequency, or in one contact, is resolved
-ENTRIES = 30_000_000  # of the largest matrix D that is held; longer recordings get fewer knots
+ENTRIES = 20_000_000  # of the largest matrix D that is held; longer recordings get fewer knots
 BLOCK = 64  # forces at once, so that memory stays bounded
 REACH = 40.0  # of ln k: from a force far below the noise to one far above it
 RMS = np.sqrt(2.0 / 3.0)  # of a force between knots of unit size
@@ -151,12 +151,20 @@ class Discrepancy:
         return float(max(found))
 
 
-def discrepancy(fit: Fit) -> Discrepancy:
-    """The force of time that the remainder of a fit asks for."""
-    period = 2 * np.pi * float(np.sqrt(fit.target.oscillator.campaign.mass / fit.value("k1")))
-    motions = tuple(_motion(fit, r) for r in range(len(fit.linearisation)))
-    parts = tuple(_part(fit, r, motion, period / KNOTS) for r, motion in enumerate(motions))
-    return Discrepancy(fit, motions, parts, *_sized(fit, parts))
+def discrepancy(fit: Fit) -> Discrepancy | None:
+    """The force of time that the remainder of a fit asks for; None where the fitted motion is none
+    that a small force could change: it ran away, or does not move.
+    """
+    stiffness = fit.value("k1")
+    if not (stiffness > 0 and all(np.isfinite(y).all() and np.ptp(y) for y in fit.displacements)):
+        return None
+    period = 2 * np.pi * float(np.sqrt(fit.target.oscillator.campaign.mass / stiffness))
+    try:
+        motions = tuple(_motion(fit, r) for r in range(len(fit.linearisation)))
+        parts = tuple(_part(fit, r, motion, period / KNOTS) for r, motion in enumerate(motions))
+        return Discrepancy(fit, motions, parts, *_sized(fit, parts))
+    except np.linalg.LinAlgError:
+        return None
 
 
 def _part(fit: Fit, r: int, motion: Motion, spacing: float) -> Part:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from bayesimpact.diagnosis.discrepancy import discrepancy
+from bayesimpact.diagnosis.refit import residual_repetition
 from bayesimpact.inference.fit import Fit
 
 Array = NDArray[np.float64]
@@ -59,6 +60,10 @@ def intervals(fit: Fit, *, remains: bool = False) -> Intervals:
     """Intervals of a fit; `remains`: something beside the noise is left."""
     mean, covariance = fit.mode, fit.covariance
     if remains:
-        mean, covariance = discrepancy(fit).posterior
+        left = discrepancy(fit)
+        if left is None:
+            covariance = covariance * residual_repetition(fit)
+        else:
+            mean, covariance = left.posterior
     bounds = np.array([(p.lower, p.upper) for p in fit.target.oscillator.layout.parameters])
     return Intervals(fit.names, mean, covariance, bounds[:, 0], bounds[:, 1])

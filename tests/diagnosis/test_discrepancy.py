@@ -11,7 +11,7 @@ from scipy import stats
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.diagnosis import discrepancy as module
-from bayesimpact.diagnosis.discrepancy import discrepancy
+from bayesimpact.diagnosis.discrepancy import Discrepancy, discrepancy
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.force import missing_force
 from bayesimpact.diagnosis.intervals import intervals
@@ -22,6 +22,12 @@ from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.free_changes import motions_beside
 
 NOISE = small_rig.NOISE
+
+
+def left_by(fit) -> Discrepancy:
+    found = discrepancy(fit)
+    assert found is not None
+    return found
 
 
 def plain_fit(campaign: Campaign):
@@ -53,7 +59,7 @@ def test_the_likelihood_is_that_of_a_dense_covariance():
         3, {"spring_cubic": {"stiffness": 1e5}}, rig=small_rig.PLAIN,
         releases=small_rig.PLAIN_RELEASES[:1], duration=1.5,
     )  # fmt: skip
-    found = discrepancy(plain_fit(campaign))
+    found = left_by(plain_fit(campaign))
     fit = found.fit
     lin, part = fit.linearisation[0], found.parts[0]
     level = fit.target.likelihood.noise.level
@@ -77,7 +83,7 @@ def test_the_likelihood_is_that_of_a_dense_covariance():
 
 @pytest.mark.parametrize("size", [2e-3, 2e-2])
 def test_a_random_force_is_sized_and_the_noise_beside_it_found(size):
-    found = discrepancy(plain_fit(shaken(1, size)))
+    found = left_by(plain_fit(shaken(1, size)))
     knots = sum(part.squares.size for part in found.parts)
     error = 3.0 / np.sqrt(2 * knots)  # of a standard deviation that so many values tell
     assert np.sqrt(found.k) * found.level == pytest.approx(size, rel=error)
@@ -85,7 +91,7 @@ def test_a_random_force_is_sized_and_the_noise_beside_it_found(size):
 
 
 def test_where_nothing_remains_nothing_is_added(small):
-    found = discrepancy(small.fit)
+    found = left_by(small.fit)
     mean, covariance = found.posterior
     np.testing.assert_allclose(mean, small.fit.mode)
     ratio = np.sqrt(np.diag(covariance)) / small.fit.sd
@@ -127,7 +133,7 @@ def test_what_a_learned_force_has_of_spring_and_damper_is_given_back():
     moved[names.index("k1")] += 20.0
     moved[names.index("c1")] += 0.05
     shifted = replace(fit, mode=moved)
-    before, after = (discrepancy(f).posterior[0] for f in (fit, shifted))
+    before, after = (left_by(f).posterior[0] for f in (fit, shifted))
     for name, scale in (("k1", 20.0), ("c1", 0.05)):
         assert after[names.index(name)] == pytest.approx(
             before[names.index(name)], abs=1e-3 * scale
@@ -140,6 +146,14 @@ def test_an_effect_that_is_not_there_is_not_apart():
     drift = next(e for e in EFFECTS if e.id == "stiffness_drift")
     scales = campaign_scales(fit)
     false = fit_from(fit, (drift,), {}, scales).fit
-    assert discrepancy(false).apart(drift) < 3.0
+    assert left_by(false).apart(drift) < 3.0
     at = false.names.index("stiffness_drift.rate")
     assert abs(false.mode[at]) / false.sd[at] > 3.0  # as far as independent samples tell
+
+
+def test_a_motion_that_ran_away_has_none(small):
+    """Intervals are then those of the fit, each independent sample counted once."""
+    away = replace(small.fit, mode=np.where(np.isin(small.fit.names, "k1"), -1.0, small.fit.mode))
+    assert discrepancy(away) is None
+    ratio = np.diag(intervals(away, remains=True).covariance) / np.diag(small.fit.covariance)
+    assert np.all(ratio >= 1.0)
