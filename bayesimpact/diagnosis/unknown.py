@@ -53,7 +53,7 @@ def _climbed(target: Target, start: Array, steps: Array, before: Fit) -> Fit:
     """The mode as near as odds ask for, which count each repeated sample of a residual once."""
     return find_mode(
         target, start, steps=steps, tolerance=TOLERANCE, max_iterations=ITERATIONS,
-        least_gain=LITTLE * residual_repetition(before),
+        least_gain=LITTLE * (residual_repetition(before) - 1.0),
     )  # fmt: skip
 
 
