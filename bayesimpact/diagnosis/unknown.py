@@ -9,7 +9,7 @@ from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.extend import difference_steps, extend, transfer
 from bayesimpact.diagnosis.force import MissingForce, refinement
 from bayesimpact.diagnosis.learned import LEARNED, knots_of, refined_force
-from bayesimpact.diagnosis.naming import leaves_something
+from bayesimpact.diagnosis.naming import is_large, leaves_something
 from bayesimpact.diagnosis.refit import (
     ITERATIONS,
     TOLERANCE,
@@ -50,11 +50,13 @@ def learn_force(fit: Fit, force: MissingForce, scales: Scales) -> Fit:
 
 
 def _climbed(target: Target, start: Array, steps: Array, before: Fit) -> Fit:
-    """The mode as near as odds ask for, which count each repeated sample of a residual once."""
+    """The mode; where the misfit is large, as near as odds ask for, which count each repeated
+    sample of a residual once.
+    """
+    least = LITTLE * residual_repetition(before) if is_large(before) else 0.0
     return find_mode(
-        target, start, steps=steps, tolerance=TOLERANCE, max_iterations=ITERATIONS,
-        least_gain=LITTLE * (residual_repetition(before) - 1.0),
-    )  # fmt: skip
+        target, start, steps=steps, tolerance=TOLERANCE, max_iterations=ITERATIONS, least_gain=least
+    )
 
 
 def with_force(candidate: Candidate, force: MissingForce, scales: Scales) -> Candidate:
