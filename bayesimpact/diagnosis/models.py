@@ -22,6 +22,7 @@ from bayesimpact.diagnosis.promising import is_redundant
 from bayesimpact.diagnosis.refit import Candidate, exchanged, fit_from, grown, refit, without
 from bayesimpact.diagnosis.scan import Scan, scan
 from bayesimpact.diagnosis.scores import Score
+from bayesimpact.diagnosis.smoothing import is_refuted
 from bayesimpact.inference.progress import Refit
 from bayesimpact.model.effects.effect import Effect, Scales
 
@@ -67,7 +68,8 @@ class Models:
     def keep(self, candidate: Candidate) -> Candidate:
         """The better end of all climbs to the candidate's model, this one among them."""
         key = frozenset(candidate.ids)
-        if shakes_in_own_band(candidate.fit, leaves_something(candidate.fit)):
+        fit = candidate.fit
+        if shakes_in_own_band(fit, leaves_something(fit)) or is_refuted(fit):
             candidate = replace(candidate, log_evidence=-np.inf)
         held = self.tried.get(key)
         sooner = candidate.fit.converged and not (held and held.fit.converged)

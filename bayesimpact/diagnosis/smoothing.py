@@ -12,9 +12,13 @@ import numpy as np
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.diagnosis.locate import Location
+from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification
 from bayesimpact.inference.spectrum import Fingerprint, find_smoothing
 from bayesimpact.model.effects import smoothing
+
+LAG = f"{smoothing.EFFECT.id}.time_constant"
+UNSURE = 0.1  # of a correlation of noise: three standard errors where 1,000 samples tell it
 
 SAVITZKY_GOLAY = replace(
     smoothing.EFFECT,
@@ -35,6 +39,21 @@ def proved_smoothing(campaign: Campaign) -> Fingerprint | None:
         return None
     free = [r for r in campaign.recordings if r.input is None]
     return find_smoothing(free) if free else None
+
+
+def is_refuted(fit: Fit) -> bool:
+    """Whether a fit has a lag that the noise of its recordings has not passed.
+
+    A filter of the chain filters what noise comes before it: a lag of tau makes neighbouring
+    samples' noise correlate by exp(-interval / tau). Without its mark on the noise a long lag is no
+    filter, but what else changes a motion's phase, or its first instants.
+    """
+    names, noise = fit.names, fit.target.likelihood.noise
+    if LAG not in names or noise.smoothing is not None:
+        return False
+    most = min(max(noise.correlation, 0.0) + UNSURE, 1.0 - 1e-9)
+    longest = -float(fit.target.oscillator.intervals.min()) / float(np.log(most))
+    return fit.value(LAG) > longest
 
 
 def filter_words(filtered: Fingerprint) -> str:

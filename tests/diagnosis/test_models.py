@@ -28,6 +28,7 @@ def test_a_set_reaches_no_less_than_what_it_contains(monkeypatch, reached, again
 
     monkeypatch.setattr(models, "grown", grown)
     monkeypatch.setattr(models, "leaves_something", lambda fit: False)
+    monkeypatch.setattr(models, "is_refuted", lambda fit: False)
     monkeypatch.setattr(models, "shakes_in_own_band", lambda fit, remains: False)
     search = Models((), None, np.random.default_rng(0), lambda words: None)
     search.keep(candidate("spring_cubic", 120.0))

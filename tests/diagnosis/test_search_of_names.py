@@ -135,6 +135,7 @@ def run(monkeypatch):
         monkeypatch.setattr(models, "LikelySets", table.sets)
         monkeypatch.setattr(models, "shakes_in_own_band", lambda fit, remains: False)
         monkeypatch.setattr(models, "leaves_something", lambda fit: False)
+        monkeypatch.setattr(models, "is_refuted", lambda fit: False)
         monkeypatch.setattr(models, "scan", table.scan)
         monkeypatch.setattr(models, "profiled", table.profiled)
         for module in (search, models):
@@ -381,6 +382,7 @@ def test_of_two_equal_ends_the_one_that_came_to_rest_is_kept(monkeypatch, second
     """Climbs to one mode differ by less than 0.05 nats."""
     monkeypatch.setattr(models, "shakes_in_own_band", lambda fit, remains: False)
     monkeypatch.setattr(models, "leaves_something", lambda fit: False)
+    monkeypatch.setattr(models, "is_refuted", lambda fit: False)
     table = Table({A: 100.0}, unfinished={A: 0.0})
     known = models.Models(EFFECTS, None, np.random.default_rng(0), lambda message: None)
     first = known.keep(table.candidate((A,), 100.0))

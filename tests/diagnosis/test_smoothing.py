@@ -12,8 +12,9 @@ from effect_rigs import BY_ID
 from bayesimpact.data.campaign import Measurement, Smoothing
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.document import document
+from bayesimpact.diagnosis.extend import campaign_scales, extend, transfer
 from bayesimpact.diagnosis.loop import Diagnosis
-from bayesimpact.diagnosis.smoothing import proved_smoothing
+from bayesimpact.diagnosis.smoothing import LAG, is_refuted, proved_smoothing
 from bayesimpact.trial.rig_chain import Chain
 
 CATALOGUE = tuple(
@@ -39,6 +40,29 @@ def test_a_lag_is_named_with_its_time_constant():
     sd = found.sd[found.names.index("smoothing.time_constant")]
     assert abs(found.value("smoothing.time_constant") - truth) < 4 * sd < 0.2 * truth
     assert diagnosis.location.regime == "measurement"
+
+
+@pytest.mark.parametrize(
+    ("lag", "correlation", "refuted"),
+    [
+        (0.05, 0.0, True),  # white noise has passed no such filter
+        (0.05, 0.98, False),  # exp(-1 ms / 50 ms)
+        (1e-3, 0.37, False),
+        (1e-4, 0.0, False),  # too short to leave a mark
+    ],
+)
+def test_a_lag_needs_its_mark_on_the_noise(small, lag, correlation, refuted):
+    scales = campaign_scales(small.fit)
+    target = extend(small.fit, (BY_ID["smoothing"],), scales)
+    layout = target.oscillator.layout
+    theta = transfer(small.fit, layout, (BY_ID["smoothing"],), scales, {})
+    theta[layout.index(LAG)] = lag
+    likelihood = replace(
+        target.likelihood, noise=replace(target.likelihood.noise, correlation=correlation)
+    )
+    fit = replace(small.fit, target=replace(target, likelihood=likelihood), mode=theta)
+    assert is_refuted(fit) is refuted
+    assert not is_refuted(small.fit)
 
 
 @pytest.fixture(scope="module")
