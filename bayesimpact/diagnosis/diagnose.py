@@ -8,7 +8,8 @@
 3. Physics is searched. Where that ends in doubt, the recordings are compared beside it, and it is
    searched once more with the other steps corrected: the simpler of two answers that explain
    everything stays.
-4. Spikes may only show against a fit with that physics: then once more without them.
+4. A start that is no free decay yet, and spikes, may only show against a fit with that physics:
+   then once more without them.
 """
 
 from __future__ import annotations
@@ -24,7 +25,9 @@ from bayesimpact.diagnosis.decision import Verdict
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.faults.compare import base_failed, gain
 from bayesimpact.diagnosis.faults.outliers import residual_spikes
+from bayesimpact.diagnosis.faults.unfree_start import BETTER, unfree_starts
 from bayesimpact.diagnosis.loop import Diagnosis, Progress, diagnose_fit
+from bayesimpact.diagnosis.naming import is_large
 from bayesimpact.diagnosis.promising import NEAR_MARGIN, SCORE_UNDERESTIMATE
 from bayesimpact.diagnosis.recording_faults import (
     Corrected,
@@ -33,7 +36,7 @@ from bayesimpact.diagnosis.recording_faults import (
     comparisons,
     shared_effects,
     with_step,
-    without_spikes,
+    without_faults,
 )
 from bayesimpact.diagnosis.scan import scan
 from bayesimpact.diagnosis.smoothing import SAVITZKY_GOLAY, whole_campaign
@@ -114,6 +117,7 @@ def diagnose(
     elif certain is not cleaned and not proved and found.verdict not in OPEN:
         alone = physics(cleaned)
         found = alone if is_settled(alone) else found
+    found = _without_unfree_start(found, campaign, physics, rng=rng)
     found = _without_late_spikes(found, campaign, physics, rng=rng)
     undecided = found.corrected is not None and found.corrected.is_open
     return replace(found, verdict="ambiguous") if undecided and is_settled(found) else found
@@ -167,6 +171,21 @@ def _size(found: Diagnosis) -> int:
     return len(found.effects) + (len(found.corrected.compared) if found.corrected else 0)
 
 
+def _without_unfree_start(
+    found: Diagnosis, as_read: Campaign, physics: Search, *, rng: np.random.Generator
+) -> Diagnosis:
+    """Where a large misfit remains: the answer without first instants that keep a model from the
+    rest, if that leaves less of it.
+    """
+    if as_read.keep_faults or found.corrected is None or not is_large(found.after):
+        return found
+    starts = unfree_starts(found.after)
+    if not starts:
+        return found
+    again = physics(without_faults(found.corrected, starts, as_read, rng=rng))
+    return again if BETTER * again.after.reduced_chi2 < found.after.reduced_chi2 else found
+
+
 def _without_late_spikes(
     found: Diagnosis, as_read: Campaign, physics: Search, *, rng: np.random.Generator
 ) -> Diagnosis:
@@ -174,7 +193,7 @@ def _without_late_spikes(
     spikes = () if as_read.keep_faults or base_failed(found.after) else residual_spikes(found.after)
     if not spikes or found.corrected is None:
         return found
-    again = physics(without_spikes(found.corrected, spikes, as_read, rng=rng))
+    again = physics(without_faults(found.corrected, spikes, as_read, rng=rng))
     return again if is_settled(again) and len(again.effects) <= len(found.effects) else found
 
 

@@ -19,7 +19,7 @@ from bayesimpact.diagnosis.faults.compare import (
     compare_recordings,
     misfits,
 )
-from bayesimpact.diagnosis.faults.outliers import residual_spikes, spikes_set_aside
+from bayesimpact.diagnosis.faults.outliers import faults_set_aside, residual_spikes
 from bayesimpact.diagnosis.smoothing import proved_smoothing
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.formula.law import is_formula
@@ -81,20 +81,21 @@ def cleaned_campaign(campaign: Campaign, *, rng: np.random.Generator, search: bo
     spikes = () if campaign.keep_faults or base_failed(fit) else residual_spikes(fit)
     if not spikes:
         return found
-    without = without_spikes(found, spikes, campaign, rng=rng)
+    without = without_faults(found, spikes, campaign, rng=rng)
     # where a fit is wrong, what stands out at a contact may be physics
     return found if misfits(without.identification.fit) else without
 
 
-def without_spikes(
-    found: Corrected, spikes: Sequence[Fault], as_read: Campaign, *, rng: np.random.Generator
+def without_faults(
+    found: Corrected, faults: Sequence[Fault], as_read: Campaign, *, rng: np.random.Generator
 ) -> Corrected:
-    """The same with spikes set aside that a fit shows."""
+    """The same with faults set aside that a fit shows."""
     before = found.identification
-    campaign = spikes_set_aside(before.fit.target.oscillator.campaign, spikes)
+    whole = before.fit.target.oscillator.campaign
+    campaign = faults_set_aside(whole, faults)
     again = replace(identify(campaign, rng=rng, search=False), search=before.search)
     change = before.fit.reduced_chi2, again.fit.reduced_chi2
-    told = (_as_read(fault, campaign, as_read) for fault in spikes)
+    told = (_as_read(fault, whole, as_read) for fault in faults)
     return replace(
         found,
         identification=again,

@@ -28,8 +28,8 @@ def residual_spikes(fit: Fit) -> tuple[Fault, ...]:
     return tuple(found)
 
 
-def spikes_set_aside(campaign: Campaign, faults: Sequence[Fault]) -> Campaign:
-    """The campaign with these spikes set aside."""
+def faults_set_aside(campaign: Campaign, faults: Sequence[Fault]) -> Campaign:
+    """The campaign with these faults set aside."""
     recordings = []
     for recording in campaign.recordings:
         own = [f for f in faults if f.recording == recording.name]

@@ -1,0 +1,90 @@
+"""A start that is no free decay yet, where only a fit shows it: the hand lets go in mid-swing.
+
+A pull or a rest shows in the readings themselves (`data.faults.start`). A push that ends while the
+mass swings does not; but a model that leaves much of a whole recording, and little of the same one
+without its first instants, was kept from fitting by these. Each recording is fitted alone, whole
+and from later instants on, and both fits are held against the same readings.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.data.faults.fault import Fault, file_time
+from bayesimpact.inference.fit import Fit, Target
+from bayesimpact.inference.likelihood import Likelihood
+from bayesimpact.inference.mode import find_mode
+from bayesimpact.inference.priors import Priors
+from bayesimpact.model.oscillator import build_oscillator
+
+Array = NDArray[np.float64]
+
+INSTANTS = (0.25, 0.5, 1.0)  # of a free period: a hand follows no longer without pulling
+BETTER = 4.0  # times less left of the same readings: three quarters of the misfit are the start's
+NEARLY = 0.5  # of the best such ratio: the earliest instant that reaches so much is taken
+ITERATIONS = 25
+
+
+def unfree_starts(fit: Fit) -> tuple[Fault, ...]:
+    """First instants of recordings that keep a fit with a large misfit from the rest of them."""
+    campaign = fit.target.oscillator.campaign
+    period = 2 * np.pi * float(np.sqrt(campaign.mass / fit.value("k1")))
+    found = []
+    for r, recording in enumerate(campaign.recordings):
+        firsts = [round(share * period / recording.interval) for share in INSTANTS]
+        if recording.input is not None or recording.samples.size < 4 * firsts[-1]:
+            continue
+        whole = _alone(fit, r, 0)
+        ratios = [_ratio(whole, _alone(fit, r, first), first) for first in firsts]
+        if max(ratios) > BETTER:
+            at = next(i for i, x in enumerate(ratios) if x >= max(BETTER, NEARLY * max(ratios)))
+            found.append(_fault(fit, r, firsts[at], ratios[at]))
+    return tuple(found)
+
+
+def _alone(fit: Fit, r: int, first: int) -> Fit:
+    """One recording from a sample on, fitted by itself from where the fit has it then."""
+    o, noise = fit.target.oscillator, fit.target.likelihood.noise
+    recording = o.campaign.recordings[r]
+    campaign = replace(o.campaign, recordings=(recording.part(first, recording.samples.size),))
+    oscillator = build_oscillator(campaign, o.effects, smoothing=o.smoothing)
+    names = oscillator.layout.names
+    at = [fit.names.index("sigma" if n.startswith("sigma") else n) for n in names]
+    priors = Priors(tuple(fit.target.priors.parameters[i] for i in at))
+    start, sd = fit.mode[at], fit.sd[at]
+    y = fit.displacements[r]
+    start[names.index(f"y0[{recording.name}]")] = y[first]
+    start[names.index(f"v0[{recording.name}]")] = np.gradient(y, recording.interval)[first]
+    target = Target(Likelihood(oscillator, noise), priors, fit.target.replaced)
+    return find_mode(target, start, steps=0.05 * sd, max_iterations=ITERATIONS)
+
+
+def _ratio(whole: Fit, later: Fit, first: int) -> float:
+    """What the fit of the whole leaves of the later readings over what their own fit does."""
+    if not np.isfinite(later.log_posterior):
+        return 0.0
+    before, after = whole.residuals[0][first:], later.residuals[0]
+    level = whole.target.likelihood.noise.level * float(whole.target.likelihood.scales[0])
+    return float(before @ before) / max(float(after @ after), after.size * level**2)
+
+
+def _fault(fit: Fit, r: int, first: int, ratio: float) -> Fault:
+    recording = fit.target.oscillator.campaign.recordings[r]
+    seconds = first * recording.interval
+    return Fault(
+        id="recording_start",
+        recording=recording.name,
+        spans=((0, first),),
+        start_s=file_time(recording, 0),
+        end_s=file_time(recording, first - 1),
+        size=seconds,
+        unit="s",
+        statement=f"the motion is not yet free for the first {seconds:.3g} s ({first} samples)",
+        remedy=f"start_s = {file_time(recording, first - 0.4):.9g}",
+        strength=ratio,
+        threshold=BETTER,
+        action="cut",
+    )

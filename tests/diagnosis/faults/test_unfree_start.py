@@ -1,0 +1,77 @@
+"""A hand that lets go in mid-swing is found against a fit, and physics is not taken for one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import small_rig
+from effect_rigs import BY_ID
+
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.diagnosis.diagnose import diagnose
+from bayesimpact.diagnosis.faults.unfree_start import unfree_starts
+from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.identify import identify
+from bayesimpact.model.free_changes import motions_beside
+
+PERIOD = 2 * np.pi * np.sqrt(small_rig.PLAIN.mass / small_rig.PLAIN.k1)
+
+
+def plain(effects=None) -> Campaign:
+    return small_rig.record(
+        3, effects, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES, duration=4.0
+    )
+
+
+def fitted(campaign: Campaign) -> Fit:
+    return identify(campaign, rng=np.random.default_rng(0), search=False).fit
+
+
+def pushed(campaign: Campaign, until: float) -> Campaign:
+    """The first recording pushed by a force that ends at a time, s."""
+    fit = fitted(campaign)
+    o, first = fit.target.oscillator, campaign.recordings[0]
+    push = np.where(first.times < until, 1.5 * np.sin(25.0 * first.times) + 1.0, 0.0)
+    q = o.layout.slots(fit.mode)[[0]]
+    moved, still = (
+        motions_beside(o, 0, q, 0, waves=w[None])[0] for w in (push, np.zeros_like(push))
+    )
+    changed = replace(first, samples=first.samples + moved - still)
+    return replace(campaign, recordings=(changed, *campaign.recordings[1:]))
+
+
+@pytest.mark.parametrize("share", [0.2, 0.45, 0.8])
+def test_a_push_that_ends_in_mid_swing_is_found(share):
+    (fault,) = unfree_starts(fitted(pushed(plain(), share * PERIOD)))
+    assert (fault.id, fault.recording, fault.action) == ("recording_start", "a", "cut")
+    assert share * PERIOD - 2e-3 <= fault.size < 2.1 * max(share, 0.25) * PERIOD
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        None,
+        {"spring_cubic": {"stiffness": 3e6}},
+        {"quadratic_drag": {"coefficient": 3.0}},
+        {"coulomb_friction": {"force": 0.1}},
+    ],
+    ids=["nothing", "cubic", "drag", "friction"],
+)
+def test_physics_is_no_start(effects):
+    assert unfree_starts(fitted(plain(effects))) == ()
+
+
+def test_physics_is_named_without_the_push():
+    """A drift of the probe adds to any motion, so that what is put together here is one."""
+    campaign = pushed(plain({"sensor_drift": {"rate": 2e-5}}), 0.4 * PERIOD)
+    effects = tuple(BY_ID[i] for i in ("sensor_drift", "spring_cubic", "coulomb_friction"))
+
+    def named(campaign: Campaign) -> tuple[str, list[str], list[str]]:
+        found = diagnose(campaign, rng=np.random.default_rng(0), effects=effects, search=False)
+        faults = found.corrected.faults if found.corrected else ()
+        return found.verdict, [e.id for e in found.effects], [f.id for f in faults]
+
+    assert named(campaign) == ("named", ["sensor_drift"], ["recording_start"])
+    assert named(replace(campaign, keep_faults=True))[2] == []
