@@ -86,7 +86,7 @@ def is_needed(naming: Naming, effect: Effect) -> bool:
     """Whether every likely hypothesis has an effect of the chosen model, although more remains."""
     if not (may_be_needed(naming, effect) and stands_out(naming, effect)):
         return False
-    if naming.left is not None and naming.left.apart(effect) < APART:
+    if naming.apart.get(effect.id, np.inf) < APART:
         return False
     chosen = frozenset(naming.chosen.candidate.ids)
     if not (naming.finished or is_compared(naming, effect)):

@@ -365,7 +365,9 @@ class _Search(Models):
     def with_residuals(self, found: Naming) -> Naming:
         """What `decide` compares where something remains: models with a residual force."""
         chosen = found.chosen.candidate
-        found = replace(found, left=discrepancy(chosen.fit))
+        left = discrepancy(chosen.fit)
+        if left is not None:
+            found = replace(found, apart={e.id: left.apart(e) for e in chosen.effects})
         smaller = {e.id: self.drop(chosen, e) for e in chosen.effects}
         for part in smaller.values():
             self.examine(part)

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bayesimpact.diagnosis.discrepancy import Discrepancy
 from bayesimpact.diagnosis.force import MissingForce
 from bayesimpact.diagnosis.refit import Candidate, tempered_evidence
 from bayesimpact.diagnosis.scan import Scan
@@ -75,7 +74,8 @@ class Naming:
     residual : models with a residual force beside their effects, fitted in full, by the ids of
         these effects; where something remains beside the chosen model
     finished : False when the budget ended the search
-    left : what the chosen model leaves, as a force of time; None where that is noise
+    apart : standard deviations of every chosen effect's size from none at all, with what the
+        remainder may have done to it in them (`discrepancy`); empty where nothing remains
     """
 
     base: State
@@ -88,7 +88,7 @@ class Naming:
     states: Mapping[frozenset[str], State] = field(default_factory=dict)
     residual: Mapping[frozenset[str], Candidate] = field(default_factory=dict)
     finished: bool = True
-    left: Discrepancy | None = None
+    apart: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def unknown(self) -> MissingForce:

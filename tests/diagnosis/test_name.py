@@ -13,7 +13,7 @@ from bayesimpact.diagnosis.decision import decide, in_its_place, ordered
 from bayesimpact.diagnosis.naming import Naming, State
 from bayesimpact.diagnosis.promising import refit_candidates
 from bayesimpact.diagnosis.refit import Candidate
-from bayesimpact.diagnosis.thresholds import ALPHA, DECISIVE, EXCESS, largest_log_odds
+from bayesimpact.diagnosis.thresholds import ALPHA, APART, DECISIVE, EXCESS, largest_log_odds
 
 COST = 3.8
 
@@ -311,3 +311,10 @@ def test_the_unknown_force_is_the_likeliest_of_its_forms():
     assert found.unknown is found.base.force
     contact = SimpleNamespace(log_evidence=30.0)
     assert replace(found, contact=contact).unknown is contact
+
+
+@pytest.mark.parametrize(("apart", "verdict"), [(APART + 0.1, "partly"), (APART - 0.1, "unknown")])
+def test_an_effect_that_its_own_interval_does_not_hold_apart_is_not_needed(apart, verdict):
+    """Intervals beside a remainder may contain no effect at all; no name then stands beside one."""
+    found = remaining(something_left(), 100.0, 10.0)
+    assert judge(replace(found, apart={FRICTION: apart})) == verdict
