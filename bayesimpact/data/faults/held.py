@@ -11,7 +11,7 @@ from bayesimpact.data.faults.fault import (
     file_time,
     times_of,
 )
-from bayesimpact.data.faults.flat import Flat, equal_share, flats, last_digit
+from bayesimpact.data.faults.flat import Flat, equal_share, flats, last_digit, reading_step
 from bayesimpact.data.gaps import excluded
 from bayesimpact.data.recording import Recording
 
@@ -25,18 +25,22 @@ def find_held(recording: Recording) -> list[Fault]:
 
     Two equal neighbours have a probability p, taken from the recording; a run of r has n p^(r - 1).
     A run must also hide a motion of four steps of the readings, or end in such a jump, or
-    reach to the end.
+    reach to the end. Where readings come in steps, one that is entered by less than a step a sample
+    and reaches to the end is rest: the motion died away, or friction holds the mass.
     """
     x = recording.samples
     share = equal_share(x)
     step = last_digit(x)
-    level = float(np.ptp(x))
+    level, rounded = float(np.ptp(x)), reading_step(x)
     chosen: list[Flat] = []
     for run in flats(x, LEAST):
         chance = x.size * max(share, 1.0 / x.size) ** (run.size - 1)
         if chance > FALSE_ALARM:
             continue
-        if max(run.missed, run.jump) < MISSED * step and not (run.end == x.size and share < COARSE):
+        dead = run.end == x.size
+        if dead and run.slope < rounded:
+            continue
+        if max(run.missed, run.jump) < MISSED * step and not (dead and share < COARSE):
             continue
         if _at_extreme(x, run, level):
             continue
@@ -46,16 +50,15 @@ def find_held(recording: Recording) -> list[Fault]:
     spans = tuple((run.first, run.end) for run in chosen)
     longest = max(chosen, key=lambda run: run.size)
     count = sum(run.size for run in chosen)
-    dead = chosen[-1].end == x.size
     log_chance = np.log10(x.size) + (longest.size - 1) * np.log10(max(share, 1.0 / x.size))
     what = (
         "zeros"
         if longest.value == 0.0
         else f"readings held at {amount(longest.value, recording.unit)}"
     )
-    place = "until the end" if dead and len(chosen) == 1 else f"in {len(chosen)} place(s)"
     tail = chosen[-1]
-    alone = dead and len(chosen) == 1
+    alone = tail.end == x.size and len(chosen) == 1
+    place = "until the end" if alone else f"in {len(chosen)} place(s)"
     return [
         Fault(
             id="recording_held",

@@ -323,3 +323,14 @@ def test_a_swing_to_the_other_side_is_no_hand() -> None:
     fault = recording_faults(Recording("p", "", samples, 0.01, quantity="angle"))[0]
     assert fault.id == "recording_start" and "at rest" in fault.statement
     assert fault.end_s == pytest.approx(1.0, abs=0.12)
+
+
+def test_friction_that_holds_an_encoder_is_no_fault() -> None:
+    """A swing that slows down, stops within a step at its last turn and stays there."""
+    t = np.arange(0.0, 30.0, 0.01)
+    rate, stop = 2 * np.pi * 0.7, 20.0 / 0.7
+    amplitude = 0.6 * (1.0 - t / stop) + 0.02
+    y = np.where(t < stop, amplitude * np.cos(rate * t), 0.02)
+    samples = np.round(y / 7e-4) * 7e-4
+    found = recording_faults(Recording("p", "", samples, 0.01, quantity="angle"))
+    assert [f.id for f in found if f.action != "notice"] == []
