@@ -65,8 +65,11 @@ class SharedModel:
         rng = np.random.default_rng(0)
         try:
             fit = identify(campaign, rng=rng, noise=self.noise, search=False).fit
+            scales = campaign_scales(fit)
+            if not all(effect.admissible(scales) for effect in self.effects):
+                return None  # a recording that misses the obstacle shows nothing of contacts
             if self.effects:
-                fit = fit_from(fit, self.effects, self.values, campaign_scales(fit)).fit
+                fit = fit_from(fit, self.effects, self.values, scales).fit
         except (BayesimpactError, ValueError, np.linalg.LinAlgError):
             return None
         return fit if np.isfinite(fit.reduced_chi2) else None
