@@ -369,8 +369,9 @@ def effects(ctx: click.Context, own: Path | None, seed: int, quiet: bool) -> Non
                 click.echo(f"{check.effect}  {check.name:<32} {check.result:<8} {check.detail}")
         ctx.exit(BAD_INPUT if any(check.result == "failed" for check in checks) else 0)
     for row in catalogue():
-        asked = "   (looked for by `effects=` in Python only)" if row.id in UNTRIED else ""
-        click.echo(f"{row.id}{asked}\n    {row.title}: {row.equation}   [{row.family}]")
+        click.echo(f"{row.id}\n    {row.title}: {row.equation}   [{row.family}]")
+        if row.id in UNTRIED:
+            click.echo("    not looked for, but where `effects=` of the library names it")
         for parameter in row.parameters:
             null = "" if parameter.null == "-" else f", vanishes at {parameter.null}"
             scope = "" if parameter.scope == "campaign" else f", one per {parameter.scope}"

@@ -15,7 +15,7 @@ from small_rig import RELEASES, RIG, record
 
 from bayesimpact.cli import main
 from bayesimpact.data.read import load_campaign
-from bayesimpact.model.effects import EFFECTS
+from bayesimpact.model.effects import EFFECTS, UNTRIED
 from bayesimpact.model.experiment import simulate
 from bayesimpact.model.own_effects import load_effects
 from bayesimpact.trial.rig_files import write_campaign
@@ -98,6 +98,7 @@ def test_effects_lists_the_whole_catalogue(run: Run) -> None:
     code, out, _ = run("effects")
     assert code == 0
     assert all(f"\n{e.id}\n" in f"\n{out}" for e in EFFECTS)
+    assert out.count("not looked for") == len(UNTRIED)
 
 
 def test_effects_of_ones_own_are_checked(run: Run, tmp_path: Path) -> None:
