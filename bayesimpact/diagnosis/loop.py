@@ -160,8 +160,8 @@ def extension(
 ) -> tuple[Fit, State | None]:
     """The fit that a verdict stands for, never worse than the base fit, and what it leaves.
 
-    Named effects are shown as the catalogue's model has them: beside a residual force, which may
-    take their place, their sizes mean nothing. Where nothing is named, the model that explains
+    Where the misfit is large, named effects are shown as the catalogue's model has them: beside a
+    residual force, which may take their place, their sizes mean nothing. Where nothing is named, the model that explains
     most; with a residual force only where the misfit is small.
     """
     base, chosen = naming.base, naming.chosen
@@ -169,7 +169,10 @@ def extension(
         return chosen.candidate.fit, None
     least = base.candidate.fit.reduced_chi2
     if decision.verdict == "partly" and chosen.candidate.fit.reduced_chi2 <= least:
-        return chosen.candidate.fit, chosen
+        beside = naming.residual.get(frozenset(chosen.candidate.ids), chosen.candidate)
+        large = is_large(base.candidate.fit) or beside.fit.reduced_chi2 > least
+        likelier = naming.log_odds(beside) > naming.log_odds(chosen.candidate) and not large
+        return (beside if likelier else chosen.candidate).fit, chosen
     choices = [(c, naming.states.get(frozenset(c.ids), chosen)) for c in naming.tried]
     if not is_large(base.candidate.fit):
         choices += [(c, chosen) for c in naming.residual.values()]
