@@ -161,8 +161,8 @@ def extension(
     """The fit that a verdict stands for, never worse than the base fit, and what it leaves.
 
     Where the misfit is large, named effects are shown as the catalogue's model has them: beside a
-    residual force, which may take their place, their sizes mean nothing. Where nothing is named, the model that explains
-    most; with a residual force only where the misfit is small.
+    residual force, which may take their place, their sizes mean nothing. Where nothing is named,
+    the model that explains most; with a residual force only where the misfit is small.
     """
     base, chosen = naming.base, naming.chosen
     if decision.verdict in ("adequate", "named", "ambiguous"):
