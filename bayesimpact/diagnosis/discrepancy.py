@@ -36,7 +36,7 @@ ENTRIES = 20_000_000  # of the largest matrix D that is held; longer recordings 
 BLOCK = 64  # forces at once, so that memory stays bounded
 REACH = 40.0  # of ln k: from a force far below the noise to one far above it
 RMS = np.sqrt(2.0 / 3.0)  # of a force between knots of unit size
-ALIGNED = 1.0  # of what a parameter hides of a missing force, over what remains of it
+ALIGNED = 1.0  # of what a parameter hides of a missing force, over what remains; not calibrated
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,6 @@ class Discrepancy:
     parts : per recording
     k : variance of its values at the knots, N2, over that of the noise as estimated, 1
     level : of the noise beside it, over its estimate
-    log_likelihood : up to a constant of the fit, nats
     values : at the knots of every recording, what the remainder says of them, (K,)
     """
 
@@ -75,7 +74,6 @@ class Discrepancy:
     parts: tuple[Part, ...]
     k: float
     level: float
-    log_likelihood: float
     values: tuple[Array, ...]
 
     @property
@@ -205,9 +203,9 @@ def _prior_information(fit: Fit) -> Array:
     return np.asarray(information)
 
 
-def _sized(fit: Fit, parts: tuple[Part, ...]) -> tuple[float, float, float, tuple[Array, ...]]:
-    """The likeliest k, level of the noise and log likelihood, the parameters at their best; and
-    values at the knots, the parameters as fitted.
+def _sized(fit: Fit, parts: tuple[Part, ...]) -> tuple[float, float, tuple[Array, ...]]:
+    """The likeliest k and level of the noise, the parameters at their best; and values at the
+    knots, the parameters as fitted.
     """
     likelihood, size = fit.target.likelihood, fit.mode.size
     total = float(likelihood.sizes.sum())
@@ -233,10 +231,10 @@ def _sized(fit: Fit, parts: tuple[Part, ...]) -> tuple[float, float, float, tupl
 
     least = -np.log(max(float(part.squares.max()) for part in parts)) - 0.1 * REACH
     best = minimize_scalar(lambda x: left(x)[0], bounds=(least, least + REACH), method="bounded")
-    value, variance = left(float(best.x))
+    variance = left(float(best.x))[1]
     k = float(np.exp(best.x))
     values = tuple(
         np.asarray(part.vectors @ (k / (1.0 + k * part.squares) * along[:, -1]))
         for part, (_, along) in zip(parts, seen, strict=True)
     )
-    return k, float(np.sqrt(variance)), -0.5 * value, values
+    return k, float(np.sqrt(variance)), values

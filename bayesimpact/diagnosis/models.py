@@ -36,9 +36,8 @@ SAME = 0.05  # nats; two climbs to one mode differ by less
 
 # Set by hand: a diagnosis of the bundled campaign begins some 25, a large misfit up to this many.
 MOST_REFITS = 150
-# s of computing: no refit begins later; an answer that says so is worth more than none. Of 24
-# strong trials (seeds 130000 on) two were still searched then, and answered no better later. Not of
-# the clock: what else a machine does must not change an answer.
+# s of computing, set by hand: no refit begins later; an answer that says so is worth more than
+# none. Not of the clock: what else a machine does must not change an answer.
 PATIENCE = 300.0
 
 Progress = Callable[[str], None]
