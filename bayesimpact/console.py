@@ -140,13 +140,13 @@ def made_folder(out: Path, go_on: str = "") -> Path:
     ctx = click.get_current_context()
     try:
         out.mkdir(parents=True, exist_ok=True)
+        if go_on:  # before the lock: who sees it may interrupt at once
+            ctx.meta[_GO_ON] = f"what was done is kept in {out}; to go on: {go_on}"
         ctx.with_resource(locked(out))
         clear_unfinished(out)
     except OSError as error:
         reason = error.strerror or str(error)
         raise InputError(f"--out {out}", reason.lower(), "a folder that can be written") from None
-    if go_on:
-        ctx.meta[_GO_ON] = f"what was done is kept in {out}; to go on: {go_on}"
     return out
 
 

@@ -148,6 +148,22 @@ def test_sigterm_is_like_ctrl_c_and_says_how_to_go_on(campaign: Path, tmp_path: 
     assert f"bayesimpact sample {campaign} --out {tmp_path} --seed 0 --resume" in last
 
 
+def test_an_interruption_right_after_the_lock_says_how_to_go_on(
+    campaign: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def interrupted(folder: Path) -> None:
+        assert (folder / ".bayesimpact.lock").exists()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("bayesimpact.console.clear_unfinished", interrupted)
+    code, error = ended(capsys, "fit", campaign, "--out", tmp_path)
+    assert code == 130
+    assert f"to go on: bayesimpact fit {campaign} --out {tmp_path}" in error.splitlines()[-1]
+
+
 def test_an_interruption_outlives_a_clean_up_that_fails() -> None:
     """A progress bar interrupted while it took its lock ended in AttributeError, exit code 1."""
     with pytest.raises(KeyboardInterrupt), interruption_kept():
