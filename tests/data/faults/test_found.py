@@ -15,6 +15,7 @@ from bayesimpact.data.faults.fault import Fault
 from bayesimpact.data.faults.find import find_faults, recording_faults, set_aside
 from bayesimpact.data.faults.flat import reading_step
 from bayesimpact.data.faults.local import FORMS, foretell, rounding_error
+from bayesimpact.data.faults.slip import find_slips
 from bayesimpact.data.read import load_campaign
 from bayesimpact.data.recording import Recording
 
@@ -173,6 +174,29 @@ def test_lost_samples(paper: Campaign, count: int) -> None:
     assert fault.id == "recording_slip"
     assert fault.start_s <= at * 1e-3 <= fault.end_s + 1e-9
     assert fault.remedy == "start_s = 2.0356"  # the longer part stays
+
+
+def ringing_stop(release: float) -> np.ndarray:
+    """6 s of a mass that meets a stop of 60 g on its own spring (70 Hz), which chatters and rings;
+    symplectic Euler, 40 steps a millisecond, contact by a stiff spring.
+    """
+    own, y, v, x, u = 0.06 * (2 * np.pi * 70.0) ** 2, release, 0.0, 0.0, 0.0
+    step, found = 1e-3 / 40, np.empty(6000)
+    for i in range(found.size):
+        found[i] = y
+        for _ in range(40):
+            force = max(4e5 * (y - 1.1e-3 - x) + 6.0 * (v - u), 0.0) if y - 1.1e-3 > x else 0.0
+            v -= step * (806.0 * y + 0.6 * v + force) / 0.503
+            u += step * (force - own * x - 1.06 * u) / 0.06
+            y, x = y + step * v, x + step * u
+    return found
+
+
+@pytest.mark.parametrize("release", [-8e-3, -7e-3])
+def test_chatter_on_a_ringing_stop_is_no_slip(release: float) -> None:
+    noise = 3e-6 * np.random.default_rng(0).standard_normal(6000)
+    recording = Recording("rings", "1", ringing_stop(release) + noise, 1e-3)
+    assert find_slips(recording) == []
 
 
 def test_samples_written_twice(paper: Campaign) -> None:
