@@ -8,6 +8,9 @@ Messenger and Bortz 2021, Multiscale Model. Simul. 19:1474, for sets of terms in
 inside the forces and readings that are too sparse for an impact bias it. So it decides nothing: the
 best sets, with all their parameters, are where refits begin.
 
+Impacts that few samples show, and a law of the stop that is not the base model's, bias the sizes of
+all forces. The same problem over stretches of free flight alone knows nothing of the stop.
+
 Effects that no force along a given path stands for (a memory, a further mode, another gap) are not
 seen here, nor are readings of velocity or acceleration.
 """
@@ -15,7 +18,7 @@ seen here, nor are readings of velocity or acceleration.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +27,7 @@ from scipy.signal import savgol_filter
 
 from bayesimpact.diagnosis.directions import is_periodic, shape_points, size_parameters
 from bayesimpact.diagnosis.extend import extend, transfer
+from bayesimpact.diagnosis.thresholds import DOUBT
 from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.model.effects.effect import Effect, Scales
 from bayesimpact.model.oscillator import Oscillator
@@ -37,6 +41,7 @@ _C1, _K1, _GAP, _K2, _OFFSET, _FRICTION = (
 )
 
 WIDTH = 0.5  # half width of a stretch, natural periods
+FLIGHT_WIDTH = 1 / 8  # of one in flight: every flight lasts half a period, two stretches and more
 STEADY = 3e-3  # of the largest speed: noise that is left in a measured velocity
 WIDEST = 1 / 24  # of a natural period: half width of the polynomials that smooth the motion
 STEP = 1e-3  # of an effect's plausible size
@@ -82,18 +87,44 @@ class Term:
     one_sided: tuple[bool, ...]
 
 
-def measured_paths(fit: Fit) -> list[Path]:
-    """Every recording's displacement and velocity from its own readings, about the fit's rest."""
+def measured_paths(fit: Fit, *, flight: bool = False) -> list[Path]:
+    """Every recording's displacement and velocity from its own readings, about the fit's rest and
+    gap; of those in `flight` the stretches do not reach the stop.
+    """
     o, noise = fit.target.oscillator, fit.target.likelihood.noise
     found = []
     for r, q in zip(o.campaign.recordings, o.layout.slots(fit.mode), strict=True):
         period = 2 * np.pi * float(np.sqrt(o.campaign.mass / q[_K1]))
         y, v = _smoothed(r.samples - q[_OFFSET], r.interval, period, noise.level)
         d = y - q[_GAP] if o.campaign.stop else np.full(y.size, -np.inf)
-        rows = rows_of(r, o.campaign.mass, WIDTH * period)
+        rows = rows_of(r, o.campaign.mass, (FLIGHT_WIDTH if flight else WIDTH) * period)
+        rows = _without_rests(rows, r.samples, noise.level)
+        if flight:
+            rows = _without(rows, d > -DOUBT * noise.level)
         operator = o.campaign.mass * rows.bend + q[_C1] * rows.slope + q[_K1] * rows.phi
         found.append(Path(y, v, d, r.times, rows, operator, _factor(rows, operator * noise.level)))
     return found
+
+
+def _without(rows: Rows, touched: NDArray[np.bool_]) -> Rows:
+    """Stretches less those with a sample in `touched` (n,)."""
+    seen = products(touched.astype(np.float64), rows.hop, np.ones(rows.phi.size))[:, 0]
+    return _only(rows, seen == 0.0)
+
+
+def _without_rests(rows: Rows, samples: Array, noise: float) -> Rows:
+    """Stretches less those in which the mass moves no more than its readings scatter.
+
+    Dry friction holds it there at a displacement that no law of the motion tells.
+    """
+    mean = np.full(rows.phi.size, 1.0 / rows.phi.size)
+    centred = samples - samples.mean()
+    scatter = products(centred**2, rows.hop, mean) - products(centred, rows.hop, mean) ** 2
+    return _only(rows, scatter[:, 0] > 2.0 * noise**2)
+
+
+def _only(rows: Rows, kept: NDArray[np.bool_]) -> Rows:
+    return replace(rows, base=rows.base * kept[:, None], target=rows.target * kept)
 
 
 def _smoothed(samples: Array, interval: float, period: float, noise: float) -> tuple[Array, Array]:

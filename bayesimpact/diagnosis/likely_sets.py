@@ -59,15 +59,19 @@ class LikelySets:
     """Sets of effects for a fit of the base model, by the equation of motion.
 
     Holds the normal equations of base model and terms, all columns scaled to norm one. There are no
-    terms, and so no sets, where a reading is no displacement, or where effects are declared.
+    terms, and so no sets, where a reading is no displacement, or where effects are declared. In
+    `flight` only what acts there has terms.
     """
 
-    def __init__(self, fit: Fit, effects: Sequence[Effect], scales: Scales) -> None:
+    def __init__(
+        self, fit: Fit, effects: Sequence[Effect], scales: Scales, *, flight: bool = False
+    ) -> None:
         o = fit.target.oscillator
-        self.fit, self.paths = fit, measured_paths(fit)
+        self.fit, self.paths = fit, measured_paths(fit, flight=flight)
         columns, targets, self.names = base_columns(fit, self.paths)
         base, target = np.concatenate(columns), np.concatenate(targets)
-        seen = () if o.acting or not o.reads_displacements else effects
+        told = base[:, 0].any() and o.reads_displacements and not o.acting
+        seen = effects if told else ()
         self.terms = terms_of(fit, seen, scales, self.paths)
         self.cost = float(np.log(2 * len(effects)))
         self.rows = max(sum(int(p.rows.kept.sum()) - 1 for p in self.paths), 1)
@@ -108,6 +112,8 @@ class LikelySets:
 
     def best(self, most: int) -> list[EffectSet]:
         """The likeliest sets of one, two, ... effects; each is likelier than all smaller ones."""
+        if not self.terms:
+            return []
         beam: list[Chosen] = [()]
         reached = none = self.log_odds(())
         found = []
@@ -128,6 +134,8 @@ class LikelySets:
 
     def gains(self, ids: Collection[str]) -> dict[str, float]:
         """By how much every other effect that has a term would make a set likelier, nats."""
+        if not self.terms:
+            return {}
         held = self._shaped([t for t in ids if any(x.effect.id == t for x in self.terms)])
         before, found = self.log_odds(held), dict[str, float]()
         for t in self._beside(held):

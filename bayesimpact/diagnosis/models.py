@@ -12,9 +12,9 @@ from functools import cached_property
 
 import numpy as np
 
+from bayesimpact.diagnosis.asked import Asked
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.force import missing_drift, missing_force
-from bayesimpact.diagnosis.likely_sets import LikelySets
 from bayesimpact.diagnosis.naming import State, is_large, leaves_something
 from bayesimpact.diagnosis.own_band import shakes_in_own_band
 from bayesimpact.diagnosis.profile_likelihood import profiled
@@ -27,7 +27,6 @@ from bayesimpact.inference.progress import Refit
 from bayesimpact.model.effects.effect import Effect, Scales
 
 STARTS = 2  # points of an effect's shape grid from which it is fitted
-ASKED = 4  # effects of the equation of motion that are tried beside a model with a large misfit
 # Nats by which a fit that ended unconverged may lie below its mode. Set by hand and generous: too
 # large a value finishes more fits, which costs seconds; too small a one loses a model.
 UNCONVERGED_SHORTFALL = 60.0
@@ -143,17 +142,21 @@ class Models:
             self.tell("fitting " + " + ".join((*candidate.ids, *(s.effect.id for s in scores))))
             self.keep(refit(candidate.fit, scores, self.scales))
 
-    def fit_sets(self, candidate: Candidate, most: int) -> list[Candidate]:
-        """Models that the equation of motion asks for along the measured motion.
+    def fit_sets(self, about: Candidate, most: int, flight: bool) -> list[Candidate]:
+        """Models that the equation of motion asks for about a model, in flight or altogether.
 
         Larger ones up to the first whose misfit is not large: there scores tell more.
         """
-        found = []
-        for chosen in self.sets.best(most) if self.may_go_on() else ():
-            self.tell("fitting " + " + ".join(e.id for e in chosen.effects))
-            start = fit_from(candidate.fit, chosen.effects, chosen.values, self.scales)
-            found.append(self.no_worse(self.keep(start)))
-            if not (is_large(found[-1].fit) and self.may_go_on()):
+        found, problem = list[Candidate](), self.asked.about(about, flight)
+        for chosen in problem.best(most):
+            key = frozenset(e.id for e in chosen.effects)
+            if not self.is_known(key):
+                if not self.may_go_on():
+                    break
+                self.tell("fitting " + " + ".join(e.id for e in chosen.effects))
+                self.keep(fit_from(problem.fit, chosen.effects, chosen.values, self.scales))
+            found.append(self.no_worse(self.tried[key]))
+            if not is_large(found[-1].fit):
                 break
         return found
 
@@ -170,20 +173,21 @@ class Models:
         return self.keep(grown(best, candidate.effects, self.scales))
 
     @cached_property
-    def sets(self) -> LikelySets:
-        """Sets of effects that the equation of motion asks for beside the base model."""
-        base = self.states[frozenset()].candidate
-        return LikelySets(base.fit, self.effects, self.scales)
+    def asked(self) -> Asked:
+        """What the equation of motion asks for."""
+        return Asked(self.states[frozenset()].candidate.fit, self.effects, self.scales)
 
-    def asked_beside(self, candidate: Candidate, scores: Sequence[Score]) -> list[Score]:
-        """Scores on a model; of one with a large misfit without effects that the equation of motion
-        sees and does not ask for first.
+    def asked_beside(
+        self, candidate: Candidate, found: Scan, promising: Sequence[Score]
+    ) -> list[Score]:
+        """Scores that are tried beside a model, the `promising` ones; with a large misfit those
+        that the equation of motion asks for first, and of the promising ones what it does not see.
         """
         if not is_large(candidate.fit):
-            return list(scores)
-        gains = self.sets.gains(candidate.ids)
-        first = sorted(gains, key=lambda i: -gains[i])[:ASKED]
-        return [s for s in scores if s.effect.id in first or s.effect.id not in gains]
+            return list(promising)
+        first, seen = self.asked.first(candidate), self.asked.seen
+        kept = first | {s.effect.id for s in promising if s.effect.id not in seen}
+        return [s for s in found.best() if s.effect.id in kept]
 
     def may_go_on(self) -> bool:
         """Whether the budget allows for more refits."""

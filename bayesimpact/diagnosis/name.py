@@ -26,7 +26,6 @@ from bayesimpact.diagnosis.promising import (
     SCORE_UNDERESTIMATE,
     families,
     in_place_of,
-    is_discontinuous,
     is_redundant,
     refit_candidates,
 )
@@ -80,21 +79,18 @@ def name(
     """
     search = _Search(effects, scales, rng, progress or (lambda message: None), clock)
     state = base = search.examine(base_candidate(fit))
-    if search.is_large:
-        state = search.asked_for(base)
-    beam = [state]
-    while not state.is_white and len(state.candidate.effects) < search.most and search.may_go_on():
-        promising = [s for s in beam if not search.is_dominated(s)]
-        better = search.best_first(state, [c for s in promising for c in search.extended(s)])
-        if not better or search.promise(better[0]) <= search.promise(state.candidate):
+    beam = search.asked_for(base) if search.is_large else [base]
+    settled = set[frozenset[str]]()
+    while True:
+        state = search.grown(beam)
+        if not search.may_be_named(state):
             break
-        state = search.examine(better[0])
-        if not state.is_white:
-            state = search.restarted(state)
-        if not state.is_white:
-            beam = [state, *(search.examine(c) for c in search.beside(state, better))]
-    if search.may_be_named(state):
         state = search.settled(state)
+        key = frozenset(state.candidate.ids)
+        if state.is_white or not search.is_large or key in settled or not search.may_go_on():
+            break
+        settled.add(key)  # what was left out or exchanged may have made room for what is missing
+        beam = [state]
     return search.naming(base, state)
 
 
@@ -116,10 +112,48 @@ class _Search(Models):
         """Effects of a model."""
         return MOST_LARGE if self.is_large else MOST_EFFECTS
 
-    def asked_for(self, base: State) -> State:
-        """The likeliest model that the equation of motion asks for along the measured motion."""
-        found = [base.candidate, *self.fit_sets(base.candidate, self.most)]
-        return self.examine(max(found, key=self.promise))
+    def grown(self, beam: list[State]) -> State:
+        """The model that ever more effects lead to from the first of a beam, or beside it."""
+        state = beam[0]
+        while not state.is_white and self.may_go_on():
+            promising = [s for s in beam if self.may_grow(s)]
+            better = self.best_first(state, [c for s in promising for c in self.extended(s)])
+            if not better or self.promise(better[0]) <= self.promise(state.candidate):
+                break
+            state = self.examine(better[0])
+            if not state.is_white:
+                state = self.restarted(state)
+            if not state.is_white:
+                beam = [state, *(self.examine(c) for c in self.beside(state, better))]
+        return state
+
+    def may_grow(self, state: State) -> bool:
+        """Whether a model may take in another effect."""
+        return len(state.candidate.effects) < self.most and not self.is_dominated(state)
+
+    def asked_for(self, base: State) -> list[State]:
+        """The likeliest models that the equation of motion asks for along the measured motion.
+
+        First in free flight: what the stop does may be still to come, and so where that is not all,
+        this model stays in the beam beside the likeliest that all stretches ask for.
+        """
+        begun = [base.candidate]
+        for flight in (True, False) if self.asked.has_stop else (False,):
+            begun.append(self.asked_again(max(begun, key=self.promise), flight))
+            if not is_large(begun[-1].fit):
+                break
+        best = max(begun, key=self.promise)
+        return [self.examine(c) for c in (best, *(c for c in begun[1:] if c is not best))]
+
+    def asked_again(self, about: Candidate, flight: bool) -> Candidate:
+        """The likeliest model asked for about one, then about that model, and so on."""
+        best = about
+        while True:
+            found = self.fit_sets(best, self.most, flight)
+            better = max([best, *found], key=self.promise)
+            if better is best or not is_large(better.fit):
+                return better
+            best = better
 
     def best_first(self, state: State, found: Sequence[Candidate]) -> list[Candidate]:
         """Extensions of a model, the next one to examine first."""
@@ -129,7 +163,8 @@ class _Search(Models):
         before, size = self.promise(state.candidate), len(state.candidate.effects)
 
         def gain_per_effect(candidate: Candidate) -> float:
-            return (self.promise(candidate) - before) / (len(candidate.effects) - size)
+            more = max(len(candidate.effects) - size, 1)
+            return (self.promise(candidate) - before) / more
 
         return sorted(ranked, key=gain_per_effect, reverse=True)
 
@@ -139,12 +174,10 @@ class _Search(Models):
         Only those that may overtake the best model so far, as far as scores tell.
         """
         behind = max(map(self.log_odds, self.tried.values())) - self.log_odds(state.candidate)
-        scores = self.refit_candidates(state.scan, behind / SCORE_UNDERESTIMATE)
-        scores = self.asked_beside(state.candidate, scores)
-        late = is_large(state.candidate.fit)  # what is on or off is tried where nothing else gains
-        found = self.fitted(state, [s for s in scores if not (late and is_discontinuous(s.effect))])
-        if late and all(self.promise(c) <= self.promise(state.candidate) for c in found):
-            found += self.fitted(state, [s for s in scores if is_discontinuous(s.effect)])
+        least = 0.0 if is_large(state.candidate.fit) else behind / SCORE_UNDERESTIMATE
+        scores = self.refit_candidates(state.scan, least)
+        scores = self.asked_beside(state.candidate, state.scan, scores)
+        found = self.fitted(state, scores)
         if not self.may_go_on():
             return found
         if not state.candidate.effects:
@@ -153,7 +186,7 @@ class _Search(Models):
                 expected = state.candidate.log_evidence + pair.gain
                 if expected > best_single + self.cost:
                     found.append(self.fit_more(state.candidate, pair.scores))
-        if is_large(state.candidate.fit) and not self.sets.terms:
+        if is_large(state.candidate.fit) and not self.asked.seen:
             found += [self.fit_more(state.candidate, j) for j in families(state.scan)]
         return found
 
@@ -330,13 +363,16 @@ class _Search(Models):
         for effect in chosen.effects:
             rest = self.drop(chosen, effect)
             found = self.scanned(rest, self.effects)
-            if self.is_large and not self.sets.terms:
+            if self.is_large and not self.asked.seen:
                 others = [[s for s in j if s.effect.id != effect.id] for j in families(found)]
                 for joint in others:
                     if len(joint) > 1 and joint[0].effect.family == effect.family:
                         self.fit_more(rest, joint)
-            scores = self.asked_beside(rest, self.refit_candidates(found))
-            for score in in_place_of(effect, scores, is_large(rest.fit)):
+            scores = self.asked_beside(rest, found, self.refit_candidates(found))
+            large = is_large(rest.fit)
+            for score in in_place_of(
+                effect, scores, large, self.asked.first(rest) if large else ()
+            ):
                 if self.may_go_on() and not is_redundant(rest, score.effect):
                     self.fit_one(rest, found, score)
                     if not score.effect.has_size:

@@ -6,7 +6,7 @@ refits cannot matter.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -71,9 +71,11 @@ def families(scan: Scan) -> list[list[Score]]:
     return [held[:JOINT] for held in by_family.values() if len(held) > 1]
 
 
-def in_place_of(effect: Effect, scores: Sequence[Score], large: bool) -> list[Score]:
+def in_place_of(
+    effect: Effect, scores: Sequence[Score], large: bool, asked: Collection[str] = ()
+) -> list[Score]:
     """Effects that might do what one does, by their `scores` on a model without it; `large` is its
-    misfit.
+    misfit, `asked` what the equation of motion asks for there.
 
     What explains less than half of its signal to first order cannot come near it. Effects that do
     not begin at the base model have no first order; they stand for one of their own family, or of
@@ -88,6 +90,6 @@ def in_place_of(effect: Effect, scores: Sequence[Score], large: bool) -> list[Sc
         and (
             _are_alike(s.effect, effect)
             if is_discontinuous(s.effect) and (large or s.gain <= least)
-            else s.gain > least
+            else s.gain > least or s.effect.id in asked
         )
     ]
