@@ -362,6 +362,8 @@ class _Search(Models):
             return
         for effect in chosen.effects:
             rest = self.drop(chosen, effect)
+            if self.is_large:
+                self.simplified(chosen, effect)
             found = self.scanned(rest, self.effects)
             if self.is_large and not self.asked.seen:
                 others = [[s for s in j if s.effect.id != effect.id] for j in families(found)]
@@ -377,6 +379,12 @@ class _Search(Models):
                     self.fit_one(rest, found, score)
                     if not score.effect.has_size:
                         self.exchange_on_off(chosen, effect, score.effect)
+
+    def simplified(self, chosen: Candidate, effect: Effect) -> None:
+        """What an effect refines in its place, whatever scores on a model without both say."""
+        for simpler in self.effects:
+            if simpler.id == effect.prefer and simpler.id not in chosen.ids and self.may_go_on():
+                self.exchange_on_off(chosen, effect, simpler)
 
     def naming(self, base: State, chosen: State) -> Naming:
         tried = tuple(sorted(self.tried.values(), key=self.log_odds, reverse=True))

@@ -156,3 +156,45 @@ def test_velocities_by_local_quartics() -> None:
         off = np.abs(path.v - speed)[inner]
         assert np.median(off) < 5e-3 * np.abs(speed).max()
         assert np.array_equal(path.d > 0, path.y > q[SLOTS.index("g")])
+
+
+def test_stretches_in_which_friction_holds_the_mass_tell_nothing() -> None:
+    """It comes to rest beside the spring's own rest, which asks for a drift of the probe."""
+    planted = {"coulomb_friction": {"force": 0.06}, "quadratic_drag": {"coefficient": 1.0}}
+    fit = fitted(decays(4, planted))
+    moves = measured_paths(fit)[0].rows.kept
+    assert moves[0] and not moves[-1] and 0.2 < moves.mean() < 0.6
+    one, two = sets_of(fit)
+    assert {e.id for e in one.effects} == {"coulomb_friction"}
+    refined = {e.prefer or e.id for e in two.effects}
+    assert refined == set(planted)
+
+
+def test_in_flight_no_law_of_the_stop_disturbs_what_is_asked_for() -> None:
+    """A stop that does not pull; over all stretches its impacts bias everything."""
+    effects: Effects = {
+        "contact_no_tension": {}, "quadratic_drag": {"coefficient": 3.0},
+        "spring_quadratic": {"stiffness": 2e4},
+    }  # fmt: skip
+    fit = fitted(small_rig.record(2, effects, duration=4.0))
+    assert fit.reduced_chi2 > 9
+    scales = campaign_scales(fit)
+    flight = LikelySets(fit, SEARCHED, scales, flight=True)
+    assert all("contact" not in term.effect.id for term in flight.terms)
+    deepest = [float(np.max(p.d)) for p in flight.paths]
+    assert min(deepest) > 0
+    for path in flight.paths:
+        kept = np.flatnonzero(path.rows.kept) * path.rows.hop
+        touched = np.concatenate([path.d[k : k + path.rows.phi.size] for k in kept])
+        assert touched.max() < 0
+    found = flight.best(5)[1]
+    assert {e.id for e in found.effects} == {"quadratic_drag", "spring_quadratic"}
+    assert found.values["spring_quadratic.stiffness"] == pytest.approx(2e4, rel=0.05)
+
+
+def test_without_a_stretch_in_flight_nothing_is_asked_for() -> None:
+    fit = fitted(small_rig.record(1, STOPPED, duration=4.0))
+    at = fit.mode.copy()
+    at[fit.names.index("g")] = -1.0
+    flight = LikelySets(replace(fit, mode=at), SEARCHED, campaign_scales(fit), flight=True)
+    assert flight.best(5) == [] and flight.gains(["spring_cubic"]) == {}

@@ -30,8 +30,9 @@ class Table:
     one from a larger model. `unfinished` has what is gained beyond where a climb gave up,
     `once` where a model's first fit ends. `force` is the evidence of a free force in place of all
     effects, to which `beside` adds where there are effects that it may stand beside. `chi2` is
-    that of every fit. `asked` are the sets that the equation of motion asks for, `seen` what it
-    gains by an effect.
+    that of every fit. `asked` are the sets that the equation of motion asks for, of all stretches
+    and `asked_in_flight`, or about a model, `asked_about`; `seen` what it gains by an effect, of
+    which `first` are tried.
     """
 
     def __init__(
@@ -46,7 +47,12 @@ class Table:
         chi2: float = 1.0,
         asked: tuple[str, ...] = (),
         seen: dict[str, float] | None = None,
+        asked_in_flight: tuple[str, ...] = (),
+        asked_about: dict[str, tuple[str, ...]] | None = None,
+        first: int = 4,
     ) -> None:
+        self.asked_in_flight, self.first = asked_in_flight, first
+        self.asked_about = {frozenset(k.split()): v for k, v in (asked_about or {}).items()}
         self.beside, self.chi2, self.asked, self.seen = beside, chi2, asked, seen or {}
         self.once = {frozenset(k.split()): v for k, v in (once or {}).items()}
         self.in_contact = in_contact
@@ -80,12 +86,26 @@ class Table:
         self.fitted.append(frozenset(e.id for e in effects))
         return self.candidate([e.id for e in effects], self.gain(self.fitted[-1]))
 
-    def sets(self, fit, effects, scales):
-        found = [
-            SimpleNamespace(effects=[BY_ID[i] for i in s.split()], values={}) for s in self.asked
-        ]
-        gains = lambda ids: {i: v for i, v in self.seen.items() if i not in ids}  # noqa: E731
-        return SimpleNamespace(terms=self.seen, best=lambda most: found, gains=gains)
+    def asks(self, base, effects, scales):
+        """What stands for the equation of motion."""
+
+        def best(names):
+            return [
+                SimpleNamespace(effects=[BY_ID[i] for i in s.split()], values={}) for s in names
+            ]
+
+        def about(model, flight):
+            again = self.asked_about.get(frozenset(model.ids), self.asked)
+            names = self.asked_in_flight if flight else again
+            return SimpleNamespace(fit=base, best=lambda most: best(names))
+
+        def first(model):
+            left = [i for i in self.seen if i not in model.ids]
+            return set(sorted(left, key=lambda i: -self.seen[i])[: self.first])
+
+        return SimpleNamespace(
+            has_stop=bool(self.asked_in_flight), seen=set(self.seen), about=about, first=first
+        )
 
     def without(self, candidate, effect, scales) -> Candidate:
         ids = [i for i in candidate.ids if i != effect.id]
@@ -132,7 +152,7 @@ def run(monkeypatch):
         monkeypatch.setattr(models, "without", table.without)
         monkeypatch.setattr(models, "exchanged", table.exchanged)
         monkeypatch.setattr(models, "fit_from", table.fit_from)
-        monkeypatch.setattr(models, "LikelySets", table.sets)
+        monkeypatch.setattr(models, "Asked", table.asks)
         monkeypatch.setattr(models, "shakes_in_own_band", lambda fit, remains: False)
         monkeypatch.setattr(models, "leaves_something", lambda fit: False)
         monkeypatch.setattr(models, "is_refuted", lambda fit: False)
@@ -188,23 +208,49 @@ def test_where_the_misfit_is_large_the_search_begins_with_what_the_equation_asks
     assert small.fitted[0] != {A, B, C}
 
 
-def test_beside_a_large_misfit_what_the_equation_asks_for_last_is_not_tried(run, monkeypatch):
-    monkeypatch.setattr(models, "ASKED", 1)
+def test_beside_a_large_misfit_what_the_equation_asks_for_last_is_not_tried(run):
     gains = {A: 300.0, f"{A} {B}": ENOUGH, f"{A} {C}": 400.0, f"{A} {D}": 400.0}
-    table = Table(gains, chi2=100.0, asked=(A,), seen={B: 9.0, C: 1.0})
+    table = Table(gains, chi2=100.0, asked=(A,), seen={B: 9.0, C: 1.0}, first=1)
     assert chosen(run(table)) == {A, B}
     assert frozenset({A, C}) not in table.fitted
     assert {frozenset({A, B}), frozenset({A, D})} <= set(table.fitted)
 
 
-def test_beside_a_large_misfit_what_is_on_or_off_comes_last(run):
-    effects = (*EFFECTS, BY_ID[N])
-    gains = {A: 300.0, f"{A} {B}": ENOUGH, f"{A} {N}": 400.0}
-    table = Table(gains, chi2=100.0, asked=(A,), seen={B: 9.0})
-    assert chosen(run(table, effects)) == {A, B}
-    assert frozenset({A, N}) not in table.fitted
-    alone = Table({A: 300.0, f"{A} {N}": ENOUGH}, chi2=100.0, asked=(A,))
-    assert chosen(run(alone, effects)) == {A, N}
+def test_the_equation_is_asked_again_about_a_better_model(run):
+    """About the base model's rest C + D look right; about that of A, it is A + B."""
+    gains = {A: 300.0, C: 1.0, f"{C} {D}": 2.0, f"{A} {B}": ENOUGH}
+    table = Table(
+        gains, chi2=100.0, asked=(C, f"{C} {D}", A), asked_about={A: (A, f"{A} {B}")},
+        seen={C: 1.0}, first=1,
+    )  # fmt: skip
+    assert chosen(run(table)) == {A, B}
+    assert table.fitted[3] == {A, B}
+
+
+def test_what_free_flight_asks_for_is_extended_beside_what_gains_more(run):
+    """Laws of the stop that imitate what it really does gain most as long as that is missing."""
+    gains = {A: 5.0, S: 200.0, f"{S} {C}": 300.0, f"{A} {N}": ENOUGH}
+    table = Table(
+        gains, chi2=100.0, asked=(S, f"{S} {C}"), asked_in_flight=(A,), seen={S: 9.0, C: 8.0}
+    )
+    assert chosen(run(table, (*EFFECTS, BY_ID[N]))) == {A, N}
+
+
+def test_the_search_goes_on_where_leaving_out_has_made_room(run, monkeypatch):
+    """Five effects are the most: with three that imitate one, a fourth and fifth find no place."""
+    monkeypatch.setattr(search, "MOST_LARGE", 3)
+    gains = {f"{A} {C} {D}": 300.0, f"{A} {B}": 300.0, f"{A} {B} {S}": ENOUGH}
+    table = Table(gains, chi2=100.0, asked=(f"{A} {C} {D}",), seen={B: 1.0, C: 1.0, D: 1.0})
+    assert chosen(run(table)) == {A, B, S}
+
+
+def test_what_an_effect_refines_is_tried_in_its_place_whatever_scores_say(run, monkeypatch):
+    """The simpler one has no score beside a model without both."""
+    power = BY_ID["power_damping"]
+    table = Table({A: 10.0, f"{A} {power.id}": ENOUGH, f"{A} {B}": ENOUGH + 4.0}, chi2=100.0,
+                  asked=(A, f"{A} {power.id}"), seen={C: 1.0}, first=1)  # fmt: skip
+    monkeypatch.setattr(search, "in_place_of", lambda *known: [])
+    assert chosen(run(table, (*EFFECTS, power))) == {A, B}
 
 
 def test_the_best_single_effect_ends_the_search(run):

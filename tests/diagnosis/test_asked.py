@@ -1,0 +1,50 @@
+"""The equation of motion is asked about any model's rest and gap."""
+
+from __future__ import annotations
+
+import numpy as np
+import small_rig
+from effect_rigs import BY_ID
+
+from bayesimpact.diagnosis.asked import ASKED, Asked
+from bayesimpact.diagnosis.extend import campaign_scales
+from bayesimpact.diagnosis.refit import base_candidate, fit_from
+from bayesimpact.inference.identify import identify
+from bayesimpact.model.effects import SEARCHED
+
+
+def test_about_a_better_model_a_quadratic_spring_hides_nothing_else() -> None:
+    """The base model's rest is off by what the spring rectifies, each recording's by its own."""
+    planted = {"spring_quadratic": {"stiffness": -4e4}, "quadratic_drag": {"coefficient": 0.5}}
+    campaign = small_rig.record(
+        5, planted, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES, duration=6.0
+    )
+    fit = identify(campaign, rng=np.random.default_rng(0), search=False).fit
+    scales = campaign_scales(fit)
+    asked, base = Asked(fit, SEARCHED, scales), base_candidate(fit)
+    spring = asked.about(base, flight=False).best(1)[0]
+    assert [e.id for e in spring.effects] == ["spring_quadratic"]
+    better = fit_from(fit, spring.effects, spring.values, scales)
+    again = asked.about(better, flight=False)
+    assert asked.about(better, flight=False) is again
+    two = again.best(2)[1]
+    assert {e.id for e in two.effects} == set(planted)
+    wrong = asked.about(base, flight=False)
+    assert two.log_odds > max(s.log_odds for s in wrong.best(5))
+    assert "quadratic_drag" in asked.first(better) and len(asked.first(better)) == ASKED
+
+
+def test_what_acts_in_flight_is_judged_there() -> None:
+    fit = identify(
+        small_rig.record(1, {"contact_no_tension": {}}, duration=4.0),
+        rng=np.random.default_rng(0), search=False,
+    ).fit  # fmt: skip
+    asked = Asked(fit, SEARCHED, campaign_scales(fit))
+    base = base_candidate(fit)
+    flight = asked.about(base, flight=True).gains(())
+    whole = asked.about(base, flight=False).gains(())
+    stops = {i: g for i, g in whole.items() if i not in flight}
+    assert set(flight) | set(stops) == asked.seen and stops
+    expected = [sorted(g, key=lambda i: -g[i])[:ASKED] for g in (flight, stops)]
+    assert asked.first(base) == {*expected[0], *expected[1]}
+    assert all(BY_ID[i].regime != "free" for i in stops)
