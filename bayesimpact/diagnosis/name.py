@@ -18,41 +18,28 @@ from bayesimpact.diagnosis.decision import in_its_place, may_be_needed, ordered
 from bayesimpact.diagnosis.discrepancy import discrepancy
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.force import missing_contact
-from bayesimpact.diagnosis.models import STARTS, UNCONVERGED_SHORTFALL, Models, Progress
+from bayesimpact.diagnosis.models import STARTS, UNCONVERGED_SHORTFALL, Progress
 from bayesimpact.diagnosis.naming import Naming, State, is_large
 from bayesimpact.diagnosis.pairs import promising_pairs
 from bayesimpact.diagnosis.promising import (
     NEAR_MARGIN,
     SCORE_UNDERESTIMATE,
     families,
-    in_place_of,
-    is_redundant,
-    refit_candidates,
 )
 from bayesimpact.diagnosis.refit import (
     Candidate,
     base_candidate,
-    residual_repetition,
-    tempered_evidence,
 )
-from bayesimpact.diagnosis.scan import Scan
-from bayesimpact.diagnosis.scores import Score
-from bayesimpact.diagnosis.thresholds import DECISIVE
+from bayesimpact.diagnosis.settle import Settling
 from bayesimpact.diagnosis.unknown import learn_force, with_force
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
 
-MOST_EFFECTS = 3
-MOST_LARGE = 5  # where the base misfit is large: several strong effects act at once
 # Effects from which on a single force in contact is fitted in their place: three sizes can follow
 # the shape of one law, which one or two seldom do.
 IMITATING_EFFECTS = 3
-# Nats by which an effect alone must fall behind the base model to be given up: more than five times
-# `DECISIVE`, for beside others it may still be right, and trying it costs one refit.
-CONTRADICTED = 30.0
 BEAM = 3  # models that are extended while the best one is not white
 PAIRS = 4  # refitted at the first step
-EXCHANGES = 3  # rounds of leaving out and exchanging effects
 
 
 def name(
@@ -72,13 +59,14 @@ def name(
     most per effect is then the next model. While it extends, the search takes any gain that the
     noise level allows, for what remains may yet be explained; effects that the odds do not demand
     are left out afterwards, and each that stays is exchanged for every other that might do what it
-    does.
+    does. Where the misfit was large, the search begins with what the equation of motion asks for,
+    and goes on from a model that has settled and still leaves something.
 
     A search that has begun `MOST_REFITS` refits or taken `PATIENCE` seconds by the `clock` begins
     no more, and names nothing that it has not compared with all that might do the same.
     """
     search = _Search(effects, scales, rng, progress or (lambda message: None), clock)
-    state = base = search.examine(base_candidate(fit))
+    base = search.examine(base_candidate(fit))
     beam = search.asked_for(base) if search.is_large else [base]
     settled = set[frozenset[str]]()
     while True:
@@ -94,23 +82,8 @@ def name(
     return search.naming(base, state)
 
 
-class _Search(Models):
+class _Search(Settling):
     """Which models to fit next, and what they are worth."""
-
-    @property
-    def cost(self) -> float:
-        """Nats per added effect, for multiplicity."""
-        return float(np.log(2 * len(self.effects)))
-
-    @property
-    def is_large(self) -> bool:
-        """Whether the base model's misfit is large."""
-        return is_large(self.states[frozenset()].candidate.fit)
-
-    @property
-    def most(self) -> int:
-        """Effects of a model."""
-        return MOST_LARGE if self.is_large else MOST_EFFECTS
 
     def grown(self, beam: list[State]) -> State:
         """The model that ever more effects lead to from the first of a beam, or beside it."""
@@ -236,44 +209,6 @@ class _Search(Models):
             and state.unknown.log_evidence < UNCONVERGED_SHORTFALL
         )
 
-    def refit_candidates(self, scan: Scan, least: float = 0.0) -> list[Score]:
-        """Effects that promise something, but for those that have proved to be wrong here."""
-        return [s for s in refit_candidates(scan, least) if not self.is_contradicted(s.effect)]
-
-    def is_contradicted(self, effect: Effect) -> bool:
-        """Whether an effect alone loses more than there is to gain, by what a free force gains.
-
-        One that was refused says nothing of itself beside others.
-        """
-        alone, base = self.tried.get(frozenset([effect.id])), self.states[frozenset()]
-        if alone is None or alone.log_evidence == -np.inf:
-            return False
-        lost = self.log_odds(base.candidate) - self.log_odds(alone)
-        return lost > max(CONTRADICTED, base.unknown.log_evidence)
-
-    def promise(self, candidate: Candidate) -> float:
-        """What a model is worth on the way: every sample counts, for what remains may yet be
-        explained.
-        """
-        return candidate.log_evidence - self.cost * len(candidate.effects)
-
-    def log_odds(self, candidate: Candidate) -> float:
-        """Log posterior odds up to a constant, each independent sample counted once."""
-        evidence = tempered_evidence(candidate, self.repetition())
-        return evidence - self.cost * len(candidate.effects)
-
-    def force_gain(self) -> float:
-        """What a free force in place of all effects would be worth, as far as scores tell."""
-        base = self.states[frozenset()]
-        return self.log_odds(base.candidate) + base.unknown.log_evidence
-
-    def repetition(self) -> float:
-        """Samples per independent one in the residual of the best model so far."""
-        best = min(self.tried.values(), key=lambda c: c.fit.reduced_chi2)
-        if self.repeated is None or self.repeated[0] is not best:
-            self.repeated = best, residual_repetition(best.fit)
-        return self.repeated[1]
-
     def restarted(self, state: State) -> State:
         """The same model with the shapes of its effects sought anew beside all others.
 
@@ -295,96 +230,6 @@ class _Search(Models):
                         for start in found.starts(score, STARTS):
                             self.start(rest, [start])
         return self.examine(self.ranked([self.tried[frozenset(chosen.ids)]])[0])
-
-    def eliminated(self, state: State) -> State:
-        """Leave out effects, the least useful first, that the recordings do not demand.
-
-        An effect stays when the model without it is decisively worse, or leaves something.
-        """
-        while len(state.candidate.effects) > 1:
-            smaller = [self.drop(state.candidate, e) for e in state.candidate.effects]
-            best = max(smaller, key=self.log_odds)
-            lost = self.log_odds(state.candidate) - self.log_odds(best)
-            complete = state.is_white and not self.examine(best).is_white
-            if lost >= DECISIVE or (lost > 0 and complete):
-                return state
-            state = self.examine(best)
-        return state
-
-    def settled(self, state: State) -> State:
-        """The model that neither leaving out nor exchanging an effect improves."""
-        for _ in range(EXCHANGES):
-            state = self.eliminated(state)
-            for candidate in self.near(state):
-                if self.may_go_on():
-                    self.exchange(candidate)
-            best = self.best(len(state.candidate.effects))
-            if set(best.ids) == set(state.candidate.ids):
-                break
-            state = self.examine(best)
-        return state
-
-    def best(self, size: int) -> Candidate:
-        """The likeliest model tried with at most so many effects."""
-        return self.ranked([c for c in self.tried.values() if len(c.effects) <= size])[0]
-
-    def ranked(self, candidates: Sequence[Candidate]) -> list[Candidate]:
-        """Models, likeliest first. An unconverged fit decides nothing near the best one.
-
-        Unless a free force wins anyhow, or the misfit is large: then the next step repairs it.
-        """
-        best = max((self.log_odds(c) for c in candidates), default=0.0)
-        models = {frozenset(c.ids): c for c in candidates}
-        if self.is_large or self.force_gain() > best + UNCONVERGED_SHORTFALL:
-            best = np.inf
-        near = [key for key, c in models.items() if self.log_odds(c) > best - UNCONVERGED_SHORTFALL]
-        for key in near:
-            if len(near) > 1 and not models[key].fit.converged:
-                models[key] = self.finished(models[key])
-        return sorted(models.values(), key=self.log_odds, reverse=True)
-
-    def near(self, state: State) -> list[Candidate]:
-        """The chosen model and those of at most its size that it does not beat decisively."""
-        least = self.log_odds(state.candidate) - DECISIVE
-        return [
-            c
-            for c in self.ranked(list(self.tried.values()))
-            if self.log_odds(c) >= least and len(c.effects) <= len(state.candidate.effects)
-        ]
-
-    def exchange(self, chosen: Candidate) -> None:
-        """Put every other effect in the place of each chosen one.
-
-        Where the misfit was large, several of its own family together too: two damping laws make a
-        third one. Where it was not, all single effects have been fitted beside the base model.
-        """
-        if len(chosen.effects) < 2 and not self.is_large:
-            return
-        for effect in chosen.effects:
-            rest = self.drop(chosen, effect)
-            if self.is_large:
-                self.simplified(chosen, effect)
-            found = self.scanned(rest, self.effects)
-            if self.is_large and not self.asked.seen:
-                others = [[s for s in j if s.effect.id != effect.id] for j in families(found)]
-                for joint in others:
-                    if len(joint) > 1 and joint[0].effect.family == effect.family:
-                        self.fit_more(rest, joint)
-            scores = self.asked_beside(rest, found, self.refit_candidates(found))
-            large = is_large(rest.fit)
-            for score in in_place_of(
-                effect, scores, large, self.asked.first(rest) if large else ()
-            ):
-                if self.may_go_on() and not is_redundant(rest, score.effect):
-                    self.fit_one(rest, found, score)
-                    if not score.effect.has_size:
-                        self.exchange_on_off(chosen, effect, score.effect)
-
-    def simplified(self, chosen: Candidate, effect: Effect) -> None:
-        """What an effect refines in its place, whatever scores on a model without both say."""
-        for simpler in self.effects:
-            if simpler.id == effect.prefer and simpler.id not in chosen.ids and self.may_go_on():
-                self.exchange_on_off(chosen, effect, simpler)
 
     def naming(self, base: State, chosen: State) -> Naming:
         tried = tuple(sorted(self.tried.values(), key=self.log_odds, reverse=True))

@@ -15,6 +15,8 @@ from bayesimpact.diagnosis.scores import Score
 
 search = importlib.import_module("bayesimpact.diagnosis.name")
 models = importlib.import_module("bayesimpact.diagnosis.models")
+ranked = importlib.import_module("bayesimpact.diagnosis.ranked")
+settle = importlib.import_module("bayesimpact.diagnosis.settle")
 
 A, B, C, D = "coulomb_friction", "quadratic_drag", "spring_cubic", "gap_wear"
 S = "contact_second_stage"  # has a depth
@@ -163,7 +165,7 @@ def run(monkeypatch):
         monkeypatch.setattr(search, "missing_contact", table.contact)
         monkeypatch.setattr(search, "learn_force", lambda fit, force, scales: force.fit)
         monkeypatch.setattr(search, "with_force", lambda candidate, force, scales: candidate)
-        monkeypatch.setattr(search, "residual_repetition", lambda fit: 1.0)
+        monkeypatch.setattr(ranked, "residual_repetition", lambda fit: 1.0)
         monkeypatch.setattr(search, "discrepancy", lambda fit: None)
         monkeypatch.setattr(search, "may_be_needed", lambda naming, effect: True)
         monkeypatch.setattr(search, "promising_pairs", lambda scan, count: ())
@@ -217,14 +219,14 @@ def test_beside_a_large_misfit_what_the_equation_asks_for_last_is_not_tried(run)
 
 
 def test_the_equation_is_asked_again_about_a_better_model(run):
-    """About the base model's rest C + D look right; about that of A, it is A + B."""
-    gains = {A: 300.0, C: 1.0, f"{C} {D}": 2.0, f"{A} {B}": ENOUGH}
+    """About the base model's rest C + D look right; about that of A, it is three others."""
+    gains = {A: 300.0, C: 1.0, f"{C} {D}": 2.0, f"{A} {B} {D}": ENOUGH}
     table = Table(
-        gains, chi2=100.0, asked=(C, f"{C} {D}", A), asked_about={A: (A, f"{A} {B}")},
+        gains, chi2=100.0, asked=(C, f"{C} {D}", A), asked_about={A: (A, f"{A} {B} {D}")},
         seen={C: 1.0}, first=1,
     )  # fmt: skip
-    assert chosen(run(table)) == {A, B}
-    assert table.fitted[3] == {A, B}
+    assert chosen(run(table)) == {A, B, D}
+    assert table.fitted[3] == {A, B, D}
 
 
 def test_what_free_flight_asks_for_is_extended_beside_what_gains_more(run):
@@ -238,7 +240,7 @@ def test_what_free_flight_asks_for_is_extended_beside_what_gains_more(run):
 
 def test_the_search_goes_on_where_leaving_out_has_made_room(run, monkeypatch):
     """Five effects are the most: with three that imitate one, a fourth and fifth find no place."""
-    monkeypatch.setattr(search, "MOST_LARGE", 3)
+    monkeypatch.setattr(ranked, "MOST_LARGE", 3)
     gains = {f"{A} {C} {D}": 300.0, f"{A} {B}": 300.0, f"{A} {B} {S}": ENOUGH}
     table = Table(gains, chi2=100.0, asked=(f"{A} {C} {D}",), seen={B: 1.0, C: 1.0, D: 1.0})
     assert chosen(run(table)) == {A, B, S}
@@ -249,7 +251,7 @@ def test_what_an_effect_refines_is_tried_in_its_place_whatever_scores_say(run, m
     power = BY_ID["power_damping"]
     table = Table({A: 10.0, f"{A} {power.id}": ENOUGH, f"{A} {B}": ENOUGH + 4.0}, chi2=100.0,
                   asked=(A, f"{A} {power.id}"), seen={C: 1.0}, first=1)  # fmt: skip
-    monkeypatch.setattr(search, "in_place_of", lambda *known: [])
+    monkeypatch.setattr(settle, "in_place_of", lambda *known: [])
     assert chosen(run(table, (*EFFECTS, power))) == {A, B}
 
 

@@ -1,0 +1,97 @@
+"""What the models of a search are worth, and which effects may still matter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from bayesimpact.diagnosis.models import UNCONVERGED_SHORTFALL, Models
+from bayesimpact.diagnosis.naming import is_large
+from bayesimpact.diagnosis.promising import refit_candidates
+from bayesimpact.diagnosis.refit import Candidate, residual_repetition, tempered_evidence
+from bayesimpact.diagnosis.scan import Scan
+from bayesimpact.diagnosis.scores import Score
+from bayesimpact.model.effects.effect import Effect
+
+MOST_EFFECTS = 3
+MOST_LARGE = 5  # where the base misfit is large: several strong effects act at once
+# Nats by which an effect alone must fall behind the base model to be given up: more than five times
+# `DECISIVE`, for beside others it may still be right, and trying it costs one refit.
+CONTRADICTED = 30.0
+
+
+class Ranked(Models):
+    """Models with their odds."""
+
+    @property
+    def cost(self) -> float:
+        """Nats per added effect, for multiplicity."""
+        return float(np.log(2 * len(self.effects)))
+
+    @property
+    def is_large(self) -> bool:
+        """Whether the base model's misfit is large."""
+        return is_large(self.states[frozenset()].candidate.fit)
+
+    @property
+    def most(self) -> int:
+        """Effects of a model."""
+        return MOST_LARGE if self.is_large else MOST_EFFECTS
+
+    def promise(self, candidate: Candidate) -> float:
+        """What a model is worth on the way: every sample counts, for what remains may yet be
+        explained.
+        """
+        return candidate.log_evidence - self.cost * len(candidate.effects)
+
+    def log_odds(self, candidate: Candidate) -> float:
+        """Log posterior odds up to a constant, each independent sample counted once."""
+        evidence = tempered_evidence(candidate, self.repetition())
+        return evidence - self.cost * len(candidate.effects)
+
+    def repetition(self) -> float:
+        """Samples per independent one in the residual of the best model so far."""
+        best = min(self.tried.values(), key=lambda c: c.fit.reduced_chi2)
+        if self.repeated is None or self.repeated[0] is not best:
+            self.repeated = best, residual_repetition(best.fit)
+        return self.repeated[1]
+
+    def force_gain(self) -> float:
+        """What a free force in place of all effects would be worth, as far as scores tell."""
+        base = self.states[frozenset()]
+        return self.log_odds(base.candidate) + base.unknown.log_evidence
+
+    def best(self, size: int) -> Candidate:
+        """The likeliest model tried with at most so many effects."""
+        return self.ranked([c for c in self.tried.values() if len(c.effects) <= size])[0]
+
+    def ranked(self, candidates: Sequence[Candidate]) -> list[Candidate]:
+        """Models, likeliest first. An unconverged fit decides nothing near the best one.
+
+        Unless a free force wins anyhow, or the misfit is large: then the next step repairs it.
+        """
+        best = max((self.log_odds(c) for c in candidates), default=0.0)
+        models = {frozenset(c.ids): c for c in candidates}
+        if self.is_large or self.force_gain() > best + UNCONVERGED_SHORTFALL:
+            best = np.inf
+        near = [key for key, c in models.items() if self.log_odds(c) > best - UNCONVERGED_SHORTFALL]
+        for key in near:
+            if len(near) > 1 and not models[key].fit.converged:
+                models[key] = self.finished(models[key])
+        return sorted(models.values(), key=self.log_odds, reverse=True)
+
+    def refit_candidates(self, scan: Scan, least: float = 0.0) -> list[Score]:
+        """Effects that promise something, but for those that have proved to be wrong here."""
+        return [s for s in refit_candidates(scan, least) if not self.is_contradicted(s.effect)]
+
+    def is_contradicted(self, effect: Effect) -> bool:
+        """Whether an effect alone loses more than there is to gain, by what a free force gains.
+
+        One that was refused says nothing of itself beside others.
+        """
+        alone, base = self.tried.get(frozenset([effect.id])), self.states[frozenset()]
+        if alone is None or alone.log_evidence == -np.inf:
+            return False
+        lost = self.log_odds(base.candidate) - self.log_odds(alone)
+        return lost > max(CONTRADICTED, base.unknown.log_evidence)

@@ -1,0 +1,87 @@
+"""Leaving effects out of a model, and putting others in their place."""
+
+from __future__ import annotations
+
+from bayesimpact.diagnosis.naming import State, is_large
+from bayesimpact.diagnosis.promising import families, in_place_of, is_redundant
+from bayesimpact.diagnosis.ranked import Ranked
+from bayesimpact.diagnosis.refit import Candidate
+from bayesimpact.diagnosis.thresholds import DECISIVE
+from bayesimpact.model.effects.effect import Effect
+
+EXCHANGES = 3  # rounds of leaving out and exchanging effects
+
+
+class Settling(Ranked):
+    """How a model settles: effects left out and exchanged."""
+
+    def settled(self, state: State) -> State:
+        """The model that neither leaving out nor exchanging an effect improves."""
+        for _ in range(EXCHANGES):
+            state = self.eliminated(state)
+            for candidate in self.near(state):
+                if self.may_go_on():
+                    self.exchange(candidate)
+            best = self.best(len(state.candidate.effects))
+            if set(best.ids) == set(state.candidate.ids):
+                break
+            state = self.examine(best)
+        return state
+
+    def eliminated(self, state: State) -> State:
+        """Leave out effects, the least useful first, that the recordings do not demand.
+
+        An effect stays when the model without it is decisively worse, or leaves something.
+        """
+        while len(state.candidate.effects) > 1:
+            smaller = [self.drop(state.candidate, e) for e in state.candidate.effects]
+            best = max(smaller, key=self.log_odds)
+            lost = self.log_odds(state.candidate) - self.log_odds(best)
+            complete = state.is_white and not self.examine(best).is_white
+            if lost >= DECISIVE or (lost > 0 and complete):
+                return state
+            state = self.examine(best)
+        return state
+
+    def near(self, state: State) -> list[Candidate]:
+        """The chosen model and those of at most its size that it does not beat decisively."""
+        least = self.log_odds(state.candidate) - DECISIVE
+        return [
+            c
+            for c in self.ranked(list(self.tried.values()))
+            if self.log_odds(c) >= least and len(c.effects) <= len(state.candidate.effects)
+        ]
+
+    def exchange(self, chosen: Candidate) -> None:
+        """Put every other effect in the place of each chosen one.
+
+        Where the misfit was large, several of its own family together too: two damping laws make a
+        third one. Where it was not, all single effects have been fitted beside the base model.
+        """
+        if len(chosen.effects) < 2 and not self.is_large:
+            return
+        for effect in chosen.effects:
+            rest = self.drop(chosen, effect)
+            if self.is_large:
+                self.simplified(chosen, effect)
+            found = self.scanned(rest, self.effects)
+            if self.is_large and not self.asked.seen:
+                others = [[s for s in j if s.effect.id != effect.id] for j in families(found)]
+                for joint in others:
+                    if len(joint) > 1 and joint[0].effect.family == effect.family:
+                        self.fit_more(rest, joint)
+            scores = self.asked_beside(rest, found, self.refit_candidates(found))
+            large = is_large(rest.fit)
+            for score in in_place_of(
+                effect, scores, large, self.asked.first(rest) if large else ()
+            ):
+                if self.may_go_on() and not is_redundant(rest, score.effect):
+                    self.fit_one(rest, found, score)
+                    if not score.effect.has_size:
+                        self.exchange_on_off(chosen, effect, score.effect)
+
+    def simplified(self, chosen: Candidate, effect: Effect) -> None:
+        """What an effect refines in its place, whatever scores on a model without both say."""
+        for simpler in self.effects:
+            if simpler.id == effect.prefer and simpler.id not in chosen.ids and self.may_go_on():
+                self.exchange_on_off(chosen, effect, simpler)
