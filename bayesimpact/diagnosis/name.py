@@ -68,16 +68,21 @@ def name(
     search = _Search(effects, scales, rng, progress or (lambda message: None), clock)
     base = search.examine(base_candidate(fit))
     beam = search.asked_for(base) if search.is_large else [base]
-    settled = set[frozenset[str]]()
+    begun = set[frozenset[str]]()
     while True:
         state = search.grown(beam)
         if not search.may_be_named(state):
             break
-        state = search.settled(state)
+        smaller = search.eliminated(state)
+        made_room = smaller is not state and frozenset(smaller.candidate.ids) not in begun
+        if not search.is_large or smaller.is_white or not made_room:
+            state = search.settled(smaller)
+        else:
+            state = smaller
         key = frozenset(state.candidate.ids)
-        if state.is_white or not search.is_large or key in settled or not search.may_go_on():
+        if state.is_white or not search.is_large or key in begun or not search.may_go_on():
             break
-        settled.add(key)  # what was left out or exchanged may have made room for what is missing
+        begun.add(key)
         beam = [state]
     return search.naming(base, state)
 
@@ -124,8 +129,8 @@ class _Search(Settling):
         while True:
             found = self.fit_sets(best, self.most, flight)
             better = max([best, *found], key=self.promise)
-            if better is best or not is_large(better.fit):
-                return better
+            if better is best:
+                return best
             best = better
 
     def best_first(self, state: State, found: Sequence[Candidate]) -> list[Candidate]:
