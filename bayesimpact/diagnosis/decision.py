@@ -6,20 +6,22 @@ Let S be the likeliest set of effects that the search reached.
    `adequate` when S is empty; `unknown` when one free force in the place of all effects beats S by
    the decisive odds; `ambiguous` when another set comes within these odds, or the search ended by
    its limit before all that might were fitted; else `named`.
-2. Something remains beside S. An effect of S is needed when
+2. Something remains beside S. All odds are those with a force of time beside every hypothesis,
+   where what the likeliest leaves beside one is noise.
+   Nothing is needed where a free force in the place of all effects leaves `EXCESS` times less of
+   the misfit: the effects only imitate it. Else an effect of S is needed when
    - every set of effects without it trails S by the decisive odds, or trails it at all where it has
-     more effects or parameters than S: what remains makes odds small, and more to fit with makes
-     imitation easy,
-   - the misfit above the noise is `EXCESS` times larger without it than with it, other effects
-     refitted, either as it is or with a residual force beside both: an effect that merely imitates
-     what the catalogue lacks leaves a large part of it, and a force beside takes its place,
+     more effects or parameters than S: more to fit with makes imitation easy,
+   - `EXCESS` times as much is left without it, other effects refitted: of the misfit above the
+     noise, or of the force about the motion's own frequencies. An effect that imitates what the
+     catalogue lacks may put the phase right, but leaves most of the force,
+   - its size is apart from none at all by `APART` of its own standard deviations, with what the
+     remainder may have done to it in them (`discrepancy`),
    - no set without it, with a residual force of whichever form is likeliest, beats S with its own
      residual force by these odds (as in 1), and
    - no other effect in its place, with such a force beside, comes within these odds of that, or
      above it where it has more parameters: what remains may be what tells two laws apart.
-   A search that ended by its limit must have fitted all of these. And
-   - its size is apart from none at all by `APART` of its own standard deviations, with what the
-     remainder may have done to it in them (`discrepancy`).
+   A search that ended by its limit must have fitted all of these.
    With needed effects the verdict is `partly`, without any it is `unknown`. Other effects of S stay
    in the fitted model, but are not named.
 
@@ -77,16 +79,14 @@ def decide(naming: Naming) -> Decision:
         settled = naming.finished and not rivals
         return Decision("named" if settled else "ambiguous", effects, rivals)
     needed = tuple(e for e in effects if is_needed(naming, e))
-    if not needed:
+    if not needed or is_imitated(naming):
         return Decision("unknown", ())
     return Decision("partly", needed, naming.rivals())
 
 
 def is_needed(naming: Naming, effect: Effect) -> bool:
     """Whether every likely hypothesis has an effect of the chosen model, although more remains."""
-    if not (may_be_needed(naming, effect) and stands_out(naming, effect)):
-        return False
-    if naming.apart.get(effect.id, np.inf) < APART:
+    if not may_be_needed(naming, effect):
         return False
     chosen = frozenset(naming.chosen.candidate.ids)
     if not (naming.finished or is_compared(naming, effect)):
@@ -97,6 +97,16 @@ def is_needed(naming: Naming, effect: Effect) -> bool:
         for ids, candidate in naming.residual.items()
         if not holds(candidate.effects, effect)
     )
+
+
+def is_imitated(naming: Naming) -> bool:
+    """Whether a free force in the place of all effects leaves far less of the misfit."""
+    free = naming.residual.get(frozenset())
+    if free is None:
+        return False
+    left = misfit_above_noise(naming, naming.chosen.candidate.fit)
+    least = max(misfit_above_noise(naming, free.fit), doubtful_misfit(naming))
+    return left > EXCESS * least
 
 
 def is_compared(naming: Naming, effect: Effect) -> bool:
@@ -133,6 +143,15 @@ def is_larger(effects: Sequence[Effect], chosen: State) -> bool:
 
 def may_be_needed(naming: Naming, effect: Effect) -> bool:
     """`is_needed` as far as models without a residual force tell."""
+    return (
+        leads_without(naming, effect)
+        and stands_out(naming, effect)
+        and naming.apart.get(effect.id, np.inf) >= APART
+    )
+
+
+def leads_without(naming: Naming, effect: Effect) -> bool:
+    """Whether every set of effects without one trails the chosen one."""
     chosen = naming.chosen
     reached = naming.log_odds(chosen.candidate)
     return not any(
@@ -143,20 +162,15 @@ def may_be_needed(naming: Naming, effect: Effect) -> bool:
 
 
 def stands_out(naming: Naming, effect: Effect) -> bool:
-    """Whether the misfit above the noise is `EXCESS` times larger without an effect.
-
-    Either of the models as they are, or of both with a residual force beside; as such a force may
-    leave nothing, what the noise level is uncertain by is the least that counts there.
-    """
+    """Whether `EXCESS` times as much is left without an effect, of misfit or of force."""
     ids = frozenset(naming.chosen.candidate.ids)
     smaller = ids - {effect.id}
-    left = misfit_above_noise(naming, naming.states[ids].candidate.fit)
-    if misfit_above_noise(naming, naming.states[smaller].candidate.fit) > EXCESS * left:
+    with_it, without_it = (
+        misfit_above_noise(naming, naming.states[key].candidate.fit) for key in (ids, smaller)
+    )
+    if without_it > EXCESS * with_it:
         return True
-    if not {ids, smaller} <= naming.residual.keys():
-        return False
-    least = max(misfit_above_noise(naming, naming.residual[ids].fit), doubtful_misfit(naming))
-    return misfit_above_noise(naming, naming.residual[smaller].fit) > EXCESS * least
+    return naming.power.get(smaller, 0.0) > EXCESS * naming.power.get(ids, np.inf)
 
 
 def in_its_place(naming: Naming, effect: Effect) -> Candidate | None:

@@ -14,7 +14,7 @@ and Ghanem 2015, Int. J. Chem. Kinet. 47:246).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -23,6 +23,8 @@ from scipy.optimize import minimize_scalar
 
 from bayesimpact.diagnosis.force import whitened_one
 from bayesimpact.diagnosis.hidden import about, parameter_forces
+from bayesimpact.diagnosis.marginal import Part, gain, products
+from bayesimpact.diagnosis.thresholds import DOUBT
 from bayesimpact.inference.fit import Fit, inverse
 from bayesimpact.model.effects.effect import Effect
 from bayesimpact.model.oscillator import build_oscillator
@@ -34,25 +36,8 @@ Array = NDArray[np.float64]
 KNOTS = 8  # in a free period: a force at its own frequency, or in one contact, is resolved
 ENTRIES = 20_000_000  # of the largest matrix D that is held; longer recordings get fewer knots
 BLOCK = 64  # forces at once, so that memory stays bounded
-REACH = 40.0  # of ln k: from a force far below the noise to one far above it
 RMS = np.sqrt(2.0 / 3.0)  # of a force between knots of unit size
 ALIGNED = 1.0  # of what a parameter hides of a missing force, over what remains; not calibrated
-
-
-@dataclass(frozen=True, eq=False)
-class Part:
-    """One recording.
-
-    Attributes
-    ----------
-    responses : D (n, K), whitened, noise = 1, turned such that their products are diagonal
-    squares : (K,) these products
-    vectors : (K, K), values at the knots of every turned response
-    """
-
-    responses: Array
-    squares: Array
-    vectors: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +60,26 @@ class Discrepancy:
     k: float
     level: float
     values: tuple[Array, ...]
+    _gains: dict[Fit, float] = field(default_factory=dict, repr=False)
+
+    def gain(self, fit: Fit) -> float:
+        """What a force of time, along this fit's motion, adds to the log evidence of any model."""
+        if fit not in self._gains:
+            self._gains[fit] = gain(fit, self.parts)
+        return self._gains[fit]
+
+    @property
+    def leaves_noise(self) -> bool:
+        """Whether what is left beside the force is noise of the level estimated: else it is no
+        force of time that remains, as where an encoder errs, and odds beside one mean little.
+        """
+        error = self.fit.target.likelihood.noise.level_error
+        return self.level**2 <= 1.0 + 2 * DOUBT * (error if np.isfinite(error) else 0.0)
+
+    @property
+    def power(self) -> float:
+        """Of the force about the motion's own frequencies, N2."""
+        return self.flat * self.level**2
 
     @property
     def forces(self) -> tuple[Array, ...]:
@@ -207,34 +212,21 @@ def _sized(fit: Fit, parts: tuple[Part, ...]) -> tuple[float, float, tuple[Array
     """The likeliest k and level of the noise, the parameters at their best; and values at the
     knots, the parameters as fitted.
     """
-    likelihood, size = fit.target.likelihood, fit.mode.size
-    total = float(likelihood.sizes.sum())
-    whole = np.zeros((size + 1, size + 1))  # products of J and, last, the residual
-    seen = []
-    for part, lin in zip(parts, fit.linearisation, strict=True):
-        at = np.append(lin.columns, size)
-        own = np.column_stack([lin.jacobian, lin.residual]) / likelihood.noise.level
-        whole[np.ix_(at, at)] += own.T @ own
-        seen.append((at, part.responses.T @ own))
+    found = products(fit, parts)
 
     def left(log_k: float) -> tuple[float, float]:
         """Minus twice the log likelihood, and the noise's variance."""
-        found, volume, k = whole.copy(), 0.0, float(np.exp(log_k))
-        for (at, along), part in zip(seen, parts, strict=True):
-            weights = k / (1.0 + k * part.squares)
-            found[np.ix_(at, at)] -= along.T @ (weights[:, None] * along)
-            volume += float(np.log1p(k * part.squares).sum())
-        score = found[:-1, -1]
-        rest = float(found[-1, -1] - score @ inverse(found[:-1, :-1]) @ score)
-        variance = max(rest, 1e-300) / total
-        return total * float(np.log(variance)) + volume, variance
+        matrix, volume = found.beside(log_k)
+        score = matrix[:-1, -1]
+        rest = float(matrix[-1, -1] - score @ inverse(matrix[:-1, :-1]) @ score)
+        variance = max(rest, 1e-300) / found.total
+        return found.total * float(np.log(variance)) + volume, variance
 
-    least = -np.log(max(float(part.squares.max()) for part in parts)) - 0.1 * REACH
-    best = minimize_scalar(lambda x: left(x)[0], bounds=(least, least + REACH), method="bounded")
+    best = minimize_scalar(lambda x: left(x)[0], bounds=found.bounds, method="bounded")
     variance = left(float(best.x))[1]
     k = float(np.exp(best.x))
     values = tuple(
         np.asarray(part.vectors @ (k / (1.0 + k * part.squares) * along[:, -1]))
-        for part, (_, along) in zip(parts, seen, strict=True)
+        for part, along in zip(parts, found.along, strict=True)
     )
     return k, float(np.sqrt(variance)), values

@@ -107,10 +107,12 @@ def with_formulas(
 
 
 def joined(naming: Naming, candidates: Sequence[Candidate]) -> Naming:
-    """The search with further models; samples are counted by the best residual of all."""
+    """The search with further models; samples are counted by the best residual of all, for one of
+    them may leave nothing.
+    """
     tried = (*naming.tried, *candidates)
     best = min(tried, key=lambda c: c.fit.reduced_chi2)
-    found = replace(naming, repetition=residual_repetition(best.fit))
+    found = replace(naming, repetition=residual_repetition(best.fit), beside=None)
     return replace(found, tried=tuple(sorted(tried, key=found.log_odds, reverse=True)))
 
 

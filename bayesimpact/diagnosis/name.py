@@ -10,12 +10,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from bayesimpact.diagnosis.decision import in_its_place, may_be_needed, ordered
-from bayesimpact.diagnosis.discrepancy import discrepancy
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.force import missing_contact
 from bayesimpact.diagnosis.models import STARTS, UNCONVERGED_SHORTFALL, Progress
@@ -30,8 +27,8 @@ from bayesimpact.diagnosis.refit import (
     Candidate,
     base_candidate,
 )
-from bayesimpact.diagnosis.settle import Settling
-from bayesimpact.diagnosis.unknown import learn_force, with_force
+from bayesimpact.diagnosis.remaining import Remaining
+from bayesimpact.diagnosis.unknown import learn_force
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
 
@@ -87,7 +84,7 @@ def name(
     return search.naming(base, state)
 
 
-class _Search(Settling):
+class _Search(Remaining):
     """Which models to fit next, and what they are worth."""
 
     def grown(self, beam: list[State]) -> State:
@@ -167,11 +164,6 @@ class _Search(Settling):
         if is_large(state.candidate.fit) and not self.asked.seen:
             found += [self.fit_more(state.candidate, j) for j in families(state.scan)]
         return found
-
-    def with_residual(self, state: State) -> Candidate:
-        """A model with the likelier form of a residual force beside its effects."""
-        self.progress("fitting a residual force beside " + " + ".join(state.candidate.ids))
-        return with_force(state.candidate, state.unknown, self.scales)
 
     def beside(self, state: State, found: Sequence[Candidate]) -> list[Candidate]:
         """Single effects that are extended beside the best model: each may be half of a pair.
@@ -255,29 +247,3 @@ class _Search(Settling):
             dict(self.states), {}, self.may_go_on(),
         )  # fmt: skip
         return found if chosen.is_white else self.with_residuals(found)
-
-    def with_residuals(self, found: Naming) -> Naming:
-        """What `decide` compares where something remains: models with a residual force."""
-        chosen = found.chosen.candidate
-        left = discrepancy(chosen.fit)
-        if left is not None:
-            found = replace(found, apart={e.id: left.apart(e) for e in chosen.effects})
-        smaller = {e.id: self.drop(chosen, e) for e in chosen.effects}
-        for part in smaller.values():
-            self.examine(part)
-        tried = tuple(sorted(self.tried.values(), key=self.log_odds, reverse=True))
-        found = replace(found, tried=tried, states=dict(self.states))
-        parts = [chosen]
-        needed = [e for e in ordered(found, chosen.effects) if may_be_needed(found, e)]
-        if needed:  # a force in the place of all of them too
-            parts.append(found.base.candidate)
-        for effect in needed:
-            other = in_its_place(found, effect)
-            parts += [smaller[effect.id], *([other] if other else [])]
-        residual: dict[frozenset[str], Candidate] = {}
-        for ids, part in {frozenset(p.ids): p for p in parts}.items():
-            if self.clock() > self.end:  # what is not compared with all of its own is not needed
-                found = replace(found, finished=False)
-                break
-            residual[ids] = self.with_residual(self.examine(part))
-        return replace(found, states=dict(self.states), residual=residual)

@@ -2,7 +2,10 @@
 
 A hypothesis is a set of effects of the catalogue and at most one residual force. All are compared
 by the same log posterior odds: log evidence, less the price of multiplicity for every effect and
-for the residual force, likelihoods counted once per independent sample of the best residual.
+for the residual force. While the search goes on, likelihoods are counted once per independent
+sample of the best residual. Where it ends with something left that a force of time describes,
+every hypothesis has such a force beside it (`discrepancy`): what a model leaves is then no noise,
+and many samples are no evidence by themselves.
 """
 
 from __future__ import annotations
@@ -12,6 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from bayesimpact.diagnosis.discrepancy import Discrepancy
 from bayesimpact.diagnosis.force import MissingForce
 from bayesimpact.diagnosis.refit import Candidate, tempered_evidence
 from bayesimpact.diagnosis.scan import Scan
@@ -74,8 +78,12 @@ class Naming:
     residual : models with a residual force beside their effects, fitted in full, by the ids of
         these effects; where something remains beside the chosen model
     finished : False when the budget ended the search
+    beside : the force of time beside every model; None where nothing remains, or something that
+        is no force of time
     apart : standard deviations of every chosen effect's size from none at all, with what the
         remainder may have done to it in them (`discrepancy`); empty where nothing remains
+    power : of the force of time that models leave about the motion's own frequencies, N2, by their
+        ids: the chosen one and those without an effect that may be needed
     """
 
     base: State
@@ -88,7 +96,9 @@ class Naming:
     states: Mapping[frozenset[str], State] = field(default_factory=dict)
     residual: Mapping[frozenset[str], Candidate] = field(default_factory=dict)
     finished: bool = True
+    beside: Discrepancy | None = None
     apart: Mapping[str, float] = field(default_factory=dict)
+    power: Mapping[frozenset[str], float] = field(default_factory=dict)
 
     @property
     def unknown(self) -> MissingForce:
@@ -98,11 +108,15 @@ class Naming:
 
     def log_odds(self, candidate: Candidate) -> float:
         """Log posterior odds of a model against the base model."""
-        return (
-            tempered_evidence(candidate, self.repetition)
-            - tempered_evidence(self.base.candidate, self.repetition)
-            - self.prior_cost * len(candidate.effects)
-        )
+        own, base = self._evidence(candidate), self._evidence(self.base.candidate)
+        return own - base - self.prior_cost * len(candidate.effects)
+
+    def _evidence(self, candidate: Candidate) -> float:
+        if self.beside is None:
+            return tempered_evidence(candidate, self.repetition)
+        if not np.isfinite(candidate.log_evidence):
+            return candidate.log_evidence
+        return candidate.log_evidence + self.beside.gain(candidate.fit)
 
     def promise(self, candidate: Candidate) -> float:
         """Log posterior odds with every sample counted, up to a constant: how much is explained."""

@@ -24,9 +24,10 @@ what could be added, but their sizes and odds are not believed.
 """
 
 EXCESS = 4.0
-"""How many times larger the misfit above the noise must be without an effect than with it, where
-something remains. An effect that only imitates physics outside the catalogue, with responses at a
-cosine of 0.87 or less, leaves more than a quarter of it. Not calibrated on trials yet.
+"""How many times as much must be left without an effect as with it, where something remains; and
+how many times less a free force must leave to replace all effects. An effect that only imitates
+physics outside the catalogue, with responses at a cosine of 0.87 or less, leaves more than a
+quarter.
 """
 
 APART = 2.576

@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 import small_rig
 from scipy import stats
+from scipy.optimize import minimize
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.diagnosis.discrepancy import Discrepancy, discrepancy
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.force import missing_force
 from bayesimpact.diagnosis.intervals import intervals
-from bayesimpact.diagnosis.refit import fit_from
+from bayesimpact.diagnosis.refit import base_candidate, fit_from
+from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.diagnosis.unknown import learn_force
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects import EFFECTS
@@ -33,10 +35,10 @@ def plain_fit(campaign: Campaign):
     return identify(campaign, rng=np.random.default_rng(0), search=False).fit
 
 
-def shaken(seed: int, size: float, duration: float = 4.0) -> Campaign:
+def shaken(seed: int, size: float, duration: float = 4.0, effects=None) -> Campaign:
     """A plain decay with a random force, linear between knots an eighth of a period apart, N."""
     clean = small_rig.record(
-        seed, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES, duration=duration
+        seed, effects, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES, duration=duration
     )
     fit = plain_fit(clean)
     o, rng = fit.target.oscillator, np.random.default_rng(1000 + seed)
@@ -76,6 +78,63 @@ def test_the_likelihood_is_that_of_a_dense_covariance():
         assert value(k * found.k, w * found.level) < best
     other = value(4 * found.k, found.level) - best
     assert other < -1.0
+
+
+def test_the_gain_is_that_of_a_dense_covariance():
+    """Laplace's method with the full covariance of force and noise, their sizes at their best;
+    the level is taken where it would be for fixed parameters, which d^2 / N nats may tell.
+    """
+    fit = plain_fit(shaken(2, 1e-2, duration=1.5))
+    found, target = left_by(fit), fit.target
+    free = target.oscillator.layout.roles("physical", "effect", "nuisance")
+    noise = target.oscillator.layout.roles("noise")
+    level = target.likelihood.noise.level
+    size = sum(lin.residual.size for lin in fit.linearisation)
+    jacobian, residual, first = np.zeros((size, fit.mode.size)), np.zeros(size), 0
+    shape = np.zeros((size, size))
+    for part, lin in zip(found.parts, fit.linearisation, strict=True):
+        rows = slice(first, first := first + lin.residual.size)
+        jacobian[rows, lin.columns], residual[rows] = lin.jacobian, lin.residual
+        shape[rows, rows] = part.responses @ part.responses.T
+    jacobian[:, noise] = 0.0
+    information = np.diag(target.priors.information(fit.mode))[np.ix_(free, free)]
+
+    def evidence(log_k: float, log_w: float) -> float:
+        dense = np.exp(2 * log_w) * level**2 * (np.eye(size) + np.exp(log_k) * shape)
+        solve = np.linalg.inv(dense)
+        precision = jacobian[:, free].T @ solve @ jacobian[:, free] + information
+        change = np.zeros(fit.mode.size)
+        slope = np.nan_to_num(target.priors.gradient(fit.mode))[free]
+        step = jacobian[:, free].T @ solve @ residual + slope
+        change[free] = np.linalg.solve(precision, step)
+        left = residual - jacobian @ change
+        prior = np.ravel(target.priors.log_density((fit.mode + change)[None]))[0]
+        chance = left @ solve @ left + np.linalg.slogdet(2 * np.pi * dense)[1]
+        return float(prior - 0.5 * (chance + np.linalg.slogdet(precision)[1]))
+
+    start = np.log([found.k, found.level])
+    best = minimize(lambda x: -evidence(*x), start, method="Nelder-Mead")
+    alone = fit.log_likelihood + np.ravel(target.priors.log_density(fit.mode[None]))[0]
+    alone += 0.5 * np.linalg.slogdet(fit.covariance[np.ix_(free, free)])[1]
+    volume = float(np.sum(target.likelihood.log_volume))
+    expected = -best.fun + volume - alone
+    assert found.gain(fit) == pytest.approx(expected, abs=max(0.1, free.size**2 / size))
+    assert expected > 100.0
+
+
+def test_a_law_that_is_there_leads_a_force_of_time_and_a_false_one_does_not():
+    """Shaken by a random force, a cubic spring is seen by its own odds beside that force; with no
+    such spring the law gains by accident what many samples make of it.
+    """
+    for stiffness, needed in ((2e6, True), (0.0, False)):
+        campaign = shaken(5, 1e-2, effects={"spring_cubic": {"stiffness": stiffness}})
+        fit = plain_fit(campaign)
+        cubic = next(e for e in EFFECTS if e.id == "spring_cubic")
+        with_it = fit_from(fit, (cubic,), {}, campaign_scales(fit))
+        beside = left_by(with_it.fit)
+        odds = with_it.log_evidence - base_candidate(fit).log_evidence
+        odds += beside.gain(with_it.fit) - beside.gain(fit)
+        assert (odds > DECISIVE) == needed, (stiffness, odds)
 
 
 @pytest.mark.parametrize("size", [2e-3, 2e-2])

@@ -202,25 +202,26 @@ def test_what_has_more_to_fit_with_must_be_likelier_to_unseat_an_effect():
         assert judge(replace(found, residual=residual)) == verdict
 
 
-def test_an_effect_may_stand_out_only_beside_a_residual_force():
-    """Something stronger hides it: with a force beside both models the misfit is its own.
+def test_an_effect_may_stand_out_by_the_force_that_is_left_without_it():
+    """About the motion's own frequencies: a misfit grows with phase errors, a force does not."""
+    for without_it, verdict in ((EXCESS + 0.1, "partly"), (EXCESS - 0.1, "unknown")):
+        found = remaining(something_left(), 15.0, 10.0)
+        power = {frozenset([FRICTION]): 1.0, frozenset[str](): without_it}
+        assert judge(replace(found, power=power)) == verdict
 
-    What the noise level is uncertain by (six per cent of a thousand samples) is the least misfit.
-    """
-    for with_it, without_it, verdict in (
-        (1.3, 1.0 + 0.3 * EXCESS + 0.02, "partly"),
-        (1.3, 1.0 + 0.3 * EXCESS - 0.02, "unknown"),
-        (1.001, 1.0 + 0.06 * EXCESS + 0.01, "partly"),
-        (1.001, 1.0 + 0.06 * EXCESS - 0.01, "unknown"),
+
+def test_nothing_is_needed_where_a_free_force_leaves_far_less():
+    """What the noise level is uncertain by (six per cent of a thousand samples) is the least."""
+    for free, verdict in (
+        (1.0 + 9.0 / EXCESS + 0.02, "partly"),
+        (1.0 + 9.0 / EXCESS - 0.02, "unknown"),
     ):
-        found = remaining(something_left(), 15.0, 10.0, beside=150.0, instead=110.0)
-        residual = {}
-        for key, chi2 in ((frozenset([FRICTION]), with_it), (frozenset(), without_it)):
-            model = found.residual[key]
-            fit = SimpleNamespace(**vars(model.fit))
-            fit.sums = np.array([1000.0 * chi2])
-            residual[key] = replace(model, fit=fit)
-        assert judge(replace(found, residual=residual)) == verdict, (with_it, without_it)
+        found = remaining(something_left(), 100.0, 10.0, beside=150.0, instead=110.0)
+        model = found.residual[frozenset()]
+        fit = SimpleNamespace(**vars(model.fit))
+        fit.sums = np.array([1000.0 * free])
+        residual = {**found.residual, frozenset(): replace(model, fit=fit)}
+        assert judge(replace(found, residual=residual)) == verdict, free
 
 
 def test_what_remains_beside_a_name_needs_decisive_odds():

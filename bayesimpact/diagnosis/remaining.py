@@ -1,0 +1,79 @@
+"""Where a search ends with something left: what a verdict compares then."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from bayesimpact.diagnosis.decision import in_its_place, leads_without, may_be_needed, ordered
+from bayesimpact.diagnosis.discrepancy import discrepancy
+from bayesimpact.diagnosis.naming import Naming, State
+from bayesimpact.diagnosis.refit import Candidate
+from bayesimpact.diagnosis.settle import EXCHANGES, Settling
+from bayesimpact.diagnosis.unknown import with_force
+
+
+class Remaining(Settling):
+    """Models beside a force of time, and beside a residual force."""
+
+    def with_residuals(self, found: Naming) -> Naming:
+        """What `decide` compares where something remains: the likeliest model beside a force of
+        time, what it is without each of its effects, and models with a residual force.
+        """
+        found = self.beside_a_force(found)
+        chosen = found.chosen.candidate
+        if found.chosen.is_white:
+            return replace(found, beside=None)
+        smaller = {e.id: self.examine(self.drop(chosen, e)).candidate for e in chosen.effects}
+        tried = tuple(sorted(self.tried.values(), key=found.log_odds, reverse=True))
+        found = replace(found, tried=tried, states=dict(self.states))
+        leading = [e for e in ordered(found, chosen.effects) if leads_without(found, e)]
+        left = {e.id: discrepancy(smaller[e.id].fit) for e in leading}
+        own = discrepancy(chosen.fit)
+        if own is not None:
+            power = {frozenset(smaller[i].ids): d.power for i, d in left.items() if d is not None}
+            found = replace(
+                found,
+                apart={e.id: own.apart(e) for e in chosen.effects},
+                power={**power, frozenset(chosen.ids): own.power},
+            )
+        needed = [e for e in leading if may_be_needed(found, e)]
+        parts = [chosen, *([found.base.candidate] if needed else [])]
+        for effect in needed:
+            other = in_its_place(found, effect)
+            parts += [smaller[effect.id], *([other] if other else [])]
+        residual: dict[frozenset[str], Candidate] = {}
+        for ids, part in {frozenset(p.ids): p for p in parts}.items():
+            if self.clock() > self.end:  # what is not compared with all of its own is not needed
+                found = replace(found, finished=False)
+                break
+            residual[ids] = self.with_residual(self.examine(part))
+        return replace(found, states=dict(self.states), residual=residual)
+
+    def beside_a_force(self, found: Naming) -> Naming:
+        """The search with a force of time beside every model, and the likeliest of them chosen;
+        as it is where what remains is no such force.
+
+        A model that the search had not settled on is compared with exchanges of its own.
+        """
+        nearest = min(self.tried.values(), key=lambda c: c.fit.reduced_chi2)
+        left = discrepancy(nearest.fit)
+        if left is None or not left.leaves_noise:
+            return found
+        found = replace(found, beside=left)
+        for turn in range(EXCHANGES):
+            chosen = found.chosen.candidate
+            for effect in chosen.effects:
+                self.drop(chosen, effect)
+            if turn and self.may_go_on():
+                self.exchange(chosen)
+            tried = tuple(sorted(self.tried.values(), key=found.log_odds, reverse=True))
+            best = self.examine(tried[0])
+            found = replace(found, tried=tried, chosen=best)
+            if set(best.candidate.ids) == set(chosen.ids) or not self.may_go_on():
+                break
+        return replace(found, states=dict(self.states))
+
+    def with_residual(self, state: State) -> Candidate:
+        """A model with the likelier form of a residual force beside its effects."""
+        self.progress("fitting a residual force beside " + " + ".join(state.candidate.ids))
+        return with_force(state.candidate, state.unknown, self.scales)
