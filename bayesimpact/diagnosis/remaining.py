@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
-from bayesimpact.diagnosis.decision import in_its_place, leads_without, may_be_needed, ordered
+from bayesimpact.diagnosis.decision import (
+    in_its_place,
+    is_imitated,
+    leads_without,
+    may_be_needed,
+    ordered,
+)
 from bayesimpact.diagnosis.discrepancy import discrepancy
 from bayesimpact.diagnosis.naming import Naming, State
 from bayesimpact.diagnosis.refit import Candidate
@@ -37,17 +44,30 @@ class Remaining(Settling):
                 power={**power, frozenset(chosen.ids): own.power},
             )
         needed = [e for e in leading if may_be_needed(found, e)]
-        parts = [chosen, *([found.base.candidate] if needed else [])]
-        for effect in needed:
+        if needed:
+            found = self.with_forces(found, [found.base.candidate])
+        found = self.with_forces(found, [chosen])
+        for effect in needed if not is_imitated(found) else ():
             other = in_its_place(found, effect)
-            parts += [smaller[effect.id], *([other] if other else [])]
-        residual: dict[frozenset[str], Candidate] = {}
-        for ids, part in {frozenset(p.ids): p for p in parts}.items():
-            if self.clock() > self.end:  # what is not compared with all of its own is not needed
-                found = replace(found, finished=False)
-                break
-            residual[ids] = self.with_residual(self.examine(part))
-        return replace(found, states=dict(self.states), residual=residual)
+            found = self.with_forces(found, [smaller[effect.id], *([other] if other else [])])
+        return found
+
+    def with_forces(self, found: Naming, candidates: Sequence[Candidate]) -> Naming:
+        """With the models of these that have a residual force beside their effects, as far as time
+        allows: what is not compared with all of its own is not needed.
+        """
+        residual = dict(found.residual)
+        for candidate in candidates:
+            key = frozenset(candidate.ids)
+            if key not in residual and self.clock() <= self.end:
+                residual[key] = self.with_residual(self.examine(candidate))
+        late = any(frozenset(c.ids) not in residual for c in candidates)
+        return replace(
+            found,
+            residual=residual,
+            states=dict(self.states),
+            finished=found.finished and not late,
+        )
 
     def beside_a_force(self, found: Naming) -> Naming:
         """The search with a force of time beside every model, and the likeliest of them chosen;
