@@ -146,6 +146,22 @@ def test_a_random_force_is_sized_and_the_noise_beside_it_found(size):
     assert found.level == pytest.approx(1.0, abs=0.05)
 
 
+def test_an_error_of_the_readings_is_no_force():
+    """Every tenth reading is off by ten times the noise: no smooth force leaves noise there."""
+    campaign = shaken(1, 1e-2, duration=2.0)
+    assert left_by(plain_fit(campaign)).leaves_noise
+    wrong = []
+    for recording in campaign.recordings:
+        samples = recording.samples.copy()
+        samples[::10] += 10 * NOISE * np.random.default_rng(1).standard_normal(samples[::10].size)
+        wrong.append(replace(recording, samples=samples))
+    noise = plain_fit(campaign).target.likelihood.noise
+    fit = plain_fit(replace(campaign, recordings=tuple(wrong)))
+    likelihood = replace(fit.target.likelihood, noise=noise)
+    fit = replace(fit, target=replace(fit.target, likelihood=likelihood))
+    assert not left_by(fit).leaves_noise
+
+
 def test_where_nothing_remains_nothing_is_added(small):
     found = left_by(small.fit)
     mean, covariance = found.posterior

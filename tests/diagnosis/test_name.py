@@ -210,6 +210,18 @@ def test_an_effect_may_stand_out_by_the_force_that_is_left_without_it():
         assert judge(replace(found, power=power)) == verdict
 
 
+def test_odds_are_those_beside_a_force_of_time_where_one_remains():
+    """What the force explains of the base model as well is no evidence for an effect."""
+    found = remaining(something_left(), 100.0, 10.0)
+    alone = found.log_odds(found.chosen.candidate)
+    for share, verdict in ((100.0 - COST - DECISIVE + 0.1, "unknown"), (50.0, "partly")):
+        base = found.base.candidate.fit
+        beside = SimpleNamespace(gain=lambda fit, own=share, base=base: own if fit is base else 0.0)
+        seen = replace(found, beside=beside)
+        assert seen.log_odds(found.chosen.candidate) == pytest.approx(alone - share)
+        assert judge(seen) == verdict
+
+
 def test_nothing_is_needed_where_a_free_force_leaves_far_less():
     """What the noise level is uncertain by (six per cent of a thousand samples) is the least."""
     for free, verdict in (
