@@ -20,7 +20,9 @@ from bayesimpact.data.gaps import runs
 from bayesimpact.data.period import rough_period
 from bayesimpact.data.recording import Recording
 
-BEYOND = 2.0  # times the largest jump that the motion alone reaches
+USUAL = 99.0  # percentile of the statistic that the motion alone may reach
+BEYOND = 3.0  # times that percentile
+WHOLE = 0.5  # of the motion's way from sample to sample: halfway between none lost and one
 BENDS = 3.0  # samples: how far a corner of the motion within a few samples may displace both sides
 MOST = 3  # slips: more jumps than this are the signal
 WIDEST = 5  # samples of a spike
@@ -35,9 +37,11 @@ def find_slips(recording: Recording) -> list[Fault]:
 
     The statistic is the distance of the two extrapolations half way between two samples, over the
     bulk of such distances. A corner keeps the displacement and may only shift it by its change of
-    slope times a few samples; besides, twice what the motion alone reaches has to be passed, the
-    largest jump but for `MOST` slips, and what rounding may do to both. Where both
-    sides do meet once a few samples beside the place are left out, those were a spike. The remedy
+    slope times a few samples; besides, three times the 99th percentile over the recording has to be
+    passed, which is what corners of the motion reach, and what rounding may do to both. A slip is
+    of whole samples: its sides are apart by half a sample's way of the motion or more, while an
+    impact, or a stop that chatters, bends the motion by less. Where both sides do meet once a few
+    samples beside the place are left out, those were a spike. The remedy
     keeps the longest part without a slip: how many samples are missing need then not be known.
     """
     x = recording.samples
@@ -53,11 +57,11 @@ def find_slips(recording: Recording) -> list[Fault]:
         return []
     least = gaussian_threshold(x.size)
     bend = np.abs(sides.slope_after - sides.slope_before)
-    peaks = sorted(jump[p] for p in _peaks(jump, jump > 0.0, form[1]))
-    usual = peaks[-MOST - 1] if len(peaks) > MOST else 0.0
+    usual = float(np.percentile(jump, USUAL))
     rounded = 2.0 * rounding_error(form, -0.5, last_digit(x))
     least_jump = max(least * level, BEYOND * usual, rounded)
-    strong = (jump > least_jump) & (jump > BENDS * np.nan_to_num(bend))
+    way = 0.5 * np.abs(sides.slope_after + sides.slope_before)
+    strong = jump > np.maximum(least_jump, np.nan_to_num(np.maximum(BENDS * bend, WHOLE * way)))
     places = [
         p
         for p in _peaks(jump, strong, form[1])

@@ -88,16 +88,20 @@ def own_fit(campaign: Campaign, recording: Recording, model: SharedModel) -> Fit
 def fit_alone(campaign: Campaign, recording: Recording, model: SharedModel) -> Alone | None:
     """The parameters that one recording shows; None where it allows no fit.
 
-    A gap that is not positive has no logarithm: it counts as not measured.
+    A gap that is not positive has no logarithm: it counts as not measured, and so does what a law
+    of the contact has replaced.
     """
     fit = own_fit(campaign, recording, model)
     if fit is None:
         return None
     chi2 = fit.reduced_chi2
     names = NAMES if campaign.stop else NAMES[:2]
-    at = [fit.target.oscillator.layout.index(_name(n, recording.case)) for n in names]
-    values = fit.mode[at]
-    known = fit.covariance[np.ix_(at, at)]  # at the noise level that the fit left, misfit or not
+    own = [_name(n, recording.case) for n in names]
+    there = np.flatnonzero([n in fit.names for n in own])
+    at = [fit.names.index(own[i]) for i in there]
+    values, known = np.zeros(len(names)), np.eye(len(names))
+    values[there] = fit.mode[at]
+    known[np.ix_(there, there)] = fit.covariance[np.ix_(at, at)]  # at the noise level it left
     if not np.isfinite(known).all():
         return None
     positive = values > 0.0

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import small_rig
 from effect_rigs import BY_ID
 
-from bayesimpact.diagnosis.faults.alone import SharedModel, inverted, own_fit
+from bayesimpact.diagnosis.faults.alone import NAMES, SharedModel, fit_alone, inverted, own_fit
 from bayesimpact.inference.noise import Noise
 
 
@@ -20,3 +21,15 @@ def test_a_recording_that_misses_the_obstacle_shows_nothing_of_contacts():
     away = replace(first, samples=-abs(first.samples))
     assert own_fit(campaign, away, model) is None
     own_fit(campaign, inverted(first), model)  # whatever it finds, it ends
+
+
+def test_what_a_law_of_the_contact_replaces_counts_as_not_measured():
+    """Hunt and Crossley's law has no c2: a comparison beside it ended in KeyError."""
+    effect = BY_ID["hunt_crossley"]
+    numbers = {"exponent": 1.4, "damping": 0.5}
+    campaign = small_rig.record(2, {effect.id: numbers})
+    model = SharedModel(Noise(level=small_rig.NOISE), (effect,))
+    found = fit_alone(campaign, campaign.recordings[0], model)
+    assert found is not None
+    variance = dict(zip(NAMES, np.diag(found.covariance), strict=True))
+    assert variance["k1"] < 1.0 and variance["g"] < 1.0 and variance["c2"] == 1e6
