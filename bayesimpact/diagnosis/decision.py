@@ -7,7 +7,7 @@ Let S be the likeliest set of effects that the search reached.
    the decisive odds; `ambiguous` when another set comes within these odds, or the search ended by
    its limit before all that might were fitted; else `named`.
 2. Something remains beside S. All odds are those with a force of time beside every hypothesis,
-   where what the likeliest leaves beside one is noise.
+   where what the model nearest to the recordings leaves beside one is noise.
    Nothing is needed where a free force in the place of all effects leaves `EXCESS` times less of
    the misfit: the effects only imitate it. Else an effect of S is needed when
    - every set of effects without it trails S by the decisive odds, or trails it at all where it has
@@ -65,8 +65,9 @@ def decide(naming: Naming) -> Decision:
     """The verdict on a finished search.
 
     Where something remains, `naming.states` must hold the chosen model and what it is without each
-    of its effects, and `naming.residual` the chosen model and, for each effect that
-    `may_be_needed`, the models without it and with others in its place, and the base model.
+    of its effects, and `naming.residual` the chosen model and, where an effect `may_be_needed`, the
+    base model and, unless that shows `is_imitated`, the models without each such effect and with
+    others in its place.
     """
     chosen = naming.chosen
     effects = ordered(naming, chosen.candidate.effects)
