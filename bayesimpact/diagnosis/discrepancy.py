@@ -136,7 +136,9 @@ class Discrepancy:
         mean, scatter = back @ fit.mode, back @ self.covariance @ back.T
         hidden = [forces.imitations(left) for left in (self.forces, learned)]
         hidden.append(mean - fit.mode)  # given back, though the force may have it by right
-        return mean, scatter + np.diag(ALIGNED**2 * np.sum(np.square(hidden), axis=0))
+        kinds = np.array([name.split("[")[0] for name in fit.names])
+        alike = kinds[:, None] == kinds  # gaps of all recordings err together
+        return mean, scatter + alike * ALIGNED**2 * sum(np.outer(h, h) for h in hidden)
 
     def apart(self, effect: Effect) -> float:
         """Standard deviations of an effect's size, its shape as fitted, from none at all: of the

@@ -310,23 +310,26 @@ def _parameters(fit: Fit, posterior: Intervals, draws: Array | None) -> dict[str
             low, median, high = map(float, np.percentile(draws[:, i], [5, 50, 95]))
         entry = {"unit": parameter.unit, "median": median, "ci90": [low, high]}
         result[parameter.name] = entry
-    _add_means(fit, result)
+    known = posterior if set(fit.names) <= set(posterior.names) else ordinary
+    result |= _means(fit, known, draws)
     return result
 
 
-def _add_means(fit: Fit, result: dict[str, dict[str, Any]]) -> None:
-    """Report a base parameter that an effect split per obstacle or recording as their mean."""
-    names = fit.target.oscillator.layout.names
+def _means(fit: Fit, posterior: Intervals, draws: Array | None) -> dict[str, dict[str, Any]]:
+    """A base parameter that an effect split per obstacle or recording, as the mean of its parts."""
+    result, names = {}, fit.names
     for base in ("c2", "g"):
         members = [i for i, n in enumerate(names) if is_added(n) and bare_name(n) == base]
-        if base not in result and members:
-            weights = np.zeros(fit.mode.size)
-            weights[members] = 1 / len(members)
-            middle = float(weights @ fit.mode)
-            sd = float(np.sqrt(weights @ fit.covariance @ weights))
-            unit = fit.target.oscillator.layout.parameters[members[0]].unit
-            result[base] = {
-                "unit": unit,
-                "median": middle,
-                "ci90": [middle - NORMAL_90 * sd, middle + NORMAL_90 * sd],
-            }
+        if base in names or not members:
+            continue
+        if draws is None:
+            at = [posterior.names.index(names[i]) for i in members]
+            middle = float(posterior.mean[at].mean())
+            half = NORMAL_90 * float(np.sqrt(posterior.covariance[np.ix_(at, at)].mean()))
+            low, high = middle - half, middle + half
+        else:
+            low, middle, high = np.percentile(draws[:, members].mean(axis=1), [5, 50, 95])
+        unit = fit.target.oscillator.layout.parameters[members[0]].unit
+        entry = {"unit": unit, "median": float(middle), "ci90": [float(low), float(high)]}
+        result[base] = entry
+    return result

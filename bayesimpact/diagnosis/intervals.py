@@ -3,7 +3,9 @@
 Where a model leaves nothing, its posterior is near normal about the mode. Where something remains,
 a force of time is part of what the recordings are (`discrepancy`): it scatters the mode as noise
 does, and the part of it that a parameter can imitate, which no remainder shows, is as large as
-the part that remains (`hidden`). Medians stay at the mode, whose motion the figures show.
+the part that remains (`hidden`). Models that do not stand out from this one make other values of
+a parameter; their scatter is added (`comparable`). Medians stay at the mode, whose motion the
+figures show.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from bayesimpact.diagnosis.comparable import Comparable
 from bayesimpact.diagnosis.discrepancy import discrepancy
 from bayesimpact.diagnosis.refit import residual_repetition
 from bayesimpact.inference.fit import Fit
@@ -56,8 +59,10 @@ class Intervals:
         return found[0], found[1], found[2]
 
 
-def intervals(fit: Fit, *, remains: bool = False) -> Intervals:
-    """Intervals of a fit; `remains`: something beside the noise is left."""
+def intervals(fit: Fit, *, remains: bool = False, beside: Comparable | None = None) -> Intervals:
+    """Intervals of a fit; `remains`: something beside the noise is left; `beside`: models that do
+    not stand out from it.
+    """
     mean, covariance = fit.mode, fit.covariance
     if remains:
         left = discrepancy(fit)
@@ -65,5 +70,7 @@ def intervals(fit: Fit, *, remains: bool = False) -> Intervals:
             covariance = covariance * residual_repetition(fit)
         else:
             mean, covariance = left.posterior
+    if beside is not None:
+        covariance = covariance + beside.between(fit)
     bounds = np.array([(p.lower, p.upper) for p in fit.target.oscillator.layout.parameters])
     return Intervals(fit.names, mean, covariance, bounds[:, 0], bounds[:, 1])

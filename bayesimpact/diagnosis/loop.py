@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.html import html_table
+from bayesimpact.diagnosis.comparable import Comparable, alike_in_misfit, alike_in_odds
 from bayesimpact.diagnosis.decision import Decision, Verdict, decide
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.force import MissingForce
@@ -148,11 +149,22 @@ def diagnose_fit(
         held,
         cases,
         limits(chosen.candidate.fit, chosen.scan, scales),
-        intervals(after, remains=state is not None),
+        intervals(after, remains=state is not None, beside=_beside(naming, decision, after, state)),
         state,
         scales,
         formulas=answer.formulas,
     )
+
+
+def _beside(
+    naming: Naming, decision: Decision, after: Fit, state: State | None
+) -> Comparable | None:
+    """Models that do not stand out from the one that is shown."""
+    if state is not None:
+        return alike_in_misfit(naming, after)
+    if decision.verdict != "ambiguous":
+        return None
+    return alike_in_odds(naming, naming.chosen.candidate, decision.rivals)
 
 
 def extension(

@@ -32,8 +32,9 @@ RIGHT = ("quiet", "named", "unknown outside", "partly outside", "formula")
 def score(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> dict[str, Any]:
     """Score an answer (the content of diagnosis.json) against the opened truth."""
     planted = [p["id"] for p in truth["planted"]]
-    named = [e["id"] for e in answer["effects"] if e["id"] not in QUIET]
-    outcome = _outcome(truth, answer["verdict"], named, answer.get("faults", ()))
+    effects = [e for e in answer["effects"] if e["id"] not in QUIET]
+    named = [e["id"] for e in effects]
+    outcome = _outcome(truth, answer["verdict"], effects, answer.get("faults", ()))
     if names_the_force(truth, answer):
         outcome = "formula"
     sets = [set(named), *(set(a["id"].split(" + ")) for a in answer["alternatives"])]
@@ -69,9 +70,13 @@ def names_the_force(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> bool
 
 
 def _outcome(
-    truth: Mapping[str, Any], verdict: str, named: list[str], faults: Sequence[Mapping[str, Any]]
+    truth: Mapping[str, Any],
+    verdict: str,
+    effects: Sequence[Mapping[str, Any]],
+    faults: Sequence[Mapping[str, Any]],
 ) -> str:
     """The outcome by the rules of its regime."""
+    named = [e["id"] for e in effects]
     if "fault" in truth:
         named_faults = [f for f in faults if f.get("action") != "notice"]
         physics = [i for i in named if not i.startswith("recording_")]
@@ -83,10 +88,16 @@ def _outcome(
     if not truth["kind"].startswith("several"):
         return outcome_of(truth["kind"], [p["id"] for p in truth["planted"]], verdict, named)
     there = [p["id"] for p in truth["planted"] if not p["outside"]]
-    outside = len(there) < len(truth["planted"])
+    beyond = [p["id"] for p in truth["planted"] if p["outside"]]
+    outside = bool(beyond)
+    right = {f["id"] for f in split(effects)[1] if is_right([f], beyond)}
+    if right:  # these stand for the force outside the catalogue
+        named = [i for i in named if i not in right]
+        outside = verdict != "named"
     if truth["rest_s"] and "recording_start" in named:  # there, and said to be there
         there.append("recording_start")
-    return judge_several(there, outside, verdict, named)
+    outcome = judge_several(there, outside, verdict, named)
+    return "formula" if right and outcome == "named" else outcome
 
 
 def outcome_of(kind: str, planted: list[str], verdict: str, named: list[str]) -> str:

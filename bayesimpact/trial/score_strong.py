@@ -3,11 +3,13 @@
 | truth | right | wrong |
 |---|---|---|
 | all in the catalogue | named (all, and no other) | wrong name, overconfident, missed |
-| a force outside it as well | partly outside, unknown outside | wrong name, overconfident, missed |
+| a force outside it as well | partly or unknown outside, formula | as above |
 
-A wrong name is an effect that is not there, under `named` or `partly`; a near neighbour of one that
-is there counts as wrong. Overconfident: no wrong name, but `named` says that nothing is left where
-something is. Partly, ambiguous and unknown for effects of the catalogue are abstentions.
+A formula of the class of the force outside the catalogue (`formula_score`) is its name: `partly`
+may have it, and `named` with all effects of the catalogue beside it is right. A wrong name is an
+effect that is not there, under `named` or `partly`; a near neighbour of one that is there counts as
+wrong. Overconfident: no wrong name, but `named` says that nothing is left where something is.
+Partly, ambiguous and unknown for effects of the catalogue are abstentions.
 """
 
 from __future__ import annotations

@@ -101,6 +101,28 @@ def test_scores_by_the_truth() -> None:
     assert score(truth(*AB), quiet)["outcome"] == "named"
 
 
+def test_a_formula_of_the_class_of_a_force_outside_is_its_name() -> None:
+    concealed = truth(AB[0], outside="damping_drift")
+
+    def with_formula(verdict: str, title: str, *effects: str) -> dict:
+        found = answer(verdict, *effects)
+        found["effects"].append(
+            {"id": "formula_x", "family": "formula", "title": title, "parameters": {}}
+        )
+        return found
+
+    said = score(concealed, with_formula("named", "force A t v", AB[0]))
+    assert said["outcome"] == "formula" and said["right"]
+    said = score(concealed, with_formula("partly", "force A t v", AB[0]))
+    assert said["outcome"] == "partly outside"
+    assert score(concealed, with_formula("named", "force A t v"))["outcome"] == "overconfident"
+    for verdict in ("partly", "named"):
+        other = score(concealed, with_formula(verdict, "force A v |v|", AB[0]))
+        assert other["outcome"] == "wrong name"
+    within = score(truth(*AB), with_formula("named", "force A t v", *AB))
+    assert within["outcome"] == "wrong name"
+
+
 def test_a_rest_may_be_named_where_there_is_one() -> None:
     said = answer("named", *AB, "recording_start")
     assert score(truth(*AB), said)["outcome"] == "wrong name"
