@@ -20,6 +20,9 @@ Array = NDArray[np.float64]
 
 
 SOFTEST = 0.01  # of k1: a base fit that found no obstacle at all still leaves a scale for one
+# Physical scales: values of one kind are pulled to the base fit's by next to nothing, which means
+# little where the misfit is large; their evidence has a prior of its own (`evidence`).
+WIDEST = 100.0
 
 
 def campaign_scales(fit: Fit) -> Scales:
@@ -96,7 +99,7 @@ def _prior(fit: Fit, effects: Sequence[Effect], name: str, scales: Scales) -> Pr
     slot_name = replaced_slot(effect, parameter)
     if slot_name is not None:
         centre = base_value(fit, slot_name)
-        return Normal(centre, parameter.scale(scales))
+        return Normal(centre, WIDEST * parameter.scale(scales))
     return effect_prior(effect, parameter, scales)
 
 

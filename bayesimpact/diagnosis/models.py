@@ -58,7 +58,7 @@ class Models:
         self.tried: dict[frozenset[str], Candidate] = {}
         self.states: dict[frozenset[str], State] = {}
         self.begun: set[tuple[object, ...]] = set()
-        self.dropped: set[tuple[frozenset[str], str]] = set()
+        self.dropped: set[tuple[frozenset[str], float, str]] = set()
         self.profiled: set[frozenset[str]] = set()
         self.refits = 0
         self.repeated: tuple[Candidate, float] | None = None
@@ -204,7 +204,7 @@ class Models:
 
     def drop(self, candidate: Candidate, effect: Effect) -> Candidate:
         """The model without one effect, fitted from here even where it was fitted before."""
-        step = (frozenset(candidate.ids), effect.id)
+        step = (frozenset(candidate.ids), candidate.fit.log_posterior, effect.id)
         if step not in self.dropped:
             self.dropped.add(step)
             self.tell("without " + effect.id)

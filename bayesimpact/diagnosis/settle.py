@@ -23,7 +23,7 @@ class Settling(Ranked):
                 if self.may_go_on():
                     self.exchange(candidate)
             best = self.best(len(state.candidate.effects))
-            if set(best.ids) == set(state.candidate.ids):
+            if best is state.candidate:  # the same set with a better end settles once more
                 break
             state = self.examine(best)
         return state

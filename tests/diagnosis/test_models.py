@@ -14,8 +14,17 @@ from bayesimpact.diagnosis.refit import Candidate
 
 
 def candidate(ids: str, reached: float) -> Candidate:
-    fit = SimpleNamespace(log_likelihood=reached, converged=True, reduced_chi2=1.0)
+    fit = SimpleNamespace(
+        log_likelihood=reached, log_posterior=reached, converged=True, reduced_chi2=1.0
+    )
     return Candidate(tuple(BY_ID[i] for i in ids.split()), fit, reached)
+
+
+def made_up(monkeypatch) -> Models:
+    monkeypatch.setattr(models, "leaves_something", lambda fit: False)
+    monkeypatch.setattr(models, "is_refuted", lambda fit: False)
+    monkeypatch.setattr(models, "shakes_in_own_band", lambda fit, remains: False)
+    return Models((), None, np.random.default_rng(0), lambda words: None)
 
 
 @pytest.mark.parametrize(("reached", "again"), [(90.0, True), (130.0, False)])
@@ -27,10 +36,7 @@ def test_a_set_reaches_no_less_than_what_it_contains(monkeypatch, reached, again
         return candidate(" ".join(e.id for e in effects), 125.0)
 
     monkeypatch.setattr(models, "grown", grown)
-    monkeypatch.setattr(models, "leaves_something", lambda fit: False)
-    monkeypatch.setattr(models, "is_refuted", lambda fit: False)
-    monkeypatch.setattr(models, "shakes_in_own_band", lambda fit, remains: False)
-    search = Models((), None, np.random.default_rng(0), lambda words: None)
+    search = made_up(monkeypatch)
     search.keep(candidate("spring_cubic", 120.0))
     search.keep(candidate("coulomb_friction", 50.0))
     larger = search.keep(candidate("spring_cubic quadratic_drag", reached))
@@ -38,3 +44,18 @@ def test_a_set_reaches_no_less_than_what_it_contains(monkeypatch, reached, again
     assert begun == ([("spring_cubic",)] if again else [])
     assert found.fit.log_likelihood == (125.0 if again else reached)
     assert search.tried[frozenset(found.ids)] is found
+
+
+def test_an_effect_is_left_out_anew_where_its_model_has_reached_more(monkeypatch):
+    """What a worse end of the larger model led to says little of the smaller one."""
+
+    def without(larger, effect, scales):
+        left = " ".join(i for i in larger.ids if i != effect.id)
+        return candidate(left, larger.fit.log_likelihood - 5.0)
+
+    monkeypatch.setattr(models, "without", without)
+    search = made_up(monkeypatch)
+    for end, expected in ((40.0, 35.0), (40.0, 35.0), (120.0, 115.0)):
+        reached = search.keep(candidate("spring_cubic quadratic_drag", end))
+        assert search.drop(reached, BY_ID["quadratic_drag"]).fit.log_likelihood == expected
+    assert search.refits == 2

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,7 +15,7 @@ from scipy.special import logsumexp
 from bayesimpact.diagnosis.directions import directions
 from bayesimpact.diagnosis.evidence import SPREADS, common_spread, log_evidence
 from bayesimpact.diagnosis.extend import campaign_scales, extend, transfer
-from bayesimpact.diagnosis.refit import Candidate, base_candidate, refit, without
+from bayesimpact.diagnosis.refit import Candidate, base_candidate, fit_from, refit, without
 from bayesimpact.diagnosis.scan import score_directions
 from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.identify import identify
@@ -236,40 +236,79 @@ def test_an_effect_that_kept_the_motion_bounded_may_be_left_out(planted):
 
 
 def test_what_was_not_fitted_has_no_evidence(small):
-    from dataclasses import replace
-
     assert log_evidence(replace(small.fit, log_posterior=-np.inf)) == -np.inf
     nan = np.full_like(small.fit.covariance, np.nan)
     assert log_evidence(replace(small.fit, covariance=nan)) == -np.inf
 
 
-@pytest.mark.parametrize("spread", [0.0, 0.02, 1.0])
-def test_values_that_share_a_spread(spread):
-    """Three gaps, measured to one thousandth of the prior's width: two grids over all three."""
+@pytest.mark.parametrize(("spread", "away"), [(0.0, 0.3), (0.02, 0.3), (1.0, 0.3), (0.5, 6.0)])
+def test_values_that_share_a_spread(spread, away):
+    """Three gaps, measured to one thousandth of the prior's width: two grids over all three, their
+    mean anywhere in an interval of 500.
+    """
     width, error, mean = 2.0, 0.002, 5.0
-    truth = mean + 0.3 + spread * np.array([1.0, -0.4, -0.7])
+    truth = mean + away + spread * np.array([1.0, -0.4, -0.7])
     precision = np.full((3, 3), -0.3) / error**2 + np.eye(3) * 1.3 / error**2
     posterior = np.linalg.inv(precision + np.eye(3) / width**2)
     mode = posterior @ (precision @ truth + mean / width**2)
     measured = np.linalg.inv(precision)
 
-    def exact(prior: np.ndarray) -> float:  # density of what was measured under a prior
-        centre = np.full(3, mean)
-        return float(stats.multivariate_normal(centre, prior + measured).logpdf(truth))
+    def exact(centre: float, prior: np.ndarray) -> float:  # of what was measured under a prior
+        return float(stats.multivariate_normal([centre] * 3, prior + measured).logpdf(truth))
 
-    shared = [exact(tau**2 * np.eye(3) + width**2) for tau in SPREADS * width]
-    expected = logsumexp(shared) - np.log(SPREADS.size) - exact(width**2 * np.eye(3))
-    found = common_spread(mode, posterior, mean, width)
-    assert found == pytest.approx(expected, abs=1e-6)
-    assert (found > 5) == (spread < 0.1)  # small differences are no longer punished
+    def over_means(tau: float) -> float:
+        best, half = float(truth.mean()), 8 * (tau + 2 * error)
+        means = np.linspace(best - half, best + half, 301)
+        found = [exact(m, tau**2 * np.eye(3)) for m in means]
+        return float(logsumexp(found) + np.log(means[1] - means[0]) - np.log(500.0))
+
+    prior = Normal(mean, width)
+    found = common_spread(mode, posterior, prior, -np.log(500.0))
+    shared = [over_means(tau) for tau in SPREADS * width]
+    expected = logsumexp(shared) - np.log(SPREADS.size) - exact(mean, width**2 * np.eye(3))
+    assert found == pytest.approx(expected, abs=0.02)
+    # small differences are not punished, nor values that are all far away
+    assert (found > 5) == (spread == 0.0 or away > 1.0), found
+
+
+def test_the_evidence_of_values_of_one_kind_hardly_depends_on_where_their_priors_were():
+    """Two ways to one model begin at base values that differ."""
+    error, truth = 1e-3, np.array([0.96, 0.42])
+    totals = []
+    for mean, width in ((0.14, 5.0), (0.5, 15.0), (0.7, 20.0)):
+        precision = np.eye(2) / error**2
+        posterior = np.linalg.inv(precision + np.eye(2) / width**2)
+        mode = posterior @ (precision @ truth + mean / width**2)
+        alone = stats.multivariate_normal([mean] * 2, (width**2 + error**2) * np.eye(2))
+        own = common_spread(mode, posterior, Normal(mean, width), -np.log(20.0))
+        totals.append(alone.logpdf(truth) + own)
+    assert np.ptp(totals) < 1.0
+
+
+def test_dampings_far_from_the_base_fit_s_are_no_less_likely():
+    """A base fit with a large misfit has a c2 that means little, and a law that takes a part of
+    every c2 upon itself, as a fast relaxation does, gains nothing by bringing them nearer to it.
+    """
+    planted = {"contact_damping_per_case": {"c2": {"1": 6.0, "2": 4.0}}}
+    base = identify(small_rig.record(2, planted), rng=np.random.default_rng(0), search=False).fit
+    wrong = base.mode.copy()
+    wrong[base.names.index("c2")] *= 0.1
+    scales = campaign_scales(replace(base, mode=wrong))
+    own = (BY_ID["contact_damping_per_case"],)
+    near = fit_from(base, own, {}, scales)
+    far = fit_from(replace(base, mode=wrong), own, {}, scales)
+    assert far.log_evidence == pytest.approx(near.log_evidence, abs=0.1)
+    fast = {"contact_relaxation.stiffness": 3000.0, "contact_relaxation.time": 1e-3}
+    relaxed = fit_from(far.fit, (*own, BY_ID["contact_relaxation"]), fast, scales)
+    assert relaxed.log_evidence < far.log_evidence
 
 
 def test_a_value_that_nothing_was_measured_of_changes_nothing():
     """An obstacle that was never touched: its value is its prior."""
-    posterior = np.diag([1e-6, 1e-6, 4.0])
-    with_it = common_spread(np.array([5.0, 5.001, 5.0]), posterior, 5.0, 2.0)
-    without_it = common_spread(np.array([5.0, 5.001]), posterior[:2, :2], 5.0, 2.0)
-    assert with_it == pytest.approx(without_it, abs=1e-3)
+    posterior, prior = np.diag([1e-6, 1e-6, 4.0]), Normal(5.0, 2.0)
+    with_it = common_spread(np.array([5.0, 5.001, 5.0]), posterior, prior, -3.0)
+    without_it = common_spread(np.array([5.0, 5.001]), posterior[:2, :2], prior, -3.0)
+    assert with_it == pytest.approx(without_it, abs=0.02)
 
 
 @pytest.mark.parametrize("effect_id", ["gap_per_recording", "contact_damping_per_case"])
