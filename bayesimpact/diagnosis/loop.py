@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -137,7 +137,7 @@ def diagnose_fit(
     return Diagnosis(
         decision.verdict,
         identification,
-        naming,
+        replace(naming, own=None),  # large, and of use for the intervals alone
         base,
         after,
         decision.effects,
@@ -148,7 +148,7 @@ def diagnose_fit(
         held,
         cases,
         limits(chosen.candidate.fit, chosen.scan, scales),
-        intervals(after, remains=state is not None),
+        intervals(after, remains=state is not None, known=naming.own),
         state,
         scales,
         formulas=answer.formulas,

@@ -80,6 +80,8 @@ class Naming:
     finished : False when the budget ended the search
     beside : the force of time beside every model; None where nothing remains, or something that
         is no force of time
+    own : the force of time that the chosen model leaves; None where nothing remains, or a motion
+        that none could change
     apart : standard deviations of every chosen effect's size from none at all, with what the
         remainder may have done to it in them (`discrepancy`); empty where nothing remains
     power : of the force of time that models leave about the motion's own frequencies, N2, by their
@@ -97,6 +99,7 @@ class Naming:
     residual: Mapping[frozenset[str], Candidate] = field(default_factory=dict)
     finished: bool = True
     beside: Discrepancy | None = None
+    own: Discrepancy | None = None
     apart: Mapping[str, float] = field(default_factory=dict)
     power: Mapping[frozenset[str], float] = field(default_factory=dict)
 
