@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.html import html_table
+from bayesimpact.diagnosis.budget import Budget, begin
 from bayesimpact.diagnosis.decision import Decision, Verdict, decide
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.force import MissingForce
@@ -109,18 +110,19 @@ def diagnose_fit(
     rng: np.random.Generator,
     effects: Sequence[Effect] = SEARCHED,
     progress: Progress | None = None,
+    budget: Budget | None = None,
 ) -> Diagnosis:
-    """The loop from a base fit on."""
-    say = progress or (lambda message: None)
+    """The loop from a base fit on; with a budget of its own where none is given."""
+    say, budget = progress or (lambda message: None), budget or begin()
     base = identification.fit
     if base.target.oscillator.smoothing is not None:  # a chain has one filter
         effects = [e for e in effects if e.id != SAVITZKY_GOLAY.id]
     scales = campaign_scales(base)
-    naming = name(base, effects, scales, rng=rng, progress=say)
+    naming = name(base, effects, scales, rng=rng, progress=say, budget=budget)
     decision = decide(naming)
     after, state = extension(naming, decision, scales, say)
     answer = Answer(naming, decision, after, state)
-    answer = with_formulas(answer, effects, scales, rng=rng, progress=say)
+    answer = with_formulas(answer, effects, scales, rng=rng, progress=say, budget=budget)
     naming, decision, after, state = answer.naming, answer.decision, answer.after, answer.state
     location, held, cases = None, None, None
     locations: tuple[Location, ...] = ()

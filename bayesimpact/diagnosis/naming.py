@@ -77,7 +77,8 @@ class Naming:
     states : every model that was examined, by its ids
     residual : models with a residual force beside their effects, fitted in full, by the ids of
         these effects; where something remains beside the chosen model
-    finished : False when the budget ended the search
+    finished : False when the budget ended the search, or left none for another one that may say
+        otherwise
     beside : the force of time beside every model; None where nothing remains, or something that
         is no force of time
     own : the force of time that the chosen model leaves; None where nothing remains, or a motion

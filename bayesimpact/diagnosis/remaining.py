@@ -65,7 +65,7 @@ class Remaining(Settling):
         residual = dict(found.residual)
         for candidate in candidates:
             key = frozenset(candidate.ids)
-            if key not in residual and self.clock() <= self.end:
+            if key not in residual and self.budget.may_go_on():
                 residual[key] = self.with_residual(self.examine(candidate))
         late = any(frozenset(c.ids) not in residual for c in candidates)
         return replace(
@@ -92,7 +92,8 @@ class Remaining(Settling):
             found = replace(found, tried=tried, chosen=best)
             if set(best.candidate.ids) == set(chosen.ids) or not self.may_go_on():
                 break
-        return replace(found, states=dict(self.states))
+        finished = found.finished and self.may_go_on()
+        return replace(found, states=dict(self.states), finished=finished)
 
     def with_residual(self, state: State) -> Candidate:
         """A model with the likelier form of a residual force beside its effects."""
