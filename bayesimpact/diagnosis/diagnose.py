@@ -41,7 +41,7 @@ from bayesimpact.diagnosis.recording_faults import (
     cleaned_campaign,
     comparisons,
     shared_effects,
-    with_step,
+    with_steps,
     without_faults,
 )
 from bayesimpact.diagnosis.scan import scan
@@ -141,7 +141,7 @@ def diagnose(
         if not exceeds(doubtful[0], fit, float(promised.max(initial=0.0))):
             break
         proved = proved or exceeds(doubtful[0], fit, float(promised.sum()))
-        certain = with_step(certain, doubtful.pop(0), rng=rng, search=search)
+        certain = with_steps(certain, [doubtful.pop(0)], rng=rng, search=search)
     searches = Searches(rng, effects, say, begin(clock))
     found = searches.first(certain)
     beside = [e for e in found.effects if e in found.after.target.oscillator.effects]
@@ -151,7 +151,7 @@ def diagnose(
     if doubtful and is_doubtful(found):
         steps = doubtful
         found = searches.again(
-            found, lambda: _with_steps(certain, steps, rng=rng, search=search), _is_simpler
+            found, lambda: with_steps(certain, steps, rng=rng, search=search), _is_simpler
         )
     elif certain is not cleaned and not proved and found.verdict not in OPEN:
         found = searches.again(found, lambda: cleaned, lambda other, _: is_settled(other))
@@ -199,14 +199,6 @@ def unfinished(found: Diagnosis) -> Diagnosis:
     """The answer where the time was up before it was compared with another one."""
     verdict: Verdict = "ambiguous" if found.verdict == "named" else found.verdict
     return replace(found, verdict=verdict, naming=replace(found.naming, finished=False))
-
-
-def _with_steps(
-    corrected: Corrected, steps: Sequence[Step], *, rng: np.random.Generator, search: bool
-) -> Corrected:
-    for step in steps:
-        corrected = with_step(corrected, step, rng=rng, search=search)
-    return corrected
 
 
 def _is_simpler(again: Diagnosis, found: Diagnosis) -> bool:

@@ -133,7 +133,7 @@ def test_a_diagnosis_without_time_for_a_second_search_says_so(monkeypatch) -> No
     monkeypatch.setattr(whole, "_of_corrected", slow)
     monkeypatch.setattr(whole, "comparisons", doubtful)
     monkeypatch.setattr(whole, "promised_gains", lambda *_, **__: np.ones(9))
-    monkeypatch.setattr(whole, "with_step", pytest.fail)
+    monkeypatch.setattr(whole, "with_steps", pytest.fail)
     campaign = small_rig.record(61, duration=1.5, releases=small_rig.RELEASES[:1])
     rng, effects = np.random.default_rng(0), (BY_ID["coulomb_friction"],)
     found = whole.diagnose(campaign, rng=rng, effects=effects, search=False, clock=clock)
@@ -162,3 +162,25 @@ def test_exchanges_beside_a_force_of_time_that_the_budget_cut_short_are_not_fini
     found = search.beside_a_force(before, left)
     assert found.chosen.candidate is other and found.beside is left
     assert exchanged == ([] if late else [other]) and found.finished == (not late)
+
+
+def test_no_residual_force_is_fitted_once_the_time_is_up() -> None:
+    """The first one may take the time of the second; without that the search is not finished."""
+    clock = Clock()
+    search = Remaining((), None, np.random.default_rng(0), pytest.fail, Budget(clock, 0.0))
+    first, second = (
+        Candidate(effects, SimpleNamespace(), 0.0) for effects in ((), (BY_ID["coulomb_friction"],))
+    )
+
+    def fitted(state: Any) -> Candidate:
+        clock.now += PATIENCE
+        return state.candidate
+
+    search.examine = lambda candidate: SimpleNamespace(candidate=candidate)
+    search.with_residual = fitted
+    state = search.examine(first)
+    naming = Naming(state, state, (first, second), 1.0)
+    found = search.with_forces(naming, [first])
+    assert list(found.residual.values()) == [first] and found.finished
+    found = search.with_forces(found, [first, second])
+    assert list(found.residual.values()) == [first] and not found.finished
