@@ -11,9 +11,10 @@
 4. A start that is no free decay yet, and spikes, may only show against a fit with that physics:
    then once more without them.
 
-All searches have one budget of computing. What is left of it after one is the next one's; where
-that is too little, the next one is not begun, the answer says that the search ended by its limit,
-and names nothing that the other might have explained.
+All searches have one budget of computing, which begins with the first. What is left of it after one
+is the next one's; where that is too little, the next one is not begun. An answer that was not
+compared with another search, or not to its end, says so and is `ambiguous` instead of `named`: the
+faults that were not asked about might do what its effects do.
 """
 
 from __future__ import annotations
