@@ -10,17 +10,24 @@
    everything stays.
 4. A start that is no free decay yet, and spikes, may only show against a fit with that physics:
    then once more without them.
+
+All searches have one budget of computing, which begins with the first. What is left of it after one
+is the next one's; where that is too little, the next one is not begun. An answer that was not
+compared with another search, or not to its end, says so and is `ambiguous` instead of `named`: the
+faults that were not asked about might do what its effects do.
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.diagnosis.budget import Budget, begin
 from bayesimpact.diagnosis.decision import Verdict
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.faults.compare import base_failed, gain
@@ -35,7 +42,7 @@ from bayesimpact.diagnosis.recording_faults import (
     cleaned_campaign,
     comparisons,
     shared_effects,
-    with_step,
+    with_steps,
     without_faults,
 )
 from bayesimpact.diagnosis.scan import scan
@@ -62,7 +69,41 @@ BESIDE: Mapping[Verdict, Verdict] = {
 OPEN: Mapping[Verdict, int] = {"adequate": 0, "named": 0, "ambiguous": 1}
 """Verdicts that explain everything, by what they leave open."""
 
-Search = Callable[[Corrected], Diagnosis]
+Better = Callable[[Diagnosis, Diagnosis], bool]
+
+
+@dataclass(frozen=True, eq=False)
+class Searches:
+    """Searches of physics on one campaign, differently corrected, with one budget."""
+
+    rng: np.random.Generator
+    effects: Sequence[Effect]
+    progress: Progress
+    budget: Budget
+
+    def first(self, corrected: Corrected) -> Diagnosis:
+        """Whatever is left of the budget."""
+        return _of_corrected(
+            corrected,
+            rng=self.rng,
+            effects=self.effects,
+            progress=self.progress,
+            budget=self.budget,
+        )
+
+    def again(
+        self, found: Diagnosis, corrected: Callable[[], Corrected], is_better: Better
+    ) -> Diagnosis:
+        """An answer, or the one with other corrections where that `is_better`.
+
+        Without time to ask for the other one, or to ask to the end, the answer is not finished.
+        """
+        if not self.budget.may_search_again():
+            return unfinished(found)
+        other = self.first(corrected())
+        if is_better(other, found):
+            return other
+        return found if other.naming.finished else unfinished(found)
 
 
 @linear_algebra_alone()
@@ -73,6 +114,7 @@ def diagnose(
     effects: Sequence[Effect] = SEARCHED,
     search: bool = True,
     progress: Progress | None = None,
+    clock: Callable[[], float] = time.process_time,
 ) -> Diagnosis:
     """Locate, name and model what the base oscillator leaves out of a campaign's recordings.
 
@@ -83,16 +125,13 @@ def diagnose(
     effects : the catalogue, and effects of one's own
     search : False leaves out the global search and trusts the quick estimates
     progress : called with a few words before every longer step
+    clock : s, of the budget; it begins with the first search of physics
 
     Raises
     ------
     InputError : a recording shows no oscillation
     """
     say = progress or (lambda message: None)
-
-    def physics(corrected: Corrected) -> Diagnosis:
-        return _of_corrected(corrected, rng=rng, effects=effects, progress=say)
-
     say("fitting the base model")
     cleaned = cleaned_campaign(campaign, rng=rng, search=search)
     say("comparing the recordings")
@@ -103,22 +142,22 @@ def diagnose(
         if not exceeds(doubtful[0], fit, float(promised.max(initial=0.0))):
             break
         proved = proved or exceeds(doubtful[0], fit, float(promised.sum()))
-        certain = with_step(certain, doubtful.pop(0), rng=rng, search=search)
-    found = physics(certain)
+        certain = with_steps(certain, [doubtful.pop(0)], rng=rng, search=search)
+    searches = Searches(rng, effects, say, begin(clock))
+    found = searches.first(certain)
     beside = [e for e in found.effects if e in found.after.target.oscillator.effects]
     if shared_effects(beside) and is_doubtful(found):
         say("comparing the recordings beside what is missing")
         doubtful = list(comparisons(certain, campaign, beside, found.after)) or doubtful
     if doubtful and is_doubtful(found):
-        corrected = certain
-        for step in doubtful:
-            corrected = with_step(corrected, step, rng=rng, search=search)
-        found = _simpler(found, physics(corrected))
+        steps = doubtful
+        found = searches.again(
+            found, lambda: with_steps(certain, steps, rng=rng, search=search), _is_simpler
+        )
     elif certain is not cleaned and not proved and found.verdict not in OPEN:
-        alone = physics(cleaned)
-        found = alone if is_settled(alone) else found
-    found = _without_unfree_start(found, campaign, physics, rng=rng)
-    found = _without_late_spikes(found, campaign, physics, rng=rng)
+        found = searches.again(found, lambda: cleaned, lambda other, _: is_settled(other))
+    found = _without_unfree_start(found, campaign, searches)
+    found = _without_late_spikes(found, campaign, searches)
     undecided = found.corrected is not None and found.corrected.is_open
     return replace(found, verdict="ambiguous") if undecided and is_settled(found) else found
 
@@ -157,13 +196,20 @@ def is_doubtful(found: Diagnosis) -> bool:
     return own or not is_settled(found)
 
 
-def _simpler(found: Diagnosis, again: Diagnosis) -> Diagnosis:
-    """Of an answer and the one with further faults corrected: what leaves less open, with least.
+def unfinished(found: Diagnosis) -> Diagnosis:
+    """The answer where the time was up before it was compared with another one."""
+    verdict: Verdict = "ambiguous" if found.verdict == "named" else found.verdict
+    return replace(found, verdict=verdict, naming=replace(found.naming, finished=False))
+
+
+def _is_simpler(again: Diagnosis, found: Diagnosis) -> bool:
+    """Whether an answer with further faults corrected leaves less open than one without, or as
+    little with no more effects and faults.
 
     Faults that leave something unexplained have not proved themselves.
     """
     order = (OPEN.get(again.verdict, 2), _size(again)), (OPEN.get(found.verdict, 2), _size(found))
-    return again if again.verdict in OPEN and order[0] <= order[1] else found
+    return again.verdict in OPEN and order[0] <= order[1]
 
 
 def _size(found: Diagnosis) -> int:
@@ -171,30 +217,34 @@ def _size(found: Diagnosis) -> int:
     return len(found.effects) + (len(found.corrected.compared) if found.corrected else 0)
 
 
-def _without_unfree_start(
-    found: Diagnosis, as_read: Campaign, physics: Search, *, rng: np.random.Generator
-) -> Diagnosis:
+def _without_unfree_start(found: Diagnosis, as_read: Campaign, searches: Searches) -> Diagnosis:
     """Where a large misfit remains: the answer without first instants that keep a model from the
     rest, if that leaves less of it.
     """
-    if as_read.keep_faults or found.corrected is None or not is_large(found.after):
+    corrected = found.corrected
+    if as_read.keep_faults or corrected is None or not is_large(found.after):
         return found
     starts = unfree_starts(found.after)
     if not starts:
         return found
-    again = physics(without_faults(found.corrected, starts, as_read, rng=rng))
-    return again if BETTER * again.after.reduced_chi2 < found.after.reduced_chi2 else found
+    return searches.again(
+        found,
+        lambda: without_faults(corrected, starts, as_read, rng=searches.rng),
+        lambda other, own: BETTER * other.after.reduced_chi2 < own.after.reduced_chi2,
+    )
 
 
-def _without_late_spikes(
-    found: Diagnosis, as_read: Campaign, physics: Search, *, rng: np.random.Generator
-) -> Diagnosis:
+def _without_late_spikes(found: Diagnosis, as_read: Campaign, searches: Searches) -> Diagnosis:
     """The answer without spikes that only the extended fit shows, if it leaves nothing then."""
     spikes = () if as_read.keep_faults or base_failed(found.after) else residual_spikes(found.after)
-    if not spikes or found.corrected is None:
+    corrected = found.corrected
+    if not spikes or corrected is None:
         return found
-    again = physics(without_faults(found.corrected, spikes, as_read, rng=rng))
-    return again if is_settled(again) and len(again.effects) <= len(found.effects) else found
+    return searches.again(
+        found,
+        lambda: without_faults(corrected, spikes, as_read, rng=searches.rng),
+        lambda other, own: is_settled(other) and len(other.effects) <= len(own.effects),
+    )
 
 
 def _of_corrected(
@@ -203,6 +253,7 @@ def _of_corrected(
     rng: np.random.Generator,
     effects: Sequence[Effect],
     progress: Progress,
+    budget: Budget,
 ) -> Diagnosis:
     """The diagnosis of a campaign whose faults are set aside or corrected."""
     for fault in corrected.faults:
@@ -210,7 +261,7 @@ def _of_corrected(
     through = corrected.identification
     if corrected.filtered is not None:
         progress("the noise spectrum proves a filter: fitted through it")
-    found = diagnose_fit(through, rng=rng, effects=effects, progress=progress)
+    found = diagnose_fit(through, rng=rng, effects=effects, progress=progress, budget=budget)
     if corrected.filtered is not None:
         campaign = through.fit.target.oscillator.campaign
         measurement = replace(campaign.measurement, smoothing=None)

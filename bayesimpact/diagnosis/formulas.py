@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bayesimpact.diagnosis.budget import Budget
 from bayesimpact.diagnosis.decision import Decision
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.force import missing_drift, missing_force
@@ -62,12 +63,17 @@ def with_formulas(
     *,
     rng: np.random.Generator,
     progress: Callable[[str], None],
+    budget: Budget,
 ) -> Answer:
     """The answer with formulas for what is unknown, and with one of them named where the odds say
     so; as it is where nothing is unknown, or the search ended by its limit.
+
+    Where the budget ends before all formulas are fitted that may be the likeliest, none is named.
     """
     if answer.decision.verdict not in ("unknown", "partly") or not answer.naming.finished:
         return answer
+    if not budget.may_go_on():
+        return replace(answer, naming=replace(answer.naming, finished=False))
     progress("scoring formulas")
     repetition = residual_repetition(answer.after)
     scores = formula_scores(answer.after, scales, repetition=repetition)
@@ -79,19 +85,15 @@ def with_formulas(
     if not any(h.best.log_odds > 0.0 for h in heads):
         return answer
     question = Question(answer.after, answer.naming.prior_cost, scores, scales)
-    fitted: dict[Subset, Candidate] = {}
-    for subset in refit_candidates(ranked, scores.terms):
-        text = formula_text([scores.terms[k] for k in subset.terms])
-        progress(f"fitting the formula {text}")
-        found = refitted(question, subset)
-        if found is not None:
-            fitted[subset] = found
+    chosen = refit_candidates(ranked, scores.terms)
+    fitted, late = _fitted(question, chosen, progress, budget)
+    answer = replace(answer, naming=replace(answer.naming, finished=not late))
     if not fitted:
         return answer
     naming = joined(answer.naming, list(fitted.values()))
     first = max(fitted, key=lambda s: naming.log_odds(fitted[s]))
     rows = listed(question, naming, heads, fitted)
-    named = _may_be_named(question, naming, ranked, fitted, first)
+    named = not late and _may_be_named(question, naming, ranked, fitted, first)
     state = None
     if named:
         progress("scoring what the formula lacks")
@@ -104,6 +106,25 @@ def with_formulas(
     ids = frozenset(fitted[first].ids)
     naming = replace(naming, chosen=state, states={**naming.states, ids: state})
     return Answer(naming, _decided(answer, fitted[first]), fitted[first].fit, None, found_formulas)
+
+
+def _fitted(
+    question: Question,
+    chosen: Sequence[Subset],
+    progress: Callable[[str], None],
+    budget: Budget,
+) -> tuple[dict[Subset, Candidate], bool]:
+    """Formulas fitted in full as far as time allows, and whether that left any out."""
+    fitted: dict[Subset, Candidate] = {}
+    for subset in chosen:
+        if not budget.may_go_on():
+            return fitted, True
+        text = formula_text([question.scores.terms[k] for k in subset.terms])
+        progress(f"fitting the formula {text}")
+        found = refitted(question, subset)
+        if found is not None:
+            fitted[subset] = found
+    return fitted, False
 
 
 def joined(naming: Naming, candidates: Sequence[Candidate]) -> Naming:

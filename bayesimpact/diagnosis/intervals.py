@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from bayesimpact.diagnosis.comparable import Comparable
-from bayesimpact.diagnosis.discrepancy import discrepancy
+from bayesimpact.diagnosis.discrepancy import Discrepancy, discrepancy
 from bayesimpact.diagnosis.refit import residual_repetition
 from bayesimpact.inference.fit import Fit
 
@@ -59,13 +59,19 @@ class Intervals:
         return found[0], found[1], found[2]
 
 
-def intervals(fit: Fit, *, remains: bool = False, beside: Comparable | None = None) -> Intervals:
-    """Intervals of a fit; `remains`: something beside the noise is left; `beside`: models that do
-    not stand out from it.
+def intervals(
+    fit: Fit,
+    *,
+    remains: bool = False,
+    known: Discrepancy | None = None,
+    beside: Comparable | None = None,
+) -> Intervals:
+    """Intervals of a fit; `remains`: something beside the noise is left, of which a force of time
+    may be `known`, perhaps of another fit; `beside`: models that do not stand out from it.
     """
     mean, covariance = fit.mode, fit.covariance
     if remains:
-        left = discrepancy(fit)
+        left = known if known is not None and known.fit is fit else discrepancy(fit)
         if left is None:
             covariance = covariance * residual_repetition(fit)
         else:

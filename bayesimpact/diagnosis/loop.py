@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.html import html_table
+from bayesimpact.diagnosis.budget import Budget, begin
 from bayesimpact.diagnosis.comparable import Comparable, alike_in_misfit, alike_in_odds
 from bayesimpact.diagnosis.decision import Decision, Verdict, decide
 from bayesimpact.diagnosis.extend import campaign_scales
@@ -110,18 +111,19 @@ def diagnose_fit(
     rng: np.random.Generator,
     effects: Sequence[Effect] = SEARCHED,
     progress: Progress | None = None,
+    budget: Budget | None = None,
 ) -> Diagnosis:
-    """The loop from a base fit on."""
-    say = progress or (lambda message: None)
+    """The loop from a base fit on; with a budget of its own where none is given."""
+    say, budget = progress or (lambda message: None), budget or begin()
     base = identification.fit
     if base.target.oscillator.smoothing is not None:  # a chain has one filter
         effects = [e for e in effects if e.id != SAVITZKY_GOLAY.id]
     scales = campaign_scales(base)
-    naming = name(base, effects, scales, rng=rng, progress=say)
+    naming = name(base, effects, scales, rng=rng, progress=say, budget=budget)
     decision = decide(naming)
     after, state = extension(naming, decision, scales, say)
     answer = Answer(naming, decision, after, state)
-    answer = with_formulas(answer, effects, scales, rng=rng, progress=say)
+    answer = with_formulas(answer, effects, scales, rng=rng, progress=say, budget=budget)
     naming, decision, after, state = answer.naming, answer.decision, answer.after, answer.state
     location, held, cases = None, None, None
     locations: tuple[Location, ...] = ()
@@ -138,7 +140,7 @@ def diagnose_fit(
     return Diagnosis(
         decision.verdict,
         identification,
-        naming,
+        replace(naming, own=None),  # large, and of use for the intervals alone
         base,
         after,
         decision.effects,
@@ -149,7 +151,12 @@ def diagnose_fit(
         held,
         cases,
         limits(chosen.candidate.fit, chosen.scan, scales),
-        intervals(after, remains=state is not None, beside=_beside(naming, decision, after, state)),
+        intervals(
+            after,
+            remains=state is not None,
+            known=naming.own,
+            beside=_beside(naming, decision, after, state),
+        ),
         state,
         scales,
         formulas=answer.formulas,

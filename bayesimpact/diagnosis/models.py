@@ -5,7 +5,6 @@ Of two ends of climbs to one model the better one is kept.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -13,6 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from bayesimpact.diagnosis.asked import Asked
+from bayesimpact.diagnosis.budget import Budget, begin
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.force import missing_drift, missing_force
 from bayesimpact.diagnosis.naming import State, is_large, leaves_something
@@ -33,11 +33,9 @@ UNCONVERGED_SHORTFALL = 60.0
 MORE = 2.0  # nats by which a score must promise more than a model has reached to fit it again
 SAME = 0.05  # nats; two climbs to one mode differ by less
 
-# Set by hand: a diagnosis of the bundled campaign begins some 25, a large misfit up to this many.
+# Of one search, set by hand: one of the bundled campaign begins some 25, with a large misfit up to
+# this many. Its time is that of the whole diagnosis (`budget`).
 MOST_REFITS = 150
-# s of computing, set by hand: no refit begins later; an answer that says so is worth more than
-# none. Not of the clock: what else a machine does must not change an answer.
-PATIENCE = 300.0
 
 Progress = Callable[[str], None]
 
@@ -51,10 +49,10 @@ class Models:
         scales: Scales,
         rng: np.random.Generator,
         progress: Progress,
-        clock: Callable[[], float] = time.process_time,
+        budget: Budget | None = None,
     ) -> None:
         self.effects, self.scales, self.rng, self.progress = effects, scales, rng, progress
-        self.clock, self.end = clock, clock() + PATIENCE
+        self.budget = budget or begin()
         self.tried: dict[frozenset[str], Candidate] = {}
         self.states: dict[frozenset[str], State] = {}
         self.begun: set[tuple[object, ...]] = set()
@@ -191,7 +189,7 @@ class Models:
 
     def may_go_on(self) -> bool:
         """Whether the budget allows for more refits."""
-        return self.refits < MOST_REFITS and self.clock() < self.end
+        return self.refits < MOST_REFITS and self.budget.may_go_on()
 
     def tell(self, words: str) -> None:
         """Count a refit, and say which."""

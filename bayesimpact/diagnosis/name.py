@@ -8,11 +8,11 @@ physics and decide between near-opposites that scores cannot tell apart.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
+from bayesimpact.diagnosis.budget import Budget
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.force import missing_contact
 from bayesimpact.diagnosis.models import STARTS, UNCONVERGED_SHORTFALL, Progress
@@ -46,7 +46,7 @@ def name(
     *,
     rng: np.random.Generator,
     progress: Progress | None = None,
-    clock: Callable[[], float] = time.process_time,
+    budget: Budget | None = None,
 ) -> Naming:
     """Find the effects that the base model of `fit` leaves out.
 
@@ -59,10 +59,10 @@ def name(
     does. Where the misfit was large, the search begins with what the equation of motion asks for,
     and goes on from a model that has settled and still leaves something.
 
-    A search that has begun `MOST_REFITS` refits or taken `PATIENCE` seconds by the `clock` begins
-    no more, and names nothing that it has not compared with all that might do the same.
+    A search that has begun `MOST_REFITS` refits or used up the `budget` begins no more, and names
+    nothing that it has not compared with all that might do the same.
     """
-    search = _Search(effects, scales, rng, progress or (lambda message: None), clock)
+    search = _Search(effects, scales, rng, progress or (lambda message: None), budget)
     base = search.examine(base_candidate(fit))
     beam = search.asked_for(base) if search.is_large else [base]
     begun = set[frozenset[str]]()

@@ -77,9 +77,12 @@ class Naming:
     states : every model that was examined, by its ids
     residual : models with a residual force beside their effects, fitted in full, by the ids of
         these effects; where something remains beside the chosen model
-    finished : False when the budget ended the search
+    finished : False when the budget ended the search, or left none for another one that may say
+        otherwise
     beside : the force of time beside every model; None where nothing remains, or something that
         is no force of time
+    own : the force of time that the chosen model leaves; None where nothing remains, or a motion
+        that none could change
     apart : standard deviations of every chosen effect's size from none at all, with what the
         remainder may have done to it in them (`discrepancy`); empty where nothing remains
     power : of the force of time that models leave about the motion's own frequencies, N2, by their
@@ -97,6 +100,7 @@ class Naming:
     residual: Mapping[frozenset[str], Candidate] = field(default_factory=dict)
     finished: bool = True
     beside: Discrepancy | None = None
+    own: Discrepancy | None = None
     apart: Mapping[str, float] = field(default_factory=dict)
     power: Mapping[frozenset[str], float] = field(default_factory=dict)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby
+from itertools import chain, groupby
 from typing import Any
 
 import numpy as np
@@ -144,13 +144,14 @@ def shared_effects(effects: Sequence[Effect]) -> tuple[Effect, ...]:
     )
 
 
-def with_step(
-    before: Corrected, step: Step, *, rng: np.random.Generator, search: bool
+def with_steps(
+    before: Corrected, steps: Sequence[Step], *, rng: np.random.Generator, search: bool
 ) -> Corrected:
-    """The same with a step of `comparisons` corrected, after all before it."""
-    campaign, filtered = _through_filter(step[-1].campaign, before.filtered)
+    """The same with the next steps of `comparisons` corrected, each after all before it."""
+    campaign, filtered = _through_filter(steps[-1][-1].campaign, before.filtered)
     identification = identify(campaign, rng=rng, search=search)
-    return Corrected(identification, before.own, (*before.compared, *step), filtered)
+    compared = (*before.compared, *chain.from_iterable(steps))
+    return Corrected(identification, before.own, compared, filtered)
 
 
 def _through_filter(

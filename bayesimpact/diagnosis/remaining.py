@@ -12,7 +12,7 @@ from bayesimpact.diagnosis.decision import (
     may_be_needed,
     ordered,
 )
-from bayesimpact.diagnosis.discrepancy import discrepancy
+from bayesimpact.diagnosis.discrepancy import Discrepancy, discrepancy
 from bayesimpact.diagnosis.naming import Naming, State
 from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.settle import EXCHANGES, Settling
@@ -26,7 +26,10 @@ class Remaining(Settling):
         """What `decide` compares where something remains: the likeliest model beside a force of
         time, what it is without each of its effects, and models with a residual force.
         """
-        found = self.beside_a_force(found)
+        nearest = min(self.tried.values(), key=lambda c: c.fit.reduced_chi2)
+        left = discrepancy(nearest.fit)
+        if left is not None and left.leaves_noise:
+            found = self.beside_a_force(found, left)
         chosen = found.chosen.candidate
         if found.chosen.is_white:
             return replace(found, beside=None)
@@ -34,12 +37,15 @@ class Remaining(Settling):
         tried = tuple(sorted(self.tried.values(), key=found.log_odds, reverse=True))
         found = replace(found, tried=tried, states=dict(self.states))
         leading = [e for e in ordered(found, chosen.effects) if leads_without(found, e)]
-        left = {e.id: discrepancy(smaller[e.id].fit) for e in leading}
-        own = discrepancy(chosen.fit)
+        without = {e.id: discrepancy(smaller[e.id].fit) for e in leading}
+        own = left if left is not None and left.fit is chosen.fit else discrepancy(chosen.fit)
         if own is not None:
-            power = {frozenset(smaller[i].ids): d.power for i, d in left.items() if d is not None}
+            power = {
+                frozenset(smaller[i].ids): d.power for i, d in without.items() if d is not None
+            }
             found = replace(
                 found,
+                own=own,
                 apart={e.id: own.apart(e) for e in chosen.effects},
                 power={**power, frozenset(chosen.ids): own.power},
             )
@@ -59,7 +65,7 @@ class Remaining(Settling):
         residual = dict(found.residual)
         for candidate in candidates:
             key = frozenset(candidate.ids)
-            if key not in residual and self.clock() <= self.end:
+            if key not in residual and self.budget.may_go_on():
                 residual[key] = self.with_residual(self.examine(candidate))
         late = any(frozenset(c.ids) not in residual for c in candidates)
         return replace(
@@ -69,16 +75,11 @@ class Remaining(Settling):
             finished=found.finished and not late,
         )
 
-    def beside_a_force(self, found: Naming) -> Naming:
-        """The search with a force of time beside every model, and the likeliest of them chosen;
-        as it is where what remains is no such force.
+    def beside_a_force(self, found: Naming, left: Discrepancy) -> Naming:
+        """The search with a force of time beside every model, and the likeliest of them chosen.
 
         A model that the search had not settled on is compared with exchanges of its own.
         """
-        nearest = min(self.tried.values(), key=lambda c: c.fit.reduced_chi2)
-        left = discrepancy(nearest.fit)
-        if left is None or not left.leaves_noise:
-            return found
         found = replace(found, beside=left)
         for turn in range(EXCHANGES):
             chosen = found.chosen.candidate
@@ -91,7 +92,8 @@ class Remaining(Settling):
             found = replace(found, tried=tried, chosen=best)
             if set(best.candidate.ids) == set(chosen.ids) or not self.may_go_on():
                 break
-        return replace(found, states=dict(self.states))
+        finished = found.finished and self.may_go_on()
+        return replace(found, states=dict(self.states), finished=finished)
 
     def with_residual(self, state: State) -> Candidate:
         """A model with the likelier form of a residual force beside its effects."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -11,6 +12,7 @@ import pytest
 from small_rig import PLAIN, PLAIN_RELEASES, record
 
 from bayesimpact.diagnosis import formulas
+from bayesimpact.diagnosis.budget import PATIENCE, begin
 from bayesimpact.diagnosis.decision import Decision
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.force import missing_drift, missing_force
@@ -52,10 +54,13 @@ def unknown(effects: dict[str, Any]) -> tuple[Answer, Scales]:
     return Answer(naming, Decision("unknown", ()), learned.fit, state), scales
 
 
-def asked(answer: Answer, scales: Scales) -> Answer:
+def asked(answer: Answer, scales: Scales, looks: int = 99) -> Answer:
+    """With time for so many looks at the clock."""
     said: list[str] = []
     rng = np.random.default_rng(1)
-    return with_formulas(answer, (), scales, rng=rng, progress=said.append)
+    times = itertools.chain([0.0] * (1 + looks), itertools.repeat(PATIENCE))
+    budget = begin(lambda: next(times))
+    return with_formulas(answer, (), scales, rng=rng, progress=said.append, budget=budget)
 
 
 @pytest.fixture(scope="module")
@@ -68,6 +73,18 @@ def detent() -> tuple[Answer, Answer, Scales]:
 def drag() -> tuple[Answer, Answer, Scales]:
     before, scales = unknown({"quadratic_drag": DRAG})
     return before, asked(before, scales), scales
+
+
+@pytest.mark.parametrize("looks", [0, 1, 2])
+def test_where_time_ends_no_formula_is_named(detent: Any, looks: int) -> None:
+    """One that was not fitted might be the likelier one."""
+    before, whole, scales = detent
+    assert whole.naming.finished and before.naming.finished
+    found = asked(before, scales, looks)
+    assert not found.naming.finished and found.decision is before.decision
+    assert found.after is before.after and found.naming.tried == before.naming.tried
+    listed = found.formulas.ranked if found.formulas else ()
+    assert sum(row.refitted for row in listed) == max(looks - 1, 0)
 
 
 def test_a_force_of_no_catalogue_is_named_with_its_numbers(detent: Any) -> None:

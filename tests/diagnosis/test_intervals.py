@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import importlib
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 import small_rig
+from effect_rigs import BY_ID
 from scipy import stats
 
+from bayesimpact.diagnosis.diagnose import diagnose
+from bayesimpact.diagnosis.discrepancy import discrepancy
 from bayesimpact.diagnosis.intervals import Intervals
+from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.diagnosis.whiteness import combined, ljung_box, whiteness_p
 from bayesimpact.inference.noise import Noise
 
@@ -68,3 +74,33 @@ def test_combined_p_value_is_fishers(small):
     assert whiteness_p(small.fit) == pytest.approx(combined(parts))
     assert whiteness_p(small.fit) > 1e-3
     assert whiteness_p(with_residuals(small.fit, Noise(0.3), 0)) < 1e-6
+
+
+def leaving_something() -> Diagnosis:
+    """Strong friction is in the catalogue, the cubic spring beside it is not."""
+    effects = {"coulomb_friction": {"force": 2e-2}, "spring_cubic": {"stiffness": 2e4}}
+    campaign = small_rig.record(
+        5, effects, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES, duration=4.0
+    )
+    rng = np.random.default_rng(0)
+    return diagnose(campaign, rng=rng, effects=(BY_ID["coulomb_friction"],), search=False)
+
+
+def test_the_force_of_time_of_the_chosen_model_is_built_once(monkeypatch) -> None:
+    """Its intervals rest on the one that the search compared, which is not kept beyond that."""
+    modules = ("remaining", "intervals", "loop")
+    remaining, ends, loop = (importlib.import_module(f"bayesimpact.diagnosis.{m}") for m in modules)
+    built = []
+
+    def counted(fit: Any) -> Any:
+        built.append(fit)
+        return discrepancy(fit)
+
+    monkeypatch.setattr(remaining, "discrepancy", counted)
+    monkeypatch.setattr(ends, "discrepancy", counted)
+    monkeypatch.setattr(loop, "with_formulas", lambda answer, *_, **__: answer)
+    found = leaving_something()
+    assert found.verdict == "partly" and found.after is found.naming.chosen.candidate.fit
+    assert len({id(fit) for fit in built}) == len(built) > 0
+    assert any(fit is found.after for fit in built)
+    assert found.naming.own is None

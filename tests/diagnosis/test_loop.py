@@ -77,6 +77,16 @@ def test_a_diagnosis_is_one_line_and_can_be_pickled(kind, request):
     assert written(again) == written(diagnosis)
 
 
+@pytest.mark.parametrize("kind", ["control", "named", "unknown"])
+def test_a_search_that_ended_by_its_limit_is_said_whatever_the_verdict(kind, request):
+    found = request.getfixturevalue(kind)
+    verdict = "ambiguous" if kind == "named" else found.verdict
+    ended = replace(found, verdict=verdict, naming=replace(found.naming, finished=False))
+    said = "The search ended by its limit: not everything that may be missing was tried."
+    assert written(ended)["summary"].endswith(f". {said}")
+    assert said not in written(found)["summary"]
+
+
 def test_nothing_missing(control):
     assert control.verdict == "adequate" and control.effects == ()
     assert control.location is None and control.held_out is None and control.alternatives == ()

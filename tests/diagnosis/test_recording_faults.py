@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.faults.noise import loud_recordings
 from bayesimpact.data.faults.spikes import find_spikes
 from bayesimpact.diagnosis import diagnose as module
+from bayesimpact.diagnosis import recording_faults as faults
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.document import document
 from bayesimpact.diagnosis.faults.compare import Compared
@@ -211,3 +214,16 @@ def test_a_recording_in_another_unit_is_not_loud() -> None:
     noise = 20 * small_rig.NOISE * np.random.default_rng(1).standard_normal(first.samples.size)
     (loud,) = loud_recordings([replace(first, samples=first.samples + noise), *others])
     assert loud.recording == "a"
+
+
+def test_several_steps_are_corrected_with_one_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each step's campaign has all before it corrected: only the last one is fitted."""
+    fitted: list[str] = []
+    monkeypatch.setattr(faults, "identify", lambda campaign, **_: fitted.append(campaign))
+    monkeypatch.setattr(faults, "_through_filter", lambda campaign, known: (campaign, known))
+    first, second, third = (SimpleNamespace(campaign=name) for name in ("one", "two", "three"))
+    before: Any = SimpleNamespace(own=("own",), compared=("known",), filtered=None)
+    steps: Any = ((first,), (second, third))
+    found = faults.with_steps(before, steps, rng=np.random.default_rng(0), search=True)
+    assert fitted == ["three"]
+    assert found.own == ("own",) and found.compared == ("known", first, second, third)

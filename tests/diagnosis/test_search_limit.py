@@ -8,9 +8,9 @@ import numpy as np
 import small_rig
 from effect_rigs import BY_ID
 
+from bayesimpact.diagnosis.budget import PATIENCE, begin
 from bayesimpact.diagnosis.decision import decide
 from bayesimpact.diagnosis.extend import campaign_scales
-from bayesimpact.diagnosis.models import PATIENCE
 from bayesimpact.diagnosis.name import name
 from bayesimpact.inference.identify import identify
 
@@ -24,7 +24,8 @@ def searched(*, looks: int):
     fit = identify(campaign, rng=np.random.default_rng(0), search=False).fit
     times = itertools.chain([0.0] * (1 + looks), itertools.repeat(PATIENCE + 1.0))
     scales = campaign_scales(fit)
-    return name(fit, CATALOGUE, scales, rng=np.random.default_rng(0), clock=lambda: next(times))
+    budget = begin(lambda: next(times))
+    return name(fit, CATALOGUE, scales, rng=np.random.default_rng(0), budget=budget)
 
 
 def test_without_time_nothing_is_fitted_and_nothing_named() -> None:

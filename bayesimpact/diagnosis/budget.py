@@ -1,0 +1,50 @@
+"""How long a diagnosis may compute: one budget for all of its searches and stages."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+# s of computing from the first search of physics on, set by hand: no fit begins later; an answer
+# that says so is worth more than none. Not of the clock: what else a machine does must not change
+# an answer.
+PATIENCE = 300.0
+# s that must be left for another search, set by hand: 42 of 60 campaigns with several strong
+# effects needed less altogether. One that begins with less would mostly end by its limit, and then
+# tell no more than that.
+ANOTHER = 60.0
+
+
+@dataclass(frozen=True)
+class Budget:
+    """Seconds of computing from one reading of a clock on.
+
+    Attributes
+    ----------
+    clock : s, whatever it began at
+    begun : its reading when the budget began
+    seconds : that may be used
+    """
+
+    clock: Callable[[], float]
+    begun: float
+    seconds: float = PATIENCE
+
+    @property
+    def left(self) -> float:
+        """Seconds that may still be used; negative once they are up."""
+        return self.begun + self.seconds - self.clock()
+
+    def may_go_on(self) -> bool:
+        """Whether another fit may begin."""
+        return self.left > 0.0
+
+    def may_search_again(self) -> bool:
+        """Whether another search may begin: with too little left it would compare too little."""
+        return self.left >= ANOTHER
+
+
+def begin(clock: Callable[[], float] = time.process_time, seconds: float = PATIENCE) -> Budget:
+    """A budget that begins now."""
+    return Budget(clock, clock(), seconds)
