@@ -24,9 +24,9 @@ class Settling(Ranked):
                     self.exchange(candidate)
             best = self.best(len(state.candidate.effects))
             if best is state.candidate:  # the same set with a better end settles once more
-                break
+                return state
             state = self.examine(best)
-        return state
+        return self.eliminated(state)  # what the last exchange led to may need less too
 
     def eliminated(self, state: State) -> State:
         """Leave out effects, the least useful first, that the recordings do not demand.

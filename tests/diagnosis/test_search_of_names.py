@@ -154,6 +154,16 @@ def test_an_exchange_replaces_an_imitation(run):
     assert chosen(run(table)) == {A, B, D}
 
 
+def test_what_the_last_exchange_leads_to_is_rid_of_what_it_does_not_need(run, monkeypatch):
+    monkeypatch.setattr(settle, "EXCHANGES", 1)
+    pairs = {f"{A} {C}": 450.0, f"{A} {B}": 440.0, f"{B} {C}": 430.0, f"{B} {D}": 560.0}
+    table = Table(
+        {A: 400.0, C: 380.0, B: 300.0, D: 100.0, f"{A} {B} {C}": 520.0} | pairs,
+        forward={f"{B} {D}": 310.0},
+    )
+    assert chosen(run(table)) == {B, D}
+
+
 def test_an_exchange_begins_at_rivals_too(run):
     """No exchange leads from {A, B} to {D, S}, one from its equal {C, D} does."""
     singles = {A: 400.0, B: 390.0, C: 380.0, D: 100.0, S: 50.0}
