@@ -149,7 +149,7 @@ def diagnose(
     if shared_effects(beside) and is_doubtful(found):
         say("comparing the recordings beside what is missing")
         doubtful = list(comparisons(certain, campaign, beside, found.after)) or doubtful
-    if doubtful and is_doubtful(found):
+    if doubtful and is_doubtful(found) and may_be_simpler(doubtful, certain, found):
         steps = doubtful
         found = searches.again(
             found, lambda: with_steps(certain, steps, rng=rng, search=search), _is_simpler
@@ -200,6 +200,13 @@ def unfinished(found: Diagnosis) -> Diagnosis:
     """The answer where the time was up before it was compared with another one."""
     verdict: Verdict = "ambiguous" if found.verdict == "named" else found.verdict
     return replace(found, verdict=verdict, naming=replace(found.naming, finished=False))
+
+
+def may_be_simpler(steps: Sequence[Step], before: Corrected, found: Diagnosis) -> bool:
+    """Whether an answer with further faults corrected could take the place of one without: not
+    where these faults alone are more than all that a settled one names.
+    """
+    return not is_settled(found) or len(before.compared) + sum(map(len, steps)) <= _size(found)
 
 
 def _is_simpler(again: Diagnosis, found: Diagnosis) -> bool:

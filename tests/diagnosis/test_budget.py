@@ -184,3 +184,16 @@ def test_no_residual_force_is_fitted_once_the_time_is_up() -> None:
     assert list(found.residual.values()) == [first] and found.finished
     found = search.with_forces(found, [first, second])
     assert list(found.residual.values()) == [first] and not found.finished
+
+
+@pytest.mark.parametrize(
+    ("verdict", "effects", "asked"),
+    [("named", 3, True), ("named", 2, True), ("named", 1, False), ("partly", 0, True)],
+)
+def test_faults_that_are_more_than_a_settled_answer_names_are_not_asked_about(
+    verdict, effects, asked
+) -> None:
+    """One fault was corrected before; one further step has two."""
+    before = SimpleNamespace(compared=("clock",))
+    found = SimpleNamespace(verdict=verdict, effects=["effect"] * effects, corrected=before)
+    assert whole.may_be_simpler([("gain", "gain")], before, found) is asked
