@@ -5,19 +5,20 @@ them; what the polynomials leave is noise. Level and correlation maximise the li
 these remainders (restricted maximum likelihood, Patterson and Thompson 1971), so no degrees of
 freedom are counted twice. Where there is a stop, only cycles on its free side count: impacts are
 kinks that no polynomial follows. Of velocities and accelerations only windows between two turning
-points count, for dry friction changes its sign there (see `noise_windows`). Windows that something else disturbs stand out and are left aside.
-A steady hum is no noise: its sine is fitted to the remainders of all windows and taken off.
+points count, for dry friction changes its sign there (see `noise_windows`). Windows that something
+else disturbs stand out and are left aside. A steady hum is no noise: its sine is fitted to the
+remainders of all windows and taken off.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
-from scipy.linalg import null_space, toeplitz
+from scipy.linalg import toeplitz
 from scipy.optimize import minimize_scalar
 
 from bayesimpact.data.campaign import Campaign, Smoothing
@@ -27,27 +28,22 @@ from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.noise_driven import driven_noise
-from bayesimpact.inference.noise_windows import Windows, centred, period_of, smooth_parts, windows
+from bayesimpact.inference.noise_filtered import filtered_noise, lower
+from bayesimpact.inference.noise_remainders import (
+    KEPT,
+    LARGEST,
+    SMALLEST,
+    WINDOWS_PER_PERIOD,
+    Remainder,
+    remainder_of,
+)
+from bayesimpact.inference.noise_windows import period_of
 
 Array = NDArray[np.float64]
 
-DEGREE = 5
-WINDOWS_PER_PERIOD = (12.0, 9.0, 7.0, 5.5, 4.5, 3.6, 3.0)
-SMALLEST, LARGEST = 12, 64
 SHORT = 6  # samples between two turning points of a motion that is sampled coarsely
-KEPT = 0.999  # fraction of undisturbed windows that the outlier test keeps
-LEAST_NUMBERS = 60  # remainders that the free side must give
-LEAST_OFF = 24  # remainders off turning points, better than many across a jump: the level to 14 %
 LEAST_CORRELATION = 0.03  # a weaker AR(1) changes no interval by more than 3 %
 LEAST_GAIN = 4.0  # in log likelihood, to call the noise coloured: 1 false call in 200
-
-
-@dataclass(frozen=True)
-class _Remainder:
-    """What polynomials leave of one window length: (windows, freedom) numbers and their basis."""
-
-    values: Array
-    basis: Array
 
 
 def estimate_noise(campaign: Campaign) -> Noise:
@@ -77,13 +73,13 @@ def estimate_noise(campaign: Campaign) -> Noise:
 def _of_one(recordings: Sequence[Recording], smoothing: Smoothing | None) -> Noise:
     """Of recordings of one quantity, behind a filter or none."""
     free = [r for r in recordings if r.input is None]
-    if not free:
-        return driven_noise(recordings, raw_noise(recordings), smoothing)
     if smoothing is None:
-        return raw_noise(free)
+        return raw_noise(free) if free else driven_noise(recordings, raw_noise(recordings))
+    if not free:
+        return filtered_noise(recordings, smoothing)
     from bayesimpact.inference.spectrum import smoothed_noise
 
-    return smoothed_noise(free, smoothing)
+    return lower(smoothed_noise(free, smoothing), filtered_noise(free, smoothing))
 
 
 def raw_noise(recordings: Sequence[Recording]) -> Noise:
@@ -115,7 +111,7 @@ def _longest(
     chosen, numbers = None, 0
     for per_period in WINDOWS_PER_PERIOD:
         length = int(np.clip(min(periods) / per_period, smallest, LARGEST))
-        remainder = _remainder(recordings, hums, length, turns)
+        remainder = remainder_of(recordings, hums, length, turns)
         if remainder is None:
             continue
         if not turns and remainder.values.size < numbers:
@@ -144,68 +140,7 @@ def _rises(before: Noise, level: float, error: float = 0.0) -> bool:
     return bool(level > before.level * (1.02 + 3 * np.hypot(before.level_error, error)))
 
 
-def _remainder(
-    recordings: Sequence[Recording], hums: Sequence[Hum | None], length: int, turns: bool
-) -> _Remainder | None:
-    degree = DEGREE if length >= SMALLEST else DEGREE - 1
-    basis = null_space(np.vander(np.linspace(-1, 1, length), degree + 1).T)
-    side = any(r.case for r in recordings)
-
-    def left(side: bool) -> Array:
-        rows = [
-            _without_shapes(_shapes(r, hum), r, windows(length, parts), basis)
-            for r, hum in zip(recordings, hums, strict=True)
-            for parts in (smooth_parts(r, side=side, turns=turns),)
-        ]
-        return np.concatenate(rows)
-
-    values = left(side)
-    if not turns:
-        return _Remainder(values, basis) if values.size >= LEAST_OFF else None
-    if side and values.size < LEAST_NUMBERS:  # hardly any free cycle: windows at the stop too
-        values = left(False)
-    return _Remainder(values, basis) if values.shape[0] >= 4 else None
-
-
-def _shapes(recording: Recording, hum: Hum | None) -> list[Array]:
-    """Signals (n,) that no polynomial follows, known but for their sizes.
-
-    A steady hum, whose amplitude and phase may drift by a line through the recording: an error of
-    the frequency, to first order. The roughness of a reading under an input: for a displacement
-    that of the input's double integral and, by the damping, of the triple one; for a derivative of
-    it, that of as many integrals fewer.
-    """
-    if recording.input is not None:
-        shown = recording.input.shown(1.0, recording.interval)
-        u = recording.input.force(1.0, recording.interval)
-        u = u - u.mean()
-        once = np.concatenate([[0.0], np.cumsum(0.5 * (u[1:] + u[:-1]))])
-        # exact for lines between samples
-        twice = np.concatenate([[0.0], np.cumsum(once[:-1] + u[:-1] / 3 + u[1:] / 6)])
-        integrals = [shown - shown.mean(), once, twice, np.cumsum(twice)]
-        return integrals[2 - recording.order :]
-    if hum is None:
-        return []
-    times = recording.times
-    angle = 2 * np.pi * hum.frequency * times
-    place = times / times[-1]
-    return [f * p for f in (np.cos(angle), np.sin(angle)) for p in (np.ones(place.size), place)]
-
-
-def _without_shapes(
-    shapes: Sequence[Array], recording: Recording, windows: Windows, basis: Array
-) -> Array:
-    """What polynomials leave of windows (count, length) of a recording, less these shapes."""
-    values = centred(recording.samples)[windows] @ basis
-    if not shapes or values.size < 8 * len(shapes):
-        return np.asarray(values)
-    columns = np.stack([(shape[windows] @ basis).ravel() for shape in shapes], axis=1)
-    columns /= np.maximum(np.sqrt(np.sum(columns**2, axis=0)), 1e-300)
-    found = np.linalg.lstsq(columns, values.ravel(), rcond=None)[0]
-    return np.asarray(values - (columns @ found).reshape(values.shape))
-
-
-def _restricted_ml(remainder: _Remainder) -> Noise:
+def _restricted_ml(remainder: Remainder) -> Noise:
     values, rho = remainder.values, 0.0
     kept = values
     for _ in range(3):  # outlier test and estimate in turn

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import minimum_filter1d
 
 from bayesimpact.data.gaps import runs
 from bayesimpact.data.recording import Recording
@@ -34,11 +35,18 @@ def windows(length: int, where: Mask) -> Windows:
     return np.asarray(first[:, None] + np.arange(length))
 
 
-def smooth_parts(recording: Recording, *, side: bool, turns: bool) -> Mask:
+def smooth_parts(recording: Recording, *, side: bool, turns: bool, reach: int = 0) -> Mask:
     """Samples (n,) on a stop's free side (where `side`) and, but for `turns`, off turning points.
 
-    Without those that are set aside.
+    Without those that are set aside, and off all of these by the `reach` of a filter, samples.
     """
+    found = _parts(recording, side, turns)
+    if reach == 0:
+        return found
+    return np.asarray(minimum_filter1d(found, 2 * reach + 1, mode="constant", cval=0))
+
+
+def _parts(recording: Recording, side: bool, turns: bool) -> Mask:
     found = np.ones(recording.samples.size, dtype=bool)
     if recording.used is not None:
         found &= recording.used
@@ -50,8 +58,8 @@ def smooth_parts(recording: Recording, *, side: bool, turns: bool) -> Mask:
     if not turns:
         period = rough_period(moved)
         index, _ = turning_points(moved, period, local.noise_level(moved, period))
-        reach = int(TURN * period)
-        for shift in range(-reach, reach + 1):
+        near = int(TURN * period)
+        for shift in range(-near, near + 1):
             found[np.clip(index + shift, 0, found.size - 1)] = False
     return found
 
