@@ -15,6 +15,7 @@ from typing import Any
 
 from bayesimpact.data import bounds
 from bayesimpact.data.campaign import SECOND_STOP, Beam, Campaign, Measurement, Smoothing
+from bayesimpact.data.channels import check_channels
 from bayesimpact.data.entries import filled_in
 from bayesimpact.data.foreign import file_bytes, is_foreign, read_foreign
 from bayesimpact.data.gaps import excluded_spans
@@ -247,6 +248,7 @@ def _recording(
         quantity=table.quantity,
         used=None if table.used is None else table.used[first:stop_at],
         input=input_of(where, entry, given, table.quantity),
+        motion_name=entry.motion or "",
     )
     key = "exclude_s" if entry.exclude_s else "resample"
     recording = excluded_spans(f"{where}, key {key}", recording, entry.exclude_s or ())
@@ -279,6 +281,7 @@ def _check_together(where: str, table: CampaignTable, recordings: list[Recording
                 with_article(recording.quantity),
                 f"motion {kind}, as the first recording's {first.quantity}, throughout",
             )
+    check_channels(where, recordings)
     if table.mass_uncertainty_kg >= table.mass_kg:
         found = f"{table.mass_uncertainty_kg:g} kg"
         accepted = f"less than the mass, {table.mass_kg:g} kg"

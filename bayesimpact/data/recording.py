@@ -27,6 +27,7 @@ class Recording:
         set aside hold a smooth stand-in, for what needs a whole recording to start from; a longer
         mask is cut to the samples, so that a recording can be shortened at its end
     input : what drove the motion, cut to the samples in the same way; None for a free decay
+    motion_name : of the motion of which this is one channel of several; "" where it is the only one
     """
 
     name: str
@@ -37,6 +38,7 @@ class Recording:
     quantity: Quantity = "displacement"
     used: NDArray[np.bool_] | None = None
     input: Input | None = None
+    motion_name: str = ""
 
     def __repr__(self) -> str:
         """One line."""

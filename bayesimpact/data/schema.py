@@ -83,6 +83,9 @@ class RecordingTable(_Table):
         None, description=f"{', '.join(UNITS)}, in quotes"
     )
     quantity: Quantity | None = Field(None, description=f"{', '.join(QUANTITIES)}, in quotes")
+    motion: Text | None = Field(
+        None, description="in quotes, the same for all channels that recorded one motion"
+    )
     start_s: Time | None = Field(None, description=f"{NUMBER}, s on the file's own clock")
     end_s: Time | None = Field(None, description=f"{NUMBER}, s on the file's own clock")
     exclude_s: list[Annotated[list[Time], Field(min_length=2, max_length=2)]] | None = Field(

@@ -25,6 +25,7 @@ from bayesimpact.inference.mode import find_mode
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.noise_estimate import estimate_noise
 from bayesimpact.inference.noise_refined import refined_noise
+from bayesimpact.inference.nuisances import nuisance_step
 from bayesimpact.inference.onsets import without_onsets
 from bayesimpact.inference.priors import Priors
 from bayesimpact.inference.search import Generation, SearchResult, metropolis_differential_evolution
@@ -297,9 +298,4 @@ class _Profile:
     def _nuisance_step(self, theta: Array, matrices: Array) -> Array:
         block = matrices[:, :, NUISANCE_SLOTS[:, None], NUISANCE_SLOTS[None, :]]
         right = matrices[:, :, NUISANCE_SLOTS, _RESIDUAL]
-        scale = np.sqrt(np.maximum(np.einsum("brii->bri", block), 1e-300))
-        scaled = block / (scale[..., :, None] * scale[..., None, :]) + 1e-9 * np.eye(3)
-        move = np.linalg.solve(scaled, (right / scale)[..., None])[..., 0] / scale
-        moved = theta.copy()
-        moved[:, self.columns[:, NUISANCE_SLOTS]] += move
-        return moved
+        return nuisance_step(theta, self.columns[:, NUISANCE_SLOTS], block, right)

@@ -15,10 +15,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.data.campaign import Smoothing
 from bayesimpact.data.recording import Recording
 from bayesimpact.inference.noise import Noise
-from bayesimpact.model.measurement import gain
 from bayesimpact.response.driven_displacement import seen_displacement
 from bayesimpact.response.half_cycles import rough_period
 
@@ -33,23 +31,12 @@ FLAT = 4.0  # loudest over quietest band, in power, up to which a floor is flat
 MEDIAN = float(np.log(2.0))  # of an ordinate of white noise, over its mean
 
 
-def driven_noise(
-    recordings: Sequence[Recording], remainders: Noise, smoothing: Smoothing | None = None
-) -> Noise:
+def driven_noise(recordings: Sequence[Recording], remainders: Noise) -> Noise:
     """The level from the gaps that the inputs leave, or what the polynomial `remainders` say.
 
     The latter where the motion is slow against the sampling, or no input leaves a gap: the source
-    then says that they are no more than a bound, which the residual of a fit may lower. Behind a
-    filter, the level is raised by what the filter takes of white noise; also a bound.
+    then says that they are no more than a bound, which the residual of a fit may lower.
     """
-    if smoothing is not None:
-        behind = driven_noise(recordings, remainders)
-        frequency: Array = np.linspace(0.0, 0.5 / recordings[0].interval, 2001)
-        passed = float(np.mean(gain(smoothing, recordings[0].interval, frequency) ** 2))
-        level = behind.level / np.sqrt(passed)
-        return replace(
-            behind, correlation=0.0, smoothing=smoothing, level=float(level), is_bound=True
-        )
     moved = ((r, seen_displacement(r).samples) for r in recordings)
     fast = [r for r, y in moved if rough_period(y) < SHORTEST_PERIOD]
     if not fast:

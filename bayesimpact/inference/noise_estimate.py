@@ -4,51 +4,46 @@ A recording is cut into windows so short that any oscillation is a polynomial of
 them; what the polynomials leave is noise. Level and correlation maximise the likelihood of exactly
 these remainders (restricted maximum likelihood, Patterson and Thompson 1971), so no degrees of
 freedom are counted twice. Where there is a stop, only cycles on its free side count: impacts are
-kinks that no polynomial follows. Windows that something else disturbs stand out and are left aside.
-A steady hum is no noise: its sine is fitted to the remainders of all windows and taken off.
+kinks that no polynomial follows. Of velocities and accelerations only windows between two turning
+points count, for dry friction changes its sign there (see `noise_windows`). Windows that something
+else disturbs stand out and are left aside. A steady hum is no noise: its sine is fitted to the
+remainders of all windows and taken off.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
-from scipy.linalg import null_space, toeplitz
+from scipy.linalg import toeplitz
 from scipy.optimize import minimize_scalar
 
 from bayesimpact.data.campaign import Campaign, Smoothing
 from bayesimpact.data.faults.flat import reading_step
-from bayesimpact.data.gaps import runs
 from bayesimpact.data.hum import Hum, find_hum
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.noise_driven import driven_noise
-from bayesimpact.response.driven_displacement import seen_displacement
-from bayesimpact.response.half_cycles import rough_period
+from bayesimpact.inference.noise_filtered import filtered_noise, lower
+from bayesimpact.inference.noise_remainders import (
+    KEPT,
+    LARGEST,
+    SMALLEST,
+    WINDOWS_PER_PERIOD,
+    Remainder,
+    remainder_of,
+)
+from bayesimpact.inference.noise_windows import period_of
 
 Array = NDArray[np.float64]
-Windows = NDArray[np.int64]
 
-DEGREE = 5
-WINDOWS_PER_PERIOD = (12.0, 9.0, 7.0, 5.5, 4.5, 3.6, 3.0)
-SMALLEST, LARGEST = 12, 64
-KEPT = 0.999  # fraction of undisturbed windows that the outlier test keeps
-MARGIN = 0.05  # of the largest displacement, below rest: the free side, where no impact is
-LEAST_NUMBERS = 60  # remainders that the free side must give
+SHORT = 6  # samples between two turning points of a motion that is sampled coarsely
 LEAST_CORRELATION = 0.03  # a weaker AR(1) changes no interval by more than 3 %
 LEAST_GAIN = 4.0  # in log likelihood, to call the noise coloured: 1 false call in 200
-
-
-@dataclass(frozen=True)
-class _Remainder:
-    """What polynomials leave of one window length: (windows, freedom) numbers and their basis."""
-
-    values: Array
-    basis: Array
 
 
 def estimate_noise(campaign: Campaign) -> Noise:
@@ -78,13 +73,13 @@ def estimate_noise(campaign: Campaign) -> Noise:
 def _of_one(recordings: Sequence[Recording], smoothing: Smoothing | None) -> Noise:
     """Of recordings of one quantity, behind a filter or none."""
     free = [r for r in recordings if r.input is None]
-    if not free:
-        return driven_noise(recordings, raw_noise(recordings), smoothing)
     if smoothing is None:
-        return raw_noise(free)
+        return raw_noise(free) if free else driven_noise(recordings, raw_noise(recordings))
+    if not free:
+        return filtered_noise(recordings, smoothing)
     from bayesimpact.inference.spectrum import smoothed_noise
 
-    return smoothed_noise(free, smoothing)
+    return lower(smoothed_noise(free, smoothing), filtered_noise(free, smoothing))
 
 
 def raw_noise(recordings: Sequence[Recording]) -> Noise:
@@ -92,20 +87,40 @@ def raw_noise(recordings: Sequence[Recording]) -> Noise:
 
     Raises `InputError` when the recordings are too short.
     """
-    chosen = None
     hums = [find_hum(r.samples, r.interval) for r in recordings]
-    for per_period in WINDOWS_PER_PERIOD:
-        remainder = _remainder(recordings, hums, per_period)
-        if remainder is None:
-            continue
-        found = _restricted_ml(remainder)
-        if chosen is not None and _rises(chosen, found):
-            break  # the oscillation itself begins to show
-        chosen = found
-    if chosen is None:
+    found = _longest(recordings, hums, False) if recordings[0].order > 0 else None
+    if found is None or any(r.input is not None for r in recordings):
+        # under an input few windows fit between turning points: they count where a jump shows
+        across = _longest(recordings, hums, True)
+        found = found if found and across and _rises(found, across.level) else across
+    if found is None:
         total = sum(r.samples.size for r in recordings)
         raise InputError("noise estimate", f"{total} samples in all", f"at least {5 * SMALLEST}")
-    return _with_step(chosen, recordings)
+    return _with_step(found, recordings)
+
+
+def _longest(
+    recordings: Sequence[Recording], hums: Sequence[Hum | None], turns: bool
+) -> Noise | None:
+    """What the longest windows say that follow the motion; None where there are too few.
+
+    `turns`: also windows across turning points, where dry friction would show.
+    """
+    smallest = SMALLEST if turns or any(r.input is not None for r in recordings) else SHORT
+    periods = [period_of(r) for r in recordings]
+    chosen, numbers = None, 0
+    for per_period in WINDOWS_PER_PERIOD:
+        length = int(np.clip(min(periods) / per_period, smallest, LARGEST))
+        remainder = remainder_of(recordings, hums, length, turns)
+        if remainder is None:
+            continue
+        if not turns and remainder.values.size < numbers:
+            break  # hardly any fits between two turning points
+        found = _restricted_ml(remainder)
+        if chosen is not None and _rises(chosen, found.level, found.level_error):
+            break  # the oscillation itself begins to show
+        chosen, numbers = found, remainder.values.size
+    return chosen
 
 
 def _with_step(noise: Noise, recordings: Sequence[Recording]) -> Noise:
@@ -120,101 +135,12 @@ def _with_step(noise: Noise, recordings: Sequence[Recording]) -> Noise:
     return replace(noise, level=floor, source="the step of the readings")
 
 
-def _rises(before: Noise, after: Noise) -> bool:
-    """Whether longer windows leave more than the errors of both levels explain."""
-    error = 3 * np.hypot(before.level_error, after.level_error)
-    return bool(after.level > before.level * (1.02 + error))
+def _rises(before: Noise, level: float, error: float = 0.0) -> bool:
+    """Whether other windows leave more than the errors of both levels explain."""
+    return bool(level > before.level * (1.02 + 3 * np.hypot(before.level_error, error)))
 
 
-def _remainder(
-    recordings: Sequence[Recording], hums: Sequence[Hum | None], per_period: float
-) -> _Remainder | None:
-    lengths = [int(np.clip(_period(r) / per_period, SMALLEST, LARGEST)) for r in recordings]
-    length = min(lengths)
-    powers = np.vander(np.linspace(-1, 1, length), DEGREE + 1)
-    basis = null_space(powers.T)
-    side = any(r.case for r in recordings)
-
-    def left(free_side: bool) -> Array:
-        rows = [
-            _without_shapes(_shapes(r, hum), r, _windows(r, length, free_side), basis)
-            for r, hum in zip(recordings, hums, strict=True)
-        ]
-        return np.concatenate(rows)
-
-    values = left(side)
-    if side and values.size < LEAST_NUMBERS:  # hardly any free cycle: windows at the stop too
-        values = left(False)
-    return _Remainder(values, basis) if values.shape[0] >= 4 else None
-
-
-def _period(recording: Recording) -> float:
-    """Rough period of the motion, in samples: under an input, that of the displacement."""
-    if recording.input is None:
-        return rough_period(recording.samples, recording.order)
-    return rough_period(seen_displacement(recording).samples)
-
-
-def _shapes(recording: Recording, hum: Hum | None) -> list[Array]:
-    """Signals (n,) that no polynomial follows, known but for their sizes.
-
-    A steady hum, whose amplitude and phase may drift by a line through the recording: an error of
-    the frequency, to first order. The roughness of a reading under an input: for a displacement
-    that of the input's double integral and, by the damping, of the triple one; for a derivative of
-    it, that of as many integrals fewer.
-    """
-    if recording.input is not None:
-        shown = recording.input.shown(1.0, recording.interval)
-        u = recording.input.force(1.0, recording.interval)
-        u = u - u.mean()
-        once = np.concatenate([[0.0], np.cumsum(0.5 * (u[1:] + u[:-1]))])
-        # exact for lines between samples
-        twice = np.concatenate([[0.0], np.cumsum(once[:-1] + u[:-1] / 3 + u[1:] / 6)])
-        integrals = [shown - shown.mean(), once, twice, np.cumsum(twice)]
-        return integrals[2 - recording.order :]
-    if hum is None:
-        return []
-    times = recording.times
-    angle = 2 * np.pi * hum.frequency * times
-    place = times / times[-1]
-    return [f * p for f in (np.cos(angle), np.sin(angle)) for p in (np.ones(place.size), place)]
-
-
-def _without_shapes(
-    shapes: Sequence[Array], recording: Recording, windows: Windows, basis: Array
-) -> Array:
-    """What polynomials leave of windows (count, length) of a recording, less these shapes."""
-    values = _centred(recording.samples)[windows] @ basis
-    if not shapes or values.size < 8 * len(shapes):
-        return np.asarray(values)
-    columns = np.stack([(shape[windows] @ basis).ravel() for shape in shapes], axis=1)
-    columns /= np.maximum(np.sqrt(np.sum(columns**2, axis=0)), 1e-300)
-    found = np.linalg.lstsq(columns, values.ravel(), rcond=None)[0]
-    return np.asarray(values - (columns @ found).reshape(values.shape))
-
-
-def _centred(samples: Array) -> Array:
-    """Samples (n,) from where they settle."""
-    return samples - float(np.median(samples[-max(samples.size // 5, 1) :]))
-
-
-def _windows(recording: Recording, length: int, side: bool) -> Windows:
-    """Samples of windows (count, length); with `side`, only of those on a stop's free side."""
-    free = np.ones(recording.samples.size, dtype=bool)
-    if side:
-        moved = _centred(seen_displacement(recording).samples)
-        free = moved < -MARGIN * np.abs(moved).max()
-    if recording.used is not None:
-        free = free & recording.used
-    starts = [
-        first + (end - first) % length // 2 + np.arange((end - first) // length) * length
-        for first, end in runs(free)
-    ]
-    first = np.concatenate([np.zeros(0, dtype=np.int64), *starts])
-    return np.asarray(first[:, None] + np.arange(length))
-
-
-def _restricted_ml(remainder: _Remainder) -> Noise:
+def _restricted_ml(remainder: Remainder) -> Noise:
     values, rho = remainder.values, 0.0
     kept = values
     for _ in range(3):  # outlier test and estimate in turn

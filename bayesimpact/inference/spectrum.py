@@ -17,13 +17,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage, optimize, signal, stats
-from scipy.linalg import toeplitz
 
 from bayesimpact.data.campaign import Smoothing
 from bayesimpact.data.gaps import runs
 from bayesimpact.data.recording import Recording
 from bayesimpact.inference.noise import Noise
-from bayesimpact.model.measurement import gain
+from bayesimpact.model.measurement import covariance, gain
 from bayesimpact.response.half_cycles import rough_period
 
 Array = NDArray[np.float64]
@@ -192,7 +191,7 @@ def _passband(
 ) -> _HalfCycles:
     """What the filter lets pass of half cycles, its power divided out."""
     duration, rows, times = halves
-    values, vectors = np.linalg.eigh(_covariance(smoothing, interval, times.size))
+    values, vectors = np.linalg.eigh(covariance(smoothing, interval, times.size))
     strong = values > STRONG * values[-1]
     white = vectors[:, strong] / np.sqrt(values[strong])
     return _HalfCycles(duration, (rows - rows.mean(axis=1, keepdims=True)) @ white, times, white)
@@ -228,13 +227,6 @@ def _free_halves(recording: Recording, length: int) -> list[int]:
             if start >= 0 and start + length <= samples.size and whole:
                 starts.append(int(start))
     return starts
-
-
-def _covariance(smoothing: Smoothing, interval: float, length: int) -> Array:
-    size = 8 * length
-    frequency: Array = np.asarray(np.fft.rfftfreq(size, interval), dtype=np.float64)
-    power = gain(smoothing, interval, frequency) ** 2
-    return np.asarray(toeplitz(np.fft.irfft(power, size)[:length]))
 
 
 def _stretches(recording: Recording) -> list[Recording]:

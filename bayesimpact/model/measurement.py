@@ -83,6 +83,16 @@ def gain(smoothing: Smoothing | None, interval: float, frequency: Array) -> Arra
     return np.asarray(np.abs(response), dtype=np.float64)
 
 
+def covariance(smoothing: Smoothing | None, interval: float, length: int) -> Array:
+    """Of `length` samples of white noise of variance 1 after the filter, (length, length)."""
+    from scipy.linalg import toeplitz
+
+    size = 8 * length
+    frequency: Array = np.asarray(np.fft.rfftfreq(size, interval), dtype=np.float64)
+    power = gain(smoothing, interval, frequency) ** 2
+    return np.asarray(toeplitz(np.fft.irfft(power, size)[:length]))
+
+
 def edge(smoothing: Smoothing | None, interval: float) -> int:
     """Samples at an end of a recording that the filter treats differently."""
     if smoothing is None:

@@ -17,7 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.channels import keepers
 from bayesimpact.data.quantity import reading_unit
+from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 from bayesimpact.model.effects.effect import Effect, EffectParameter, catalogued
 
@@ -133,10 +135,10 @@ def build_layout(
             unit = _read(campaign, effect, parameter.unit)
             for name in _instances(campaign, effect, parameter):
                 add(name, unit, "effect", parameter.lower, parameter.upper)
-    for recording in campaign.recordings:
+    for recording, keeper in zip(campaign.recordings, keepers(campaign.recordings), strict=True):
         for nuisance, unit in _NUISANCE_UNITS.items():
             unit = reading_unit(unit, recording.order) if nuisance == "offset" else unit
-            add(f"{nuisance}[{recording.name}]", unit, "nuisance")
+            add(_nuisances(recording, keeper)[nuisance], unit, "nuisance")
     orders = [r.order for r in campaign.recordings]
     for name, order in zip(sigma_names(campaign, sigma_per_recording), orders, strict=False):
         add(name, reading_unit("m", order), "noise", 0.0)
@@ -245,12 +247,10 @@ def _maps(
     for effect in effects:
         for slot, value in effect.sets.items():
             constants[:, SLOTS.index(slot)] = value
+    states = keepers(campaign.recordings)
     for r, recording in enumerate(campaign.recordings):
         constants[r, SLOTS.index("A")] = 0.0 if recording.input is None else 1.0
-        plain = {
-            "k2": f"k2[{recording.case}]",
-            **{n: f"{n}[{recording.name}]" for n in _NUISANCE_UNITS},
-        }
+        plain = {"k2": f"k2[{recording.case}]", **_nuisances(recording, states[r])}
         if recording.input is not None and recording.input.free:
             plain["A"] = INPUT_GAIN
         for i, slot in enumerate(SLOTS):
@@ -264,6 +264,11 @@ def _maps(
             else:
                 constants[r, j] = owner[1].fixed
     return columns, constants
+
+
+def _nuisances(recording: Recording, keeper: str) -> dict[str, str]:
+    """Slot -> name; channels of one motion share the state that `keeper` begins with."""
+    return {n: f"{n}[{recording.name if n == 'offset' else keeper}]" for n in _NUISANCE_UNITS}
 
 
 def _own(owner: tuple[Effect, EffectParameter], case: str, recording: str) -> str:
