@@ -63,6 +63,18 @@ def test_physics_is_no_start(effects):
     assert unfree_starts(fitted(plain(effects))) == ()
 
 
+def test_channels_of_one_motion_are_fitted_each_from_their_common_start():
+    """The second one has no state of its own in the whole campaign's fit."""
+    campaign = plain({"spring_cubic": {"stiffness": 3e6}})
+    one, noise = campaign.recordings[0], np.random.default_rng(1)
+    samples = one.samples + small_rig.NOISE * noise.standard_normal(one.samples.size)
+    other = replace(one, name="other", samples=samples)
+    pair = tuple(replace(r, motion_name="first") for r in (one, other))
+    fit = fitted(replace(campaign, recordings=pair))
+    assert "y0[other]" not in fit.names
+    assert unfree_starts(fit) == ()
+
+
 def test_physics_is_named_without_the_push():
     """A drift of the probe adds to any motion, so that what is put together here is one."""
     campaign = pushed(plain({"sensor_drift": {"rate": 2e-5}}), 0.4 * PERIOD)
