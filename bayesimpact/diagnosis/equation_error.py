@@ -32,7 +32,7 @@ from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.model.effects.effect import Effect, Scales
 from bayesimpact.model.oscillator import Oscillator
 from bayesimpact.model.parameters import INPUT_GAIN, SLOTS, instance_name
-from bayesimpact.model.path_forces import add_forces, has_memory
+from bayesimpact.model.path_forces import add_forces
 from bayesimpact.response.weak_form import Rows, products, rows_of
 
 Array = NDArray[np.float64]
@@ -45,6 +45,9 @@ FLIGHT_WIDTH = 1 / 8  # of one in flight: every flight lasts half a period, two 
 STEADY = 3e-3  # of the largest speed: noise that is left in a measured velocity
 WIDEST = 1 / 24  # of a natural period: half width of the polynomials that smooth the motion
 STEP = 1e-3  # of an effect's plausible size
+# points of a shape grid for one of the scores': a force costs nothing here, and what a shape beside
+# the true one leaves of a large effect asks for other effects
+FINER = 4
 RIDGE = 1e-9  # stretches that overlap much are nearly dependent
 
 
@@ -194,9 +197,7 @@ def terms_of(
         if is_periodic(effect) or not forces or not effect.admissible(scales):
             continue
         target = extend(fit, (effect,), scales)
-        if any(has_memory(law) for law in target.oscillator.laws):
-            continue
-        for shapes in shape_points(effect, scales):
+        for shapes in shape_points(effect, scales, FINER):
             term = _term(fit, target, effect, scales, shapes, paths)
             if term is not None:
                 found.append(term)
