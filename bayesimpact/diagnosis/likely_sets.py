@@ -2,7 +2,7 @@
 
 All sets come from the normal equations of `equation_error`: a beam of the best ones is extended by
 one effect at a time. A set counts by what its least squares leave of the stretches, with the price
-of every unknown (Schwarz 1978) and of every effect.
+of every unknown (Schwarz 1978), shapes among them, and of every effect.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ class LikelySets:
         be, below zero.
         """
         x, left = self.solve(chosen)
-        unknowns = x.size - len(self.base)
+        unknowns = x.size - len(self.base) + sum(len(self.terms[t].shapes) for t in chosen)
         signs = [s for t in chosen for s in self.terms[t].one_sided]
         if x[0] <= 0.0 or np.any(x[len(self.base) :][signs] <= 0.0):
             return -np.inf
