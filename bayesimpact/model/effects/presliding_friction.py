@@ -14,8 +14,7 @@ goes on once the amplitude is not larger than x.
 Source: Dahl 1968, Aerospace Corporation report TOR-0158(3107-18)-1; Dahl 1976, AIAA Journal
 14:1675.
 Status: the path and its work checked in closed form; compiled law against two
-independent integrators of its rate. Simulated and fitted, not looked for unless asked: beside
-hysteresis_bouc_wen, the same law, dry friction alone was often called ambiguous.
+independent integrators of its rate.
 """
 
 from __future__ import annotations
