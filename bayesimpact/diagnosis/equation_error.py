@@ -11,8 +11,9 @@ best sets, with all their parameters, are where refits begin.
 Impacts that few samples show, and a law of the stop that is not the base model's, bias the sizes of
 all forces. The same problem over stretches of free flight alone knows nothing of the stop.
 
-Effects that no force along a given path stands for (a memory, a further mode, another gap) are not
-seen here, nor are readings of velocity or acceleration.
+A state that the motion drives (a memory) follows from the measured motion. Effects that no force
+along a given path stands for (a further mode, another gap) are not seen here, nor are readings of
+velocity or acceleration.
 """
 
 from __future__ import annotations
