@@ -88,12 +88,21 @@ def whitened(target: Target, values: Sequence[Array], sigma: Array) -> tuple[Arr
     return tuple(noise.whiten(v, r.interval, r.used, r.order) / s for v, r, s in rows)
 
 
-def shape_points(effect: Effect, scales: Scales) -> list[dict[str, float]]:
-    """The points of an effect's shape grid, `<effect>.<parameter>` -> value."""
+def shape_points(effect: Effect, scales: Scales, finer: int = 1) -> list[dict[str, float]]:
+    """The points of an effect's shape grid, `<effect>.<parameter>` -> value, `finer` times as many
+    along every axis.
+    """
     shapes = [p for p in effect.parameters if p.is_shape]
     axes = [p.grid(scales) if p.grid else np.array([p.scale(scales)]) for p in shapes]
+    axes = [_finer(axis, finer) for axis in axes]
     keys = [f"{effect.id}.{p.name}" for p in shapes]
     return [dict(zip(keys, map(float, point), strict=True)) for point in itertools.product(*axes)]
+
+
+def _finer(axis: Array, times: int) -> Array:
+    """An axis with `times` - 1 points between each two."""
+    places = np.arange(times * (axis.size - 1) + 1) / times
+    return np.interp(places, np.arange(axis.size), axis)
 
 
 def size_parameters(target: Target, effect: Effect) -> list[tuple[str, EffectParameter]]:

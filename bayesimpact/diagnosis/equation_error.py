@@ -11,8 +11,9 @@ best sets, with all their parameters, are where refits begin.
 Impacts that few samples show, and a law of the stop that is not the base model's, bias the sizes of
 all forces. The same problem over stretches of free flight alone knows nothing of the stop.
 
-Effects that no force along a given path stands for (a memory, a further mode, another gap) are not
-seen here, nor are readings of velocity or acceleration.
+A state that the motion drives (a memory) follows from the measured motion. Effects that no force
+along a given path stands for (a further mode, another gap) are not seen here, nor are readings of
+velocity or acceleration.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.model.effects.effect import Effect, Scales
 from bayesimpact.model.oscillator import Oscillator
 from bayesimpact.model.parameters import INPUT_GAIN, SLOTS, instance_name
-from bayesimpact.model.path_forces import add_forces, has_memory
+from bayesimpact.model.path_forces import add_forces
 from bayesimpact.response.weak_form import Rows, products, rows_of
 
 Array = NDArray[np.float64]
@@ -45,6 +46,9 @@ FLIGHT_WIDTH = 1 / 8  # of one in flight: every flight lasts half a period, two 
 STEADY = 3e-3  # of the largest speed: noise that is left in a measured velocity
 WIDEST = 1 / 24  # of a natural period: half width of the polynomials that smooth the motion
 STEP = 1e-3  # of an effect's plausible size
+# points of a shape grid for one of the scores', to which a force along a path costs little: what a
+# shape beside the true one leaves of a large effect asks for other effects
+FINER = 4
 RIDGE = 1e-9  # stretches that overlap much are nearly dependent
 
 
@@ -78,6 +82,8 @@ class Term:
     names : of its size parameters; its id for what it adds where they are at their null
     columns : per recording (stretches, k), whitened, per unit of them
     one_sided : which of them cannot be negative, (k,)
+    on_grid : whether the shape is one of the scores' grid; sets are chosen from those, for on a
+        finer one a law with a free power comes nearer to the errors of another law than that itself
     """
 
     effect: Effect
@@ -85,6 +91,7 @@ class Term:
     names: tuple[str, ...]
     columns: tuple[Array, ...]
     one_sided: tuple[bool, ...]
+    on_grid: bool
 
 
 def measured_paths(fit: Fit, *, flight: bool = False) -> list[Path]:
@@ -187,19 +194,18 @@ def without_rest(path: Path, x: Array) -> Array:
 def terms_of(
     fit: Fit, effects: Iterable[Effect], scales: Scales, paths: Sequence[Path]
 ) -> list[Term]:
-    """What every effect adds to the equation of motion, at every point of its shape grid."""
+    """What every effect adds to the equation of motion, at every point of a finer shape grid."""
     found = []
     for effect in effects:
         forces = set(effect.binds) <= {"friction"} and not effect.sets
         if is_periodic(effect) or not forces or not effect.admissible(scales):
             continue
         target = extend(fit, (effect,), scales)
-        if any(has_memory(law) for law in target.oscillator.laws):
-            continue
-        for shapes in shape_points(effect, scales):
+        grid = shape_points(effect, scales)
+        for shapes in shape_points(effect, scales, FINER):
             term = _term(fit, target, effect, scales, shapes, paths)
             if term is not None:
-                found.append(term)
+                found.append(replace(term, on_grid=shapes in grid))
     return found
 
 
@@ -231,7 +237,7 @@ def _term(
         return None
     return Term(
         effect, shapes, tuple(names[i] for i in seen), tuple(c[:, seen] for c in columns),
-        tuple(one_sided[i] for i in seen),
+        tuple(one_sided[i] for i in seen), True,
     )  # fmt: skip
 
 

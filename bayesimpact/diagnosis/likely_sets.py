@@ -2,7 +2,7 @@
 
 All sets come from the normal equations of `equation_error`: a beam of the best ones is extended by
 one effect at a time. A set counts by what its least squares leave of the stretches, with the price
-of every unknown (Schwarz 1978) and of every effect.
+of every unknown (Schwarz 1978), shapes among them, and of every effect.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ class LikelySets:
         be, below zero.
         """
         x, left = self.solve(chosen)
-        unknowns = x.size - len(self.base)
+        unknowns = x.size - len(self.base) + sum(len(self.terms[t].shapes) for t in chosen)
         signs = [s for t in chosen for s in self.terms[t].one_sided]
         if x[0] <= 0.0 or np.any(x[len(self.base) :][signs] <= 0.0):
             return -np.inf
@@ -126,10 +126,15 @@ class LikelySets:
                     if odds > level.get(ids, (-np.inf, ()))[0]:
                         level[ids] = odds, (*chosen, t)
             ranked = sorted(level.values(), key=lambda one: -one[0])[:BEAM]
-            if not ranked or ranked[0][0] <= reached:
+            if not ranked:
                 break
-            reached, beam = ranked[0][0], [chosen for _, chosen in ranked]
-            found.append(self._set(beam[0], reached - none))
+            beam = [chosen for _, chosen in ranked]
+            best = self._refined(beam[0])
+            odds = self.log_odds(best)
+            if odds <= reached:
+                break
+            reached = odds
+            found.append(self._set(best, reached - none))
         return [_completed(one, self.fit, self.paths) for one in found]
 
     def gains(self, ids: Collection[str]) -> dict[str, float]:
@@ -146,12 +151,19 @@ class LikelySets:
 
     def _shaped(self, ids: Sequence[str]) -> Chosen:
         """The terms of a set of effects, each at its likeliest shape beside the others."""
-        own = {i: [t for t, x in enumerate(self.terms) if x.effect.id == i] for i in ids}
-        chosen = {i: own[i][0] for i in ids}
-        for i in (*ids, *ids):
-            rest = [t for other, t in chosen.items() if other != i]
-            chosen[i] = max(own[i], key=lambda t: self.log_odds((*rest, t)))
-        return tuple(chosen.values())
+        every = [term.effect.id for term in self.terms]
+        return self._refined([every.index(i) for i in ids])
+
+    def _refined(self, chosen: Sequence[int]) -> Chosen:
+        """A set with the shape of each effect where it is likeliest beside the others, also between
+        the points from which sets are chosen.
+        """
+        found = list(chosen)
+        for k in (*range(len(found)), *range(len(found))):
+            effect, rest = self.terms[found[k]].effect, (*found[:k], *found[k + 1 :])
+            own = [t for t, term in enumerate(self.terms) if term.effect is effect]
+            found[k] = max(own, key=lambda t: self.log_odds((*rest, t)))
+        return tuple(found)
 
     def _beside(self, chosen: Sequence[int]) -> list[int]:
         """Terms that a set may take in."""
@@ -160,7 +172,9 @@ class LikelySets:
         return [
             t
             for t, term in enumerate(self.terms)
-            if term.effect.id not in ids and all(term.effect.stands_beside(e) for e in held)
+            if term.on_grid
+            and term.effect.id not in ids
+            and all(term.effect.stands_beside(e) for e in held)
         ]
 
     def _set(self, chosen: Sequence[int], odds: float) -> EffectSet:

@@ -11,7 +11,7 @@
 | sigma | log-uniform, eight decades about the estimate; log-normal, 10 %, about a stated noise |
 | input_gain | uniform, +- 100 times the quick estimate |
 | added effects | half-Cauchy (Cauchy with both signs) of a physical scale |
-| their shapes | log-normal, or log-uniform between two positive bounds |
+| their shapes | log-normal, or log-uniform between two positive bounds or in their range |
 
 Campaign.toml's [priors] replace any of them.
 """
@@ -109,6 +109,8 @@ def effect_prior(effect: Effect, parameter: EffectParameter, scales: Scales) -> 
     scale = parameter.scale(scales)
     if parameter.circular:
         return Uniform(-2 * np.pi, 4 * np.pi)
+    if parameter.within is not None:
+        return LogUniform(*parameter.within(scales))
     if parameter.is_shape and parameter.lower > 0.0 and parameter.upper < np.inf:
         return LogUniform(parameter.lower, parameter.upper)
     if parameter.is_shape:

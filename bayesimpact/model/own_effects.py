@@ -199,6 +199,12 @@ def _check_parameter(effect: Effect, parameter: EffectParameter, place: _Place) 
         inside = grid.ndim == 1 and grid.size and np.isfinite(grid).all()
         if not (inside and grid.min() >= parameter.lower and grid.max() <= parameter.upper):
             raise InputError(f"{where}, grid", str(grid)[:80], "values within the bounds")
+    if parameter.within is not None:
+        found = tried(place, where, lambda: tuple(map(float, parameter.within(USUAL))))  # type: ignore[misc]
+        ordered = len(found) == 2 and 0.0 < found[0] < found[1] < np.inf
+        if not (ordered and parameter.is_shape):
+            accepted = "for a shape (null=None): two numbers above 0, ascending"
+            raise InputError(f"{where}, within", str(found), accepted)
 
 
 def tried(place: _Place, where: str, call: Callable[[], Any]) -> Any:

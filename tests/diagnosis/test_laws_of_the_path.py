@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 import small_rig
 from effect_rigs import BY_ID, with_effect
 
@@ -23,17 +24,28 @@ def score(effect: Effect) -> Score:
     return Score(effect, {}, 0.0, 1.0, none, none, 0.0, none, 1.0, 9.0, ())
 
 
-def test_a_loop_as_wide_as_the_swing_is_named():
-    stiffness, decay = 8.0, 1 / 6e-3
-    planted = {"hysteresis_bouc_wen": {"stiffness": stiffness, "decay": decay}}
-    campaign = small_rig.record(seed=11, effects=planted)
-    found = bi.diagnose(campaign, search=False, seed=0, effects=(*bi.SEARCHED, LOOP))
-    assert found.verdict == "named" and [e.id for e in found.effects] == [LOOP.id]
-    for name, true in (("stiffness", stiffness), ("decay", decay)):
-        at = found.after.names.index(f"{LOOP.id}.{name}")
+@pytest.mark.parametrize(
+    ("law", "numbers"),
+    [
+        (LOOP, {"stiffness": 8.0, "decay": 1 / 6e-3}),
+        (DAHL, {"force": 3e-3, "displacement": 3e-4}),
+        (LOOP, {"stiffness": 100.0, "decay": 2 / 6e-3}),
+        (DAHL, {"force": 0.05, "displacement": 3e-4}),
+    ],
+)
+def test_one_law_has_the_name_of_its_range(law: Effect, numbers: dict[str, float]) -> None:
+    """A loop as wide as the swing, and friction that gives a little: small, and a large misfit."""
+    campaign = small_rig.record(seed=11, effects={law.id: numbers})
+    both = (*(e for e in bi.SEARCHED if e.id not in (LOOP.id, DAHL.id)), LOOP, DAHL)
+    found = bi.diagnose(campaign, search=False, seed=0, effects=both)
+    assert found.verdict == "named" and [e.id for e in found.effects] == [law.id]
+    for name, true in numbers.items():
+        at = found.after.names.index(f"{law.id}.{name}")
         assert abs(found.after.mode[at] - true) < 4 * found.after.sd[at]
-    one = frozenset([LOOP.id])
-    assert not any(one < frozenset(c.ids) and DAHL.id in c.ids for c in found.naming.tried)
+    one = frozenset([law.id])
+    assert not any(
+        one < frozenset(c.ids) and {LOOP.id, DAHL.id} <= {*c.ids} for c in found.naming.tried
+    )
 
 
 def test_one_law_is_not_added_to_itself(small):

@@ -13,6 +13,8 @@ from effect_rigs import BY_ID
 from bayesimpact.data.campaign import SECOND_STOP, Campaign
 from bayesimpact.data.input import Input
 from bayesimpact.data.recording import Recording
+from bayesimpact.diagnosis.asked import Asked
+from bayesimpact.diagnosis.directions import shape_points
 from bayesimpact.diagnosis.equation_error import Path, measured_paths, terms_of, without_rest
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.likely_sets import EffectSet, LikelySets
@@ -20,7 +22,7 @@ from bayesimpact.diagnosis.refit import fit_from
 from bayesimpact.diagnosis.size import force_along
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
-from bayesimpact.model.effects import SEARCHED
+from bayesimpact.model.effects import EFFECTS, SEARCHED
 from bayesimpact.model.parameters import SLOTS
 from bayesimpact.trial.rig import Effects
 
@@ -68,10 +70,15 @@ def test_three_strong_effects_are_asked_for(seed: int) -> None:
 def test_with_a_stop() -> None:
     fit = fitted(small_rig.record(1, STOPPED, duration=4.0))
     assert fit.reduced_chi2 > 9
-    found = sets_of(fit)[-1]  # with others that repair what sparse samples of impacts do
-    assert {e.id for e in found.effects} > set(STOPPED)
-    candidate = fit_from(fit, found.effects, found.values, campaign_scales(fit))
-    assert candidate.fit.reduced_chi2 < 1.2
+    scales = campaign_scales(fit)
+    found = LikelySets(fit, SEARCHED, scales, flight=True).best(1)[0]
+    assert [e.id for e in found.effects] == ["opposite_stop"]
+    assert found.values["opposite_stop.gap"] == pytest.approx(3e-3, rel=0.01)  # off the coarse grid
+    stop = fit_from(fit, found.effects, found.values, scales)
+    beside = Asked(fit, SEARCHED, scales).first(stop)
+    assert "contact_damping_indentation" in beside
+    effects = [BY_ID[i] for i in STOPPED]
+    assert fit_from(fit, effects, found.values, scales).fit.reduced_chi2 < 1.2
 
 
 def test_driven_with_an_unknown_gain() -> None:
@@ -122,6 +129,54 @@ def test_columns_are_the_law_along_the_path(effect_id: str) -> None:
         force = force_along(effect.law, path.y, path.v, path.t, [1.0, *shapes], q)
         expected = without_rest(path, path.rows.integrals(force)[:, None])
         np.testing.assert_allclose(columns, expected, rtol=1e-6, atol=1e-9 * np.abs(expected).max())
+
+
+LOOPS = {
+    "hysteresis_bouc_wen": {"stiffness": 40.0, "decay": 300.0},
+    "presliding_friction": {"force": 0.02, "displacement": 2.5e-4},
+    "spring_piecewise": {"stiffness": 200.0, "gap": 3e-3, "damping": 1.0},
+}
+
+
+@pytest.mark.parametrize("effect_id", LOOPS)
+def test_a_memory_and_a_clearance_are_asked_for_at_a_shape_nearby(effect_id: str) -> None:
+    """States follow the measured motion; of the grid the nearest point is taken."""
+    planted = {effect_id: LOOPS[effect_id]}
+    if effect_id == "spring_piecewise":  # of rigs with a stop only
+        fit = fitted(small_rig.record(3, planted, duration=4.0))
+    else:
+        fit = fitted(decays(3, planted))
+    effects = [e for e in EFFECTS if e in SEARCHED or e.id in LOOPS]
+    assert fit.reduced_chi2 > 9
+    sets = LikelySets(fit, effects, campaign_scales(fit), flight=effect_id == "spring_piecewise")
+    first = sets.best(5)[0]
+    assert [e.id for e in first.effects] == [effect_id]
+    for name, value in LOOPS[effect_id].items():
+        assert first.values[f"{effect_id}.{name}"] == pytest.approx(value, rel=0.3)
+
+
+def test_a_shape_has_its_price() -> None:
+    """A power of the speed may be two: quadratic drag has one unknown less."""
+    fit = fitted(decays(2, {"quadratic_drag": {"coefficient": 3.0}}))
+    sets = LikelySets(fit, SEARCHED, campaign_scales(fit))
+    assert [e.id for e in sets.best(1)[0].effects] == ["quadratic_drag"]
+    for effect_id, unknowns in (("quadratic_drag", 1), ("power_damping", 2)):
+        own = [[i] for i, term in enumerate(sets.terms) if term.effect.id == effect_id]
+        one = max(own, key=sets.log_odds)
+        price = -0.5 * sets.rows * sets.solve(one)[1] - sets.log_odds(one)
+        assert price == pytest.approx(0.5 * unknowns * np.log(sets.rows) + sets.cost)
+
+
+def test_grids_are_finer_here() -> None:
+    scales = campaign_scales(fitted(small_rig.record(1)))
+    law = BY_ID["opposite_stop"]
+    coarse, fine = ([*map(dict.values, shape_points(law, scales, k))] for k in (1, 3))
+    own = law.parameter("gap").grid
+    assert own is not None
+    np.testing.assert_array_equal(np.ravel([*map(list, coarse)]), own(scales))
+    axis = np.ravel([*map(list, fine)])
+    np.testing.assert_allclose(axis[::3], own(scales))
+    np.testing.assert_allclose(np.diff(axis)[:3], np.diff(own(scales))[0] / 3)
 
 
 def test_errors_of_stretches_are_white() -> None:

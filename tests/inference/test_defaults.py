@@ -124,6 +124,8 @@ def test_priors_of_effects():
     assert prior_of("contact_power_law", "exponent") == Cauchy(1.0, exponent.scale(SCALES))
     time = BY_ID["contact_relaxation"].parameter("time")
     assert prior_of("contact_relaxation", "time") == LogNormal(time.scale(SCALES), 1.5)
+    low, high = prior_of("presliding_friction", "displacement").support
+    assert 0 < low < 0.01 * SCALES.amplitude and high == 0.14 * SCALES.amplitude
     phase = prior_of("harmonic_forcing", "phase")
     assert isinstance(phase, Uniform) and phase.lower < 0 and phase.upper > 2 * np.pi
 

@@ -76,6 +76,8 @@ def test_its_law_is_the_one_that_is_simulated(tmp_path):
         ("s: s.damping", "s: -1.0", "scale: found -1.0 on an ordinary rig"),
         ("lower=0.0", "lower=0.0, upper=-1.0", "lower and upper: found 0.0 to -1.0"),
         ("lower=0.0", "lower=2.0", "null: found 0.0"),
+        ("lower=0.0", "within=lambda s: (1.0, 2.0)", r"within: found \(1.0, 2.0\)"),
+        ("lower=0.0", "null=None, within=lambda s: (2.0, 1.0)", r"within: found \(2.0, 1.0\)"),
         ("lower=0.0", 'scope="planet"', "scope: found 'planet'"),
         ("return p[0]", "return helper() * p[0]", r"mine.py, line \d, .*force: found NameError"),
         ("p[0] * v * v * v", "p[0] * [v].size", "line 6, .*force: found Unknown attribute"),

@@ -88,9 +88,6 @@ UNTRIED = (
     "base_motion",
     "adhesion",
     "obstacle_restitution",
-    "presliding_friction",
-    "spring_piecewise",
-    "hysteresis_bouc_wen",
 )
 """Simulated and fitted like any, but not looked for unless asked: trials have not shown yet that
 they are named rightly.

@@ -102,12 +102,14 @@ class EffectParameter:
     name, unit : unit for displacements; `bayesimpact.model.parameters.unit_for` translates
     scale : size that would be plausible, from the campaign's scales: the prior is half-Cauchy
         (Cauchy when both signs are admissible) about `null` with this scale; for a shape parameter
-        the prior is log-normal about it, or log-uniform between two positive bounds
+        the prior is log-normal about it, or log-uniform between two positive bounds or `within`
     lower, upper : physical bounds
     null : value at which the effect vanishes; None for a shape parameter (a depth, a time constant,
         a frequency), which means nothing while the amplitude is at its null
     scope : one value for the campaign, per case or per recording
     grid : for a shape parameter, the values that a scan tries, from the scales
+    within : for a shape parameter, the range outside which the law goes by another name, from the
+        scales: the prior is log-uniform in it
     circular : a phase, rad
     fixed : a constant of the law, not an unknown
     spectral : a frequency, Hz; a scan should try the peaks of the residual's periodogram as well
@@ -124,6 +126,7 @@ class EffectParameter:
     null: float | None = 0.0
     scope: Scope = "campaign"
     grid: Callable[[Scales], NDArray[np.float64]] | None = None
+    within: Callable[[Scales], tuple[float, float]] | None = None
     circular: bool = False
     fixed: float | None = None
     spectral: bool = False
@@ -222,7 +225,7 @@ class Effect(Picklable):
     needs_stop : True when it makes no sense without an obstacle
     prefer : id of the simpler effect that this one reduces to at its null
     restates : id of an effect that is the same law in other numbers, for another range of them: no
-        model holds both, and only their priors tell them apart
+        model holds both, and only the ranges `within` which they go by these names tell them apart
     condition : what else a campaign must offer (two obstacles, two impacts, ...); None for nothing
     size : how large it is for given parameters, where the peak of its force along the motion or of
         its change of the readings does not say so

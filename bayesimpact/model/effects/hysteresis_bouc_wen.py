@@ -4,8 +4,8 @@ Equation: force a z, z' = v - b |v| z (A = 1: only the product of a and A means 
 N/m, b in 1/m (for angles N m/rad, 1/rad). z depends on the path alone: |z| rises to 1 / b. z = 0 at
 a recording's first sample.
 At its null: a = 0 is the base model; b then means nothing. b -> 0 is a spring, part of k1; a large
-b with F = a / b is coulomb_friction, which is simpler and preferred; between them, for b well above
-one over the amplitude, it is presliding_friction, the same law in other numbers.
+b with F = a / b is coulomb_friction, which is simpler and preferred; between them, for 1 / b below
+0.14 of the amplitude, it is called presliding_friction, the same law in other numbers.
 Energy: dissipates; 4 a (A b - tanh(A b)) / b^2 in a cycle of amplitude A.
 Valid: joints, wire ropes and elastomers whose loop does not depend on the speed; n = 1, loading
 and unloading alike (beta = b, gamma = 0).
@@ -24,6 +24,9 @@ import math
 import numpy as np
 
 from bayesimpact.model.effects.effect import Effect, EffectParameter, Law, Numbers, Scales, Size
+from bayesimpact.model.effects.presliding_friction import LONGEST
+
+SMALLEST = 0.1  # over one over the amplitude: a spring with a loss factor of 4 %, hard to tell
 
 
 def force(
@@ -76,7 +79,8 @@ EFFECT = Effect(
             scale=lambda s: 1.0 / s.amplitude,
             lower=0.0,
             null=None,
-            grid=lambda s: np.array([0.3, 1.0, 2.0, 4.0]) / s.amplitude,
+            grid=lambda s: np.array([0.3, 1.0, 2.0, 4.0, 6.5]) / s.amplitude,
+            within=lambda s: (SMALLEST / s.amplitude, 1.0 / (LONGEST * s.amplitude)),
         ),
     ),
     law=Law(force, travel=travel, first_at_turn=first_at_turn, ignores_speed=True),

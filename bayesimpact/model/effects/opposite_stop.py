@@ -17,6 +17,8 @@ import numpy as np
 
 from bayesimpact.model.effects.effect import Effect, EffectParameter, Law, Numbers
 
+GAPS = (0.2, 0.35, 0.5, 0.6, 0.7, 0.8, 0.87, 0.94)  # of the largest amplitude
+
 
 def force(
     y: float, v: float, d: float, t: float, z: float, touching: float, p: Numbers, q: Numbers
@@ -51,7 +53,7 @@ EFFECT = Effect(
             scale=lambda s: 0.7 * s.amplitude,
             lower=0.0,
             null=None,
-            grid=lambda s: np.array([0.2, 0.35, 0.5, 0.6, 0.7, 0.8, 0.87, 0.94]) * s.amplitude,
+            grid=lambda s: np.array(GAPS) * s.amplitude,
         ),
     ),
     law=Law(force, surface=surface, polynomial=True, ignores_speed=True),

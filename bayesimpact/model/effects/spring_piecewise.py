@@ -20,6 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from bayesimpact.model.effects.effect import Effect, EffectParameter, Law, Numbers
+from bayesimpact.model.effects.opposite_stop import GAPS
 
 
 def force(
@@ -55,7 +56,8 @@ EFFECT = Effect(
             scale=lambda s: 0.7 * s.amplitude,
             lower=0.0,
             null=None,
-            grid=lambda s: np.array([0.2, 0.4, 0.6, 0.75, 0.9]) * s.amplitude,
+            # opposite_stop's: of two laws that differ by a damper the one with the finer grid wins
+            grid=lambda s: np.array(GAPS) * s.amplitude,
         ),
         EffectParameter(
             "damping",

@@ -173,6 +173,18 @@ def test_shapes_have_grids_within_their_bounds():
         for parameter, values in zip(shapes, grids, strict=True):
             assert values.size >= 2
             assert np.all((values >= parameter.lower) & (values <= parameter.upper))
+            low, high = effect_prior(effect, parameter, scales).support
+            assert np.all((values >= low) & (values <= high))
+
+
+def test_two_names_of_one_law_hold_in_ranges_that_meet():
+    """x of presliding_friction is one over the decay of hysteresis_bouc_wen."""
+    scales = TestRig().scales()
+    way = BY_ID["presliding_friction"].parameter("displacement").within
+    decay = BY_ID["hysteresis_bouc_wen"].parameter("decay").within
+    assert way is not None and decay is not None
+    assert way(scales)[1] == pytest.approx(1 / decay(scales)[1], rel=1e-12)
+    assert all(p.within is None or p.is_shape for e in EFFECTS for p in e.parameters)
 
 
 def test_admissible_only_where_it_could_show():
