@@ -71,7 +71,7 @@ def document(
     return {
         "schema": "bayesimpact/diagnosis/2",
         "verdict": d.verdict,
-        "summary": failure(d.identification.fit)
+        "summary": failure(d.identification.fit, explained=d.verdict in ("adequate", "named"))
         + summary(
             d.verdict,
             d.effects,

@@ -124,10 +124,14 @@ def remaining(left: Remainder | None, unit: str = "m") -> str:
     )
 
 
-def failure(fit: Fit) -> str:
-    """A sentence where the base model leaves more than half of the signal; else empty."""
+def failure(fit: Fit, *, explained: bool = False) -> str:
+    """A sentence where the base model leaves more than half of the signal; else empty. Likely
+    reasons are told where the answer has not `explained` it.
+    """
     if not base_failed(fit):
         return ""
+    if explained:
+        return "The base model alone leaves more than half of the signal. "
     reasons = ["a wrong sign, unit or clock of the recordings"]
     inputs = [r.input for r in fit.target.oscillator.campaign.recordings if r.input is not None]
     if inputs:
