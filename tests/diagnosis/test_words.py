@@ -90,7 +90,7 @@ def test_a_failed_base_fit_says_what_may_be_wrong():
     assert failure(fit_of(0.4, known)) == ""
     assert "sign, unit or clock" in failure(fit_of(0.6, None))
     assert "input" not in failure(fit_of(0.6, None))
-    assert "sign" not in failure(fit_of(0.6, None), explained=True)
+    assert "wrong sign" not in failure(fit_of(0.6, None), explained=True)
     assert "half of the signal" in failure(fit_of(0.6, None), explained=True)
     assert 'gain = "free"' in failure(fit_of(0.6, None, known))
     said = failure(fit_of(0.6, free))
