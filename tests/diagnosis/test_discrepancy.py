@@ -217,6 +217,20 @@ def test_what_a_learned_force_has_of_spring_and_damper_is_given_back():
         )
 
 
+def test_what_a_remainder_hides_moves_parameters_of_one_kind_together():
+    """The mean of two stiffnesses or of a gap's parts is no better known than each of them."""
+    campaign = small_rig.record(3, {"spring_cubic": {"stiffness": 1e6}})
+    left = left_by(plain_fit(campaign))
+    hidden = left.posterior[1] - left.covariance
+    names = list(left.fit.names)
+    one, other, k1 = names.index("k2[1]"), names.index("k2[2]"), names.index("k1")
+    assert hidden[one, one] > left.covariance[one, one] / 100 and hidden[k1, k1] > 0
+    assert hidden[one, other] == pytest.approx(np.sqrt(hidden[one, one] * hidden[other, other]))
+    assert hidden[one, k1] == pytest.approx(
+        0.0, abs=1e-9 * np.sqrt(hidden[one, one] * hidden[k1, k1])
+    )
+
+
 def test_an_effect_that_is_not_there_is_not_apart():
     campaign = shaken(7, 1e-2)
     fit = plain_fit(campaign)
