@@ -10,8 +10,9 @@ Let S be the likeliest set of effects that the search reached.
    where what the model nearest to the recordings leaves beside one is noise.
    Nothing is needed where a free force in the place of all effects leaves `EXCESS` times less of
    the misfit: the effects only imitate it. Else an effect of S is needed when
-   - every set of effects without it trails S by the decisive odds, or trails it at all where it has
-     more effects or parameters than S: more to fit with makes imitation easy,
+   - every set of effects without it trails S by the decisive odds; one with more effects or
+     parameters than S trails at all what is likeliest with the effect and no larger than that one:
+     more to fit with makes imitation easy, and the rest of the truth may be among it,
    - `EXCESS` times as much is left without it, other effects refitted: of the misfit above the
      noise, or of the force about the motion's own frequencies. An effect that imitates what the
      catalogue lacks may put the phase right, but leaves most of the force,
@@ -136,10 +137,12 @@ def lead(naming: Naming, ids: frozenset[str]) -> float:
 
 def is_larger(effects: Sequence[Effect], chosen: State) -> bool:
     """Whether a set of effects is larger than the chosen one, or as large with more parameters."""
-    own = chosen.candidate.effects
-    if len(effects) != len(own):
-        return len(effects) > len(own)
-    return sum(len(e.parameters) for e in effects) > sum(len(e.parameters) for e in own)
+    return size(effects) > size(chosen.candidate.effects)
+
+
+def size(effects: Sequence[Effect]) -> tuple[int, int]:
+    """Numbers of effects and of their parameters."""
+    return len(effects), sum(len(e.parameters) for e in effects)
 
 
 def may_be_needed(naming: Naming, effect: Effect) -> bool:
@@ -152,13 +155,20 @@ def may_be_needed(naming: Naming, effect: Effect) -> bool:
 
 
 def leads_without(naming: Naming, effect: Effect) -> bool:
-    """Whether every set of effects without one trails the chosen one."""
+    """Whether every set of effects without one trails the chosen one; those that are larger, the
+    likeliest with it that is no larger than they are.
+    """
     chosen = naming.chosen
-    reached = naming.log_odds(chosen.candidate)
+    own = naming.log_odds(chosen.candidate)
+    with_it = [(size(c.effects), naming.log_odds(c)) for c in naming.tried if effect.id in c.ids]
+
+    def least(rival: Candidate) -> float:
+        if not is_larger(rival.effects, chosen):
+            return own - DECISIVE
+        return max([own, *(odds for larger, odds in with_it if larger <= size(rival.effects))])
+
     return not any(
-        naming.log_odds(c) > reached - (0.0 if is_larger(c.effects, chosen) else DECISIVE)
-        for c in naming.tried
-        if not holds(c.effects, effect)
+        naming.log_odds(c) > least(c) for c in naming.tried if not holds(c.effects, effect)
     )
 
 

@@ -93,7 +93,7 @@ def shape_points(effect: Effect, scales: Scales, finer: int = 1) -> list[dict[st
     along every axis.
     """
     shapes = [p for p in effect.parameters if p.is_shape]
-    axes = [p.grid(scales) if p.grid else np.array([p.scale(scales)]) for p in shapes]
+    axes = [np.asarray(p.grid(scales) if p.grid else [p.scale(scales)]) for p in shapes]
     axes = [_finer(axis, finer) for axis in axes]
     keys = [f"{effect.id}.{p.name}" for p in shapes]
     return [dict(zip(keys, map(float, point), strict=True)) for point in itertools.product(*axes)]

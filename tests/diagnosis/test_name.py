@@ -202,6 +202,17 @@ def test_what_has_more_to_fit_with_must_be_likelier_to_unseat_an_effect():
         assert judge(replace(found, residual=residual)) == verdict
 
 
+def test_a_larger_set_is_compared_with_what_is_likeliest_with_the_effect_and_no_larger():
+    """A third law that both may take in says nothing of the effect."""
+    rival = candidate(f"{DRAG} gap_wear", 101.0 + COST)
+    assert judge(remaining(something_left(), 100.0, 10.0, rival)) == "unknown"
+    for gain, verdict in ((101.1, "partly"), (100.9, "unknown")):
+        both = candidate(f"{FRICTION} gap_wear", gain + COST)
+        assert judge(remaining(something_left(), 100.0, 10.0, rival, both)) == verdict
+    larger = candidate(f"{FRICTION} gap_wear gap_per_recording", 110.0 + 2 * COST)
+    assert judge(remaining(something_left(), 100.0, 10.0, rival, larger)) == "unknown"
+
+
 def test_an_effect_may_stand_out_by_the_force_that_is_left_without_it():
     """About the motion's own frequencies: a misfit grows with phase errors, a force does not."""
     for without_it, verdict in ((EXCESS + 0.1, "partly"), (EXCESS - 0.1, "unknown")):
