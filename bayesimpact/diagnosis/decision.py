@@ -137,10 +137,10 @@ def lead(naming: Naming, ids: frozenset[str]) -> float:
 
 def is_larger(effects: Sequence[Effect], chosen: State) -> bool:
     """Whether a set of effects is larger than the chosen one, or as large with more parameters."""
-    return size(effects) > size(chosen.candidate.effects)
+    return complexity(effects) > complexity(chosen.candidate.effects)
 
 
-def size(effects: Sequence[Effect]) -> tuple[int, int]:
+def complexity(effects: Sequence[Effect]) -> tuple[int, int]:
     """Numbers of effects and of their parameters."""
     return len(effects), sum(len(e.parameters) for e in effects)
 
@@ -160,12 +160,13 @@ def leads_without(naming: Naming, effect: Effect) -> bool:
     """
     chosen = naming.chosen
     own = naming.log_odds(chosen.candidate)
-    with_it = [(size(c.effects), naming.log_odds(c)) for c in naming.tried if effect.id in c.ids]
+    with_it = [c for c in naming.tried if effect.id in c.ids]
 
     def least(rival: Candidate) -> float:
         if not is_larger(rival.effects, chosen):
             return own - DECISIVE
-        return max([own, *(odds for larger, odds in with_it if larger <= size(rival.effects))])
+        most = complexity(rival.effects)
+        return max([own, *(naming.log_odds(c) for c in with_it if complexity(c.effects) <= most)])
 
     return not any(
         naming.log_odds(c) > least(c) for c in naming.tried if not holds(c.effects, effect)

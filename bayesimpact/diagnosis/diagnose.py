@@ -81,7 +81,7 @@ class Searches:
     progress: Progress
     budget: Budget
 
-    def first(self, corrected: Corrected) -> Diagnosis:
+    def search(self, corrected: Corrected) -> Diagnosis:
         """Whatever is left of the budget."""
         return _of_corrected(
             corrected,
@@ -100,7 +100,7 @@ class Searches:
         """
         if not self.budget.may_search_again():
             return unfinished(found)
-        other = self.first(corrected())
+        other = self.search(corrected())
         if is_better(other, found):
             return other
         return found if other.naming.finished else unfinished(found)
@@ -144,7 +144,7 @@ def diagnose(
         proved = proved or exceeds(doubtful[0], fit, float(promised.sum()))
         certain = with_steps(certain, [doubtful.pop(0)], rng=rng, search=search)
     searches = Searches(rng, effects, say, begin(clock))
-    found = searches.first(certain)
+    found = searches.search(certain)
     beside = [e for e in found.effects if e in found.after.target.oscillator.effects]
     if shared_effects(beside) and is_doubtful(found):
         say("comparing the recordings beside what is missing")

@@ -55,11 +55,11 @@ class Discrepancy:
     """
 
     fit: Fit
-    motions: tuple[Motion, ...]
-    parts: tuple[Part, ...]
+    motions: tuple[Motion, ...] = field(repr=False)
+    parts: tuple[Part, ...] = field(repr=False)
     k: float
     level: float
-    values: tuple[Array, ...]
+    values: tuple[Array, ...] = field(repr=False)
     _gains: dict[Fit, float] = field(default_factory=dict, repr=False)
 
     def gain(self, fit: Fit) -> float:

@@ -91,7 +91,7 @@ class Term:
     names: tuple[str, ...]
     columns: tuple[Array, ...]
     one_sided: tuple[bool, ...]
-    on_grid: bool
+    on_grid: bool = True
 
 
 def measured_paths(fit: Fit, *, flight: bool = False) -> list[Path]:
@@ -237,7 +237,7 @@ def _term(
         return None
     return Term(
         effect, shapes, tuple(names[i] for i in seen), tuple(c[:, seen] for c in columns),
-        tuple(one_sided[i] for i in seen), True,
+        tuple(one_sided[i] for i in seen),
     )  # fmt: skip
 
 

@@ -27,7 +27,8 @@ EXCESS = 4.0
 """How many times as much must be left without an effect as with it, where something remains; and
 how many times less a free force must leave to replace all effects. An effect that only imitates
 physics outside the catalogue, with responses at a cosine of 0.87 or less, leaves more than a
-quarter. Not calibrated on trials yet.
+quarter. Models that leave less than that many times as much do not stand out either: intervals hold
+their values too. Not calibrated on trials yet.
 """
 
 APART = 2.576

@@ -84,9 +84,8 @@ def refined_noise(fit: Fit) -> Noise:
     noise = fit.target.likelihood.noise
     if noise.is_bound and fit.reduced_chi2 < 1.0:
         error = float(np.sqrt(0.5 / fit.target.likelihood.sizes.sum()))
-        level = noise.level * float(
-            np.sqrt(fit.reduced_chi2)
-        )  # before a filter, as the residual is not
+        # of the noise before a filter; the residual's rms is that behind it
+        level = noise.level * float(np.sqrt(fit.reduced_chi2))
         return replace(noise, level=level, level_error=error, source="residual of the base model")
     plain = noise.correlation == 0.0 and noise.smoothing is None
     if plain or fit.reduced_chi2 > GROSS or fit.target.oscillator.campaign.mixed:

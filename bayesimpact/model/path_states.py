@@ -34,9 +34,7 @@ def follow(law: Any, y: Any, v: Any, d: Any, t: Any, p: Any, q: Any, z: Any) -> 
 
 
 @compiled(nogil=True)
-def _follow_path(
-    travel: Any, y: Any, v: Any, d: Any, t: Any, p: Any, q: Any, z: Any
-) -> None:  # fmt: skip
+def _follow_path(travel: Any, y: Any, v: Any, d: Any, t: Any, p: Any, q: Any, z: Any) -> None:
     start, way, turned = 0.0, np.sign(v[0]), y[0]
     z[0] = 0.0
     for i in range(1, y.size):
@@ -52,9 +50,7 @@ def _follow_path(
 
 
 @compiled(nogil=True)
-def _follow_time(
-    rate: Any, y: Any, v: Any, d: Any, t: Any, p: Any, q: Any, z: Any
-) -> None:  # fmt: skip
+def _follow_time(rate: Any, y: Any, v: Any, d: Any, t: Any, p: Any, q: Any, z: Any) -> None:
     z[0] = 0.0
     for i in range(1, y.size):
         now, h = z[i - 1], (t[i] - t[i - 1]) / PARTS

@@ -91,7 +91,7 @@ def test_a_search_for_which_too_little_is_left_is_not_begun(monkeypatch, verdict
 def test_searches_share_one_budget(monkeypatch) -> None:
     clock = Clock()
     asked, given = searches(monkeypatch, clock, MadeUp("partly"), took=100.0)
-    found = asked.first(None)
+    found = asked.search(None)
     for turn in range(4):
         found = asked.again(found, lambda: None, better(False))
         assert found.naming.finished == (turn < 2)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import small_rig
@@ -12,11 +14,32 @@ from bayesimpact.diagnosis.decision import holds
 from bayesimpact.diagnosis.directions import directions
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.promising import families
+from bayesimpact.diagnosis.refit import fit_from
 from bayesimpact.diagnosis.scan import Scan
 from bayesimpact.diagnosis.scores import Score
+from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects import Effect
 
 LOOP, DAHL = BY_ID["hysteresis_bouc_wen"], BY_ID["presliding_friction"]
+
+
+@pytest.mark.parametrize("cut", [0, 37, 120])
+def test_a_memory_is_not_known_where_a_recording_was_cut(cut: int) -> None:
+    """A limit of the law's model: its state at a first sample that is no release is no unknown. A
+    fit that begins at the truth leaves something, and its k1 is tens of standard deviations off.
+    """
+    truth = {"stiffness": 120.0, "decay": 200.0}
+    campaign = small_rig.record(
+        1, {LOOP.id: truth}, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES, duration=4.0
+    )
+    left = tuple(r.part(cut, r.samples.size) for r in campaign.recordings)
+    base = identify(replace(campaign, recordings=left), rng=np.random.default_rng(0), search=False)
+    values = {f"{LOOP.id}.{name}": value for name, value in truth.items()}
+    fit = fit_from(base.fit, (LOOP,), values, campaign_scales(base.fit)).fit
+    at = fit.names.index("k1")
+    off = abs(fit.mode[at] - small_rig.PLAIN.k1) / fit.sd[at]
+    assert (off > 20.0 and fit.reduced_chi2 > 5.0) if cut else (off < 4.0)
+    assert cut or fit.reduced_chi2 < 1.1
 
 
 def score(effect: Effect) -> Score:

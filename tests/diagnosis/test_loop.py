@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import pickle
 from dataclasses import replace
@@ -12,6 +13,7 @@ import small_rig
 from effect_rigs import BY_ID
 from scipy import stats
 
+from bayesimpact.diagnosis.comparable import Comparable
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.document import document
 from bayesimpact.diagnosis.loop import Diagnosis
@@ -127,6 +129,21 @@ def test_an_effect_outside_the_catalogue_is_unknown_and_learned(unknown):
     ignored = physical_z(unknown.before)
     assert max(map(abs, carried.values())) < 0.3 * max(map(abs, ignored.values()))
     assert max(map(abs, carried.values())) < 3.0
+
+
+def test_intervals_hold_what_comparable_models_make_of_a_parameter(monkeypatch):
+    def beside(naming, fit):
+        mode = fit.mode.copy()
+        mode[fit.names.index("k1")] += 50.0
+        return Comparable((replace(fit, mode=mode),), np.full(1, 0.5))
+
+    loop = importlib.import_module("bayesimpact.diagnosis.loop")
+    monkeypatch.setattr(loop, "alike_in_misfit", beside)
+    without = tuple(BY_ID[i] for i in ("coulomb_friction", "sensor_drift"))
+    found = run(44, HARDENING, without, small_rig.RELEASES[:2])
+    assert found.remains is not None
+    low, _, high = found.intervals.quantiles("k1")
+    assert high - low > 2 * stats.norm.ppf(0.95) * 50.0 * np.sqrt(0.5)
 
 
 TOP = {

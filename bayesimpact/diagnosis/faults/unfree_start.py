@@ -13,7 +13,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.data.channels import keepers
 from bayesimpact.data.faults.fault import Fault, file_time
 from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.likelihood import Likelihood
@@ -53,15 +52,10 @@ def _alone(fit: Fit, r: int, first: int) -> Fit:
     campaign = replace(o.campaign, recordings=(recording.part(first, recording.samples.size),))
     oscillator = build_oscillator(campaign, o.effects, smoothing=o.smoothing)
     names = oscillator.layout.names
-    first_channel = keepers(o.campaign.recordings)[r]  # in whole: its state is this recording's
-
-    def name_in_whole(name: str) -> str:
-        if name.startswith("sigma"):
-            return "sigma"
-        state = name in (f"y0[{recording.name}]", f"v0[{recording.name}]")
-        return f"{name[:2]}[{first_channel}]" if state else name
-
-    at = [fit.names.index(name_in_whole(n)) for n in names]
+    own, whole = oscillator.layout, o.layout
+    at = np.full(own.size, fit.target.likelihood.sigma_columns[r])  # but for the noise:
+    known = own.columns[0] >= 0
+    at[own.columns[0, known]] = whole.columns[r, known]  # channels share what has one name
     priors = Priors(tuple(fit.target.priors.parameters[i] for i in at))
     start, sd = fit.mode[at], fit.sd[at]
     y = fit.displacements[r]

@@ -2,7 +2,7 @@
 
 Equation: force a z, z' = v - b |v| z (A = 1: only the product of a and A means something); a in
 N/m, b in 1/m (for angles N m/rad, 1/rad). z depends on the path alone: |z| rises to 1 / b. z = 0 at
-a recording's first sample.
+a recording's first sample: of one that was cut while the mass moved k1 and a come out wrong.
 At its null: a = 0 is the base model; b then means nothing. b -> 0 is a spring, part of k1; a large
 b with F = a / b is coulomb_friction, which is simpler and preferred; between them, for 1 / b below
 0.14 of the amplitude, it is called presliding_friction, the same law in other numbers.

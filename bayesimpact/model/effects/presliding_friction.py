@@ -2,7 +2,7 @@
 
 Equation: force z, z' = s v (1 - z / F sign v) with s = F / x; F in N, x in m (for angles N m, rad):
 x is the way on which the friction builds up. z depends on the path alone, and is 0 at a recording's
-first sample.
+first sample; where that was cut while the mass moved, the error is forgotten over a few x.
 At its null: F = 0 is the base model; x then means nothing. x -> 0 is coulomb_friction, which is
 simpler and preferred; for x above 0.14 of the amplitude it is called hysteresis_bouc_wen, the same
 law in other numbers.
