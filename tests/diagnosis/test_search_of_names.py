@@ -164,6 +164,24 @@ def test_what_the_last_exchange_leads_to_is_rid_of_what_it_does_not_need(run, mo
     assert chosen(run(table)) == {B, D}
 
 
+def test_a_better_end_of_the_same_set_settles_once_more(monkeypatch):
+    """What its effects are worth was told at the worse end."""
+    first, better = (Table({}).candidate((A, B), gain) for gain in (40.0, 90.0))
+    settling, eliminated = object.__new__(settle.Settling), []
+    stand_ins = {
+        "eliminated": lambda state: eliminated.append(state.candidate.fit.gain) or state,
+        "near": lambda state: [state.candidate],
+        "may_go_on": lambda: True,
+        "exchange": lambda candidate: None,
+        "best": lambda size: better,
+        "examine": lambda candidate: SimpleNamespace(candidate=candidate),
+    }
+    for name, stand_in in stand_ins.items():
+        monkeypatch.setattr(settling, name, stand_in, raising=False)
+    found = settling.settled(SimpleNamespace(candidate=first))
+    assert found.candidate is better and eliminated == [40.0, 90.0]
+
+
 def test_an_exchange_begins_at_rivals_too(run):
     """No exchange leads from {A, B} to {D, S}, one from its equal {C, D} does."""
     singles = {A: 400.0, B: 390.0, C: 380.0, D: 100.0, S: 50.0}
