@@ -14,7 +14,10 @@ from bayesimpact.data.recording import Recording
 BAND = 5.0  # standard deviations of the noise, or two steps, about the first reading
 LEAST_BAND = 0.01  # of the amplitude: noise behind a filter does not show in differences, and a
 # free motion takes 2 % of a period to leave this band
-NATURAL = 3.0  # times as long as a free motion stays in that band at a turning point
+# Times as long as a free motion stays in that band after a turning point; one that begins just
+# before it 1 + sqrt(2) times
+NATURAL = 3.0
+COARSE = 2  # samples more: the first reading counts before, and the one that left the band, after
 SHORTEST = 0.08  # of a period
 FEWEST = 3  # samples, whose median is the reading at rest: no more of them would be no rest
 LATE = 1.1  # of a period: a free decay is largest before
@@ -23,6 +26,8 @@ WIDE = 11  # samples of a running median: spikes of five do not show in it
 NARROW = 1 / 8  # of a period, at most: a wider one bends the motion
 UNCROSSED = 0.75  # of a period: a free motion passes its rest within half a period
 GROWTH = 1.3  # largest excursion over what came before it, on either side
+WINDOW = 1 / 25  # of a period, in which a speed is told; two samples at least
+SLOW = 1 / 3  # of a linear free motion's speed: those of a pendulum to 160 degrees are above half
 
 
 def find_start(recording: Recording) -> list[Fault]:
@@ -30,7 +35,8 @@ def find_start(recording: Recording) -> list[Fault]:
 
     Rest: the readings keep to the first one for longer than a free motion can about a turning
     point, sqrt(2 b / A) of a radian for a band b and an amplitude A. Hand: the largest excursion
-    comes late and exceeds what came before on its side; the free decay begins where it is left.
+    comes late and exceeds what came before on its side, or the first turning point is reached from
+    a speed with which a free motion would not get there; the free decay begins where that is left.
     """
     if recording.used is not None and not recording.used[:3].all():
         return []
@@ -49,8 +55,11 @@ def find_start(recording: Recording) -> list[Fault]:
     height = abs(float(x[peak] - settled))
     band = max(BAND * noise, 2.0 * step, LEAST_BAND * height)
     natural = np.sqrt(2.0 * band / max(height, band)) * period / (2 * np.pi)
-    least = max(NATURAL * natural, SHORTEST * period, FEWEST)
+    least = max(NATURAL * natural + COARSE, SHORTEST * period, FEWEST)
     hand = _grown(x - settled, peak, period)
+    if not hand:
+        peak = _pushed(x - settled, band, period)
+        hand = peak > 0
     rest = _leaves(x, peak if hand else 0, band, None if hum is None else hum.frequency)
     if not hand and rest <= least:
         return []
@@ -116,3 +125,22 @@ def _grown(centred: Array, peak: int, period: float) -> bool:
         return True
     before = np.abs(centred[: max(int(peak - 0.25 * period), 1)])  # a free swing has two sides
     return bool(height > GROWTH * float(before.max()))
+
+
+def _pushed(centred: Array, band: float, period: float) -> int:
+    """Sample of the first turning point, where the way out to it was begun too slowly for a free
+    motion; 0 where it was not.
+
+    A free motion of amplitude A passes A cos(phase), and its phase goes on by 2 pi in a period.
+    """
+    count = max(2, round(WINDOW * period))
+    way = np.sign(centred[0]) * centred[: int(period / 2)]
+    turn = int(np.argmax(way))
+    height = float(way[turn])
+    if turn <= count or way[: turn + 1].min() <= 0.0 or height - way[0] < 2.0 * band:
+        return 0
+    phase = np.arccos(way[: turn + 1] / height)
+    free = 2 * np.pi * count / period
+    told = height * (np.cos(phase[:-count] - free) - np.cos(phase[:-count])) > band
+    gone = phase[:-count] - phase[count:]
+    return turn if bool(np.any(gone[told] < SLOW * free)) else 0
