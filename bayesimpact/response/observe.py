@@ -119,7 +119,31 @@ def _fit(observed: Observed) -> Flight | None:
 
 
 def observe_decay(observed: Observed) -> Flight | None:
-    """The oscillator without a stop, from all samples; None without an oscillation."""
+    """The oscillator without a stop, from all samples; None without an oscillation.
+
+    The frequency of the half cycles and that of the strongest line are tried; where no half cycles
+    stand out (slow decays cut short, a beat), the line's must explain most of the readings.
+    """
+    found = [] if (rate := _rate_of_half_cycles(observed)) is None else [_decay(observed, rate)]
+    other = _decay(observed, observed.omega)
+    if other is not None and (found or _explains(other, observed)):
+        found.append(other)
+    return min((f for f in found if f is not None), key=lambda f: f.rms, default=None)
+
+
+def _decay(observed: Observed, omega: float) -> Flight | None:
+    return solve_flight(observed.samples, observed.arcs, observed.intervals, omega, scan=1.05)
+
+
+def _explains(flight: Flight, observed: Observed) -> bool:
+    """Whether a fit leaves less than half of the readings' variance."""
+    square = [float(np.sum((x - np.mean(x)) ** 2)) for x in observed.samples]
+    size = sum(x.size for x in observed.samples)
+    return flight.rms**2 < 0.5 * sum(square) / size
+
+
+def _rate_of_half_cycles(observed: Observed) -> float | None:
+    """Angular frequency of the complete half cycles, rad/s; None where a recording shows none."""
     rates, weights = [], []
     for r, samples in enumerate(observed.samples):
         halves = half_cycles(samples, observed.rests[r], observed.periods[r], observed.noises[r])
@@ -130,10 +154,7 @@ def observe_decay(observed: Observed) -> Flight | None:
         period = 2 * float(np.average(halves.durations, weights=halves.amplitudes**2))
         rates.append(2 * np.pi / (period * observed.intervals[r]))
         weights.append(weight)
-    if not rates:
-        return None
-    omega = float(np.average(rates, weights=weights))
-    return solve_flight(observed.samples, observed.arcs, observed.intervals, omega, scan=1.05)
+    return float(np.average(rates, weights=weights)) if rates else None
 
 
 def observe_cycles(cases: Sequence[int], observed: Observed, flight: Flight) -> tuple[Cycles, Ints]:

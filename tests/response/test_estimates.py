@@ -257,6 +257,36 @@ def test_noise_alone_is_refused(stop: bool) -> None:
         estimate(campaign)
 
 
+def plain(samples: np.ndarray, interval: float) -> Campaign:
+    return Campaign("p", 1.0, (Recording("p", "", samples, interval),), stop=False)
+
+
+def test_two_slow_periods_are_an_oscillation() -> None:
+    """Few half cycles are whole; a decaying sine explains the readings all the same."""
+    t = np.arange(0.0, 36.0, 0.1)
+    y = 0.04 * np.exp(-0.08 * t) * np.cos(0.71 * t + 0.4)
+    y += 4e-3 * np.random.default_rng(3).standard_normal(t.size)
+    assert estimate(plain(y, 0.1)).k1 == pytest.approx(0.71**2 + 0.08**2, rel=0.03)
+
+
+def test_a_beat_is_an_oscillation() -> None:
+    t = np.arange(0.0, 6.6, 0.025)
+    y = np.cos(14.2 * t) + 0.5 * np.cos(13.0 * t + 1.0) + 0.5 * np.cos(1.1 * t)
+    y += 5e-3 * np.random.default_rng(3).standard_normal(t.size)
+    assert estimate(plain(y, 0.025)).k1 == pytest.approx(14.2**2, rel=0.03)
+
+
+@pytest.mark.parametrize("noise", [0.0, 2e-3])
+def test_no_frequency_beyond_half_the_sampling_rate(noise: float) -> None:
+    """Noise about a rest before the motion passes as fast half cycles: their frequency is none."""
+    rng = np.random.default_rng(5)
+    t = np.arange(0.0, 40.0, 0.1)
+    y = 0.13 * np.exp(-0.08 * t) * np.cos(0.7 * t)
+    hand = 0.12 * rng.choice([-1.0, 1.0], 12)
+    y = np.concatenate([hand, y]) + noise * rng.standard_normal(t.size + 12)
+    assert estimate(plain(y, 0.1)).k1 == pytest.approx(0.49, rel=0.2)
+
+
 def test_a_plain_oscillator_passes_its_rest() -> None:
     """A tone that does not decay beside the motion: the centres of the swings lie elsewhere."""
     t = np.arange(600) * 2e-3
