@@ -44,6 +44,7 @@ Array = NDArray[np.float64]
 SHORT = 6  # samples between two turning points of a motion that is sampled coarsely
 LEAST_CORRELATION = 0.03  # a weaker AR(1) changes no interval by more than 3 %
 LEAST_GAIN = 4.0  # in log likelihood, to call the noise coloured: 1 false call in 200
+ROUNDING = 1e-9  # of the largest remainder: what arithmetic leaves of readings that do not change
 
 
 def estimate_noise(campaign: Campaign) -> Noise:
@@ -142,12 +143,14 @@ def _rises(before: Noise, level: float, error: float = 0.0) -> bool:
 
 def _restricted_ml(remainder: Remainder) -> Noise:
     values, rho = remainder.values, 0.0
+    sizes = np.abs(values).max(axis=1)
+    if np.median(sizes) <= ROUNDING * sizes.max():
+        # most windows do not leave a step of the readings: it is their noise
+        error = float(np.sqrt(0.5 / values.size))
+        return Noise(0.0, None, 0.0, error, 0.0, "polynomial remainders")
     kept = values
     for _ in range(3):  # outlier test and estimate in turn
         kept = values[_undisturbed(values, _covariance(remainder.basis, rho))]
-        if not kept.any():  # most windows do not leave a step of the readings: it is their noise
-            error = float(np.sqrt(0.5 / values.size))
-            return Noise(0.0, None, 0.0, error, 0.0, "polynomial remainders")
         rho, best = _best_correlation(kept, remainder.basis)
     white = _log_likelihood(kept, np.eye(kept.shape[1]))
     error = _correlation_error(kept, remainder.basis, rho)
