@@ -86,6 +86,9 @@ class TestRig:
         own |= {f"k2[{i}]": k for i, k in enumerate(self.k2)}
         for i, name in enumerate(self.names()):
             own |= {f"y0[{name}]": self.y0[i], f"v0[{name}]": self.v0[i], f"offset[{name}]": 0.0}
+        for effect in oscillator.effects:
+            for name in (p.name for p in effect.parameters if p.initial):
+                own |= {f"{effect.id}.{name}[{r}]": 0.0 for r in self.names()}
         own |= values
         return np.array([own[name] for name in oscillator.layout.names])
 

@@ -41,7 +41,10 @@ class Naive:
         self.t, self.slide = 0.0, np.sign(self.v0)
         self.beyond = self.y0 < -self.number("spring_piecewise", "gap", np.inf)
         # y, v, relaxation, displacement and velocity of second mode, obstacle, frame; loops
-        self.state = [self.y0, self.v0, *[0.0] * 9]
+        begun = self.number("hysteresis_bouc_wen", "start")
+        begun /= self.number("hysteresis_bouc_wen", "stiffness") or 1.0
+        self.state = [self.y0, self.v0, *[0.0] * 7, begun]
+        self.state.append(self.number("presliding_friction", "start"))
         self.ratio = self.number("base_motion", "mass_ratio")
         self.mode = FREE
 

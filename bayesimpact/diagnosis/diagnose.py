@@ -191,7 +191,8 @@ def is_doubtful(found: Diagnosis) -> bool:
 
     Physics shows differently in recordings of different amplitude.
     """
-    own = any(p.scope != "campaign" for e in found.effects for p in e.parameters if not p.circular)
+    parameters = [p for e in found.effects for p in e.parameters]
+    own = any(p.scope != "campaign" and not (p.circular or p.initial) for p in parameters)
     own = own or any(map(is_formula, found.effects))
     return own or not is_settled(found)
 

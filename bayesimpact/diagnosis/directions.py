@@ -113,7 +113,7 @@ def size_parameters(target: Target, effect: Effect) -> list[tuple[str, EffectPar
         "case": list(campaign.cases),
         "recording": [r.name for r in campaign.recordings],
     }
-    sizes = [p for p in effect.parameters if not p.is_shape]
+    sizes = [p for p in effect.parameters if p.is_size]
     return [(instance_name(effect, p, key), p) for p in sizes for key in keys[p.scope]]
 
 

@@ -148,7 +148,7 @@ class Discrepancy:
         at = [i for i, name in enumerate(layout.names) if name.startswith(own)]
         kinds = [effect.parameter(bare_name(layout.names[i])) for i in at]
         shapes = [i for i, kind in zip(at, kinds, strict=True) if kind.is_shape]
-        sizes = [(i, kind.null) for i, kind in zip(at, kinds, strict=True) if not kind.is_shape]
+        sizes = [(i, kind.null) for i, kind in zip(at, kinds, strict=True) if kind.is_size]
         found = [np.inf] if not sizes or any(null is None for _, null in sizes) else []
         for i, null in sizes if not found else ():
             part = inverse(self.posterior[1][np.ix_([i, *shapes], [i, *shapes])])

@@ -2,10 +2,10 @@
 
 Values of one kind, one per obstacle or recording, share a spread that is not known beforehand:
 normal about a common mean with a standard deviation between a ten millionth of their priors' and
-all of it (`extend.WIDEST` physical scales), uniform in the logarithm; their mean has the prior of
-the parameter that they replace. Independent priors of the physical scale would make small
-differences, however certain, cost eight nats apiece, and large ones, about a base fit that leaves
-most of the recordings unexplained, hundreds.
+all of it (`WIDEST` physical scales), uniform in the logarithm. Their mean has the prior of the
+parameter that they replace; of the states in which recordings begin it is 0. Independent priors of
+the physical scale would make small differences, however certain, cost eight nats apiece, and large
+ones, about a base fit that leaves most of the recordings unexplained, hundreds.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from scipy import special, stats
 
 from bayesimpact.inference.fit import Fit, inverse, likelihood_gradient
-from bayesimpact.inference.prior import LogNormal, Normal, Uniform
+from bayesimpact.inference.prior import LogNormal, Normal, Prior, Uniform
+from bayesimpact.model.effects.effect import EffectParameter
 
 Array = NDArray[np.float64]
 
@@ -40,24 +41,33 @@ def structure(fit: Fit) -> float:
             if parameter.circular:  # the interval of three turns holds the mode three times
                 turns = [(p.upper - p.lower) / (2 * np.pi) for p in priors if type(p) is Uniform]
                 gain += float(np.sum(np.log(np.maximum(turns, 1.0))))
-            elif parameter.replaces and at.size > 1 and len(set(priors)) == 1:
-                own_prior = priors[0]
-                if isinstance(own_prior, Normal):
-                    shared = fit.target.replaced.get(parameter.replaces, own_prior)
-                    density = float(shared.log_density(np.array(fit.mode[at].mean())))
-                    covariance = fit.covariance[np.ix_(at, at)]
-                    gain += common_spread(fit.mode[at], covariance, own_prior, density)
+            elif (parameter.replaces or parameter.initial) and len(set(priors)) == 1:
+                gain += _of_one_kind(fit, parameter, at, priors[0])
     return gain
 
 
-def common_spread(mode: Array, covariance: Array, prior: Normal, density: float) -> float:
+def _of_one_kind(
+    fit: Fit, parameter: EffectParameter, at: NDArray[np.int64], prior: Prior
+) -> float:
+    """What values at these positions, each with this prior, gain by a spread that they share."""
+    if not isinstance(prior, Normal) or (parameter.replaces and at.size == 1):
+        return 0.0
+    density = None
+    if parameter.replaces:
+        shared = fit.target.replaced.get(parameter.replaces, prior)
+        density = float(shared.log_density(np.array(fit.mode[at].mean())))
+    return common_spread(fit.mode[at], fit.covariance[np.ix_(at, at)], prior, density)
+
+
+def common_spread(mode: Array, covariance: Array, prior: Normal, density: float | None) -> float:
     """Evidence of a common spread about a common mean over that of independent priors, nats.
 
     Parameters
     ----------
     mode, covariance : (K,), (K, K) posterior under independent priors
     prior : of each value
-    density : log density of the prior of their mean, flat as far as the values say where that is
+    density : log density of the prior of their mean, flat as far as the values say where that is;
+        None for a mean that is known, the prior's
     """
     size = mode.size
     posterior = inverse(covariance)
@@ -66,18 +76,20 @@ def common_spread(mode: Array, covariance: Array, prior: Normal, density: float)
     measured = (vectors * (prior.sd**2 / np.maximum(values, UNMEASURED))) @ vectors.T
     centre = measured @ (posterior @ (mode - prior.mean))
     shared = [
-        _log_density_of_some_mean(centre, (s * prior.sd) ** 2 * np.eye(size) + measured, density)
+        _log_density(centre, (s * prior.sd) ** 2 * np.eye(size) + measured, density)
         for s in SPREADS
     ]
-    each = prior.sd**2 * np.eye(size) + measured
-    log_det, square = np.linalg.slogdet(each)[1], centre @ np.linalg.solve(each, centre)
-    return float(special.logsumexp(shared) - np.log(SPREADS.size) + 0.5 * (log_det + square))
+    each = _log_density(centre, prior.sd**2 * np.eye(size) + measured, None)
+    return float(special.logsumexp(shared) - np.log(SPREADS.size) - each)
 
 
-def _log_density_of_some_mean(x: Array, covariance: Array, density: float) -> float:
-    """Log density of N(m, covariance) at x over a mean m of all its parts with this log density,
-    without the factors of 2 pi; no more than at the best mean.
+def _log_density(x: Array, covariance: Array, density: float | None) -> float:
+    """Log density of N(m, covariance) at x, m = 0, or over a mean m of all its parts with this log
+    density, without the factors of 2 pi; no more than at the best mean.
     """
+    if density is None:
+        square = float(x @ np.linalg.solve(covariance, x))
+        return -0.5 * (float(np.linalg.slogdet(covariance)[1]) + square)
     _, log_det = np.linalg.slogdet(covariance)
     solved = np.linalg.solve(covariance, np.column_stack([x, np.ones(x.size)]))
     precision = float(solved[:, 1].sum())

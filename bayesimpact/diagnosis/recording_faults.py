@@ -140,7 +140,7 @@ def shared_effects(effects: Sequence[Effect]) -> tuple[Effect, ...]:
     return tuple(
         e
         for e in effects
-        if not is_formula(e) and all(p.scope != "recording" for p in e.parameters)
+        if not is_formula(e) and all(p.scope != "recording" or p.initial for p in e.parameters)
     )
 
 

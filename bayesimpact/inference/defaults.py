@@ -3,7 +3,7 @@
 | parameter | default prior |
 |---|---|
 | c1 | uniform, 0 to critical damping of the suspension |
-| k1 | uniform, 0 to 100 times the quick estimate |
+| k1 | uniform, 0 to 100 times the quick estimate, and no faster than half the sampling rate |
 | c2 | uniform, 0 to 20 times critical damping in contact |
 | g, y0, offset | uniform, +- 20 times the largest displacement |
 | v0 | uniform, +- 20 times the largest speed |
@@ -12,6 +12,7 @@
 | input_gain | uniform, +- 100 times the quick estimate |
 | added effects | half-Cauchy (Cauchy with both signs) of a physical scale |
 | their shapes | log-normal, or log-uniform between two positive bounds or in their range |
+| states in which recordings begin | normal about 0, as wide as values of one kind |
 
 Campaign.toml's [priors] replace any of them.
 """
@@ -38,6 +39,9 @@ from bayesimpact.model.parameters import is_added
 from bayesimpact.response.estimates import Estimates
 
 SHAPE_WIDTH = 1.5  # of the log-normal prior of a depth, a time constant, a frequency
+# Physical scales: values of one kind are pulled together by next to nothing, which means little
+# where the misfit is large; their evidence has a prior of its own (`diagnosis.evidence`).
+WIDEST = 100.0
 
 
 def default_priors(
@@ -80,11 +84,12 @@ def _default(
     if kind == "offset":  # what is added to a reading is limited by the readings
         reach = 20 * max(float(np.ptp(r.samples)) for r in campaign.recordings)
     stiffest = max([k1, *estimates.k2.values()])
+    fastest = mass * (np.pi / min(r.interval for r in campaign.recordings)) ** 2  # else an alias
     gain = 100 * abs(estimates.input_gain or 1.0)
     ranges = {
         "input_gain": (-gain, gain),
         "c1": (0.0, 2 * np.sqrt(k1 * mass)),
-        "k1": (0.0, 100 * k1),
+        "k1": (0.0, min(100 * k1, max(4 * k1, fastest))),
         "c2": (0.0, 40 * np.sqrt(stiffest * mass)),
         "k2": (0.0, 1000 * stiffest),
         "v0": (-reach * np.sqrt(stiffest / mass), reach * np.sqrt(stiffest / mass)),
@@ -117,6 +122,8 @@ def effect_prior(effect: Effect, parameter: EffectParameter, scales: Scales) -> 
         return LogNormal(scale, SHAPE_WIDTH)
     if parameter.lower == parameter.null == 0.0:
         return HalfCauchy(scale)
+    if parameter.initial:
+        return Normal(parameter.null or 0.0, WIDEST * scale)
     if parameter.replaces:
         return Normal(centre_of(parameter, scales), scale)
     return Cauchy(centre_of(parameter, scales), scale)

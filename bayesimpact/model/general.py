@@ -34,7 +34,6 @@ from bayesimpact.model.added.context import (
     FRICTION,
     K1,
     K2,
-    LAW_COLUMNS,
     NOW,
     OBSTACLE_MASS,
     RESTITUTION,
@@ -288,7 +287,7 @@ def integrate_many(
     q : (K, Q) slots, then the parameters of the laws, SI units
     mass : kg
     intervals, counts : (K,) sampling intervals, s, and numbers of samples
-    laws : (L, 5 to 8) table of laws, see `bayesimpact.model.effects.effect.law_row`
+    laws : (L, LAW_ROW) table of laws, see `bayesimpact.model.effects.effect.law_row`
     out : (K, n) receives displacements, m, or what `orders` says, without the sensor's offset
     orders : (K,) which time derivative of the displacement; None: 0 throughout
     inputs : measured forces, where recordings have any; the slot A is then their gain
@@ -298,8 +297,7 @@ def integrate_many(
     -------
     (K,) codes: OK, BAD_PARAMETERS, TOO_MANY_EVENTS or NOT_FINITE; `out` is then not to be used.
     """
-    table = np.zeros((laws.shape[0], LAW_COLUMNS), dtype=np.int64)
-    table[:, : laws.shape[1]] = laws
+    table = np.ascontiguousarray(laws)
     codes = np.zeros(q.shape[0], dtype=np.int64)
     q = np.ascontiguousarray(q)
     orders = np.zeros_like(counts) if orders is None else np.ascontiguousarray(orders)

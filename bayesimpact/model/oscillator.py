@@ -113,7 +113,8 @@ class Oscillator:
         rows, first = [], len(SLOTS)
         for effect in self.acting:
             if effect.law is not None:
-                rows.append(law_row(effect.law, first))
+                own = [first + i for i, p in enumerate(effect.parameters) if p.initial]
+                rows.append(law_row(effect.law, first, *own))
                 first += len(effect.parameters)
         return np.array(rows, dtype=np.int64).reshape(-1, LAW_ROW)
 

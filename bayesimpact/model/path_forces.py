@@ -13,6 +13,7 @@ from bayesimpact.model.added.context import (
     LAW_FIRST,
     LAW_FLAGS,
     LAW_FORCE,
+    LAW_INITIAL,
     LAW_SURFACE,
 )
 from bayesimpact.model.callback import call_law
@@ -33,6 +34,7 @@ def add_forces(
     z = np.zeros(y.size)
     for row in rows:
         own = base + row * size
+        z[0] = q[row, law[LAW_INITIAL]] if law[LAW_INITIAL] >= 0 else 0.0
         follow(law, y, v, d, t, own + place, own, z)
         for i in range(y.size):
             if d[i] > 0.0 or not law[LAW_FLAGS] & CONTACT_ONLY:

@@ -24,6 +24,7 @@ PARTS = 4  # of a sampling interval: an impact begins and ends within one
 def follow(law: Any, y: Any, v: Any, d: Any, t: Any, p: Any, q: Any, z: Any) -> None:
     """Fill z (n,) with a law's state at samples of displacement, velocity, indentation and time.
 
+    z[0] is given.
     p and q are the addresses of the law's parameters and of the slots. A law without a memory
     leaves z as it is.
     """
@@ -35,8 +36,7 @@ def follow(law: Any, y: Any, v: Any, d: Any, t: Any, p: Any, q: Any, z: Any) -> 
 
 @compiled(nogil=True)
 def _follow_path(travel: Any, y: Any, v: Any, d: Any, t: Any, p: Any, q: Any, z: Any) -> None:
-    start, way, turned = 0.0, np.sign(v[0]), y[0]
-    z[0] = 0.0
+    start, way, turned = z[0], np.sign(v[0]), y[0]
     for i in range(1, y.size):
         touching = 1.0 if d[i] > 0.0 else 0.0
         if v[i] * way < 0.0:
@@ -51,7 +51,6 @@ def _follow_path(travel: Any, y: Any, v: Any, d: Any, t: Any, p: Any, q: Any, z:
 
 @compiled(nogil=True)
 def _follow_time(rate: Any, y: Any, v: Any, d: Any, t: Any, p: Any, q: Any, z: Any) -> None:
-    z[0] = 0.0
     for i in range(1, y.size):
         now, h = z[i - 1], (t[i] - t[i - 1]) / PARTS
         for k in range(PARTS):

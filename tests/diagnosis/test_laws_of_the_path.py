@@ -12,34 +12,45 @@ from effect_rigs import BY_ID, with_effect
 import bayesimpact as bi
 from bayesimpact.diagnosis.decision import holds
 from bayesimpact.diagnosis.directions import directions
+from bayesimpact.diagnosis.evidence import common_spread
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.promising import families
-from bayesimpact.diagnosis.refit import fit_from
 from bayesimpact.diagnosis.scan import Scan
 from bayesimpact.diagnosis.scores import Score
-from bayesimpact.inference.identify import identify
+from bayesimpact.inference.prior import Normal
 from bayesimpact.model.effects import Effect
 
 LOOP, DAHL = BY_ID["hysteresis_bouc_wen"], BY_ID["presliding_friction"]
 
 
 @pytest.mark.parametrize("cut", [0, 37, 120])
-def test_a_memory_is_not_known_where_a_recording_was_cut(cut: int) -> None:
-    """A limit of the law's model: its state at a first sample that is no release is no unknown. A
-    fit that begins at the truth leaves something, and its k1 is tens of standard deviations off.
-    """
+def test_a_memory_is_found_where_a_recording_was_cut(cut: int) -> None:
+    """The state at the first sample is an unknown of every recording, at a release and later."""
     truth = {"stiffness": 120.0, "decay": 200.0}
     campaign = small_rig.record(
         1, {LOOP.id: truth}, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES, duration=4.0
     )
     left = tuple(r.part(cut, r.samples.size) for r in campaign.recordings)
-    base = identify(replace(campaign, recordings=left), rng=np.random.default_rng(0), search=False)
-    values = {f"{LOOP.id}.{name}": value for name, value in truth.items()}
-    fit = fit_from(base.fit, (LOOP,), values, campaign_scales(base.fit)).fit
-    at = fit.names.index("k1")
-    off = abs(fit.mode[at] - small_rig.PLAIN.k1) / fit.sd[at]
-    assert (off > 20.0 and fit.reduced_chi2 > 5.0) if cut else (off < 4.0)
-    assert cut or fit.reduced_chi2 < 1.1
+    found = bi.diagnose(replace(campaign, recordings=left), search=False, seed=0)
+    assert found.verdict == "named" and [e.id for e in found.effects] == [LOOP.id]
+    expected = {f"{LOOP.id}.{name}": value for name, value in truth.items()}
+    for name, value in {"k1": small_rig.PLAIN.k1, **expected}.items():
+        at = found.after.names.index(name)
+        assert abs(found.after.mode[at] - value) < 4.0 * found.after.sd[at], name
+    starts = [i for i, n in enumerate(found.after.names) if n.startswith(f"{LOOP.id}.start")]
+    known = np.abs(found.after.mode[starts]) / found.after.sd[starts]
+    assert len(starts) == 2 and (known.min() > 50.0 if cut else known.max() < 4.0)
+
+
+def test_starts_that_recordings_share_cost_little() -> None:
+    """Nine states that are nothing: a spread that they share is told, not nine sizes apart."""
+    sd = np.full(9, 1e-3)
+    prior = Normal(0.0, 100.0)
+    alone = -np.sum(np.log(prior.sd / sd))
+    shared = common_spread(np.zeros(9), np.diag(1 / (1 / sd**2 + 1e-4)), prior, None)
+    assert -4.0 < alone + shared < 0.0
+    apart = common_spread(np.full(9, 3.0), np.diag(sd**2), prior, None)
+    assert shared - apart > 50.0
 
 
 def score(effect: Effect) -> Score:

@@ -28,7 +28,7 @@ def path(t: float) -> tuple[float, float]:
 
 
 def along(effect_id: str, sizes: list[Mapping[str, float]]) -> np.ndarray:
-    """Forces (K, n) of a law for its numbers, one row each."""
+    """Forces (K, n) of a law for its numbers, one row each, in a campaign's recording `a`."""
     effect, campaign = BY_ID[effect_id], record(1)
     oscillator = build_oscillator(campaign, [effect])
     names = oscillator.layout.names
@@ -43,26 +43,29 @@ def along(effect_id: str, sizes: list[Mapping[str, float]]) -> np.ndarray:
     return out
 
 
-def integrated(rate: Rate) -> np.ndarray:
-    """The state (n,) at `TIMES`, from zero."""
+def integrated(rate: Rate, start: float = 0.0) -> np.ndarray:
+    """The state (n,) at `TIMES`."""
     found = solve_ivp(
-        lambda t, z: [rate(*path(t), z[0])], (0, TIMES[-1]), [0.0], "DOP853", TIMES,
+        lambda t, z: [rate(*path(t), z[0])], (0, TIMES[-1]), [start], "DOP853", TIMES,
         rtol=1e-9, atol=1e-14, max_step=2e-4,
     )  # fmt: skip
     return found.y[0]
 
 
-@pytest.mark.parametrize("decay", [80.0, 600.0])
-def test_a_wide_loop(decay: float) -> None:
-    (force,) = along("hysteresis_bouc_wen", [{"stiffness": 120.0, "decay": decay}])
-    expected = 120.0 * integrated(lambda y, v, z: v - decay * abs(v) * z)
+@pytest.mark.parametrize(("decay", "start"), [(80.0, 0.0), (600.0, 0.0), (80.0, -0.7)])
+def test_a_wide_loop(decay: float, start: float) -> None:
+    numbers = {"stiffness": 120.0, "decay": decay, "start[a]": start}
+    (force,) = along("hysteresis_bouc_wen", [numbers])
+    expected = 120.0 * integrated(lambda y, v, z: v - decay * abs(v) * z, start / 120.0)
     np.testing.assert_allclose(force, expected, atol=2e-4 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("way", [1e-4, 5e-4])
-def test_friction_that_gives(way: float) -> None:
-    (force,) = along("presliding_friction", [{"force": 0.3, "displacement": way}])
-    expected = 0.3 * integrated(lambda y, v, z: v / way * (1 - z * np.sign(v)))
+@pytest.mark.parametrize(("way", "start"), [(1e-4, 0.0), (5e-4, 0.0), (5e-4, 0.2)])
+def test_friction_that_gives(way: float, start: float) -> None:
+    (force,) = along(
+        "presliding_friction", [{"force": 0.3, "displacement": way, "start[a]": start}]
+    )
+    expected = 0.3 * integrated(lambda y, v, z: v / way * (1 - z * np.sign(v)), start / 0.3)
     np.testing.assert_allclose(force, expected, atol=2e-3 * 0.3)
 
 

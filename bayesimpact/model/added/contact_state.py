@@ -30,6 +30,7 @@ from bayesimpact.model.added.context import (
     LAW_FIRST,
     LAW_FLAGS,
     LAW_FORCE,
+    LAW_INITIAL,
     LAW_SURFACE,
     LAW_TRAVEL,
     NO_TENSION,
@@ -148,6 +149,8 @@ def begin(w: Any) -> Any:
     begin_bodies(y, v, w)
     for law in range(w.size):
         w.work[WORK_COLUMNS * law + TURNED] = y
+        initial = w.laws[LAW_COLUMNS * law + LAW_INITIAL]
+        tell(law, q[initial] if initial >= 0 else 0.0, w)
     s[GAP] = q[G]
     s[SLIDING] = np.sign(v)
     if y > s[GAP]:

@@ -116,6 +116,9 @@ class EffectParameter:
     replaces : base parameter (c2, g) in whose place this one stands: the effect vanishes when all
         its instances equal that parameter; `null` is then None, the prior normal about `centre`
     centre : centre of that prior, from the scales
+    initial : the law's state at a recording's first sample, which no score looks for: a law has it
+        as a recording has its y0 and v0. The null is what it is without one, and the prior normal
+        about it with a spread that all recordings share
     """
 
     name: str
@@ -132,6 +135,12 @@ class EffectParameter:
     spectral: bool = False
     replaces: Literal["c2", "g"] | None = None
     centre: Callable[[Scales], float] | None = None
+    initial: bool = False
+
+    @property
+    def is_size(self) -> bool:
+        """True when the effect vanishes with it: neither a shape nor an initial state."""
+        return not (self.is_shape or self.initial)
 
     @property
     def is_shape(self) -> bool:
@@ -157,8 +166,8 @@ class Law:
     rate : time derivative of the state z (a law with memory), or None
     travel : for a state that follows the path and not the time (rate-independent hysteresis): its
         value where the motion has gone by `y` (m, signed) since it last turned, in the direction
-        `v` (-1, 1; 0 before it first moves), from `z`, the state where it turned. Zero at a
-        recording's first sample; steps end on turning points
+        `v` (-1, 1; 0 before it first moves), from `z`, the state where it turned; steps end on
+        turning points
     surface : a smooth function of y or d whose zero is a kink of the force; steps end on it. (A
         force may jump at impact, being evaluated in contact only, and where a flag below says
         so; other jumps cost accuracy.)
@@ -177,7 +186,8 @@ class Law:
         far apart): a step passes about one of them
     ignores_speed : the force does not depend on v: four evaluations a step are then enough, not six
 
-    The state of a law that acts in contact only is not integrated in flight: its rate may there
+    A state is 0 at a recording's first sample, or what a parameter that is `initial` says. The
+    state of a law that acts in contact only is not integrated in flight: its rate may there
     depend on the state alone, linearly (it decays, or it stays).
     """
 
@@ -266,7 +276,7 @@ class Effect(Picklable):
     @property
     def has_size(self) -> bool:
         """False for an effect that is on or off: it has no parameters, or only shapes."""
-        return not all(p.is_shape or p.fixed is not None for p in self.parameters)
+        return any(p.is_size and p.fixed is None for p in self.parameters)
 
     def excludes(self, other: Effect) -> frozenset[str]:
         """Slots that both claim: each feeds one, or one feeds what the other fixes."""
@@ -299,18 +309,25 @@ def catalogued(id: str) -> Effect | None:
     return effect
 
 
-LAW_ROW = 9  # numbers in a law's row
+LAW_ROW = 10  # numbers in a law's row
 
 
-def law_row(law: Law, first: int) -> list[int]:
-    """A law's row in the general simulator's table; its parameters begin at slot `first`."""
+def law_row(law: Law, first: int, initial: int = -1) -> list[int]:
+    """A law's row in the general simulator's table.
+
+    Parameters
+    ----------
+    first : slot at which the law's parameters begin
+    initial : slot of its state at the first sample; -1: that is 0
+    """
     functions = (law.force, law.rate, law.surface)
     flags = (law.where == "contact") + 2 * law.kink_at_turn + 4 * law.rough_at_touch
     flags += 8 * law.polynomial + 16 * law.ignores_speed
     flags += 32 * law.jump_at_turn + 64 * law.jump_at_surface
     force, rate, surface = (address(f) if f else 0 for f in functions)
     extents = (law.pace, law.grain, law.first_at_turn, law.travel)
-    return [force, rate, surface, flags, first, *(address(f) if f else 0 for f in extents)]
+    addresses = [address(f) if f else 0 for f in extents]
+    return [force, rate, surface, flags, first, *addresses, initial]
 
 
 @cache

@@ -1,11 +1,12 @@
 """Hysteresis of the suspension by Bouc and Wen: a spring that slips the more the further it goes.
 
-Equation: force a z, z' = v - b |v| z (A = 1: only the product of a and A means something); a in
-N/m, b in 1/m (for angles N m/rad, 1/rad). z depends on the path alone: |z| rises to 1 / b. z = 0 at
-a recording's first sample: of one that was cut while the mass moved k1 and a come out wrong.
-At its null: a = 0 is the base model; b then means nothing. b -> 0 is a spring, part of k1; a large
-b with F = a / b is coulomb_friction, which is simpler and preferred; between them, for 1 / b below
-0.14 of the amplitude, it is called presliding_friction, the same law in other numbers.
+Equation: force z, z' = a v - b |v| z (A = 1: only the product of a and A means something); a in
+N/m, b in 1/m (for angles N m/rad, 1/rad). z depends on the path alone: |z| rises to a / b. What it
+is at a recording's first sample, `start` in N, depends on what was before, so every recording has
+its own.
+At its null: a = 0 is the base model; b and start then mean nothing. b -> 0 is a spring, part of k1;
+a large b with F = a / b is coulomb_friction, which is simpler and preferred; between them, for 1 /
+b below 0.14 of the amplitude, it is called presliding_friction, the same law in other numbers.
 Energy: dissipates; 4 a (A b - tanh(A b)) / b^2 in a cycle of amplitude A.
 Valid: joints, wire ropes and elastomers whose loop does not depend on the speed; n = 1, loading
 and unloading alike (beta = b, gamma = 0).
@@ -32,18 +33,18 @@ SMALLEST = 0.1  # over one over the amplitude: a spring with a loss factor of 4 
 def force(
     y: float, v: float, d: float, t: float, z: float, touching: float, p: Numbers, q: Numbers
 ) -> float:
-    """Restoring force a z, N."""
-    return p[0] * z
+    """Restoring force, N."""
+    return z
 
 
 def travel(
     y: float, v: float, d: float, t: float, z: float, touching: float, p: Numbers, q: Numbers
 ) -> float:
-    """Z after a way y from a turning point, in the direction v: dz = dy - b |dy| z."""
+    """Force after a way y from a turning point, in the direction v: dz = a dy - b |dy| z."""
     way = p[1] * abs(y)
     slip = -math.expm1(-way)
     rise = y * (1.0 - 0.5 * way) if way < 1e-6 else v * slip / p[1]
-    return z * (1.0 - slip) + rise
+    return z * (1.0 - slip) + p[0] * rise
 
 
 def first_at_turn(
@@ -64,7 +65,7 @@ EFFECT = Effect(
     id="hysteresis_bouc_wen",
     family="free damping",
     title="hysteresis of the suspension",
-    equation="force a z, z' = v - b |v| z",
+    equation="force z, z' = a v - b |v| z",
     regime="free",
     energy="dissipates",
     statement=(
@@ -81,6 +82,9 @@ EFFECT = Effect(
             null=None,
             grid=lambda s: np.array([0.3, 1.0, 2.0, 4.0, 6.5]) / s.amplitude,
             within=lambda s: (SMALLEST / s.amplitude, 1.0 / (LONGEST * s.amplitude)),
+        ),
+        EffectParameter(
+            "start", "N", scale=lambda s: 0.1 * s.force, scope="recording", initial=True
         ),
     ),
     law=Law(force, travel=travel, first_at_turn=first_at_turn, ignores_speed=True),

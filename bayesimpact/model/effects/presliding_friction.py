@@ -1,11 +1,11 @@
 """Dry friction that gives a little before it slides, by Dahl.
 
 Equation: force z, z' = s v (1 - z / F sign v) with s = F / x; F in N, x in m (for angles N m, rad):
-x is the way on which the friction builds up. z depends on the path alone, and is 0 at a recording's
-first sample; where that was cut while the mass moved, the error is forgotten over a few x.
-At its null: F = 0 is the base model; x then means nothing. x -> 0 is coulomb_friction, which is
-simpler and preferred; for x above 0.14 of the amplitude it is called hysteresis_bouc_wen, the same
-law in other numbers.
+x is the way on which the friction builds up. z depends on the path alone. What it is at a
+recording's first sample, `start` in N, depends on what was before, so every recording has its own.
+At its null: F = 0 is the base model; x and start then mean nothing. x -> 0 is coulomb_friction,
+which is simpler and preferred; for x above 0.14 of the amplitude it is called hysteresis_bouc_wen,
+the same law in other numbers.
 Energy: dissipates; nearly 4 F (A - x) in a cycle of an amplitude A far above x.
 Valid: bearings, guides and clamped joints; static and sliding friction equal, no creep under a
 load at rest, no Stribeck effect.
@@ -34,15 +34,16 @@ SHORTEST, LONGEST = 1e-3, 0.14
 def force(
     y: float, v: float, d: float, t: float, z: float, touching: float, p: Numbers, q: Numbers
 ) -> float:
-    """Friction force, N; z is its share of F."""
-    return p[0] * z
+    """Friction force, N."""
+    return z
 
 
 def travel(
     y: float, v: float, d: float, t: float, z: float, touching: float, p: Numbers, q: Numbers
 ) -> float:
-    """Share of F after a way y from a turning point, in the direction v."""
-    return v - (v - z) * math.exp(-abs(y) / p[1]) if y != 0.0 else z
+    """Friction force after a way y from a turning point, in the direction v."""
+    limit = v * p[0]
+    return limit - (limit - z) * math.exp(-abs(y) / p[1]) if y != 0.0 else z
 
 
 def first_at_turn(
@@ -73,6 +74,9 @@ EFFECT = Effect(
             null=None,
             grid=lambda s: np.array([0.003, 0.01, 0.03, 0.1]) * s.amplitude,
             within=lambda s: (SHORTEST * s.amplitude, LONGEST * s.amplitude),
+        ),
+        EffectParameter(
+            "start", "N", scale=lambda s: 0.5 * s.damping_force, scope="recording", initial=True
         ),
     ),
     law=Law(force, travel=travel, first_at_turn=first_at_turn, ignores_speed=True),

@@ -56,8 +56,8 @@ CONTRACT = {
     "spring_quintic": ["stiffness"],
     "power_damping": ["coefficient", "exponent"],
     "structural_damping": ["loss"],
-    "hysteresis_bouc_wen": ["stiffness", "decay"],
-    "presliding_friction": ["force", "displacement"],
+    "hysteresis_bouc_wen": ["stiffness", "decay", "start[recording]"],
+    "presliding_friction": ["force", "displacement", "start[recording]"],
 }
 DISSIPATIVE = {
     "contact_damping_indentation.coefficient", "contact_damping_speed.coefficient",
