@@ -13,12 +13,15 @@ from bayesimpact.inference.noise import Noise
 
 
 def test_a_recording_that_misses_the_obstacle_shows_nothing_of_contacts():
-    """Upside down it never touches: there is no speed of impact to scale an effect by."""
+    """Swings within the gap: there is no speed of impact to scale an effect by."""
     campaign = small_rig.record(1)
     model = SharedModel(Noise(level=small_rig.NOISE), (BY_ID["contact_damping_speed"],))
     first = campaign.recordings[0]
     assert own_fit(campaign, first, model) is not None
-    away = replace(first, samples=-abs(first.samples))
+    rate = np.sqrt(small_rig.RIG.k1 / small_rig.RIG.mass)
+    within = 0.3 * small_rig.RIG.g * np.exp(-0.2 * first.times) * np.cos(rate * first.times)
+    noise = small_rig.NOISE * np.random.default_rng(0).standard_normal(within.size)
+    away = replace(first, samples=within + noise)
     assert own_fit(campaign, away, model) is None
     own_fit(campaign, inverted(first), model)  # whatever it finds, it ends
 
