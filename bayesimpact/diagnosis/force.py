@@ -105,6 +105,12 @@ class MissingForce:
         b = np.einsum("ni,ij,nj->n", basis, self.covariance[n:, n:], basis)
         return np.sqrt(np.maximum(a, 0)), np.sqrt(np.maximum(b, 0))
 
+    def deviation(self, y: Array, v: Array, t: Array) -> Array:
+        """Posterior standard deviation of the force at points of the trajectory (n,), N."""
+        basis, first = (self._basis(t), y / self.reach) if self.reach else (self._basis(y), 1.0)
+        both = np.hstack([basis * np.reshape(first, (-1, 1)), basis * v[:, None]])
+        return np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", both, self.covariance, both), 0.0))
+
     def _basis(self, along: Array) -> Array:
         basis = spline_basis(along, self.low, self.spacing, self.knots)
         return basis * (along >= self.low)[:, None] if self.touching else basis

@@ -9,7 +9,7 @@ comparing the evidence of a free force with that of a free distortion of the pro
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,7 @@ class Location:
     displacement, velocity, time : ranges, m, m/s, s
     recordings, cases : where it shows, most first
     force_rms : over the place, N
+    force_sd : how well that is known where no effect tells it, N
     contact_share : share of the squared force beyond the gap
     agrees : both views name the same regime
     gain : log-likelihood gain per recording and time bin, (R, TIME_BINS), nats
@@ -57,6 +58,7 @@ class Location:
     contact_share: float
     agrees: bool
     gain: Array
+    force_sd: float = 0.0
 
 
 def locate(base: Fit, better: Fit, force: MissingForce, effects: tuple[Effect, ...]) -> Location:
@@ -71,8 +73,12 @@ def locate(base: Fit, better: Fit, force: MissingForce, effects: tuple[Effect, .
     if own and len(own) == len(effects):
         weights = [np.sum(parts, axis=0) ** 2 for parts in zip(*own, strict=True)]
         return _place(base, better, weights, None, effects)
-    weights = [force.force(y, v, t) ** 2 for (y, v), t in zip(points, times, strict=True)]
-    return _place(base, better, weights, force, effects)
+    along = [(y, v, t) for (y, v), t in zip(points, times, strict=True)]
+    found = _place(base, better, [force.force(*at) ** 2 for at in along], force, effects)
+    y, v = (np.concatenate([at[i] for at in along]) for i in (0, 1))
+    held = _between(y, found.displacement) & _between(v, found.velocity)
+    variance = np.concatenate([force.deviation(*at) for at in along])[held] ** 2
+    return replace(found, force_sd=float(np.sqrt(np.mean(variance))) if held.any() else 0.0)
 
 
 def locate_effect(naming: Naming, effect: Effect, better: Fit) -> Location:

@@ -17,6 +17,7 @@ from bayesimpact.model.units import span_of, two_digits
 SHARED = ("k2", "k1", "c1", "c2", "g")
 OPEN = 0.5  # half-width of a 90 % interval over the median: more than 0.5 leaves a size open
 FOLD = 10.0  # a change of more than ten times the value is told as a multiple, not in per cent
+TOLD = 2.0  # posterior standard deviations of a force, from which on its size means something
 
 _REGIMES = {
     "free": "in the suspension, wherever the mass moves",
@@ -165,6 +166,14 @@ def _moved(shifts: Mapping[str, Shift], cause: str) -> str:
     return f" {cause} {verb} {worst} {size}."
 
 
+def _size_of_force(location: Location, unit: str) -> str:
+    size = two_digits(location.force_rms, unit)
+    if location.force_rms > TOLD * location.force_sd:
+        return f"with {size} rms"
+    most = two_digits(location.force_rms + TOLD * location.force_sd, unit)
+    return f"with a force that the recordings hardly tell (up to {most} rms)"
+
+
 def summary(
     verdict: str,
     effects: tuple[Effect, ...],
@@ -192,11 +201,11 @@ def summary(
     place = _REGIMES[location.regime]
     if verdict == "unknown" or (verdict == "partly" and not effects):
         cost = _moved(shifts, "Fitting a force in its place")
-        force = two_digits(location.force_rms, "N m" if angle else "N")
+        force = _size_of_force(location, "N m" if angle else "N")
         slowly = " It is a stiffness or damping that changes with time." if drifts else ""
         return (
             f"Something is missing that the catalogue does not hold. It acts {place}, mostly at "
-            f"{_span(location.displacement, 'rad' if angle else 'm')}, with {force} rms.{slowly}"
+            f"{_span(location.displacement, 'rad' if angle else 'm')}, {force}.{slowly}"
             f"{cost}{remains}{faults}"
         )
     titles = " and ".join(e.title for e in effects)

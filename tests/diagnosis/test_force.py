@@ -220,6 +220,8 @@ def test_force_and_spread_are_those_of_the_coefficients(detent):
     spread = np.concatenate([(draws[:, : found.knots] @ basis.T).std(axis=0),
                              (draws[:, found.knots :] @ basis.T).std(axis=0)])  # fmt: skip
     np.testing.assert_allclose(np.concatenate(found.spread(y)), spread, rtol=0.03, atol=1e-9)
+    deviation = found.deviation(y, v, np.zeros_like(y))
+    np.testing.assert_allclose(deviation, (draws @ whole.T).std(axis=0), rtol=0.03)
 
 
 def test_the_learned_force_goes_back_into_the_simulator(detent):

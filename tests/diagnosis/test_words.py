@@ -98,7 +98,9 @@ def test_a_failed_base_fit_says_what_may_be_wrong():
 
 
 def place(regime: str):
-    return SimpleNamespace(regime=regime, displacement=(-2e-3, 1.5e-3), force_rms=0.012)
+    return SimpleNamespace(
+        regime=regime, displacement=(-2e-3, 1.5e-3), force_rms=0.012, force_sd=0.001
+    )
 
 
 def test_the_paragraph():
@@ -123,9 +125,19 @@ def test_the_paragraph():
     assert "It rubs." in said and said.endswith(" More.")
     said = summary("partly", (), (), place("contact"), (), {}, "", faults=" A spike.")
     assert said.startswith("Something is missing") and said.endswith(" A spike.")
-    wide = SimpleNamespace(regime="free", displacement=(-0.3, 0.31), force_rms=0.012)
+    wide = SimpleNamespace(
+        regime="free", displacement=(-0.3, 0.31), force_rms=0.012, force_sd=0.001
+    )
     said = summary("unknown", (), (), wide, (), {}, "", angle=True)
     assert "\N{MINUS SIGN}0.30 to 0.31 rad" in said and "0.012 N m rms" in said
+
+
+def test_a_force_that_is_hardly_known_has_no_size():
+    vague = SimpleNamespace(
+        regime="free", displacement=(-2e-3, 1.5e-3), force_rms=3.5, force_sd=3.25
+    )
+    said = summary("unknown", (), (), vague, (), {}, "")
+    assert "hardly tell (up to 10 N rms)" in said and "3.5" not in said
 
 
 def test_recordings_keep_their_truth(small):
