@@ -41,10 +41,12 @@ class Naive:
         self.t, self.slide = 0.0, np.sign(self.v0)
         self.beyond = self.y0 < -self.number("spring_piecewise", "gap", np.inf)
         # y, v, relaxation, displacement and velocity of second mode, obstacle, frame; loops
-        begun = self.number("hysteresis_bouc_wen", "start")
-        begun /= self.number("hysteresis_bouc_wen", "stiffness") or 1.0
-        self.state = [self.y0, self.v0, *[0.0] * 7, begun]
-        self.state.append(self.number("presliding_friction", "start"))
+        bouc_wen, dahl = (
+            self.number(e, "start") for e in ("hysteresis_bouc_wen", "presliding_friction")
+        )
+        bouc_wen /= self.number("hysteresis_bouc_wen", "decay") or 1.0
+        dahl *= self.number("presliding_friction", "force")
+        self.state = [self.y0, self.v0, *[0.0] * 7, bouc_wen, dahl]
         self.ratio = self.number("base_motion", "mass_ratio")
         self.mode = FREE
 

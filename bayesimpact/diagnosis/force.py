@@ -109,7 +109,8 @@ class MissingForce:
         """Posterior standard deviation of the force at points of the trajectory (n,), N."""
         basis, first = (self._basis(t), y / self.reach) if self.reach else (self._basis(y), 1.0)
         both = np.hstack([basis * np.reshape(first, (-1, 1)), basis * v[:, None]])
-        return np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", both, self.covariance, both), 0.0))
+        variance = np.einsum("ni,ij,nj->n", both, self.covariance, both)
+        return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
     def _basis(self, along: Array) -> Array:
         basis = spline_basis(along, self.low, self.spacing, self.knots)

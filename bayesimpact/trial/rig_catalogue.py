@@ -233,7 +233,7 @@ def _structural_damping(site: Site, p: Numbers, slot: int) -> Part:
 
 
 def _bouc_wen(site: Site, p: Numbers, slot: int) -> Part:
-    """Force a z, z' = v - b abs(v) z, from `start` N on."""
+    """Force a z, z' = v - b abs(v) z, from the share `start` of 1 / b on."""
     stiffness, decay = p["stiffness"], p["decay"]
 
     def rates(piece: Piece) -> Rates:
@@ -241,11 +241,11 @@ def _bouc_wen(site: Site, p: Numbers, slot: int) -> Part:
         return lambda t, y, v, state: (v * (1 - signed * state[slot]),)
 
     law = everywhere(lambda t, y, v, state: stiffness * state[slot])
-    return Part(law, states=(p.get("start", 0.0) / stiffness if stiffness else 0.0,), rates=rates)
+    return Part(law, states=(p.get("start", 0.0) / decay if decay else 0.0,), rates=rates)
 
 
 def _presliding(site: Site, p: Numbers, slot: int) -> Part:
-    """Dahl's friction: force F u, u' = v (1 - u sign(v)) / x, from `start` N on."""
+    """Dahl's friction: force F u, u' = v (1 - u sign(v)) / x, from u = `start` on."""
     force, way = p["force"], p["displacement"]
 
     def rates(piece: Piece) -> Rates:
@@ -253,7 +253,7 @@ def _presliding(site: Site, p: Numbers, slot: int) -> Part:
         return lambda t, y, v, state: (v * (1 - sign * state[slot]) / way,)
 
     law = everywhere(lambda t, y, v, state: force * state[slot])
-    return Part(law, states=(p.get("start", 0.0) / force if force else 0.0,), rates=rates)
+    return Part(law, states=(p.get("start", 0.0),), rates=rates)
 
 
 def _smoothing(chain: Chain, p: Numbers) -> Chain:

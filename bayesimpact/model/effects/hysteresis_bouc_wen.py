@@ -1,9 +1,9 @@
 """Hysteresis of the suspension by Bouc and Wen: a spring that slips the more the further it goes.
 
 Equation: force z, z' = a v - b |v| z (A = 1: only the product of a and A means something); a in
-N/m, b in 1/m (for angles N m/rad, 1/rad). z depends on the path alone: |z| rises to a / b. What it
-is at a recording's first sample, `start` in N, depends on what was before, so every recording has
-its own.
+N/m, b in 1/m (for angles N m/rad, 1/rad). z depends on the path alone and never passes a / b. What
+it is at a recording's first sample depends on what was before, so every recording has its own
+`start`, as a share of a / b.
 At its null: a = 0 is the base model; b and start then mean nothing. b -> 0 is a spring, part of k1;
 a large b with F = a / b is coulomb_friction, which is simpler and preferred; between them, for 1 /
 b below 0.14 of the amplitude, it is called presliding_friction, the same law in other numbers.
@@ -25,7 +25,7 @@ import math
 import numpy as np
 
 from bayesimpact.model.effects.effect import Effect, EffectParameter, Law, Numbers, Scales, Size
-from bayesimpact.model.effects.presliding_friction import LONGEST
+from bayesimpact.model.effects.presliding_friction import LONGEST, START
 
 SMALLEST = 0.1  # over one over the amplitude: a spring with a loss factor of 4 %, hard to tell
 
@@ -33,18 +33,15 @@ SMALLEST = 0.1  # over one over the amplitude: a spring with a loss factor of 4 
 def force(
     y: float, v: float, d: float, t: float, z: float, touching: float, p: Numbers, q: Numbers
 ) -> float:
-    """Restoring force, N."""
-    return z
+    """Restoring force, N; z is its share of the limit a / b."""
+    return p[0] / p[1] * z if p[1] > 0.0 else 0.0
 
 
 def travel(
     y: float, v: float, d: float, t: float, z: float, touching: float, p: Numbers, q: Numbers
 ) -> float:
-    """Force after a way y from a turning point, in the direction v: dz = a dy - b |dy| z."""
-    way = p[1] * abs(y)
-    slip = -math.expm1(-way)
-    rise = y * (1.0 - 0.5 * way) if way < 1e-6 else v * slip / p[1]
-    return z * (1.0 - slip) + p[0] * rise
+    """Share of the limit after a way y from a turning point, in the direction v."""
+    return z - (z - v) * -math.expm1(-p[1] * abs(y)) if y != 0.0 else z
 
 
 def first_at_turn(
@@ -83,9 +80,7 @@ EFFECT = Effect(
             grid=lambda s: np.array([0.3, 1.0, 2.0, 4.0, 6.5]) / s.amplitude,
             within=lambda s: (SMALLEST / s.amplitude, 1.0 / (LONGEST * s.amplitude)),
         ),
-        EffectParameter(
-            "start", "N", scale=lambda s: 0.1 * s.force, scope="recording", initial=True
-        ),
+        START,
     ),
     law=Law(force, travel=travel, first_at_turn=first_at_turn, ignores_speed=True),
     prefer="coulomb_friction",

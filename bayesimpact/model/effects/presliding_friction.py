@@ -2,7 +2,8 @@
 
 Equation: force z, z' = s v (1 - z / F sign v) with s = F / x; F in N, x in m (for angles N m, rad):
 x is the way on which the friction builds up. z depends on the path alone. What it is at a
-recording's first sample, `start` in N, depends on what was before, so every recording has its own.
+recording's first sample depends on what was before, so every recording has its own `start`, as a
+share of F.
 At its null: F = 0 is the base model; x and start then mean nothing. x -> 0 is coulomb_friction,
 which is simpler and preferred; for x above 0.14 of the amplitude it is called hysteresis_bouc_wen,
 the same law in other numbers.
@@ -30,20 +31,24 @@ from bayesimpact.model.effects.effect import Effect, EffectParameter, Law, Numbe
 # fifth of it, so most of the way is sliding.
 SHORTEST, LONGEST = 1e-3, 0.14
 
+# of the largest force, which the state never passes; its prior is as wide as that (`defaults`)
+START = EffectParameter(
+    "start", "-", lambda s: 0.01, lower=-1.0, upper=1.0, scope="recording", initial=True
+)
+
 
 def force(
     y: float, v: float, d: float, t: float, z: float, touching: float, p: Numbers, q: Numbers
 ) -> float:
-    """Friction force, N."""
-    return z
+    """Friction force, N; z is its share of F."""
+    return p[0] * z
 
 
 def travel(
     y: float, v: float, d: float, t: float, z: float, touching: float, p: Numbers, q: Numbers
 ) -> float:
-    """Friction force after a way y from a turning point, in the direction v."""
-    limit = v * p[0]
-    return limit - (limit - z) * math.exp(-abs(y) / p[1]) if y != 0.0 else z
+    """Share of F after a way y from a turning point, in the direction v."""
+    return v - (v - z) * math.exp(-abs(y) / p[1]) if y != 0.0 else z
 
 
 def first_at_turn(
@@ -75,9 +80,7 @@ EFFECT = Effect(
             grid=lambda s: np.array([0.003, 0.01, 0.03, 0.1]) * s.amplitude,
             within=lambda s: (SHORTEST * s.amplitude, LONGEST * s.amplitude),
         ),
-        EffectParameter(
-            "start", "N", scale=lambda s: 0.5 * s.damping_force, scope="recording", initial=True
-        ),
+        START,
     ),
     law=Law(force, travel=travel, first_at_turn=first_at_turn, ignores_speed=True),
     prefer="coulomb_friction",
