@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ from bayesimpact.diagnosis.whiteness import whiteness_p
 from bayesimpact.diagnosis.words import (
     failure,
     left_open,
+    nearest,
     parameter_shifts,
     remaining,
     statement,
@@ -85,6 +87,7 @@ def document(
             angle=angle,
             drifts=d.naming.unknown.reach > 0,
         )
+        + _nearest(d)
         + _unfinished(d),
         "location": _location(d.location) or (place(faulty) if faulty else None),
         "faults": fault_entries(d.corrected) if d.corrected else [],
@@ -260,6 +263,13 @@ def _others(d: Diagnosis) -> tuple[Candidate, ...]:
         rest = [c for c in rest if not named <= set(c.ids)]
     others = [*d.alternatives, *(c for c in rest if c not in d.alternatives)]
     return tuple(others[: max(len(d.alternatives), MOST_OTHERS)])
+
+
+def _nearest(d: Diagnosis) -> str:
+    """What comes nearest where no effect is named."""
+    if d.verdict not in ("unknown", "partly") or d.effects:
+        return ""
+    return nearest([(a["id"], a["probability"]) for a in map(partial(_alternative, d), _others(d))])
 
 
 def _alternative(d: Diagnosis, candidate: Candidate) -> dict[str, Any]:

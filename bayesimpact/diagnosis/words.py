@@ -17,6 +17,7 @@ from bayesimpact.model.units import span_of, two_digits
 SHARED = ("k2", "k1", "c1", "c2", "g")
 OPEN = 0.5  # half-width of a 90 % interval over the median: more than 0.5 leaves a size open
 FOLD = 10.0  # a change of more than ten times the value is told as a multiple, not in per cent
+WORTH_TELLING = 0.1  # probability among all sets of effects that were fitted
 TOLD = 2.0  # posterior standard deviations of a force, from which on its size means something
 
 _REGIMES = {
@@ -107,6 +108,15 @@ def title_of(effect_id: str) -> str:
 def titles_of(ids: str) -> str:
     """Titles for ids joined by " + "; words stay what they are."""
     return " and ".join(title_of(i) for i in ids.split(" + "))
+
+
+def nearest(sets: Sequence[tuple[str, float]]) -> str:
+    """The likeliest sets of effects where none is enough, ids with probabilities, in a sentence."""
+    told = [f"{titles_of(ids)} ({100 * p:.0f} %)" for ids, p in sets if p >= WORTH_TELLING]
+    if not told:
+        return ""
+    comes = "comes" if len(told) == 1 else "come"
+    return f" Of the catalogue {' or '.join(told)} {comes} nearest, but not near enough."
 
 
 def remaining(left: Remainder | None, unit: str = "m") -> str:

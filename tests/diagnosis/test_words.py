@@ -14,6 +14,7 @@ from bayesimpact.diagnosis.words import (
     Shift,
     failure,
     left_open,
+    nearest,
     parameter_shift,
     parameter_shifts,
     remaining,
@@ -138,6 +139,18 @@ def test_a_force_that_is_hardly_known_has_no_size():
     )
     said = summary("unknown", (), (), vague, (), {}, "")
     assert "hardly tell (up to 10 N rms)" in said and "3.5" not in said
+
+
+def test_what_comes_nearest():
+    sets = [
+        ("sensor_quadratic", 0.6),
+        ("coulomb_friction + gap_wear", 0.33),
+        ("spring_cubic", 0.01),
+    ]
+    said = nearest(sets)
+    assert "(60 %) or dry friction and a gap that grows at every impact (33 %) come near" in said
+    assert "cubic" not in said and " (60 %) comes nearest" in nearest(sets[:1])
+    assert nearest(sets[2:]) == nearest([]) == ""
 
 
 def test_recordings_keep_their_truth(small):
