@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from scipy.signal import lfilter, savgol_filter
 
 from bayesimpact.data.bundled import bundled_campaign
@@ -348,57 +347,6 @@ def test_a_swing_to_the_other_side_is_no_hand() -> None:
     fault = recording_faults(Recording("p", "", samples, 0.01, quantity="angle"))[0]
     assert fault.id == "recording_start" and "at rest" in fault.statement
     assert fault.end_s == pytest.approx(1.0, abs=0.12)
-
-
-def swing(phase: float, push: float, noise: float, seed: int) -> Recording:
-    """A decay at 30 readings a period that passes cos(phase) first; until it first turns only the
-    share `push` of its way there has been gone, slowly at first.
-    """
-    t = np.arange(0.0, 12.0, 1 / 30)
-    y = np.exp(-0.05 * t) * np.cos(2 * np.pi * t + phase)
-    turn = int(np.argmax(np.abs(y[:15])))
-    y[:turn] = y[0] + (y[turn] - y[0]) * (t[:turn] / t[turn]) ** (1.0 + push)
-    y = y + noise * np.random.default_rng(seed).standard_normal(t.size)
-    return Recording("p", "", y, 1 / 30, quantity="angle")
-
-
-@pytest.mark.parametrize("phase", [-1.2, -0.9, np.pi - 1.0])
-@pytest.mark.parametrize("noise", [1e-4, 1e-2])
-def test_a_hand_that_pushes_to_the_first_turning_point(phase: float, noise: float) -> None:
-    found = recording_faults(swing(phase, 2.0, noise, 1))
-    assert [f.id for f in found] == ["recording_start"]
-    turn = -phase % np.pi / (2 * np.pi)
-    assert "not yet free" in found[0].statement
-    assert found[0].end_s == pytest.approx(turn, abs=2 / 30)
-
-
-def test_free_swings_that_begin_anywhere_are_no_hand() -> None:
-    """Linear ones and pendulums of up to 150 degrees, from every phase."""
-    rng = np.random.default_rng(7)
-    for seed in range(60):
-        phase, size = rng.uniform(0, 2 * np.pi), rng.uniform(0.1, 2.6)
-        energy = 1 - np.cos(size)
-        y0 = size * np.cos(phase)
-        v0 = -np.sign(np.sin(phase)) * np.sqrt(2 * max(energy - 1 + np.cos(y0), 0.0))
-        t = np.arange(0.0, 60.0, 10 ** rng.uniform(-1.5, -0.5))
-        for force in (np.sin, lambda x: x):
-            found = solve_ivp(
-                lambda t, s, f=force: [s[1], -f(s[0]) - 0.02 * s[1]], (0, t[-1]), [y0, v0],
-                t_eval=t, rtol=1e-8,
-            )  # fmt: skip
-            y = found.y[0] + 10 ** rng.uniform(-4, -2) * size * rng.standard_normal(t.size)
-            faults = recording_faults(Recording("p", "", y, float(t[1]), quantity="angle"))
-            assert not any("not yet free" in f.statement for f in faults), (seed, phase, size)
-
-
-@pytest.mark.parametrize(("before", "noise"), [(0.08, 4e-3), (0.09, 2e-2)])
-def test_a_coarse_turning_point_is_no_rest(before: float, noise: float) -> None:
-    """Twenty-four readings a period, from just before a peak."""
-    t = np.arange(200) / 24 - before
-    y = 1.24 * np.exp(-0.05 * t) * np.cos(2 * np.pi * t)
-    y += noise * np.random.default_rng(0).standard_normal(t.size)
-    found = recording_faults(Recording("p", "", y, 1 / 24))
-    assert [f.id for f in found if f.action != "notice"] == []
 
 
 def test_friction_that_holds_an_encoder_is_no_fault() -> None:
