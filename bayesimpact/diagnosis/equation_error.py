@@ -138,7 +138,8 @@ def _smoothed(samples: Array, interval: float, period: float, noise: float) -> t
     """Displacement and velocity (n,) by local quartics, no wider than the noise asks for."""
     speed = np.pi * float(np.ptp(samples)) / period
     asked = (3.0 * noise / (STEADY * speed * interval)) ** (2 / 3)
-    half = int(np.clip(np.ceil(asked), 3, max(WIDEST * period / interval, 3)))
+    most = min(WIDEST * period / interval, (samples.size - 1) / 2)  # a fitted period may be long
+    half = int(np.clip(np.ceil(asked), 3, max(most, 3)))
     y, v = (savgol_filter(samples, 2 * half + 1, 4, deriv=k, delta=interval) for k in (0, 1))
     return np.asarray(y), np.asarray(v)
 

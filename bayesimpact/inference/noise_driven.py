@@ -63,6 +63,8 @@ def _gap(recording: Recording) -> Array | None:
     assert recording.input is not None
     driving, response = _powers(recording.input.samples), _powers(recording.samples)
     count = int(TOP * driving.size) // BAND
+    if count < LEAST_BANDS:
+        return None
     bands = driving[: count * BAND].reshape(count, BAND).mean(axis=1)
     loud = np.flatnonzero(bands > SILENT * bands.max())
     first = int(loud[-1]) + 2 if loud.size else 0  # one more: a window leaks into its neighbour

@@ -7,6 +7,7 @@ import small_rig
 from effect_rigs import BY_ID
 
 from bayesimpact.diagnosis.asked import ASKED, Asked
+from bayesimpact.diagnosis.equation_error import _smoothed
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.refit import base_candidate, fit_from
 from bayesimpact.inference.identify import identify
@@ -48,3 +49,10 @@ def test_what_acts_in_flight_is_judged_there() -> None:
     expected = [sorted(g, key=lambda i: -g[i])[:ASKED] for g in (flight, stops)]
     assert asked.first(base) == {*expected[0], *expected[1]}
     assert all(BY_ID[i].regime != "free" for i in stops)
+
+
+def test_a_period_longer_than_the_recording_is_smoothed_over_what_there_is() -> None:
+    """A fit that failed may have any period, and noise that asks for long polynomials."""
+    samples = 1e-3 * np.random.default_rng(0).standard_normal(40)
+    y, v = _smoothed(samples, 1e-3, 10.0, 1.0)
+    assert y.shape == v.shape == (40,) and np.isfinite(v).all()
