@@ -110,6 +110,11 @@ def read_table(
     return Table(even.samples, even.interval, float(times[0]), quantity, even.used)
 
 
+def squeezed(name: str) -> str:
+    """A column's name without its blanks, which a reader of a header does not see."""
+    return "".join(name.split())
+
+
 def _is_content(line: str) -> bool:
     return bool(line.strip()) and not line.lstrip().startswith("#")
 
@@ -169,6 +174,7 @@ def _response_column(
 ) -> int:
     if column is not None:
         found = [i for i, name in enumerate(names) if name == column]
+        found = found or [i for i, n in enumerate(names) if squeezed(n) == squeezed(column)]
         if len(found) == 1 and found[0] != time:
             return found[0]
         state = f'column = "{column}", which is ' + (

@@ -13,8 +13,8 @@ from bayesimpact.data.clock import check_rate
 from bayesimpact.data.gaps import on_clock
 from bayesimpact.data.input import Kind, unit_factor
 from bayesimpact.data.quantity import UNITS, Quantity, order_of, units_of
-from bayesimpact.data.readers.channel import TIME_UNITS, Channel
-from bayesimpact.data.table import Table
+from bayesimpact.data.readers.channel import TIME_UNITS, Channel, name_and_unit
+from bayesimpact.data.table import Table, squeezed
 from bayesimpact.data.window import unbroken, window
 from bayesimpact.errors import InputError
 
@@ -123,7 +123,7 @@ def _of_block(
 
 
 def _named(path: Path, channels: Sequence[Channel], key: str, asked: str | int) -> Channel:
-    fitting = [c for c in channels if asked in (c.name, c.label, f"{c.name} ({c.unit})")]
+    fitting = _called(channels, asked)
     if not fitting and str(asked).isdigit() and 1 <= int(asked) <= len(channels):
         fitting = [channels[int(asked) - 1]]
     if len(fitting) == 1:
@@ -133,6 +133,15 @@ def _named(path: Path, channels: Sequence[Channel], key: str, asked: str | int) 
     accepted = f"one of this file's channels: {listed(channels)}"
     accepted += ", and their block" if len(fitting) > 1 else ""
     raise InputError(str(path), found, accepted)
+
+
+def _called(channels: Sequence[Channel], asked: str | int) -> list[Channel]:
+    """Channels of a name; else those whose name and unit are written like that, but for blanks."""
+    exact = [c for c in channels if asked in (c.name, c.label, f"{c.name} ({c.unit})")]
+    if exact or isinstance(asked, int):
+        return exact
+    name, unit = name_and_unit(asked)
+    return [c for c in channels if squeezed(c.name) == squeezed(name) and unit in ("", c.unit)]
 
 
 def _response(path: Path, channels: Sequence[Channel], wanted: Wanted) -> Channel:
