@@ -194,10 +194,13 @@ def summary(
         cost = _moved(shifts, "Fitting a force in its place")
         force = two_digits(location.force_rms, "N m" if angle else "N")
         slowly = " It is a stiffness or damping that changes with time." if drifts else ""
+        head = "Something is missing that the catalogue does not hold."
+        if faults:  # they are all that has a name
+            head = f"Faults of recordings are set aside or corrected.{faults} The rest is unknown."
         return (
-            f"Something is missing that the catalogue does not hold. It acts {place}, mostly at "
+            f"{head} It acts {place}, mostly at "
             f"{_span(location.displacement, 'rad' if angle else 'm')}, with {force} rms.{slowly}"
-            f"{cost}{remains}{faults}"
+            f"{cost}{remains}"
         )
     titles = " and ".join(e.title for e in effects)
     cost = _moved(shifts, "Adding it" if len(effects) == 1 else "Adding them")
