@@ -136,6 +136,17 @@ def test_recording_that_starts_before_the_release(run: Run, tmp_path: Path) -> N
     assert "a:" not in err
 
 
+@pytest.mark.parametrize("stop", [True, False])
+def test_few_samples_per_period_speak_of_contacts_where_there_are_any(
+    stop: bool, run: Run, tmp_path: Path
+) -> None:
+    few = csv(decay(120, 1e-2), interval=1e-2)  # 16 per period
+    toml = TOML if stop else TOML.replace("mass_kg", "stop = false\nmass_kg")
+    code, out, err = run("check", write(tmp_path, toml, a=few, b=few))
+    assert code == 0 and "a: only 16 samples per period: " in err
+    assert ("contact" in out + err) is stop
+
+
 @pytest.mark.parametrize(
     ("raised", "code", "words"),
     [(KeyboardInterrupt(), 130, "interrupted"), (SimulationError("code 4"), 1, "code 4")],

@@ -63,17 +63,19 @@ def campaign_warnings(campaign: Campaign, noise: Noise | None) -> list[str]:
             f"{smoothing.window}, as MATLAB's smooth does"
         )
     for recording in campaign.recordings:
-        warnings += [f"{recording.name}: {text}" for text in _recording_warnings(recording)]
+        found = _recording_warnings(recording, stop=campaign.stop)
+        warnings += [f"{recording.name}: {text}" for text in found]
     return warnings
 
 
-def _recording_warnings(recording: Recording) -> list[str]:
+def _recording_warnings(recording: Recording, *, stop: bool) -> list[str]:
     period = rough_period(recording.samples, recording.interval)
     assert period is not None  # load_campaign refuses recordings without one
     warnings = []
     per_period = period / recording.interval
     if per_period < 20:
-        warnings.append(f"only {per_period:.0f} samples per period: contacts are seen poorly")
+        poorly = "contacts are" if stop else "what changes within one is"
+        warnings.append(f"only {per_period:.0f} samples per period: {poorly} seen poorly")
     if recording.duration < 5 * period:
         warnings.append(f"only {recording.duration / period:.1f} periods: damping is seen poorly")
     rest = np.median(recording.samples[recording.samples.size // 2 :])
