@@ -29,6 +29,7 @@ from bayesimpact.diagnosis.words import (
     remaining,
     statement,
     summary,
+    titles_of,
 )
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect
@@ -84,6 +85,7 @@ def document(
             faults=in_words(d.corrected) if d.corrected else "",
             angle=angle,
             drifts=d.naming.unknown.reach > 0,
+            probe=_of_the_probe(d),
         )
         + _unfinished(d),
         "location": _location(d.location) or (place(faulty) if faulty else None),
@@ -260,6 +262,18 @@ def _others(d: Diagnosis) -> tuple[Candidate, ...]:
         rest = [c for c in rest if not named <= set(c.ids)]
     others = [*d.alternatives, *(c for c in rest if c not in d.alternatives)]
     return tuple(others[: max(len(d.alternatives), MOST_OTHERS)])
+
+
+def _of_the_probe(d: Diagnosis) -> str:
+    """Titles of the likeliest of the other models where there is evidence for it and all of it acts
+    in the measuring chain; else empty.
+    """
+    base = d.naming.base.candidate
+    likeliest = max(_others(d), key=d.naming.log_odds, default=base)
+    better = likeliest.log_evidence > base.log_evidence
+    if not better or any(e.regime != "measurement" for e in likeliest.effects):
+        return ""
+    return titles_of(" + ".join(likeliest.ids))
 
 
 def _alternative(d: Diagnosis, candidate: Candidate) -> dict[str, Any]:
