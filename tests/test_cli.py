@@ -85,10 +85,10 @@ def test_check_says_what_was_read_and_what_will_be_estimated(run: Run, tmp_path:
     code, out, err = run("check", tmp_path)
     assert (code, err) == (0, "")
     lines = {line.split()[0]: line.split() for line in out.splitlines() if line.strip()}
-    # name, case, samples, Hz, start, length, period; then first and largest in mm
+    # name, case, samples, Hz, start, length, period; then rest, first and largest in mm
     assert lines["a"][:7] == ["a", "1", "600", "500", "0", "1.198", "0.1563"]
     assert lines["c"][:7] == ["c", "2", "1500", "1000", "0.25", "1.499", "0.1563"]
-    assert [float(x) for x in lines["a"][7:9]] == pytest.approx([-6.0, 6.0], rel=0.05)
+    assert [float(x) for x in lines["a"][8:10]] == pytest.approx([-6.0, 6.0], rel=0.05)
     assert "will be estimated: 13 parameters" in out
     for words in ("k2[1], k2[2]  N/m", "y0[a], y0[c]  m", "v0[a], v0[c]  m/s", "sigma  m"):
         assert words in out
@@ -134,6 +134,29 @@ def test_recording_that_starts_before_the_release(run: Run, tmp_path: Path) -> N
     assert code == 0
     assert "b: the largest excursion comes 0.6 s" in err and "set start_s = 1.6" in err
     assert "a:" not in err
+
+
+def test_first_and_largest_are_counted_from_one_rest(run: Run, tmp_path: Path) -> None:
+    """Once told of a probe that reads 418 mm at rest: first 478.8, largest 71.25."""
+    code, out, _ = run("check", write(tmp_path, a=csv(0.4 + decay()), b=csv(decay())))
+    rows = {line.split()[0]: line.split() for line in out.splitlines() if line.strip()}
+    names = rows["recording"]
+    assert names[-5:] == ["rest", "mm", "first", "largest", "decay"]
+    far, near = ([float(x) for x in rows[name][7:10]] for name in ("a", "b"))
+    assert code == 0 and far[0] == pytest.approx(400.0 + near[0], abs=0.1)
+    assert far[1:] == pytest.approx(near[1:], abs=1e-3)
+    assert near[2] == pytest.approx(-near[1]) == pytest.approx(6.0, rel=0.05)
+
+
+@pytest.mark.parametrize("stop", [True, False])
+def test_few_samples_per_period_speak_of_contacts_where_there_are_any(
+    stop: bool, run: Run, tmp_path: Path
+) -> None:
+    few = csv(decay(120, 1e-2), interval=1e-2)  # 16 per period
+    toml = TOML if stop else TOML.replace("mass_kg", "stop = false\nmass_kg")
+    code, out, err = run("check", write(tmp_path, toml, a=few, b=few))
+    assert code == 0 and "a: only 16 samples per period: " in err
+    assert ("contact" in out + err) is stop
 
 
 @pytest.mark.parametrize(

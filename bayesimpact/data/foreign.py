@@ -64,14 +64,13 @@ def read_input(source: Path, entry: RecordingTable, data: bytes) -> Table:
         accepted = "the name of a column in quotes, or its number counted from 1"
         raise InputError(f"{source}, input, key column", "nothing", accepted)
     channels = read_channels(source, data, encoding=entry.encoding, skip_rows=entry.skip_rows or 0)
-    windowed = is_foreign(source, entry, data)  # as the response is read
     wanted = Wanted(
         column=given.column,
         time_column=entry.time_column,
         block=entry.block,
         sample_rate=entry.sample_rate_hz,
-        start=entry.start_s if windowed else None,
-        end=entry.end_s if windowed else None,
+        start=entry.start_s,
+        end=entry.end_s,
         resample=entry.resample,
         kind=given.kind,
     )

@@ -18,6 +18,7 @@ from bayesimpact.data.read import build_campaign
 from bayesimpact.data.recording import Recording
 from bayesimpact.data.schema import RecordingTable, parse_campaign
 from bayesimpact.data.table import TIME_COLUMNS, Table
+from bayesimpact.data.window import unbroken, window
 from bayesimpact.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -29,6 +30,7 @@ The stress in a vibrating spring grows with its speed, strain = speed / wave spe
 32, 1960): 5 km/s and a strain of 1 % give 50 m/s, beyond which a metal spring yields. Millimetres
 taken for metres exceed twice that above 2.5 Hz and 6.5 mm.
 """
+_NUMBERS = "finite numbers, (n,), two or more"
 _OWN = ("samples", "times_s", "used")
 _OF_FILES = frozenset(
     ("file", "column", "channel", "block", "skip_rows", "encoding", "time_column")
@@ -154,21 +156,32 @@ def _samples(where: str, entry: RecordingTable, given: Mapping[str, Any]) -> Tab
     samples = _floats(f"{where}, key samples", given["samples"])
     quantity, factor = UNITS[entry.unit or ""]
     used = _mask(f"{where}, key used", given.get("used"), samples.size)
-    if given.get("times_s") is not None:
-        times = _floats(f"{where}, key times_s", given["times_s"])
-        if times.size != samples.size:
-            found = f"{times.size} times of {samples.size} samples"
-            raise InputError(f"{where}, key times_s", found, "a time for every sample")
-        rows = np.arange(times.size, dtype=np.int64)
-        if entry.resample and used is not None:  # what does not count is a gap in the clock
-            times, samples, rows, used = times[used], samples[used], rows[used], None
-        even = on_clock(where, times, samples * factor, rows, "sample", resample=entry.resample)
-        check_rate(where, even.interval, entry.sample_rate_hz)
-        used = even.used if used is None else used
-        return Table(even.samples, even.interval, float(times[0]), quantity, used)
-    if entry.sample_rate_hz is None:
-        raise InputError(where, "no clock", "times_s (n,), or sample_rate_hz")
-    return Table(samples * factor, 1.0 / entry.sample_rate_hz, 0.0, quantity, used)
+    if given.get("times_s") is None:
+        if entry.sample_rate_hz is None:
+            raise InputError(where, "no clock", "times_s (n,), or sample_rate_hz")
+        interval = 1.0 / entry.sample_rate_hz
+        first, last = window((interval, 0.0), samples.size, entry.start_s, entry.end_s)
+        _check_finite(f"{where}, key samples", samples[first:last], first)
+        used = None if used is None else used[first:last]
+        return Table(samples[first:last] * factor, interval, first * interval, quantity, used)
+    times = _floats(f"{where}, key times_s", given["times_s"])
+    if times.size != samples.size:
+        found = f"{times.size} times of {samples.size} samples"
+        raise InputError(f"{where}, key times_s", found, "a time for every sample")
+    first, last = window(times, samples.size, entry.start_s, entry.end_s)
+    if entry.resample:
+        first, last = unbroken(times, samples, first, last)
+    rows = np.arange(first, last, dtype=np.int64)
+    times, samples = times[first:last], samples[first:last]
+    _check_finite(f"{where}, key times_s", times, first)
+    _check_finite(f"{where}, key samples", samples, first)
+    used = None if used is None else used[first:last]
+    if entry.resample and used is not None:  # what does not count is a gap in the clock
+        times, samples, rows, used = times[used], samples[used], rows[used], None
+    even = on_clock(where, times, samples * factor, rows, "sample", resample=entry.resample)
+    check_rate(where, even.interval, entry.sample_rate_hz)
+    used = even.used if used is None else used
+    return Table(even.samples, even.interval, float(times[0]), quantity, used)
 
 
 def _with_input(where: str, entry: RecordingTable, table: Table, given: Mapping[str, Any]) -> Table:
@@ -200,20 +213,23 @@ def _mask(where: str, given: Any, size: int) -> NDArray[np.bool_] | None:
 
 
 def _floats(where: str, values: Any) -> Floats:
-    """Two or more finite numbers, (n,)."""
-    accepted = "finite numbers, (n,), two or more"
+    """Two or more numbers, (n,), finite or not."""
     if isinstance(values, np.ma.MaskedArray):
         values = np.ma.filled(values.astype(np.float64), np.nan)
     array = np.asarray(values)
     if array.dtype.kind not in "fiu":
-        raise InputError(where, f"an array of {array.dtype}", accepted)
+        raise InputError(where, f"an array of {array.dtype}", _NUMBERS)
     if array.ndim != 1 or array.size < 2:
-        raise InputError(where, f"an array of shape {array.shape}", accepted)
-    floats = array.astype(np.float64)
-    wrong = np.flatnonzero(~np.isfinite(floats))
+        raise InputError(where, f"an array of shape {array.shape}", _NUMBERS)
+    return array.astype(np.float64)
+
+
+def _check_finite(where: str, values: Floats, first: int) -> None:
+    """Refuse a value that is no finite number; `first` is the position of the first one."""
+    wrong = np.flatnonzero(~np.isfinite(values))
     if wrong.size:
-        raise InputError(f"{where}, sample {wrong[0]}", f"{floats[wrong[0]]}", accepted)
-    return floats
+        i = int(wrong[0])
+        raise InputError(f"{where}, sample {first + i}", f"{values[i]}", _NUMBERS)
 
 
 def _check_speed(where: str, table: Table) -> None:

@@ -213,6 +213,7 @@ def _table(source: Path, entry: RecordingTable, data: bytes) -> Table:
         unit=entry.unit,
         sample_rate=entry.sample_rate_hz,
         resample=entry.resample,
+        span=(entry.start_s, entry.end_s),
     )
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from bayesimpact.data.clock import check_rate
 from bayesimpact.data.gaps import on_clock
 from bayesimpact.data.quantity import RESPONSE_COLUMNS, UNITS, Quantity
+from bayesimpact.data.window import unbroken, window
 from bayesimpact.errors import InputError
 
 TIME_COLUMNS = {"time_s": 1.0, "time_ms": 1e-3}
@@ -60,6 +61,7 @@ def read_table(
     unit: str | None = None,
     sample_rate: float | None = None,
     resample: bool = False,
+    span: tuple[float | None, float | None] = (None, None),
 ) -> Table:
     """Parse the content of a recording's file.
 
@@ -71,6 +73,7 @@ def read_table(
         `RESPONSE_COLUMNS` or there are several
     sample_rate : Hz, for a file without a time column
     resample : the clock is uneven: take the readings over to even times
+    span : start and end of what is used, s; readings and spacing outside are not checked
 
     Raises
     ------
@@ -92,11 +95,24 @@ def read_table(
             accepted = f"a column {' or '.join(TIME_COLUMNS)}, or sample_rate_hz in campaign.toml"
             found = f"no time column among {', '.join(layout.names)}"
             raise InputError(f"{path}, header row", found, accepted)
-        return Table(samples, 1.0 / sample_rate, 0.0, quantity)
+        interval = 1.0 / sample_rate
+        first, last = window((interval, 0.0), samples.size, *span)
+        _check_finite(path, lines, layout, samples[first:last], rows[first:last])
+        return Table(samples[first:last], interval, first * interval, quantity)
     times = numbers[:, 0] * TIME_COLUMNS[layout.names[layout.time]]
+    first, last = window(times, samples.size, *span)
+    if resample:
+        first, last = unbroken(times, samples, first, last)
+    times, samples, rows = times[first:last], samples[first:last], rows[first:last]
+    _check_finite(path, lines, layout, samples, rows)
     even = on_clock(path, times, samples, rows, resample=resample)
     check_rate(path, even.interval, sample_rate)
     return Table(even.samples, even.interval, float(times[0]), quantity, even.used)
+
+
+def squeezed(name: str) -> str:
+    """A column's name without its blanks, which a reader of a header does not see."""
+    return "".join(name.split())
 
 
 def _is_content(line: str) -> bool:
@@ -158,6 +174,7 @@ def _response_column(
 ) -> int:
     if column is not None:
         found = [i for i, name in enumerate(names) if name == column]
+        found = found or [i for i, n in enumerate(names) if squeezed(n) == squeezed(column)]
         if len(found) == 1 and found[0] != time:
             return found[0]
         state = f'column = "{column}", which is ' + (
@@ -196,14 +213,16 @@ def _is_number(text: str) -> bool:
 def _numbers(
     path: Path, lines: list[str], first: int, layout: _Layout
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Time (if any) and response as in the file, (n, 1 or 2), and their line numbers (n,)."""
+    """Time (if any) and response as in the file, (n, 1 or 2), and their line numbers (n,).
+
+    A response that is no finite number is NaN.
+    """
     last = len(lines)
     while last > first and not lines[last - 1].strip():
         last -= 1
     body = lines[first:last]
     if layout.separator != ",":
         body = _decimal_points(path, body, first)
-    columns = [layout.response] if layout.time is None else [layout.time, layout.response]
     values: list[list[float]] = []
     rows: list[int] = []
     for line, text in enumerate(body, first + 1):
@@ -211,7 +230,7 @@ def _numbers(
             if values and not text.strip():
                 raise InputError(f"{path}, line {line}", "an empty line", "a row of numbers")
             continue
-        values.append(_row(path, line, text, layout, columns))
+        values.append(_row(path, line, text, layout))
         rows.append(line)
     if len(values) < 2:
         found = "only a header row" if not values else "one sample"
@@ -233,23 +252,50 @@ def _decimal_points(path: Path, body: list[str], first: int) -> list[str]:
     return [text.replace(",", ".") for text in body] if comma else body
 
 
-def _row(path: Path, line: int, text: str, layout: _Layout, columns: list[int]) -> list[float]:
+def _row(path: Path, line: int, text: str, layout: _Layout) -> list[float]:
     fields = text.strip("\n").split(layout.separator)
-    where = f"{path}, line {line}"
     if len(fields) != len(layout.names):
         accepted = f"{len(layout.names)} fields as in the header ({', '.join(layout.names)})"
         if layout.separator == ",":
             accepted += "; decimal commas need semicolons between the columns"
-        raise InputError(where, f'{len(fields)} fields ("{text.strip()}")', accepted)
-    numbers = []
-    for column in columns:
-        field = fields[column].strip()
-        try:
-            number = float(field)
-        except ValueError:
-            number = math.nan
-        if not math.isfinite(number) or "_" in field:
-            found = f'"{field}"' if field else "an empty field"
-            raise InputError(f"{where}, column {layout.names[column]}", found, "a finite number")
-        numbers.append(number)
-    return numbers
+        found = f'{len(fields)} fields ("{text.strip()}")'
+        raise InputError(f"{path}, line {line}", found, accepted)
+    response = _number(fields[layout.response])
+    if layout.time is None:
+        return [response]
+    time = _number(fields[layout.time])
+    if math.isnan(time):
+        raise _no_number(path, line, layout, layout.time, fields)
+    return [time, response]
+
+
+def _number(field: str) -> float:
+    """A finite number, else NaN."""
+    try:
+        number = float(field)
+    except ValueError:
+        return math.nan
+    return number if math.isfinite(number) and "_" not in field else math.nan
+
+
+def _check_finite(
+    path: Path,
+    lines: Sequence[str],
+    layout: _Layout,
+    samples: NDArray[np.float64],
+    rows: NDArray[np.int64],
+) -> None:
+    wrong = np.flatnonzero(np.isnan(samples))
+    if wrong.size:
+        line = int(rows[wrong[0]])
+        fields = lines[line - 1].strip("\n").split(layout.separator)
+        raise _no_number(path, line, layout, layout.response, fields)
+
+
+def _no_number(
+    path: Path, line: int, layout: _Layout, column: int, fields: Sequence[str]
+) -> InputError:
+    field = fields[column].strip()
+    found = f'"{field}"' if field else "an empty field"
+    where = f"{path}, line {line}, column {layout.names[column]}"
+    return InputError(where, found, "a finite number")

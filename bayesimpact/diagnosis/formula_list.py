@@ -87,12 +87,12 @@ def listed(
         own = [terms[k] for k in subset.terms]
         sizes = tuple(float(values[f"{effect_id(t)}.size"]) for t in own)
         found = tuple(fitted_term(t, values) for t in own)
-        alike = _alike(classes[subset], subset, terms)
+        alike = _alike(question, classes[subset], subset)
         rows.append(_row(question, subset, (found, sizes), naming.log_odds(candidate), alike))
     for head in heads[: 2 * LISTED]:
         if head.best.log_odds > 0.0 and not {head.best, *head.alike} & fitted.keys():
             own = [terms[k] for k in head.best.terms]
-            alike = _alike(head, head.best, terms)
+            alike = _alike(question, head, head.best)
             odds = head.best.log_odds + offset
             row = _row(question, head.best, (tuple(own), head.best.sizes), odds, alike)
             rows.append(replace(row, refitted=False))
@@ -116,15 +116,16 @@ def _row(
     return Formula(*found, log_odds, 0.0, True, alike, effects, peak)
 
 
-def _alike(head: FormulaClass, own: Subset, terms: Sequence[Term]) -> tuple[str, ...]:
+def _alike(question: Question, head: FormulaClass, own: Subset) -> tuple[str, ...]:
     """Formulas of a class within the decisive odds that differ in more than their shapes."""
+    terms, angle = question.scores.terms, question.scales.angle
     known = {kinds_of(own, terms)}
     found: list[str] = []
     for subset in (head.best, *head.alike):
         kinds = kinds_of(subset, terms)
         if kinds not in known and subset.log_odds > own.log_odds - DECISIVE:
             known.add(kinds)
-            found.append(formula_text([terms[i] for i in subset.terms]))
+            found.append(formula_text([terms[i] for i in subset.terms], angle=angle))
     return tuple(found[:ALIKE])
 
 

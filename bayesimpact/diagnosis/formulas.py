@@ -119,7 +119,8 @@ def _fitted(
     for subset in chosen:
         if not budget.may_go_on():
             return fitted, True
-        text = formula_text([question.scores.terms[k] for k in subset.terms])
+        terms = [question.scores.terms[k] for k in subset.terms]
+        text = formula_text(terms, angle=question.scales.angle)
         progress(f"fitting the formula {text}")
         found = refitted(question, subset)
         if found is not None:

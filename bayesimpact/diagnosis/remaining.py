@@ -97,5 +97,6 @@ class Remaining(Settling):
 
     def with_residual(self, state: State) -> Candidate:
         """A model with the likelier form of a residual force beside its effects."""
-        self.progress("fitting a residual force beside " + " + ".join(state.candidate.ids))
+        beside = " + ".join(state.candidate.ids) or "the base model"
+        self.progress(f"fitting a residual force beside {beside}")
         return with_force(state.candidate, state.unknown, self.scales)

@@ -25,7 +25,12 @@ _SHAPES = ("place", "width", "fade")
 
 
 def effect_file(
-    terms: Sequence[Term], effects: Sequence[Effect], sizes: Sequence[float], status: str
+    terms: Sequence[Term],
+    effects: Sequence[Effect],
+    sizes: Sequence[float],
+    status: str,
+    *,
+    angle: bool = False,
 ) -> str:
     """The text of a file that defines one effect per term.
 
@@ -35,9 +40,10 @@ def effect_file(
     effects : of `law.effect_of`, one per term
     sizes : that were found
     status : how sure it is, for the head
+    angle : the displacement is an angle; only words differ
     """
     title = "A force: " + " + ".join(
-        f"{s:.4g} {t.text()}" for s, t in zip(sizes, terms, strict=True)
+        f"{s:.4g} {t.text(angle=angle)}" for s, t in zip(sizes, terms, strict=True)
     )
     parts = [HEAD.format(title=title, status=status)]
     for i, (term, effect, size) in enumerate(zip(terms, effects, sizes, strict=True)):

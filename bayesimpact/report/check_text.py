@@ -63,17 +63,19 @@ def campaign_warnings(campaign: Campaign, noise: Noise | None) -> list[str]:
             f"{smoothing.window}, as MATLAB's smooth does"
         )
     for recording in campaign.recordings:
-        warnings += [f"{recording.name}: {text}" for text in _recording_warnings(recording)]
+        found = _recording_warnings(recording, stop=campaign.stop)
+        warnings += [f"{recording.name}: {text}" for text in found]
     return warnings
 
 
-def _recording_warnings(recording: Recording) -> list[str]:
+def _recording_warnings(recording: Recording, *, stop: bool) -> list[str]:
     period = rough_period(recording.samples, recording.interval)
     assert period is not None  # load_campaign refuses recordings without one
     warnings = []
     per_period = period / recording.interval
     if per_period < 20:
-        warnings.append(f"only {per_period:.0f} samples per period: contacts are seen poorly")
+        poorly = "contacts are" if stop else "what changes within one is"
+        warnings.append(f"only {per_period:.0f} samples per period: {poorly} seen poorly")
     if recording.duration < 5 * period:
         warnings.append(f"only {recording.duration / period:.1f} periods: damping is seen poorly")
     rest = np.median(recording.samples[recording.samples.size // 2 :])
@@ -90,14 +92,13 @@ def _recording_warnings(recording: Recording) -> list[str]:
 def _recordings_block(campaign: Campaign) -> str:
     units = list(dict.fromkeys(_shown(r)[1] for r in campaign.recordings))
     head = ["recording", "case", "samples", "Hz", "start s", "length s", "period s"]
-    rows = [[*head, f"first {' or '.join(units)}", "largest", "decay"]]
-    if len(units) == 1:
-        rows = [[*head, f"first {units[0]}", f"largest {units[0]}", "decay"]]
+    rows = [[*head, f"rest {' or '.join(units)}", "first", "largest", "decay"]]
     for r in campaign.recordings:
         scale, _ = _shown(r)
         period = rough_period(r.samples, r.interval)
-        amplitude = np.abs(r.samples - np.median(r.samples)).max() * scale
-        numbers = [1 / r.interval, r.start, r.duration, period, r.samples[0] * scale, amplitude]
+        rest = _rest(r)
+        shown = [rest, r.samples[0] - rest, np.abs(r.samples - rest).max()]
+        numbers = [1 / r.interval, r.start, r.duration, period, *(x * scale for x in shown)]
         row = [r.name, r.case or "-", str(r.samples.size), *(f"{x:.4g}" for x in numbers)]
         rows.append([*row, envelope_bars(r)])
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
@@ -106,7 +107,13 @@ def _recordings_block(campaign: Campaign) -> str:
         cells = [cell.rjust(width) for cell, width in zip(row, widths, strict=True)]
         cells[0], cells[-1] = row[0].ljust(widths[0]), row[-1]
         lines.append("  ".join(cells))
+    lines.append("(first and largest are counted from rest, the median of the readings)")
     return "\n".join([*lines, *_inputs(campaign)])
+
+
+def _rest(recording: Recording) -> float:
+    """Reading about which a recording swings."""
+    return float(np.median(recording.samples))
 
 
 def _inputs(campaign: Campaign) -> list[str]:
@@ -131,7 +138,7 @@ def _shown(recording: Recording) -> tuple[float, str]:
 
 def envelope_bars(recording: Recording) -> str:
     """Largest excursion in equal spans of time of a period or more, as a row of bars."""
-    excursion = np.abs(recording.samples - np.median(recording.samples))
+    excursion = np.abs(recording.samples - _rest(recording))
     period = rough_period(recording.samples, recording.interval) or recording.duration
     count = min(COLUMNS, max(1, int(recording.duration / period)))
     spans = np.array_split(excursion, count)

@@ -57,7 +57,7 @@ def diagnosis_view(results: Results) -> dict[str, Any] | None:
         return None
     before, after = (diagnosis.get("parameters", {}).get(k, {}) for k in ("before", "after"))
     return {
-        "verdict": VERDICTS.get(diagnosis["verdict"], diagnosis["verdict"]),
+        "verdict": verdict_words(diagnosis),
         "changed": diagnosis["verdict"] != "adequate",
         "location": _location(
             diagnosis.get("location"), length, named=bool(diagnosis.get("effects"))
@@ -88,6 +88,15 @@ def diagnosis_view(results: Results) -> dict[str, Any] | None:
         "seen": seen(diagnosis),
         "next": next_view(diagnosis.get("next")),
     }
+
+
+def verdict_words(diagnosis: Mapping[str, Any]) -> str:
+    """The verdict as a heading; faults of recordings are no part of the physics that is missing."""
+    verdict = str(diagnosis["verdict"])
+    families = {effect.get("family") for effect in diagnosis.get("effects") or ()}
+    if verdict == "partly" and families == {"recording"}:
+        return "Faults of recordings are set aside or corrected; the rest is unknown"
+    return VERDICTS.get(verdict, verdict)
 
 
 def _location(

@@ -13,11 +13,11 @@ from bayesimpact.model.units import quantity as amount
 from bayesimpact.report.change_view import NUISANCES, estimate
 from bayesimpact.report.diagnosis_view import (
     REGIMES,
-    VERDICTS,
     gain_words,
     probability,
     remainder_rows,
     size_words,
+    verdict_words,
 )
 from bayesimpact.report.results import Results
 from bayesimpact.report.tables import symbol
@@ -32,7 +32,7 @@ def story_rows(results: Results) -> list[tuple[str, list[str | Markup]]]:
     if diagnosis is None:
         return []
     rows = [
-        ("verdict", [VERDICTS.get(diagnosis["verdict"], diagnosis["verdict"])]),
+        ("verdict", [verdict_words(diagnosis)]),
         ("place", _place(results, diagnosis.get("location"))),
         ("physics", _physics(diagnosis)),
         ("size", _size(results, diagnosis)),

@@ -71,6 +71,42 @@ def test_pattern(tmp_path: Path) -> None:
         load_campaign(_folder(tmp_path, "ran*.npz"))
 
 
+@pytest.mark.parametrize(
+    ("head", "asked"),
+    [
+        ("Time ( s ),Voltage ( V )", "Voltage ( V )"),
+        ("Time ( s ),Voltage ( V )", "Voltage (V)"),
+        ("Time ( s ),Voltage ( V )", "Voltage[V]"),
+        ("Time [s],Weg am Ende [\N{MICRO SIGN}V]", "Weg  am Ende [\N{MICRO SIGN}V]"),
+        ("Time [s],x/V", "x/V"),
+        ("Time [s],laser tip", "laser  tip"),
+        ("time_s,laser tip (raw)", "laser tip(raw)"),
+    ],
+)
+def test_a_column_is_called_as_in_its_file_whatever_blanks(
+    tmp_path: Path, head: str, asked: str
+) -> None:
+    made.text(head)(tmp_path / "a.csv")
+    keys = f'column = "{asked}"\nunit = "mm"\n'
+    (recording,) = load_campaign(_folder(tmp_path, "a.csv", keys)).recordings
+    np.testing.assert_allclose(recording.samples, decay(), rtol=1e-11)
+
+
+def test_blanks_choose_between_columns_that_differ_by_them(tmp_path: Path) -> None:
+    rows = [f"{t:.6g},0,{x:.12g}" for t, x in zip(made.TIMES, made.MM, strict=True)]
+    for time in ("time_s", "Time [s]"):
+        (tmp_path / "a.csv").write_text("\n".join([f"{time},ab,a b", *rows]) + "\n")
+        keys = 'column = "{}"\nunit = "mm"\n'
+        (recording,) = load_campaign(_folder(tmp_path, "a.csv", keys.format("a b"))).recordings
+        np.testing.assert_allclose(recording.samples, decay(), rtol=1e-11)
+        with pytest.raises(InputError, match="there 2 times"):
+            load_campaign(_folder(tmp_path, "a.csv", keys.format("a  b")))
+    other = keys.format("x [N]")  # a unit that is not the column's
+    made.text("Time [s],x [V]")(tmp_path / "a.csv")
+    with pytest.raises(InputError, match="there 0 times"):
+        load_campaign(_folder(tmp_path, "a.csv", other))
+
+
 def test_empty_cells_outside_the_window(tmp_path: Path) -> None:
     rows = [f"{t:.6g},{x:.12g}" for t, x in zip(made.TIMES, made.MM, strict=True)]
     rows[500:] = [row.split(",")[0] + "," for row in rows[500:]]

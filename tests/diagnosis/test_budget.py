@@ -187,6 +187,20 @@ def test_no_residual_force_is_fitted_once_the_time_is_up() -> None:
 
 
 @pytest.mark.parametrize(
+    ("effects", "named"),
+    [((), "the base model"), ((BY_ID["coulomb_friction"],), "coulomb_friction")],
+)
+def test_a_residual_force_is_said_to_stand_beside_a_model(effects, named, monkeypatch) -> None:
+    module = importlib.import_module("bayesimpact.diagnosis.remaining")
+    monkeypatch.setattr(module, "with_force", lambda candidate, unknown, scales: candidate)
+    said: list[str] = []
+    search = Remaining((), None, np.random.default_rng(0), said.append, Budget(Clock(), 0.0))
+    state: Any = SimpleNamespace(candidate=Candidate(effects, SimpleNamespace(), 0.0), unknown=None)
+    search.with_residual(state)
+    assert said == [f"fitting a residual force beside {named}"]
+
+
+@pytest.mark.parametrize(
     ("verdict", "effects", "asked"),
     [("named", 3, True), ("named", 2, True), ("named", 1, False), ("partly", 0, True)],
 )

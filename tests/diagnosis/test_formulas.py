@@ -54,9 +54,9 @@ def unknown(effects: dict[str, Any]) -> tuple[Answer, Scales]:
     return Answer(naming, Decision("unknown", ()), learned.fit, state), scales
 
 
-def asked(answer: Answer, scales: Scales, looks: int = 99) -> Answer:
-    """With time for so many looks at the clock."""
-    said: list[str] = []
+def asked(answer: Answer, scales: Scales, looks: int = 99, said: list[str] | None = None) -> Answer:
+    """With time for so many looks at the clock; what it said goes to `said`."""
+    said = [] if said is None else said
     rng = np.random.default_rng(1)
     times = itertools.chain([0.0] * (1 + looks), itertools.repeat(PATIENCE))
     budget = begin(lambda: next(times))
@@ -160,6 +160,24 @@ def test_text_has_a_letter_for_every_size(detent: Any) -> None:
     _, found, _ = detent
     text = formula_text([f.terms[0] for f in found.formulas.ranked[:2]])
     assert text.startswith("A ") and " + B " in text
+
+
+def test_places_of_an_angle_are_angles_wherever_they_are_written(
+    detent: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before, _, scales = detent
+    said: list[str] = []
+    found = asked(before, replace(scales, angle=True), said=said)
+    entries = formula_entries(found.formulas, scales, angle=True)
+    written = [*said, *(text for e in entries for text in (e["formula"], *e["alike"]))]
+    assert any("fitting the formula" in text and "mrad" in text for text in said)
+    assert any("mrad" in text for e in entries for text in e["alike"])
+    assert not any(" mm" in text for text in written)
+    campaign = found.formulas.reference.target.oscillator.campaign
+    assert " mm" in found_file(found.formulas).split('"""')[1]
+    monkeypatch.setattr(type(campaign), "angular", True)
+    title = found_file(found.formulas).split('"""')[1]
+    assert "mrad" in title and " mm" not in title
 
 
 CUBE = Term("everywhere", ONE, Power(3.0, True))

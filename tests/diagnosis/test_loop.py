@@ -246,6 +246,28 @@ def test_the_document_of_an_ambiguous_case_lists_the_rivals(named):
     assert content["effects"][0]["id"] == "contact_hardening"
 
 
+@pytest.mark.parametrize(
+    ("effects", "gain", "said"),
+    [
+        (("sensor_drift",), 5.0, True),
+        (("sensor_drift", "sensor_hum"), 5.0, True),
+        (("sensor_drift",), -1.0, False),  # no evidence for it
+        (("sensor_drift", "coulomb_friction"), 5.0, False),
+        (("coulomb_friction",), 5.0, False),
+    ],
+)
+def test_an_unknown_force_may_be_the_probe_s_where_that_is_likeliest(unknown, effects, gain, said):
+    base = unknown.naming.base.candidate
+    own = tuple(BY_ID[i] for i in effects)
+    likely = replace(base, effects=own, log_evidence=base.log_evidence + gain)
+    less = replace(base, effects=(BY_ID["quadratic_drag"],), log_evidence=base.log_evidence - 9.0)
+    naming = replace(unknown.naming, tried=(base, less, likely))
+    content = written(replace(unknown, naming=naming, alternatives=()))
+    titles = " and ".join(e.title for e in own)
+    assert (f"in the measuring chain: {titles}." in content["summary"]) is said
+    assert ("It acts" in content["summary"]) is not said
+
+
 def test_the_same_seed_gives_the_same_document(control):
     again = written(run(41))
     assert again == written(control)

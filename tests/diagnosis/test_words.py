@@ -125,7 +125,9 @@ def test_the_paragraph():
     assert said.startswith("Dry friction is needed by every likely model")
     assert "It rubs." in said and said.endswith(" More.")
     said = summary("partly", (), (), place("contact"), (), {}, "", faults=" A spike.")
-    assert said.startswith("Something is missing") and said.endswith(" A spike.")
+    head = "Faults of recordings are set aside or corrected. A spike. The rest is unknown."
+    assert said.startswith(head)
+    assert said.count("A spike.") == 1 and "catalogue does not hold" not in said
     wide = SimpleNamespace(
         regime="free", displacement=(-0.3, 0.31), force_rms=0.012, force_sd=0.001
     )
@@ -151,6 +153,18 @@ def test_what_comes_nearest():
     assert "(60 %) or dry friction and a gap that grows at every impact (33 %) come near" in said
     assert "cubic" not in said and " (60 %) comes nearest" in nearest(sets[:1])
     assert nearest(sets[2:]) == nearest([]) == ""
+
+
+def test_what_may_be_the_probe_s_is_not_said_to_act_in_the_mechanics():
+    title = "drift of the probe's zero"
+    said = summary("unknown", (), (), place("free"), (), {}, "", drifts=True, probe=title)
+    assert "Seen as a force it would act in the suspension" in said and "It acts" not in said
+    assert f"0.012 N rms; likeliest of the catalogue, in the measuring chain: {title}. " in said
+    assert "It would be a stiffness" in said
+    said = summary("unknown", (), (), place("free"), (), {}, "", drifts=True)
+    assert "It acts in the suspension" in said and "It is a stiffness" in said
+    said = summary("unknown", (), (), place("measurement"), (), {}, "", probe=title)
+    assert "It acts in the measuring chain" in said and title not in said
 
 
 def test_recordings_keep_their_truth(small):

@@ -163,3 +163,14 @@ def test_all_better_and_unsure_is_said_so() -> None:
     gain = {"value": 47749.0, "se": 29764.0, "wins": 2, "of": 2, "improved": False}
     text = page(diagnosed(fit={"before": {}, "after": {}, "held_out_gain": gain}))[1].text
     assert "All 2 are predicted better" in text and "no clear improvement" not in text
+
+
+def test_a_fault_of_a_recording_is_no_part_of_the_physics() -> None:
+    spikes = DIAGNOSIS["effects"][0] | {"id": "recording_spikes", "family": "recording"}
+    results = diagnosed(verdict="partly", effects=[spikes])
+    told_so = "Faults of recordings are set aside or corrected; the rest is unknown"
+    assert told(results)["verdict"] == told_so
+    view = diagnosis_view(results)
+    assert view is not None and view["verdict"] == told_so
+    both = diagnosed(verdict="partly", effects=[spikes, *DIAGNOSIS["effects"]])
+    assert told(both)["verdict"].startswith("Part of what is missing is named")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,8 +13,9 @@ from bayesimpact.data.clock import check_rate
 from bayesimpact.data.gaps import on_clock
 from bayesimpact.data.input import Kind, unit_factor
 from bayesimpact.data.quantity import UNITS, Quantity, order_of, units_of
-from bayesimpact.data.readers.channel import TIME_UNITS, Channel
-from bayesimpact.data.table import Table
+from bayesimpact.data.readers.channel import TIME_UNITS, Channel, name_and_unit
+from bayesimpact.data.table import Table, squeezed
+from bayesimpact.data.window import unbroken, window
 from bayesimpact.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -56,9 +56,9 @@ def choose(path: Path, channels: Sequence[Channel], wanted: Wanted) -> Table:
     channel = _response(path, inside, wanted)
     quantity, factor = _quantity(path, channel, wanted)
     times = _times(path, channels, channel, wanted)
-    first, last = _window(times, channel, wanted)
+    first, last = window(times, channel.samples.size, wanted.start, wanted.end)
     if wanted.resample and not isinstance(times, tuple):
-        first, last = _unbroken(times, channel.samples, first, last)
+        first, last = unbroken(times, channel.samples, first, last)
     samples = channel.samples[first:last]
     _check_finite(path, channel, samples, first)
     if isinstance(times, tuple):
@@ -123,7 +123,7 @@ def _of_block(
 
 
 def _named(path: Path, channels: Sequence[Channel], key: str, asked: str | int) -> Channel:
-    fitting = [c for c in channels if asked in (c.name, c.label, f"{c.name} ({c.unit})")]
+    fitting = _called(channels, asked)
     if not fitting and str(asked).isdigit() and 1 <= int(asked) <= len(channels):
         fitting = [channels[int(asked) - 1]]
     if len(fitting) == 1:
@@ -133,6 +133,15 @@ def _named(path: Path, channels: Sequence[Channel], key: str, asked: str | int) 
     accepted = f"one of this file's channels: {listed(channels)}"
     accepted += ", and their block" if len(fitting) > 1 else ""
     raise InputError(str(path), found, accepted)
+
+
+def _called(channels: Sequence[Channel], asked: str | int) -> list[Channel]:
+    """Channels of a name; else those whose name and unit are written like that, but for blanks."""
+    exact = [c for c in channels if asked in (c.name, c.label, f"{c.name} ({c.unit})")]
+    if exact or isinstance(asked, int):
+        return exact
+    name, unit = name_and_unit(asked)
+    return [c for c in channels if squeezed(c.name) == squeezed(name) and unit in ("", c.unit)]
 
 
 def _response(path: Path, channels: Sequence[Channel], wanted: Wanted) -> Channel:
@@ -201,49 +210,6 @@ def _times(
         return 1.0 / wanted.sample_rate, channel.start
     found = f"no clock for channel {channel.name} among {listed(channels)}"
     raise InputError(str(path), found, "time_column, or sample_rate_hz in campaign.toml")
-
-
-def _window(
-    times: tuple[float, float] | Floats, channel: Channel, wanted: Wanted
-) -> tuple[int, int]:
-    """Samples between start and end; all of them where the window holds fewer than two.
-
-    What lies outside may hold no numbers: cells left empty by shorter channels.
-    """
-    size, margin = channel.samples.size, 1e-6
-    if isinstance(times, tuple):
-        interval, start = times
-        low = 0 if wanted.start is None else math.ceil((wanted.start - start) / interval - margin)
-        high = (
-            size
-            if wanted.end is None
-            else (math.floor((wanted.end - start) / interval + margin) + 1)
-        )
-    else:
-        steps = np.diff(times)
-        steps = steps[np.isfinite(steps)]
-        spacing = float(np.median(steps)) if steps.size else 0.0
-        slack = margin * abs(spacing)
-        inside = np.ones(size, dtype=bool)
-        if wanted.start is not None:
-            inside &= times >= wanted.start - slack
-        if wanted.end is not None:
-            inside &= times <= wanted.end + slack
-        kept = np.flatnonzero(inside)
-        low, high = (int(kept[0]), int(kept[-1]) + 1) if kept.size else (0, 0)
-    low, high = max(0, low), min(size, high)
-    return (low, high) if high - low >= 2 else (0, size)
-
-
-def _unbroken(times: Floats, samples: Floats, first: int, last: int) -> tuple[int, int]:
-    """The window first..last-1 and all numbers that follow on either side without a break.
-
-    The even clock is the whole file's, as for a text, whatever part of it start and end keep.
-    """
-    broken = np.flatnonzero(~(np.isfinite(times) & np.isfinite(samples)))
-    before, after = broken[broken < first], broken[broken >= last]
-    low = int(before[-1]) + 1 if before.size else 0
-    return low, int(after[0]) if after.size else samples.size
 
 
 def _check_finite(path: Path, channel: Channel, samples: Floats, first: int) -> None:
