@@ -141,8 +141,8 @@ def is_larger(effects: Sequence[Effect], chosen: State) -> bool:
 
 
 def complexity(effects: Sequence[Effect]) -> tuple[int, int]:
-    """Numbers of effects and of their parameters."""
-    return len(effects), sum(len(e.parameters) for e in effects)
+    """Numbers of effects and of their parameters, states at the beginning apart."""
+    return len(effects), sum(not p.initial for e in effects for p in e.parameters)
 
 
 def may_be_needed(naming: Naming, effect: Effect) -> bool:

@@ -31,7 +31,6 @@ from bayesimpact.diagnosis.words import (
     remaining,
     statement,
     summary,
-    titles_of,
 )
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect
@@ -87,7 +86,7 @@ def document(
             faults=in_words(d.corrected) if d.corrected else "",
             angle=angle,
             drifts=d.naming.unknown.reach > 0,
-            probe=_of_the_probe(d),
+            probe=_is_of_the_probe(d),
         )
         + _nearest(d)
         + _unfinished(d),
@@ -274,16 +273,14 @@ def _nearest(d: Diagnosis) -> str:
     return nearest([(a["id"], a["probability"]) for a in map(partial(_alternative, d), _others(d))])
 
 
-def _of_the_probe(d: Diagnosis) -> str:
-    """Titles of the likeliest of the other models where there is evidence for it and all of it acts
-    in the measuring chain; else empty.
+def _is_of_the_probe(d: Diagnosis) -> bool:
+    """Whether there is evidence for the likeliest of the other models, and all of it acts in the
+    measuring chain.
     """
     base = d.naming.base.candidate
     likeliest = max(_others(d), key=d.naming.log_odds, default=base)
     better = likeliest.log_evidence > base.log_evidence
-    if not better or any(e.regime != "measurement" for e in likeliest.effects):
-        return ""
-    return titles_of(" + ".join(likeliest.ids))
+    return better and all(e.regime == "measurement" for e in likeliest.effects)
 
 
 def _alternative(d: Diagnosis, candidate: Candidate) -> dict[str, Any]:

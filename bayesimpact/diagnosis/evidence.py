@@ -2,10 +2,11 @@
 
 Values of one kind, one per obstacle or recording, share a spread that is not known beforehand:
 normal about a common mean with a standard deviation between a ten millionth of their priors' and
-all of it (`WIDEST` physical scales), uniform in the logarithm. Their mean has the prior of the
-parameter that they replace; of the states in which recordings begin it is 0. Independent priors of
-the physical scale would make small differences, however certain, cost eight nats apiece, and large
-ones, about a base fit that leaves most of the recordings unexplained, hundreds.
+all of it (`extend.WIDEST` physical scales), uniform in the logarithm; their mean has the prior of
+the parameter that they replace. So do the states in which recordings begin; their mean is 0 and
+their prior as wide as their law allows. Independent priors of the physical scale would make small
+differences, however certain, cost eight nats apiece, and large ones, about a base fit that leaves
+most of the recordings unexplained, hundreds.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.inference.defaults import WIDEST, effect_prior
+from bayesimpact.inference.defaults import effect_prior
 from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.prior import Normal, Prior
@@ -20,6 +20,9 @@ Array = NDArray[np.float64]
 
 
 SOFTEST = 0.01  # of k1: a base fit that found no obstacle at all still leaves a scale for one
+# Physical scales: values of one kind are pulled to the base fit's by next to nothing, which means
+# little where the misfit is large; their evidence has a prior of its own (`evidence`).
+WIDEST = 100.0
 
 
 def campaign_scales(fit: Fit) -> Scales:

@@ -9,7 +9,7 @@ comparing the evidence of a free force with that of a free distortion of the pro
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,12 +73,8 @@ def locate(base: Fit, better: Fit, force: MissingForce, effects: tuple[Effect, .
     if own and len(own) == len(effects):
         weights = [np.sum(parts, axis=0) ** 2 for parts in zip(*own, strict=True)]
         return _place(base, better, weights, None, effects)
-    along = [(y, v, t) for (y, v), t in zip(points, times, strict=True)]
-    found = _place(base, better, [force.force(*at) ** 2 for at in along], force, effects)
-    y, v = (np.concatenate([at[i] for at in along]) for i in (0, 1))
-    held = _between(y, found.displacement) & _between(v, found.velocity)
-    variance = np.concatenate([force.deviation(*at) for at in along])[held] ** 2
-    return replace(found, force_sd=float(np.sqrt(np.mean(variance))) if held.any() else 0.0)
+    weights = [force.force(y, v, t) ** 2 for (y, v), t in zip(points, times, strict=True)]
+    return _place(base, better, weights, force, effects)
 
 
 def locate_effect(naming: Naming, effect: Effect, better: Fit) -> Location:
@@ -131,12 +127,17 @@ def _place(
     if force is not None and not force.reach:
         share = force.share_within(*place[0])
     rms = float(np.sqrt(np.mean(w[held]))) if held.any() else 0.0
+    sd = 0.0
+    if force is not None and held.any():
+        times = [r.times for r in base.target.oscillator.campaign.recordings]
+        known = [force.deviation(*p, t) for p, t in zip(points, times, strict=True)]
+        sd = float(np.sqrt(np.mean(np.concatenate(known)[held] ** 2)))
     if regime == "measurement":
         share, rms = _positive_share(gain), 0.0
     names, cases = _where(base, gain)
     return Location(
         regime, share, place[0], place[1], _time_range(base, gain), names, cases, rms,
-        contact_share, _agree(regime, seen), gain,
+        contact_share, _agree(regime, seen), gain, sd,
     )  # fmt: skip
 
 

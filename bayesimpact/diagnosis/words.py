@@ -197,13 +197,13 @@ def summary(
     faults: str = "",
     angle: bool = False,
     drifts: bool = False,
-    probe: str = "",
+    probe: bool = False,
 ) -> str:
     """One paragraph; `remains` says what is left beside the named effects, `faults` what was wrong
     with recordings.
 
-    `drifts`: the likelier unknown force changes with time. `probe`: what the likeliest model of the
-    catalogue is called where all of it acts in the measuring chain; else empty.
+    `drifts`: the likelier unknown force changes with time. `probe`: all of the likeliest model of
+    the catalogue acts in the measuring chain.
     """
     if verdict == "adequate":
         found = "Nothing is missing: the base model describes the recordings down to the noise."
@@ -214,18 +214,15 @@ def summary(
     if verdict == "unknown" or (verdict == "partly" and not effects):
         cost = _moved(shifts, "Fitting a force in its place")
         force = _size_of_force(location, "N m" if angle else "N")
-        slowly = " It is a stiffness or damping that changes with time." if drifts else ""
-        acts, likeliest = "It acts", ""
-        if probe and location.regime != "measurement":
-            acts = "Seen as a force it would act"
-            likeliest = f"; likeliest of the catalogue, in the measuring chain: {probe}"
-            slowly = slowly.replace("It is", "It would be")
+        slowly = " It may be a stiffness or damping that changes with time." if drifts else ""
+        seen = probe and location.regime != "measurement"
+        acts = "Seen as a force it would act" if seen else "It acts"
         head = "Something is missing that the catalogue does not hold."
         if faults:  # they are all that has a name
             head = f"Faults of recordings are set aside or corrected.{faults} The rest is unknown."
         return (
             f"{head} {acts} {place}, mostly at "
-            f"{_span(location.displacement, 'rad' if angle else 'm')}, {force}{likeliest}."
+            f"{_span(location.displacement, 'rad' if angle else 'm')}, {force}."
             f"{slowly}{cost}{remains}"
         )
     titles = " and ".join(e.title for e in effects)

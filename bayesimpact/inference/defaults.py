@@ -3,7 +3,7 @@
 | parameter | default prior |
 |---|---|
 | c1 | uniform, 0 to critical damping of the suspension |
-| k1 | uniform, 0 to 100 times the quick estimate, and no faster than half the sampling rate |
+| k1 | uniform, 0 to 100 times the quick estimate; less where that is an alias, 4 times at least |
 | c2 | uniform, 0 to 20 times critical damping in contact |
 | g, y0, offset | uniform, +- 20 times the largest displacement |
 | v0 | uniform, +- 20 times the largest speed |
@@ -12,7 +12,7 @@
 | input_gain | uniform, +- 100 times the quick estimate |
 | added effects | half-Cauchy (Cauchy with both signs) of a physical scale |
 | their shapes | log-normal, or log-uniform between two positive bounds or in their range |
-| states in which recordings begin | normal about 0, as wide as values of one kind |
+| states in which recordings begin | normal about their null, of the largest that they can be |
 
 Campaign.toml's [priors] replace any of them.
 """
@@ -39,9 +39,6 @@ from bayesimpact.model.parameters import is_added
 from bayesimpact.response.estimates import Estimates
 
 SHAPE_WIDTH = 1.5  # of the log-normal prior of a depth, a time constant, a frequency
-# Physical scales: values of one kind are pulled together by next to nothing, which means little
-# where the misfit is large; their evidence has a prior of its own (`diagnosis.evidence`).
-WIDEST = 100.0
 
 
 def default_priors(
@@ -109,7 +106,8 @@ def effect_prior(effect: Effect, parameter: EffectParameter, scales: Scales) -> 
     """Prior of an effect's parameter at its physical scale.
 
     Sizes have heavy tails, for on real rigs an effect may be many times what is usual. Values of
-    one kind that replace a base parameter are normal about their common mean.
+    one kind that replace a base parameter are normal about their common mean, states in which
+    recordings begin about their null.
     """
     scale = parameter.scale(scales)
     if parameter.circular:
@@ -122,9 +120,7 @@ def effect_prior(effect: Effect, parameter: EffectParameter, scales: Scales) -> 
         return LogNormal(scale, SHAPE_WIDTH)
     if parameter.lower == parameter.null == 0.0:
         return HalfCauchy(scale)
-    if parameter.initial:
-        return Normal(parameter.null or 0.0, WIDEST * scale)
-    if parameter.replaces:
+    if parameter.replaces or parameter.initial:
         return Normal(centre_of(parameter, scales), scale)
     return Cauchy(centre_of(parameter, scales), scale)
 

@@ -255,6 +255,10 @@ def _check_law(effect: Effect, law: Law, place: _Place) -> None:
     if law.rate is not None and law.travel is not None:
         found = "rate and travel"
         raise InputError(place.of(effect, "law"), found, "one state: it follows time, or the path")
+    initial = [p.name for p in effect.parameters if p.initial]
+    if len(initial) > (law.rate is not None or law.travel is not None):
+        accepted = "one initial state at most, of a law with a rate or a travel"
+        raise InputError(place.of(effect, "parameters"), ", ".join(initial), accepted)
     if law.jump_at_surface and law.surface is None:
         raise InputError(place.of(effect, "law"), "jump_at_surface without surface", "both")
     for field in fields(law):

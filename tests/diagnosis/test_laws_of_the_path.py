@@ -10,11 +10,13 @@ import small_rig
 from effect_rigs import BY_ID, with_effect
 
 import bayesimpact as bi
-from bayesimpact.diagnosis.decision import holds
+from bayesimpact.diagnosis.decision import complexity, holds
+from bayesimpact.diagnosis.diagnose import is_doubtful
 from bayesimpact.diagnosis.directions import directions
-from bayesimpact.diagnosis.evidence import common_spread
+from bayesimpact.diagnosis.evidence import common_spread, structure
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.promising import families
+from bayesimpact.diagnosis.recording_faults import shared_effects
 from bayesimpact.diagnosis.scan import Scan
 from bayesimpact.diagnosis.scores import Score
 from bayesimpact.inference.prior import Normal
@@ -33,24 +35,28 @@ def test_a_memory_is_found_where_a_recording_was_cut(cut: int) -> None:
     left = tuple(r.part(cut, r.samples.size) for r in campaign.recordings)
     found = bi.diagnose(replace(campaign, recordings=left), search=False, seed=0)
     assert found.verdict == "named" and [e.id for e in found.effects] == [LOOP.id]
+    assert shared_effects(found.effects) == found.effects  # its starts tell no recording apart
+    assert not is_doubtful(found) and not shared_effects([BY_ID["gap_per_recording"]])
     expected = {f"{LOOP.id}.{name}": value for name, value in truth.items()}
     for name, value in {"k1": small_rig.PLAIN.k1, **expected}.items():
         at = found.after.names.index(name)
         assert abs(found.after.mode[at] - value) < 4.0 * found.after.sd[at], name
     starts = [i for i, n in enumerate(found.after.names) if n.startswith(f"{LOOP.id}.start")]
     known = np.abs(found.after.mode[starts]) / found.after.sd[starts]
+    assert cut or structure(found.after) > 5.0  # nats: one spread in place of two sizes
     assert len(starts) == 2 and (known.min() > 50.0 if cut else known.max() < 4.0)
 
 
 def test_starts_that_recordings_share_cost_little() -> None:
-    """Nine states that are nothing: a spread that they share is told, not nine sizes apart."""
-    sd = np.full(9, 1e-3)
-    prior = Normal(0.0, 100.0)
-    alone = -np.sum(np.log(prior.sd / sd))
-    shared = common_spread(np.zeros(9), np.diag(1 / (1 / sd**2 + 1e-4)), prior, None)
-    assert -4.0 < alone + shared < 0.0
-    apart = common_spread(np.full(9, 3.0), np.diag(sd**2), prior, None)
-    assert shared - apart > 50.0
+    """Nine states that are nothing cost what one spread of fifteen does, not nine sizes apart; nine
+    that are something cost nearly as much as they do each by itself.
+    """
+    sd, prior = np.full(9, 1e-3), Normal(0.0, 1.0)
+    covariance = np.diag(1 / (1 / sd**2 + 1 / prior.sd**2))
+    alone = -float(np.sum(np.log(prior.sd / sd)))
+    assert -4.0 < alone + common_spread(np.zeros(9), covariance, prior, None) < 0.0
+    apart = np.array([1.0, -1.0, 0.5, -0.5, 0.8, -0.8, 1.0, -1.0, 0.6])
+    assert -4.0 < common_spread(apart, covariance, prior, None) < 0.0
 
 
 def score(effect: Effect) -> Score:
@@ -80,6 +86,10 @@ def test_one_law_has_the_name_of_its_range(law: Effect, numbers: dict[str, float
     assert not any(
         one < frozenset(c.ids) and {LOOP.id, DAHL.id} <= {*c.ids} for c in found.naming.tried
     )
+
+
+def test_states_at_the_beginning_are_no_parameters_to_fit_more_with():
+    assert complexity([LOOP]) == complexity([DAHL]) == complexity([BY_ID["power_damping"]])
 
 
 def test_one_law_is_not_added_to_itself(small):

@@ -75,6 +75,17 @@ def test_the_range_is_the_shortest_that_holds_its_share(seed):
     assert high - low <= brute_force_shortest(x, w) + gaps.max()
 
 
+def test_a_force_is_known_as_well_as_where_it_acts(small, force):
+    step = made(force, lambda y: 0.03 * (y > GAP + 4e-4))
+    found = locate(small.fit, small.fit, step, ())
+    y, v = (np.concatenate(c) for c in zip(*trajectory_points(small.fit), strict=True))
+    low, high = found.displacement
+    slow, fast = found.velocity
+    held = (y >= max(low, GAP)) & (y <= high) & (v >= slow) & (v <= fast)
+    expected = np.sqrt(np.mean(step.deviation(y, v, y)[held] ** 2))
+    assert found.force_sd == pytest.approx(expected, rel=1e-9)
+
+
 def test_a_force_in_contact(small, force):
     found = locate(small.fit, small.fit, made(force, lambda y: 0.03 * (y > GAP + 4e-4)), ())
     assert found.regime == "contact" and found.contact_share > 0.95 and found.agrees

@@ -263,8 +263,9 @@ def test_an_unknown_force_may_be_the_probe_s_where_that_is_likeliest(unknown, ef
     less = replace(base, effects=(BY_ID["quadratic_drag"],), log_evidence=base.log_evidence - 9.0)
     naming = replace(unknown.naming, tried=(base, less, likely))
     content = written(replace(unknown, naming=naming, alternatives=()))
-    titles = " and ".join(e.title for e in own)
-    assert (f"in the measuring chain: {titles}." in content["summary"]) is said
+    told = f"Of the catalogue {' and '.join(e.title for e in own)} ("
+    assert (told in content["summary"]) is (gain > 0.0)
+    assert ("Seen as a force it would act" in content["summary"]) is said
     assert ("It acts" in content["summary"]) is not said
 
 

@@ -53,7 +53,7 @@ def test_the_table(campaign, guess):
     speed = reach * np.sqrt(k2 / mass)
     expected = {
         "c1": (0.0, 2 * np.sqrt(k1 * mass)),
-        "k1": (0.0, min(100 * k1, mass * (np.pi / campaign.recordings[0].interval) ** 2)),
+        "k1": (0.0, 100 * k1),
         "c2": (0.0, 20 * critical),
         "k2[1]": (0.0, 1000 * k2),
         "k2[2]": (0.0, 1000 * k2),
@@ -69,6 +69,18 @@ def test_the_table(campaign, guess):
     sigma = priors["sigma"]
     assert isinstance(sigma, LogUniform)
     np.testing.assert_allclose((sigma.lower, sigma.upper), (4e-10, 4e-2))
+
+
+@pytest.mark.parametrize(("interval", "most"), [(1e-3, None), (1e-2, 1.0), (0.1, 0.0)])
+def test_k1_is_none_of_a_motion_that_the_sampling_cannot_show(campaign, guess, interval, most):
+    """Up to a natural frequency of half the sampling rate; 4 times the estimate at least."""
+    slow = replace(
+        campaign, recordings=tuple(replace(r, interval=interval) for r in campaign.recordings)
+    )
+    limit = campaign.mass * (np.pi / interval) ** 2
+    prior = named(slow, guess)["k1"]
+    expected = {None: 100 * guess.k1, 1.0: limit, 0.0: 4 * guess.k1}[most]
+    assert prior.upper == pytest.approx(expected, rel=1e-12)
 
 
 def test_the_truth_is_inside(campaign, guess):

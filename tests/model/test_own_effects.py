@@ -10,7 +10,7 @@ from effect_rigs import BY_ID, TestRig, moved
 
 import bayesimpact as bi
 from bayesimpact.errors import InputError
-from bayesimpact.model.effects import SEARCHED, UNTRIED
+from bayesimpact.model.effects import SEARCHED, UNTRIED, EffectParameter
 from bayesimpact.model.own_effects import catalogue_with, check_effects, load_effects
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "own_effect.py"
@@ -117,6 +117,18 @@ def test_effects_handed_over_in_python_are_checked_too(tmp_path):
         check_effects([3])
     with pytest.raises(InputError, match="regime: found 'sky'"):
         bi.diagnose(TestRig(duration=0.2).campaign(), effects=[replace(cubic, regime="sky")])
+
+
+def test_an_initial_state_is_of_a_law_that_has_one():
+    """Of a force without a memory, or beside another, it would mean nothing."""
+    start = EffectParameter("start", "-", lambda s: 1.0, scope="recording", initial=True)
+    loop, rub = BY_ID["hysteresis_bouc_wen"], BY_ID["spring_cubic"]
+    check_effects([replace(loop, id="own_loop")])
+    for effect, found in ((rub, "start"), (loop, "start, more")):
+        more = start if effect is rub else replace(start, name="more")
+        wrong = replace(effect, id="own", parameters=(*effect.parameters, more))
+        with pytest.raises(InputError, match=f"found {found}; accepted: one initial state"):
+            check_effects([wrong])
 
 
 def test_the_example_can_be_used():

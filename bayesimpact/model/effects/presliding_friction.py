@@ -31,9 +31,9 @@ from bayesimpact.model.effects.effect import Effect, EffectParameter, Law, Numbe
 # fifth of it, so most of the way is sliding.
 SHORTEST, LONGEST = 1e-3, 0.14
 
-# of the largest force, which the state never passes; its prior is as wide as that (`defaults`)
+# of the largest force, which the state never passes
 START = EffectParameter(
-    "start", "-", lambda s: 0.01, lower=-1.0, upper=1.0, scope="recording", initial=True
+    "start", "-", lambda s: 1.0, lower=-1.0, upper=1.0, scope="recording", initial=True
 )
 
 

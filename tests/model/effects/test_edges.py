@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from effect_rigs import BY_ID, MOVING, TestRig, by_hand, by_rig, moved, typical
 
-from bayesimpact.inference.defaults import WIDEST, effect_prior
+from bayesimpact.inference.defaults import effect_prior
 from bayesimpact.model.general import BAD_PARAMETERS, OK, integrate_many
 from bayesimpact.model.oscillator import build_oscillator
 from bayesimpact.model.parameters import SLOTS, WITHOUT
@@ -189,7 +189,6 @@ def test_finite_over_the_whole_prior_box(effect):
                     drawn = float(
                         effect_prior(effect, parameter, scales).ppf(rng.uniform(0.1, 0.9))
                     )
-                    drawn /= WIDEST if parameter.initial else 1.0  # priors of values of one kind
                     values[name] = min(max(drawn, parameter.lower), parameter.upper)
             thetas.append(rig.theta(oscillator, values))
         for y in oscillator.predict(np.array(thetas)):
