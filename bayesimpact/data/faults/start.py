@@ -137,7 +137,7 @@ def _pushed(centred: Array, band: float, period: float) -> int:
     way = np.sign(centred[0]) * centred[: int(period / 2)]
     turn = int(np.argmax(way))
     height = float(way[turn])
-    if turn <= count or way[: turn + 1].min() <= 0.0 or height - way[0] < 2.0 * band:
+    if turn <= count or way[: turn + 1].min() <= 0.0:
         return 0
     phase = np.arccos(way[: turn + 1] / height)
     free = 2 * np.pi * count / period
