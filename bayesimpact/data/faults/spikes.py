@@ -1,9 +1,13 @@
-"""`recording_spikes`: readings that neither their past nor their future foretells."""
+"""`recording_spikes`: readings that neither their past nor their future foretells.
+
+Spikes close to each other are found by `bursts`.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
+from bayesimpact.data.faults.bursts import Spike, find_bursts
 from bayesimpact.data.faults.fault import (
     Array,
     Fault,
@@ -15,7 +19,7 @@ from bayesimpact.data.faults.fault import (
 )
 from bayesimpact.data.faults.flat import last_digit
 from bayesimpact.data.faults.local import best_form, foretell, robust_sd, rounding_error
-from bayesimpact.data.gaps import excluded
+from bayesimpact.data.gaps import excluded, runs, without
 from bayesimpact.data.period import rough_period
 from bayesimpact.data.recording import Recording
 
@@ -27,6 +31,17 @@ MOST = 0.01  # of the samples: more deviations than this are the signal
 
 
 def find_spikes(recording: Recording) -> list[Fault]:
+    """Up to five samples in a row far off the motion; impacts are none.
+
+    Those close to each other come first, as in `bursts`, and then those alone, as in
+    `lone_spikes`, without them: beside a spike a good reading may look like one.
+    """
+    close = find_bursts(recording)
+    rest = without(recording, [one.span for one in close]) if close else recording
+    return _fault(recording, [*close, *_foretold(rest)])
+
+
+def lone_spikes(recording: Recording) -> list[Fault]:
     """Up to five samples in a row far off what both sides foretell alike; impacts are none.
 
     A brief contact is a spike of the acceleration away from the stop: such a one does not count.
@@ -35,6 +50,11 @@ def find_spikes(recording: Recording) -> list[Fault]:
     deviations. It has to pass the Gaussian threshold and four times the 97th percentile over the
     recording, which is what the corners of the motion itself reach.
     """
+    return _fault(recording, _foretold(recording))
+
+
+def _foretold(recording: Recording) -> list[Spike]:
+    """What `lone_spikes` finds, none touching another."""
     x = recording.samples
     period = rough_period(x, 1.0)
     form = best_form(x, period)
@@ -44,16 +64,24 @@ def find_spikes(recording: Recording) -> list[Fault]:
         for strength, size, span in _of_width(x, form, width, least):
             if not (size < 0.0 and recording.order == 2 and recording.case):
                 found.append((strength, size, span))
-    spans: list[tuple[float, float, Span]] = []
+    chosen: list[Spike] = []
     for strength, size, (first, end) in sorted(found, reverse=True):
-        if all(end + 1 < a or first > b + 1 for _, _, (a, b) in spans):
-            spans.append((strength, size, (first, end)))
-    count = sum(end - first for _, _, (first, end) in spans)
-    if not spans or count > max(MOST * x.size, LONGEST):
+        if all(end + 1 < one.span[0] or first > one.span[1] + 1 for one in chosen):
+            chosen.append(Spike((first, end), size, strength, least))
+    count = sum(one.span[1] - one.span[0] for one in chosen)
+    return chosen if count <= max(MOST * x.size, LONGEST) else []
+
+
+def _fault(recording: Recording, spikes: list[Spike]) -> list[Fault]:
+    """One fault that names them all; what was found twice is one."""
+    if not spikes:
         return []
-    spans.sort(key=lambda one: one[2])
-    places = tuple(span for _, _, span in spans)
-    largest = max(abs(size) for _, size, _ in spans)
+    bad = np.zeros(recording.samples.size, bool)
+    for one in spikes:
+        bad[slice(*one.span)] = True
+    places = tuple(runs(bad))
+    largest = max(abs(one.size) for one in spikes)
+    clearest = max(spikes, key=lambda one: one.strength / one.threshold)
     noun = "spike" if len(places) == 1 else f"{len(places)} spikes"
     return [
         Fault(
@@ -67,8 +95,8 @@ def find_spikes(recording: Recording) -> list[Fault]:
             statement=f"{noun} of up to {amount(largest, recording.unit)} at "
             f"{times_of(recording, places)}",
             remedy=excluded(recording, places),
-            strength=max(strength for strength, _, _ in spans),
-            threshold=least,
+            strength=clearest.strength,
+            threshold=clearest.threshold,
         )
     ]
 

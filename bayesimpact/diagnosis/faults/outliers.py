@@ -1,7 +1,9 @@
 """Spikes that only show against the fit: few readings far off, at a contact that hides them.
 
 Near an impact neither side foretells a reading, so that `data.faults.spikes` must be silent there.
-In the residual of a fit there are no impacts, unless the model is wrong.
+In the residual of a fit there are no impacts, unless the model is wrong: what it leaves of a brief
+contact then looks like a spike, but comes back with every period, for which `lone_spikes` allows
+and `data.faults.bursts` does not.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ import numpy as np
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.faults.fault import Fault
 from bayesimpact.data.faults.find import applied
-from bayesimpact.data.faults.spikes import find_spikes
+from bayesimpact.data.faults.spikes import lone_spikes
 from bayesimpact.inference.fit import Fit
 
 
@@ -24,7 +26,7 @@ def residual_spikes(fit: Fit) -> tuple[Fault, ...]:
     recordings = fit.target.oscillator.campaign.recordings
     for recording, residual in zip(recordings, fit.residuals, strict=True):
         kept = residual if recording.used is None else np.where(recording.used, residual, 0.0)
-        found += find_spikes(replace(recording, samples=kept))
+        found += lone_spikes(replace(recording, samples=kept))
     return tuple(found)
 
 
