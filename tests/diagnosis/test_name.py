@@ -10,10 +10,12 @@ import pytest
 from effect_rigs import BY_ID
 
 from bayesimpact.diagnosis.decision import decide, in_its_place, ordered
+from bayesimpact.diagnosis.learned import learned_drift, learned_force
 from bayesimpact.diagnosis.naming import Naming, State
 from bayesimpact.diagnosis.promising import refit_candidates
 from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.thresholds import ALPHA, APART, DECISIVE, EXCESS, largest_log_odds
+from bayesimpact.model.effects.effect import Effect
 
 COST = 3.8
 
@@ -102,14 +104,22 @@ def test_a_pair_is_compared_with_what_lacks_one_of_its_members():
     assert not naming(single, candidate("gap_wear gap_per_recording", 199.9 + COST)).rivals()
 
 
+OF_MOTION, OF_TIME = learned_force(-1.0, 1.0, 1.0, 1.0), learned_drift(10.0, 1.0, 1.0, 1.0)
+
+
+def beside_force(model: Candidate, evidence: float, force: Effect = OF_MOTION) -> Candidate:
+    """A model with a residual force, and its log evidence less what that costs."""
+    return Candidate((*model.effects, force), model.fit, 1000.0 + evidence + COST)
+
+
 def remaining(
     chosen: State, without: float, chi2: float, *others: Candidate, beside: float = 0.0,
-    instead: float = 0.0,
+    instead: float = 0.0, force: Effect = OF_MOTION,
 ) -> Naming:  # fmt: skip
     """A chosen single effect beside which something remains.
 
     `without`: misfit over the noise without it; `chi2`: with it; log evidences of a residual force
-    `beside` the effect and `instead` of it, where above zero.
+    `beside` the effect and `instead` of it, where above zero, less what a further effect costs.
     """
     found = naming(chosen, *others, base_chi2=without)
     base = found.base
@@ -123,7 +133,7 @@ def remaining(
             target=target, sums=np.array([1000.0 * misfit]), reduced_chi2=misfit
         )
     residual = {
-        frozenset(m.candidate.ids): replace(m.candidate, log_evidence=1000.0 + e)
+        frozenset(m.candidate.ids): beside_force(m.candidate, e, force)
         for m, e in ((chosen, beside), (base, instead))
         if e
     }
@@ -162,6 +172,21 @@ def test_an_effect_that_a_residual_force_replaces_is_not_needed():
         assert judge(found) == verdict, (beside, instead)
 
 
+@pytest.mark.parametrize("effect", [FRICTION, "stiffness_drift", "sensor_cubic"])
+@pytest.mark.parametrize("force", [OF_MOTION, OF_TIME], ids=["motion", "time"])
+def test_a_residual_force_that_cannot_be_the_effect_is_another_explanation(
+    effect: str, force: Effect
+) -> None:
+    """It then unseats the effect where it is likelier at all."""
+    restates = {(FRICTION, OF_MOTION.equation), ("stiffness_drift", OF_TIME.equation)}
+    chosen = state(candidate(effect, 100.0), p_force=ALPHA / 2, force_evidence=2 * DECISIVE)
+    needed = DECISIVE if (effect, force.equation) in restates else 0.0
+    for more, verdict in ((0.1, "unknown"), (-0.1, "partly")):
+        lead = 100.0 - COST + needed + more
+        found = remaining(chosen, 100.0, 10.0, instead=lead, force=force)
+        assert judge(found) == verdict
+
+
 def test_a_search_that_ended_by_its_limit_needs_only_what_it_has_compared():
     """The effect with a residual force beside, and such a force in its place."""
     found = remaining(something_left(), 100.0, 10.0, beside=110.0, instead=100.0)
@@ -174,7 +199,7 @@ def test_a_search_that_ended_by_its_limit_needs_only_what_it_has_compared():
     ended = remaining(something_left(), 100.0, 10.0, other, beside=110.0, instead=100.0)
     ended = replace(ended, finished=False)
     assert judge(ended) == "unknown"
-    fitted = {frozenset([DRAG]): replace(other, log_evidence=1050.0)}
+    fitted = {frozenset([DRAG]): beside_force(other, 50.0)}
     assert judge(replace(ended, residual={**ended.residual, **fitted})) == "partly"
 
 
@@ -186,7 +211,7 @@ def test_an_effect_whose_place_another_can_take_beside_a_residual_force_is_not_n
         (100.0 - DECISIVE - 0.1, "partly"),
     ):
         found = remaining(something_left(), 100.0, 10.0, other)
-        residual = {frozenset([DRAG]): replace(other, log_evidence=1000.0 + beside)}
+        residual = {frozenset([DRAG]): beside_force(other, beside)}
         assert in_its_place(found, BY_ID[FRICTION]) is other
         assert judge(replace(found, residual=residual)) == verdict
 
@@ -198,7 +223,7 @@ def test_what_has_more_to_fit_with_must_be_likelier_to_unseat_an_effect():
         assert judge(remaining(something_left(), 100.0, 10.0, larger)) == verdict
         behind = candidate("power_damping", 50.0)
         found = remaining(something_left(), 100.0, 10.0, behind)
-        residual = {frozenset(["power_damping"]): replace(behind, log_evidence=1000.0 + gain)}
+        residual = {frozenset(["power_damping"]): beside_force(behind, gain)}
         assert judge(replace(found, residual=residual)) == verdict
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from bayesimpact.data.faults.fault import Fault, amount, file_time, times_of
 from bayesimpact.data.faults.flat import Flat, flats, reading_step
 from bayesimpact.data.gaps import excluded
@@ -12,6 +14,13 @@ LEAST = 3  # equal readings in a row at the extreme
 MISSED = 3.0  # steps (or standard deviations of the noise) that the motion would have made
 SEVERAL = 2  # half cycles cut, or one with as many samples as below
 LONG = 12
+SCATTER = 0.005
+"""Of the range of the readings: how far those at the end of a recorder's range may scatter, where
+it is analogue or its gain is adjusted afterwards."""
+FLAT = 5.0
+"""Times the scatter that the motion would have made: a turning point that nothing cuts makes one
+time of it within such a run, as its slopes at the ends tell. One half cycle suffices where as many
+times what counts is hidden."""
 
 
 def find_clipped(recording: Recording) -> list[Fault]:
@@ -25,18 +34,27 @@ def find_clipped(recording: Recording) -> list[Fault]:
     unit = max(reading_step(x), noise_level(x))
     found = []
     for extreme, side in ((float(x.max()), "largest"), (float(x.min()), "smallest")):
-        cut = [
-            run for run in flats(x, LEAST) if run.value == extreme and run.missed > MISSED * unit
-        ]
-        if len(cut) >= SEVERAL or any(run.size >= LONG and run.first > 0 for run in cut):
-            found.append(_fault(recording, extreme, side, cut, unit))
+        for scatter in (0.0, *([SCATTER * float(np.ptp(x))] if not recording.case else [])):
+            at_end = np.where(np.abs(x - extreme) <= scatter, extreme, x)
+            least = max(MISSED * unit, FLAT * scatter)
+            cut = [
+                run for run in flats(at_end, LEAST) if run.value == extreme and run.missed > least
+            ]
+            if len(cut) >= SEVERAL or any(
+                run.first > 0 and (run.size >= LONG or run.missed > FLAT * least) for run in cut
+            ):
+                # what stands alone at the extreme between two runs was cut as well
+                alone = [run for run in flats(at_end, 1) if run.value == extreme]
+                found.append(_fault(recording, side, cut, alone))
+                break
     return found
 
 
-def _fault(recording: Recording, extreme: float, side: str, cut: list[Flat], unit: float) -> Fault:
+def _fault(recording: Recording, side: str, cut: list[Flat], places: list[Flat]) -> Fault:
     x = recording.samples
-    # what stands alone at the extreme between two runs was cut as well
-    spans = tuple((run.first, run.end) for run in flats(x, 1) if run.value == extreme)
+    unit = max(reading_step(x), noise_level(x))
+    extreme = cut[0].value
+    spans = tuple((run.first, run.end) for run in places)
     hidden = max(run.missed for run in cut)
     return Fault(
         id="recording_clipped",

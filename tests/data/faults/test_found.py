@@ -11,6 +11,7 @@ from scipy.signal import lfilter, savgol_filter
 
 from bayesimpact.data.bundled import bundled_campaign
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.faults.clipped import find_clipped
 from bayesimpact.data.faults.fault import Fault
 from bayesimpact.data.faults.find import find_faults, recording_faults, set_aside
 from bayesimpact.data.faults.flat import reading_step
@@ -165,6 +166,33 @@ def test_clipping(paper: Campaign, low: bool) -> None:
     fault = only(spoiled(paper, cut))
     assert fault.id == "recording_clipped" and fault.size == limit
     assert covered(fault) == set(np.flatnonzero((x <= limit) if low else (x >= limit)))
+
+
+def scattered(x: np.ndarray, limit: float, scatter: float) -> np.ndarray:
+    """Readings cut at both ends of a range that scatter there, as an accelerometer's do."""
+    ends = limit - scatter * np.random.default_rng(1).exponential(size=x.size)
+    return np.clip(x, -ends, ends)
+
+
+def swing(case: str) -> Recording:
+    t = np.arange(1500) * 1e-3
+    noise = np.random.default_rng(2).normal(0.0, 0.005, t.size)
+    samples = 10.0 * np.exp(-t) * np.cos(2 * np.pi * 20.0 * t) + noise
+    return Recording("swing", case, samples, 1e-3, quantity="acceleration")
+
+
+def test_clipping_at_ends_that_scatter() -> None:
+    free = swing("")
+    faults = find_clipped(replace(free, samples=scattered(free.samples, 8.0, 0.01)))
+    assert [f.size for f in faults] == pytest.approx([8.0, -8.0], abs=0.01)
+    largest = set(np.flatnonzero(free.samples > 8.1))
+    assert largest <= covered(next(f for f in faults if f.size > 0.0))
+    assert not find_clipped(free)
+
+
+def test_what_an_obstacle_may_have_stopped_is_not_clipped() -> None:
+    free = swing("a")
+    assert not find_clipped(replace(free, samples=scattered(free.samples, 8.0, 0.01)))
 
 
 @pytest.mark.parametrize("count", [15, 3])
