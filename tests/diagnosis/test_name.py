@@ -266,10 +266,25 @@ def test_nothing_is_needed_where_a_free_force_leaves_far_less():
     ):
         found = remaining(something_left(), 100.0, 10.0, beside=150.0, instead=110.0)
         model = found.residual[frozenset()]
-        fit = SimpleNamespace(**vars(model.fit))
-        fit.sums = np.array([1000.0 * free])
-        residual = {**found.residual, frozenset(): replace(model, fit=fit)}
+        residual = {**found.residual, frozenset(): with_misfit(model, free)}
         assert judge(replace(found, residual=residual)) == verdict, free
+
+
+def with_misfit(model: Candidate, chi2: float) -> Candidate:
+    fit = SimpleNamespace(**{**vars(model.fit), "sums": np.array([1000.0 * chi2])})
+    return replace(model, fit=fit)
+
+
+def test_an_effect_is_needed_where_it_does_what_a_free_force_does_not() -> None:
+    """With a force beside it as well it leaves far less than the force alone."""
+    for both, verdict in ((1.0 + 1.0 / EXCESS - 0.01, "partly"), (1.3, "unknown")):
+        found = remaining(something_left(), 100.0, 10.0, beside=150.0, instead=90.0)
+        alone, beside = (found.residual[frozenset(k)] for k in ([], [FRICTION]))
+        residual = {
+            frozenset[str](): with_misfit(alone, 2.0),
+            frozenset([FRICTION]): with_misfit(beside, both),
+        }
+        assert judge(replace(found, residual=residual)) == verdict, both
 
 
 def test_what_remains_beside_a_name_needs_decisive_odds():
