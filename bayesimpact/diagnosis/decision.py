@@ -9,8 +9,8 @@ Let S be the likeliest set of effects that the search reached.
 2. Something remains beside S. All odds are those with a force of time beside every hypothesis,
    where what the model nearest to the recordings leaves beside one is noise.
    Nothing is needed where a free force in the place of all effects leaves `EXCESS` times less of
-   the misfit, and S with such a force beside it no less than that: the effects only imitate it.
-   Else an effect of S is needed when
+   the misfit, and S with such a force beside it is not decisively likelier than that force alone:
+   the effects only imitate it. Else an effect of S is needed when
    - every set of effects without it trails S by the decisive odds; one with more effects or
      parameters than S trails at all what is likeliest with the effect and no larger than that one:
      more to fit with makes imitation easy, and the rest of the truth may be among it,
@@ -107,8 +107,8 @@ def is_needed(naming: Naming, effect: Effect) -> bool:
 def is_imitated(naming: Naming) -> bool:
     """Whether a free force in the place of all effects leaves far less of the misfit.
 
-    Not where the effects with a free force beside them leave as much less than that again: then
-    they do what the force alone does not.
+    Not where the effects with a free force beside them are decisively likelier than that force
+    alone: then they do what it does not.
     """
     free = naming.residual.get(frozenset())
     if free is None:
@@ -116,7 +116,7 @@ def is_imitated(naming: Naming) -> bool:
     left = misfit_above_noise(naming, naming.chosen.candidate.fit)
     least = max(misfit_above_noise(naming, free.fit), doubtful_misfit(naming))
     both = naming.residual.get(frozenset(naming.chosen.candidate.ids))
-    if both is not None and misfit_above_noise(naming, both.fit) * EXCESS < least:
+    if both is not None and naming.log_odds(both) > naming.log_odds(free) + DECISIVE:
         return False
     return left > EXCESS * least
 

@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 
 CHANGE = 3.0  # norm of the response to a difference step, in units of the noise
 FIRST_STEP = 1e-5  # of a parameter's physical scale, to find the right step
+DECAY = "decay"  # parameter of a periodic effect that rings down, 1/s
 INVISIBLE = 1e-6  # a response below this at the first step is rounding, not physics
 
 
@@ -74,6 +75,20 @@ def directions(fit: Fit, effects: Iterable[Effect], scales: Scales) -> tuple[Dir
 def is_periodic(effect: Effect) -> bool:
     """True for an effect with a phase."""
     return any(p.circular for p in effect.parameters)
+
+
+def is_steady(effect: Effect) -> bool:
+    """False for a periodic effect that rings down."""
+    return all(p.name != DECAY for p in effect.parameters)
+
+
+def decays_of(effect: Effect, scales: Scales) -> Array:
+    """Rates (k,) at which a periodic effect may ring down, 1/s; zero for a steady one."""
+    if is_steady(effect):
+        return np.zeros(1)
+    grid = effect.parameter(DECAY).grid
+    assert grid is not None
+    return grid(scales)
 
 
 def sigma_of(fit: Fit) -> Array:

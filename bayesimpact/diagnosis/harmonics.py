@@ -62,11 +62,11 @@ def joined(parts: Iterable[Blocks]) -> Blocks:
     return Blocks(own, absorbed, score, found[0].columns)
 
 
-def line_blocks(fit: Fit, r: int, grid: Array) -> Blocks:
+def line_blocks(fit: Fit, r: int, grid: Array, decay: float = 0.0) -> Blocks:
     """A hum of one metre at equally spaced frequencies (F,), Hz, two or more of them.
 
     By Fourier sums of the whitened residual and derivatives: all but exact where the fitted
-    parameters absorb little of it.
+    parameters absorb little of it, and where it decays (1/s) slowly beside its period.
     """
     part, sigma, noise = fit.linearisation[r], sigma_of(fit)[r], fit.target.likelihood.noise
     oscillator = fit.target.oscillator
@@ -74,14 +74,16 @@ def line_blocks(fit: Fit, r: int, grid: Array) -> Blocks:
     white = np.vstack([part.residual, part.jacobian.T]) / sigma
     used = oscillator.campaign.recordings[r].used
     stacked, start = noise.in_time(white, count, interval, used)
+    n = stacked.shape[-1]
+    envelope = np.exp(-decay * (start + interval * np.arange(n)))
+    stacked = stacked * envelope
     step = 2 * np.pi * interval * (grid[1] - grid[0])
     first = 2 * np.pi * interval * grid[0]
     sums = czt(stacked, grid.size, np.exp(-1j * step), np.exp(1j * first), axis=-1)
     lift = _whitening_gain(fit, grid, interval) / (sigma * fit.target.likelihood.scales[r])
     sums = sums * np.exp(-2j * np.pi * grid * start)
     pairs = np.stack([-sums.imag, sums.real], axis=-1) * lift[:, None]  # (1 + k, F, 2)
-    n = stacked.shape[-1]
-    own = (0.5 * n * lift**2)[:, None, None] * np.eye(2)
+    own = (0.5 * np.sum(envelope**2) * lift**2)[:, None, None] * np.eye(2)
     return Blocks(own, pairs[1:].transpose(1, 0, 2), pairs[0], part.columns)
 
 
@@ -91,11 +93,15 @@ def _whitening_gain(fit: Fit, grid: Array, interval: float) -> Array:
     return np.sqrt((1 - 2 * rho * np.cos(angle) + rho**2) / (1 - rho**2))
 
 
-def hums(fit: Fit, r: int, lines: Array) -> Array:
-    """Whitened sine and cosine of one unit of the reading at every frequency (F,), Hz: (2 F, n)."""
+def hums(fit: Fit, r: int, lines: Array, decay: float = 0.0) -> Array:
+    """Whitened sine and cosine of one unit of the reading at every frequency (F,), Hz: (2 F, n).
+
+    From the first sample on they decay, 1/s.
+    """
     recording = fit.target.oscillator.campaign.recordings[r]
     angle = 2 * np.pi * lines[:, None] * recording.times
     waves = np.stack([np.sin(angle), np.cos(angle)], axis=1).reshape(2 * lines.size, -1)
+    waves = waves * np.exp(-decay * recording.times)
     return whitened_one(fit, r, waves, sigma_of(fit))
 
 

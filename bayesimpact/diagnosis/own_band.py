@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.hum import find_hum
 from bayesimpact.data.recording import Recording
-from bayesimpact.diagnosis.directions import is_periodic
+from bayesimpact.diagnosis.directions import is_periodic, is_steady
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect
 
@@ -22,20 +24,35 @@ def shakes_in_own_band(fit: Fit, remains: bool) -> bool:
 
     There a decaying motion and a steady one differ only by phase, and the steady one passes for any
     slow change of frequency or damping: over the whole band where something `remains`. A force,
-    which has a motion of its own to begin with, passes for one always where the recordings are too
-    short to tell both frequencies apart. A line too slow for any recording to show it come and go
-    passes for a drift.
+    which has a motion of its own to begin with, and a mode that rings down as the motion does, pass
+    for one always where the recordings are too short to tell both frequencies apart. A line too
+    slow for any recording to show it come and go passes for a drift.
     """
     longest = max(r.duration for r in fit.target.oscillator.campaign.recordings)
     if any(frequency * longest < SLOWEST for _, frequency in _lines(fit)):
         return True
-    return any(
-        _moves_at(recording, frequency)
-        if remains
-        else effect.observe is None and _is_unresolved(recording, frequency)
-        for effect, frequency in _lines(fit)
-        for recording in fit.target.oscillator.campaign.recordings
-    )
+    for effect, frequency in _lines(fit):
+        steady = is_steady(effect)
+        for recording in fit.target.oscillator.campaign.recordings:
+            motion = recording if steady else _without(recording, effect, fit)
+            if remains and _moves_at(motion, frequency):
+                return True
+            own_motion = effect.observe is None or not steady
+            if not remains and own_motion and _is_unresolved(motion, frequency):
+                return True
+    return False
+
+
+def _without(recording: Recording, effect: Effect, fit: Fit) -> Recording:
+    """A recording without what an effect adds to its readings."""
+    assert effect.observe is not None
+    row = [
+        fit.value(f"{effect.id}.{p.name}" + f"[{recording.name}]" * (p.scope == "recording"))
+        for p in effect.parameters
+    ]
+    nothing = np.zeros((1, recording.samples.size))
+    added = effect.observe(nothing, recording.times, np.array([row]))[0]
+    return replace(recording, samples=recording.samples - added)
 
 
 def _lines(fit: Fit) -> list[tuple[Effect, float]]:

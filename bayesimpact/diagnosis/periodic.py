@@ -1,9 +1,10 @@
-"""Scans over frequency: a harmonic force on the mass, a hum in the probe's signal.
+"""Scans over frequency: a harmonic force on the mass, a hum in the probe's signal, a mode that rings
+down in it.
 
-Both have an amplitude and, in every recording, a phase; while the amplitude is zero the phases mean
+All have an amplitude and, in every recording, a phase; while the amplitude is zero the phases mean
 nothing, so each frequency is tested with a free sine and cosine per recording: 2 R numbers, chi-
 squared under the model once the fitted parameters are projected off. The smallest p-value pays for
-the number of independent frequencies.
+the number of independent frequencies, and of the decays of what rings down.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from bayesimpact.diagnosis.directions import is_periodic
+from bayesimpact.diagnosis.directions import decays_of, is_periodic, is_steady
 from bayesimpact.diagnosis.forced_responses import force_responses
 from bayesimpact.diagnosis.harmonics import (
     Blocks,
@@ -94,53 +95,79 @@ def _best_frequency(fit: Fit, effect: Effect, scales: Scales) -> Score | None:
     grid = frequencies(fit, effect, scales)
     if grid.size < 2:
         return None
-    above = grid[:0] if effect.observe is None else leaking(fit, scales)
-    recordings = range(len(fit.linearisation))
-    blocks = [_blocks(fit, r, effect, grid, above, scales) for r in recordings]
-    statistic, sizes, information = _statistics(fit, blocks)
+    above = leaking(fit, scales) if effect.observe is not None and is_steady(effect) else grid[:0]
+    decays = decays_of(effect, scales)
+    scans = [_scan_of_frequency(fit, effect, grid, above, decay, scales) for decay in decays]
+    turn = int(np.argmax([statistic.max() for statistic, _, _ in scans]))
+    statistic, sizes, information = scans[turn]
     best = int(np.argmax(statistic))
     if best >= grid.size:
         best = grid.size + int(np.argmax(raw_power(fit, above)))
     grid = np.concatenate([grid, above])
-    freedom = 2 * len(blocks)
+    trials, freedom = grid.size * decays.size, sizes.shape[1]
     alone = float(stats.chi2.sf(statistic[best], freedom))
-    p_value = float(min(1.0, alone * grid.size))
-    amplitudes = np.hypot(sizes[best, 0::2], sizes[best, 1::2])
-    weight = 0.5 * (np.diag(information[best])[0::2] + np.diag(information[best])[1::2])
-    amplitude = float(np.sum(weight * amplitudes) / np.sum(weight))
-    sd = float(1 / np.sqrt(weight.sum()))
+    p_value = float(min(1.0, alone * trials))
+    amplitude, sd, names = _amplitudes(fit, effect, sizes[best], information[best])
     return Score(
         effect,
-        _shapes(fit, effect, float(grid[best]), sizes[best]),
+        _shapes(fit, effect, float(grid[best]), float(decays[turn]), sizes[best]),
         float(stats.norm.isf(max(p_value, 1e-300) / 2)),
         p_value,
-        np.array([amplitude]),
-        np.array([sd]),
-        LIMIT_SD * sd,
+        amplitude,
+        sd,
+        LIMIT_SD * float(sd[0]),
         np.zeros(fit.mode.size),
         1.0,
-        0.5 * float(statistic[best]) - float(np.log(grid.size)) - 0.5 * freedom,
-        (f"{effect.id}.amplitude",),
+        0.5 * float(statistic[best]) - float(np.log(trials)) - 0.5 * freedom,
+        names,
     )
 
 
-def _blocks(fit: Fit, r: int, effect: Effect, grid: Array, above: Array, scales: Scales) -> Blocks:
+def _scan_of_frequency(
+    fit: Fit, effect: Effect, grid: Array, above: Array, decay: float, scales: Scales
+) -> tuple[Array, Array, Array]:
+    recordings = range(len(fit.linearisation))
+    blocks = [_blocks(fit, r, effect, grid, above, decay, scales) for r in recordings]
+    return _statistics(fit, blocks)
+
+
+def _amplitudes(
+    fit: Fit, effect: Effect, sizes: Array, information: Array
+) -> tuple[Array, Array, tuple[str, ...]]:
+    """Amplitudes, their standard deviations and names: one for all recordings, or one each."""
+    amplitudes = np.hypot(sizes[0::2], sizes[1::2])
+    weight = 0.5 * (np.diag(information)[0::2] + np.diag(information)[1::2])
+    if effect.parameter("amplitude").scope == "recording":
+        recordings = fit.target.oscillator.campaign.recordings
+        names = tuple(f"{effect.id}.amplitude[{r.name}]" for r in recordings)
+        return amplitudes, 1.0 / np.sqrt(np.maximum(weight, 1e-300)), names
+    amplitude = float(np.sum(weight * amplitudes) / np.sum(weight))
+    return np.array([amplitude]), np.array([1 / np.sqrt(weight.sum())]), (f"{effect.id}.amplitude",)
+
+
+def _blocks(
+    fit: Fit, r: int, effect: Effect, grid: Array, above: Array, decay: float, scales: Scales
+) -> Blocks:
     if effect.observe is None:
         shaken = force_responses(fit, r, grid, scales)
         return joined(blocks_in_parts(fit, r, grid, shaken))
-    waves = partial(hums, fit, r)
+    waves = partial(hums, fit, r, decay=decay)
     slow = grid < NEAR_RESONANCE * scales.natural_frequency
-    sums = [line_blocks(fit, r, grid[~slow])] if np.sum(~slow) > 1 else []
+    sums = [line_blocks(fit, r, grid[~slow], decay)] if np.sum(~slow) > 1 else []
     near = grid[slow] if sums else grid
     return joined(
         [*blocks_in_parts(fit, r, near, waves), *sums, *blocks_in_parts(fit, r, above, waves)]
     )
 
 
-def _shapes(fit: Fit, effect: Effect, frequency: float, sizes: Array) -> dict[str, float]:
+def _shapes(
+    fit: Fit, effect: Effect, frequency: float, decay: float, sizes: Array
+) -> dict[str, float]:
     phases = np.arctan2(sizes[1::2], sizes[0::2]) % (2 * np.pi)
     recordings = fit.target.oscillator.campaign.recordings
     shapes = {f"{effect.id}.frequency": frequency}
+    if not is_steady(effect):
+        shapes[f"{effect.id}.decay"] = decay
     for recording, phase in zip(recordings, phases, strict=True):
         shapes[f"{effect.id}.phase[{recording.name}]"] = float(phase)
     return shapes

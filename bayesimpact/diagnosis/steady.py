@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from bayesimpact.diagnosis.directions import is_periodic
+from bayesimpact.diagnosis.directions import is_periodic, is_steady
 from bayesimpact.diagnosis.forced_responses import simulated_responses
 from bayesimpact.diagnosis.harmonics import Blocks, blocks_of, hums, projected
 from bayesimpact.inference.fit import Fit
@@ -28,7 +28,7 @@ def steadiness(fit: Fit, scales: Scales) -> tuple[float, ...]:
     """p-values that what a model calls periodic is steady, one per periodic effect in it."""
     found = []
     for effect in fit.target.oscillator.acting:
-        if is_periodic(effect):
+        if is_periodic(effect) and is_steady(effect):
             lines = fit.value(f"{effect.id}.frequency") + SIDEBANDS / scales.duration
             recordings = range(len(fit.linearisation))
             found.append(

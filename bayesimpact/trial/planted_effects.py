@@ -51,6 +51,7 @@ class PlantedEffect:
     slot : effects with the same slot exclude each other
     by_noise : its trace in the noise shows it, however small its response
     angle : it means something for angles only
+    free : it means something without an obstacle only
     """
 
     regimes: tuple[str, ...]
@@ -60,6 +61,7 @@ class PlantedEffect:
     slot: str = ""
     by_noise: bool = False
     angle: bool = False
+    free: bool = False
 
     def fits(self, cases: int, recordings: int, angle: bool = False) -> bool:
         """Whether a campaign with so many obstacles and recordings can show it.
@@ -67,7 +69,7 @@ class PlantedEffect:
         `angle` says that the recordings are of an angle.
         """
         enough = cases >= self.obstacles and recordings >= self.recordings
-        return enough and (angle or not self.angle)
+        return enough and (angle or not self.angle) and not (self.free and cases)
 
 
 def sign_of(rng: Rng) -> float:
@@ -260,6 +262,24 @@ def _hum(design: Design, rng: Rng) -> Form:
     return Form(build, 1e-6 * reach, largest=0.05 * reach)
 
 
+def _released_mode(design: Design, rng: Rng) -> Form:
+    """Above the motion and below the band's end; every release excites it as it happens to."""
+    natural, highest = design.omega / (2 * pi), 0.2 * design.rate
+    frequency = log_uniform(rng, (1.5 * natural, max(min(8.0 * natural, highest), 2.0 * natural)))
+    decay = log_uniform(rng, (0.5, 10.0)) / design.duration
+    shares = {r.name: log_uniform(rng, (0.5, 2.0)) for r in design.releases}
+    phases = {r.name: float(rng.uniform(0, 2 * pi)) for r in design.releases}
+    reach = design.amplitude
+
+    def build(size: float) -> Parameters:
+        amplitudes = {name: size * share for name, share in shares.items()}
+        return {
+            "frequency": frequency, "decay": decay, "amplitude": amplitudes, "phase": phases
+        }  # fmt: skip
+
+    return Form(build, 1e-6 * reach, largest=0.1 * reach)
+
+
 def _smoothing(design: Design, rng: Rng) -> Form:
     """An undeclared Savitzky-Golay filter; on or off, its window drawn."""
     contact = pi / design.contact_omega * design.rate
@@ -328,7 +348,8 @@ PLANTED_EFFECTS: Mapping[str, PlantedEffect] = {
     "sensor_cubic": PlantedEffect(
         ("measurement",), one_number("gain", lambda d: 0.3 / d.amplitude**2, signed=True)
     ),
-    "sensor_hum": PlantedEffect(("measurement",), _hum),
+    "sensor_hum": PlantedEffect(("measurement",), _hum, slot="hum"),
+    "released_mode": PlantedEffect(("measurement",), _released_mode, slot="hum", free=True),
     "pendulum_sine": PlantedEffect(("free",), lambda d, r: Form(lambda s: {}, 0.0), angle=True),
     "pendulum_with_spring": PlantedEffect(
         ("free",), one_number("stiffness", lambda d: d.rig.k1), angle=True

@@ -267,6 +267,10 @@ def _hum(probe: Probe, p: Numbers) -> Probe:
     return replace(probe, hum=p["amplitude"], hum_frequency=p["frequency"], hum_phase=p["phase"])
 
 
+def _released_mode(probe: Probe, p: Numbers) -> Probe:
+    return replace(_hum(probe, p), hum_decay=p["decay"])
+
+
 CATALOGUE: Mapping[str, Planted] = {
     "contact_damping_indentation": Planted(
         ("coefficient",), obstacle=True, part=_damping_indentation
@@ -330,6 +334,9 @@ CATALOGUE: Mapping[str, Planted] = {
     ),
     "sensor_cubic": Planted(("gain",), probe=lambda probe, p: replace(probe, cubic=p["gain"])),
     "sensor_hum": Planted(("amplitude", "frequency"), per_recording=("phase",), probe=_hum),
+    "released_mode": Planted(
+        ("frequency", "decay"), per_recording=("amplitude", "phase"), probe=_released_mode
+    ),
     "pendulum_sine": Planted(optional=("stiffness",), part=_pendulum),
     "pendulum_with_spring": Planted(("stiffness",), part=_pendulum),
     "spring_quintic": Planted(("stiffness",), part=_spring_quintic),

@@ -1,6 +1,6 @@
 """The rig's measuring chain: probe, rest reading, noise, smoothing, digits, in this order.
 
-measured = round(smooth(y + gain2 y^2 + gain3 y^3 + drift t + hum sin(2 pi f t + phase)
+measured = round(smooth(y + gain2 y^2 + gain3 y^3 + drift t + hum exp(-r t) sin(2 pi f t + phase)
                         + offset + noise))
 """
 
@@ -60,7 +60,7 @@ class Probe:
     ----------
     quadratic, cubic : gains of y^2 (1/m) and y^3 (1/m2)
     drift : m/s
-    hum, hum_frequency, hum_phase : m, Hz, rad
+    hum, hum_frequency, hum_phase, hum_decay : m, Hz, rad, 1/s
     """
 
     quadratic: float = 0.0
@@ -69,11 +69,13 @@ class Probe:
     hum: float = 0.0
     hum_frequency: float = 0.0
     hum_phase: float = 0.0
+    hum_decay: float = 0.0
 
     def reads(self, displacement: Series, times: Series) -> Series:
         """Reading of the probe, (n,), m; the true displacement is not rescaled."""
         y = displacement
         wave = np.sin(2 * pi * self.hum_frequency * times + self.hum_phase)
+        wave = wave * np.exp(-self.hum_decay * times)
         distorted = y + self.quadratic * y**2 + self.cubic * y**3
         return distorted + self.drift * times + self.hum * wave
 

@@ -264,7 +264,7 @@ def test_nothing_is_needed_where_a_free_force_leaves_far_less():
         (1.0 + 9.0 / EXCESS + 0.02, "partly"),
         (1.0 + 9.0 / EXCESS - 0.02, "unknown"),
     ):
-        found = remaining(something_left(), 100.0, 10.0, beside=150.0, instead=110.0)
+        found = remaining(something_left(), 100.0, 10.0, beside=100.0 + COST, instead=100.0)
         model = found.residual[frozenset()]
         residual = {**found.residual, frozenset(): with_misfit(model, free)}
         assert judge(replace(found, residual=residual)) == verdict, free
@@ -276,15 +276,12 @@ def with_misfit(model: Candidate, chi2: float) -> Candidate:
 
 
 def test_an_effect_is_needed_where_it_does_what_a_free_force_does_not() -> None:
-    """With a force beside it as well it leaves far less than the force alone."""
-    for both, verdict in ((1.0 + 1.0 / EXCESS - 0.01, "partly"), (1.3, "unknown")):
-        found = remaining(something_left(), 100.0, 10.0, beside=150.0, instead=90.0)
-        alone, beside = (found.residual[frozenset(k)] for k in ([], [FRICTION]))
-        residual = {
-            frozenset[str](): with_misfit(alone, 2.0),
-            frozenset([FRICTION]): with_misfit(beside, both),
-        }
-        assert judge(replace(found, residual=residual)) == verdict, both
+    """With that force beside it, it is decisively likelier than the force alone."""
+    for more, verdict in ((0.1, "partly"), (-0.1, "unknown")):
+        beside = 100.0 + COST + DECISIVE + more
+        found = remaining(something_left(), 100.0, 10.0, beside=beside, instead=100.0)
+        alone = with_misfit(found.residual[frozenset()], 1.1)
+        assert judge(replace(found, residual={**found.residual, frozenset(): alone})) == verdict
 
 
 def test_what_remains_beside_a_name_needs_decisive_odds():

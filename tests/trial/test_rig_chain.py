@@ -41,6 +41,11 @@ def test_perfect_chain_returns_the_motion(truth):
             {"amplitude": 1e-5, "frequency": 50.0, "phase": {"r": 0.4}},
             lambda y, t: y + 1e-5 * np.sin(2 * np.pi * 50.0 * t + 0.4),
         ),
+        (
+            "released_mode",
+            {"amplitude": {"r": 1e-5}, "frequency": 50.0, "decay": 3.0, "phase": {"r": 0.4}},
+            lambda y, t: y + 1e-5 * np.exp(-3.0 * t) * np.sin(2 * np.pi * 50.0 * t + 0.4),
+        ),
     ],
 )
 def test_probe_distorts_the_true_displacement_before_the_offset(

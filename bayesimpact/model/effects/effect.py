@@ -235,7 +235,7 @@ class Effect(Picklable):
     energy : what it does to mechanical energy
     statement : sentence for the report with `{size}` and `{share}` filled in
     needs_stop : True when it makes no sense without an obstacle
-    prefer : id of the simpler effect that this one reduces to at its null
+    prefer : id of the simpler effect that this one reduces to, at its null or with a shape of zero
     restates : id of an effect that is the same law in other numbers, for another range of them: no
         model holds both, and only the ranges `within` which they go by these names tell them apart
     condition : what else a campaign must offer (two obstacles, two impacts, ...); None for nothing
