@@ -1,5 +1,4 @@
-"""Scans over frequency: a harmonic force on the mass, a hum in the probe's signal, a mode that rings
-down in it.
+"""Scans over frequency: a harmonic force on the mass, a hum in the probe's signal, a ringing mode.
 
 All have an amplitude and, in every recording, a phase; while the amplitude is zero the phases mean
 nothing, so each frequency is tested with a free sine and cosine per recording: 2 R numbers, chi-
