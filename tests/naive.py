@@ -153,13 +153,14 @@ def _solve(function, low, high):
         if value == 0 or slope == 0:
             break
         moved = t - value / slope
-        if not low <= moved <= high:
+        inside = low <= moved <= high
+        if not inside:  # t itself may be the middle: that is no end yet
             moved = (low + high) / 2
         if (function(moved)[0] > 0) == sign:
             high = moved
         else:
             low = moved
-        done = abs(moved - t) < mp.mpf(10) ** (-mp.mp.dps + 12) * (1 + abs(t))
+        done = inside and abs(moved - t) < mp.mpf(10) ** (-mp.mp.dps + 12) * (1 + abs(t))
         t = moved
         if done:
             break
