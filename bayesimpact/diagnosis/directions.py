@@ -86,9 +86,8 @@ def decays_of(effect: Effect, scales: Scales) -> Array:
     """Rates (k,) at which a periodic effect may ring down, 1/s; zero for a steady one."""
     if is_steady(effect):
         return np.zeros(1)
-    grid = effect.parameter(DECAY).grid
-    assert grid is not None
-    return grid(scales)
+    decay = effect.parameter(DECAY)
+    return decay.grid(scales) if decay.grid else np.array([decay.scale(scales)])
 
 
 def sigma_of(fit: Fit) -> Array:

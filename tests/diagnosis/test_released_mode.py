@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import bayesimpact as bi
 from bayesimpact.diagnosis.loop import Diagnosis
+from bayesimpact.diagnosis.own_band import shakes_in_own_band
 
 RATE, SECONDS, MAIN, NOISE = 500.0, 6.0, 4.1, 5e-6
 FREQUENCY, DECAY = 17.3, 1.5
@@ -39,6 +42,17 @@ def test_a_mode_that_rings_down_is_named_with_its_numbers(size: float) -> None:
         sd = float(fit.sd[fit.names.index(key)])
         assert abs(fit.value(key) - true) < 4.0 * sd, name
     assert abs(fit.value("k1") / (0.5 * (2 * np.pi * MAIN) ** 2 + 0.5 * 0.25**2) - 1.0) < 1e-4
+
+
+def test_the_mode_s_own_line_is_not_the_motion() -> None:
+    """A strong one stands in the recordings' spectrum as the motion does."""
+    found = diagnosed((1.5e-3, 1.5e-3, 1e-3), DECAY, 4)
+    assert [e.id for e in found.effects] == ["released_mode"]
+    assert not shakes_in_own_band(found.after, remains=True)
+    at = found.after.names.index("released_mode.frequency")
+    mode = found.after.mode.copy()
+    mode[at] = 1.02 * MAIN
+    assert shakes_in_own_band(replace(found.after, mode=mode), remains=True)
 
 
 def test_a_steady_line_is_a_hum() -> None:
