@@ -11,9 +11,9 @@ Let S be the likeliest set of effects that the search reached.
    Nothing is needed where a free force in the place of all effects leaves `EXCESS` times less of
    the misfit, and S with such a force beside it is not decisively likelier than that force alone:
    the effects only imitate it. Else an effect of S is needed when
-   - every set of effects without it trails S by the decisive odds; one with more effects or
-     parameters than S trails at all what is likeliest with the effect and no larger than that one:
-     more to fit with makes imitation easy, and the rest of the truth may be among it,
+   - every set of effects without it trails S by the decisive odds, or trails at all a set with the
+     effect that has fewer effects or parameters; if it has more than S itself, one that has no
+     more: more to fit with makes imitation easy, and the rest of the truth may be among it,
    - `EXCESS` times as much is left without it, other effects refitted: of the misfit above the
      noise, or of the force about the motion's own frequencies. An effect that imitates what the
      catalogue lacks may put the phase right, but leaves most of the force,
@@ -163,18 +163,18 @@ def may_be_needed(naming: Naming, effect: Effect) -> bool:
 
 
 def leads_without(naming: Naming, effect: Effect) -> bool:
-    """Whether every set of effects without one trails the chosen one; those that are larger, the
-    likeliest with it that is no larger than they are.
+    """Whether every set of effects without one trails the chosen one decisively, or at all one that
+    has the effect and is simpler; where it is larger than the chosen one, no larger.
     """
     chosen = naming.chosen
     own = naming.log_odds(chosen.candidate)
     with_it = [c for c in naming.tried if effect.id in c.ids]
 
     def least(rival: Candidate) -> float:
-        if not is_larger(rival.effects, chosen):
-            return own - DECISIVE
-        most = complexity(rival.effects)
-        return max([own, *(naming.log_odds(c) for c in with_it if complexity(c.effects) <= most)])
+        most, larger = complexity(rival.effects), is_larger(rival.effects, chosen)
+        sizes = [(complexity(c.effects), naming.log_odds(c)) for c in with_it]
+        simpler = [odds for size, odds in sizes if size < most or (larger and size == most)]
+        return max([own - DECISIVE, *simpler])
 
     return not any(
         naming.log_odds(c) > least(c) for c in naming.tried if not holds(c.effects, effect)

@@ -229,13 +229,13 @@ class _Search(Remaining):
         return self.examine(self.ranked([self.tried[frozenset(chosen.ids)]])[0])
 
     def naming(self, base: State, chosen: State) -> Naming:
-        tried = tuple(sorted(self.tried.values(), key=self.log_odds, reverse=True))
         if self.may_be_named(chosen):
             best = self.best(len(chosen.candidate.effects))
             if set(best.ids) != set(chosen.candidate.ids):
-                chosen = self.examine(best)
+                chosen = self.eliminated(self.examine(best))
         contact = missing_contact(base.candidate.fit, self.scales, rng=self.rng)
         odds = -np.inf
+        tried = tuple(sorted(self.tried.values(), key=self.log_odds, reverse=True))
         many = len(chosen.candidate.effects) >= IMITATING_EFFECTS and not self.is_large
         if contact is not None and many:
             replaced = " + ".join(chosen.candidate.ids)

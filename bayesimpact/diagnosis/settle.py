@@ -29,12 +29,12 @@ class Settling(Ranked):
         return self.eliminated(state)  # what the last exchange led to may need less too
 
     def eliminated(self, state: State) -> State:
-        """Leave out effects, the least useful first, that the recordings do not demand.
+        """Leave out effects, the least useful first, that the recordings do not demand; where
+        something remains, put the law that one refines in its place.
 
         An effect stays when the model without it is decisively worse, or leaves something.
         """
-        while len(state.candidate.effects) > 1:
-            smaller = [self.drop(state.candidate, e) for e in state.candidate.effects]
+        while smaller := self.smaller(state):
             best = max(smaller, key=self.log_odds)
             lost = self.log_odds(state.candidate) - self.log_odds(best)
             complete = state.is_white and not self.examine(best).is_white
@@ -42,6 +42,14 @@ class Settling(Ranked):
                 return state
             state = self.examine(best)
         return state
+
+    def smaller(self, state: State) -> list[Candidate]:
+        """Models with one effect less, or with a simpler one where something remains."""
+        chosen = state.candidate
+        found = [self.drop(chosen, e) for e in chosen.effects if len(chosen.effects) > 1]
+        if not state.is_white:
+            found += [c for e in chosen.effects for c in self.simplified(chosen, e)]
+        return found
 
     def near(self, state: State) -> list[Candidate]:
         """The chosen model and those of at most its size that it does not beat decisively."""
@@ -80,8 +88,11 @@ class Settling(Ranked):
                     if not score.effect.has_size:
                         self.exchange_on_off(chosen, effect, score.effect)
 
-    def simplified(self, chosen: Candidate, effect: Effect) -> None:
+    def simplified(self, chosen: Candidate, effect: Effect) -> list[Candidate]:
         """What an effect refines in its place, whatever scores on a model without both say."""
+        found = []
         for simpler in self.effects:
             if simpler.id == effect.prefer and simpler.id not in chosen.ids and self.may_go_on():
                 self.exchange_on_off(chosen, effect, simpler)
+                found.append(self.tried[frozenset(chosen.ids) - {effect.id} | {simpler.id}])
+        return found

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from effect_rigs import BY_ID
 
-from bayesimpact.diagnosis.decision import decide, in_its_place, ordered
+from bayesimpact.diagnosis.decision import decide, in_its_place, leads_without, ordered
 from bayesimpact.diagnosis.learned import learned_force
 from bayesimpact.diagnosis.naming import Naming, State
 from bayesimpact.diagnosis.promising import refit_candidates
@@ -221,6 +221,20 @@ def test_a_larger_set_is_compared_with_what_is_likeliest_with_the_effect_and_no_
         assert judge(remaining(something_left(), 100.0, 10.0, rival, both)) == verdict
     larger = candidate(f"{FRICTION} gap_wear gap_per_recording", 110.0 + 2 * COST)
     assert judge(remaining(something_left(), 100.0, 10.0, rival, larger)) == "unknown"
+
+
+def test_a_set_that_trails_a_simpler_one_with_the_effect_says_nothing_against_it():
+    """Though it is no larger than the chosen set: that one has a larger law beside the effect."""
+    chosen = state(
+        candidate(f"{FRICTION} power_damping", 100.0 + COST),
+        p_force=ALPHA / 2,
+        force_evidence=2 * DECISIVE,
+    )
+    rival = candidate("power_damping spring_cubic", 97.0 + COST)
+    for gain, leads in ((97.1, True), (96.9, False)):
+        simpler = candidate(f"{FRICTION} {DRAG}", gain + COST)
+        found = naming(chosen, rival, simpler)
+        assert leads_without(found, BY_ID[FRICTION]) == leads
 
 
 def test_an_effect_may_stand_out_by_the_force_that_is_left_without_it():

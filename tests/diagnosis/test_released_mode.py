@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from effect_rigs import BY_ID
 
 import bayesimpact as bi
 from bayesimpact.diagnosis.loop import Diagnosis
@@ -27,7 +26,7 @@ def diagnosed(amplitudes: tuple[float, ...], decay: float, seed: int) -> Diagnos
         y = y + amplitude * np.exp(-decay * t) * line + NOISE * rng.standard_normal(t.size)
         recordings.append({"name": f"r{i}", "samples": y, "unit": "m", "sample_rate_hz": RATE})
     campaign = bi.Campaign.from_arrays(recordings, name="beam", mass_kg=0.5, stop=False)
-    return bi.diagnose(campaign, effects=(*bi.SEARCHED, BY_ID["released_mode"]))
+    return bi.diagnose(campaign)
 
 
 @pytest.mark.parametrize("size", [1e-5, 3e-4])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -144,6 +145,19 @@ def test_an_effect_that_is_hardly_needed_is_left_out(run):
     assert chosen(run(table)) == {A}
     needed = Table({A: 497.0, B: 250.0, f"{A} {B}": 510.0}, forward={A: 300.0})
     assert chosen(run(needed)) == {A, B}
+
+
+@pytest.mark.parametrize(("lost", "simpler"), [(5.4, True), (5.6, False)])
+def test_where_something_remains_a_law_must_be_decisively_better_than_what_it_refines(
+    run, monkeypatch, lost, simpler
+):
+    monkeypatch.setitem(BY_ID, B, replace(BY_ID[B], prefer=A))
+    effects = tuple(BY_ID[i] for i in (A, B, C, D, S))
+    gains = {A: 40.0, B: 40.0, C: 50.0, f"{B} {C}": 400.0, f"{A} {C}": 400.0 - lost}
+    for left in (0.0, ENOUGH - 400.0):
+        table = Table({k: v + left for k, v in gains.items()} | {"": 0.0}, chi2=100.0)
+        expected = {A, C} if simpler and not left else {B, C}
+        assert chosen(run(table, effects)) == expected
 
 
 def test_an_exchange_replaces_an_imitation(run):

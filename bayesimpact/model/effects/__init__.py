@@ -90,7 +90,6 @@ UNTRIED = (
     "base_motion",
     "adhesion",
     "obstacle_restitution",
-    "released_mode",
 )
 """Simulated and fitted like any, but not looked for unless asked: trials have not shown yet that
 they are named rightly.
