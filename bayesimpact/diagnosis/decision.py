@@ -19,8 +19,9 @@ Let S be the likeliest set of effects that the search reached.
      catalogue lacks may put the phase right, but leaves most of the force,
    - its size is apart from none at all by `APART` of its own standard deviations, with what the
      remainder may have done to it in them (`discrepancy`),
-   - no set without it, with a residual force of whichever form is likeliest, beats S with its own
-     residual force by these odds (as in 1), and
+   - no set without it, with a residual force of whichever form is likeliest, is likelier than S
+     with its own residual force: by these odds (as in 1), where that force depends on what the
+     effect's depends on and may be no more than the effect itself, and
    - no other effect in its place, with such a force beside, comes within these odds of that, or
      above it where it has more parameters: what remains may be what tells two laws apart.
    A search that ended by its limit must have fitted all of these.
@@ -38,6 +39,7 @@ from typing import Literal
 
 import numpy as np
 
+from bayesimpact.diagnosis.learned import may_restate
 from bayesimpact.diagnosis.naming import Naming, State
 from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.thresholds import APART, DECISIVE, DOUBT, EXCESS
@@ -96,7 +98,7 @@ def is_needed(naming: Naming, effect: Effect) -> bool:
         return False
     reached = naming.with_residual_force(chosen)
     return not any(
-        naming.with_residual_force(ids) > reached + lead(naming, ids)
+        naming.with_residual_force(ids) > reached + lead(naming, ids, effect)
         for ids, candidate in naming.residual.items()
         if not holds(candidate.effects, effect)
     )
@@ -131,16 +133,18 @@ def is_compared(naming: Naming, effect: Effect) -> bool:
     return rivals | ({frozenset(other.ids)} if other else set()) <= naming.residual.keys()
 
 
-def lead(naming: Naming, ids: frozenset[str]) -> float:
+def lead(naming: Naming, ids: frozenset[str], effect: Effect) -> float:
     """Odds by which a model with a residual force must lead the chosen one to unseat an effect.
 
-    One with fewer effects decisively, for the force may imitate them; one with another effect in a
-    place may trail as much, unless it has more parameters.
+    One with fewer effects decisively where the force may be the effect itself (`may_restate`), for
+    it then contradicts nothing; else it is another explanation, and so is another effect in a
+    place: these may trail as much, or not at all where they have more parameters to fit with.
     """
+    found = naming.residual[ids].effects
     if len(ids) < len(naming.chosen.candidate.effects):
-        return DECISIVE
-    found = tuple(e for e in naming.residual[ids].effects if e.id in ids)
-    return 0.0 if is_larger(found, naming.chosen) else -DECISIVE
+        return DECISIVE if may_restate(found[-1], effect) else 0.0
+    named = tuple(e for e in found if e.id in ids)
+    return 0.0 if is_larger(named, naming.chosen) else -DECISIVE
 
 
 def is_larger(effects: Sequence[Effect], chosen: State) -> bool:

@@ -133,6 +133,25 @@ def refined_force(effect: Effect, factor: int) -> Effect:
     return learned_force(knots.low, high, a.value, b.value, intervals * factor + 3)
 
 
+def may_restate(force: Effect, effect: Effect) -> bool:
+    """Whether a learned force may be the force of an effect: it depends on the same things.
+
+    One of displacement and velocity may be any law of these, but no change with time; one that
+    changes with time no other law; one in contact what acts there. None has a memory, and none is
+    an error of the readings.
+    """
+    law = effect.law
+    memory = law is not None and (law.rate or law.travel)
+    if effect.observe is not None or effect.regime == "measurement" or memory:
+        return False
+    of_time = law is not None and law.of_time
+    reach = knots_of(force).reach
+    if reach > 0.0:
+        return of_time and effect.family == "free stiffness"
+    in_flight = effect.regime in ("free", "everywhere")
+    return not of_time and (reach == 0.0 or not in_flight)
+
+
 @dataclass(frozen=True)
 class Constant:
     """A prior's width whatever the campaign; a record, for lambdas cannot be pickled."""

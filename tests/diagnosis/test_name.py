@@ -10,7 +10,7 @@ import pytest
 from effect_rigs import BY_ID
 
 from bayesimpact.diagnosis.decision import decide, in_its_place, leads_without, ordered
-from bayesimpact.diagnosis.learned import learned_force
+from bayesimpact.diagnosis.learned import learned_drift, learned_force
 from bayesimpact.diagnosis.naming import Naming, State
 from bayesimpact.diagnosis.promising import refit_candidates
 from bayesimpact.diagnosis.refit import Candidate
@@ -104,7 +104,7 @@ def test_a_pair_is_compared_with_what_lacks_one_of_its_members():
     assert not naming(single, candidate("gap_wear gap_per_recording", 199.9 + COST)).rivals()
 
 
-OF_MOTION = learned_force(-1.0, 1.0, 1.0, 1.0)
+OF_MOTION, OF_TIME = learned_force(-1.0, 1.0, 1.0, 1.0), learned_drift(10.0, 1.0, 1.0, 1.0)
 
 
 def beside_force(model: Candidate, evidence: float, force: Effect = OF_MOTION) -> Candidate:
@@ -170,6 +170,21 @@ def test_an_effect_that_a_residual_force_replaces_is_not_needed():
     ):
         found = remaining(something_left(), 100.0, 10.0, beside=beside, instead=instead)
         assert judge(found) == verdict, (beside, instead)
+
+
+@pytest.mark.parametrize("effect", [FRICTION, "stiffness_drift", "sensor_cubic"])
+@pytest.mark.parametrize("force", [OF_MOTION, OF_TIME], ids=["motion", "time"])
+def test_a_residual_force_that_cannot_be_the_effect_is_another_explanation(
+    effect: str, force: Effect
+) -> None:
+    """It then unseats the effect where it is likelier at all."""
+    restates = {(FRICTION, OF_MOTION.equation), ("stiffness_drift", OF_TIME.equation)}
+    chosen = state(candidate(effect, 100.0), p_force=ALPHA / 2, force_evidence=2 * DECISIVE)
+    needed = DECISIVE if (effect, force.equation) in restates else 0.0
+    for more, verdict in ((0.1, "unknown"), (-0.1, "partly")):
+        lead = 100.0 - COST + needed + more
+        found = remaining(chosen, 100.0, 10.0, instead=lead, force=force)
+        assert judge(found) == verdict
 
 
 def test_a_search_that_ended_by_its_limit_needs_only_what_it_has_compared():

@@ -185,6 +185,7 @@ class Law:
     grain : length, m, below which the force does look like a polynomial (a spline's knots lie that
         far apart): a step passes about one of them
     ignores_speed : the force does not depend on v: four evaluations a step are then enough, not six
+    of_time : the force depends on time explicitly
 
     A state is 0 at a recording's first sample, or what a parameter that is `initial` says. The
     state of a law that acts in contact only is not integrated in flight: its rate may there
@@ -205,6 +206,7 @@ class Law:
     jump_at_surface: bool = False
     polynomial: bool = False
     ignores_speed: bool = False
+    of_time: bool = False
 
 
 Numbers = Sequence[float]

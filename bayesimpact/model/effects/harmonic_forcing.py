@@ -63,5 +63,5 @@ EFFECT = Effect(
             grid=lambda s: np.array([0.0, 0.5, 1.0, 1.5]) * math.pi,
         ),
     ),
-    law=Law(force, pace=pace, polynomial=True, ignores_speed=True),
+    law=Law(force, pace=pace, polynomial=True, ignores_speed=True, of_time=True),
 )

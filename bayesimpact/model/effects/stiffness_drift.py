@@ -37,5 +37,5 @@ EFFECT = Effect(
         "({share} of the peak elastic force)."
     ),
     parameters=(EffectParameter("rate", "1/s", scale=lambda s: 0.02 / s.duration),),
-    law=Law(force, polynomial=True, ignores_speed=True),
+    law=Law(force, polynomial=True, ignores_speed=True, of_time=True),
 )
