@@ -44,13 +44,11 @@ class State:
     def is_white(self) -> bool:
         """True when neither the catalogue nor an unknown force explains anything more.
 
-        The base model is tested at a stated rate of false alarms. Beside effects, what remains
-        needs decisive odds as they do: each model on the way is tested anew, and one in a hundred
-        has a small p-value by chance.
+        What remains needs decisive odds as every name does: each model on the way is tested anew,
+        one in a hundred has a small p-value by chance, and where the noise of an instrument is not
+        quite what is assumed of it, more.
         """
         forces = (self.force, self.drift)
-        if not self.candidate.effects:
-            return min([self.scan.p_value, *(f.p_value for f in forces)]) >= ALPHA
         if largest_log_odds(self.scan.p_value) >= DECISIVE:
             return False
         return not any(f.log_evidence >= DECISIVE and f.p_value < ALPHA for f in forces)

@@ -6,10 +6,11 @@ from __future__ import annotations
 
 import math
 
+from scipy.optimize import brentq
+
 ALPHA = 0.004
-"""Of each of the three tests that ask whether the base model lacks anything (catalogue, force,
-drift): one in a hundred controls is then called incomplete. Measured with the search before version
-0.2: 297 of 300 controls adequate.
+"""Of the tests of a free force against the noise, which stand beside its odds: what a thousand
+draws of the null resolve well.
 """
 
 DECISIVE = 5.5
@@ -49,3 +50,8 @@ def largest_log_odds(p_value: float) -> float:
         return 0.0
     p = max(p_value, 1e-300)
     return -math.log(-math.e * p * math.log(p))
+
+
+def p_value_of(log_odds: float) -> float:
+    """The p-value that stands for such log odds at most, nats, above 0."""
+    return float(math.exp(brentq(lambda x: largest_log_odds(math.exp(x)) - log_odds, -600.0, -1.0)))

@@ -14,9 +14,10 @@ import numpy as np
 
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.force import missing_drift, missing_force
+from bayesimpact.diagnosis.naming import State
+from bayesimpact.diagnosis.refit import base_candidate
 from bayesimpact.diagnosis.scan import scan
 from bayesimpact.diagnosis.smoothing import proved_smoothing
-from bayesimpact.diagnosis.thresholds import ALPHA
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects import SEARCHED
 from bayesimpact.trial.draw import draw
@@ -35,19 +36,20 @@ def alarm(settings: Settings, seed: int) -> dict[str, Any]:
     fit = identify(drawn.campaign, rng=rng, search=False).fit
     scales = campaign_scales(fit)
     scanned = scan(fit, SEARCHED, scales, rng=rng)
-    force = missing_force(fit, scales, rng=rng).p_value
-    drift = missing_drift(fit, scales, rng=rng).p_value
+    force = missing_force(fit, scales, rng=rng)
+    drift = missing_drift(fit, scales, rng=rng)
+    alone = State(base_candidate(fit), scanned, force, drift)
     filtered = proved_smoothing(drawn.campaign) is not None
     return {
         "seed": seed,
         "rig_kind": drawn.truth["rig_kind"],
         "noise": drawn.truth["noise_kind"],
         "scan_p": scanned.p_value,
-        "force_p": force,
-        "drift_p": drift,
+        "force_p": force.p_value,
+        "drift_p": drift.p_value,
         "filter": filtered,
         "best": scanned.best()[0].effect.id if scanned.scores else None,
-        "alarm": bool(min(scanned.p_value, force, drift) < ALPHA or filtered),
+        "alarm": filtered or not alone.is_white,
     }
 
 

@@ -20,7 +20,7 @@ from scipy import stats
 from bayesimpact.data.campaign import Measurement
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.scan import scan
-from bayesimpact.diagnosis.thresholds import ALPHA, DECISIVE
+from bayesimpact.diagnosis.thresholds import DECISIVE, p_value_of
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.trial.bundle import PAPER_HEIGHTS, PAPER_RIG
 from bayesimpact.trial.designs import Design
@@ -34,7 +34,7 @@ from bayesimpact.trial.summary import rate
 Array = NDArray[np.float64]
 
 FAMILIES = 3  # of tests that share the alarm probability: scores, forcing, hum
-NULL_DRAWS = 20_000
+NULL_DRAWS = 200_000
 NINETY = 0.9
 STRENGTHS = np.geomspace(0.2, 40.0, 400)
 SHOWN = slice(None, None, 8)  # of STRENGTHS, in power.json
@@ -93,7 +93,7 @@ def critical_score(sensitivity: Sensitivity, rng: np.random.Generator) -> float:
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     draws = rng.standard_normal((NULL_DRAWS, scale.size)) @ root.T
-    return float(np.quantile(np.abs(draws).max(axis=1), 1 - ALPHA / FAMILIES))
+    return float(np.quantile(np.abs(draws).max(axis=1), 1 - p_value_of(DECISIVE) / FAMILIES))
 
 
 def power(sensitivity: Sensitivity, effect: str, rng: np.random.Generator) -> Power | None:

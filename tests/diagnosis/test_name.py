@@ -14,7 +14,14 @@ from bayesimpact.diagnosis.learned import learned_drift, learned_force
 from bayesimpact.diagnosis.naming import Naming, State
 from bayesimpact.diagnosis.promising import refit_candidates
 from bayesimpact.diagnosis.refit import Candidate
-from bayesimpact.diagnosis.thresholds import ALPHA, APART, DECISIVE, EXCESS, largest_log_odds
+from bayesimpact.diagnosis.thresholds import (
+    ALPHA,
+    APART,
+    DECISIVE,
+    EXCESS,
+    largest_log_odds,
+    p_value_of,
+)
 from bayesimpact.model.effects.effect import Effect
 
 COST = 3.8
@@ -61,8 +68,8 @@ def judge(found: Naming) -> str:
 
 def test_nothing_missing_is_adequate_and_an_alarm_without_a_name_is_unknown():
     assert judge(naming(state(candidate("", 0.0)))) == "adequate"
-    assert judge(naming(state(candidate("", 0.0), p_force=ALPHA / 2))) == "unknown"
-    assert judge(naming(state(candidate("", 0.0), p_catalogue=ALPHA / 2))) == "unknown"
+    for alarm in ({"p_force": ALPHA / 2, "force_evidence": DECISIVE + 0.1}, {"p_catalogue": 1e-5}):
+        assert judge(naming(state(candidate("", 0.0), **alarm))) == "unknown"
 
 
 def test_a_name_needs_decisive_odds_over_every_rival():
@@ -298,16 +305,16 @@ def test_an_effect_is_needed_where_it_does_what_a_free_force_does_not() -> None:
         assert judge(replace(found, residual={**found.residual, frozenset(): alone})) == verdict
 
 
-def test_what_remains_beside_a_name_needs_decisive_odds():
-    """The base model's alarm is one of p-values alone, whose rate is known."""
+def test_what_remains_needs_decisive_odds():
+    """Beside a name and beside the base model: a small p-value alone is no alarm."""
     for evidence, white in ((DECISIVE - 0.1, True), (DECISIVE + 0.1, False)):
         chosen = state(candidate(FRICTION, 100.0), p_force=ALPHA / 2, force_evidence=evidence)
         assert chosen.is_white == white
     by_chance = state(candidate(FRICTION, 2192.0), p_catalogue=0.0026)
     assert by_chance.is_white and judge(naming(by_chance)) == "named"
     assert not state(candidate(FRICTION, 2192.0), p_catalogue=1e-5).is_white
-    base = state(candidate("", 0.0), p_force=ALPHA / 2, force_evidence=DECISIVE - 0.1)
-    assert judge(naming(base)) == "unknown"
+    for alarm in ({"p_force": ALPHA / 2, "force_evidence": DECISIVE - 0.1}, {"p_catalogue": 3e-4}):
+        assert judge(naming(state(candidate("", 0.0), **alarm))) == "adequate"
 
 
 def test_a_p_value_stands_for_odds_of_a_bound():
@@ -315,6 +322,7 @@ def test_a_p_value_stands_for_odds_of_a_bound():
     for p, odds in ((0.05, 2.46), (0.01, 7.99), (0.001, 53.3)):
         assert np.exp(largest_log_odds(p)) == pytest.approx(odds, rel=0.005)
     assert largest_log_odds(0.5) == 0.0 and np.isfinite(largest_log_odds(0.0))
+    assert p_value_of(np.log(53.3)) == pytest.approx(0.001, rel=0.01)
 
 
 @pytest.mark.parametrize("ids", [FRICTION, f"{FRICTION} spring_cubic"])

@@ -55,7 +55,7 @@ def test_the_critical_score() -> None:
     """Above that of one test, below Bonferroni's for three hundred; alarms at its rate."""
     rng = np.random.default_rng(1)
     sensitivity = Sensitivity(draw_rig_design("small", "white", rng), rng)
-    assert 3.0 < critical_score(sensitivity, rng) < 4.8
+    assert 4.0 < critical_score(sensitivity, rng) < 5.5
     found = power(sensitivity, "sensor_drift", rng)
     assert (
         found is not None
