@@ -21,6 +21,7 @@ from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.remainder import Remainder, remainder
 from bayesimpact.diagnosis.size import size, size_in_words, yardstick
 from bayesimpact.diagnosis.smoothing import filter_parameters, filter_words
+from bayesimpact.diagnosis.summary import Findings, summary
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.diagnosis.whiteness import whiteness_p
 from bayesimpact.diagnosis.words import (
@@ -30,7 +31,6 @@ from bayesimpact.diagnosis.words import (
     parameter_shifts,
     remaining,
     statement,
-    summary,
 )
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect
@@ -75,18 +75,21 @@ def document(
         "verdict": d.verdict,
         "summary": failure(d.identification.fit, explained=d.verdict in ("adequate", "named"))
         + summary(
-            d.verdict,
-            d.effects,
-            statements,
-            d.location,
-            alternatives,
-            parameter_shifts(before, after) if d.verdict != "adequate" else {},
-            _detectable(d),
-            remaining(left, reading.unit),
-            faults=in_words(d.corrected) if d.corrected else "",
-            angle=angle,
-            drifts=d.naming.unknown.reach > 0,
-            probe=_is_of_the_probe(d),
+            Findings(
+                d.verdict,
+                d.effects,
+                statements,
+                d.location,
+                alternatives,
+                parameter_shifts(before, after) if d.verdict != "adequate" else {},
+                _detectable(d),
+                remaining(left, reading.unit),
+                faults=in_words(d.corrected) if d.corrected else "",
+                angle=angle,
+                drifts=d.naming.unknown.reach > 0,
+                probe=_is_of_the_probe(d),
+                more=len(d.after.target.oscillator.effects) > len(d.effects),
+            )
         )
         + _nearest(d)
         + _unfinished(d),

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from bayesimpact.diagnosis.faults.compare import base_failed
-from bayesimpact.diagnosis.locate import Location
 from bayesimpact.diagnosis.remainder import Remainder
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects import EFFECTS
@@ -16,11 +15,9 @@ from bayesimpact.model.units import span_of, two_digits
 
 SHARED = ("k2", "k1", "c1", "c2", "g")
 OPEN = 0.5  # half-width of a 90 % interval over the median: more than 0.5 leaves a size open
-FOLD = 10.0  # a change of more than ten times the value is told as a multiple, not in per cent
 WORTH_TELLING = 0.1  # probability among all sets of effects that were fitted
-TOLD = 2.0  # posterior standard deviations of a force, from which on its size means something
 
-_REGIMES = {
+REGIMES = {
     "free": "in the suspension, wherever the mass moves",
     "contact": "in contact with the obstacle",
     "entry": "where contact begins",
@@ -47,7 +44,7 @@ def left_open(effect: Effect, values: Mapping[str, Mapping[str, Any]]) -> str:
     if 0.5 * (high - low) <= OPEN * abs(median):
         return ""
     name = effect.parameters[0].name.replace("_", " ")
-    return f" What remains leaves that open: its {name} may be {_span((low, high), unit)}."
+    return f" What remains leaves that open: its {name} may be {span((low, high), unit)}."
 
 
 @dataclass(frozen=True)
@@ -107,7 +104,7 @@ def title_of(effect_id: str) -> str:
 
 def titles_of(ids: str) -> str:
     """Titles for ids joined by " + "; words stay what they are."""
-    return " and ".join(title_of(i) for i in ids.split(" + "))
+    return listed(title_of(i) for i in ids.split(" + "))
 
 
 def nearest(sets: Sequence[tuple[str, float]]) -> str:
@@ -131,7 +128,7 @@ def remaining(left: Remainder | None, unit: str = "m") -> str:
         )
     guess = f"; likeliest: {titles_of(left.guess)}" if left.guess else ""
     return (
-        f" Unexplained remains {size}, {_REGIMES[left.regime]}{guess}. The intervals allow for it."
+        f" Unexplained remains {size}, {REGIMES[left.regime]}{guess}. The intervals allow for it."
     )
 
 
@@ -156,87 +153,12 @@ def failure(fit: Fit, *, explained: bool = False) -> str:
     )
 
 
-def _span(ends: Sequence[float], unit: str) -> str:
+def listed(titles: Iterable[str]) -> str:
+    """Words with commas and an "and"."""
+    *first, last = [*titles] or [""]
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def span(ends: Sequence[float], unit: str) -> str:
+    """A range in words."""
     return span_of(ends, unit).replace("\N{NO-BREAK SPACE}", " ")
-
-
-def _moved(shifts: Mapping[str, Shift], cause: str) -> str:
-    """What the added physics does to the obstacle's stiffness, or to what it moves most surely."""
-    chosen = [n for n in shifts if n.startswith("k2")] or list(shifts)
-    if not chosen:
-        return ""
-    sure = [n for n in chosen if not shifts[n].least] or chosen
-    worst = max(sure, key=lambda n: abs(shifts[n].share))
-    shift = shifts[worst]
-    verb = "raises" if shift.share > 0 else "lowers"
-    least = "at least " if shift.least else ""
-    size = f"by {least}{two_digits(100 * abs(shift.share))} %"
-    if shift.share > FOLD:
-        size = f"to {least}{two_digits(1 + shift.share)} times its value"
-    return f" {cause} {verb} {worst} {size}."
-
-
-def _size_of_force(location: Location, unit: str) -> str:
-    size = two_digits(location.force_rms, unit)
-    if location.force_rms > TOLD * location.force_sd:
-        return f"with {size} rms"
-    most = two_digits(location.force_rms + TOLD * location.force_sd, unit)
-    return f"with a force that the recordings hardly tell (up to {most} rms)"
-
-
-def summary(
-    verdict: str,
-    effects: tuple[Effect, ...],
-    statements: tuple[str, ...],
-    location: Location | None,
-    alternatives: tuple[str, ...],
-    shifts: Mapping[str, Shift],
-    detectable: str,
-    remains: str = "",
-    *,
-    faults: str = "",
-    angle: bool = False,
-    drifts: bool = False,
-    probe: bool = False,
-) -> str:
-    """One paragraph; `remains` says what is left beside the named effects, `faults` what was wrong
-    with recordings.
-
-    `drifts`: the likelier unknown force changes with time. `probe`: all of the likeliest model of
-    the catalogue acts in the measuring chain.
-    """
-    if verdict == "adequate":
-        found = "Nothing is missing: the base model describes the recordings down to the noise."
-        return f"{found} {detectable}".strip()
-    if location is None:
-        return f"Nothing is missing beside faults of the recordings:{faults} {detectable}".strip()
-    place = _REGIMES[location.regime]
-    if verdict == "unknown" or (verdict == "partly" and not effects):
-        cost = _moved(shifts, "Fitting a force in its place")
-        force = _size_of_force(location, "N m" if angle else "N")
-        slowly = " It may be a stiffness or damping that changes with time." if drifts else ""
-        seen = probe and location.regime != "measurement"
-        acts = "Seen as a force it would act" if seen else "It acts"
-        head = "Something is missing that the catalogue does not hold."
-        if faults:  # they are all that has a name
-            head = f"Faults of recordings are set aside or corrected.{faults} The rest is unknown."
-        return (
-            f"{head} {acts} {place}, mostly at "
-            f"{_span(location.displacement, 'rad' if angle else 'm')}, {force}."
-            f"{slowly}{cost}{remains}"
-        )
-    titles = " and ".join(e.title for e in effects)
-    cost = _moved(shifts, "Adding it" if len(effects) == 1 else "Adding them")
-    if verdict == "ambiguous" and alternatives:
-        others = " or ".join(titles_of(a) for a in alternatives)
-        return (
-            f"Something is missing {place}; the likeliest is {titles}, but the recordings cannot "
-            f"tell it from {others}.{cost}{faults}"
-        )
-    if verdict == "partly":
-        needed = "is needed" if len(effects) == 1 else "are needed"
-        return (
-            f"{titles[0].upper()}{titles[1:]} {needed} by every likely model, but something else "
-            f"is missing too. {' '.join(statements)}{cost}{remains}{faults}"
-        )
-    return f"The base model leaves out {titles}, {place}. {' '.join(statements)}{cost}{faults}"

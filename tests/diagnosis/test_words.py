@@ -10,6 +10,7 @@ import small_rig
 from effect_rigs import BY_ID
 
 from bayesimpact.diagnosis.remainder import Remainder
+from bayesimpact.diagnosis.summary import Findings, summary
 from bayesimpact.diagnosis.words import (
     Shift,
     failure,
@@ -19,8 +20,11 @@ from bayesimpact.diagnosis.words import (
     parameter_shifts,
     remaining,
     statement,
-    summary,
 )
+
+
+def told(*args: object, **more: object) -> str:
+    return summary(Findings(*args, **more))
 
 
 def entry(median: float, half: float) -> dict[str, object]:
@@ -44,12 +48,12 @@ def test_a_wide_interval_proves_its_nearer_end_only():
     # a normal law cut at zero: nothing is likelier than what its interval leaves out there
     assert parameter_shift(old, {"median": 5.0, "ci90": [0.45, 14.0]}) is None
     assert parameter_shift(old, {"median": 2.0, "ci90": [0.024, 3.0]}) is None
-    said = summary(
+    said = told(
         "partly", (BY_ID["coulomb_friction"],), ("",), place("free"), (),
         {"c1": Shift(17.0, least=True), "k1": Shift(0.058)}, "",
     )  # fmt: skip
     assert "Adding it raises k1 by 5.8 %" in said and "c1" not in said
-    said = summary("unknown", (), (), place("free"), (), {"c1": Shift(17.0, least=True)}, "")
+    said = told("unknown", (), (), place("free"), (), {"c1": Shift(17.0, least=True)}, "")
     assert "Fitting a force in its place raises c1 to at least 18 times its value" in said
 
 
@@ -107,39 +111,59 @@ def place(regime: str):
 def test_the_paragraph():
     friction = (BY_ID["coulomb_friction"],)
     shifts = {"k1": Shift(0.2), "k2[1]": Shift(-0.082), "k2[2]": Shift(0.03)}
-    said = summary("adequate", (), (), None, (), {}, "Limits.")
+    said = told("adequate", (), (), None, (), {}, "Limits.")
     assert said.startswith("Nothing is missing") and said.endswith("Limits.")
-    said = summary("named", friction, ("It rubs.",), place("free"), (), shifts, "")
+    said = told("named", friction, ("It rubs.",), place("free"), (), shifts, "")
     assert "dry friction" in said and "It rubs." in said and "suspension" in said
     assert "Adding it lowers k2[1] by 8.2 %" in said
-    said = summary("ambiguous", friction, ("",), place("contact"), ("gap_wear + own",), shifts, "")
+    said = told("ambiguous", friction, ("",), place("contact"), ("gap_wear + own",), shifts, "")
     assert (
         "a gap that grows at every impact and own" in said
         and "cannot tell" in said
         and "obstacle" in said
     )
-    said = summary("unknown", (), (), place("contact"), (), {"k1": Shift(0.04)}, "")
+    said = told("unknown", (), (), place("contact"), (), {"k1": Shift(0.04)}, "")
     assert "\N{MINUS SIGN}2.0 to 1.5 mm" in said and "0.012 N rms" in said
     assert "raises k1 by 4.0 %" in said
-    said = summary("partly", friction, ("It rubs.",), place("free"), (), {}, "", " More.")
+    said = told("partly", friction, ("It rubs.",), place("free"), (), {}, "", " More.")
     assert said.startswith("Dry friction is needed by every likely model")
     assert "It rubs." in said and said.endswith(" More.")
-    said = summary("partly", (), (), place("contact"), (), {}, "", faults=" A spike.")
+    said = told("partly", (), (), place("contact"), (), {}, "", faults=" A spike.")
     head = "Faults of recordings are set aside or corrected. A spike. The rest is unknown."
     assert said.startswith(head)
     assert said.count("A spike.") == 1 and "catalogue does not hold" not in said
     wide = SimpleNamespace(
         regime="free", displacement=(-0.3, 0.31), force_rms=0.012, force_sd=0.001
     )
-    said = summary("unknown", (), (), wide, (), {}, "", angle=True)
+    said = told("unknown", (), (), wide, (), {}, "", angle=True)
     assert "\N{MINUS SIGN}0.30 to 0.31 rad" in said and "0.012 N m rms" in said
+
+
+def test_likely_sets_are_told_by_what_they_share_and_what_they_differ_in():
+    effects = (BY_ID["input_delay"], BY_ID["coulomb_friction"])
+    sets = ("input_delay + quadratic_drag", "input_delay")
+    said = told("ambiguous", effects, ("", ""), place("measurement"), sets)
+    assert said.startswith("Delay of the measured input is needed by every likely model. Beside it")
+    assert "likeliest is dry friction" in said and "from quadratic drag or nothing more." in said
+    many = ("gap_wear", "spring_cubic", "quadratic_drag", "sensor_hum", "power_damping")
+    said = told("ambiguous", effects, ("", ""), place("measurement"), many)
+    assert said.startswith("Something is missing; the likeliest is delay of the measured input and")
+    assert "quadratic drag or 2 other sets of effects." in said and "hum" not in said
+    said = told("ambiguous", effects[:1], ("",), place("measurement"), ("sensor_hum",))
+    assert "missing in the measuring chain, not in the mechanics; the likeliest" in said
+
+
+def test_what_a_model_with_more_effects_does_is_not_said_of_those_named():
+    friction, shifts = (BY_ID["coulomb_friction"],), {"k1": Shift(0.2)}
+    for more, cause in ((True, "The fitted model raises"), (False, "Adding it raises")):
+        assert cause in told("partly", friction, ("",), place("free"), (), shifts, more=more)
 
 
 def test_a_force_that_is_hardly_known_has_no_size():
     vague = SimpleNamespace(
         regime="free", displacement=(-2e-3, 1.5e-3), force_rms=3.5, force_sd=3.25
     )
-    said = summary("unknown", (), (), vague, (), {}, "")
+    said = told("unknown", (), (), vague, (), {}, "")
     assert "hardly tell (up to 10 N rms)" in said and "3.5" not in said
 
 
@@ -156,12 +180,12 @@ def test_what_comes_nearest():
 
 
 def test_what_may_be_the_probe_s_is_not_said_to_act_in_the_mechanics():
-    said = summary("unknown", (), (), place("free"), (), {}, "", drifts=True, probe=True)
+    said = told("unknown", (), (), place("free"), (), {}, "", drifts=True, probe=True)
     assert "Seen as a force it would act in the suspension" in said and "It acts" not in said
     assert "It may be a stiffness" in said
-    said = summary("unknown", (), (), place("free"), (), {}, "")
+    said = told("unknown", (), (), place("free"), (), {}, "")
     assert "It acts in the suspension" in said and "stiffness" not in said
-    said = summary("unknown", (), (), place("measurement"), (), {}, "", probe=True)
+    said = told("unknown", (), (), place("measurement"), (), {}, "", probe=True)
     assert "It acts in the measuring chain" in said
 
 
