@@ -58,9 +58,11 @@ class Ranked(Models):
         return self.repeated[1]
 
     def force_gain(self) -> float:
-        """What a free force in place of all effects would be worth, as far as scores tell."""
+        """What a free force in place of all effects would be worth, as far as scores tell, each
+        independent sample counted once.
+        """
         base = self.states[frozenset()]
-        return self.log_odds(base.candidate) + base.unknown.log_evidence
+        return self.log_odds(base.candidate) + base.unknown.log_evidence / self.repetition()
 
     def best(self, size: int) -> Candidate:
         """The likeliest model tried with at most so many effects."""

@@ -13,6 +13,7 @@ from made_up_models import EFFECTS, ENOUGH, A, B, C, D, N, S, Table
 
 search = importlib.import_module("bayesimpact.diagnosis.name")
 models = importlib.import_module("bayesimpact.diagnosis.models")
+naming = importlib.import_module("bayesimpact.diagnosis.naming")
 ranked = importlib.import_module("bayesimpact.diagnosis.ranked")
 settle = importlib.import_module("bayesimpact.diagnosis.settle")
 remaining = importlib.import_module("bayesimpact.diagnosis.remaining")
@@ -20,7 +21,7 @@ remaining = importlib.import_module("bayesimpact.diagnosis.remaining")
 
 @pytest.fixture
 def run(monkeypatch):
-    def go(table: Table, effects=EFFECTS):
+    def go(table: Table, effects=EFFECTS, repetition=1.0):
         monkeypatch.setattr(models, "refit", table.refit)
         monkeypatch.setattr(models, "without", table.without)
         monkeypatch.setattr(models, "exchanged", table.exchanged)
@@ -35,7 +36,7 @@ def run(monkeypatch):
             monkeypatch.setattr(module, "model_evidence", lambda fit: fit.gain)
         monkeypatch.setattr(search, "missing_contact", table.contact)
         monkeypatch.setattr(search, "learn_force", lambda fit, force, scales: force.fit)
-        monkeypatch.setattr(ranked, "residual_repetition", lambda fit: 1.0)
+        monkeypatch.setattr(ranked, "residual_repetition", lambda fit: repetition)
         monkeypatch.setattr(remaining, "with_force", lambda candidate, force, scales: candidate)
         monkeypatch.setattr(remaining, "discrepancy", lambda fit: None)
         monkeypatch.setattr(remaining, "may_be_needed", lambda naming, effect: True)
@@ -234,6 +235,14 @@ def test_the_search_ends_when_a_free_force_explains_what_is_left(run):
     for beside, reached in ((200.0, 1), (170.0, 2), (150.0, 3)):
         run(table := Table(steps, beside=beside))
         assert max(map(len, table.fitted)) == reached
+
+
+def test_a_force_in_place_of_all_effects_counts_each_independent_sample_once(run, monkeypatch):
+    """As the odds of models do: else it ends a search whose next step explains all."""
+    for module in (ranked, naming):
+        monkeypatch.setattr(module, "tempered_evidence", lambda model, n: model.log_evidence / n)
+    table = Table({A: 100.0, f"{A} {B}": ENOUGH}, force=1000.0)
+    assert chosen(run(table, repetition=10.0)) == {A, B}
 
 
 def test_a_model_beside_which_a_force_explains_the_rest_is_not_extended(run):

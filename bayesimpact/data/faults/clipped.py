@@ -38,10 +38,10 @@ def find_clipped(recording: Recording) -> list[Fault]:
             at_end = np.where(np.abs(x - extreme) <= scatter, extreme, x)
             least = max(MISSED * unit, FLAT * scatter)
             cut = [
-                run for run in flats(at_end, LEAST) if run.value == extreme and run.missed > least
+                run for run in flats(at_end, LEAST) if run.value == extreme and run.missed() > least
             ]
             if len(cut) >= SEVERAL or any(
-                run.first > 0 and (run.size >= LONG or run.missed > FLAT * least) for run in cut
+                run.first > 0 and (run.size >= LONG or run.missed() > FLAT * least) for run in cut
             ):
                 # what stands alone at the extreme between two runs was cut as well
                 alone = [run for run in flats(at_end, 1) if run.value == extreme]
@@ -55,7 +55,7 @@ def _fault(recording: Recording, side: str, cut: list[Flat], places: list[Flat])
     unit = max(reading_step(x), noise_level(x))
     extreme = cut[0].value
     spans = tuple((run.first, run.end) for run in places)
-    hidden = max(run.missed for run in cut)
+    hidden = max(run.missed() for run in cut)
     return Fault(
         id="recording_clipped",
         recording=recording.name,

@@ -35,13 +35,13 @@ class Flat:
         """Samples in the run."""
         return self.end - self.first
 
-    @property
-    def missed(self) -> float:
+    def missed(self, step: float = 0.0) -> float:
         """How far a motion with this slope at its ends gets within the run and back, at least.
 
-        A parabola that enters with slope s turns within r samples at a height of s r / 4.
+        A parabola that enters with slope s turns within r samples at a height of s r / 4. Where
+        readings are multiples of a `step`, a slope of one step over the neighbours may be none.
         """
-        return 0.25 * self.slope * self.size
+        return 0.25 * max(self.slope - step / NEIGHBOURS, 0.0) * self.size
 
 
 def flats(samples: Array, least: int) -> list[Flat]:

@@ -40,7 +40,7 @@ def find_held(recording: Recording) -> list[Fault]:
         dead = run.end == x.size
         if dead and run.slope < rounded:
             continue
-        if max(run.missed, run.jump) < MISSED * step and not (dead and share < COARSE):
+        if max(run.missed(rounded), run.jump) < MISSED * step and not (dead and share < COARSE):
             continue
         if _at_extreme(x, run, level):
             continue

@@ -33,8 +33,9 @@ def find_noise(recording: Recording) -> list[Fault]:
         return []
     edges = np.linspace(0, x.size, count + 1).astype(int)
     parts = list(zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True))
-    sixth = np.array([noise_level(x[a:b]) for a, b in parts])
-    fourth = np.array([_fourth(x[a:b]) for a, b in parts])
+    rounding = reading_step(x) / np.sqrt(12.0)  # a motion rounds at random, a rest does not
+    sixth = np.maximum([noise_level(x[a:b]) for a, b in parts], rounding)
+    fourth = np.maximum([_fourth(x[a:b]) for a, b in parts], rounding)
     usual, other = float(np.median(sixth)), float(np.median(fourth))
     if usual == 0.0 or other == 0.0:
         return []

@@ -118,6 +118,23 @@ def test_rounded_readings_that_repeat_where_a_smoothed_motion_turns_are_none(see
     assert recording_faults(Recording("a", "", x, 2.5e-3)) == []
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_a_mass_that_friction_stops_before_an_encoder_has_no_fault(seed: int) -> None:
+    """Its last step into the rest lies within the samples that tell the slope there, and noise
+    brings another step now and then, so that no rest reaches to the end. Nor is the motion louder
+    than the rest, which nothing rounds.
+    """
+    rng, step = np.random.default_rng(seed), 6e-4
+    t = np.arange(3000) * 1e-2
+    swing = 0.2 * np.maximum(1.0 - t / 15.0, 0.0) * np.cos(2 * np.pi * 1.1 * t)
+    x = np.round(swing / step + 0.3 * rng.standard_normal(t.size))
+    x[1500:] = -1.0 * (rng.random(1500) < 0.01)
+    x[1496:1500] = -1.0, -1.0, 0.0, -1.0
+    x[1500:1640] = 0.0
+    x[1640:1644] = -1.0, 0.0, 0.0, -1.0
+    assert recording_faults(Recording("a", "", x * step, 1e-2)) == []
+
+
 @pytest.mark.parametrize("form", FORMS)
 def test_rounding_moves_a_prediction_no_further_than_its_bound(form: tuple[int, int]) -> None:
     rng = np.random.default_rng(1)
