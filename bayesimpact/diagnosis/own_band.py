@@ -16,6 +16,8 @@ from bayesimpact.model.effects.effect import Effect
 Array = NDArray[np.float64]
 
 OWN_BAND = 0.1  # of the spectrum's peak
+MULTIPLES = 5  # of the motion's frequency: quadratic to quintic laws
+FINER = 8  # lines for one that the duration resolves
 SLOWEST = 3.0  # periods in the longest recording: scans begin at five, refits may wander
 
 
@@ -25,8 +27,9 @@ def shakes_in_own_band(fit: Fit, remains: bool) -> bool:
     There a decaying motion and a steady one differ only by phase, and the steady one passes for any
     slow change of frequency or damping: over the whole band where something `remains`. A force,
     which has a motion of its own to begin with, and a mode that rings down as the motion does, pass
-    for one always where the recordings are too short to tell both frequencies apart. A line too
-    slow for any recording to show it come and go passes for a drift.
+    for one always where the recordings are too short to tell both frequencies apart. At a multiple
+    of the motion's frequency such a mode is what any law that is not linear makes of the motion. A
+    line too slow for any recording to show it come and go passes for a drift.
     """
     longest = max(r.duration for r in fit.target.oscillator.campaign.recordings)
     if any(frequency * longest < SLOWEST for _, frequency in _lines(fit)):
@@ -39,6 +42,8 @@ def shakes_in_own_band(fit: Fit, remains: bool) -> bool:
                 return True
             own_motion = effect.observe is None or not steady
             if not remains and own_motion and _is_unresolved(motion, frequency):
+                return True
+            if not steady and _is_multiple(motion, frequency):
                 return True
     return False
 
@@ -61,8 +66,8 @@ def _lines(fit: Fit) -> list[tuple[Effect, float]]:
     return [(e, fit.value(f"{e.id}.frequency")) for e in effects]
 
 
-def _spectrum(recording: Recording) -> Array:
-    """Amplitudes at multiples of the reciprocal of the duration, but for the mean.
+def _spectrum(recording: Recording, finer: int = 1) -> Array:
+    """Amplitudes at multiples of the reciprocal of the duration, or `finer`, but for the mean.
 
     Without a steady line above the motion's band: that is no motion.
     """
@@ -70,7 +75,7 @@ def _spectrum(recording: Recording) -> Array:
     hum = find_hum(samples, recording.interval)
     if hum is not None:
         samples = samples - hum.readings(recording.times)
-    return np.abs(np.fft.rfft(samples - samples.mean()))
+    return np.asarray(np.abs(np.fft.rfft(samples - samples.mean(), finer * samples.size)))
 
 
 def _moves_at(recording: Recording, frequency: float) -> bool:
@@ -83,6 +88,17 @@ def _moves_at(recording: Recording, frequency: float) -> bool:
 
 def _is_unresolved(recording: Recording, frequency: float) -> bool:
     """Whether a recording's strongest line lies closer to a frequency, Hz, than its duration can
-    separate."""
+    separate.
+    """
     peak = 1 + int(np.argmax(_spectrum(recording)[1:]))
     return abs(frequency * recording.samples.size * recording.interval - peak) < 1.0
+
+
+def _is_multiple(recording: Recording, frequency: float) -> bool:
+    """Whether a frequency, Hz, is a multiple of that of the strongest line, as far as the duration
+    can tell.
+    """
+    duration = recording.samples.size * recording.interval
+    own = (FINER + np.argmax(_spectrum(recording, FINER)[FINER:])) / FINER
+    multiple = round(frequency * duration / own)
+    return 2 <= multiple <= MULTIPLES and abs(frequency * duration - multiple * own) < 1.0

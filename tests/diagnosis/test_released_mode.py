@@ -62,3 +62,13 @@ def test_a_steady_line_is_a_hum() -> None:
 
 def test_nothing_is_found_in_noise() -> None:
     assert diagnosed((0.0, 0.0, 0.0), 0.0, 3).verdict == "adequate"
+
+
+def test_a_mode_at_a_multiple_of_the_motion_s_frequency_is_what_a_law_makes_of_it() -> None:
+    """Once named for a string pendulum whose second harmonic a camera had made."""
+    found = diagnosed((3e-4, 6e-4, 2e-4), DECAY, 1)
+    at = found.after.names.index("released_mode.frequency")
+    for multiple, refused in ((2.0, True), (3.02, True), (3.1, False), (6.0, False)):
+        mode = found.after.mode.copy()
+        mode[at] = multiple * MAIN
+        assert shakes_in_own_band(replace(found.after, mode=mode), remains=False) == refused
