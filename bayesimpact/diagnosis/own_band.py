@@ -99,6 +99,6 @@ def _is_multiple(recording: Recording, frequency: float) -> bool:
     can tell.
     """
     duration = recording.samples.size * recording.interval
-    own = (FINER + np.argmax(_spectrum(recording, FINER)[FINER:])) / FINER
+    own = 1.0 + int(np.argmax(_spectrum(recording, FINER)[FINER:])) / FINER
     multiple = round(frequency * duration / own)
     return 2 <= multiple <= MULTIPLES and abs(frequency * duration - multiple * own) < 1.0
