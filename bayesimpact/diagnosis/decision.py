@@ -26,7 +26,9 @@ Let S be the likeliest set of effects that the search reached.
      above it where it has more parameters: what remains may be what tells two laws apart.
    A search that ended by its limit must have fitted all of these.
    With needed effects the verdict is `partly`, without any it is `unknown`. Other effects of S stay
-   in the fitted model, but are not named.
+   in the fitted model, but are not named. Where every likely set that lacks one of them has another
+   of its family, and all of the above holds of these together, it is told that one of them is
+   needed.
 
 A name never rests on one p-value.
 """
@@ -47,6 +49,9 @@ from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect
 
 Verdict = Literal["adequate", "named", "partly", "ambiguous", "unknown"]
+Group = tuple[Effect, ...]
+
+LARGEST_GROUP = 3  # effects of which one is needed: more tell little
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,11 +63,13 @@ class Decision:
     verdict : see `bayesimpact.diagnosis.decision`
     effects : that are named, most important first
     rivals : sets of effects that come within the decisive odds
+    either : groups of effects of one family, of each of which every likely set has one
     """
 
     verdict: Verdict
     effects: tuple[Effect, ...]
     rivals: tuple[Candidate, ...] = ()
+    either: tuple[Group, ...] = ()
 
 
 def decide(naming: Naming) -> Decision:
@@ -83,25 +90,47 @@ def decide(naming: Naming) -> Decision:
         rivals = naming.rivals()
         settled = naming.finished and not rivals
         return Decision("named" if settled else "ambiguous", effects, rivals)
-    needed = tuple(e for e in effects if is_needed(naming, e))
-    if not needed or is_imitated(naming):
+    if is_imitated(naming):
         return Decision("unknown", ())
-    return Decision("partly", needed, naming.rivals())
+    needed = tuple(e for e in effects if is_needed(naming, (e,)))
+    groups = (group_of(naming, e) for e in effects if e not in needed)
+    either = tuple(g for g in groups if len(g) > 1 and is_needed(naming, g))
+    return Decision("partly" if needed else "unknown", needed, naming.rivals(), either)
 
 
-def is_needed(naming: Naming, effect: Effect) -> bool:
-    """Whether every likely hypothesis has an effect of the chosen model, although more remains."""
-    if not may_be_needed(naming, effect):
+def is_needed(naming: Naming, group: Group) -> bool:
+    """Whether every likely hypothesis has an effect of the chosen model, the first of a group, or
+    another of the group, although more remains.
+    """
+    if not may_be_needed(naming, group):
         return False
     chosen = frozenset(naming.chosen.candidate.ids)
-    if not (naming.finished or is_compared(naming, effect)):
+    if not (naming.finished or is_compared(naming, group)):
         return False
     reached = naming.with_residual_force(chosen)
     return not any(
-        naming.with_residual_force(ids) > reached + lead(naming, ids, effect)
+        naming.with_residual_force(ids) > reached + lead(naming, ids, group[0])
         for ids, candidate in naming.residual.items()
-        if not holds(candidate.effects, effect)
+        if not holds(candidate.effects, group)
     )
+
+
+def group_of(naming: Naming, effect: Effect) -> Group:
+    """An effect of the chosen model, and those of its family that likely sets without it have in
+    its place; alone where one of them has none, or there are too many.
+    """
+    chosen = naming.chosen.candidate
+    least = naming.log_odds(chosen) - DECISIVE
+    others = dict[str, Effect]()
+    for candidate in naming.tried:
+        if naming.log_odds(candidate) <= least or holds(candidate.effects, (effect,)):
+            continue
+        same = [e for e in candidate.effects if e.family == effect.family]
+        found = [e for e in same if e.id not in chosen.ids]
+        if len(found) != 1:
+            return (effect,)
+        others[found[0].id] = found[0]
+    return (effect, *others.values()) if len(others) < LARGEST_GROUP else (effect,)
 
 
 def is_imitated(naming: Naming) -> bool:
@@ -121,15 +150,15 @@ def is_imitated(naming: Naming) -> bool:
     return left > EXCESS * least
 
 
-def is_compared(naming: Naming, effect: Effect) -> bool:
+def is_compared(naming: Naming, group: Group) -> bool:
     """Whether a search that ended by its limit has still fitted what an effect must beat.
 
     With a residual force: the chosen model, the base model, the one without the effect, and the
-    likeliest with another in its place.
+    likeliest with another, not of its group, in its place.
     """
     chosen = frozenset(naming.chosen.candidate.ids)
-    other = in_its_place(naming, effect)
-    rivals = {chosen, frozenset[str](), chosen - {effect.id}}
+    other = in_its_place(naming, group)
+    rivals = {chosen, frozenset[str](), chosen - {group[0].id}}
     return rivals | ({frozenset(other.ids)} if other else set()) <= naming.residual.keys()
 
 
@@ -157,22 +186,22 @@ def complexity(effects: Sequence[Effect]) -> tuple[int, int]:
     return len(effects), sum(not p.initial for e in effects for p in e.parameters)
 
 
-def may_be_needed(naming: Naming, effect: Effect) -> bool:
+def may_be_needed(naming: Naming, group: Group) -> bool:
     """`is_needed` as far as models without a residual force tell."""
     return (
-        leads_without(naming, effect)
-        and stands_out(naming, effect)
-        and naming.apart.get(effect.id, np.inf) >= APART
+        leads_without(naming, group)
+        and stands_out(naming, group[0])
+        and naming.apart.get(group[0].id, np.inf) >= APART
     )
 
 
-def leads_without(naming: Naming, effect: Effect) -> bool:
-    """Whether every set of effects without one trails the chosen one decisively, or at all one that
-    has the effect and is simpler; where it is larger than the chosen one, no larger.
+def leads_without(naming: Naming, group: Group) -> bool:
+    """Whether every set without an effect of a group trails the chosen one decisively, or at all
+    one that has such an effect and is simpler; where it is larger than the chosen one, no larger.
     """
     chosen = naming.chosen
     own = naming.log_odds(chosen.candidate)
-    with_it = [c for c in naming.tried if effect.id in c.ids]
+    with_it = [c for c in naming.tried if any(e.id in c.ids for e in group)]
 
     def least(rival: Candidate) -> float:
         most, larger = complexity(rival.effects), is_larger(rival.effects, chosen)
@@ -181,7 +210,7 @@ def leads_without(naming: Naming, effect: Effect) -> bool:
         return max([own - DECISIVE, *simpler])
 
     return not any(
-        naming.log_odds(c) > least(c) for c in naming.tried if not holds(c.effects, effect)
+        naming.log_odds(c) > least(c) for c in naming.tried if not holds(c.effects, group)
     )
 
 
@@ -197,21 +226,25 @@ def stands_out(naming: Naming, effect: Effect) -> bool:
     return naming.power.get(smaller, 0.0) > EXCESS * naming.power.get(ids, np.inf)
 
 
-def in_its_place(naming: Naming, effect: Effect) -> Candidate | None:
-    """The likeliest model with another effect in the place of one of the chosen model's."""
+def in_its_place(naming: Naming, group: Group) -> Candidate | None:
+    """The likeliest model with an effect in the place of one of the chosen model's, the first of a
+    group, that is not of the group.
+    """
     chosen = frozenset(naming.chosen.candidate.ids)
-    rest = chosen - {effect.id}
+    rest = chosen - {group[0].id}
     others = [
         c
         for c in naming.tried
-        if len(c.ids) == len(chosen) and rest < frozenset(c.ids) and not holds(c.effects, effect)
+        if len(c.ids) == len(chosen) and rest < frozenset(c.ids) and not holds(c.effects, group)
     ]
     return max(others, key=naming.log_odds, default=None)
 
 
-def holds(effects: Sequence[Effect], effect: Effect) -> bool:
-    """Whether a model has an effect, one that reduces to it (`prefer`), or its restatement."""
-    return any(effect.id in (e.id, e.prefer) or effect.is_same_law(e) for e in effects)
+def holds(effects: Sequence[Effect], group: Group) -> bool:
+    """Whether a model has an effect of a group, one that reduces to it (`prefer`), or its
+    restatement.
+    """
+    return any(g.id in (e.id, e.prefer) or g.is_same_law(e) for e in effects for g in group)
 
 
 def misfit_above_noise(naming: Naming, fit: Fit) -> float:

@@ -89,6 +89,7 @@ def document(
                 drifts=d.naming.unknown.reach > 0,
                 probe=_is_of_the_probe(d),
                 more=len(d.after.target.oscillator.effects) > len(d.effects),
+                either=d.either,
             )
         )
         + _nearest(d)
@@ -99,6 +100,7 @@ def document(
         "formulas": formula_entries(d.formulas, d.scales, angle=angle),
         "effects": (as_effects(d.corrected) if d.corrected else [])
         + [_effect(d, e, text, after) for e, text in zip(d.effects, statements, strict=True)],
+        "either": [[e.id for e in group] for group in d.either],
         "alternatives": [_alternative(d, c) for c in _others(d)],
         "fit": _fit(d),
         "parameters": {"before": before, "after": after},

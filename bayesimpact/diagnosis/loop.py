@@ -62,6 +62,7 @@ class Diagnosis:
     filtered : the filter that the noise spectrum proves and campaign.toml does not declare
     corrected : faults of the recordings, set aside or corrected before anything else
     formulas : for a learned force, where something is unknown
+    either : groups of effects that the recordings cannot tell apart, one of each of which is needed
     """
 
     verdict: Verdict
@@ -83,6 +84,7 @@ class Diagnosis:
     filtered: Fingerprint | None = None
     corrected: Corrected | None = None
     formulas: Formulas | None = None
+    either: tuple[tuple[Effect, ...], ...] = ()
 
     def __repr__(self) -> str:
         """One line."""
@@ -160,6 +162,7 @@ def diagnose_fit(
         state,
         scales,
         formulas=answer.formulas,
+        either=decision.either,
     )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from bayesimpact.diagnosis.decision import (
+    group_of,
     in_its_place,
     is_imitated,
     leads_without,
@@ -36,8 +37,10 @@ class Remaining(Settling):
         smaller = {e.id: self.examine(self.drop(chosen, e)).candidate for e in chosen.effects}
         tried = tuple(sorted(self.tried.values(), key=found.log_odds, reverse=True))
         found = replace(found, tried=tried, states=dict(self.states))
-        leading = [e for e in ordered(found, chosen.effects) if leads_without(found, e)]
-        without = {e.id: discrepancy(smaller[e.id].fit) for e in leading}
+        alone = [(e,) for e in ordered(found, chosen.effects)]
+        groups = [g if leads_without(found, g) else group_of(found, g[0]) for g in alone]
+        leading = [g for g in groups if leads_without(found, g)]
+        without = {g[0].id: discrepancy(smaller[g[0].id].fit) for g in leading}
         own = left if left is not None and left.fit is chosen.fit else discrepancy(chosen.fit)
         if own is not None:
             power = {
@@ -49,13 +52,13 @@ class Remaining(Settling):
                 apart={e.id: own.apart(e) for e in chosen.effects},
                 power={**power, frozenset(chosen.ids): own.power},
             )
-        needed = [e for e in leading if may_be_needed(found, e)]
+        needed = [g for g in leading if may_be_needed(found, g)]
         if needed:
             found = self.with_forces(found, [found.base.candidate])
         found = self.with_forces(found, [chosen])
-        for effect in needed if not is_imitated(found) else ():
-            other = in_its_place(found, effect)
-            found = self.with_forces(found, [smaller[effect.id], *([other] if other else [])])
+        for group in needed if not is_imitated(found) else ():
+            other = in_its_place(found, group)
+            found = self.with_forces(found, [smaller[group[0].id], *([other] if other else [])])
         return found
 
     def with_forces(self, found: Naming, candidates: Sequence[Candidate]) -> Naming:

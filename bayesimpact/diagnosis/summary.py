@@ -32,6 +32,7 @@ class Findings:
     drifts : the likelier unknown force changes with time
     probe : all of the likeliest model of the catalogue acts in the measuring chain
     more : the fitted model has effects that are not named
+    either : groups of effects, of each of which every likely set has one
     """
 
     verdict: str
@@ -47,6 +48,7 @@ class Findings:
     drifts: bool = False
     probe: bool = False
     more: bool = False
+    either: tuple[tuple[Effect, ...], ...] = ()
 
     @property
     def cost(self) -> str:
@@ -72,7 +74,7 @@ def summary(found: Findings) -> str:
         needed = "is needed" if len(found.effects) == 1 else "are needed"
         return (
             f"{_capital(titles)} {needed} by every likely model, but something else "
-            f"is missing too. {statements}{found.cost}{found.remains}{found.faults}"
+            f"is missing too. {statements}{_groups(found)}{found.cost}{found.remains}{found.faults}"
         )
     place = REGIMES[found.location.regime]
     return f"The base model leaves out {titles}, {place}. {statements}{found.cost}{found.faults}"
@@ -89,10 +91,22 @@ def _unknown(found: Findings, location: Location) -> str:
         faults = f"Faults of recordings are set aside or corrected.{found.faults}"
         head = f"{faults} The rest is unknown."
     return (
-        f"{head} {acts} {REGIMES[location.regime]}, mostly at "
+        f"{head}{_groups(found)} {acts} {REGIMES[location.regime]}, mostly at "
         f"{span(location.displacement, 'rad' if found.angle else 'm')}, {force}."
         f"{slowly}{cost}{found.remains}"
     )
+
+
+def _groups(found: Findings) -> str:
+    """What is needed of groups whose members the recordings do not tell apart."""
+    told = []
+    for group in found.either:
+        *some, last = (e.title for e in group)
+        which = f"{'either ' if len(some) == 1 else ''}{', '.join(some)} or {last}"
+        told.append(
+            f" {_capital(which)} is needed by every likely model; the recordings cannot tell which."
+        )
+    return "".join(told)
 
 
 def _ambiguous(found: Findings, location: Location) -> str:

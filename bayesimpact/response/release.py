@@ -58,8 +58,8 @@ def release(
     t = np.arange(max(count, 4)) * interval
     b = c / (2 * o.mass)
     root = np.sqrt(complex(k / o.mass - b**2)) + 1e-12
-    decay = np.exp(-b * t)
-    cosine, sine = (decay * np.cos(root * t)).real, (decay * np.sin(root * t) / root).real
+    one, other = np.exp((1j * root - b) * t), np.exp((-1j * root - b) * t)  # both decay
+    cosine, sine = ((one + other) / 2).real, ((one - other) / (2j * root)).real
     basis = np.stack([cosine + b * sine, sine], axis=1)
     start = _linear(basis, signal[: t.size] - centre, noise, centre)
     if count >= max(6, period / 4):

@@ -101,4 +101,4 @@ def test_one_law_is_not_added_to_itself(small):
     assert {d.effect.id for d in scored} == {law.id}
     best = Scan((score(DAHL), score(LOOP), score(friction)), 1.0, None, (), ())
     assert [[s.effect.id for s in j] for j in families(best)] == [[DAHL.id, friction.id]]
-    assert holds([LOOP], DAHL) and holds([DAHL], LOOP) and not holds([friction], LOOP)
+    assert holds([LOOP], (DAHL,)) and holds([DAHL], (LOOP,)) and not holds([friction], (LOOP,))

@@ -219,7 +219,7 @@ def test_an_effect_whose_place_another_can_take_beside_a_residual_force_is_not_n
     ):
         found = remaining(something_left(), 100.0, 10.0, other)
         residual = {frozenset([DRAG]): beside_force(other, beside)}
-        assert in_its_place(found, BY_ID[FRICTION]) is other
+        assert in_its_place(found, (BY_ID[FRICTION],)) is other
         assert judge(replace(found, residual=residual)) == verdict
 
 
@@ -256,7 +256,28 @@ def test_a_set_that_trails_a_simpler_one_with_the_effect_says_nothing_against_it
     for gain, leads in ((97.1, True), (96.9, False)):
         simpler = candidate(f"{FRICTION} {DRAG}", gain + COST)
         found = naming(chosen, rival, simpler)
-        assert leads_without(found, BY_ID[FRICTION]) == leads
+        assert leads_without(found, (BY_ID[FRICTION],)) == leads
+
+
+@pytest.mark.parametrize(
+    ("others", "told"),
+    [
+        ((DRAG,), (FRICTION, DRAG)),
+        ((DRAG, "power_damping"), (FRICTION, DRAG, "power_damping")),
+        ((DRAG, "structural_damping", "power_damping"), None),  # too many
+        (("spring_cubic",), None),  # not of its family
+    ],
+)
+def test_of_a_group_one_is_needed_where_likely_sets_have_one_each(
+    others: tuple[str, ...], told: tuple[str, ...] | None
+) -> None:
+    near = [candidate(i, 99.0 - n) for n, i in enumerate(others)]
+    found = remaining(something_left(), 100.0, 10.0, *near)
+    decision = decide(found)
+    assert decision.verdict == "unknown"
+    assert [tuple(e.id for e in g) for g in decision.either] == ([told] if told else [])
+    beside = {frozenset[str](): beside_force(found.base.candidate, 200.0)}
+    assert decide(replace(found, residual=beside)).either == ()
 
 
 def test_an_effect_may_stand_out_by_the_force_that_is_left_without_it():

@@ -153,6 +153,15 @@ def test_likely_sets_are_told_by_what_they_share_and_what_they_differ_in():
     assert "missing in the measuring chain, not in the mechanics; the likeliest" in said
 
 
+def test_a_group_of_which_one_is_needed_is_told():
+    cubic, sine, five = (BY_ID[i] for i in ("spring_cubic", "pendulum_sine", "spring_quintic"))
+    said = told("unknown", (), (), place("free"), either=((cubic, sine),))
+    assert "hold. Either cubic stiffness of the suspension or gravity pendulum is needed" in said
+    friction = (BY_ID["coulomb_friction"],)
+    said = told("partly", friction, ("It rubs.",), place("free"), either=((cubic, sine, five),))
+    assert "rubs. Cubic stiffness of the suspension, gravity pendulum or quintic" in said
+
+
 def test_what_a_model_with_more_effects_does_is_not_said_of_those_named():
     friction, shifts = (BY_ID["coulomb_friction"],), {"k1": Shift(0.2)}
     for more, cause in ((True, "The fitted model raises"), (False, "Adding it raises")):

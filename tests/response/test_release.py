@@ -60,3 +60,14 @@ def test_without_a_stop() -> None:
     assert v0 == pytest.approx(0.1, abs=1e-7)
     assert 0 < sd_y0 < NOISE
     assert 0 < sd_v0 < 1e-3
+
+
+def test_a_motion_that_creeps_back_without_a_swing() -> None:
+    """Strongly damped: its two rates lie orders of magnitude apart."""
+    creeping = Oscillator(PAPER["mass"], 4e4, PAPER["k1"], 0.0, np.inf, 0.0)
+    b = creeping.c1 / (2 * creeping.mass)
+    slow = b - np.sqrt(b**2 - creeping.k1 / creeping.mass)
+    t = np.arange(4000) * 1e-3
+    with np.errstate(all="raise", under="ignore"):
+        y0, _, sd, _ = release(-4e-3 * np.exp(-slow * t), 1e-3, creeping, 1e-6)
+    assert y0 == pytest.approx(-4e-3, abs=5 * sd)
