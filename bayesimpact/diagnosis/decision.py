@@ -95,7 +95,9 @@ def decide(naming: Naming) -> Decision:
     needed = tuple(e for e in effects if is_needed(naming, (e,)))
     groups = (group_of(naming, e) for e in effects if e not in needed)
     either = tuple(g for g in groups if len(g) > 1 and is_needed(naming, g))
-    return Decision("partly" if needed else "unknown", needed, naming.rivals(), either)
+    if not needed:
+        return Decision("unknown", (), either=either)
+    return Decision("partly", needed, naming.rivals(), either)
 
 
 def is_needed(naming: Naming, group: Group) -> bool:

@@ -19,8 +19,6 @@ from bayesimpact.diagnosis.thresholds import (
 from bayesimpact.model.effects.effect import Effect
 
 COST = 3.8
-
-
 OCCAM = 10.0  # nats between likelihood and evidence of a model with effects
 
 

@@ -155,7 +155,7 @@ def test_of_a_group_one_is_needed_where_likely_sets_have_one_each(
     near = [candidate(i, 99.0 - n) for n, i in enumerate(others)]
     found = remaining(something_left(), 100.0, 10.0, *near)
     decision = decide(found)
-    assert decision.verdict == "unknown"
+    assert decision.verdict == "unknown" and decision.rivals == ()
     assert [tuple(e.id for e in g) for g in decision.either] == ([told] if told else [])
     beside = {frozenset[str](): beside_force(found.base.candidate, 200.0)}
     assert decide(replace(found, residual=beside)).either == ()

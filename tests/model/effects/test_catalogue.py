@@ -263,6 +263,14 @@ def test_laws_that_are_said_to_ignore_the_speed_do():
         assert effect.law.ignores_speed == (changes == 0.0 and not remembers), effect.id
 
 
+def test_laws_that_are_said_to_depend_on_time_do():
+    q, p = np.full(len(SLOTS), 2.0), np.full(8, 1.3)
+    for effect in EFFECTS:
+        if effect.law is not None:
+            one, other = (effect.law.force(0.3, 0.4, 0.3, t, 0.1, 1.0, p, q) for t in (0.7, 1.9))
+            assert effect.law.of_time == (one != other), effect.id
+
+
 def test_the_spread_of_contact_damping_is_told_as_a_share_of_its_mean():
     """A base fit with c2 = 0 has no yardstick of its own."""
     size = BY_ID["contact_damping_per_case"].size
