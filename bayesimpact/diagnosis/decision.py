@@ -204,10 +204,10 @@ def leads_without(naming: Naming, group: Group) -> bool:
     chosen = naming.chosen
     own = naming.log_odds(chosen.candidate)
     with_it = [c for c in naming.tried if any(e.id in c.ids for e in group)]
+    sizes = [(complexity(c.effects), naming.log_odds(c)) for c in with_it]
 
     def least(rival: Candidate) -> float:
         most, larger = complexity(rival.effects), is_larger(rival.effects, chosen)
-        sizes = [(complexity(c.effects), naming.log_odds(c)) for c in with_it]
         simpler = [odds for size, odds in sizes if size < most or (larger and size == most)]
         return max([own - DECISIVE, *simpler])
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from bayesimpact.diagnosis.extend import (
 from bayesimpact.diagnosis.scores import Score
 from bayesimpact.diagnosis.thresholds import LARGE
 from bayesimpact.inference.climb import Climb
-from bayesimpact.inference.fit import Fit, Target, inverse
+from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.horizon import growing_horizon
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.model.effects.effect import Effect, Scales
@@ -53,6 +54,19 @@ class Candidate:
     def ids(self) -> tuple[str, ...]:
         """Ids of the effects."""
         return tuple(e.id for e in self.effects)
+
+    @cached_property
+    def prior_shares(self) -> Array:
+        """Shares (m,), 0 to 1, of the posterior precision that come from the priors.
+
+        Along the directions in which the two are diagonal together (generalized eigenvalues); of
+        all parameters but noise levels.
+        """
+        fit = self.fit
+        moving = np.setdiff1d(np.arange(fit.mode.size), fit.target.oscillator.layout.roles("noise"))
+        known = np.sqrt(fit.target.priors.information(fit.mode)[moving])
+        shares = fit.covariance[np.ix_(moving, moving)] * np.outer(known, known)
+        return np.asarray(np.clip(np.linalg.eigvalsh(shares), 0.0, 1.0))
 
 
 def base_candidate(fit: Fit) -> Candidate:
@@ -232,15 +246,9 @@ def tempered_evidence(candidate: Candidate, repetition: float) -> float:
     if repetition <= 1.0 or not np.isfinite(candidate.log_evidence):
         return candidate.log_evidence
     lost = (1.0 - 1.0 / repetition) * fit.log_likelihood
-    known = fit.target.priors.information(fit.mode)
-    noise = fit.target.oscillator.layout.roles("noise")
-    moving = np.setdiff1d(np.arange(fit.mode.size), noise)
-    scale = fit.sd[moving]
-    precision = inverse(fit.covariance[np.ix_(moving, moving)]) * np.outer(scale, scale)
-    prior = np.diag(known[moving] * scale**2)
-    flatter = (precision - prior) / repetition + prior
-    gained = 0.5 * (np.linalg.slogdet(precision)[1] - np.linalg.slogdet(flatter)[1])
-    gained += 0.5 * noise.size * np.log(repetition)
+    known = candidate.prior_shares
+    gained = -0.5 * np.sum(np.log((1.0 - known) / repetition + known))
+    gained += 0.5 * fit.target.oscillator.layout.roles("noise").size * np.log(repetition)
     return candidate.log_evidence - lost + float(gained)
 
 

@@ -15,7 +15,14 @@ from scipy.special import logsumexp
 from bayesimpact.diagnosis.directions import directions
 from bayesimpact.diagnosis.evidence import SPREADS, common_spread, log_evidence
 from bayesimpact.diagnosis.extend import campaign_scales, extend, transfer
-from bayesimpact.diagnosis.refit import Candidate, base_candidate, fit_from, refit, without
+from bayesimpact.diagnosis.refit import (
+    Candidate,
+    base_candidate,
+    fit_from,
+    refit,
+    tempered_evidence,
+    without,
+)
 from bayesimpact.diagnosis.scan import score_directions
 from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.identify import identify
@@ -110,6 +117,19 @@ def test_evidence_of_a_linear_model():
     fit = linear_fit(300, 4, [Normal(0.5, 2.0)] * 4)
     # the level's own skewness is of order d^2 / n
     assert log_evidence(fit) == pytest.approx(exact_log_evidence(fit), abs=0.03)
+
+
+@pytest.mark.parametrize("known", [0.05, 1e3])
+def test_evidence_counts_every_repeated_sample_once(known):
+    """Likelihoods of samples that come seven times each, to the power 1/7, are those of one each;
+    the first coefficient is known beforehand as well as from the samples, or not at all.
+    """
+    once = linear_fit(400, 2, [Normal(0.0, known), Normal(0.0, 1e3)], shift=3.0)
+    x, y = once.target.likelihood.x, once.target.likelihood.y
+    target = Target(Linear(np.tile(x, (7, 1)), np.tile(y, 7)), once.target.priors)
+    often = find_mode(target, once.mode, tolerance=1e-8)
+    tempered = tempered_evidence(Candidate((), often, log_evidence(often)), 7.0)
+    assert tempered == pytest.approx(log_evidence(once), abs=0.01)
 
 
 @pytest.mark.parametrize("shift", [6.0, 2.0, 0.7, 0.0, -0.7, -2.0, -6.0, -20.0])
