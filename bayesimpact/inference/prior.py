@@ -13,10 +13,10 @@ from __future__ import annotations
 import math
 import sys
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -84,6 +84,15 @@ class Prior(ABC):
         # From the smallest normal number, for a q of exactly 0 is at minus infinity for a normal.
         return self.ppf(rng.uniform(np.finfo(np.float64).tiny, 1.0, size))
 
+    @classmethod
+    def of_several(cls, priors: Sequence[Prior]) -> Self:
+        """One record for K priors of this kind: its functions take x (..., K), a column each."""
+        record = object.__new__(cls)
+        for field in fields(cls):
+            values = np.array([getattr(prior, field.name) for prior in priors])
+            object.__setattr__(record, field.name, values)
+        return record
+
     @property
     @abstractmethod
     def support(self) -> tuple[float, float]:
@@ -115,9 +124,8 @@ class Prior(ABC):
             inside &= x > 0
         if inside.all():
             return np.asarray(function(x))
-        result = np.full(x.shape, outside)
-        result[inside] = function(x[inside])
-        return result
+        with np.errstate(all="ignore"):  # outside it may not exist
+            return np.where(inside, function(x), outside)
 
 
 @dataclass(frozen=True)
@@ -139,7 +147,7 @@ class Uniform(Prior):
         require(math.isfinite(self.upper - self.lower), "uniform prior", found, "a finite width")
 
     def _log_density(self, x: Array) -> Array:
-        return np.full(x.shape, -math.log(self.upper - self.lower))
+        return np.full(x.shape, -np.log(self.upper - self.lower))
 
     def _gradient(self, x: Array) -> Array:
         return np.zeros(x.shape)
@@ -169,7 +177,8 @@ class Normal(Prior):
         require(self.sd > 0, "normal prior, sd", repr(self.sd), "a number above 0")
 
     def _log_density(self, x: Array) -> Array:
-        return -0.5 * ((x - self.mean) / self.sd) ** 2 - math.log(self.sd) - _LOG_SQRT_2PI
+        constant = np.log(self.sd) + _LOG_SQRT_2PI
+        return np.asarray(-0.5 * ((x - self.mean) / self.sd) ** 2 - constant)
 
     def _gradient(self, x: Array) -> Array:
         return (self.mean - x) / self.sd**2
@@ -203,8 +212,8 @@ class HalfNormal(_Half):
     kind: ClassVar[str] = "halfnormal"
 
     def _log_density(self, x: Array) -> Array:
-        constant = math.log(2) - math.log(self.scale) - _LOG_SQRT_2PI
-        return -0.5 * (x / self.scale) ** 2 + constant
+        constant = math.log(2) - np.log(self.scale) - _LOG_SQRT_2PI
+        return np.asarray(-0.5 * (x / self.scale) ** 2 + constant)
 
     def _gradient(self, x: Array) -> Array:
         return -x / self.scale**2
@@ -237,7 +246,7 @@ class Cauchy(Prior):
 
     def _log_density(self, x: Array) -> Array:
         z = (x - self.median) / self.scale
-        return np.asarray(-np.log1p(z**2) - math.log(math.pi * self.scale))
+        return np.asarray(-np.log1p(z**2) - np.log(math.pi * self.scale))
 
     def _gradient(self, x: Array) -> Array:
         z = (x - self.median) / self.scale
@@ -274,7 +283,9 @@ class HalfCauchy(_Half):
 
     @cached_property
     def _whole(self) -> Cauchy:
-        return Cauchy(0.0, self.scale)
+        if np.ndim(self.scale) == 0:
+            return Cauchy(0.0, self.scale)
+        return Cauchy.of_several([Cauchy(0.0, scale) for scale in np.ravel(self.scale)])
 
     def information(self, x: npt.ArrayLike) -> Array:
         """As of the whole density."""
@@ -315,11 +326,11 @@ class LogNormal(Prior):
         require(self.sigma > 0, "lognormal prior, sigma", repr(self.sigma), "a number above 0")
 
     def _standardised(self, x: Array) -> Array:
-        return np.asarray((np.log(x) - math.log(self.median)) / self.sigma)
+        return np.asarray((np.log(x) - np.log(self.median)) / self.sigma)
 
     def _log_density(self, x: Array) -> Array:
         z = self._standardised(x)
-        return np.asarray(-0.5 * z**2 - np.log(x) - math.log(self.sigma) - _LOG_SQRT_2PI)
+        return np.asarray(-0.5 * z**2 - np.log(x) - np.log(self.sigma) - _LOG_SQRT_2PI)
 
     def _gradient(self, x: Array) -> Array:
         return -(1 + self._standardised(x) / self.sigma) / x
@@ -354,11 +365,11 @@ class LogUniform(Prior):
         require(0 < self.lower < self.upper, "loguniform prior", found, "0 < lower < upper")
 
     @property
-    def _log_width(self) -> float:
-        return math.log(self.upper) - math.log(self.lower)
+    def _log_width(self) -> Array:
+        return np.asarray(np.log(self.upper) - np.log(self.lower))
 
     def _log_density(self, x: Array) -> Array:
-        return np.asarray(-np.log(x) - math.log(self._log_width))
+        return np.asarray(-np.log(x) - np.log(self._log_width))
 
     def _gradient(self, x: Array) -> Array:
         return -1 / x
@@ -367,5 +378,5 @@ class LogUniform(Prior):
         return 1 / x**2
 
     def _ppf(self, q: Array) -> Array:
-        x = np.exp(math.log(self.lower) + q * self._log_width)
+        x = np.exp(np.log(self.lower) + q * self._log_width)
         return np.asarray(np.clip(x, self.lower, self.upper))

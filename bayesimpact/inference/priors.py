@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from numpy.typing import NDArray
 
 from bayesimpact.errors import InputError
 from bayesimpact.inference.prior import (
@@ -22,7 +24,7 @@ from bayesimpact.inference.prior import (
     require,
 )
 
-Array = npt.NDArray[np.float64]
+Array = NDArray[np.float64]
 
 KINDS: Mapping[str, type[Prior]] = {
     prior.kind: prior
@@ -81,30 +83,24 @@ class Priors:
         """Joint log density (B,) of theta (B, d); any leading shape, none included."""
         theta = self._checked(theta)
         total = np.zeros(theta.shape[:-1])
-        for column, prior in enumerate(self.parameters):
-            total += prior.log_density(theta[..., column])
+        for columns, prior in self._kinds:
+            total += prior.log_density(theta[..., columns]).sum(axis=-1)
         return total
 
     def gradient(self, theta: npt.ArrayLike) -> Array:
         """Gradient (d,) of the log density at theta (d,); any leading shape as well."""
-        theta = self._checked(theta)
-        columns = [p.gradient(theta[..., i]) for i, p in enumerate(self.parameters)]
-        return np.stack(columns, axis=-1)
+        return self._each(theta, lambda prior, x: prior.gradient(x))
 
     def hessian(self, theta: npt.ArrayLike) -> Array:
         """Diagonal (d,) of the log density's Hessian at theta (d,); the rest of it is zero."""
-        theta = self._checked(theta)
-        columns = [p.curvature(theta[..., i]) for i, p in enumerate(self.parameters)]
-        return np.stack(columns, axis=-1)
+        return self._each(theta, lambda prior, x: prior.curvature(x))
 
     def information(self, theta: npt.ArrayLike) -> Array:
         """What the priors add to the information at theta (d,): inverse variances, never negative.
 
         See `Prior.information`; any leading shape as well.
         """
-        theta = self._checked(theta)
-        columns = [p.information(theta[..., i]) for i, p in enumerate(self.parameters)]
-        return np.stack(columns, axis=-1)
+        return self._each(theta, lambda prior, x: prior.information(x))
 
     def ppf(self, q: npt.ArrayLike) -> Array:
         """Quantiles (B, d) at probabilities q (B, d), parameter by parameter."""
@@ -115,15 +111,32 @@ class Priors:
         """`size` independent draws (size, d)."""
         return np.stack([p.sample(rng, size) for p in self.parameters], axis=-1)
 
-    @property
+    @cached_property
     def lower(self) -> Array:
         """Lower ends (d,) of the supports."""
         return np.array([p.support[0] for p in self.parameters])
 
-    @property
+    @cached_property
     def upper(self) -> Array:
         """Upper ends (d,) of the supports."""
         return np.array([p.support[1] for p in self.parameters])
+
+    @cached_property
+    def _kinds(self) -> tuple[tuple[NDArray[np.int64], Prior], ...]:
+        """Columns of the priors of each kind, and these in one record."""
+        found, kinds = [], list[type[Prior]](dict.fromkeys(map(type, self.parameters)))
+        for kind in kinds:
+            columns = np.array([i for i, p in enumerate(self.parameters) if type(p) is kind])
+            found.append((columns, kind.of_several([self.parameters[i] for i in columns])))
+        return tuple(found)
+
+    def _each(self, theta: npt.ArrayLike, function: Callable[[Prior, Array], Array]) -> Array:
+        """A function of every parameter's prior and its column of theta (..., d)."""
+        theta = self._checked(theta)
+        result = np.empty(theta.shape)
+        for columns, prior in self._kinds:
+            result[..., columns] = function(prior, theta[..., columns])
+        return result
 
     def _checked(self, theta: npt.ArrayLike) -> Array:
         theta = np.asarray(theta, dtype=np.float64)

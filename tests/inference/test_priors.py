@@ -190,6 +190,22 @@ def test_joint_density_is_the_sum_and_derivatives_stay_apart() -> None:
     np.testing.assert_allclose(np.stack([priors.lower, priors.upper], axis=1), supports, rtol=1e-12)
 
 
+@pytest.mark.parametrize("method", ["log_density", "gradient", "information", "hessian"])
+def test_joint_priors_say_what_each_prior_says(method: str) -> None:
+    """In mixed order, some values outside, at a bound, or no numbers."""
+    rng = np.random.default_rng(7)
+    alone = [TWINS[i][0] for i in rng.permutation(len(TWINS))]
+    theta = Priors(tuple(alone)).sample(rng, 40)
+    theta[3], theta[4, ::3], theta[5, 1::2], theta[6] = 0.0, np.nan, np.inf, -1.0
+    own = "curvature" if method == "hessian" else method
+    expected = np.stack([getattr(p, own)(theta[:, i]) for i, p in enumerate(alone)], axis=-1)
+    found = getattr(Priors(tuple(alone)), method)
+    if method == "log_density":
+        expected = expected.sum(axis=-1)
+    np.testing.assert_allclose(found(theta), expected, rtol=1e-13)
+    np.testing.assert_allclose(found(theta[7]), expected[7], rtol=1e-13)
+
+
 def test_one_parameter_outside_makes_the_joint_density_zero() -> None:
     priors = Priors((Uniform(0.0, 1.0), Normal(0.0, 1.0)))
     result = priors.log_density([[0.5, 0.0], [1.5, 0.0], [0.5, np.nan]])
