@@ -15,7 +15,6 @@ import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
-from functools import cached_property
 from typing import ClassVar, Self
 
 import numpy as np
@@ -86,7 +85,10 @@ class Prior(ABC):
 
     @classmethod
     def of_several(cls, priors: Sequence[Prior]) -> Self:
-        """One record for K priors of this kind: its functions take x (..., K), a column each."""
+        """One record for K priors of this kind, its fields (K,): functions of x (..., K).
+
+        The priors have been checked, each by itself.
+        """
         record = object.__new__(cls)
         for field in fields(cls):
             values = np.array([getattr(prior, field.name) for prior in priors])
@@ -226,6 +228,29 @@ class HalfNormal(_Half):
         return np.asarray(self.scale * math.sqrt(2) * erfinv(q))
 
 
+def _cauchy_log_density(x: Array, scale: float) -> Array:
+    """Of a Cauchy density about 0."""
+    return np.asarray(-np.log1p((x / scale) ** 2) - np.log(math.pi * scale))
+
+
+def _cauchy_gradient(x: Array, scale: float) -> Array:
+    z = x / scale
+    return np.asarray(-2 * z / (1 + z**2) / scale)
+
+
+def _cauchy_curvature(x: Array, scale: float) -> Array:
+    z = x / scale
+    return np.asarray(2 * (z**2 - 1) / (1 + z**2) ** 2 / scale**2)
+
+
+def _cauchy_information(x: Array, scale: float) -> Array:
+    """Of the parabola that touches the log density at x and lies below it everywhere.
+
+    de Leeuw and Lange 2009, Comput. Stat. Data Anal. 53:2471: convex tails add no negative one.
+    """
+    return np.asarray(2.0 / (scale**2 + x**2))
+
+
 @dataclass(frozen=True)
 class Cauchy(Prior):
     """Bell-shaped about a median, its tails so heavy that a value far beyond the scale costs
@@ -244,24 +269,18 @@ class Cauchy(Prior):
     def _check(self) -> None:
         require(self.scale > 0, "cauchy prior, scale", repr(self.scale), "a number above 0")
 
+    def information(self, x: npt.ArrayLike) -> Array:
+        """See `_cauchy_information`."""
+        return _cauchy_information(np.asarray(x) - self.median, self.scale)
+
     def _log_density(self, x: Array) -> Array:
-        z = (x - self.median) / self.scale
-        return np.asarray(-np.log1p(z**2) - np.log(math.pi * self.scale))
+        return _cauchy_log_density(x - self.median, self.scale)
 
     def _gradient(self, x: Array) -> Array:
-        z = (x - self.median) / self.scale
-        return np.asarray(-2 * z / (1 + z**2) / self.scale)
+        return _cauchy_gradient(x - self.median, self.scale)
 
     def _curvature(self, x: Array) -> Array:
-        z = (x - self.median) / self.scale
-        return np.asarray(2 * (z**2 - 1) / (1 + z**2) ** 2 / self.scale**2)
-
-    def information(self, x: npt.ArrayLike) -> Array:
-        """Of the parabola that touches the log density at x and lies below it everywhere.
-
-        de Leeuw and Lange 2009, Comput. Stat. Data Anal. 53:2471: convex tails add no negative one.
-        """
-        return np.asarray(2.0 / (self.scale**2 + (np.asarray(x) - self.median) ** 2))
+        return _cauchy_curvature(x - self.median, self.scale)
 
     def _ppf(self, q: Array) -> Array:
         # Each tail by its own probability: the tangent near a right angle loses the digits.
@@ -281,24 +300,18 @@ class HalfCauchy(_Half):
 
     kind: ClassVar[str] = "halfcauchy"
 
-    @cached_property
-    def _whole(self) -> Cauchy:
-        if np.ndim(self.scale) == 0:
-            return Cauchy(0.0, self.scale)
-        return Cauchy.of_several([Cauchy(0.0, scale) for scale in np.ravel(self.scale)])
-
     def information(self, x: npt.ArrayLike) -> Array:
-        """As of the whole density."""
-        return self._whole.information(x)
+        """As of the whole density, see `_cauchy_information`."""
+        return _cauchy_information(np.asarray(x), self.scale)
 
     def _log_density(self, x: Array) -> Array:
-        return self._whole._log_density(x) + math.log(2)
+        return _cauchy_log_density(x, self.scale) + math.log(2)
 
     def _gradient(self, x: Array) -> Array:
-        return self._whole._gradient(x)
+        return _cauchy_gradient(x, self.scale)
 
     def _curvature(self, x: Array) -> Array:
-        return self._whole._curvature(x)
+        return _cauchy_curvature(x, self.scale)
 
     def _ppf(self, q: Array) -> Array:
         with np.errstate(divide="ignore"):

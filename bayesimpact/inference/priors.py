@@ -111,12 +111,12 @@ class Priors:
         """`size` independent draws (size, d)."""
         return np.stack([p.sample(rng, size) for p in self.parameters], axis=-1)
 
-    @cached_property
+    @property
     def lower(self) -> Array:
         """Lower ends (d,) of the supports."""
         return np.array([p.support[0] for p in self.parameters])
 
-    @cached_property
+    @property
     def upper(self) -> Array:
         """Upper ends (d,) of the supports."""
         return np.array([p.support[1] for p in self.parameters])
