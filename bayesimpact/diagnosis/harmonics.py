@@ -62,6 +62,17 @@ def joined(parts: Iterable[Blocks]) -> Blocks:
     return Blocks(own, absorbed, score, found[0].columns)
 
 
+def absorbed(fit: Fit, blocks: Sequence[Blocks], at: int, sizes: Array) -> Array:
+    """Shift of the model's parameters (d,) that ignoring lines at one frequency causes, whose
+    columns have these sizes (m R,).
+    """
+    shift, own = np.zeros(fit.mode.size), blocks[0].score.shape[1]
+    for block, mine in zip(blocks, sizes.reshape(-1, own), strict=True):
+        shift[block.columns] += block.absorbed[at] @ mine
+    shift[fit.target.oscillator.layout.roles("noise")] = 0.0
+    return np.asarray(fit.covariance @ shift)
+
+
 def line_blocks(fit: Fit, r: int, grid: Array, decay: float = 0.0) -> Blocks:
     """A hum of one metre at equally spaced frequencies (F,), Hz, two or more of them.
 

@@ -19,6 +19,7 @@ from bayesimpact.diagnosis.directions import decays_of, is_periodic, is_steady
 from bayesimpact.diagnosis.forced_responses import force_responses
 from bayesimpact.diagnosis.harmonics import (
     Blocks,
+    absorbed,
     blocks_in_parts,
     hums,
     joined,
@@ -97,8 +98,8 @@ def _best_frequency(fit: Fit, effect: Effect, scales: Scales) -> Score | None:
     above = leaking(fit, scales) if effect.observe is not None and is_steady(effect) else grid[:0]
     decays = decays_of(effect, scales)
     scans = [_scan_of_frequency(fit, effect, grid, above, decay, scales) for decay in decays]
-    turn = int(np.argmax([statistic.max() for statistic, _, _ in scans]))
-    statistic, sizes, information = scans[turn]
+    turn = int(np.argmax([statistic.max() for statistic, *_ in scans]))
+    statistic, sizes, information, blocks = scans[turn]
     best = int(np.argmax(statistic))
     if best >= grid.size:
         best = grid.size + int(np.argmax(raw_power(fit, above)))
@@ -107,15 +108,17 @@ def _best_frequency(fit: Fit, effect: Effect, scales: Scales) -> Score | None:
     alone = float(stats.chi2.sf(statistic[best], freedom))
     p_value = float(min(1.0, alone * trials))
     amplitude, sd, names = _amplitudes(fit, effect, sizes[best], information[best])
+    phases = np.arctan2(sizes[best, 1::2], sizes[best, 0::2]) % (2 * np.pi)
+    started = amplitude * np.stack([np.cos(phases), np.sin(phases)])  # with these a refit begins
     return Score(
         effect,
-        _shapes(fit, effect, float(grid[best]), float(decays[turn]), sizes[best]),
+        _shapes(fit, effect, float(grid[best]), float(decays[turn]), phases),
         float(stats.norm.isf(max(p_value, 1e-300) / 2)),
         p_value,
         amplitude,
         sd,
         LIMIT_SD * float(sd[0]),
-        np.zeros(fit.mode.size),
+        absorbed(fit, blocks, best, started.T.ravel()) / fit.sd,
         1.0,
         0.5 * float(statistic[best]) - float(np.log(trials)) - 0.5 * freedom,
         names,
@@ -124,10 +127,10 @@ def _best_frequency(fit: Fit, effect: Effect, scales: Scales) -> Score | None:
 
 def _scan_of_frequency(
     fit: Fit, effect: Effect, grid: Array, above: Array, decay: float, scales: Scales
-) -> tuple[Array, Array, Array]:
+) -> tuple[Array, Array, Array, list[Blocks]]:
     recordings = range(len(fit.linearisation))
     blocks = [_blocks(fit, r, effect, grid, above, decay, scales) for r in recordings]
-    return _statistics(fit, blocks)
+    return *_statistics(fit, blocks), blocks
 
 
 def _amplitudes(
@@ -160,9 +163,8 @@ def _blocks(
 
 
 def _shapes(
-    fit: Fit, effect: Effect, frequency: float, decay: float, sizes: Array
+    fit: Fit, effect: Effect, frequency: float, decay: float, phases: Array
 ) -> dict[str, float]:
-    phases = np.arctan2(sizes[1::2], sizes[0::2]) % (2 * np.pi)
     recordings = fit.target.oscillator.campaign.recordings
     shapes = {f"{effect.id}.frequency": frequency}
     if not is_steady(effect):
