@@ -22,6 +22,7 @@ FAR = 50.0  # nats; beyond four times that, the floor grows with the root of the
 DISCONTINUOUS = 8.0  # nats expected, from which on effects that are on or off are always fitted
 SCORE_UNDERESTIMATE = 1.5  # by how much a score may underrate what a refit gains
 JOINT = 3  # effects of one family that are tried in one step
+AT_THE_STOP = {"contact", "entry", "exit"}  # regimes
 
 
 def refit_candidates(scan: Scan, least: float = 0.0) -> list[Score]:
@@ -55,7 +56,7 @@ def is_redundant(candidate: Candidate, effect: Effect) -> bool:
 
 
 def _are_alike(one: Effect, other: Effect) -> bool:
-    return one.family == other.family or "free" not in (one.regime, other.regime)
+    return one.family == other.family or {one.regime, other.regime} <= AT_THE_STOP
 
 
 def families(scan: Scan) -> list[list[Score]]:
