@@ -2,11 +2,12 @@
 
 About a mode the residual r is linear in a change x of the parameters and in the force c at its
 knots. With normal c that integrates out, r - J x ~ N(0, w^2 (1 + k D D')), and x by Laplace's
-method about the mode beside the force, to which a few Gauss-Newton steps lead with the true
-residual at each. The responses D along the motion of the model that comes nearest to the recordings
-serve all models: they are compared under one and the same alternative, that what they leave is a
-force which no law of the motion has (model error inside the likelihood: Kennedy and O'Hagan 2001,
-J. R. Stat. Soc. B 63:425).
+method about the mode beside the force. Gauss-Newton steps lead there, with the true residual at
+each and new derivatives where old ones lead no further: that mode is often hundreds of the fit's
+standard deviations away. The responses D along the motion of the model that comes nearest to the
+recordings serve all models: they are compared under one and the same alternative, that what they
+leave is a force which no law of the motion has (model error inside the likelihood: Kennedy and
+O'Hagan 2001, J. R. Stat. Soc. B 63:425).
 """
 
 from __future__ import annotations
@@ -19,13 +20,18 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from bayesimpact.inference.fit import Fit, inverse
+from bayesimpact.inference.likelihood import Linearisation
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 REACH = 40.0  # of ln k: from a force far below the noise to one far above it
 TINY = 1e-12  # of what is left; less is rounding
-SHARES = (1.0, 1.0, 0.3, 0.1)  # of Gauss-Newton steps that are tried one after the other
+SHARES = (1.0, 0.5, 0.25, 0.1)  # of a Gauss-Newton step: the first one that gains is taken
+STEPS = 4  # with the same derivatives
+RENEWALS = 4  # at most, of the derivatives
+GAINED = 0.1  # nats: what gains less is the mode
+STEP = 0.05  # of a standard deviation, other parameters as they are: for differences
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,8 +102,12 @@ class Products:
 
 def products(fit: Fit, parts: Sequence[Part]) -> Products:
     """Of a fit, with responses along its own motion or a near one."""
+    return _products(fit, parts, fit.linearisation)
+
+
+def _products(fit: Fit, parts: Sequence[Part], linear: Sequence[Linearisation]) -> Products:
     likelihood, size = fit.target.likelihood, fit.mode.size
-    level, linear = likelihood.noise.level, fit.linearisation
+    level = likelihood.noise.level
     whole, along = np.zeros((size + 1, size + 1)), []
     for part, lin in zip(parts, linear, strict=True):
         at = np.append(lin.columns, size)
@@ -124,16 +134,39 @@ def gain(fit: Fit, parts: Sequence[Part]) -> float:
     """What the force adds to a model's log evidence, its size and the noise level at their best."""
     priors, likelihood = fit.target.priors, fit.target.likelihood
     free = fit.target.oscillator.layout.roles("physical", "effect", "nuisance")
-    here = _point(fit, fit.mode, products(fit, parts))
-    for share in SHARES:
-        further = _moved(fit, here, share)
-        if further is not None and further.value > here.value:
-            here = further
+    here = _climbed(fit, _point(fit, fit.mode, products(fit, parts)))
     level, total = likelihood.noise.level, here.found.total
     unit = float(np.sum(likelihood.log_volume)) - total * np.log(level * np.sqrt(2 * np.pi))
     alone = fit.log_likelihood + 0.5 * _log_volume(fit.covariance[np.ix_(free, free)])
     alone += float(np.ravel(priors.log_density(fit.mode[None]))[0])
     return float(unit + here.value - alone)
+
+
+def _climbed(fit: Fit, start: _Point) -> _Point:
+    """The mode beside the force, from the fit's own."""
+    here = _stepped(fit, start)
+    steps = STEP / np.sqrt(np.diag(inverse(fit.covariance)))
+    for _ in range(RENEWALS):
+        linear = fit.target.likelihood.linearise(here.theta, steps, roughly=True)
+        if not all(np.isfinite(part.jacobian).all() for part in linear):
+            break
+        renewed = _point(fit, here.theta, _products(fit, start.found.parts, linear))
+        further = _stepped(fit, renewed)
+        here, gained = further, further.value - renewed.value
+        if gained < GAINED:
+            break
+    return here
+
+
+def _stepped(fit: Fit, here: _Point) -> _Point:
+    """As far as the derivatives at a point lead."""
+    for _ in range(STEPS):
+        points = (_moved(fit, here, share) for share in SHARES)
+        further = next((p for p in points if p is not None and p.value > here.value), here)
+        gained, here = further.value - here.value, further
+        if gained < GAINED:
+            break
+    return here
 
 
 def _moved(fit: Fit, here: _Point, share: float) -> _Point | None:

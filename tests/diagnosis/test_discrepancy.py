@@ -18,6 +18,7 @@ from bayesimpact.diagnosis.intervals import intervals
 from bayesimpact.diagnosis.refit import base_candidate, fit_from
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.diagnosis.unknown import learn_force
+from bayesimpact.inference.climb import Climb
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.free_changes import motions_beside
@@ -248,3 +249,19 @@ def test_a_motion_that_ran_away_has_none(small):
     assert discrepancy(away) is None
     ratio = np.diag(intervals(away, remains=True).covariance) / np.diag(small.fit.covariance)
     assert np.all(ratio >= 1.0)
+
+
+def test_a_gain_does_not_depend_on_where_the_fit_ended():
+    """Under the force the mode is far from the fit's: odds are those of that mode."""
+    campaign = shaken(5, 1e-2, effects={"spring_cubic": {"stiffness": 2e6}})
+    fit, cubic = plain_fit(campaign), next(e for e in EFFECTS if e.id == "spring_cubic")
+    fit = fit_from(fit, (cubic,), {}, campaign_scales(fit)).fit
+    found = left_by(fit)
+    climb, away = Climb(fit.target, 0.05 * fit.sd, None, ()), fit.mode.copy()
+    at = fit.names.index("spring_cubic.stiffness")
+    away[at] += 300.0 * fit.sd[at]
+    totals = []
+    for start in (fit, climb.fit(climb.evaluate(away), True)):
+        volume = 0.5 * np.linalg.slogdet(start.covariance)[1]
+        totals.append(start.log_posterior + volume + found.gain(start))
+    assert totals[1] == pytest.approx(totals[0], abs=0.5)
