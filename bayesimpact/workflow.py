@@ -22,7 +22,7 @@ from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.document import document
 from bayesimpact.diagnosis.formula_words import EFFECT_FILE, found_file
 from bayesimpact.diagnosis.loop import Diagnosis
-from bayesimpact.diagnosis.parametric_bootstrap import certificate
+from bayesimpact.diagnosis.parametric_bootstrap import parametric_bootstrap
 from bayesimpact.errors import InputError
 from bayesimpact.inference.identify import Identification, identify
 from bayesimpact.inference.posterior import Posterior, sample
@@ -177,7 +177,9 @@ def diagnose_campaign(
     if certify:
         again = np.random.default_rng([seed, 1])
         with refit_bar(say, bar) as tell:
-            certified = certificate(diagnosis, certify, rng=again, effects=effects, progress=tell)
+            certified = parametric_bootstrap(
+                diagnosis, certify, rng=again, effects=effects, progress=tell
+            )
     content = document(
         diagnosis,
         seed=seed,

@@ -70,18 +70,18 @@ def proposals(
     widest = max(len(h.names) for h in rivals.hypotheses)
     draws = rng.standard_normal((DRAWS, widest))
 
-    def judged(designs: Sequence[Design]) -> list[Proposal]:
+    def proposed(designs: Sequence[Design]) -> list[Proposal]:
         found = [assess(design, rivals, draws) for design in designs]
         return ranked([p for p in found if p is not None], rivals)
 
     say("comparing repeats of the recordings")
-    again = judged(repeats(rivals))[:1]
+    again = proposed(repeats(rivals))[:1]
     say("comparing releases")
-    found = judged(first_designs(rivals))
+    found = proposed(first_designs(rivals))
     best = next((p.design for p in found if p.design.joins), None)
     if best is not None:
         say("comparing longer and faster recordings, and other gaps")
-        found += judged(variants(best, rivals))
+        found += proposed(variants(best, rivals))
     return tuple(ranked([*again, *found], rivals))
 
 

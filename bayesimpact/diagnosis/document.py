@@ -15,7 +15,7 @@ from bayesimpact.diagnosis.intervals import Intervals, intervals
 from bayesimpact.diagnosis.limits import PRACTICAL, Limit
 from bayesimpact.diagnosis.locate import Location
 from bayesimpact.diagnosis.loop import Diagnosis
-from bayesimpact.diagnosis.parametric_bootstrap import Certificate
+from bayesimpact.diagnosis.parametric_bootstrap import ParametricBootstrap
 from bayesimpact.diagnosis.recording_faults import as_effects, fault_entries, in_words, place
 from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.remainder import Remainder, remainder
@@ -49,7 +49,7 @@ def document(
     versions: Mapping[str, str],
     draws_before: Array | None = None,
     draws_after: Array | None = None,
-    certified: Certificate | None = None,
+    certified: ParametricBootstrap | None = None,
 ) -> dict[str, Any]:
     """The content of diagnosis.json.
 

@@ -151,6 +151,8 @@ def _climbed(fit: Fit, start: _Point) -> _Point:
         if not all(np.isfinite(part.jacobian).all() for part in linear):
             break
         renewed = _point(fit, here.theta, _products(fit, start.found.parts, linear))
+        if not np.isfinite(renewed.value):
+            break
         further = _stepped(fit, renewed)
         here, gained = further, further.value - renewed.value
         if gained < GAINED:

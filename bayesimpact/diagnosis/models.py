@@ -220,7 +220,7 @@ class Models:
             self.keep(exchanged(candidate, old, new, self.scales))
 
     def finished(self, candidate: Candidate) -> Candidate:
-        """A model whose climb gave up, at the highest point of its profile likelihood."""
+        """A model whose climb did not converge, at the highest point of its profile likelihood."""
         key = frozenset(candidate.ids)
         if key not in self.profiled:
             self.profiled.add(key)

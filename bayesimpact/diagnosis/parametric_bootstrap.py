@@ -2,7 +2,7 @@
 
 The loop is repeated on simulated campaigns with the recordings, releases, noise and filter of the
 one that was diagnosed: with nothing missing, and with the effects that were named, at their sizes
-(a parametric bootstrap, Efron 1979). The simulator is the diagnosis' own, so what the certificate
+(a parametric bootstrap, Efron 1979). The simulator is the diagnosis' own, so what the bootstrap
 cannot see is physics that the simulator gets wrong; blind trials see that.
 """
 
@@ -25,7 +25,7 @@ Rng = np.random.Generator
 
 
 @dataclass(frozen=True)
-class Certificate:
+class ParametricBootstrap:
     """Outcomes of the repeated loop.
 
     Attributes
@@ -42,21 +42,21 @@ class Certificate:
     misnamed: int
 
 
-def certificate(
+def parametric_bootstrap(
     diagnosis: Diagnosis,
     count: int,
     *,
     rng: Rng,
     effects: Sequence[Effect] = SEARCHED,
     progress: Callable[[str], None] | None = None,
-) -> Certificate:
+) -> ParametricBootstrap:
     """Repeat the loop `count` times with nothing missing and `count` times with what was named."""
     say = progress or (lambda message: None)
 
     def answers(fit: Fit, what: str) -> list[tuple[str, frozenset[str]]]:
         found: list[tuple[str, frozenset[str]]] = []
         for i in range(count):
-            say(f"certificate: {what} {i + 1} of {count}")
+            say(f"parametric bootstrap: {what} {i + 1} of {count}")
             again = diagnose(simulated(fit, rng), rng=rng, effects=effects, search=False)
             found.append((again.verdict, frozenset(e.id for e in again.effects)))
         return found
@@ -65,7 +65,7 @@ def certificate(
     named = diagnosis.naming.chosen.candidate
     planted = answers(named.fit, "planted") if diagnosis.verdict == "named" and named.ids else []
     wanted = frozenset(named.ids)
-    return Certificate(
+    return ParametricBootstrap(
         len(controls),
         sum(verdict != "adequate" for verdict, _ in controls),
         len(planted),

@@ -212,7 +212,7 @@ def run_driven(
 
     Parameters
     ----------
-    q : (11,) parameters, SI units (see `scaled`); A is the gain of the input
+    q : (11,) parameters, SI units (see `normalized`); A is the gain of the input
     mass, interval : kg, s
     wave : the input
     sink : what to compare with, or to fill

@@ -45,7 +45,7 @@ def run(
 
     Parameters
     ----------
-    q : (11,) parameters, SI units (see `scaled`)
+    q : (11,) parameters, SI units (see `normalized`)
     mass, interval, n : kg, s, samples
     sink : what to compare with, or to fill
     response_tables : tables, kept from call to call

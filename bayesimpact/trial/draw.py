@@ -13,7 +13,7 @@ import numpy as np
 from bayesimpact.errors import InputError, SimulationError
 from bayesimpact.trial.designs import RIG_DESIGNS, Design, draw_rig_design, log_uniform
 from bayesimpact.trial.drawn import Drawn
-from bayesimpact.trial.faults import PLANTS, plant_fault
+from bayesimpact.trial.faults import PLANTED_FAULTS, plant_fault
 from bayesimpact.trial.faults_rig import OTHER_RIG, another_rig
 from bayesimpact.trial.planted_effects import PLANTED_EFFECTS
 from bayesimpact.trial.rig import Effects, make_campaign
@@ -77,7 +77,9 @@ def _attempt(settings: Settings, seed: int, kind: str, turn: int, rng: Rng) -> D
 def _faults(settings: Settings, ids: tuple[str, ...]) -> list[str]:
     """Faults that some rig shows on which these effects can stand."""
     cases = max(RIG_DESIGNS[name].cases for name in _possible(settings, ids))
-    known = [k for k, plant in PLANTS.items() if cases >= (2 if k == "case" else plant.stop)]
+    known = [
+        k for k, plant in PLANTED_FAULTS.items() if cases >= (2 if k == "case" else plant.stop)
+    ]
     return [*known, OTHER_RIG]
 
 

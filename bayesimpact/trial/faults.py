@@ -137,7 +137,7 @@ def clock(r: Recording, noise: float, rng: Rng) -> tuple[Recording, Place, float
     return replace(r, interval=r.interval * by), (0.0, r.duration), by
 
 
-PLANTS: Mapping[str, PlantedFault] = {
+PLANTED_FAULTS: Mapping[str, PlantedFault] = {
     "spikes": PlantedFault("recording_spikes", spikes),
     "held": PlantedFault("recording_held", held),
     "slip": PlantedFault("recording_slip", slip),
@@ -157,7 +157,7 @@ def plant_fault(
     campaign: Campaign, kind: str, noise: float, rng: Rng
 ) -> tuple[Campaign, dict[str, Any]] | None:
     """A campaign with one fault, and the truth about it; None where the rig cannot show it."""
-    plant = PLANTS[kind]
+    plant = PLANTED_FAULTS[kind]
     if (plant.stop and not campaign.stop) or (kind == "case" and len(campaign.cases) < 2):
         return None
     recordings = list(campaign.recordings)
@@ -199,7 +199,7 @@ def _filtered(
     return replace(spoiled, samples=samples)
 
 
-def judge_fault(truth: Mapping[str, Any], found: Sequence[Mapping[str, Any]]) -> str:
+def score_fault(truth: Mapping[str, Any], found: Sequence[Mapping[str, Any]]) -> str:
     """`named`, `missed`, `elsewhere` (another recording or time) or `wrong name`.
 
     `found` are faults with id, recording, start_s and end_s, notices left out. A duplicate may be

@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from bayesimpact.trial.faults import judge_fault
+from bayesimpact.trial.faults import score_fault
 from bayesimpact.trial.formula_score import is_right, split
-from bayesimpact.trial.score_strong import inconsistent, judge_several, quality
+from bayesimpact.trial.score_strong import inconsistent, quality, score_several
 
 NORMAL_90 = 1.6448536269514722
 QUIET = ("noise_correlated",)  # reported beside a verdict, never a name
@@ -83,7 +83,7 @@ def _outcome(
         planted = {p["id"] for p in truth["planted"]}
         if set(physics) - planted and verdict in ("named", "partly"):
             return "wrong name"
-        outcome = judge_fault(truth["fault"], named_faults)
+        outcome = score_fault(truth["fault"], named_faults)
         return outcome if outcome != "named" or set(physics) == planted else "fault alone"
     if not truth["kind"].startswith("several"):
         return outcome_of(truth["kind"], [p["id"] for p in truth["planted"]], verdict, named)
@@ -96,7 +96,7 @@ def _outcome(
         outside = verdict != "named"
     if truth["rest_s"] and "recording_start" in named:  # there, and said to be there
         there.append("recording_start")
-    outcome = judge_several(there, outside, verdict, named)
+    outcome = score_several(there, outside, verdict, named)
     return "formula" if right and outcome == "named" else outcome
 
 

@@ -21,7 +21,7 @@ SLACK = 1e-6  # relative: two fits that stopped at the same place
 MEASURES = ("rms_m", "reduced_chi2")
 
 
-def judge_several(planted: Sequence[str], outside: bool, verdict: str, named: Sequence[str]) -> str:
+def score_several(planted: Sequence[str], outside: bool, verdict: str, named: Sequence[str]) -> str:
     """The outcome in two words.
 
     Parameters

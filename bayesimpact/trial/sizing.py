@@ -109,8 +109,8 @@ def pair(
     sensitivity: Sensitivity, ids: Sequence[str], strengths: Sequence[float], least: float, rng: Rng
 ) -> tuple[Sized, ...]:
     """Two effects, each `strength` limits above what the other one could imitate of it."""
-    plants = [planted_effect_of(e) for e in ids]
-    forms = [plant.form(sensitivity.design, rng) for plant in plants]
+    planted = [planted_effect_of(e) for e in ids]
+    forms = [plant.form(sensitivity.design, rng) for plant in planted]
     both = list(zip(ids, forms, strict=True))
     found = [sized(sensitivity, effect, form, 1.0) for effect, form in both]
     own = _own_share(found, ids)
@@ -121,12 +121,12 @@ def pair(
                 raise Unsuitable(f"{effect} would have to be unphysically large")
             found[i] = placed(sensitivity, effect, form, size)
     own = _own_share(found, ids)
-    for one, (effect, _), plant in zip(found, both, plants, strict=True):
+    for one, (effect, _), plant in zip(found, both, planted, strict=True):
         if one.score * own < 0.7 * LIMIT * least and not plant.by_noise:
             raise Unsuitable(f"{effect} is hidden by its partner")
     return tuple(
         Sized(e, f.build(x.size), x.score * own / LIMIT, x.score, f, p)
-        for (e, f), p, x in zip(both, plants, found, strict=True)
+        for (e, f), p, x in zip(both, planted, found, strict=True)
     )
 
 

@@ -8,7 +8,11 @@ import small_rig
 from effect_rigs import BY_ID
 
 from bayesimpact.diagnosis.loop import diagnose_fit
-from bayesimpact.diagnosis.parametric_bootstrap import Certificate, certificate, simulated
+from bayesimpact.diagnosis.parametric_bootstrap import (
+    ParametricBootstrap,
+    parametric_bootstrap,
+    simulated,
+)
 from bayesimpact.inference.identify import identify
 
 FEW = [BY_ID[i] for i in ("coulomb_friction", "quadratic_drag", "gap_wear")]
@@ -30,12 +34,12 @@ def test_a_certificate_of_what_stands_out():
     base = identify(campaign, rng=np.random.default_rng(0), search=False)
     found = diagnose_fit(base, rng=np.random.default_rng(0), effects=FEW)
     assert found.verdict == "named"
-    said = certificate(found, 2, rng=np.random.default_rng(0), effects=FEW)
-    assert said == Certificate(2, 0, 2, 2, 0)
+    said = parametric_bootstrap(found, 2, rng=np.random.default_rng(0), effects=FEW)
+    assert said == ParametricBootstrap(2, 0, 2, 2, 0)
 
 
 def test_of_an_adequate_model_only_controls_are_repeated(small):
     found = diagnose_fit(small, rng=np.random.default_rng(0), effects=FEW)
     assert found.verdict == "adequate"
-    said = certificate(found, 1, rng=np.random.default_rng(0), effects=FEW)
+    said = parametric_bootstrap(found, 1, rng=np.random.default_rng(0), effects=FEW)
     assert (said.controls, said.planted, said.named) == (1, 0, 0)

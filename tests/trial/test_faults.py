@@ -11,7 +11,7 @@ from bayesimpact.data.faults.fault import fault_document
 from bayesimpact.data.faults.find import find_faults
 from bayesimpact.trial import draw as draw_module
 from bayesimpact.trial.draw import draw
-from bayesimpact.trial.faults import PLANTS, judge_fault, plant_fault
+from bayesimpact.trial.faults import PLANTED_FAULTS, plant_fault, score_fault
 from bayesimpact.trial.settings import Settings
 
 SETTINGS = Settings(kinds=("fault",), rig_kinds=("small",), noises=("white",))
@@ -22,7 +22,7 @@ def control():
     return draw(Settings(kinds=("control",), rig_kinds=("small",), noises=("white",)), 1)
 
 
-@pytest.mark.parametrize("kind", PLANTS)
+@pytest.mark.parametrize("kind", PLANTED_FAULTS)
 def test_a_fault_is_in_one_recording_and_nowhere_else(control, kind: str) -> None:
     rng = np.random.default_rng(3)
     planted = plant_fault(control.campaign, kind, control.truth["noise_m"], rng)
@@ -33,7 +33,7 @@ def test_a_fault_is_in_one_recording_and_nowhere_else(control, kind: str) -> Non
     }
     after = {r.name: (r.case, r.interval, r.samples.tobytes()) for r in campaign.recordings}
     assert [n for n in after if before.get(n) != after[n]] == [truth["recording"]]
-    assert truth["id"] == PLANTS[kind].id
+    assert truth["id"] == PLANTED_FAULTS[kind].id
 
 
 @pytest.mark.parametrize("kind", ["spikes", "held", "start", "duplicate"])
@@ -43,18 +43,18 @@ def test_what_was_put_in_is_found(control, kind: str) -> None:
     )
     assert planted is not None
     found = [f for f in find_faults(planted[0]) if f.action != "notice"]
-    assert judge_fault(planted[1], [fault_document(f) for f in found]) == "named"
+    assert score_fault(planted[1], [fault_document(f) for f in found]) == "named"
 
 
 def test_scores() -> None:
     truth = {"id": "recording_held", "recording": "a", "start_s": 1.0, "end_s": 1.2, "timed": True}
     right = {"id": "recording_held", "recording": "a", "start_s": 1.1, "end_s": 1.3}
-    assert judge_fault(truth, [right]) == "named"
-    assert judge_fault(truth, []) == "missed"
-    assert judge_fault(truth, [right | {"recording": "b"}]) == "elsewhere"
-    assert judge_fault(truth, [right | {"start_s": 1.3, "end_s": 1.4}]) == "elsewhere"
-    assert judge_fault(truth, [right | {"id": "recording_spikes"}]) == "wrong name"
-    assert judge_fault(truth, [right, right | {"id": "recording_spikes"}]) == "wrong name"
+    assert score_fault(truth, [right]) == "named"
+    assert score_fault(truth, []) == "missed"
+    assert score_fault(truth, [right | {"recording": "b"}]) == "elsewhere"
+    assert score_fault(truth, [right | {"start_s": 1.3, "end_s": 1.4}]) == "elsewhere"
+    assert score_fault(truth, [right | {"id": "recording_spikes"}]) == "wrong name"
+    assert score_fault(truth, [right, right | {"id": "recording_spikes"}]) == "wrong name"
 
 
 def test_a_trial_says_in_its_truth_what_was_put_in_and_is_the_same_again() -> None:
@@ -66,7 +66,7 @@ def test_a_trial_says_in_its_truth_what_was_put_in_and_is_the_same_again() -> No
 
 
 def test_a_recording_of_another_rig_has_another_motion_and_the_rest_stays() -> None:
-    seed = len(PLANTS)  # whose turn it is
+    seed = len(PLANTED_FAULTS)  # whose turn it is
     drawn = draw(SETTINGS, seed)
     fault = drawn.truth["fault"]
     assert fault["id"] == "recording_other_rig" and abs(fault["size"] - 1) >= 0.003
@@ -88,6 +88,6 @@ def test_a_fault_and_an_effect_stand_in_one_truth() -> None:
 
 def test_faults_beside_an_effect_are_those_that_its_rigs_can_show() -> None:
     settings = replace(SETTINGS, rig_kinds=("paper", "torsion", "plain"))
-    assert draw_module._faults(settings, ()) == [*PLANTS, "other_rig"]
+    assert draw_module._faults(settings, ()) == [*PLANTED_FAULTS, "other_rig"]
     beside = draw_module._faults(settings, ("pendulum_sine",))
     assert {"reversed", "gain", "clock", "case"}.isdisjoint(beside) and "duplicate" in beside

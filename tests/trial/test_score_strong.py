@@ -9,7 +9,7 @@ from test_score import ANSWER
 
 from bayesimpact.trial.line import trial_line
 from bayesimpact.trial.score import outcome_of, score
-from bayesimpact.trial.score_strong import inconsistent, judge_several, worse
+from bayesimpact.trial.score_strong import inconsistent, score_several, worse
 from bayesimpact.trial.summary import summarise
 from bayesimpact.trial.summary_strong import selection
 from bayesimpact.trial.table import summary_text
@@ -43,7 +43,7 @@ AB = ["quadratic_drag", "spring_cubic"]
     ],
 )
 def test_outcomes(outside: bool, verdict: str, named: list[str], outcome: str) -> None:
-    assert judge_several(AB, outside, verdict, named) == outcome
+    assert score_several(AB, outside, verdict, named) == outcome
 
 
 def test_partly_in_the_weak_regime() -> None:

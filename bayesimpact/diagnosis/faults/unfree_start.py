@@ -1,4 +1,4 @@
-"""A start that is no free decay yet, where only a fit shows it: the hand lets go in mid-swing.
+"""A start that is no free decay yet, where only a fit shows it: a hand lets go of a moving mass.
 
 A pull or a rest shows in the readings themselves (`data.faults.start`). A push that ends while the
 mass swings does not; but a model that leaves much of a whole recording, and little of the same one

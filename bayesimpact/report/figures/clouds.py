@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from bayesimpact.inference.convergence import quiet_arviz
-from bayesimpact.report.figures.style import Array, NormalizedParameters
+from bayesimpact.report.figures.style import Array, LabScale
 from bayesimpact.report.results import Draws
 
 LEVELS = (1 - float(np.exp(-0.5)), 1 - float(np.exp(-2.0)))
@@ -141,9 +141,7 @@ class NormalCloud(Cloud):
             axis.plot(x, y, color=self.colour, lw=0.9)
 
 
-def plotted(
-    law: Law, names: tuple[str, ...], axes: list[NormalizedParameters], colour: str
-) -> Cloud:
+def plotted(law: Law, names: tuple[str, ...], axes: list[LabScale], colour: str) -> Cloud:
     """A posterior on the axes of the plot, in the order of `names`."""
     columns = [law.names.index(name) if name in law.names else -1 for name in names]
     known = np.array(columns) >= 0

@@ -20,7 +20,7 @@ from bayesimpact.report.figures.style import (
     ORANGE,
     WIDTH,
     Array,
-    NormalizedParameters,
+    LabScale,
     full_symbol,
     label,
     scaled,
@@ -98,7 +98,7 @@ def _estimate(law: Law, k: int) -> Estimate:
     return median, low, high
 
 
-def _axis(law: Law, before: Law | None, k: int, estimate: Estimate) -> NormalizedParameters:
+def _axis(law: Law, before: Law | None, k: int, estimate: Estimate) -> LabScale:
     """The axis of a parameter: from zero, or from the median as its title has it."""
     name, unit = law.names[k], law.units[k]
     both = [law.values[:, k]]
@@ -174,7 +174,7 @@ def _title(axis: Axes, name: str, unit: str, estimate: Estimate) -> None:
     axis.set_title(f"{symbol}\n{text}", loc="left", fontsize=8.5)
 
 
-def _outer_labels(panels: np.ndarray, axes: list[NormalizedParameters], i: int) -> None:
+def _outer_labels(panels: np.ndarray, axes: list[LabScale], i: int) -> None:
     """Ticks and labels along the bottom and the left edge only."""
     last = panels.shape[0] - 1
     for axis in panels[i, : i + 1]:

@@ -158,7 +158,7 @@ def full_symbol(name: str) -> str:
 
 
 @dataclass(frozen=True)
-class NormalizedParameters:
+class LabScale:
     """An axis for values that may differ only in their last digits.
 
     Attributes
@@ -182,15 +182,15 @@ class NormalizedParameters:
         return np.asarray((values - self.offset) * self.scale)
 
 
-def scaled(name: str, unit: str, values: Array) -> NormalizedParameters:
+def scaled(name: str, unit: str, values: Array) -> LabScale:
     """The axis on which draws of a parameter can be read: from zero, or from their middle."""
     centre, spread = float(np.median(values)), float(np.ptp(values)) / 4
     if not spread > 0 or abs(centre) < 50 * spread:
         shown = readable(unit, float(np.max(np.abs(values))) if values.size else 0.0)
-        return NormalizedParameters(0.0, shown.scale, symbol(name), shown.unit)
+        return LabScale(0.0, shown.scale, symbol(name), shown.unit)
     about, fine = display(unit, abs(centre)), readable(unit, spread)
     places = decimals(spread * about.scale, 1)
     offset = round(centre * about.scale, places) / about.scale
     sign = "\N{MINUS SIGN}" if offset > 0 else "+"
     middle = f"{number(abs(offset) * about.scale, places)} {typeset(about.unit)}"
-    return NormalizedParameters(offset, fine.scale, f"{symbol(name)} {sign} {middle}", fine.unit)
+    return LabScale(offset, fine.scale, f"{symbol(name)} {sign} {middle}", fine.unit)
