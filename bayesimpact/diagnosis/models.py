@@ -13,7 +13,6 @@ import numpy as np
 
 from bayesimpact.diagnosis.asked import Asked
 from bayesimpact.diagnosis.budget import Budget, begin
-from bayesimpact.diagnosis.discrepancy import Discrepancy
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.force import missing_drift, missing_force
 from bayesimpact.diagnosis.naming import State, is_large, leaves_something
@@ -61,7 +60,6 @@ class Models:
         self.profiled: set[frozenset[str]] = set()
         self.refits = 0
         self.repeated: tuple[Candidate, float] | None = None
-        self.along: tuple[float, Discrepancy | None] | None = None
 
     def keep(self, candidate: Candidate) -> Candidate:
         """The better end of all climbs to the candidate's model, this one among them."""

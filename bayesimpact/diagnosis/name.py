@@ -54,11 +54,10 @@ def name(
     something of, by the best pairs at first, and where the misfit is large by several effects of
     one family at once, because damping laws may help little alone and much together; what gains
     most per effect is then the next model. While it extends, the search takes any gain that the
-    noise level allows, for what remains may yet be explained; where the misfit was large and a
-    force of time describes what the nearest model leaves, a gain beside such a force. Effects that
-    the odds do not demand are left out afterwards, and each that stays is exchanged for every other
-    that might do what it does. Where the misfit was large, the search begins with what the equation
-    of motion asks for, and goes on from a model that has settled and still leaves something.
+    noise level allows, for what remains may yet be explained; effects that the odds do not demand
+    are left out afterwards, and each that stays is exchanged for every other that might do what it
+    does. Where the misfit was large, the search begins with what the equation of motion asks for,
+    and goes on from a model that has settled and still leaves something.
 
     A search that has begun `MOST_REFITS` refits or used up the `budget` begins no more, and names
     nothing that it has not compared with all that might do the same.

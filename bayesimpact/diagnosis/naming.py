@@ -3,10 +3,9 @@
 A hypothesis is a set of effects of the catalogue and at most one residual force. All are compared
 by the same log posterior odds: log evidence, less the price of multiplicity for every effect and
 for the residual force. While the search goes on, likelihoods are counted once per independent
-sample of the best residual; where the misfit was large, every hypothesis has a force of time
-beside it (`discrepancy`) as soon as the nearest model leaves such a force, and so it is wherever a
-search ends with one left: what a model leaves is then no noise, and many samples are no evidence by
-themselves.
+sample of the best residual. Where it ends with something left that a force of time describes,
+every hypothesis has such a force beside it (`discrepancy`): what a model leaves is then no noise,
+and many samples are no evidence by themselves.
 """
 
 from __future__ import annotations

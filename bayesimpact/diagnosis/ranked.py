@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bayesimpact.diagnosis.discrepancy import Discrepancy, discrepancy
 from bayesimpact.diagnosis.models import UNCONVERGED_SHORTFALL, Models
 from bayesimpact.diagnosis.naming import is_large
 from bayesimpact.diagnosis.promising import refit_candidates
@@ -20,7 +19,6 @@ MOST_LARGE = 5  # where the base misfit is large: several strong effects act at 
 # Nats by which an effect alone must fall behind the base model to be given up: more than five times
 # `DECISIVE`, for beside others it may still be right, and trying it costs one refit.
 CONTRADICTED = 30.0
-NEARER = 2.0  # times less left by the nearest model: responses are superposed along its motion anew
 
 
 class Ranked(Models):
@@ -41,39 +39,15 @@ class Ranked(Models):
         """Effects of a model."""
         return MOST_LARGE if self.is_large else MOST_EFFECTS
 
-    @property
-    def left(self) -> Discrepancy | None:
-        """The force of time that models have beside them, along the motion of the nearest one.
-
-        None where the base misfit is not large, or while what the nearest model leaves is no such
-        force.
-        """
-        if not self.is_large:
-            return None
-        nearest = min(self.tried.values(), key=lambda c: c.fit.reduced_chi2).fit
-        if self.along is None or nearest.reduced_chi2 * NEARER < self.along[0]:
-            self.along = nearest.reduced_chi2, discrepancy(nearest)
-        left = self.along[1]
-        return left if left is not None and left.leaves_noise else None
-
     def promise(self, candidate: Candidate) -> float:
-        """What a model is worth on the way: beside a force of time, or with every sample counted,
-        for what remains may yet be explained.
+        """What a model is worth on the way: every sample counts, for what remains may yet be
+        explained.
         """
-        left = self.left
-        if left is not None and np.isfinite(candidate.log_evidence):
-            return self.log_odds(candidate)
         return candidate.log_evidence - self.cost * len(candidate.effects)
 
     def log_odds(self, candidate: Candidate) -> float:
-        """Log posterior odds up to a constant, beside a force of time; or each independent sample
-        counted once.
-        """
-        left = self.left
-        if left is not None and np.isfinite(candidate.log_evidence):
-            evidence = candidate.log_evidence + left.gain(candidate.fit)
-        else:
-            evidence = tempered_evidence(candidate, self.repetition())
+        """Log posterior odds up to a constant, each independent sample counted once."""
+        evidence = tempered_evidence(candidate, self.repetition())
         return evidence - self.cost * len(candidate.effects)
 
     def repetition(self) -> float:
