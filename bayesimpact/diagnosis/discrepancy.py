@@ -214,7 +214,7 @@ def _sized(fit: Fit, parts: tuple[Part, ...]) -> tuple[float, float, tuple[Array
     """The likeliest k and level of the noise, the parameters at their best; and values at the
     knots, the parameters as fitted.
     """
-    found = products(fit, parts)
+    found = products(fit, parts, fit.linearisation)
 
     def left(log_k: float) -> tuple[float, float]:
         """Minus twice the log likelihood, and the noise's variance."""

@@ -100,12 +100,8 @@ class Products:
         return replace(self, along=tuple(along), whole=whole)
 
 
-def products(fit: Fit, parts: Sequence[Part]) -> Products:
-    """Of a fit, with responses along its own motion or a near one."""
-    return _products(fit, parts, fit.linearisation)
-
-
-def _products(fit: Fit, parts: Sequence[Part], linear: Sequence[Linearisation]) -> Products:
+def products(fit: Fit, parts: Sequence[Part], linear: Sequence[Linearisation]) -> Products:
+    """Of a fit linearised somewhere, with responses along its own motion or a near one."""
     likelihood, size = fit.target.likelihood, fit.mode.size
     level = likelihood.noise.level
     whole, along = np.zeros((size + 1, size + 1)), []
@@ -134,7 +130,7 @@ def gain(fit: Fit, parts: Sequence[Part]) -> float:
     """What the force adds to a model's log evidence, its size and the noise level at their best."""
     priors, likelihood = fit.target.priors, fit.target.likelihood
     free = fit.target.oscillator.layout.roles("physical", "effect", "nuisance")
-    here = _climbed(fit, _point(fit, fit.mode, products(fit, parts)))
+    here = _climbed(fit, _point(fit, fit.mode, products(fit, parts, fit.linearisation)))
     level, total = likelihood.noise.level, here.found.total
     unit = float(np.sum(likelihood.log_volume)) - total * np.log(level * np.sqrt(2 * np.pi))
     alone = fit.log_likelihood + 0.5 * _log_volume(fit.covariance[np.ix_(free, free)])
@@ -150,7 +146,7 @@ def _climbed(fit: Fit, start: _Point) -> _Point:
         linear = fit.target.likelihood.linearise(here.theta, steps, roughly=True)
         if not all(np.isfinite(part.jacobian).all() for part in linear):
             break
-        renewed = _point(fit, here.theta, _products(fit, start.found.parts, linear))
+        renewed = _point(fit, here.theta, products(fit, start.found.parts, linear))
         if not np.isfinite(renewed.value):
             break
         further = _stepped(fit, renewed)

@@ -34,8 +34,8 @@ def refit_candidates(scan: Scan, least: float = 0.0) -> list[Score]:
     scores = scan.best()
     most = max((s.gain for s in scores), default=0.0)
     floor = max(least, LEAST_GAIN, min(NEAR_BEST * most, np.sqrt(FAR * most)) - NEAR_MARGIN)
-    discontinuous = most > DISCONTINUOUS
-    return [s for s in scores if s.gain > floor or (discontinuous and is_discontinuous(s.effect))]
+    gains = most > DISCONTINUOUS
+    return [s for s in scores if s.gain > floor or (gains and is_discontinuous(s.effect))]
 
 
 def is_discontinuous(effect: Effect) -> bool:
