@@ -113,8 +113,7 @@ def _effects(settings: Settings, kind: str, turn: int, rng: Rng) -> tuple[str, .
 
 
 def _compatible(first: str, second: str) -> bool:
-    slot = PLANTED_EFFECTS[first].slot
-    return not slot or slot != PLANTED_EFFECTS[second].slot
+    return not set(PLANTED_EFFECTS[first].slots) & set(PLANTED_EFFECTS[second].slots)
 
 
 def _possible(settings: Settings, ids: tuple[str, ...]) -> list[str]:

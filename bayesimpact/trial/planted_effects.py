@@ -48,7 +48,7 @@ class PlantedEffect:
     regimes : places that are right: free, contact, everywhere, measurement
     form : draws its shape for a design
     obstacles, recordings : how many it needs at least
-    slot : effects with the same slot exclude each other
+    slots : effects that share one of these exclude each other
     by_noise : its trace in the noise shows it, however small its response
     angle : it means something for angles only
     free : it means something without an obstacle only
@@ -58,7 +58,7 @@ class PlantedEffect:
     form: Callable[[Design, Rng], Form]
     obstacles: int = 0
     recordings: int = 1
-    slot: str = ""
+    slots: tuple[str, ...] = ()
     by_noise: bool = False
     angle: bool = False
     free: bool = False
@@ -296,7 +296,7 @@ PLANTED_EFFECTS: Mapping[str, PlantedEffect] = {
         one_number("coefficient", lambda d: d.contact_stiffness * d.indentation / d.speed**2),
         1,
     ),
-    "contact_damping_per_case": PlantedEffect(("contact",), _per_case, 2, slot="c2"),
+    "contact_damping_per_case": PlantedEffect(("contact",), _per_case, 2, slots=("c2",)),
     "contact_hardening": PlantedEffect(
         ("contact",),
         one_number(
@@ -304,23 +304,23 @@ PLANTED_EFFECTS: Mapping[str, PlantedEffect] = {
         ),
         1,
     ),
-    "contact_power_law": PlantedEffect(("contact",), _exponent, 1),
+    "contact_power_law": PlantedEffect(("contact",), _exponent, 1, slots=("k2 d",)),
     "contact_second_stage": PlantedEffect(("contact",), _second_stage, 1),
-    "hunt_crossley": PlantedEffect(("contact",), _hunt_crossley, 1, slot="c2"),
+    "hunt_crossley": PlantedEffect(("contact",), _hunt_crossley, 1, slots=("c2", "k2 d")),
     "contact_no_tension": PlantedEffect(
-        ("contact",), lambda d, r: Form(lambda s: {}, 0.0), 1, slot="end"
+        ("contact",), lambda d, r: Form(lambda s: {}, 0.0), 1, slots=("end",)
     ),
     "contact_relaxation": PlantedEffect(("contact",), _relaxation, 1),
-    "obstacle_mass": PlantedEffect(("contact",), _obstacle_mass, 1, slot="end"),
-    "adhesion": PlantedEffect(("contact",), _adhesion, 1, slot="end"),
+    "obstacle_mass": PlantedEffect(("contact",), _obstacle_mass, 1, slots=("end",)),
+    "adhesion": PlantedEffect(("contact",), _adhesion, 1, slots=("end",)),
     "obstacle_restitution": PlantedEffect(("contact",), _restitution, 1),
     "obstacle_mode": PlantedEffect(("contact",), _obstacle_mode, 1),
     "base_motion": PlantedEffect(("everywhere", "free", "contact"), _base_motion),
     "second_mode": PlantedEffect(("contact",), _second_mode, 1),
     "gap_wear": PlantedEffect(
-        ("contact",), one_number("step", lambda d: 0.1 * d.indentation), 1, slot="wear"
+        ("contact",), one_number("step", lambda d: 0.1 * d.indentation), 1, slots=("wear",)
     ),
-    "gap_per_recording": PlantedEffect(("contact",), _gaps, 1, 2, slot="g"),
+    "gap_per_recording": PlantedEffect(("contact",), _gaps, 1, 2, slots=("g",)),
     "coulomb_friction": PlantedEffect(
         ("free",), one_number("force", lambda d: 0.1 * d.rig.k1 * d.amplitude)
     ),
@@ -334,7 +334,7 @@ PLANTED_EFFECTS: Mapping[str, PlantedEffect] = {
         ("free",), one_number("stiffness", lambda d: 0.3 * d.rig.k1 / d.amplitude**2, signed=True)
     ),
     "stiffness_drift": PlantedEffect(
-        ("free",), one_number("rate", lambda d: 0.3 / d.duration, signed=True), slot="k1"
+        ("free",), one_number("rate", lambda d: 0.3 / d.duration, signed=True), slots=("k1",)
     ),
     "harmonic_forcing": PlantedEffect(("everywhere", "free"), _forcing),
     "opposite_stop": PlantedEffect(("free",), _opposite_stop, obstacles=1),
@@ -348,8 +348,8 @@ PLANTED_EFFECTS: Mapping[str, PlantedEffect] = {
     "sensor_cubic": PlantedEffect(
         ("measurement",), one_number("gain", lambda d: 0.3 / d.amplitude**2, signed=True)
     ),
-    "sensor_hum": PlantedEffect(("measurement",), _hum, slot="hum"),
-    "released_mode": PlantedEffect(("measurement",), _released_mode, slot="hum", free=True),
+    "sensor_hum": PlantedEffect(("measurement",), _hum, slots=("hum",)),
+    "released_mode": PlantedEffect(("measurement",), _released_mode, slots=("hum",), free=True),
     "pendulum_sine": PlantedEffect(("free",), lambda d, r: Form(lambda s: {}, 0.0), angle=True),
     "pendulum_with_spring": PlantedEffect(
         ("free",), one_number("stiffness", lambda d: d.rig.k1), angle=True
@@ -361,6 +361,6 @@ PLANTED_EFFECTS: Mapping[str, PlantedEffect] = {
     "structural_damping": PlantedEffect(("free",), one_number("loss", lambda d: 0.1), obstacles=1),
     "hysteresis_bouc_wen": PlantedEffect(("free",), _bouc_wen),
     "presliding_friction": PlantedEffect(("free",), _presliding),
-    "smoothing": PlantedEffect(("measurement",), _smoothing, slot="smoothing", by_noise=True),
+    "smoothing": PlantedEffect(("measurement",), _smoothing, slots=("smoothing",), by_noise=True),
 }
 """Every effect of the catalogue that may be planted, by its id."""

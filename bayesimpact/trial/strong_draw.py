@@ -157,12 +157,12 @@ def _fit(
 
 def _rivals(design: Design, ids: list[str], rng: Rng) -> dict[str, Any]:
     """Every other effect of the catalogue that this rig can show, each a little of it."""
-    slots = {CATALOGUE_STRONG[e].slot for e in ids if e in CATALOGUE_STRONG} - {""}
+    slots = {s for e in ids if e in CATALOGUE_STRONG for s in CATALOGUE_STRONG[e].slots}
     result = {}
     known = tuple(e for e in CATALOGUE_STRONG if e not in ("pendulum_sine", *ids))
     for effect in _fit(known, CATALOGUE_STRONG, design, False):
         plant = CATALOGUE_STRONG[effect]
-        if plant.slot not in slots:
+        if not slots.intersection(plant.slots):
             form = plant.form(design, rng)
             result[effect] = form.build(form.start)
     return result

@@ -102,3 +102,9 @@ def test_one_law_is_not_added_to_itself(small):
     best = Scan((score(DAHL), score(LOOP), score(friction)), 1.0, None, (), ())
     assert [[s.effect.id for s in j] for j in families(best)] == [[DAHL.id, friction.id]]
     assert holds([LOOP], (DAHL,)) and holds([DAHL], (LOOP,)) and not holds([friction], (LOOP,))
+
+
+def test_a_term_of_the_base_model_has_one_other_form():
+    hertz, crossley = BY_ID["contact_power_law"], BY_ID["hunt_crossley"]
+    assert not hertz.stands_beside(crossley) and not crossley.stands_beside(hertz)
+    assert crossley.stands_beside(BY_ID["contact_hardening"])  # which adds a term

@@ -42,9 +42,8 @@ def test_every_effect_can_be_planted() -> None:
     decays = {e.id for e in EFFECTS} - {"input_delay"}  # the rig is never driven
     assert decays - {"noise_correlated"} <= set(PLANTED_EFFECTS)
     for first, second in ((a, b) for a in EFFECTS for b in EFFECTS if a.id < b.id):
-        if first.excludes(second):  # no model can hold both
-            slot = PLANTED_EFFECTS[first.id].slot
-            assert slot and slot == PLANTED_EFFECTS[second.id].slot
+        if first.excludes(second) or (first.replaces and first.replaces == second.replaces):
+            assert set(PLANTED_EFFECTS[first.id].slots) & set(PLANTED_EFFECTS[second.id].slots)
 
 
 @pytest.mark.parametrize("effect", [*PLANTED_EFFECTS, *OUTSIDE_EFFECTS])

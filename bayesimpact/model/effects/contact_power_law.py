@@ -38,5 +38,6 @@ EFFECT = Effect(
     ),
     parameters=(EffectParameter("exponent", "-", scale=lambda s: 0.2, lower=0.5, null=1.0),),
     law=Law(force, where="contact", rough_at_touch=True, ignores_speed=True),
+    replaces="k2 d",
     needs_stop=True,
 )

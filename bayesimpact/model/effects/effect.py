@@ -234,6 +234,7 @@ class Effect(Picklable):
     regime : where it acts
     energy : what it does to mechanical energy
     statement : sentence for the report with `{size}` and `{share}` filled in
+    replaces : term of the base model that it writes in another form; no model holds two forms
     needs_stop : True when it makes no sense without an obstacle
     prefer : id of the simpler effect that this one reduces to, at its null or with a shape of zero
     restates : id of an effect that is the same law in other numbers, for another range of them: no
@@ -255,6 +256,7 @@ class Effect(Picklable):
     binds: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     sets: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     observe: Observe | None = None
+    replaces: str | None = None
     needs_stop: bool = False
     prefer: str | None = None
     restates: str | None = None
@@ -288,7 +290,8 @@ class Effect(Picklable):
 
     def stands_beside(self, other: Effect) -> bool:
         """True when one model may hold both."""
-        return not (self.excludes(other) or self.is_same_law(other))
+        twice = self.replaces is not None and self.replaces == other.replaces
+        return not (twice or self.excludes(other) or self.is_same_law(other))
 
     def is_same_law(self, other: Effect) -> bool:
         """True for two effects that differ in the names and ranges of their numbers only."""

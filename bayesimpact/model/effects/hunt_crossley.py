@@ -78,5 +78,6 @@ EFFECT = Effect(
     ),
     law=Law(force, where="contact", rough_at_touch=True),
     sets=MappingProxyType({"c2": 0.0}),
+    replaces="k2 d",
     needs_stop=True,
 )
