@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.diagnosis.budget import Budget
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.extend import difference_steps, extend, transfer
 from bayesimpact.diagnosis.formula_scores import FormulaScores
 from bayesimpact.diagnosis.learned import LEARNED
-from bayesimpact.diagnosis.refit import ITERATIONS, TOLERANCE, Candidate, best_start, step_sizes
+from bayesimpact.diagnosis.naming import Naming, leaves_something
+from bayesimpact.diagnosis.refit import (
+    ITERATIONS,
+    TOLERANCE,
+    Candidate,
+    best_start,
+    step_sizes,
+    without,
+)
+from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.formula.evidence import Subset
 from bayesimpact.formula.grammar import Term
-from bayesimpact.formula.law import effect_id, effect_of, starts_of
+from bayesimpact.formula.law import effect_id, effect_of, is_formula, starts_of
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.model.effects.effect import Effect, Scales
@@ -117,6 +127,43 @@ def refitted(question: Question, subset: Subset) -> Candidate | None:
     start = best_start(target, unshifted, predicted, step)
     fit = find_mode(target, start, steps=step, tolerance=TOLERANCE, max_iterations=ITERATIONS)
     return Candidate(effects, fit, model_evidence(fit) - length_price(question, subset))
+
+
+def without_idle(
+    question: Question, naming: Naming, fitted: Mapping[Subset, Candidate], budget: Budget
+) -> dict[Subset, Candidate]:
+    """Fitted formulas without the effects that their models need no more, as far as time allows.
+
+    What was fitted before may only have imitated the force that a formula is. All formulas that may
+    come within the decisive odds of the likeliest are treated alike.
+    """
+    first = max(map(naming.log_odds, fitted.values()))
+    least = first - DECISIVE - question.cost * len(question.others)
+    found = dict(fitted)
+    for subset, candidate in fitted.items():
+        while naming.log_odds(candidate) >= least and budget.may_go_on():
+            smaller = _without_one(question, naming, subset, candidate)
+            if smaller is None:
+                break
+            found[subset] = candidate = smaller
+    return found
+
+
+def _without_one(
+    question: Question, naming: Naming, subset: Subset, candidate: Candidate
+) -> Candidate | None:
+    """The likeliest model with an effect less, formulas kept; None where that is decisively worse,
+    or leaves more than noise and the candidate does not.
+    """
+    price = length_price(question, subset)
+    others = [e for e in candidate.effects if not is_formula(e)]
+    found = [without(candidate, e, question.scales) for e in others]
+    smaller = [replace(c, log_evidence=c.log_evidence - price) for c in found]
+    best = max(smaller, key=naming.log_odds, default=None)
+    if best is None or naming.log_odds(candidate) - naming.log_odds(best) >= DECISIVE:
+        return None
+    complete = leaves_something(best.fit) and not leaves_something(candidate.fit)
+    return None if complete else best
 
 
 def effect_for(question: Question, i: int, size: float) -> Effect:

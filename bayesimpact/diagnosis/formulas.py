@@ -30,6 +30,7 @@ from bayesimpact.diagnosis.formula_refits import (
     length_price,
     refit_candidates,
     refitted,
+    without_idle,
 )
 from bayesimpact.diagnosis.formula_scores import formula_scores
 from bayesimpact.diagnosis.learned import LEARNED
@@ -91,6 +92,10 @@ def with_formulas(
     if not fitted:
         return answer
     naming = joined(answer.naming, list(fitted.values()))
+    if question.others and not late:
+        progress("leaving out effects that formulas make idle")
+        fitted = without_idle(question, naming, fitted, budget)
+        naming = joined(answer.naming, list(fitted.values()))
     first = max(fitted, key=lambda s: naming.log_odds(fitted[s]))
     rows = listed(question, naming, heads, fitted)
     named = not late and _may_be_named(question, naming, ranked, fitted, first)
@@ -204,7 +209,7 @@ def _examined(
 
 def _decided(answer: Answer, candidate: Candidate) -> Decision:
     """The decision with the formula's effects named; whole where all others of its model are."""
-    before = answer.decision.effects
+    before = tuple(e for e in answer.decision.effects if e.id in candidate.ids)
     known = {e.id for e in before}
     own = tuple(e for e in candidate.effects if is_formula(e) and e.id not in known)
     others = {e.id for e in candidate.effects} - {e.id for e in own}

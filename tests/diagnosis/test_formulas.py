@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from effect_rigs import BY_ID
 from small_rig import PLAIN, PLAIN_RELEASES, record
 
 from bayesimpact.diagnosis import formulas
@@ -22,7 +23,12 @@ from bayesimpact.diagnosis.formula_words import formula_entries, found_file
 from bayesimpact.diagnosis.formulas import Answer, joined, with_formulas
 from bayesimpact.diagnosis.learned import LEARNED
 from bayesimpact.diagnosis.naming import Naming, State
-from bayesimpact.diagnosis.refit import Candidate, base_candidate, residual_repetition
+from bayesimpact.diagnosis.refit import (
+    Candidate,
+    base_candidate,
+    grown,
+    residual_repetition,
+)
 from bayesimpact.diagnosis.scan import score_directions
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.diagnosis.unknown import with_force
@@ -38,20 +44,28 @@ DETENT = {"stiffness": 8.0, "place": -2.5e-3, "width": 7e-4}
 DRAG = {"coefficient": 0.02}  # seven times as much is told from v^3
 
 
-def unknown(effects: dict[str, Any]) -> tuple[Answer, Scales]:
-    """What a diagnosis that knows no effect ends with: a learned force and the verdict unknown."""
+def unknown(effects: dict[str, Any], named: tuple[Effect, ...] = ()) -> tuple[Answer, Scales]:
+    """What a diagnosis that knows no effect, or names one, ends with: a learned force."""
     rng = np.random.default_rng(0)
     campaign = record(3, effects, rig=PLAIN, releases=PLAIN_RELEASES, duration=4.0, rate=500.0)
     base = base_candidate(identify(campaign, rng=rng, search=False).fit)
     scales = campaign_scales(base.fit)
-    force = missing_force(base.fit, scales, rng=rng)
-    state = State(
-        base, score_directions(base.fit, (), rng=rng), force,
-        missing_drift(base.fit, scales, rng=rng),
-    )  # fmt: skip
-    naming = Naming(state, state, (base,), np.log(50.0), residual_repetition(base.fit))
-    learned = with_force(base, force, scales)
-    return Answer(naming, Decision("unknown", ()), learned.fit, state), scales
+    first = state = _state(base, scales, rng)
+    if named:
+        state = _state(grown(base, named, scales), scales, rng)
+    chosen = state.candidate
+    repetition = residual_repetition(chosen.fit)
+    naming = Naming(first, state, (chosen, base)[: 1 + len(named)], np.log(50.0), repetition)
+    learned = with_force(chosen, state.force, scales)
+    decision = Decision("partly" if named else "unknown", named)
+    return Answer(naming, decision, learned.fit, state), scales
+
+
+def _state(candidate: Candidate, scales: Scales, rng: np.random.Generator) -> State:
+    fit = candidate.fit
+    scored = score_directions(fit, (), rng=rng)
+    force, drift = (f(fit, scales, rng=rng) for f in (missing_force, missing_drift))
+    return State(candidate, scored, force, drift)
 
 
 def asked(answer: Answer, scales: Scales, looks: int = 99, said: list[str] | None = None) -> Answer:
@@ -101,6 +115,17 @@ def test_a_force_of_no_catalogue_is_named_with_its_numbers(detent: Any) -> None:
         off = (values[names[own]] - abs(DETENT[true])) / sd[names[own]]
         assert abs(off) < 4.0, own
     assert LEARNED not in {e.id for e in found.after.target.oscillator.effects}
+
+
+def test_an_effect_that_imitated_the_force_goes_once_the_formula_is_in(detent: Any) -> None:
+    cubic = BY_ID["spring_cubic"]
+    before, scales = unknown({"detent": DETENT}, named=(cubic,))
+    assert before.decision.effects == (cubic,)
+    found = asked(before, scales)
+    assert found.decision.verdict == "named"
+    named = [e.id for e in found.decision.effects]
+    assert named == [e.id for e in detent[1].decision.effects]
+    assert found.naming.chosen.candidate.ids == tuple(named)
 
 
 def test_the_one_named_leads_all_others_by_the_decisive_odds(detent: Any) -> None:
