@@ -10,10 +10,13 @@ from dataclasses import dataclass
 # that says so is worth more than none. Not of the clock: what else a machine does must not change
 # an answer.
 PATIENCE = 300.0
+# s of a search's time that are kept for what its answer is compared with (each needed effect left
+# out, with a residual force), set by hand: a search that used up all of it could name nothing.
+COMPARISONS = 60.0
 # s that must be left for another search, set by hand: 42 of 60 campaigns with several strong
-# effects needed less altogether. One that begins with less would mostly end by its limit, and then
-# tell no more than that.
-ANOTHER = 60.0
+# effects needed less altogether, comparisons apart. One that begins with less would mostly end by
+# its limit, and then tell no more than that.
+ANOTHER = COMPARISONS + 60.0
 
 
 @dataclass(frozen=True)
@@ -39,6 +42,10 @@ class Budget:
     def may_go_on(self) -> bool:
         """Whether another fit may begin."""
         return self.left > 0.0
+
+    def may_search_on(self) -> bool:
+        """Whether another fit of a search may begin: time to compare its answer is kept."""
+        return self.left > COMPARISONS
 
     def may_search_again(self) -> bool:
         """Whether another search may begin: with too little left it would compare too little."""

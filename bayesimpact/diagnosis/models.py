@@ -189,7 +189,7 @@ class Models:
 
     def may_go_on(self) -> bool:
         """Whether the budget allows for more refits."""
-        return self.refits < MOST_REFITS and self.budget.may_go_on()
+        return self.refits < MOST_REFITS and self.budget.may_search_on()
 
     def tell(self, words: str) -> None:
         """Count a refit, and say which."""

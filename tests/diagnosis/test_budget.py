@@ -13,7 +13,7 @@ import pytest
 import small_rig
 from effect_rigs import BY_ID
 
-from bayesimpact.diagnosis.budget import ANOTHER, PATIENCE, Budget, begin
+from bayesimpact.diagnosis.budget import ANOTHER, COMPARISONS, PATIENCE, Budget, begin
 from bayesimpact.diagnosis.document import document
 from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.diagnosis.naming import Naming
@@ -90,7 +90,7 @@ def test_a_search_for_which_too_little_is_left_is_not_begun(monkeypatch, verdict
 
 def test_searches_share_one_budget(monkeypatch) -> None:
     clock = Clock()
-    asked, given = searches(monkeypatch, clock, MadeUp("partly"), took=100.0)
+    asked, given = searches(monkeypatch, clock, MadeUp("partly"), took=(PATIENCE - ANOTHER) / 2)
     found = asked.search(None)
     for turn in range(4):
         found = asked.again(found, lambda: None, better(False))
@@ -162,6 +162,20 @@ def test_exchanges_beside_a_force_of_time_that_the_budget_cut_short_are_not_fini
     found = search.beside_a_force(before, left)
     assert found.chosen.candidate is other and found.beside is left
     assert exchanged == ([] if late else [other]) and found.finished == (not late)
+
+
+def test_a_search_keeps_time_for_what_its_answer_is_compared_with() -> None:
+    clock = Clock()
+    search = Remaining((), None, np.random.default_rng(0), pytest.fail, Budget(clock, 0.0))
+    assert search.may_go_on()
+    clock.now = PATIENCE - COMPARISONS
+    assert not search.may_go_on()
+    base = Candidate((), SimpleNamespace(), 0.0)
+    search.examine = lambda candidate: SimpleNamespace(candidate=candidate)
+    search.with_residual = lambda state: state.candidate
+    state = search.examine(base)
+    found = search.with_forces(Naming(state, state, (base,), 1.0), [base])
+    assert list(found.residual.values()) == [base]
 
 
 def test_no_residual_force_is_fitted_once_the_time_is_up() -> None:
