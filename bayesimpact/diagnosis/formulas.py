@@ -9,7 +9,8 @@ refitted in full, as effects like any. One is named when
   and all other formulas that do not contain it, fitted or scored; with the price of their lengths
   and without it, as effects are compared.
 
-Else the verdict stays, and the formulas are listed with their odds.
+Else the formulas are listed with their odds, and the verdict stays; but an effect that the
+likeliest of all models lacks, formulas among them, is not named: it imitated what a formula is.
 """
 
 from __future__ import annotations
@@ -94,8 +95,9 @@ def with_formulas(
     naming = joined(answer.naming, list(fitted.values()))
     if question.others and not late:
         progress("leaving out effects that formulas make idle")
-        fitted = without_idle(question, naming, fitted, budget)
-        naming = joined(answer.naming, list(fitted.values()))
+        smaller = without_idle(question, naming, fitted, budget)
+        naming = joined(answer.naming, [*{*fitted.values(), *smaller.values()}])
+        fitted = smaller
     first = max(fitted, key=lambda s: naming.log_odds(fitted[s]))
     rows = listed(question, naming, heads, fitted)
     named = not late and _may_be_named(question, naming, ranked, fitted, first)
@@ -107,7 +109,8 @@ def with_formulas(
     seen = scores.seen[:, list(first.terms)] @ np.array(first.sizes)
     found_formulas = Formulas(rows, answer.after, named, seen)
     if not named or state is None:
-        return replace(answer, formulas=found_formulas)
+        decision = _needed(answer.decision, naming)
+        return replace(answer, decision=decision, formulas=found_formulas)
     ids = frozenset(fitted[first].ids)
     naming = replace(naming, chosen=state, states={**naming.states, ids: state})
     return Answer(naming, _decided(answer, fitted[first]), fitted[first].fit, None, found_formulas)
@@ -205,6 +208,15 @@ def _examined(
         missing_force(fit, scales, rng=rng),
         missing_drift(fit, scales, rng=rng),
     )
+
+
+def _needed(decision: Decision, naming: Naming) -> Decision:
+    """The decision with those of its effects that the likeliest of all models has."""
+    likeliest = set(naming.tried[0].ids)
+    effects = tuple(e for e in decision.effects if e.id in likeliest)
+    if len(effects) == len(decision.effects):
+        return decision
+    return replace(decision, verdict="partly" if effects else "unknown", effects=effects)
 
 
 def _decided(answer: Answer, candidate: Candidate) -> Decision:

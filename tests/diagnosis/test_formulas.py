@@ -128,6 +128,22 @@ def test_an_effect_that_imitated_the_force_goes_once_the_formula_is_in(detent: A
     assert found.naming.chosen.candidate.ids == tuple(named)
 
 
+@pytest.mark.parametrize("others", [(), ("quadratic_drag",)])
+def test_no_effect_is_named_that_the_likeliest_formula_makes_idle(
+    monkeypatch: Any, others: tuple[str, ...]
+) -> None:
+    """Nor where the formula is not named itself; what it has beside it stays."""
+    drag = dict.fromkeys(others, DRAG)
+    effects = tuple(BY_ID[i] for i in ("spring_cubic", *others))
+    before, scales = unknown({"detent": DETENT, **drag}, named=effects)
+    assert before.decision.effects == effects
+    monkeypatch.setattr(formulas, "_may_be_named", lambda *_: False)
+    found = asked(before, scales)
+    assert not found.formulas.named and found.after is before.after
+    assert tuple(e.id for e in found.decision.effects) == others
+    assert found.decision.verdict == ("partly" if others else "unknown")
+
+
 def test_the_one_named_leads_all_others_by_the_decisive_odds(detent: Any) -> None:
     before, found, _ = detent
     first, own = found.formulas.ranked[0], set(found.naming.chosen.candidate.ids)
