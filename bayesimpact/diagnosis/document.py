@@ -63,7 +63,7 @@ def document(
     noise = d.identification.noise
     campaign = d.before.target.oscillator.campaign
     angle, reading = campaign.angular, campaign.recordings[0]
-    left = remainder(d.naming, d.after, d.remains)
+    left = remainder(d.naming, d.after, d.remains, d.formulas)
     before = _parameters(d.before, intervals(d.before), draws_before)
     after = _parameters(d.after, d.intervals, draws_after if d.remains is None else None)
     told = {} if d.remains is None else after

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bayesimpact.diagnosis.formula_list import Formulas, formula_text
 from bayesimpact.diagnosis.locate import locate
 from bayesimpact.diagnosis.naming import Naming, State
 from bayesimpact.inference.fit import Fit
@@ -21,7 +22,7 @@ class Remainder:
     share : the same over the rms of the signal about its mean
     over_noise : rms residual over the noise
     regime, displacement, recordings : where, from the force that would explain it
-    guess : ids that the likeliest larger model adds, or a form of force; "" for none
+    guess : a formula, ids that the likeliest larger model adds, or a form of force; "" for none
     """
 
     rms: float
@@ -33,7 +34,9 @@ class Remainder:
     guess: str
 
 
-def remainder(naming: Naming, after: Fit, left: State | None) -> Remainder | None:
+def remainder(
+    naming: Naming, after: Fit, left: State | None, formulas: Formulas | None = None
+) -> Remainder | None:
     """What `after` leaves; `left` is the model whose remainder was examined, None for noise."""
     if left is None:
         return None
@@ -44,8 +47,18 @@ def remainder(naming: Naming, after: Fit, left: State | None) -> Remainder | Non
     place = locate(left.candidate.fit, best, left.unknown, ())
     return Remainder(
         rms, rms / signal, over, place.regime, place.displacement, place.recordings,
-        next_guess(naming, left),
+        likeliest_formula(formulas) or next_guess(naming, left),
     )  # fmt: skip
+
+
+def likeliest_formula(formulas: Formulas | None) -> str:
+    """The first formula, where it is likelier than all other models together; else ""."""
+    if formulas is None or not formulas.ranked:
+        return ""
+    first, o = formulas.ranked[0], formulas.reference.target.oscillator
+    if not (first.refitted and first.probability > 0.5):
+        return ""
+    return f"a force {formula_text(first.terms, angle=o.campaign.angular)}"
 
 
 def next_guess(naming: Naming, left: State) -> str:

@@ -103,8 +103,9 @@ def title_of(effect_id: str) -> str:
 
 
 def titles_of(ids: str) -> str:
-    """Titles for ids joined by " + "; words stay what they are."""
-    return listed(title_of(i) for i in ids.split(" + "))
+    """Titles for ids joined by " + "; words and formulas stay what they are."""
+    parts = ids.split(" + ")
+    return ids if any(" " in part for part in parts) else listed(map(title_of, parts))
 
 
 def nearest(sets: Sequence[tuple[str, float]]) -> str:

@@ -29,6 +29,7 @@ from bayesimpact.diagnosis.refit import (
     grown,
     residual_repetition,
 )
+from bayesimpact.diagnosis.remainder import likeliest_formula, remainder
 from bayesimpact.diagnosis.scan import score_directions
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.diagnosis.unknown import with_force
@@ -142,6 +143,10 @@ def test_no_effect_is_named_that_the_likeliest_formula_makes_idle(
     assert not found.formulas.named and found.after is before.after
     assert tuple(e.id for e in found.decision.effects) == others
     assert found.decision.verdict == ("partly" if others else "unknown")
+    guess = remainder(found.naming, found.after, found.state, found.formulas).guess
+    assert guess == "a force " + formula_text(found.formulas.ranked[0].terms)
+    scored = replace(found.formulas.ranked[0], refitted=False)
+    assert not likeliest_formula(replace(found.formulas, ranked=(scored,)))
 
 
 def test_the_one_named_leads_all_others_by_the_decisive_odds(detent: Any) -> None:

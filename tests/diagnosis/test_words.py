@@ -81,6 +81,8 @@ def test_what_remains_is_said_in_units():
     assert "obstacle" in said and "likeliest: a gap that grows at every impact" in said
     assert remaining(None) == "" and "130 µrad" in remaining(left, "rad")
     assert "likeliest" not in remaining(replace(left, guess=""))
+    formula = "a force A v^2 + B exp(-((y + 1 mm)/2 mm)^2) sign(v)"
+    assert f"; likeliest: {formula}." in remaining(replace(left, guess=formula))
 
 
 def fit_of(rms: float, *inputs: object):
