@@ -6,8 +6,8 @@
    effect promises. Where physics then leaves something, once more without these corrections, unless
    one gained more than all effects together promise.
 3. Physics is searched. Where that ends in doubt, the recordings are compared beside it, and it is
-   searched once more with the other steps corrected: the simpler of two answers that explain
-   everything stays.
+   searched once more with the other steps corrected, unless an answer that explains everything
+   needs all of its effects beside these: the simpler of two such answers stays.
 4. A start that is no free decay yet, and spikes, may only show against a fit with that physics:
    then once more without them.
 
@@ -46,6 +46,13 @@ from bayesimpact.diagnosis.recording_faults import (
     without_faults,
 )
 from bayesimpact.diagnosis.scan import scan
+from bayesimpact.diagnosis.simpler import (
+    OPEN,
+    is_settled,
+    is_simpler,
+    makes_idle,
+    may_be_simpler,
+)
 from bayesimpact.diagnosis.smoothing import SAVITZKY_GOLAY, whole_campaign
 from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.fit import Fit
@@ -65,9 +72,6 @@ BESIDE: Mapping[Verdict, Verdict] = {
     "unknown": "partly",
 }
 """Verdicts where a fault of a recording or a filter has been named already."""
-
-OPEN: Mapping[Verdict, int] = {"adequate": 0, "named": 0, "ambiguous": 1}
-"""Verdicts that explain everything, by what they leave open."""
 
 Better = Callable[[Diagnosis, Diagnosis], bool]
 
@@ -150,10 +154,7 @@ def diagnose(
         say("comparing the recordings beside what is missing")
         doubtful = list(comparisons(certain, campaign, beside, found.after)) or doubtful
     if doubtful and is_doubtful(found) and may_be_simpler(doubtful, certain, found):
-        steps = doubtful
-        found = searches.again(
-            found, lambda: with_steps(certain, steps, rng=rng, search=search), _is_simpler
-        )
+        found = _beside_faults(found, certain, doubtful, searches, search)
     elif certain is not cleaned and not proved and found.verdict not in OPEN:
         found = searches.again(found, lambda: cleaned, lambda other, _: is_settled(other))
     found = _without_unfree_start(found, campaign, searches)
@@ -180,11 +181,6 @@ def exceeds(step: Step, fit: Fit, promised: float) -> bool:
     return base_failed(fit) or gained > SCORE_UNDERESTIMATE * promised + NEAR_MARGIN
 
 
-def is_settled(found: Diagnosis) -> bool:
-    """Whether nothing remains and nothing is open."""
-    return found.verdict in ("adequate", "named")
-
-
 def is_doubtful(found: Diagnosis) -> bool:
     """Whether what was found may be a fault of a recording: nothing that holds for all recordings
     alike explains them.
@@ -203,26 +199,22 @@ def unfinished(found: Diagnosis) -> Diagnosis:
     return replace(found, verdict=verdict, naming=replace(found.naming, finished=False))
 
 
-def may_be_simpler(steps: Sequence[Step], before: Corrected, found: Diagnosis) -> bool:
-    """Whether an answer with further faults corrected could take the place of one without: not
-    where these faults alone are more than all that a settled one names.
+def _beside_faults(
+    found: Diagnosis, before: Corrected, steps: Sequence[Step], searches: Searches, search: bool
+) -> Diagnosis:
+    """The answer, or a simpler one with further faults corrected; a settled one stays where these
+    do nothing that its effects do.
     """
-    return not is_settled(found) or len(before.compared) + sum(map(len, steps)) <= _size(found)
 
+    def corrected() -> Corrected:
+        return with_steps(before, steps, rng=searches.rng, search=search)
 
-def _is_simpler(again: Diagnosis, found: Diagnosis) -> bool:
-    """Whether an answer with further faults corrected leaves less open than one without, or as
-    little with no more effects and faults.
-
-    Faults that leave something unexplained have not proved themselves.
-    """
-    order = (OPEN.get(again.verdict, 2), _size(again)), (OPEN.get(found.verdict, 2), _size(found))
-    return again.verdict in OPEN and order[0] <= order[1]
-
-
-def _size(found: Diagnosis) -> int:
-    """Effects, and faults that comparing recordings showed."""
-    return len(found.effects) + (len(found.corrected.compared) if found.corrected else 0)
+    if not is_settled(found):
+        return searches.again(found, corrected, is_simpler)
+    again = corrected()
+    if not makes_idle(again, found):
+        return found
+    return searches.again(found, lambda: again, is_simpler)
 
 
 def _without_unfree_start(found: Diagnosis, as_read: Campaign, searches: Searches) -> Diagnosis:

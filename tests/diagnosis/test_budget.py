@@ -19,6 +19,7 @@ from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.diagnosis.naming import Naming
 from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.remaining import Remaining
+from bayesimpact.diagnosis.simpler import may_be_simpler
 
 whole = importlib.import_module("bayesimpact.diagnosis.diagnose")
 
@@ -224,4 +225,4 @@ def test_faults_that_are_more_than_a_settled_answer_names_are_not_asked_about(
     """One fault was corrected before; one further step has two."""
     before = SimpleNamespace(compared=("clock",))
     found = SimpleNamespace(verdict=verdict, effects=["effect"] * effects, corrected=before)
-    assert whole.may_be_simpler([("gain", "gain")], before, found) is asked
+    assert may_be_simpler([("gain", "gain")], before, found) is asked

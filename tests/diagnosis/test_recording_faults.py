@@ -22,6 +22,8 @@ from bayesimpact.diagnosis.document import document
 from bayesimpact.diagnosis.faults.compare import Compared
 from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.diagnosis.recording_faults import Corrected, Step, cleaned_campaign
+from bayesimpact.diagnosis.simpler import makes_idle
+from bayesimpact.inference.identify import identify
 from bayesimpact.trial.rig import Release
 from bayesimpact.workflow import _strict
 
@@ -165,6 +167,29 @@ def test_a_gain_shows_beside_the_physics_that_hides_it() -> None:
     assert (fault.id, fault.recording) == ("recording_gain", "c")
     assert fault.size == pytest.approx(1.0, abs=0.1)
     assert found.verdict == "named" and [e.id for e in found.effects] == ["spring_quadratic"]
+
+
+@pytest.mark.parametrize("hides", [False, True])
+def test_faults_that_do_nothing_that_the_effects_do_are_not_searched_beside(
+    monkeypatch: pytest.MonkeyPatch, hides: bool
+) -> None:
+    """Gaps of their own that recordings have are no gain; those that a gain makes are."""
+    gaps = {} if hides else {"a": 1.2e-3, "b": 1.24e-3, "c": 1.17e-3}
+    right = small_rig.record(66, {"gap_per_recording": {"g": gaps}} if gaps else {}, duration=1.5)
+    first, second, *others = right.recordings
+    loud = replace(second, samples=1.02 * second.samples)
+    scaled = replace(right, recordings=(first, loud, *others))
+    read, corrected = (scaled, right) if hides else (right, scaled)
+    rng = np.random.default_rng(0)
+    monkeypatch.setattr(module, "comparisons", lambda *_: ())
+    found = diagnose(read, rng=rng, effects=CATALOGUE, search=False)
+    assert found.verdict == "named" and [e.id for e in found.effects] == ["gap_per_recording"]
+    again = Corrected(identify(corrected, rng=rng, search=False))
+    assert makes_idle(again, found) is hides
+    monkeypatch.setattr(module, "with_steps", lambda *_, **__: again)
+    asked: Any = SimpleNamespace(rng=rng, again=lambda found, corrected, better: corrected())
+    expected = again if hides else found
+    assert module._beside_faults(found, found.corrected, (), asked, False) is expected
 
 
 @pytest.mark.parametrize(("effects", "searches"), [(3, 1), (10**7, 2)])
