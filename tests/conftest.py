@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 import small_rig
 from coarse_figures import draw_coarsely
+from compiled_once import compile_once
 
 from bayesimpact.cli import main
 from bayesimpact.inference.identify import Identification, identify
+
+
+def pytest_sessionstart() -> None:
+    if worker := os.environ.get("PYTEST_XDIST_WORKER"):
+        compile_once(worker)
 
 
 @pytest.fixture(scope="session")
