@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from browser import Tab, browser, chromium
+from coarse_figures import draw_coarsely
 from diagnosed import diagnosed
 from synthetic import make_results, row
 
 from bayesimpact.report.archive import save_results
 from bayesimpact.report.cycles import cycles, telling_cycle, touches
 from bayesimpact.report.explorer import MOST_SAMPLES, explorer_data, explorer_words, scripts
-from bayesimpact.report.figures import shares
 from bayesimpact.report.figures.force_map import force_unit
 from bayesimpact.report.figures.recordings import close_up
 from bayesimpact.report.force_in_time import force_in_time
@@ -155,11 +155,11 @@ def test_scripts_are_the_same_in_every_page_and_hold_no_address() -> None:
 
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A report written again from its files, by one process."""
+    """A report written again from its files; of its figures, this page shows the explorer's."""
     folder = tmp_path_factory.mktemp("explorer")
     save_results(compared(), folder)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(shares, "started", lambda folder: None)
+        draw_coarsely(patch)
         return rewrite_report(folder).page
 
 
