@@ -16,8 +16,9 @@ from bayesimpact.trial.table import summary_text
 
 pytestmark = pytest.mark.long
 
-# Two of each kind, of those that cost little. Seed s draws kinds[s % 4]; sizes are far above the
-# limits, for this rig is short and tells less than the paper's.
+# Two of each kind, of those that cost little, but one from outside: the search for its formula
+# costs most. Seed s draws kinds[s % 4]; sizes are far above the limits, for this rig is short and
+# tells less than the paper's.
 SETTINGS = Settings(
     effects=(
         "sensor_quadratic",
@@ -32,7 +33,7 @@ SETTINGS = Settings(
     noises=("white",),
     search=False,
 )
-SEEDS = range(8)
+SEEDS = range(7)
 
 
 def timeless(result: dict) -> dict:
@@ -49,7 +50,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> list[dict]:
 
 
 def test_every_kind_is_answered_right(results: list[dict]) -> None:
-    """Nothing is ever called wrong; a short rig may leave one or two of eight undecided."""
+    """Nothing is ever called wrong; a short rig may leave one or two of seven undecided."""
     assert not [r["failed"] for r in results if "failed" in r]
     outcomes = {
         kind: Counter(r["score"]["outcome"] for r in results if r["truth"]["kind"] == kind)
@@ -80,6 +81,6 @@ def test_one_trial_again_bit_for_bit(results: list[dict], tmp_path: Path) -> Non
 
 def test_the_summary(results: list[dict]) -> None:
     summary = summarise(results)
-    assert summary["trials"] == 8 and not summary["failed"] and len(summary["misses"]) <= 2
+    assert summary["trials"] == len(SEEDS) and not summary["failed"] and len(summary["misses"]) <= 2
     assert summary["confident_wrong_names"]["hits"] == 0
     assert "controls called adequate         100.0 %" in summary_text(summary)
