@@ -125,6 +125,7 @@ def test_a_faulty_effect_is_refused_before_any_work(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("coarse_figures")
 def test_an_effect_of_ones_own_is_named(run: Run, campaign: Path, tmp_path: Path) -> None:
     """A magnet that the catalogue does not know, played by the simulator with noise on top."""

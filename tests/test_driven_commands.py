@@ -69,6 +69,7 @@ def test_a_quick_diagnosis(
     _run(capsys, "report", tmp_path)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("coarse_figures")
 def test_an_accelerometer_on_a_mass_whose_base_moves(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -75,6 +75,7 @@ def test_modules_beside_the_recordings_are_never_imported(tmp_path: Path, diagno
     assert not (here / "cache").exists() and not (campaign / "cache").exists()
 
 
+@pytest.mark.long
 def test_workers_import_nothing_from_the_working_folder(tmp_path: Path) -> None:
     """Dask's are new processes, started in the working folder."""
     marker, here = tmp_path / "marker", tmp_path / "here"

@@ -15,6 +15,7 @@ from bayesimpact.data.read import load_campaign
 from bayesimpact.workflow import fit_campaign
 
 QUICK = 8
+ONE_PYTHON = 4  # of these
 
 
 def written(folder: Path, strange: Strange) -> Path:
@@ -26,7 +27,13 @@ def written(folder: Path, strange: Strange) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("kind", list(STRANGE)[:QUICK])
+@pytest.mark.parametrize(
+    "kind",
+    [
+        kind if number >= ONE_PYTHON else pytest.param(kind, marks=pytest.mark.long)
+        for number, kind in enumerate(list(STRANGE)[:QUICK])
+    ],
+)
 def test_a_strange_campaign_ends_in_a_report(kind: str, tmp_path: Path) -> None:
     campaign = load_campaign(written(tmp_path / "campaign", STRANGE[kind]()))
     made = fit_campaign(campaign, tmp_path / "out")

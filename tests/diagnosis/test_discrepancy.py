@@ -172,6 +172,7 @@ def test_where_nothing_remains_nothing_is_added(small):
     assert np.all((ratio > 0.9) & (ratio < 1.3)), ratio
 
 
+@pytest.mark.long
 def test_intervals_hold_the_truth_under_a_random_force():
     """Ordinary intervals do not: they count every sample of what the force left. The mode's own
     scatter is the force's, and the intervals are wider: it may also hide.

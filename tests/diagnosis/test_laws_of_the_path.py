@@ -25,7 +25,7 @@ from bayesimpact.model.effects import Effect
 LOOP, DAHL = BY_ID["hysteresis_bouc_wen"], BY_ID["presliding_friction"]
 
 
-@pytest.mark.parametrize("cut", [0, 37, 120])
+@pytest.mark.parametrize("cut", [0, pytest.param(37, marks=pytest.mark.long), 120])
 def test_a_memory_is_found_where_a_recording_was_cut(cut: int) -> None:
     """The state at the first sample is an unknown of every recording, at a release and later."""
     truth = {"stiffness": 120.0, "decay": 200.0}
@@ -68,8 +68,8 @@ def score(effect: Effect) -> Score:
     ("law", "numbers"),
     [
         (LOOP, {"stiffness": 8.0, "decay": 1 / 6e-3}),
-        (DAHL, {"force": 3e-3, "displacement": 3e-4}),
-        (LOOP, {"stiffness": 100.0, "decay": 2 / 6e-3}),
+        pytest.param(DAHL, {"force": 3e-3, "displacement": 3e-4}, marks=pytest.mark.long),
+        pytest.param(LOOP, {"stiffness": 100.0, "decay": 2 / 6e-3}, marks=pytest.mark.long),
         (DAHL, {"force": 0.05, "displacement": 3e-4}),
     ],
 )

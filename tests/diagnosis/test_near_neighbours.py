@@ -10,7 +10,9 @@ from bayesimpact.trial.rig import Release, Rig, make_campaign
 from bayesimpact.trial.rig_chain import Chain
 
 
-@pytest.mark.parametrize(("amplitude", "seed"), [(0.25, 1), (0.28, 2)])
+@pytest.mark.parametrize(
+    ("amplitude", "seed"), [(0.25, 1), pytest.param(0.28, 2, marks=pytest.mark.long)]
+)
 def test_a_sine_is_told_from_its_cubic(amplitude: float, seed: int) -> None:
     """Beside a gross misfit, where the equation of motion asks for spring_cubic first.
 

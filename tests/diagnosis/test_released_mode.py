@@ -29,7 +29,7 @@ def diagnosed(amplitudes: tuple[float, ...], decay: float, seed: int) -> Diagnos
     return bi.diagnose(campaign)
 
 
-@pytest.mark.parametrize("size", [1e-5, 3e-4])
+@pytest.mark.parametrize("size", [1e-5, pytest.param(3e-4, marks=pytest.mark.long)])
 def test_a_mode_that_rings_down_is_named_with_its_numbers(size: float) -> None:
     amplitudes = (size, 2.0 * size, 0.7 * size)
     found = diagnosed(amplitudes, DECAY, 1)

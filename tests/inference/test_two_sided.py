@@ -48,7 +48,11 @@ def recorded(
     ("second", "rig"),
     [
         (SECOND, small_rig.RIG),
-        (STIFF, replace(small_rig.RIG, g=2.0e-3, k2={"1": 26000.0, "2": 40000.0})),
+        pytest.param(
+            STIFF,
+            replace(small_rig.RIG, g=2.0e-3, k2={"1": 26000.0, "2": 40000.0}),
+            marks=pytest.mark.long,
+        ),
     ],
     ids=["paper", "stiff"],
 )
@@ -117,8 +121,8 @@ def test_an_unknown_effect_cannot_be_declared() -> None:
     ("kind", "quantity", "noise"),
     [
         ("sweep", "displacement", 5e-6),
-        ("noise", "displacement", 5e-6),
-        ("noise", "velocity", 2e-4),
+        pytest.param("noise", "displacement", 5e-6, marks=pytest.mark.long),
+        pytest.param("noise", "velocity", 2e-4, marks=pytest.mark.long),
         ("sweep", "acceleration", 2e-2),
     ],
 )

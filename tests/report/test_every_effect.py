@@ -98,7 +98,10 @@ def written(small: Identification, fit: Fit, folder: Path, verdict: str = "named
     return write_fit(final, folder, diagnosis=content, diagnosis_arrays=arrays)
 
 
-@pytest.mark.parametrize("effect_id", list(BY_ID))
+@pytest.mark.parametrize(
+    "effect_id",
+    [i if n % 4 == 0 else pytest.param(i, marks=pytest.mark.long) for n, i in enumerate(BY_ID)],
+)
 def test_report_of_every_effect(small: Identification, effect_id: str, tmp_path: Path) -> None:
     made = written(small, extended(small, effect_id), tmp_path)
     assert dict(made.failed) == {}

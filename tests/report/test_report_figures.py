@@ -89,7 +89,7 @@ def test_fifty_recordings_show_the_worst_of_every_case() -> None:
     assert len({r.name for r in shown}) == MOST
 
 
-@pytest.mark.parametrize("count", [1, 9])
+@pytest.mark.parametrize("count", [1, pytest.param(9, marks=pytest.mark.long)])
 def test_nothing_overlaps(count: int) -> None:
     """Titles and labels keep clear of one another, of other panels and of the edge."""
     results = make_results(count, 3 if count > 1 else 1, n=300)

@@ -79,6 +79,7 @@ def test_many_random_rigs(many: Found) -> None:
     assert all(count <= 1 for count in counts.values()), counts
 
 
+@pytest.mark.long
 def test_the_errors_are_of_the_size_they_say(many: Found) -> None:
     """Standardised errors neither vanish nor explode; floors make them rather too large."""
     ratios = np.array(
@@ -298,6 +299,7 @@ def test_a_plain_oscillator_passes_its_rest() -> None:
     assert abs(found.offset["a"]) < 1e-3
 
 
+@pytest.mark.long
 def test_what_stands_in_a_long_gap_is_no_motion(many: Found) -> None:
     """The estimates of a campaign with a quarter of one recording set aside are as good."""
     holed: Found = []
