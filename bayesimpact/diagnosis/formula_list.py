@@ -87,7 +87,8 @@ def listed(
         own = [terms[k] for k in subset.terms]
         sizes = tuple(float(values[f"{effect_id(t)}.size"]) for t in own)
         found = tuple(fitted_term(t, values) for t in own)
-        alike = _alike(question, classes[subset], subset)
+        head = classes.get(subset, FormulaClass(subset, subset.log_odds, ()))
+        alike = _alike(question, head, subset)
         rows.append(_row(question, subset, (found, sizes), naming.log_odds(candidate), alike))
     for head in heads[: 2 * LISTED]:
         if head.best.log_odds > 0.0 and not {head.best, *head.alike} & fitted.keys():
@@ -97,7 +98,9 @@ def listed(
             row = _row(question, head.best, (tuple(own), head.best.sizes), odds, alike)
             rows.append(replace(row, refitted=False))
     rows.sort(key=lambda f: -f.log_odds)
-    known = [naming.log_odds(c) for c in naming.tried if c not in fitted.values()]
+    holding = [set(c.ids) for c in fitted.values()]
+    others = [c for c in naming.tried if not any(ids <= set(c.ids) for ids in holding)]
+    known = [naming.log_odds(c) for c in others]  # what holds a formula does not speak against it
     total = float(np.logaddexp.reduce([*known, *(f.log_odds for f in rows)]))
     return tuple(replace(f, probability=float(np.exp(f.log_odds - total))) for f in rows[:LISTED])
 

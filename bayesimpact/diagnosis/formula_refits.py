@@ -26,7 +26,7 @@ from bayesimpact.diagnosis.refit import (
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.formula.evidence import Subset
 from bayesimpact.formula.grammar import Term
-from bayesimpact.formula.law import effect_id, effect_of, is_formula, starts_of
+from bayesimpact.formula.law import effect_id, effect_of, starts_of
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.model.effects.effect import Effect, Scales
@@ -46,12 +46,19 @@ class Question:
     ----------
     reference : the fit that the terms were scored on
     cost : nats per effect
+    ranked : formulas by their scores, likeliest first
     """
 
     reference: Fit
     cost: float
     scores: FormulaScores
     scales: Scales
+    ranked: Sequence[Subset]
+
+    @cached_property
+    def scored(self) -> dict[tuple[int, ...], Subset]:
+        """Formulas by their terms."""
+        return {s.terms: s for s in self.ranked}
 
     @cached_property
     def kind_prices(self) -> Array:
@@ -131,39 +138,62 @@ def refitted(question: Question, subset: Subset) -> Candidate | None:
 
 def without_idle(
     question: Question, naming: Naming, fitted: Mapping[Subset, Candidate], budget: Budget
-) -> dict[Subset, Candidate]:
-    """Fitted formulas without the effects that their models need no more, as far as time allows.
+) -> dict[Subset, tuple[Subset, Candidate]]:
+    """Every fitted formula without the terms and effects that its model needs no more, as far as
+    time allows.
 
-    What was fitted before may only have imitated the force that a formula is. All formulas that may
-    come within the decisive odds of the likeliest are treated alike.
+    What was fitted before may only have imitated the force that a formula is, and terms of a
+    formula what the scores, which are linear, did not see of another. All formulas that may come
+    within the decisive odds of the likeliest are treated alike.
     """
     first = max(map(naming.log_odds, fitted.values()))
-    least = first - DECISIVE - question.cost * len(question.others)
-    found = dict(fitted)
+    idle = max(len(c.effects) for c in fitted.values())
+    least = first - DECISIVE - question.cost * idle
+    found = {}
     for subset, candidate in fitted.items():
+        own = subset
         while naming.log_odds(candidate) >= least and budget.may_go_on():
-            smaller = _without_one(question, naming, subset, candidate)
+            smaller = _without_one(question, naming, own, candidate)
             if smaller is None:
                 break
-            found[subset] = candidate = smaller
+            own, candidate = smaller
+        found[subset] = own, candidate
     return found
 
 
 def _without_one(
     question: Question, naming: Naming, subset: Subset, candidate: Candidate
-) -> Candidate | None:
-    """The likeliest model with an effect less, formulas kept; None where that is decisively worse,
-    or leaves more than noise and the candidate does not.
+) -> tuple[Subset, Candidate] | None:
+    """The likeliest model with a term or an effect less; None where that is decisively worse, or
+    leaves more than noise and the candidate does not.
     """
-    price = length_price(question, subset)
-    others = [e for e in candidate.effects if not is_formula(e)]
-    found = [without(candidate, e, question.scales) for e in others]
-    smaller = [replace(c, log_evidence=c.log_evidence - price) for c in found]
-    best = max(smaller, key=naming.log_odds, default=None)
-    if best is None or naming.log_odds(candidate) - naming.log_odds(best) >= DECISIVE:
+    own = {effect_id(question.scores.terms[k]): i for i, k in enumerate(subset.terms)}
+    smaller = []
+    for effect in candidate.effects:
+        rest = subset
+        if effect.id in own:
+            if len(own) == 1:
+                continue
+            rest = _shortened(question, subset, own[effect.id])
+        found = without(candidate, effect, question.scales)
+        price = length_price(question, rest)
+        smaller.append((rest, replace(found, log_evidence=found.log_evidence - price)))
+    best = max(smaller, key=lambda one: naming.log_odds(one[1]), default=None)
+    if best is None or naming.log_odds(candidate) - naming.log_odds(best[1]) >= DECISIVE:
         return None
-    complete = leaves_something(best.fit) and not leaves_something(candidate.fit)
+    complete = leaves_something(best[1].fit) and not leaves_something(candidate.fit)
     return None if complete else best
+
+
+def _shortened(question: Question, subset: Subset, i: int) -> Subset:
+    """A formula without its term i, as it was scored, or as likely as the whole formula less the
+    price of that term: the scores of other formulas are compared with it.
+    """
+    terms = subset.terms[:i] + subset.terms[i + 1 :]
+    sizes = subset.sizes[:i] + subset.sizes[i + 1 :]
+    odds = subset.log_odds + float(question.scores.problem.price[subset.terms[i]])
+    rest = Subset(terms, sizes, odds)
+    return max(rest, question.scored.get(terms, rest), key=lambda s: s.log_odds)
 
 
 def effect_for(question: Question, i: int, size: float) -> Effect:

@@ -15,7 +15,7 @@ likeliest of all models lacks, formulas among them, is not named: it imitated wh
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -86,18 +86,26 @@ def with_formulas(
     heads = formula_classes(ranked, scores.terms, classes)
     if not any(h.best.log_odds > 0.0 for h in heads):
         return answer
-    question = Question(answer.after, answer.naming.prior_cost, scores, scales)
+    question = Question(answer.after, answer.naming.prior_cost, scores, scales, ranked)
     chosen = refit_candidates(ranked, scores.terms)
     fitted, late = _fitted(question, chosen, progress, budget)
     answer = replace(answer, naming=replace(answer.naming, finished=not late))
     if not fitted:
         return answer
     naming = joined(answer.naming, list(fitted.values()))
-    if question.others and not late:
-        progress("leaving out effects that formulas make idle")
+    if not late:
+        progress("leaving out what formulas make idle")
         smaller = without_idle(question, naming, fitted, budget)
-        naming = joined(answer.naming, [*{*fitted.values(), *smaller.values()}])
-        fitted = smaller
+        naming = joined(answer.naming, [*fitted.values(), *(c for _, c in smaller.values())])
+        fitted = _different(smaller.values(), naming, scores.terms)
+        reduced = smaller.keys() - fitted.keys()
+        own = {kinds_of(s, scores.terms) for s in fitted.keys() - smaller.keys()}
+        heads = [
+            h
+            for h in heads
+            if not reduced.intersection((h.best, *h.alike))
+            and kinds_of(h.best, scores.terms) not in own
+        ]
     first = max(fitted, key=lambda s: naming.log_odds(fitted[s]))
     rows = listed(question, naming, heads, fitted)
     named = not late and _may_be_named(question, naming, ranked, fitted, first)
@@ -134,6 +142,21 @@ def _fitted(
         if found is not None:
             fitted[subset] = found
     return fitted, False
+
+
+def _different(
+    found: Iterable[tuple[Subset, Candidate]], naming: Naming, terms: Sequence[Term]
+) -> dict[Subset, Candidate]:
+    """The likeliest fit of formulas of one kind, by the one that scored best."""
+    kinds: dict[tuple[str, ...], list[tuple[Subset, Candidate]]] = {}
+    for one in found:
+        kinds.setdefault(kinds_of(one[0], terms), []).append(one)
+    return {
+        max((s for s, _ in same), key=lambda s: s.log_odds): max(
+            (c for _, c in same), key=naming.log_odds
+        )
+        for same in kinds.values()
+    }
 
 
 def joined(naming: Naming, candidates: Sequence[Candidate]) -> Naming:

@@ -129,6 +129,23 @@ def test_an_effect_that_imitated_the_force_goes_once_the_formula_is_in(detent: A
     assert found.naming.chosen.candidate.ids == tuple(named)
 
 
+def test_a_term_that_says_nothing_beside_another_goes(detent: Any, monkeypatch: Any) -> None:
+    """Where scores, which are linear, put no shorter formula among those that are fitted."""
+    before, whole, scales = detent
+    kinds = {repr(t.kind) for t in whole.formulas.ranked[0].terms}
+
+    def longer(ranked: list[Subset], terms: list[Term]) -> list[Subset]:
+        own = [(s, {repr(terms[i].kind) for i in s.terms}) for s in ranked]
+        return [next(s for s, has in own if kinds < has and "bump" not in str(has - kinds))]
+
+    monkeypatch.setattr(formulas, "refit_candidates", longer)
+    found = asked(before, scales)
+    (first, *others) = found.formulas.ranked
+    assert {repr(t.kind) for t in first.terms} == kinds
+    assert all({repr(t.kind) for t in f.terms} != kinds for f in others)
+    assert found.formulas.named and len(found.decision.effects) == len(kinds)
+
+
 @pytest.mark.parametrize("others", [(), ("quadratic_drag",)])
 def test_no_effect_is_named_that_the_likeliest_formula_makes_idle(
     monkeypatch: Any, others: tuple[str, ...]
