@@ -15,7 +15,7 @@ likeliest of all models lacks, formulas among them, is not named: it imitated wh
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,14 +24,17 @@ from bayesimpact.diagnosis.budget import Budget
 from bayesimpact.diagnosis.decision import Decision
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.force import missing_drift, missing_force
-from bayesimpact.diagnosis.formula_list import Formulas, formula_text, listed
+from bayesimpact.diagnosis.formula_list import Formulas, listed
 from bayesimpact.diagnosis.formula_refits import (
     Question,
     kinds_of,
     length_price,
-    refit_candidates,
-    refitted,
-    without_idle,
+)
+from bayesimpact.diagnosis.formula_rounds import (
+    Refits,
+    fitted_formulas,
+    is_told,
+    scored_rivals,
 )
 from bayesimpact.diagnosis.formula_scores import formula_scores
 from bayesimpact.diagnosis.learned import LEARNED
@@ -87,28 +90,15 @@ def with_formulas(
     if not any(h.best.log_odds > 0.0 for h in heads):
         return answer
     question = Question(answer.after, answer.naming.prior_cost, scores, scales, ranked)
-    chosen = refit_candidates(ranked, scores.terms)
-    fitted, late = _fitted(question, chosen, progress, budget)
+    found = fitted_formulas(question, answer.naming, progress, budget)
+    fitted, naming, late = found.fitted, found.naming, found.late
     answer = replace(answer, naming=replace(answer.naming, finished=not late))
     if not fitted:
         return answer
-    naming = joined(answer.naming, list(fitted.values()))
-    if not late:
-        progress("leaving out what formulas make idle")
-        smaller = without_idle(question, naming, fitted, budget)
-        naming = joined(answer.naming, [*fitted.values(), *(c for _, c in smaller.values())])
-        fitted = _different(smaller.values(), naming, scores.terms)
-        reduced = smaller.keys() - fitted.keys()
-        own = {kinds_of(s, scores.terms) for s in fitted.keys() - smaller.keys()}
-        heads = [
-            h
-            for h in heads
-            if not reduced.intersection((h.best, *h.alike))
-            and kinds_of(h.best, scores.terms) not in own
-        ]
+    heads = [h for h in heads if not is_told(h, found, scores.terms)]
     first = max(fitted, key=lambda s: naming.log_odds(fitted[s]))
     rows = listed(question, naming, heads, fitted)
-    named = not late and _may_be_named(question, naming, ranked, fitted, first)
+    named = not late and _may_be_named(question, found, first)
     state = None
     if named:
         progress("scoring what the formula lacks")
@@ -124,63 +114,13 @@ def with_formulas(
     return Answer(naming, _decided(answer, fitted[first]), fitted[first].fit, None, found_formulas)
 
 
-def _fitted(
-    question: Question,
-    chosen: Sequence[Subset],
-    progress: Callable[[str], None],
-    budget: Budget,
-) -> tuple[dict[Subset, Candidate], bool]:
-    """Formulas fitted in full as far as time allows, and whether that left any out."""
-    fitted: dict[Subset, Candidate] = {}
-    for subset in chosen:
-        if not budget.may_go_on():
-            return fitted, True
-        terms = [question.scores.terms[k] for k in subset.terms]
-        text = formula_text(terms, angle=question.scales.angle)
-        progress(f"fitting the formula {text}")
-        found = refitted(question, subset)
-        if found is not None:
-            fitted[subset] = found
-    return fitted, False
-
-
-def _different(
-    found: Iterable[tuple[Subset, Candidate]], naming: Naming, terms: Sequence[Term]
-) -> dict[Subset, Candidate]:
-    """The likeliest fit of formulas of one kind, by the one that scored best."""
-    kinds: dict[tuple[str, ...], list[tuple[Subset, Candidate]]] = {}
-    for one in found:
-        kinds.setdefault(kinds_of(one[0], terms), []).append(one)
-    return {
-        max((s for s, _ in same), key=lambda s: s.log_odds): max(
-            (c for _, c in same), key=naming.log_odds
-        )
-        for same in kinds.values()
-    }
-
-
-def joined(naming: Naming, candidates: Sequence[Candidate]) -> Naming:
-    """The search with further models; samples are counted by the best residual of all, for one of
-    them may leave nothing.
-    """
-    tried = (*naming.tried, *candidates)
-    best = min(tried, key=lambda c: c.fit.reduced_chi2)
-    found = replace(naming, repetition=residual_repetition(best.fit), beside=None)
-    return replace(found, tried=tuple(sorted(tried, key=found.log_odds, reverse=True)))
-
-
-def _may_be_named(
-    question: Question,
-    naming: Naming,
-    ranked: Sequence[Subset],
-    fitted: Mapping[Subset, Candidate],
-    first: Subset,
-) -> bool:
+def _may_be_named(question: Question, found: Refits, first: Subset) -> bool:
     """Whether a formula leads all other hypotheses by the decisive odds and explains the rest.
 
     With the price of their lengths, which says what is simpler, and with that of effects alone: no
     name rests on being shorter to write.
     """
+    naming, fitted = found.naming, found.fitted
     candidate, scores = fitted[first], question.scores
     if not candidate.fit.converged or leaves_something(candidate.fit):
         return False
@@ -199,10 +139,9 @@ def _may_be_named(
         learned = Candidate(reference.target.oscillator.effects, reference, evidence)
         rivals.append((naming.log_odds(learned), 0.0, DECISIVE))
     reached, length = naming.log_odds(candidate), length_price(question, first)
-    for s in ranked:
-        if not kinds <= set(kinds_of(s, terms)):
-            odds = reached + s.log_odds - first.log_odds
-            rivals.append((odds, length_price(question, s), needed_lead(kinds, s, terms)))
+    for s in scored_rivals(question, found, first):
+        odds = reached + s.log_odds - first.log_odds
+        rivals.append((odds, length_price(question, s), needed_lead(kinds, s, terms)))
     return all(
         reached - odds > least and reached + length - odds - extra > least
         for odds, extra, least in rivals

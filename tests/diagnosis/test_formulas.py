@@ -12,15 +12,16 @@ import pytest
 from effect_rigs import BY_ID
 from small_rig import PLAIN, PLAIN_RELEASES, record
 
-from bayesimpact.diagnosis import formulas
+from bayesimpact.diagnosis import formula_rounds, formulas
 from bayesimpact.diagnosis.budget import PATIENCE, begin
 from bayesimpact.diagnosis.decision import Decision
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.force import missing_drift, missing_force
 from bayesimpact.diagnosis.formula_list import formula_text
 from bayesimpact.diagnosis.formula_refits import refit_candidates
+from bayesimpact.diagnosis.formula_rounds import joined
 from bayesimpact.diagnosis.formula_words import formula_entries, found_file
-from bayesimpact.diagnosis.formulas import Answer, joined, with_formulas
+from bayesimpact.diagnosis.formulas import Answer, with_formulas
 from bayesimpact.diagnosis.learned import LEARNED
 from bayesimpact.diagnosis.naming import Naming, State
 from bayesimpact.diagnosis.refit import (
@@ -136,9 +137,9 @@ def test_a_term_that_says_nothing_beside_another_goes(detent: Any, monkeypatch: 
 
     def longer(ranked: list[Subset], terms: list[Term]) -> list[Subset]:
         own = [(s, {repr(terms[i].kind) for i in s.terms}) for s in ranked]
-        return [next(s for s, has in own if kinds < has and "bump" not in str(has - kinds))]
+        return [s for s, has in own if kinds < has and "bump" not in str(has - kinds)][:1]
 
-    monkeypatch.setattr(formulas, "refit_candidates", longer)
+    monkeypatch.setattr(formula_rounds, "refit_candidates", longer)
     found = asked(before, scales)
     (first, *others) = found.formulas.ranked
     assert {repr(t.kind) for t in first.terms} == kinds
@@ -260,14 +261,15 @@ def test_no_name_rests_on_being_shorter_to_write(
     terms = (Term("everywhere", ONE, Power(2.0, True)), rival)
     question = SimpleNamespace(
         scores=SimpleNamespace(terms=terms), reference=fit, cost=4.0,
-        kind_prices=np.array([5.0, price]),
+        kind_prices=np.array([5.0, price]), ranked=(),
     )  # fmt: skip
     own = Effect("formula_one", "formula", "", "", "free", "either", "")
     other = Effect("formula_two", "formula", "", "", "free", "either", "")
     first, second = Subset((0,), (1.0,), 100.0), Subset((1,), (1.0,), 93.0)
     fitted = {first: Candidate((own,), fit, 0.0), second: Candidate((other,), fit, -7.0)}
     naming = replace(found.naming, tried=tuple(fitted.values()))
-    said = formulas._may_be_named(question, naming, [first, second], fitted, first)  # type: ignore[arg-type]
+    refits = formula_rounds.Refits(frozenset(fitted), fitted, naming, False)
+    said = formulas._may_be_named(question, refits, first)  # type: ignore[arg-type]
     assert said is named
 
 
