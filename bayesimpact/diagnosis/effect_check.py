@@ -162,7 +162,7 @@ def _steps(effect: Effect) -> Answer:
 
 def _derivatives(effect: Effect) -> Answer:
     """Forward differences, as a fit takes them, against central ones of a smaller step."""
-    sizes = [p for p in effect.parameters if p.is_size and p.fixed is None]
+    sizes = [p for p in effect.parameters if p.is_size]
     if not sizes:
         return "skipped", "it is on or off"
     worst = 0.0

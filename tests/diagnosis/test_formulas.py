@@ -13,6 +13,7 @@ from effect_rigs import BY_ID
 from small_rig import PLAIN, PLAIN_RELEASES, record
 
 from bayesimpact.diagnosis import formula_rounds, formulas
+from bayesimpact.diagnosis.asked import Asked
 from bayesimpact.diagnosis.budget import PATIENCE, begin
 from bayesimpact.diagnosis.decision import Decision
 from bayesimpact.diagnosis.extend import campaign_scales
@@ -31,7 +32,7 @@ from bayesimpact.diagnosis.refit import (
     residual_repetition,
 )
 from bayesimpact.diagnosis.remainder import likeliest_formula, remainder
-from bayesimpact.diagnosis.scan import score_directions
+from bayesimpact.diagnosis.scan import scan, score_directions
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.diagnosis.unknown import with_force
 from bayesimpact.formula.evidence import Subset
@@ -145,6 +146,16 @@ def test_a_term_that_says_nothing_beside_another_goes(detent: Any, monkeypatch: 
     assert {repr(t.kind) for t in first.terms} == kinds
     assert all({repr(t.kind) for t in f.terms} != kinds for f in others)
     assert found.formulas.named and len(found.decision.effects) == len(kinds)
+
+
+def test_a_formula_is_scored_and_asked_for_like_any_effect(detent: Any) -> None:
+    """Its fixed numbers are no sizes: they have no place among the unknowns."""
+    before, found, scales = detent
+    base, (law,) = before.naming.base.candidate.fit, found.decision.effects
+    (score,) = scan(base, (law,), scales, rng=np.random.default_rng(0)).best()
+    assert score.names == (f"{law.id}.size",) and score.gain > 10.0
+    asked_for = Asked(base, (law,), scales)
+    assert asked_for.seen == {law.id}
 
 
 @pytest.mark.parametrize("others", [(), ("quadratic_drag",)])

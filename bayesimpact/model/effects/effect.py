@@ -139,13 +139,13 @@ class EffectParameter:
 
     @property
     def is_size(self) -> bool:
-        """True when the effect vanishes with it: neither a shape nor an initial state."""
-        return not (self.is_shape or self.initial)
+        """True when the effect vanishes with it: no shape, initial state or fixed number."""
+        return self.fixed is None and not (self.is_shape or self.initial)
 
     @property
     def is_shape(self) -> bool:
         """True when the parameter means nothing while the effect is at its null."""
-        return self.null is None and self.replaces is None
+        return self.null is None and self.replaces is None and self.fixed is None
 
 
 @dataclass(frozen=True)
@@ -280,7 +280,7 @@ class Effect(Picklable):
     @property
     def has_size(self) -> bool:
         """False for an effect that is on or off: it has no parameters, or only shapes."""
-        return any(p.is_size and p.fixed is None for p in self.parameters)
+        return any(p.is_size for p in self.parameters)
 
     def excludes(self, other: Effect) -> frozenset[str]:
         """Slots that both claim: each feeds one, or one feeds what the other fixes."""
