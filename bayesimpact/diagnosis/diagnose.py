@@ -209,7 +209,7 @@ def _beside_faults(
     def corrected() -> Corrected:
         return with_steps(before, steps, rng=searches.rng, search=search)
 
-    if not is_settled(found):
+    if not is_settled(found) or not searches.budget.may_go_on():
         return searches.again(found, corrected, is_simpler)
     again = corrected()
     if not makes_idle(again, found):

@@ -144,9 +144,9 @@ def without_idle(
 
     What was fitted before may only have imitated the force that a formula is, and terms of a
     formula what the scores, which are linear, did not see of another. All formulas that may come
-    within the decisive odds of the likeliest are treated alike.
+    within the decisive odds of the likeliest model of the search `naming` are treated alike.
     """
-    first = max(map(naming.log_odds, fitted.values()))
+    first = naming.log_odds(naming.tried[0])
     idle = max(len(c.effects) for c in fitted.values())
     least = first - DECISIVE - question.cost * idle
     found = {}

@@ -60,17 +60,29 @@ def fitted_formulas(
     for _ in range(ROUNDS):
         fitted, late = _fitted(question, todo, progress, budget)
         begun |= fitted
-        whole = joined(naming, [*begun.values(), *(c for _, c in ends.values())])
+        ends |= {s: (s, c) for s, c in fitted.items()}
         if fitted and not late:
             progress("leaving out what formulas make idle")
+            whole = _with_all(naming, begun, ends)
             ends |= without_idle(question, whole, fitted, budget)
-        ends = {**{s: (s, c) for s, c in begun.items()}, **ends}
-        whole = joined(naming, [*begun.values(), *(c for _, c in ends.values())])
+            late = not budget.may_go_on()  # and so some may be compared as they were begun
+        whole = _with_all(naming, begun, ends)
         found = Refits(frozenset(begun), _different(ends.values(), whole, terms), whole, late)
         todo = [] if late or not fitted else _unsettled(question, found)
         if not todo:
             break
     return found
+
+
+def _with_all(
+    naming: Naming,
+    begun: Mapping[Subset, Candidate],
+    ends: Mapping[Subset, tuple[Subset, Candidate]],
+) -> Naming:
+    """The search with the models of formulas as they were begun and as they ended."""
+    return joined(
+        naming, [*begun.values(), *(c for s, c in ends.values() if c is not begun.get(s))]
+    )
 
 
 def _unsettled(question: Question, found: Refits) -> list[Subset]:

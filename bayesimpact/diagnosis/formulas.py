@@ -6,8 +6,8 @@ refitted in full, as effects like any. One is named when
 
 - it leaves nothing, by the tests that the catalogue's models pass (`State.is_white`), and
 - it leads every other hypothesis by the decisive odds: the models of the search, the learned force,
-  and all other formulas that do not contain it, fitted or scored; with the price of their lengths
-  and without it, as effects are compared.
+  and all other formulas that do not contain it, fitted or, where none of their kind was, scored;
+  with the price of their lengths and without it, as effects are compared.
 
 Else the formulas are listed with their odds, and the verdict stays; but an effect that the
 likeliest of all models lacks, formulas among them, is not named: it imitated what a formula is.

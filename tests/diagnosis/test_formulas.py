@@ -158,6 +158,25 @@ def test_a_formula_is_scored_and_asked_for_like_any_effect(detent: Any) -> None:
     assert asked_for.seen == {law.id}
 
 
+def test_formulas_that_still_speak_against_the_likeliest_are_fitted_next(
+    detent: Any, monkeypatch: Any
+) -> None:
+    """The first round meets only one that the force is not."""
+    before, whole, scales = detent
+    chosen, turns = formula_rounds.refit_candidates, []
+
+    def late(ranked: list[Subset], terms: list[Term]) -> list[Subset]:
+        turns.append(len(ranked))
+        if len(turns) > 1:
+            return chosen(ranked, terms)
+        return [s for s in ranked if all(terms[i].region != "bump" for i in s.terms)][:1]
+
+    monkeypatch.setattr(formula_rounds, "refit_candidates", late)
+    found = asked(before, scales)
+    assert len(turns) > 1 and found.decision.verdict == "named"
+    assert found.formulas.ranked[0].terms[0].kind == whole.formulas.ranked[0].terms[0].kind
+
+
 @pytest.mark.parametrize("others", [(), ("quadratic_drag",)])
 def test_no_effect_is_named_that_the_likeliest_formula_makes_idle(
     monkeypatch: Any, others: tuple[str, ...]

@@ -17,6 +17,7 @@ from bayesimpact.data.faults.noise import loud_recordings
 from bayesimpact.data.faults.spikes import find_spikes
 from bayesimpact.diagnosis import diagnose as module
 from bayesimpact.diagnosis import recording_faults as faults
+from bayesimpact.diagnosis.budget import begin
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.document import document
 from bayesimpact.diagnosis.faults.compare import Compared
@@ -187,9 +188,13 @@ def test_faults_that_do_nothing_that_the_effects_do_are_not_searched_beside(
     again = Corrected(identify(corrected, rng=rng, search=False))
     assert makes_idle(again, found) is hides
     monkeypatch.setattr(module, "with_steps", lambda *_, **__: again)
-    asked: Any = SimpleNamespace(rng=rng, again=lambda found, corrected, better: corrected())
+    asked: Any = SimpleNamespace(
+        rng=rng, again=lambda found, corrected, better: corrected(), budget=begin(lambda: 0.0)
+    )
     expected = again if hides else found
     assert module._beside_faults(found, found.corrected, (), asked, False) is expected
+    asked.budget = begin(lambda: 0.0, 0.0)  # no time to ask: what `again` says of that stands
+    assert module._beside_faults(found, found.corrected, (), asked, False) is again
 
 
 @pytest.mark.parametrize(("effects", "searches"), [(3, 1), (10**7, 2)])
