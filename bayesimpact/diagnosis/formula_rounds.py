@@ -36,7 +36,7 @@ class Refits:
     ----------
     begun : as they were begun
     fitted : what is left of them without idle terms and effects, of every kind the likeliest
-    naming : the search with all of their models
+    naming : the search with these models
     late : whether time left any out
     """
 
@@ -53,36 +53,25 @@ def fitted_formulas(
     scores still speak against the likeliest, `ROUNDS` times at most.
     """
     terms = question.scores.terms
-    begun: dict[Subset, Candidate] = {}
+    begun: set[Subset] = set()
     ends: dict[Subset, tuple[Subset, Candidate]] = {}
     found = Refits(frozenset(), {}, naming, False)
     todo = refit_candidates(question.ranked, terms)
     for _ in range(ROUNDS):
         fitted, late = _fitted(question, todo, progress, budget)
-        begun |= fitted
+        begun |= fitted.keys()
         ends |= {s: (s, c) for s, c in fitted.items()}
+        whole = joined(naming, [c for _, c in ends.values()])
         if fitted and not late:
             progress("leaving out what formulas make idle")
-            whole = _with_all(naming, begun, ends)
             ends |= without_idle(question, whole, fitted, budget)
             late = not budget.may_go_on()  # and so some may be compared as they were begun
-        whole = _with_all(naming, begun, ends)
-        found = Refits(frozenset(begun), _different(ends.values(), whole, terms), whole, late)
+        best = _different(ends.values(), whole, terms)
+        found = Refits(frozenset(begun), best, joined(naming, list(best.values())), late)
         todo = [] if late or not fitted else _unsettled(question, found)
         if not todo:
             break
     return found
-
-
-def _with_all(
-    naming: Naming,
-    begun: Mapping[Subset, Candidate],
-    ends: Mapping[Subset, tuple[Subset, Candidate]],
-) -> Naming:
-    """The search with the models of formulas as they were begun and as they ended."""
-    return joined(
-        naming, [*begun.values(), *(c for s, c in ends.values() if c is not begun.get(s))]
-    )
 
 
 def _unsettled(question: Question, found: Refits) -> list[Subset]:
@@ -135,16 +124,15 @@ def is_told(head: FormulaClass, found: Refits, terms: Sequence[Term]) -> bool:
 def _different(
     found: Iterable[tuple[Subset, Candidate]], naming: Naming, terms: Sequence[Term]
 ) -> dict[Subset, Candidate]:
-    """The likeliest fit of formulas of one kind, by the one that scored best."""
+    """The likeliest fit of formulas of one kind, as likely by its scores as the best of them."""
     kinds: dict[tuple[str, ...], list[tuple[Subset, Candidate]]] = {}
     for one in found:
         kinds.setdefault(kinds_of(one[0], terms), []).append(one)
-    return {
-        max((s for s, _ in same), key=lambda s: s.log_odds): max(
-            (c for _, c in same), key=naming.log_odds
-        )
-        for same in kinds.values()
-    }
+    best = {}
+    for same in kinds.values():
+        subset, candidate = max(same, key=lambda one: naming.log_odds(one[1]))
+        best[replace(subset, log_odds=max(s.log_odds for s, _ in same))] = candidate
+    return best
 
 
 def joined(naming: Naming, candidates: Sequence[Candidate]) -> Naming:

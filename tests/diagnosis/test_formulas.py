@@ -177,6 +177,18 @@ def test_formulas_that_still_speak_against_the_likeliest_are_fitted_next(
     assert found.formulas.ranked[0].terms[0].kind == whole.formulas.ranked[0].terms[0].kind
 
 
+def test_of_two_fits_of_one_kind_the_likelier_keeps_its_own_terms(detent: Any) -> None:
+    """Terms on a grid have names of their own: those of another made a traceback."""
+    _, found, _ = detent
+    terms = [WIDE, replace(WIDE, place=1e-3), CUBE]
+    near, far, cube = (Subset((i,), (1.0,), odds) for i, odds in enumerate((5.0, 9.0, 7.0)))
+    fit = found.after
+    good, bad, other = (Candidate((), fit, value) for value in (3.0, 2.0, 1.0))
+    ends = [(near, good), (far, bad), (cube, other)]
+    best = formula_rounds._different(ends, found.naming, terms)
+    assert best == {replace(near, log_odds=9.0): good, cube: other}
+
+
 @pytest.mark.parametrize("others", [(), ("quadratic_drag",)])
 def test_no_effect_is_named_that_the_likeliest_formula_makes_idle(
     monkeypatch: Any, others: tuple[str, ...]
