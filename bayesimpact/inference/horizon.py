@@ -42,6 +42,14 @@ def growing_horizon(
     Parameters `held` stay where they start until the whole recordings count: what a short stretch
     does not tell, it should not move. Other arguments as for `find_mode`.
     """
+    theta = by_stretches(target, start, steps=steps, held=held)
+    return find_mode(target, theta, steps=steps, tolerance=tolerance, max_iterations=max_iterations)
+
+
+def by_stretches(
+    target: Target, start: Array, *, steps: Array | None = None, held: Sequence[int] = ()
+) -> Array:
+    """Where the modes for ever longer stretches lead from `start` (d,); arguments as above."""
     theta = start
     k1 = float(start[target.oscillator.layout.index("k1")])
     for duration in stretches(target.oscillator.campaign, k1):
@@ -50,7 +58,7 @@ def growing_horizon(
             steps=steps, held=held, tolerance=ROUGHLY, max_iterations=SOON,
         )  # fmt: skip
         theta = there.mode if np.isfinite(there.log_posterior) else theta
-    return find_mode(target, theta, steps=steps, tolerance=tolerance, max_iterations=max_iterations)
+    return theta
 
 
 def best_climb(

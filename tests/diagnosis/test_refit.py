@@ -12,6 +12,7 @@ from effect_rigs import BY_ID
 from scipy import integrate, stats
 from scipy.special import logsumexp
 
+from bayesimpact.diagnosis import refit as refits
 from bayesimpact.diagnosis.directions import directions
 from bayesimpact.diagnosis.evidence import SPREADS, common_spread, log_evidence
 from bayesimpact.diagnosis.extend import campaign_scales, extend, transfer
@@ -19,6 +20,7 @@ from bayesimpact.diagnosis.refit import (
     Candidate,
     base_candidate,
     fit_from,
+    or_by_stretches,
     refit,
     tempered_evidence,
     without,
@@ -234,6 +236,27 @@ def test_leaving_an_effect_out_returns_to_the_base_model(planted):
     assert back.ids == ()
     assert back.log_evidence == pytest.approx(base_candidate(fit).log_evidence, abs=0.02)
     np.testing.assert_array_less(np.abs(back.fit.mode - fit.mode) / fit.sd, 0.1)
+
+
+def off_the_mode(fit, factor):
+    """A start with another frequency, and the difference steps of the mode."""
+    theta = fit.mode.copy()
+    theta[fit.names.index("k1")] *= factor
+    return theta, 0.05 * np.where(fit.sd > 0, fit.sd, 1e-9)
+
+
+def test_no_climb_follows_stretches_that_come_out_higher(planted, monkeypatch):
+    fit, _ = planted
+    start, steps = off_the_mode(fit, 1.02)
+    climbs = []
+
+    def counted(target, *args, **options):
+        climbs.append(target)
+        return find_mode(target, *args, **options)
+
+    monkeypatch.setattr(refits, "find_mode", counted)
+    assert or_by_stretches(fit, start, steps) is fit
+    assert not climbs
 
 
 def test_an_effect_that_kept_the_motion_bounded_may_be_left_out(planted):

@@ -1,0 +1,33 @@
+"""Which frequencies are the motion's own: what it passes through, not what its ends leak."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bayesimpact.data.recording import Recording
+from bayesimpact.diagnosis.own_band import _moves_at
+
+INTERVAL, SAMPLES = 1.0 / 550.0, 242
+LINE = 1.0 / (INTERVAL * SAMPLES)  # Hz that the duration resolves
+
+
+def decay(first: float, last: float) -> Recording:
+    """A decay whose frequency, Hz, changes steadily from `first` to `last`."""
+    t = INTERVAL * np.arange(SAMPLES)
+    phase = 2 * np.pi * (first * t + 0.5 * (last - first) * t**2 / t[-1])
+    return Recording("struck", "", np.exp(-2.2 * t) * np.cos(phase), INTERVAL)
+
+
+@pytest.mark.parametrize(
+    ("lines", "own"), [(0.0, True), (1.0, True), (-1.0, True), (2.8, False), (-3.0, False)]
+)
+def test_a_motion_of_one_frequency_leaks_to_no_other(lines, own):
+    """Cut off at both ends, its spectrum falls with 1 / f: to a tenth three lines away."""
+    assert _moves_at(decay(19.8, 19.8), 19.8 + lines * LINE) is own
+
+
+@pytest.mark.parametrize(("frequency", "own"), [(17.0, True), (20.0, True), (23.0, True),
+                                                (11.0, False), (29.0, False)])  # fmt: skip
+def test_frequencies_that_a_motion_passes_through_are_its_own(frequency, own):
+    assert _moves_at(decay(24.0, 16.0), frequency) is own
