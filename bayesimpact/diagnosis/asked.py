@@ -42,14 +42,14 @@ class Asked:
             self.posed[key] = LikelySets(at, self.effects, self.scales, flight=flight)
         return self.posed[key]
 
-    def first(self, model: Candidate) -> set[str]:
-        """Effects that are asked for first beside a model.
+    def first(self, model: Candidate, about: Candidate) -> set[str]:
+        """Effects that are asked for first beside a model, posed `about` the best one known.
 
         What acts in flight is judged there, the others by all stretches.
         """
         first, seen = set[str](), set[str]()
         for flight in (True, False) if self.has_stop else (False,):
-            found = self.about(model, flight).gains(model.ids)
+            found = self.about(about, flight).gains(model.ids)
             gains = {i: g for i, g in found.items() if i not in seen}
             first |= set(sorted(gains, key=lambda i: -gains[i])[:ASKED])
             seen |= set(gains)

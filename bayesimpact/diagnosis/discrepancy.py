@@ -24,11 +24,12 @@ from scipy.optimize import minimize_scalar
 from bayesimpact.diagnosis.force import whitened_one
 from bayesimpact.diagnosis.hidden import about, parameter_forces
 from bayesimpact.diagnosis.marginal import Part, gain, products
+from bayesimpact.diagnosis.sizes import sizes_of
 from bayesimpact.diagnosis.thresholds import DOUBT
 from bayesimpact.inference.fit import Fit, inverse
 from bayesimpact.model.effects.effect import Effect
 from bayesimpact.model.oscillator import build_oscillator
-from bayesimpact.model.parameters import BASE_SLOTS, SLOTS, WITHOUT, bare_name
+from bayesimpact.model.parameters import BASE_SLOTS, SLOTS, WITHOUT
 from bayesimpact.model.superposition import Motion, answers, motion_along
 
 Array = NDArray[np.float64]
@@ -144,15 +145,11 @@ class Discrepancy:
         """Standard deviations of an effect's size, its shape as fitted, from none at all: of the
         largest one; infinite where it has no size.
         """
-        layout, own = self.fit.target.oscillator.layout, f"{effect.id}."
-        at = [i for i, name in enumerate(layout.names) if name.startswith(own)]
-        kinds = [effect.parameter(bare_name(layout.names[i])) for i in at]
-        shapes = [i for i, kind in zip(at, kinds, strict=True) if kind.is_shape]
-        sizes = [(i, kind.null) for i, kind in zip(at, kinds, strict=True) if kind.is_size]
-        found = [np.inf] if not sizes or any(null is None for _, null in sizes) else []
-        for i, null in sizes if not found else ():
+        sizes, shapes = sizes_of(self.fit, effect)
+        found = [] if sizes else [np.inf]
+        for i, null in sizes:
             part = inverse(self.posterior[1][np.ix_([i, *shapes], [i, *shapes])])
-            found.append(abs(float(self.fit.mode[i]) - float(null or 0.0)) * part[0, 0] ** 0.5)
+            found.append(abs(float(self.fit.mode[i]) - null) * part[0, 0] ** 0.5)
         return float(max(found))
 
 

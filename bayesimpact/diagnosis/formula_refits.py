@@ -23,6 +23,7 @@ from bayesimpact.diagnosis.refit import (
     step_sizes,
     without,
 )
+from bayesimpact.diagnosis.sizes import loss_without
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.formula.evidence import Subset
 from bayesimpact.formula.grammar import Term
@@ -35,6 +36,7 @@ Array = NDArray[np.float64]
 
 REFITTED = 6  # formulas of different kinds
 MOST_SHAPES = 3  # of one formula: with more of them a climb takes half a minute, and rarely rests
+SURE = 20.0  # times the decisive odds by which a linear loss is surely no less: set by hand
 BEHIND = 60.0  # nats by which a score may underrate a formula that a refit would put first
 
 
@@ -171,6 +173,8 @@ def _without_one(
     smaller = []
     for effect in candidate.effects:
         rest = subset
+        if loss_without(candidate.fit, effect) > SURE * DECISIVE * naming.repetition:
+            continue
         if effect.id in own:
             if len(own) == 1:
                 continue

@@ -138,7 +138,7 @@ class Models:
         if begun not in self.begun:
             self.begun.add(begun)
             self.tell("fitting " + " + ".join((*candidate.ids, *(s.effect.id for s in scores))))
-            self.keep(refit(candidate.fit, scores, self.scales))
+            self.keep(refit(candidate.fit, scores, self.scales, goal=self.goal()))
 
     def fit_sets(self, about: Candidate, most: int, flight: bool) -> list[Candidate]:
         """Models that the equation of motion asks for about a model, in flight or altogether.
@@ -176,16 +176,21 @@ class Models:
         return Asked(self.states[frozenset()].candidate.fit, self.effects, self.scales)
 
     def asked_beside(
-        self, candidate: Candidate, found: Scan, promising: Sequence[Score]
+        self, candidate: Candidate, about: Candidate, found: Scan, promising: Sequence[Score]
     ) -> list[Score]:
         """Scores that are tried beside a model, the `promising` ones; with a large misfit those
-        that the equation of motion asks for first, and of the promising ones what it does not see.
+        that the equation of motion, posed `about` a model, asks for first, and of the promising
+        ones what it does not see.
         """
         if not is_large(candidate.fit):
             return list(promising)
-        first, seen = self.asked.first(candidate), self.asked.seen
+        first, seen = self.asked.first(candidate, about), self.asked.seen
         kept = first | {s.effect.id for s in promising if s.effect.id not in seen}
         return [s for s in found.best() if s.effect.id in kept]
+
+    def goal(self) -> float:
+        """Log likelihood below which no climb matters: minus infinity, as long as none is known."""
+        return -np.inf
 
     def may_go_on(self) -> bool:
         """Whether the budget allows for more refits."""
@@ -215,7 +220,7 @@ class Models:
         if begun not in self.begun:
             self.begun.add(begun)
             self.tell(f"{new.id} in place of {old.id} in " + " + ".join(candidate.ids))
-            self.keep(exchanged(candidate, old, new, self.scales))
+            self.keep(exchanged(candidate, old, new, self.scales, goal=self.goal()))
 
     def finished(self, candidate: Candidate) -> Candidate:
         """A model whose climb did not converge, at the highest point of its profile likelihood."""

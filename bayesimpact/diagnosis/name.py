@@ -151,7 +151,7 @@ class _Search(Remaining):
         behind = max(map(self.log_odds, self.tried.values())) - self.log_odds(state.candidate)
         least = 0.0 if is_large(state.candidate.fit) else behind / SCORE_UNDERESTIMATE
         scores = self.refit_candidates(state.scan, least)
-        scores = self.asked_beside(state.candidate, state.scan, scores)
+        scores = self.asked_beside(state.candidate, state.candidate, state.scan, scores)
         found = self.fitted(state, scores)
         if not self.may_go_on():
             return found

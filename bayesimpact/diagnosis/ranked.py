@@ -12,6 +12,7 @@ from bayesimpact.diagnosis.promising import refit_candidates
 from bayesimpact.diagnosis.refit import Candidate, residual_repetition, tempered_evidence
 from bayesimpact.diagnosis.scan import Scan
 from bayesimpact.diagnosis.scores import Score
+from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.model.effects.effect import Effect
 
 MOST_EFFECTS = 3
@@ -63,6 +64,14 @@ class Ranked(Models):
         """
         base = self.states[frozenset()]
         return self.log_odds(base.candidate) + base.unknown.log_evidence / self.repetition()
+
+    def goal(self) -> float:
+        """Log likelihood that a model must reach to come within the decisive odds of one that
+        leaves nothing: no evidence is above the largest likelihood. Minus infinity without one.
+        """
+        complete = [s.candidate for s in self.states.values() if s.is_white]
+        reached = max(map(self.log_odds, complete), default=-np.inf)
+        return self.repetition() * (reached - DECISIVE)
 
     def best(self, size: int) -> Candidate:
         """The likeliest model tried with at most so many effects."""

@@ -74,13 +74,14 @@ def base_candidate(fit: Fit) -> Candidate:
     return Candidate(fit.target.oscillator.effects, fit, model_evidence(fit))
 
 
-def refit(fit: Fit, scores: Sequence[Score], scales: Scales) -> Candidate:
+def refit(fit: Fit, scores: Sequence[Score], scales: Scales, *, goal: float = -np.inf) -> Candidate:
     """Fit the model of `fit` with the effects of `scores` added.
 
     The scores are linear predictions. The climb begins at the best point between the unshifted
     model and the predicted one; one that gains nothing begins again at either end. Where the misfit
     is large, predictions point beyond the mode and side minima lie close: there a climb over
-    growing stretches of the recordings is taken too.
+    growing stretches of the recordings is taken too. A climb that will not reach a log likelihood
+    of `goal` ends early.
     """
     effects = (*fit.target.oscillator.effects, *(s.effect for s in scores))
     shapes = {name: value for s in scores for name, value in s.shapes.items()}
@@ -93,10 +94,14 @@ def refit(fit: Fit, scores: Sequence[Score], scales: Scales) -> Candidate:
         fit, target, step_sizes(names, target.oscillator.acting, scales, scores)
     )
     start = best_start(target, unshifted, predicted, steps)
-    options: dict[str, Any] = {"steps": steps, "tolerance": TOLERANCE, "max_iterations": ITERATIONS}
-    found = find_mode(target, start, **options)
+    goal += prior_at(target, unshifted)
+    options: dict[str, Any] = {
+        "steps": steps, "tolerance": TOLERANCE, "max_iterations": ITERATIONS, "goal": goal
+    }  # fmt: skip
     if fit.reduced_chi2 > LARGE**2:
-        found = or_by_stretches(found, unshifted, steps)
+        found = of_two_ways(target, start, unshifted, steps, goal)
+    else:
+        found = find_mode(target, start, **options)
     for other in (predicted, unshifted):
         gained = found.log_likelihood > fit.log_likelihood + GAINED
         if not (np.array_equal(start, other) or gained):
@@ -128,20 +133,49 @@ def by_growing_horizon(target: Target, start: Array, steps: Array) -> Fit:
     return find_mode(target, theta, steps=steps, tolerance=TOLERANCE, max_iterations=ITERATIONS)
 
 
-def or_by_stretches(found: Fit, start: Array, steps: Array | None) -> Fit:
-    """The end of a climb, or the one that ever longer stretches lead to from the same start.
-
-    These find another mode where the climb ended in a side minimum; then they come out lower than
-    its end before they climb with the whole recordings (all six of 63 climbs of development that
-    ended higher by this way did, but for one; it was unconverged and far from the likeliest).
+def of_two_ways(target: Target, start: Array, first: Array, steps: Array, goal: float) -> Fit:
+    """The likelier end of a climb from `start` and of the one that ever longer stretches lead to
+    from `first`. Either ends early where it will not reach a log posterior of `goal`, the climb
+    also where it will not come as far as the stretches did.
     """
-    target = found.target
+    theta, reached = _stretched(target, first, steps)
+    found = find_mode(
+        target, start,
+        steps=steps, tolerance=TOLERANCE, max_iterations=ITERATIONS, goal=max(goal, reached),
+    )  # fmt: skip
+    return _or_from(found, theta, reached, steps, goal)
+
+
+def or_by_stretches(found: Fit, start: Array, steps: Array | None, goal: float = -np.inf) -> Fit:
+    """The end of a climb, or the one that ever longer stretches lead to from the same start."""
+    return _or_from(found, *_stretched(found.target, start, steps), steps, goal)
+
+
+def _stretched(target: Target, start: Array, steps: Array | None) -> tuple[Array, float]:
+    """Where ever longer stretches lead to, and the log posterior of the whole recordings there."""
     theta = by_stretches(target, start, steps=steps, held=_shapes(target))
-    reached = Climb(target, steps, None, ()).evaluate(theta.copy()).value
-    if not reached < -found.log_posterior:
+    return theta, -Climb(target, steps, None, ()).evaluate(theta.copy()).value
+
+
+def _or_from(found: Fit, theta: Array, reached: float, steps: Array | None, goal: float) -> Fit:
+    """The end of a climb, or of one from where stretches lead to, if they `reached` more.
+
+    They do where they lead to another mode than a climb that ended in a side minimum (all six of 63
+    climbs of development that ended higher by way of them, but for one; it was unconverged and far
+    from the likeliest).
+    """
+    if not reached > found.log_posterior:
         return found
-    other = find_mode(target, theta, steps=steps, tolerance=TOLERANCE, max_iterations=ITERATIONS)
+    other = find_mode(
+        found.target, theta,
+        steps=steps, tolerance=TOLERANCE, max_iterations=ITERATIONS, goal=goal,
+    )  # fmt: skip
     return better(found, other)
+
+
+def prior_at(target: Target, theta: Array) -> float:
+    """Log prior density at one point (d,)."""
+    return float(np.ravel(target.priors.log_density(theta[None]))[0])
 
 
 def _shapes(target: Target) -> list[int]:
@@ -186,30 +220,36 @@ def grown(candidate: Candidate, effects: tuple[Effect, ...], scales: Scales) -> 
     return _refitted(candidate, effects, scales)
 
 
-def exchanged(candidate: Candidate, old: Effect, new: Effect, scales: Scales) -> Candidate:
+def exchanged(
+    candidate: Candidate, old: Effect, new: Effect, scales: Scales, *, goal: float = -np.inf
+) -> Candidate:
     """The candidate's model with an effect that has no size in the place of one of its own.
 
     Such an effect cannot grow from nothing, so the climb begins where the imitated one stands.
     """
     effects = (*(e for e in candidate.effects if e.id != old.id), new)
-    return _refitted(candidate, effects, scales)
+    return _refitted(candidate, effects, scales, goal)
 
 
-def _refitted(candidate: Candidate, effects: tuple[Effect, ...], scales: Scales) -> Candidate:
+def _refitted(
+    candidate: Candidate, effects: tuple[Effect, ...], scales: Scales, goal: float = -np.inf
+) -> Candidate:
     """A model fitted from the candidate's mode, effects that it lacks at their null."""
     target = extend(candidate.fit, effects, scales)
     layout = target.oscillator.layout
     start = transfer(candidate.fit, layout, effects, scales, {})
     sizes = step_sizes(layout.names, target.oscillator.acting, scales, ())
     steps = difference_steps(candidate.fit, target, sizes)
-    found = find_mode(target, start, steps=steps, tolerance=TOLERANCE, max_iterations=ITERATIONS)
+    goal += prior_at(target, start)
+    options: dict[str, Any] = {
+        "steps": steps, "tolerance": TOLERANCE, "max_iterations": ITERATIONS, "goal": goal
+    }  # fmt: skip
+    found = find_mode(target, start, **options)
     if not np.isfinite(found.log_posterior):  # an effect that is gone had kept the motion bounded
         start = at_null(target, start)
-        found = find_mode(
-            target, start, steps=steps, tolerance=TOLERANCE, max_iterations=ITERATIONS
-        )
+        found = find_mode(target, start, **options)
     if found.reduced_chi2 > LARGE**2:
-        found = or_by_stretches(found, start, steps)
+        found = or_by_stretches(found, start, steps, goal)
     return Candidate(effects, found, model_evidence(found))
 
 

@@ -78,10 +78,10 @@ class Settling(Ranked):
                 for joint in others:
                     if len(joint) > 1 and joint[0].effect.family == effect.family:
                         self.fit_more(rest, joint)
-            scores = self.asked_beside(rest, found, self.refit_candidates(found))
+            scores = self.asked_beside(rest, chosen, found, self.refit_candidates(found))
             large = is_large(rest.fit)
             for score in in_place_of(
-                effect, scores, large, self.asked.first(rest) if large else ()
+                effect, scores, large, self.asked.first(rest, chosen) if large else ()
             ):
                 if self.may_go_on() and not is_redundant(rest, score.effect):
                     self.fit_one(rest, found, score)

@@ -41,6 +41,7 @@ def find_mode(
     tolerance: float = 1e-3,
     max_iterations: int = 60,
     least_gain: float = 0.0,
+    goal: float = -np.inf,
 ) -> Fit:
     """Climb from `start` (d,) to the nearest mode.
 
@@ -51,7 +52,9 @@ def find_mode(
     dear. Parameters `held` stay where they start. The noise levels in `start` are ignored. Stops
     when a step is below `tolerance` standard deviations, or when new derivatives twice gain no more
     than a few such steps would (or than `LITTLE`, where differences promised more: not converged
-    then). Where gains below `least_gain`, nats, decide nothing, two of them end a climb.
+    then). Where gains below `least_gain`, nats, decide nothing, two of them end a climb. So do two
+    that fall short of what every step left would have to gain for a log posterior of `goal`: an end
+    below it is of no use.
     """
     climb = Climb(target, steps, slopes, held)
     here = climb.evaluate(start)
@@ -77,11 +80,12 @@ def find_mode(
             climb.renew()
         elif not (climb.stale or converged):
             creeps = steps is not None and size > DOUBTFUL and gain < LITTLE
-            creeps = creeps or gain < max(least_gain, 0.5 * (STALLED * tolerance) ** 2)
+            least = max(least_gain, (goal + here.value) / (max_iterations - climb.iterations + 1))
+            creeps = creeps or gain < max(least, 0.5 * (STALLED * tolerance) ** 2)
             stalls = stalls + 1 if creeps else 0
             if stalls < STALLS and moved:
                 continue
-            if stalls and least_gain > LITTLE:
+            if stalls and least > LITTLE:
                 break
             stalls = 0
             if climb.roughly:

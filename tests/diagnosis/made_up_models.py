@@ -56,6 +56,7 @@ class Table:
         self.unfinished = {frozenset(k.split()): v for k, v in (unfinished or {}).items()}
         self.force = force
         self.fitted: list[frozenset[str]] = []
+        self.goals: dict[frozenset[str], float] = {}
         self.finished: list[frozenset[str]] = []
 
     def gain(self, ids) -> float:
@@ -71,9 +72,10 @@ class Table:
         )  # fmt: skip
         return Candidate(tuple(BY_ID[i] for i in ids), fit, gain)
 
-    def refit(self, fit, scores, scales) -> Candidate:
+    def refit(self, fit, scores, scales, *, goal) -> Candidate:
         ids = (*fit.ids, *(s.effect.id for s in scores))
         self.fitted.append(key := frozenset(ids))
+        self.goals[key] = goal
         reached = self.forward.get(key, self.gain(ids))
         return self.candidate(ids, self.once.pop(key, reached))
 
@@ -94,7 +96,7 @@ class Table:
             names = self.asked_in_flight if flight else again
             return SimpleNamespace(fit=base, best=lambda most: best(names))
 
-        def first(model):
+        def first(model, about):
             left = [i for i in self.seen if i not in model.ids]
             return set(sorted(left, key=lambda i: -self.seen[i])[: self.first])
 
@@ -106,7 +108,7 @@ class Table:
         ids = [i for i in candidate.ids if i != effect.id]
         return self.candidate(ids, self.gain(ids))
 
-    def exchanged(self, candidate, old, new, scales) -> Candidate:
+    def exchanged(self, candidate, old, new, scales, *, goal) -> Candidate:
         ids = [i for i in candidate.ids if i != old.id] + [new.id]
         return self.candidate(ids, self.gain(ids))
 

@@ -32,7 +32,10 @@ def test_about_a_better_model_a_quadratic_spring_hides_nothing_else() -> None:
     assert {e.id for e in two.effects} == set(planted)
     wrong = asked.about(base, flight=False)
     assert two.log_odds > max(s.log_odds for s in wrong.best(5))
-    assert "quadratic_drag" in asked.first(better) and len(asked.first(better)) == ASKED
+    assert (
+        "quadratic_drag" in asked.first(better, better)
+        and len(asked.first(better, better)) == ASKED
+    )
 
 
 def test_what_acts_in_flight_is_judged_there() -> None:
@@ -47,7 +50,7 @@ def test_what_acts_in_flight_is_judged_there() -> None:
     stops = {i: g for i, g in whole.items() if i not in flight}
     assert set(flight) | set(stops) == asked.seen and stops
     expected = [sorted(g, key=lambda i: -g[i])[:ASKED] for g in (flight, stops)]
-    assert asked.first(base) == {*expected[0], *expected[1]}
+    assert asked.first(base, base) == {*expected[0], *expected[1]}
     assert all(BY_ID[i].regime != "free" for i in stops)
 
 

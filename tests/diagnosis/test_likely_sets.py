@@ -75,7 +75,7 @@ def test_with_a_stop() -> None:
     assert [e.id for e in found.effects] == ["opposite_stop"]
     assert found.values["opposite_stop.gap"] == pytest.approx(3e-3, rel=0.01)  # off the coarse grid
     stop = fit_from(fit, found.effects, found.values, scales)
-    beside = Asked(fit, SEARCHED, scales).first(stop)
+    beside = Asked(fit, SEARCHED, scales).first(stop, stop)
     assert "contact_damping_indentation" in beside
     effects = [BY_ID[i] for i in STOPPED]
     assert fit_from(fit, effects, found.values, scales).fit.reduced_chi2 < 1.2

@@ -11,6 +11,8 @@ import pytest
 from effect_rigs import BY_ID
 from made_up_models import EFFECTS, ENOUGH, A, B, C, D, N, S, Table
 
+from bayesimpact.diagnosis.thresholds import DECISIVE
+
 search = importlib.import_module("bayesimpact.diagnosis.name")
 models = importlib.import_module("bayesimpact.diagnosis.models")
 naming = importlib.import_module("bayesimpact.diagnosis.naming")
@@ -69,6 +71,17 @@ def test_where_the_misfit_is_large_what_gains_most_per_effect_comes_first(run):
     assert chosen(run(table)) == {A, B, C}
     first_step = [{A, B}, *({e} for e in (A, B, C, D, S))]
     assert next(ids for ids in table.fitted if ids not in first_step) in ({A, C}, {B, C})
+
+
+def test_beside_a_model_that_leaves_nothing_climbs_have_a_goal(run):
+    """Its odds less the decisive ones: a likelihood below cannot come near them."""
+    gains = {A: 300.0, B: 20.0, f"{A} {B}": ENOUGH, f"{A} {C}": 310.0, f"{B} {D}": 310.0}
+    table = Table(gains, chi2=100.0)
+    assert chosen(run(table)) == {A, B}
+    goals = [table.goals[ids] for ids in table.fitted]
+    assert goals[0] == -np.inf
+    expected = ENOUGH - 2 * np.log(2 * len(EFFECTS)) - DECISIVE
+    assert goals[-1] == pytest.approx(expected)
 
 
 def test_where_the_misfit_is_large_the_search_begins_with_what_the_equation_asks_for(run):

@@ -18,6 +18,7 @@ from bayesimpact.diagnosis.harmonics import (
     hums,
     line_blocks,
     projected,
+    rotations,
 )
 from bayesimpact.diagnosis.models import Models
 from bayesimpact.diagnosis.own_band import shakes_in_own_band
@@ -257,3 +258,13 @@ def with_line(fit: Fit, frequency: float, what: str = "harmonic_forcing") -> Fit
     shapes = {f"{what}.frequency": frequency}
     mode = transfer(fit, target.oscillator.layout, effects, scales, shapes)
     return replace(fit, target=target, mode=mode)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 32])
+def test_lines_turned_by_equal_steps_are_sines_and_cosines(count):
+    lines, times = 3.7 + 0.31 * np.arange(count), 0.2 + 1e-3 * np.arange(4000)
+    expected = np.exp(2j * np.pi * np.outer(lines, times))
+    np.testing.assert_allclose(rotations(lines, times), expected, atol=1e-11)
+    uneven = lines**1.1
+    expected = np.exp(2j * np.pi * np.outer(uneven, times))
+    np.testing.assert_allclose(rotations(uneven, times), expected, atol=1e-11)

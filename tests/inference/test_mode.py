@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import small_rig
 from effect_rigs import BY_ID
+from made_up_valley import valley
 from scipy.optimize import least_squares, minimize_scalar
 
 from bayesimpact.data.campaign import Smoothing
 from bayesimpact.inference.climb import best_sigma
 from bayesimpact.inference.fit import Fit, Target, inverse
-from bayesimpact.inference.likelihood import Likelihood, Linearisation
+from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.prior import (
@@ -26,7 +27,6 @@ from bayesimpact.inference.prior import (
 )
 from bayesimpact.inference.priors import Priors
 from bayesimpact.model.oscillator import build_oscillator
-from bayesimpact.model.parameters import Parameter
 from bayesimpact.trial.rig import Release, Rig
 
 SAVGOL = Smoothing("savgol", window=11, polyorder=2)
@@ -276,60 +276,6 @@ def test_iterations_are_limited():
     assert not fit.converged and fit.iterations == 2
 
 
-@dataclass
-class Valley:
-    """Rosenbrock's residuals 10 (y - x^2), 1 - x (and zeros) in place of an oscillator's.
-
-    Derivatives may have the wrong `sign`, or be off by the relative error `rough` (or, where rough
-    ones are asked for, `rougher`).
-    """
-
-    sign: float = 1.0
-    steep: float = 10.0
-    rough: float = 0.0
-    rougher: float = 0.0
-    sizes = np.array([4.0])
-    log_volume = np.array([0.0])
-    sigma_columns = np.array([2])
-
-    @property
-    def oscillator(self):
-        parameters = (
-            Parameter("x", "", "physical"),
-            Parameter("y", "", "physical"),
-            Parameter("sigma", "", "noise", 0.0),
-        )
-        roles = lambda *r: np.array([i for i, p in enumerate(parameters) if p.role in r])  # noqa: E731
-        return SimpleNamespace(layout=SimpleNamespace(parameters=parameters, roles=roles))
-
-    def __post_init__(self) -> None:
-        self.rng = np.random.default_rng(0)
-        self.asked: list[bool] = []
-
-    def residuals(self, theta: np.ndarray) -> tuple[np.ndarray, ...]:
-        x, y = theta[:, 0], theta[:, 1]
-        rest = np.full_like(x, 1e-2)
-        return (np.stack([self.steep * (y - x**2), 1 - x, rest, rest], axis=1),)
-
-    def misfit(self, theta: np.ndarray) -> np.ndarray:
-        return np.sum(self.residuals(np.atleast_2d(theta))[0] ** 2, axis=1)[:, None]
-
-    def linearise(
-        self, theta: np.ndarray, steps: object = None, *, roughly: bool = False
-    ) -> tuple[Linearisation, ...]:
-        a = self.steep
-        jacobian = np.array([[2 * a * theta[0], -a], [1, 0], [0, 0], [0, 0]], dtype=float)
-        error = self.rougher if roughly else self.rough
-        jacobian *= self.sign * (1 + error * self.rng.standard_normal((4, 2)))
-        self.asked.append(roughly)
-        return (Linearisation(self.residuals(theta[None])[0][0], jacobian, np.array([0, 1])),)
-
-
-def valley(**kind: float) -> Target:
-    priors = Priors((Uniform(-9, 9), Uniform(-9, 9), LogUniform(1e-6, 1e6)))
-    return Target(Valley(**kind), priors)
-
-
 @pytest.mark.parametrize(("steep", "iterations"), [(10.0, 10), (1e4, 300)])
 def test_a_curved_valley_is_followed_to_its_end(steep, iterations):
     """Without bent steps it takes 16 and 1742."""
@@ -337,6 +283,18 @@ def test_a_curved_valley_is_followed_to_its_end(steep, iterations):
     fit = find_mode(valley(steep=steep), start, max_iterations=iterations)
     assert fit.converged
     np.testing.assert_allclose(fit.mode[:2], 1.0, atol=1e-4)
+
+
+def test_a_climb_that_will_not_reach_its_goal_ends_early():
+    """Neither at once nor later where the goal lies within reach."""
+    start, options = np.array([-1.2, 1.0, 1.0]), {"max_iterations": 300}
+    whole = find_mode(valley(steep=1e4), start, **options)
+    assert whole.converged and whole.iterations > 100
+    lost = find_mode(valley(steep=1e4), start, goal=whole.log_posterior + 100.0, **options)
+    assert not lost.converged and lost.iterations < 0.5 * whole.iterations
+    begun = find_mode(valley(steep=1e4), start, max_iterations=1)
+    found = find_mode(valley(steep=1e4), start, goal=begun.log_posterior, **options)
+    assert found.converged and found.iterations == whole.iterations
 
 
 def test_rough_derivatives_end_the_climb_where_they_tell_no_more():
