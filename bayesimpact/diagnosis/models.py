@@ -33,10 +33,6 @@ UNCONVERGED_SHORTFALL = 60.0
 MORE = 2.0  # nats by which a score must promise more than a model has reached to fit it again
 SAME = 0.05  # nats; two climbs to one mode differ by less
 
-# Of one search, set by hand: one of the bundled campaign begins some 25, with a large misfit up to
-# this many. Its time is that of the whole diagnosis (`budget`).
-MOST_REFITS = 150
-
 Progress = Callable[[str], None]
 
 
@@ -194,7 +190,7 @@ class Models:
 
     def may_go_on(self) -> bool:
         """Whether the budget allows for more refits."""
-        return self.refits < MOST_REFITS and self.budget.may_search_on()
+        return self.budget.may_search_on()
 
     def tell(self, words: str) -> None:
         """Count a refit, and say which."""

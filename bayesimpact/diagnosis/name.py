@@ -59,8 +59,8 @@ def name(
     does. Where the misfit was large, the search begins with what the equation of motion asks for,
     and goes on from a model that has settled and still leaves something.
 
-    A search that has begun `MOST_REFITS` refits or used up the `budget` begins no more, and names
-    nothing that it has not compared with all that might do the same.
+    A search that has used up the `budget` begins no more refits, and names nothing that it has not
+    compared with all that might do the same.
     """
     search = _Search(effects, scales, rng, progress or (lambda message: None), budget)
     base = search.examine(base_candidate(fit))
