@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import hilbert
 
 from bayesimpact.data.hum import find_hum
 from bayesimpact.data.recording import Recording
@@ -17,6 +18,7 @@ Array = NDArray[np.float64]
 
 OWN_BAND = 0.1  # of the spectrum's peak
 MULTIPLES = 5  # of the motion's frequency: quadratic to quintic laws
+ALIKE = 0.87  # leaves a quarter of the power, as in `thresholds.EXCESS`
 FINER = 8  # lines for one that the duration resolves
 SLOWEST = 3.0  # periods in the longest recording: scans begin at five, refits may wander
 
@@ -31,20 +33,23 @@ def shakes_in_own_band(fit: Fit, remains: bool) -> bool:
     of the motion's frequency such a mode is what any law that is not linear makes of the motion. A
     line too slow for any recording to show it come and go passes for a drift.
     """
-    longest = max(r.duration for r in fit.target.oscillator.campaign.recordings)
+    recordings = fit.target.oscillator.campaign.recordings
+    longest = max(r.duration for r in recordings)
     if any(frequency * longest < SLOWEST for _, frequency in _lines(fit)):
         return True
     for effect, frequency in _lines(fit):
         steady = is_steady(effect)
-        for recording in fit.target.oscillator.campaign.recordings:
+        for recording in recordings:
             motion = recording if steady else _without(recording, effect, fit)
             if remains and _moves_at(motion, frequency):
                 return True
             own_motion = effect.observe is None or not steady
             if not remains and own_motion and _is_unresolved(motion, frequency):
                 return True
-            if not steady and _is_multiple(motion, frequency):
+            if not steady and multiple_of(motion, frequency):
                 return True
+        if steady and all(_passes_for_harmonic(r, frequency) for r in recordings):
+            return True
     return False
 
 
@@ -103,11 +108,23 @@ def _is_unresolved(recording: Recording, frequency: float) -> bool:
     return abs(frequency * recording.samples.size * recording.interval - peak) < 1.0
 
 
-def _is_multiple(recording: Recording, frequency: float) -> bool:
-    """Whether a frequency, Hz, is a multiple of that of the strongest line, as far as the duration
-    can tell.
+def multiple_of(recording: Recording, frequency: float) -> int:
+    """Which multiple of that of the strongest line a frequency, Hz, is, 2 to `MULTIPLES`, as far as
+    the duration can tell; else 0.
     """
     duration = recording.samples.size * recording.interval
     own = 1.0 + int(np.argmax(_spectrum(recording, FINER)[FINER:])) / FINER
     multiple = round(frequency * duration / own)
-    return 2 <= multiple <= MULTIPLES and abs(frequency * duration - multiple * own) < 1.0
+    near = abs(frequency * duration - multiple * own) < 1.0
+    return multiple if near and 2 <= multiple <= MULTIPLES else 0
+
+
+def _passes_for_harmonic(recording: Recording, frequency: float) -> bool:
+    """Whether a steady line is alike to what a power of the motion makes at a multiple of its
+    frequency: the envelope to that power has a cosine of `ALIKE` with a steady one.
+    """
+    multiple = multiple_of(recording, frequency)
+    if not multiple:
+        return False
+    envelope = np.abs(hilbert(recording.samples - recording.samples.mean())) ** multiple
+    return bool(envelope.mean() > ALIKE * np.sqrt(np.mean(envelope**2)))

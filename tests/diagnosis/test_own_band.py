@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bayesimpact.data.recording import Recording
-from bayesimpact.diagnosis.own_band import _moves_at
+from bayesimpact.diagnosis.own_band import _moves_at, _passes_for_harmonic, multiple_of
 
 INTERVAL, SAMPLES = 1.0 / 550.0, 242
 LINE = 1.0 / (INTERVAL * SAMPLES)  # Hz that the duration resolves
@@ -31,3 +31,16 @@ def test_a_motion_of_one_frequency_leaks_to_no_other(lines, own):
                                                 (11.0, False), (29.0, False)])  # fmt: skip
 def test_frequencies_that_a_motion_passes_through_are_its_own(frequency, own):
     assert _moves_at(decay(24.0, 16.0), frequency) is own
+
+
+@pytest.mark.parametrize(("rate", "times", "passes"), [(0.03, 2.0, True), (0.03, 3.02, True),
+                                                       (0.03, 2.4, False), (0.5, 2.0, False),
+                                                       (0.03, 1.0, False)])  # fmt: skip
+def test_a_steady_line_at_a_multiple_is_a_harmonic_where_the_motion_hardly_decays(
+    rate, times, passes
+):
+    """A filmed pendulum of eight cycles had a hum of twice its frequency."""
+    t = np.arange(240) / 30.0
+    motion = Recording("filmed", "", np.exp(-rate * t) * np.cos(2 * np.pi * 0.99 * t), 1.0 / 30.0)
+    assert _passes_for_harmonic(motion, times * 0.99) is passes
+    assert multiple_of(motion, times * 0.99) == (round(times) if times in (2.0, 3.02) else 0)
