@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.lock import locked
+from bayesimpact.data.short_repr import short_repr
 from bayesimpact.errors import InputError
 from bayesimpact.inference.chainfile import ChainFolder
 from bayesimpact.inference.convergence import ConvergenceRecord, assess, autocorrelation_time
@@ -93,6 +94,8 @@ class Chains:
     evaluations: int
     seconds: float
     seed: int
+
+    __repr__ = short_repr
 
     @property
     def flat(self) -> Array:

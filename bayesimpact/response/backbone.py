@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bayesimpact.data.short_repr import short_repr
 from bayesimpact.errors import InputError
 from bayesimpact.response import local
 from bayesimpact.response.half_cycles import HalfCycles, half_cycles, rough_period
@@ -40,6 +41,8 @@ class Branch:
     amplitude: Floats
     damping_ratio: Floats
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class Backbone:
@@ -56,6 +59,8 @@ class Backbone:
     lower: Branch
     rest: float
     noise: float
+
+    __repr__ = short_repr
 
 
 def backbone(

@@ -18,6 +18,7 @@ import numpy as np
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.frozen import Picklable
 from bayesimpact.data.gaps import before_gap
+from bayesimpact.data.short_repr import short_repr
 from bayesimpact.errors import InputError
 from bayesimpact.response import local
 from bayesimpact.response.contact import Contact, Free, fit_contact
@@ -68,6 +69,8 @@ class Estimates(Picklable):
     sd: Mapping[str, float]
     impacts: Mapping[str, int]
     input_gain: float | None = None
+
+    __repr__ = short_repr
 
     @property
     def values(self) -> dict[str, float]:

@@ -263,6 +263,10 @@ class Effect(Picklable):
     condition: Callable[[Scales], bool] | None = None
     size: Callable[[Numbers, Scales], Size] | None = None
 
+    def __repr__(self) -> str:
+        """One line."""
+        return f"<Effect {self.id}: {self.title}>"
+
     def __reduce_ex__(self, protocol: Any) -> Any:
         """Pickle an effect of the catalogue by its id: its functions cannot be pickled."""
         if catalogued(self.id) is self:
