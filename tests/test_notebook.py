@@ -59,6 +59,7 @@ def test_a_campaign_lists_its_recordings(found: Diagnosis) -> None:
 
 
 def test_a_fit_shows_what_recordings_share(found: Diagnosis) -> None:
+    assert repr(found.identification).endswith("at rest>, not searched>")
     shown = cells(found.identification._repr_html_())
     assert shown[::4] == ["c1", "k1", "c2", "g", "k2[1]", "k2[2]"]
     assert float(shown[5]) == pytest.approx(found.before.value("k1"), rel=1e-3)

@@ -166,7 +166,7 @@ def _whiteness(results: Results) -> Check:
 def _mode(results: Results) -> Check:
     finding = "the last step was below a thousandth of a standard deviation"
     return Check(
-        "The climb to the mode came to rest",
+        "The fit converged to the mode",
         _status(results.fit_converged),
         finding if results.fit_converged else "it ran out of iterations",
     )

@@ -263,7 +263,7 @@ class Results:
         distance from 1 in standard errors
     log_posterior : at the mode
     covariance : (d, d) Laplace, in the order of `rows`, SI
-    fit_converged : the climb to the mode came to rest
+    fit_converged : the last step of the fit was negligible
     search, sampler, draws, backbone : None where there are none
     before, before_backbone : draws and backbone check of the model without the effects
     checks : the checklist

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagnosed import MODELS, diagnosed, diagnosis_figures, made_up_arrays
+from diagnosed import LIMITS, MODELS, diagnosed, diagnosis_figures, made_up_arrays
 from matplotlib.collections import PathCollection
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
@@ -15,6 +15,7 @@ from matplotlib.text import Text
 
 from bayesimpact.report.archive import load_results, save_results
 from bayesimpact.report.captions import caption
+from bayesimpact.report.diagnosis_view import diagnosis_view
 from bayesimpact.report.figures.improvement import shifts
 from bayesimpact.report.figures.ranking import FREE_FORCE, MOST, ranked
 from bayesimpact.report.figures.save import all_figures, png
@@ -118,6 +119,17 @@ def test_captions_say_what_holds_for_this_diagnosis_only() -> None:
 def test_limits_are_told_in_their_units() -> None:
     text = words(diagnosis_figures(diagnosed())["limits"]).replace("\N{NO-BREAK SPACE}", " ")
     assert "100 µN" in text and "95.0 N/m" in text and "detection limit" in text
+
+
+def test_limits_stand_in_one_order_under_one_name_in_table_and_figure() -> None:
+    """The table had the scan's order and titles, the figure its own order and ids."""
+    results = diagnosed(limits=LIMITS[::-1])
+    view = diagnosis_view(results)
+    assert view is not None
+    titles = [limit["title"] for limit in view["limits"]]
+    assert titles == ["quadratic drag", "relaxation of the obstacle"]
+    axis = diagnosis_figures(results)["limits"].axes[0]
+    assert [label.get_text() for label in axis.get_yticklabels()] == titles
 
 
 def test_shifts_are_in_deviations_of_the_base_model() -> None:

@@ -90,7 +90,7 @@ def test_what_went_wrong_in_the_computation_is_said() -> None:
     stuck = assessed(replace(apart, fit_converged=False))
     assert "did not come to rest" in stuck.headline
     assert [c.title for c in stuck.failed] == [
-        "The climb to the mode came to rest",
+        "The fit converged to the mode",
         "Guess and global search end at the same mode",
         "The sampler converged",
     ]
