@@ -38,7 +38,7 @@ Array = NDArray[np.float64]
 
 _FORMAT = 1
 _BLOCK_STEPS, _BLOCK_DRAWS, _LEAST_BLOCK = 50, 3600, 8
-_QUICK_WALKERS = 64  # looked at before a full assessment is worth its time
+_QUICK_WALKERS = 64  # looked at first, for a full assessment takes longer
 
 
 @dataclass(frozen=True)

@@ -119,7 +119,7 @@ def _trust(results: Results) -> str:
             "there may be a better one still."
         )
     if not results.fit_converged:
-        words += " The climb to the mode did not come to rest."
+        words += " The fit did not converge to the mode."
     return words
 
 

@@ -144,7 +144,7 @@ def _width(row: Mapping[str, Any]) -> float:
 def _posterior(
     fit: Fit, method: Method, seed: int, rng: np.random.Generator
 ) -> tuple[Array, Array]:
-    """Draws (S, d), and weights (S,) that sum up to what they are worth in independent draws."""
+    """Draws (S, d), and weights (S,) whose sum is the equivalent number of independent draws."""
     if method == "emcee":
         draws = sample(fit, seed=seed).thinned(DRAWS, rng)
         return draws, np.ones(draws.shape[0])

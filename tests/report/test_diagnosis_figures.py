@@ -111,8 +111,8 @@ def test_captions_say_what_holds_for_this_diagnosis_only() -> None:
     assert "predicted" not in caption("improvement", free)
     assert "Impacts" in caption("gain", results) and "Impacts" not in caption("gain", free)
     assert "Nothing is missing" in caption("force_map", diagnosed(verdict="adequate"))
-    gross = diagnosed(fit={"before": {"reduced_chi2": 8510.0}})
-    assert "rough guide" in caption("force_map", gross)
+    large = diagnosed(fit={"before": {"reduced_chi2": 8510.0}})
+    assert "rough guide" in caption("force_map", large)
     assert "rough guide" not in caption("force_map", results)
 
 
