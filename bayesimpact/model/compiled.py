@@ -123,7 +123,7 @@ def compilation_announced(say: Callable[[str], None], after: float = 1.0) -> Ite
 
 
 class _Announcer(event.Listener):  # type: ignore[misc]
-    """Speaks of the outermost function only, not of those that it calls, nor of short waits."""
+    """Speaks of the package's outermost function, not of those that it calls, nor of short waits."""
 
     def __init__(self, say: Callable[[str], None], after: float) -> None:
         self.say, self.after = say, after
@@ -132,8 +132,9 @@ class _Announcer(event.Listener):  # type: ignore[misc]
         self.waiting = threading.Timer(after, self._tell, [""])
 
     def _tell(self, words: str) -> None:
-        self.told = True
-        self.say(words)
+        if words:
+            self.told = True
+            self.say(words)
 
     def on_start(self, event: Any) -> None:
         if not self.starts:
@@ -142,6 +143,8 @@ class _Announcer(event.Listener):  # type: ignore[misc]
             name = f"{dispatcher.py_func.__module__}.{dispatcher.py_func.__name__}"
             words = f"compiling {name}" + ", once: later runs find it in the cache" * kept
             self.told = False
+            if not name.startswith("bayesimpact."):  # ArviZ compiles, too, for a moment
+                words = ""
             self.waiting = threading.Timer(self.after, self._tell, [words])
             self.waiting.daemon = True
             self.waiting.start()

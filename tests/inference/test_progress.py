@@ -77,9 +77,10 @@ def test_the_first_call_is_not_silent_while_it_compiles(
     def new(x: float) -> float:
         return x + 1.0
 
+    new.py_func.__module__ = "bayesimpact.example"
     with compilation_shown(shown, after=0.001):
         new(1.0)
-    assert (f"compiling {__name__}.new" in capsys.readouterr().err) is bool(shown)
+    assert ("compiling bayesimpact.example.new" in capsys.readouterr().err) is bool(shown)
 
 
 def test_the_main_steps_show_what_they_compile(monkeypatch: pytest.MonkeyPatch) -> None:
