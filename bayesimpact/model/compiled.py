@@ -123,7 +123,7 @@ def compilation_announced(say: Callable[[str], None], after: float = 1.0) -> Ite
 
 
 class _Announcer(event.Listener):  # type: ignore[misc]
-    """Speaks of the package's outermost function, not of those that it calls, nor of short waits."""
+    """Speaks of outermost functions of the package, not of those that they call or short waits."""
 
     def __init__(self, say: Callable[[str], None], after: float) -> None:
         self.say, self.after = say, after
