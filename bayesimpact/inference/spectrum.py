@@ -23,7 +23,7 @@ from bayesimpact.data.gaps import runs
 from bayesimpact.data.recording import Recording
 from bayesimpact.inference.noise import Noise
 from bayesimpact.model.measurement import covariance, gain
-from bayesimpact.response.half_cycles import rough_period
+from bayesimpact.response.half_cycles import spectral_period
 
 Array = NDArray[np.float64]
 isotonic_regression: Any = optimize.isotonic_regression
@@ -244,7 +244,7 @@ def _periodogram(recording: Recording) -> tuple[Array, Array, float]:
     frequency, power = _periodogram_of(
         recording.samples, 1 / interval, window="hann", detrend="linear"
     )
-    lowest = ABOVE / (rough_period(recording.samples, recording.order) * interval)
+    lowest = ABOVE / (spectral_period(recording.samples, recording.order) * interval)
     # neighbours of a Hann window overlap: every second ordinate is nearly independent
     chosen = np.flatnonzero((frequency > lowest) & (frequency < 0.49 / interval))[::2]
     return frequency[chosen], power[chosen], interval

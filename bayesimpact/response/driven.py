@@ -21,7 +21,7 @@ from bayesimpact.response.driven_displacement import (
     first_guess,
     without_base,
 )
-from bayesimpact.response.half_cycles import rough_period
+from bayesimpact.response.half_cycles import spectral_period
 from bayesimpact.response.weak_form import Rows, least_squares, rows_of
 
 Floats = NDArray[np.float64]
@@ -70,7 +70,7 @@ def estimate_driven(campaign: Campaign) -> Driven:
     derived = not all(r.is_displacement for r in read)
     natural = 2 * np.pi * float(np.sqrt(guess.mass / guess.k1))
     if not derived:
-        natural = float(np.median([rough_period(r.samples) * r.interval for r in read]))
+        natural = float(np.median([spectral_period(r.samples) * r.interval for r in read]))
     for _ in range(ROUNDS_DERIVED if derived else ROUNDS):
         relative = [without_base(r, guess.gain) for r in read]
         moved = [displacement_under(r, guess, b) for r, b in zip(relative, biases, strict=True)]

@@ -24,7 +24,7 @@ from bayesimpact.response import local
 from bayesimpact.response.contact import Contact, Free, fit_contact
 from bayesimpact.response.driven import estimate_driven
 from bayesimpact.response.flight import Flight
-from bayesimpact.response.half_cycles import rough_period
+from bayesimpact.response.half_cycles import spectral_period
 from bayesimpact.response.observe import (
     Observed,
     look,
@@ -150,7 +150,7 @@ def _driven(campaign: Campaign) -> Estimates:
         pairs = zip(recordings, values, strict=True)
         return MappingProxyType({r.name: float(value) for r, value in pairs})
 
-    noises = [local.noise_level(r.samples, rough_period(r.samples, r.order)) for r in recordings]
+    noises = [local.noise_level(r.samples, spectral_period(r.samples, r.order)) for r in recordings]
     free = any(r.input is not None and r.input.free for r in recordings)
     estimates = Estimates(
         k1=found.k1,

@@ -40,9 +40,9 @@ class PlantedFault:
 
 
 def _period(recording: Recording) -> float:
-    from bayesimpact.data.period import rough_period
+    from bayesimpact.data.period import crossing_period
 
-    return rough_period(recording.samples, 1.0) or recording.samples.size / 10
+    return crossing_period(recording.samples, 1.0) or recording.samples.size / 10
 
 
 def _new(
