@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from coarse_figures import draw_coarsely
 from diagnosed import LIMITS, MODELS, diagnosed, diagnosis_figures, made_up_arrays
 from matplotlib.collections import PathCollection
 from matplotlib.colors import to_hex
@@ -155,8 +156,10 @@ def test_any_number_of_recordings(count: int, cases: int) -> None:
         assert png(figure).startswith(b"\x89PNG")
 
 
-@pytest.mark.usefixtures("coarse_figures")
-def test_report_is_drawn_again_from_stored_results(tmp_path: Path) -> None:
+def test_report_is_drawn_again_from_stored_results(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    draw_coarsely(monkeypatch, pixels=True)  # the same to the pixel
     results = diagnosed(2, 1)
     save_results(results, tmp_path)
     loaded = load_results(tmp_path)
