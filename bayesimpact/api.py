@@ -19,7 +19,7 @@ from bayesimpact.errors import InputError
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification, identify
 from bayesimpact.inference.posterior import Posterior
-from bayesimpact.inference.progress import progress_bar, refit_bar
+from bayesimpact.inference.progress import compilation_shown, progress_bar, refit_bar
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -59,7 +59,8 @@ def fit(
     ------
     InputError : a recording shows no oscillation
     """
-    return identify(campaign, rng=generator(seed, rng), **settings)
+    with compilation_shown():
+        return identify(campaign, rng=generator(seed, rng), **settings)
 
 
 def sample(
@@ -88,7 +89,7 @@ def sample(
     mode = mode.fit if isinstance(mode, Identification) else mode
     number = int(generator(seed, rng).integers(2**31)) if rng is not None else seed or 0
     place = None if folder is None else Path(folder)
-    with progress_bar(progress) as callback:
+    with compilation_shown(progress), progress_bar(progress) as callback:
         return posterior.sample(
             mode, seed=number, folder=place, resume=resume, callback=callback, **settings
         )
@@ -129,7 +130,7 @@ def diagnose(
         chosen = tuple(effects)
         check_effects(chosen)
     shown = None if progress is None else False
-    with refit_bar(progress or (lambda words: None), shown) as tell:
+    with compilation_shown(), refit_bar(progress or (lambda words: None), shown) as tell:
         return diagnosed(
             campaign, rng=generator(seed, rng), effects=chosen, search=search, progress=tell
         )

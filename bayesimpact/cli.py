@@ -27,6 +27,7 @@ from bayesimpact.console import (
     results_option,
     telling,
     unmade_words,
+    without_chance,
 )
 from bayesimpact.errors import InputError
 from bayesimpact.fleet.command import fleet
@@ -36,9 +37,13 @@ from bayesimpact.trial.command import trial
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="bayesimpact")
 def main() -> None:
-    """Identify an impacting system from displacement recordings, and what its model leaves out.
+    """Identify an impacting system from recordings of its motion, and what its model leaves out.
 
     CAMPAIGN is a folder with campaign.toml and recordings, or that file.
+
+    \b
+    Completion of commands and options in bash (or zsh, fish):
+    eval "$(_BAYESIMPACT_COMPLETE=bash_source bayesimpact)"
     """
     # Numbers that overflow in a trial step are dealt with there; the warning tells a user nothing.
     warnings.filterwarnings("ignore", category=RuntimeWarning)
@@ -51,12 +56,11 @@ def main() -> None:
 @main.command()
 @campaign_argument
 @out_option
-@common
+@without_chance
 def check(campaign: Path, out: Path | None, seed: int, quiet: bool) -> None:
     """Read and check CAMPAIGN, plot it, and say what will be estimated.
 
-    With --out the plot is saved as DIR/check.png. Nothing is drawn at random here: --seed is taken
-    for the sake of scripts that pass it to every command.
+    With --out the plot is saved as DIR/check.png.
     """
     from bayesimpact.data.faults.find import set_aside
     from bayesimpact.report.check_text import campaign_text, campaign_warnings, measured_noise
@@ -96,7 +100,7 @@ def check(campaign: Path, out: Path | None, seed: int, quiet: bool) -> None:
     help="Sampling rate of files without a clock.",
 )
 @click.option("--plot", is_flag=True, help="Draw all channels into FOLDER/channels.png.")
-@common
+@without_chance
 def new(
     folder: Path, files: tuple[Path, ...], mass: float | None, stop: bool | None, case: str | None,
     unit: str | None, rate: float | None, plot: bool, seed: int, quiet: bool,
@@ -104,8 +108,7 @@ def new(
     """Look at instrument files FILE... and write FOLDER/campaign.toml with comments.
 
     Says which channels the files hold and what it assumed. Files from elsewhere are copied into
-    FOLDER; what is there already is never replaced. Nothing is asked, and nothing is drawn at
-    random: --seed is taken for the sake of scripts.
+    FOLDER; what is there already is never replaced. Nothing is asked.
     """
     from bayesimpact.data import draft
     from bayesimpact.data.quantity import UNITS
@@ -240,7 +243,7 @@ def diagnose(
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
 @click.option("--pdf", is_flag=True, help="Print it as DIR/report.pdf by an installed Chromium.")
 @click.option("--latex", is_flag=True, help="Write its tables for a paper: DIR/tables.tex.")
-@common
+@without_chance
 @click.pass_context
 def report(
     ctx: click.Context, folder: Path, pdf: bool, latex: bool, seed: int, quiet: bool
@@ -348,7 +351,7 @@ def demo(ctx: click.Context, out: Path, seed: int, quiet: bool) -> None:
     help="Check the effects that FILE.py defines as those of the catalogue are. The file is "
     "executed as Python.",
 )
-@common
+@without_chance
 @click.pass_context
 def effects(ctx: click.Context, own: Path | None, seed: int, quiet: bool) -> None:
     """List the catalogue of effects: equations, parameters and units.

@@ -32,6 +32,13 @@ _GO_ON = "bayesimpact.go_on"  # in a context's meta: what to type after an inter
 class Commands(click.Group):
     """A group that turns what goes wrong in any command into one message and its exit code."""
 
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Every command with its first sentence, whole: click cuts it to one line."""
+        with formatter.section("Commands"):
+            formatter.write_dl(
+                [(name, one.get_short_help_str(limit=200)) for name, one in self.commands.items()]
+            )
+
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command; `InputError` exits 2, other errors of the package 1, Ctrl-C and SIGTERM
         130; a place that cannot be written exits 2, a disk that is full or fails 1.
@@ -68,20 +75,20 @@ def _end(ctx: click.Context, message: str, code: int) -> NoReturn:
     ctx.exit(code)
 
 
-def common(command: Callable[..., None]) -> Callable[..., None]:
-    """Options that every command takes."""
-    for option in (
-        click.option("--quiet", is_flag=True, help="Print nothing but warnings and errors."),
-        click.option(
-            "--seed",
-            type=click.IntRange(min=0),
-            default=0,
-            show_default=True,
-            help="Same seed, same result.",
-        ),
-    ):
-        command = option(command)
-    return command
+def _common(seed: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Options that every command takes; `seed`: what --seed does there."""
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        number = click.IntRange(min=0)
+        given = click.option("--seed", type=number, default=0, show_default=True, help=seed)
+        quiet = click.option("--quiet", is_flag=True, help="Print nothing but warnings and errors.")
+        return given(quiet(command))
+
+    return decorate
+
+
+common = _common("Same seed, same result.")
+without_chance = _common("No effect here; taken since all commands take it.")
 
 
 _DATA = "bayesimpact.data"  # in a context's meta: folders of --data

@@ -200,6 +200,21 @@ def test_every_command_takes_the_common_options() -> None:
         assert {"--seed", "--quiet"} <= options, command.name
 
 
+def test_no_help_text_is_cut(run: Run) -> None:
+    """Click cuts the line on a command to the width of the terminal: six ended in dots."""
+    _, out, _ = run("--help")
+    listed = " ".join(out.split("Commands:")[1].split())
+    assert "..." not in listed.replace("FILE...", "")
+    assert "what the base model leaves out of CAMPAIGN." in listed
+    assert '\n  eval "$(_BAYESIMPACT_COMPLETE=bash_source bayesimpact)"' in out
+
+
+def test_a_seed_without_effect_says_so(run: Run) -> None:
+    for name in main.commands:
+        _, out, _ = run(name, "--help")
+        assert ("No effect here" in out) == (name in ("check", "new", "report", "effects")), name
+
+
 def test_version(run: Run) -> None:
     from importlib.metadata import version
 

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields, is_dataclass
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,8 +14,11 @@ from effect_rigs import BY_ID
 
 import bayesimpact as bi
 from bayesimpact.data.html import html_table, resolved
+from bayesimpact.data.short_repr import short_repr
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.loop import Diagnosis
+from bayesimpact.inference.posterior import Posterior
+from bayesimpact.report.build import results_from_fit, results_from_posterior
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +59,7 @@ def test_a_campaign_lists_its_recordings(found: Diagnosis) -> None:
 
 
 def test_a_fit_shows_what_recordings_share(found: Diagnosis) -> None:
+    assert repr(found.identification).endswith("at rest>, not searched>")
     shown = cells(found.identification._repr_html_())
     assert shown[::4] == ["c1", "k1", "c2", "g", "k2[1]", "k2[2]"]
     assert float(shown[5]) == pytest.approx(found.before.value("k1"), rel=1e-3)
@@ -76,8 +83,67 @@ def test_the_summary_of_a_diagnosis_is_that_of_the_extended_model(found: Diagnos
     assert row.low < scale * 0.01 < row.high
 
 
-def test_a_posterior_shows_medians(found: Diagnosis) -> None:
-    posterior = bi.sample(found, seed=1, target_ess=200.0)
+@pytest.fixture(scope="module")
+def posterior(found: Diagnosis) -> Posterior:
+    return bi.sample(found, seed=1, target_ess=200.0)
+
+
+def test_a_posterior_shows_medians(posterior: Posterior) -> None:
     shown = cells(posterior._repr_html_())
     assert shown[0] == "c1"
     assert float(shown[1]) == pytest.approx(np.median(posterior.column("c1")), rel=1e-3)
+
+
+def test_results_of_a_folder_show_what_recordings_share(found: Diagnosis) -> None:
+    results = results_from_fit(found.identification)
+    shown = cells(results._repr_html_())
+    assert shown[::5] == ["c1", "k1", "c2", "g", "k2[1]", "k2[2]"]
+    assert float(shown[6]) == pytest.approx(found.before.value("k1"), rel=1e-3)
+
+
+def records(value: Any, seen: dict[int, Any]) -> Iterator[Any]:
+    """Every record of the package that can be reached from another, each once."""
+    if id(value) in seen or isinstance(value, (str, np.ndarray)):
+        return
+    seen[id(value)] = value
+    inside: list[Any] = []
+    if type(value).__module__.startswith("bayesimpact"):
+        yield value
+        inside = [getattr(value, f.name, None) for f in fields(value)] if is_record(value) else []
+    elif isinstance(value, Mapping):
+        inside = list(value.values())
+    elif isinstance(value, (tuple, list)):
+        inside = list(value)
+    for one in inside:
+        yield from records(one, seen)
+
+
+def is_record(value: Any) -> bool:
+    return is_dataclass(value) and not isinstance(value, type)
+
+
+def test_no_record_prints_pages(found: Diagnosis, posterior: Posterior) -> None:
+    """Naming once printed 223,000 characters: who asks for a part gets a line or two."""
+    everything = (found, posterior, results_from_posterior(posterior))
+    sizes = {(len(repr(one)), type(one).__name__) for one in records(everything, {})}
+    met = {name for _, name in sizes}
+    assert {"Naming", "State", "MissingForce", "Chains", "Results", "Layout"} <= met
+    assert max(sizes) < (600, "")
+
+
+def test_a_record_prints_kinds_in_place_of_what_is_long() -> None:
+    @dataclass
+    class Example:
+        values: np.ndarray
+        few: tuple[str, ...]
+        many: list[int]
+        level: float
+        nested: Any = None
+        hidden: int = field(default=0, repr=False)
+
+        __repr__ = short_repr
+
+    inner = Example(np.zeros(2), (), [], 1.0)
+    shown = repr(Example(np.zeros((5, 7)), ("a",), [0] * 50, 1 / 3, inner))
+    few = "values=<array (5, 7)>, few=('a'), many=<50 items>, level=0.333333, nested=<Example>"
+    assert shown == f"Example({few})"

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.clock import even_interval
-from bayesimpact.data.period import rough_period
+from bayesimpact.data.period import crossing_period
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 
@@ -76,7 +76,7 @@ def before_gap(recording: Recording) -> Recording:
 def _period(samples: Array, used: Mask) -> float | None:
     """Rough period of the longest run of samples that count, in samples."""
     longest = max(runs(used), key=lambda run: run[1] - run[0], default=(0, 0))
-    return rough_period(samples[slice(*longest)], 1.0)
+    return crossing_period(samples[slice(*longest)], 1.0)
 
 
 def excluded_spans(where: str, recording: Recording, spans: Sequence[Sequence[float]]) -> Recording:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.data.period import rough_period
+from bayesimpact.data.period import crossing_period
 
 Array = NDArray[np.float64]
 
@@ -57,7 +57,7 @@ def find_hum(samples: Array, interval: float) -> Hum | None:
     of the level about it, to stand alone (harmonics of sharp impacts come as a comb), and to keep
     its amplitude and phase through the recording (harmonics of a decaying motion do not for long).
     """
-    period = rough_period(samples, interval)
+    period = crossing_period(samples, interval)
     if period is None or samples.size < PARTS * LEAST_PART:
         return None
     line = _line(samples, interval, 1.0 / period)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.clock import check_rate
 from bayesimpact.data.gaps import on_clock
-from bayesimpact.data.period import rough_period
+from bayesimpact.data.period import crossing_period
 from bayesimpact.data.quantity import RESPONSE_COLUMNS, UNITS, is_angular, order_of, unit_of
 from bayesimpact.data.read import build_campaign
 from bayesimpact.data.recording import Recording
@@ -233,7 +233,7 @@ def _check_finite(where: str, values: Floats, first: int) -> None:
 
 
 def _check_speed(where: str, table: Table) -> None:
-    period = rough_period(table.samples, table.interval)
+    period = crossing_period(table.samples, table.interval)
     order = order_of(table.quantity)
     if period is None or is_angular(table.quantity) or order == 2:
         return  # an impact's peak acceleration says nothing of the speed

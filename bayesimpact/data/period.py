@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def rough_period(samples: NDArray[np.float64], interval: float) -> float | None:
+def crossing_period(samples: NDArray[np.float64], interval: float) -> float | None:
     """Mean time between crossings of the median in one direction, s; None below three crossings.
 
     Parameters

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from bayesimpact.data.period import rough_period
+from bayesimpact.data.period import crossing_period
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 
@@ -36,7 +36,7 @@ Range = tuple[float, float]
 
 def parameter_ranges(mass: float, recordings: Sequence[Recording]) -> dict[str, Range]:
     """Lowest and highest believable value, SI, by the parameter's name without its brackets."""
-    periods = [rough_period(r.samples, r.interval) or 0.5 * r.duration for r in recordings]
+    periods = [crossing_period(r.samples, r.interval) or 0.5 * r.duration for r in recordings]
     omegas = 2.0 * np.pi / np.array(periods)
     slow, fast = float(omegas.min()) / SLOWER, float(omegas.max()) * FASTER
     reach = FARTHER * max(r.motion(rate) for r, rate in zip(recordings, omegas, strict=True))

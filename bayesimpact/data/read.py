@@ -20,7 +20,7 @@ from bayesimpact.data.entries import filled_in
 from bayesimpact.data.foreign import file_bytes, is_foreign, read_foreign
 from bayesimpact.data.gaps import excluded_spans
 from bayesimpact.data.input_column import input_of, with_input
-from bayesimpact.data.period import rough_period
+from bayesimpact.data.period import crossing_period
 from bayesimpact.data.prior_bounds import check_prior, parameter_ranges
 from bayesimpact.data.quantity import Quantity, check_quantity, unit_of, with_article
 from bayesimpact.data.recording import Recording
@@ -264,7 +264,7 @@ def _check_motion(where: str, recording: Recording) -> None:
     if samples.max() == samples.min():
         found = f"{samples.size} samples that all equal {samples[0]:.6g} {recording.unit}"
         raise InputError(where, found, _ACCEPTED)
-    period = rough_period(samples, recording.interval)
+    period = crossing_period(samples, recording.interval)
     if period is None or recording.duration < 2.0 * period * (1.0 - 1e-3):
         found = f"{samples.size} samples over {recording.duration:.4g} s, fewer than two periods"
         if period is not None:

@@ -31,7 +31,7 @@ Index = NDArray[np.int64]
 ROUNDS = 12
 """Steps at most by which a rival's parameters imitate another model."""
 DAMPING = (0.0, 1e-6, 1e-4, 1e-2, 1.0)
-"""Of a step, the next where one leads uphill: along a valley the linear problem points too far."""
+"""Of a step, the next where one leads uphill: along a curve the linear problem points too far."""
 SETTLED = 0.02
 """They stop where the sum of squares is what the linear problem promised, or falls no more, but for
 so much of it.

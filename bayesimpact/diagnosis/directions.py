@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.data.short_repr import short_repr
 from bayesimpact.diagnosis.extend import extend, replaced_slot, transfer
 from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.model.effects.effect import Effect, EffectParameter, Scales
@@ -48,6 +49,8 @@ class Direction:
     parts: tuple[Array, ...]
     one_sided: bool
     contrast: bool = False
+
+    __repr__ = short_repr
 
 
 def directions(fit: Fit, effects: Iterable[Effect], scales: Scales) -> tuple[Direction, ...]:

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.data.short_repr import short_repr
 from bayesimpact.diagnosis.directions import sigma_of, whitened
 from bayesimpact.diagnosis.force_evidence import WIDTHS, ForceEvidence
 from bayesimpact.diagnosis.learned import (
@@ -71,6 +72,8 @@ class MissingForce:
     projection: Projection
     reach: float = 0.0
     touching: bool = False
+
+    __repr__ = short_repr
 
     @property
     def gain(self) -> float:

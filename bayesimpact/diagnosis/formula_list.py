@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.data.short_repr import short_repr
 from bayesimpact.diagnosis.formula_refits import Question, effect_for, kinds_of
 from bayesimpact.diagnosis.naming import Naming
 from bayesimpact.diagnosis.refit import Candidate
@@ -51,6 +52,8 @@ class Formula:
     effects: tuple[Effect, ...]
     peak: float
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class Formulas:
@@ -69,6 +72,8 @@ class Formulas:
     reference: Fit
     named: bool
     seen_as: Array
+
+    __repr__ = short_repr
 
 
 def listed(

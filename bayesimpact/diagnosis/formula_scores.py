@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.data.short_repr import short_repr
 from bayesimpact.diagnosis.directions import sigma_of
 from bayesimpact.diagnosis.force import motion_range, whitened_one
 from bayesimpact.diagnosis.learned import LEARNED
@@ -62,6 +63,8 @@ class FormulaScores:
     size: Array
     seen: Array
     motions: tuple[Motion, ...]
+
+    __repr__ = short_repr
 
 
 def formula_scores(fit: Fit, scales: Scales, *, repetition: float = 1.0) -> FormulaScores:

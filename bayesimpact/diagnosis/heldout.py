@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign, Smoothing
+from bayesimpact.data.short_repr import short_repr
 from bayesimpact.diagnosis.evidence import log_evidence
 from bayesimpact.diagnosis.extend import difference_steps
 from bayesimpact.diagnosis.refit import TOLERANCE
@@ -46,6 +47,8 @@ class HeldOut:
     labels: tuple[str, ...]
     before: Array
     after: Array
+
+    __repr__ = short_repr
 
     @property
     def gain(self) -> float:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from bayesimpact.data.short_repr import short_repr
 from bayesimpact.diagnosis.comparable import Comparable
 from bayesimpact.diagnosis.discrepancy import Discrepancy, discrepancy
 from bayesimpact.diagnosis.refit import residual_repetition
@@ -40,6 +41,8 @@ class Intervals:
     covariance: Array
     lower: Array
     upper: Array
+
+    __repr__ = short_repr
 
     def quantiles(self, name: str) -> tuple[float, float, float]:
         """Quantiles 0.05, 0.5 and 0.95 of one parameter; KeyError for an unknown name."""

@@ -48,7 +48,7 @@ def force(y, v, d, t, z, touching, p, q):  # type: ignore[no-untyped-def]
     return (a + b * v) * (1.0 / 6.0)
 
 
-def grain(y, v, d, t, z, touching, p, q):  # type: ignore[no-untyped-def]
+def feature_length(y, v, d, t, z, touching, p, q):  # type: ignore[no-untyped-def]
     """Distance of the knots, m; those over time lie too far apart to matter to a step."""
     return p[2] if p[3] <= 0.0 else math.inf
 
@@ -89,7 +89,7 @@ def learned_contact(
     return replace(
         found,
         regime="contact",
-        law=Law(force, where="contact", grain=grain, polynomial=True),
+        law=Law(force, where="contact", feature_length=feature_length, polynomial=True),
         needs_stop=True,
     )
 
@@ -190,5 +190,5 @@ def _learned(
             "A force outside the catalogue acts, up to {size} ({share} of the peak elastic force)."
         ),
         parameters=head + a + b,
-        law=Law(force, grain=grain, polynomial=True),
+        law=Law(force, feature_length=feature_length, polynomial=True),
     )

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.data.short_repr import short_repr
 from bayesimpact.diagnosis.directions import sigma_of
 from bayesimpact.diagnosis.force import MissingForce, trajectory_points
 from bayesimpact.diagnosis.naming import Naming
@@ -59,6 +60,8 @@ class Location:
     agrees: bool
     gain: Array
     force_sd: float = 0.0
+
+    __repr__ = short_repr
 
 
 def locate(base: Fit, better: Fit, force: MissingForce, effects: tuple[Effect, ...]) -> Location:

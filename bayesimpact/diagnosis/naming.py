@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from bayesimpact.data.short_repr import short_repr
 from bayesimpact.diagnosis.discrepancy import Discrepancy
 from bayesimpact.diagnosis.force import MissingForce
 from bayesimpact.diagnosis.refit import Candidate, tempered_evidence
@@ -39,6 +40,8 @@ class State:
     scan: Scan
     force: MissingForce
     drift: MissingForce
+
+    __repr__ = short_repr
 
     @property
     def is_white(self) -> bool:
@@ -101,6 +104,8 @@ class Naming:
     own: Discrepancy | None = None
     apart: Mapping[str, float] = field(default_factory=dict)
     power: Mapping[frozenset[str], float] = field(default_factory=dict)
+
+    __repr__ = short_repr
 
     @property
     def unknown(self) -> MissingForce:

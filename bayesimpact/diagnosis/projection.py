@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.data.short_repr import short_repr
 from bayesimpact.diagnosis.directions import sigma_of
 from bayesimpact.inference.fit import Fit, inverse
 
@@ -42,6 +43,8 @@ class Projection:
     information: Array
     absorbed: Array
     kept: Array
+
+    __repr__ = short_repr
 
     def subset(self, index: Sequence[int] | NDArray[np.int64]) -> Projection:
         """The same for some of the columns."""

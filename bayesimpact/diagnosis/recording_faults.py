@@ -12,6 +12,7 @@ import numpy as np
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.faults.fault import Fault, fault_document
 from bayesimpact.data.faults.find import set_aside
+from bayesimpact.data.short_repr import short_repr
 from bayesimpact.diagnosis.faults.alone import SharedModel
 from bayesimpact.diagnosis.faults.compare import (
     Compared,
@@ -48,6 +49,8 @@ class Corrected:
     own: tuple[Fault, ...] = ()
     compared: tuple[Compared, ...] = ()
     filtered: Fingerprint | None = None
+
+    __repr__ = short_repr
 
     @property
     def faults(self) -> tuple[Fault, ...]:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.data.short_repr import short_repr
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.extend import (
     difference_steps,
@@ -49,6 +50,8 @@ class Candidate:
     effects: tuple[Effect, ...]
     fit: Fit
     log_evidence: float
+
+    __repr__ = short_repr
 
     @property
     def ids(self) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from bayesimpact.data.short_repr import short_repr
 from bayesimpact.diagnosis.directions import Direction, directions
 from bayesimpact.diagnosis.periodic import periodic_scores
 from bayesimpact.diagnosis.projection import Projection, project
@@ -45,6 +46,8 @@ class Scan:
     projection: Projection
     groups: tuple[NDArray[np.int64], ...]
     found: tuple[Direction, ...]
+
+    __repr__ = short_repr
 
     def best(self) -> tuple[Score, ...]:
         """The best score of every effect, strongest first."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.data.short_repr import short_repr
 from bayesimpact.model.effects.effect import Effect
 
 Array = NDArray[np.float64]
@@ -44,3 +45,5 @@ class Score:
     kept: float
     gain: float
     names: tuple[str, ...]
+
+    __repr__ = short_repr

@@ -98,7 +98,7 @@ def edges(y, v, d, t, z, touching, p, q):  # type: ignore[no-untyped-def]
     return p[2] * p[2] - x * x
 
 
-def grain(y, v, d, t, z, touching, p, q):  # type: ignore[no-untyped-def]
+def feature_length(y, v, d, t, z, touching, p, q):  # type: ignore[no-untyped-def]
     """Length below which a bump looks like a polynomial, m."""
     return 0.5 * p[2]
 
@@ -211,14 +211,14 @@ def law_of(term: Term) -> Law:
         kink_at_turn=not jumps and (rooted or term.fade > 0 or m == Power(2.0, True)),
         first_at_turn=first_at_turn if rooted else None,
         rough_at_touch=term.region == "contact" and not term.position.exponent.is_integer(),
-        grain=grain if term.region in ("bump", "box") else None,
+        feature_length=feature_length if term.region in ("bump", "box") else None,
         polynomial=_is_polynomial(term),
         ignores_speed=m.is_one and term.fade == 0.0,
     )
 
 
 def _is_polynomial(term: Term) -> bool:
-    """Whether it is a polynomial between its kinks (a bump, below its grain)."""
+    """Whether it is a polynomial between its kinks (a bump, below its feature_length)."""
     whole = term.position.exponent.is_integer() and term.speed.exponent.is_integer()
     kinked = term.region in ("everywhere", "bump", "box") and not (
         term.position.is_plain or term.position.is_one

@@ -131,13 +131,15 @@ def _law(number: str, term: Term, effect: Effect) -> tuple[list[str], list[str]]
             _function(f"first{number}", "Shortest step at a turn over the usual one.", [body])
         )
         words.append(f"first_at_turn=first{number}")
-    if law.grain is not None:
+    if law.feature_length is not None:
         functions.append(
             _function(
-                f"grain{number}", "Length of its features, m.", [f"return 0.5 * {places['width']}"]
+                f"feature_length{number}",
+                "Length of its features, m.",
+                [f"return 0.5 * {places['width']}"],
             )
         )
-        words.append(f"grain=grain{number}")
+        words.append(f"feature_length=feature_length{number}")
     flags = (
         "kink_at_turn",
         "rough_at_touch",

@@ -1,4 +1,4 @@
-"""The steps of a climb to a mode: damped, inside the bounds, bent where a valley bends."""
+"""The steps of a climb to a mode: damped, in the bounds, corrected where a minimum is curved."""
 
 from __future__ import annotations
 
@@ -196,7 +196,7 @@ class Climb:
         return step
 
     def bend(self, theta: Array, slope: Slope, step: Array, damping: float) -> Array:
-        """What a step must be corrected by to follow a valley that bends, to second order.
+        """What a step must be corrected by to follow a narrow minimum that curves, to second order.
 
         The geodesic acceleration of Transtrum and Sethna 2012, from one more simulation.
         """

@@ -22,6 +22,8 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.data.short_repr import short_repr
+
 Array = NDArray[np.float64]
 
 TAIL = (0.05, 0.95)  # quantiles of the tail ESS: the ends of the reported 90 % intervals
@@ -54,6 +56,8 @@ class ConvergenceRecord:
     thin: int
     converged: bool
     reasons: tuple[str, ...]
+
+    __repr__ = short_repr
 
 
 def quiet_arviz() -> ModuleType:

@@ -1,6 +1,6 @@
 """The mode of a base model that holds effects of the catalogue: a stop on either side, say.
 
-No quick estimate knows of these effects, so a global search decides where the climb begins: it
+No quick estimate knows of these effects, so a global search decides where the fit begins: it
 runs on the first cycles, with the general simulator, over the physical parameters and those of the
 effects. Start values come from the first samples and the tail of every recording. Searches are
 repeated until two ends of climbs, the best one among them, agree. Of a driven recording the search

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.html import html_table, resolved
+from bayesimpact.data.short_repr import short_repr
 from bayesimpact.inference.likelihood import Likelihood, Linearisation
 from bayesimpact.inference.prior import Prior
 from bayesimpact.inference.priors import Priors
@@ -32,6 +33,8 @@ class Target:
     likelihood: Likelihood
     priors: Priors
     replaced: Mapping[str, Prior] = field(default_factory=dict)
+
+    __repr__ = short_repr
 
     @property
     def oscillator(self) -> Oscillator:

@@ -69,6 +69,7 @@ class Identification:
     def __repr__(self) -> str:
         """One line."""
         ends = "guess and search agree" if self.agree else "guess and search differ"
+        ends = "not searched" if self.from_search is None else ends
         return f"<Identification: {self.fit!r}, {ends}>"
 
     def _repr_html_(self) -> str:

@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.data.short_repr import short_repr
 from bayesimpact.inference.noise import Noise
 from bayesimpact.model.derivatives import trajectories_and_derivatives
 from bayesimpact.model.measurement import smooth
@@ -59,6 +60,8 @@ class Linearisation:
     jacobian: Array
     columns: Index
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class Likelihood:
@@ -66,6 +69,8 @@ class Likelihood:
 
     oscillator: Oscillator
     noise: Noise
+
+    __repr__ = short_repr
 
     @cached_property
     def sizes(self) -> Array:

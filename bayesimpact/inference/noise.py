@@ -103,7 +103,7 @@ class Noise:
         return white
 
     def size(self, n: int, interval: float, used: Mask | None = None) -> int:
-        """How many independent numbers `n` samples are worth."""
+        """To how many independent numbers `n` samples amount."""
         if self.smoothing is None:
             return n if used is None else int(used.sum())
         if used is None:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from bayesimpact.data.recording import Recording
 from bayesimpact.inference.noise import Noise
 from bayesimpact.response.driven_displacement import seen_displacement
-from bayesimpact.response.half_cycles import rough_period
+from bayesimpact.response.half_cycles import spectral_period
 
 Array = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ def driven_noise(recordings: Sequence[Recording], remainders: Noise) -> Noise:
     then says that they are no more than a bound, which the residual of a fit may lower.
     """
     moved = ((r, seen_displacement(r).samples) for r in recordings)
-    fast = [r for r, y in moved if rough_period(y) < SHORTEST_PERIOD]
+    fast = [r for r, y in moved if spectral_period(y) < SHORTEST_PERIOD]
     if not fast:
         return remainders
     floors = [bands for r in fast if (bands := _gap(r)) is not None]

@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 ABOVE = 2.0  # times the fastest natural frequency
 LEAST_ORDINATES = 200
-GROSS = 4.0  # chi-squared per sample from which on a residual is no longer nearly noise
+LARGE_MISFIT = 4.0  # chi-squared per sample from which on a residual is no longer nearly noise
 PASSED = 0.05  # of the power, at least: what a filter has left of noise more than of anything else
 COLOURED = 20.0  # nats over white noise, behind a filter
 BEND = 0.01  # step in the correlation for the curvature of the likelihood
@@ -88,7 +88,7 @@ def refined_noise(fit: Fit) -> Noise:
         level = noise.level * float(np.sqrt(fit.reduced_chi2))
         return replace(noise, level=level, level_error=error, source="residual of the base model")
     plain = noise.correlation == 0.0 and noise.smoothing is None
-    if plain or fit.reduced_chi2 > GROSS or fit.target.oscillator.campaign.mixed:
+    if plain or fit.reduced_chi2 > LARGE_MISFIT or fit.target.oscillator.campaign.mixed:
         return noise
     found = _ordinates(fit, lowest := ABOVE * fastest_frequency(fit))
     if found.power.size < LEAST_ORDINATES:

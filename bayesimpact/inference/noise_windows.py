@@ -15,7 +15,7 @@ from bayesimpact.data.gaps import runs
 from bayesimpact.data.recording import Recording
 from bayesimpact.response import local
 from bayesimpact.response.driven_displacement import seen_displacement
-from bayesimpact.response.half_cycles import rough_period, turning_points
+from bayesimpact.response.half_cycles import spectral_period, turning_points
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -56,7 +56,7 @@ def _parts(recording: Recording, side: bool, turns: bool) -> Mask:
     if side:
         found &= moved < -MARGIN * np.abs(moved).max()
     if not turns:
-        period = rough_period(moved)
+        period = spectral_period(moved)
         index, _ = turning_points(moved, period, local.noise_level(moved, period))
         near = int(TURN * period)
         for shift in range(-near, near + 1):
@@ -67,8 +67,8 @@ def _parts(recording: Recording, side: bool, turns: bool) -> Mask:
 def period_of(recording: Recording) -> float:
     """Rough period of the motion, in samples: under an input, that of the displacement."""
     if recording.input is None:
-        return rough_period(recording.samples, recording.order)
-    return rough_period(seen_displacement(recording).samples)
+        return spectral_period(recording.samples, recording.order)
+    return spectral_period(seen_displacement(recording).samples)
 
 
 def centred(samples: Array) -> Array:

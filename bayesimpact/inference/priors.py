@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.typing import NDArray
 
+from bayesimpact.data.short_repr import short_repr
 from bayesimpact.errors import InputError
 from bayesimpact.inference.prior import (
     Cauchy,
@@ -72,6 +73,8 @@ class Priors:
     """
 
     parameters: tuple[Prior, ...]
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         require(len(self.parameters) > 0, "priors", "none", "one prior per parameter")

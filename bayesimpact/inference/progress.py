@@ -1,4 +1,4 @@
-"""Bars for what takes long, in terminals and notebooks: the sampler's steps, a search's refits."""
+"""Bars for what takes long, in terminals and notebooks: steps, refits, and compiling."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from bayesimpact.inference.sample import Progress
+from bayesimpact.model.compiled import compilation_announced
 
 
 class Refit(str):
@@ -65,8 +66,31 @@ def refit_bar(
         bar.close()
 
 
-def _bar(unit: str, shown: bool | None) -> Any:
+@contextmanager
+def compilation_shown(shown: bool | None = None, after: float = 1.0) -> Iterator[None]:
+    """A line while something must be compiled for longer than `after` seconds; `shown` as above.
+
+    The first call in a new installation compiles for a minute, which would else pass in silence.
+    """
+    bars: list[Any] = []
+
+    def say(words: str) -> None:
+        if bars:  # the end of what the last line told
+            bars.pop().close()
+        else:
+            bars.append(_bar("", shown, bar_format="{desc}"))
+            bars[0].set_description_str(words)
+
+    with compilation_announced(say, after):
+        try:
+            yield
+        finally:
+            for bar in bars:
+                bar.close()
+
+
+def _bar(unit: str, shown: bool | None, **form: Any) -> Any:
     with warnings.catch_warnings():  # that a notebook could have finer bars
         warnings.simplefilter("ignore")
         from tqdm.auto import tqdm
-    return tqdm(unit=unit, disable=None if shown is None else not shown, leave=False)
+    return tqdm(unit=unit, disable=None if shown is None else not shown, leave=False, **form)

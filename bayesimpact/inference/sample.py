@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.lock import locked
+from bayesimpact.data.short_repr import short_repr
 from bayesimpact.errors import InputError
 from bayesimpact.inference.chainfile import ChainFolder
 from bayesimpact.inference.convergence import ConvergenceRecord, assess, autocorrelation_time
@@ -37,7 +38,7 @@ Array = NDArray[np.float64]
 
 _FORMAT = 1
 _BLOCK_STEPS, _BLOCK_DRAWS, _LEAST_BLOCK = 50, 3600, 8
-_QUICK_WALKERS = 64  # looked at before a full assessment is worth its time
+_QUICK_WALKERS = 64  # looked at first, for a full assessment takes longer
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,8 @@ class Chains:
     evaluations: int
     seconds: float
     seed: int
+
+    __repr__ = short_repr
 
     @property
     def flat(self) -> Array:

@@ -47,6 +47,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from bayesimpact.data.short_repr import short_repr
 from bayesimpact.errors import InputError
 from bayesimpact.inference.evolution import (
     Box,
@@ -102,6 +103,8 @@ class History:
     mean_f: Array
     mean_cr: Array
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class SearchResult:
@@ -126,6 +129,8 @@ class SearchResult:
     history: History
     population: Array
     values: Array
+
+    __repr__ = short_repr
 
 
 def metropolis_differential_evolution(

@@ -23,7 +23,7 @@ from bayesimpact.data.gaps import runs
 from bayesimpact.data.recording import Recording
 from bayesimpact.inference.noise import Noise
 from bayesimpact.model.measurement import covariance, gain
-from bayesimpact.response.half_cycles import rough_period
+from bayesimpact.response.half_cycles import spectral_period
 
 Array = NDArray[np.float64]
 isotonic_regression: Any = optimize.isotonic_regression
@@ -35,7 +35,7 @@ WINDOWS = range(5, 62, 2)
 ORDERS = (0, 2, 4, 6)
 ABOVE = 10.0  # times the lowest frequency of the motion: noise only
 DECISIVE = 20.0  # nats that a filter needs over any spectrum without side lobes
-LEAST_SHAPE = 5.0  # nats over white noise, for a filter worth comparing with anything else
+LEAST_SHAPE = 5.0  # nats over white noise, for a filter to be compared with anything else
 LEAST_ORDINATES = 40
 LINE_REACH = 17  # ordinates over which the noise has one level
 LINE = 7.0  # nats beyond the largest of as many ordinates of noise
@@ -244,7 +244,7 @@ def _periodogram(recording: Recording) -> tuple[Array, Array, float]:
     frequency, power = _periodogram_of(
         recording.samples, 1 / interval, window="hann", detrend="linear"
     )
-    lowest = ABOVE / (rough_period(recording.samples, recording.order) * interval)
+    lowest = ABOVE / (spectral_period(recording.samples, recording.order) * interval)
     # neighbours of a Hann window overlap: every second ordinate is nearly independent
     chosen = np.flatnonzero((frequency > lowest) & (frequency < 0.49 / interval))[::2]
     return frequency[chosen], power[chosen], interval

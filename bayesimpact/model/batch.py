@@ -22,14 +22,14 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Span = tuple[int, int]
 
-#: Fewer samples than this are not worth waking other threads for.
-SAMPLES_WORTH_THREADS = 100_000
+#: Fewer samples than this are done before other threads are awake.
+THREADED_SAMPLES = 100_000
 
 
 def parts(batch: int, samples: int) -> int:
     """Return into how many shares a job of `batch` x `samples` samples is cut."""
     threads = available()
-    if threads == 1 or batch * samples < SAMPLES_WORTH_THREADS:
+    if threads == 1 or batch * samples < THREADED_SAMPLES:
         return 1
     return min(SHARES_PER_THREAD * threads, max(batch, threads))
 

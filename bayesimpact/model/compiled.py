@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -112,33 +113,46 @@ def typed(number: int) -> int:
 
 
 @contextmanager
-def compilation_announced(say: Callable[[str], None]) -> Iterator[None]:
-    """Call `say` before and after whatever must be compiled; a later run finds it in the cache."""
-    listener: Any = _Announcer(say)
+def compilation_announced(say: Callable[[str], None], after: float = 1.0) -> Iterator[None]:
+    """Call `say` `after` so many seconds of whatever must be compiled, and at its end; a later run
+    finds it in the cache.
+    """
+    listener: Any = _Announcer(say, after)
     with event.install_listener("numba:compile", listener):  # type: ignore[no-untyped-call]
         yield
 
 
 class _Announcer(event.Listener):  # type: ignore[misc]
-    """Speaks of the outermost function only, not of those that it calls."""
+    """Speaks of outermost functions of the package, not of those that they call or short waits."""
 
-    def __init__(self, say: Callable[[str], None]) -> None:
-        self.say = say
+    def __init__(self, say: Callable[[str], None], after: float) -> None:
+        self.say, self.after = say, after
         self.starts: list[float] = []
         self.told = False
+        self.waiting = threading.Timer(after, self._tell, [""])
+
+    def _tell(self, words: str) -> None:
+        if words:
+            self.told = True
+            self.say(words)
 
     def on_start(self, event: Any) -> None:
         if not self.starts:
             dispatcher = event.data["dispatcher"]
-            # numba compiles helpers of its own, for a moment each
-            self.told = not dispatcher.py_func.__module__.startswith("numba.")
-        if not self.starts and self.told:
             kept = not isinstance(dispatcher._cache, NullCache)
             name = f"{dispatcher.py_func.__module__}.{dispatcher.py_func.__name__}"
-            self.say(f"compiling {name}" + ", once: later runs find it in the cache" * kept)
+            words = f"compiling {name}" + ", once: later runs find it in the cache" * kept
+            self.told = False
+            if not name.startswith("bayesimpact."):  # ArviZ compiles, too, for a moment
+                words = ""
+            self.waiting = threading.Timer(self.after, self._tell, [words])
+            self.waiting.daemon = True
+            self.waiting.start()
         self.starts.append(time.perf_counter())
 
     def on_end(self, event: Any) -> None:
         seconds = time.perf_counter() - self.starts.pop()
-        if not self.starts and self.told:
-            self.say(f"compiled in {seconds:.1f} s")
+        if not self.starts:
+            self.waiting.cancel()
+            if self.told:
+                self.say(f"compiled in {seconds:.1f} s")

@@ -37,12 +37,12 @@ def wave_responses(changes: FreeChanges, frequencies: Array) -> Array:
     begins = np.array([part.begin for part in parts])
     ends = np.cumsum([part.readings.shape[0] for part in parts])
     readings = np.concatenate([part.readings for part in parts])
-    pushes, carried = np.concatenate(changes.pushes), changes.carried
+    impulses, carried = np.concatenate(changes.impulses), changes.carried
     out = np.empty((2 * frequencies.size, changes.points))
 
     def run(low: int, high: int) -> None:
         _superpose(
-            readings, pushes, begins, ends, carried, changes.direct, angles[low:high],
+            readings, impulses, begins, ends, carried, changes.direct, angles[low:high],
             weights[:, low:high], out[2 * low : 2 * high],
         )  # fmt: skip
 
@@ -71,10 +71,10 @@ def _lagrange(x: Array) -> Array:
 
 @compiled(nogil=True)
 def _superpose(
-    readings: Any, pushes: Any, begins: Any, ends: Any, carried: Any, direct: Any, angles: Any,
+    readings: Any, impulses: Any, begins: Any, ends: Any, carried: Any, direct: Any, angles: Any,
     weights: Any, out: Any,
 ) -> None:  # fmt: skip
-    """Fill in `out` (2 F, n), stretch by stretch: rows begin..end of `readings` and `pushes`."""
+    """Fill in `out` (2 F, n), stretch by stretch: rows begin..end of `readings` and `impulses`."""
     points = weights.shape[2]
     for f in range(angles.size):
         step = complex(np.cos(angles[f]), np.sin(angles[f]))
@@ -93,7 +93,7 @@ def _superpose(
                 if i + 1 < n:
                     left = min(max(i + 1 - points // 2, 0), n - points)
                     for j in range(points):
-                        push = wave * weights[i - left, f, j]
-                        one += push * pushes[first + left + j, 0]
-                        other += push * pushes[first + left + j, 1]
+                        impulse = wave * weights[i - left, f, j]
+                        one += impulse * impulses[first + left + j, 0]
+                        other += impulse * impulses[first + left + j, 1]
                 wave *= step

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 Laws = NDArray[np.int64]
 
 FADED = 1e-2  # of its largest size a change keeps four digits: of the noise, rounding is 1e-9
-POINTS = 6  # samples between which a response to pushes is interpolated
+POINTS = 6  # samples between which a response to impulses is interpolated
 SHORTEST = POINTS + 2  # samples of a stretch
 _Y0, _V0, _GAIN, _K1 = (SLOTS.index(name) for name in ("y0", "v0", "A", "k1"))
 
@@ -72,7 +72,7 @@ class FreeChanges:
         return 1 / self.mass if self.order == 2 else 0.0
 
     @cached_property
-    def pushes(self) -> tuple[Array, ...]:
+    def impulses(self) -> tuple[Array, ...]:
         """Both changes (n, 2) that a unit impulse makes at every sample, per stretch.
 
         Raises
@@ -88,7 +88,7 @@ class FreeChanges:
 
         Raises
         ------
-        LinAlgError : as `pushes`
+        LinAlgError : as `impulses`
         """
         pairs = zip(self.stretches[1:], self.stretches, strict=False)
         found = [np.linalg.solve(part.states[0], last.states[-1]) for part, last in pairs]
@@ -98,7 +98,7 @@ class FreeChanges:
 def free_changes(
     oscillator: Oscillator, r: int, slots: Array, small: float, *, factor: int = 1
 ) -> FreeChanges:
-    """Changes of recording r's motion by the initial state, later ones by short pushes.
+    """Changes of recording r's motion by the initial state, later ones by short impulses.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def free_changes(
     begins = np.arange(0, max(last - SHORTEST, 1), length)
     found = [_part(whole, 0, last if begins.size == 1 else length)]
     runs = []
-    for first in (1, 2):  # a push ends the stretch before in its own run: neighbours take turns
+    for first in (1, 2):  # an impulse ends the stretch before in its run: neighbours take turns
         waves[:] = 0.0
         for begin in begins[first::2]:
             waves[[0, 1], [begin - apart - 1, begin - 1]] = small * slots[_K1]
@@ -181,7 +181,7 @@ def motions_beside(
             q = q.copy()
             q[:, _GAIN] = 1.0
             inputs = Inputs(waves.reshape(-1), np.arange(q.shape[0]) * count)
-        else:  # the pushes act at the samples as well, and add nothing to readings of their own
+        else:  # the impulses act at the samples as well, and add nothing to readings of their own
             acting = np.array([[1.0], [1.0], [0.0]])[..., None]
             both = own[:, None] + acting * (waves / q[:, [_GAIN]])
             inputs = Inputs(both.reshape(3, -1), np.arange(q.shape[0]) * count)

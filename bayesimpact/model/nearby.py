@@ -48,24 +48,24 @@ def readings_near(oscillator: Oscillator, r: int, theta: Array, error: float) ->
     """
     q = oscillator.layout.slots(theta)[:, r]
     q[:, _OFFSET] = 0.0
-    pushed = _pushed(q, oscillator.laws)
-    if pushed.size < PAYS or oscillator.campaign.stop:
+    superposable = _apart_by_forces(q, oscillator.laws)
+    if superposable.size < PAYS or oscillator.campaign.stop:
         return oscillator.predict_recording(r, theta)
-    judges = pushed[np.linspace(0, pushed.size - 1, CHECKED + 2).astype(int)[1:-1]]
-    simulated = np.union1d(np.setdiff1d(np.arange(q.shape[0]), pushed), judges)
+    checked = superposable[np.linspace(0, superposable.size - 1, CHECKED + 2).astype(int)[1:-1]]
+    simulated = np.union1d(np.setdiff1d(np.arange(q.shape[0]), superposable), checked)
     motions = np.empty((q.shape[0], int(oscillator.counts[r])))
     motions[simulated] = oscillator.motions_of(np.full(simulated.size, r), q[simulated])
     if not np.isfinite(motions[0]).all():  # it ran away
         return oscillator.predict_recording(r, theta)
-    superposed = motions[0] + _changes(oscillator, r, q[np.concatenate([[0], pushed])])
-    wrong = superposed[np.searchsorted(pushed, judges)] - motions[judges]
+    superposed = motions[0] + _changes(oscillator, r, q[np.concatenate([[0], superposable])])
+    wrong = superposed[np.searchsorted(superposable, checked)] - motions[checked]
     if not np.all(np.linalg.norm(wrong, axis=1) <= error):
         return oscillator.predict_recording(r, theta)
-    motions[pushed] = superposed
+    motions[superposable] = superposed
     return oscillator.read(r, motions, theta)
 
 
-def _pushed(q: Array, laws: Index) -> Index:
+def _apart_by_forces(q: Array, laws: Index) -> Index:
     """Which slots (B, Q) differ from the first by forces along the motion alone, ascending.
 
     None where no law is both steady and has so many of them that superposition pays.

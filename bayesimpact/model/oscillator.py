@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign, Smoothing
+from bayesimpact.data.short_repr import short_repr
 from bayesimpact.model import measurement
 from bayesimpact.model.arguments import Inputs
 from bayesimpact.model.effects.effect import LAW_ROW, Effect, law_row
@@ -48,6 +49,8 @@ class Oscillator:
     effects: tuple[Effect, ...]
     layout: Layout
     smoothing: Smoothing | None = None
+
+    __repr__ = short_repr
 
     def __getstate__(self) -> dict[str, Any]:
         """For pickle: addresses of compiled laws mean nothing in another process."""

@@ -20,6 +20,7 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.channels import keepers
 from bayesimpact.data.quantity import reading_unit
 from bayesimpact.data.recording import Recording
+from bayesimpact.data.short_repr import short_repr
 from bayesimpact.errors import InputError
 from bayesimpact.model.effects.effect import Effect, EffectParameter, catalogued
 
@@ -66,6 +67,8 @@ class Layout:
     parameters: tuple[Parameter, ...]
     columns: NDArray[np.int64]
     constants: NDArray[np.float64]
+
+    __repr__ = short_repr
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -20,6 +20,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike
 
+from bayesimpact.data.short_repr import short_repr
 from bayesimpact.errors import InputError, SimulationError
 from bayesimpact.model import batch as compiled_batch
 from bayesimpact.model import normalized
@@ -148,6 +149,8 @@ class Trajectory:
     displacement: Floats
     velocity: Floats
     impacts: Floats
+
+    __repr__ = short_repr
 
 
 def simulate(

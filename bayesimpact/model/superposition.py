@@ -1,7 +1,7 @@
 """How a recording would change under small forces along its motion, without simulating them.
 
 About a motion the state's change obeys a linear equation, whatever laws act: it is a sum of two
-free changes (`free_changes`, jumps at the obstacle included), and a force pushes both, instant by
+free changes (`free_changes`, jumps at the obstacle included), and a force changes both, instant by
 instant (variation of parameters: Coddington and Levinson 1955, chapter 3). The free changes are had
 from a few simulated motions; after that every force costs one sum over its history.
 
@@ -66,7 +66,7 @@ def motion_along(oscillator: Oscillator, r: int, q: Array, reach: float) -> Moti
     changes = free_changes(oscillator, r, q, STEP * reach, factor=factor)
     y, v = changes.motion
     d = y - q[_GAP] if oscillator.campaign.stop else np.full(y.size, -np.inf)
-    _ = changes.pushes, changes.carried  # raise here, where the caller expects it
+    _ = changes.impulses, changes.carried  # raise here, where the caller expects it
     t, steps = np.arange(y.size) * changes.interval, _steps(v, d, changes.interval)
     return Motion(y, v, d, t, changes, steps, factor)
 
@@ -118,15 +118,15 @@ def answers(motion: Motion, forces: Array) -> Array:
     out = np.empty((forces.shape[0], motion.samples))
     state = np.zeros((2, forces.shape[0]))
     changes, factor = motion.changes, motion.factor
-    for part, pushes, carried in zip(
-        changes.stretches, changes.pushes, changes.carried, strict=True
+    for part, impulses, carried in zip(
+        changes.stretches, changes.impulses, changes.carried, strict=True
     ):
         own = slice(part.begin, part.begin + part.readings.shape[0])
         rows = part.readings[::factor].T
         first = part.begin // factor
         state = carried @ state
         states = _states(
-            -pushes.T, forces[:, own], motion.steps[:, own][:, : pushes.shape[0] - 1], factor
+            -impulses.T, forces[:, own], motion.steps[:, own][:, : impulses.shape[0] - 1], factor
         )
         states += state[..., None]
         np.einsum("ks,kts->ts", rows, states, out=out[:, first : first + rows.shape[1]])
@@ -134,9 +134,9 @@ def answers(motion: Motion, forces: Array) -> Array:
     return out - changes.direct * forces[:, ::factor] if changes.direct else out
 
 
-def _states(pushes: Array, forces: Array, steps: Array, factor: int) -> Array:
+def _states(impulses: Array, forces: Array, steps: Array, factor: int) -> Array:
     """What forces (K, n) make of both free changes by every sample, (2, K, samples)."""
-    before, after = steps[0] * pushes[:, :-1], steps[1] * pushes[:, 1:]
+    before, after = steps[0] * impulses[:, :-1], steps[1] * impulses[:, 1:]
     count, samples = forces.shape[0], (forces.shape[1] - 1) // factor + 1
     inner = before[:, 1:] + after[:, :-1]
     nodes = np.concatenate([before[:, :1], inner], axis=1).reshape(2, samples - 1, factor)

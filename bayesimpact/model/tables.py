@@ -1,4 +1,4 @@
-"""What is worth computing once per regime: its motion at every sample, and close to any time.
+"""What is computed once per regime: its motion at every sample, and close to any time.
 
 Time is counted in sampling intervals. Row 0 to 3 of a table hold S, D, E and F of `flow` at 0, 1,
 ..., LENGTH (E and F only with forcing): every sample between two events is then a product of the

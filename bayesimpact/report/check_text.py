@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bayesimpact.data.campaign import SECOND_STOP, Campaign
-from bayesimpact.data.period import rough_period
+from bayesimpact.data.period import crossing_period
 from bayesimpact.data.recording import Recording
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.noise_estimate import raw_noise
@@ -69,7 +69,7 @@ def campaign_warnings(campaign: Campaign, noise: Noise | None) -> list[str]:
 
 
 def _recording_warnings(recording: Recording, *, stop: bool) -> list[str]:
-    period = rough_period(recording.samples, recording.interval)
+    period = crossing_period(recording.samples, recording.interval)
     assert period is not None  # load_campaign refuses recordings without one
     warnings = []
     per_period = period / recording.interval
@@ -95,7 +95,7 @@ def _recordings_block(campaign: Campaign) -> str:
     rows = [[*head, f"rest {' or '.join(units)}", "first", "largest", "decay"]]
     for r in campaign.recordings:
         scale, _ = _shown(r)
-        period = rough_period(r.samples, r.interval)
+        period = crossing_period(r.samples, r.interval)
         rest = _rest(r)
         shown = [rest, r.samples[0] - rest, np.abs(r.samples - rest).max()]
         numbers = [1 / r.interval, r.start, r.duration, period, *(x * scale for x in shown)]
@@ -139,7 +139,7 @@ def _shown(recording: Recording) -> tuple[float, str]:
 def envelope_bars(recording: Recording) -> str:
     """Largest excursion in equal spans of time of a period or more, as a row of bars."""
     excursion = np.abs(recording.samples - _rest(recording))
-    period = rough_period(recording.samples, recording.interval) or recording.duration
+    period = crossing_period(recording.samples, recording.interval) or recording.duration
     count = min(COLUMNS, max(1, int(recording.duration / period)))
     spans = np.array_split(excursion, count)
     heights = np.array([span.max() for span in spans]) / excursion.max()

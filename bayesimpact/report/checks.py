@@ -119,7 +119,7 @@ def _trust(results: Results) -> str:
             "there may be a better one still."
         )
     if not results.fit_converged:
-        words += " The climb to the mode did not come to rest."
+        words += " The fit did not converge to the mode."
     return words
 
 
@@ -166,7 +166,7 @@ def _whiteness(results: Results) -> Check:
 def _mode(results: Results) -> Check:
     finding = "the last step was below a thousandth of a standard deviation"
     return Check(
-        "The climb to the mode came to rest",
+        "The fit converged to the mode",
         _status(results.fit_converged),
         finding if results.fit_converged else "it ran out of iterations",
     )

@@ -67,6 +67,7 @@ def diagnosis_view(results: Results) -> dict[str, Any] | None:
             {
                 "id": other["id"],
                 "titles": titles_of(other["id"]),
+                "name": other["id"].replace("_", " "),  # as the figure of the models has it
                 "probability": probability(other["probability"]),
                 "evidence": _plain(other["delta_log_evidence"], 1),
             }
@@ -119,7 +120,8 @@ def _location(
             rows.append((words, span_of(location[key], si)))
     for key in ("cases", "recordings"):
         if location.get(key):
-            rows.append((key, ", ".join(str(x) for x in location[key])))
+            order = ", most first" if len(location[key]) > 1 else ""
+            rows.append((key + order, ", ".join(str(x) for x in location[key])))
     if location.get("force_rms_n") is not None and not named:
         force = quantity(location["force_rms_n"], "N m" if unit == "rad" else "N", 2)
         rows.append(("force, rms", f"{force}, with what base parameters could imitate"))

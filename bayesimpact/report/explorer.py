@@ -149,7 +149,7 @@ def _floats(values: Array) -> str:
 
 
 def _integers(values: Array) -> dict[str, Any]:
-    """16-bit integers, and what one is worth; the lowest stands for what is not finite."""
+    """16-bit integers, and the size of one; the lowest stands for what is not finite."""
     known = np.isfinite(values)
     scale = float(np.max(np.abs(values[known]), initial=0.0)) / _INTEGERS or 1.0
     integers = np.where(known, np.round(np.where(known, values, 0.0) / scale), -_INTEGERS - 1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import inf
 from typing import Any
 
 from markupsafe import Markup
@@ -23,8 +24,17 @@ def _own_name(parameter: str) -> str | Markup:
 
 
 def not_found(diagnosis: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """Limits of effects of which nothing is seen: what is seen is not ruled out by its limit."""
-    return [x for x in diagnosis.get("limits", ()) if x.get("answer") != "present"]
+    """Limits of effects of which nothing is seen: what is seen is not ruled out by its limit.
+
+    Those that are ruled out most clearly come first, in the table as in the figure.
+    """
+
+    def over_practical(limit: Mapping[str, Any]) -> float:
+        upper, practical = limit.get("upper95"), limit.get("practical_size")
+        return float(upper / practical) if upper is not None and practical else inf
+
+    unseen = [x for x in diagnosis.get("limits", ()) if x.get("answer") != "present"]
+    return sorted(unseen, key=over_practical)
 
 
 def limit_row(limit: Mapping[str, Any], *, remains: bool) -> dict[str, str | Markup]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.quantity import Quantity, unit_of
+from bayesimpact.data.short_repr import short_repr
 
 Array = NDArray[np.float64]
 
@@ -48,6 +49,8 @@ class RecordingResult:
     displacement: Array = field(default_factory=lambda: np.zeros(0))
     scale: float = 1.0
     input: str = ""
+
+    __repr__ = short_repr
 
     def motion(self, predicted: Array, offset: float) -> Array:
         """Displacement (n,), m, of a model that reads `predicted` (n,), from the true rest.

@@ -13,7 +13,9 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.data.html import html_table, resolved
 from bayesimpact.data.quantity import Quantity, is_angular, unit_of
+from bayesimpact.data.short_repr import short_repr
 from bayesimpact.report.recording_result import RecordingResult as RecordingResult
 
 Array = NDArray[np.float64]
@@ -55,6 +57,8 @@ class Row:
     prior: str
     posterior_sd: float = float("nan")
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class SearchSummary:
@@ -76,6 +80,8 @@ class SearchSummary:
     stopped: str
     agree: bool
     distance: float
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +117,8 @@ class SamplerSummary:
     traces: Array
     trace_steps: Array
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class Draws:
@@ -127,6 +135,8 @@ class Draws:
     names: tuple[str, ...]
     units: tuple[str, ...]
     values: Array
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,6 +161,8 @@ class Curve:
     frequency_band: Array
     damping_band: Array
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class BackboneSummary:
@@ -172,6 +184,8 @@ class BackboneSummary:
     inside: Array
     p_values: Array
     replicates: int
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True)
@@ -249,7 +263,7 @@ class Results:
         distance from 1 in standard errors
     log_posterior : at the mode
     covariance : (d, d) Laplace, in the order of `rows`, SI
-    fit_converged : the climb to the mode came to rest
+    fit_converged : the last step of the fit was negligible
     search, sampler, draws, backbone : None where there are none
     before, before_backbone : draws and backbone check of the model without the effects
     checks : the checklist
@@ -284,6 +298,21 @@ class Results:
     diagnosis: Mapping[str, Any] | None = None
     diagnosis_arrays: Mapping[str, Array] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        """One line."""
+        found = self.verdict if self.diagnosis is None else self.diagnosis["verdict"]
+        count = f"{len(self.recordings)} recordings, {len(self.rows)} parameters"
+        return f"<Results of {self.name!r}: {found}, {count}>"
+
+    def _repr_html_(self) -> str:
+        """Parameters that all recordings share, with 90 % intervals, SI, for a notebook."""
+        rows = []
+        for row in self.select("physical", "effect"):
+            width = row.ci90[1] - row.ci90[0]
+            shown = (resolved(x, width) for x in (row.median, *row.ci90))
+            rows.append((row.name, *shown, row.unit))
+        return html_table(repr(self), ("parameter", self.centre, "5 %", "95 %", "unit"), rows)
 
     @property
     def cases(self) -> tuple[str, ...]:

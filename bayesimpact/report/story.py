@@ -39,7 +39,7 @@ def story_rows(results: Results) -> list[tuple[str, list[str | Markup]]]:
         ("remains", _remains(results, diagnosis.get("remainder"))),
         ("improvement", _improvement(results, diagnosis)),
         ("could still hide", _hidden(diagnosis)),
-        ("certificate", _certificate(diagnosis.get("certificate"))),
+        ("parametric bootstrap", _bootstrap(diagnosis.get("certificate"))),
     ]
     return [(question, answer) for question, answer in rows if answer]
 
@@ -153,18 +153,18 @@ def _improvement(results: Results, diagnosis: Mapping[str, Any]) -> list[str | M
     return lines
 
 
-def _certificate(certificate: Mapping[str, Any] | None) -> list[str | Markup]:
+def _bootstrap(counts: Mapping[str, Any] | None) -> list[str | Markup]:
     """How the loop did on simulated campaigns of the same design."""
-    if not certificate:
+    if not counts:
         return []
     lines: list[str | Markup] = [
-        f"of {certificate['controls']} simulated campaigns with nothing missing, "
-        f"{certificate['false_alarms']} raised an alarm"
+        f"of {counts['controls']} simulated campaigns with nothing missing, "
+        f"{counts['false_alarms']} raised an alarm"
     ]
-    if certificate["planted"]:
+    if counts["planted"]:
         lines.append(
-            f"of {certificate['planted']} with what was named here, {certificate['named']} were "
-            f"named the same, {certificate['misnamed']} got another name"
+            f"of {counts['planted']} with what was named here, {counts['named']} were "
+            f"named the same, {counts['misnamed']} got another name"
         )
     return lines
 

@@ -13,9 +13,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from bayesimpact.data.short_repr import short_repr
 from bayesimpact.errors import InputError
 from bayesimpact.response import local
-from bayesimpact.response.half_cycles import HalfCycles, half_cycles, rough_period
+from bayesimpact.response.half_cycles import HalfCycles, half_cycles, spectral_period
 from bayesimpact.response.rest import rest_position
 
 Floats = NDArray[np.float64]
@@ -40,6 +41,8 @@ class Branch:
     amplitude: Floats
     damping_ratio: Floats
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class Backbone:
@@ -56,6 +59,8 @@ class Backbone:
     lower: Branch
     rest: float
     noise: float
+
+    __repr__ = short_repr
 
 
 def backbone(
@@ -116,7 +121,7 @@ def backbone(
     ):
         if choice not in known:
             raise InputError(name, repr(choice), " or ".join(known))
-    period = rough_period(signal)
+    period = spectral_period(signal)
     level = local.noise_level(signal, period) if noise is None else float(noise)
     zero = rest_position(signal, period, level) if rest is None else float(rest)
     halves = half_cycles(signal, zero, period, level)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bayesimpact.data.frozen import Picklable
+from bayesimpact.data.short_repr import short_repr
 from bayesimpact.errors import InputError
 from bayesimpact.response.backbone import Backbone, Damping, Estimator, backbone
 
@@ -50,6 +51,8 @@ class Band:
     inside: float
     p_value: float
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class BackboneCheck(Picklable):
@@ -69,6 +72,8 @@ class BackboneCheck(Picklable):
     p_value: float
     backbone: Backbone
     draws: int
+
+    __repr__ = short_repr
 
 
 def check_backbone(

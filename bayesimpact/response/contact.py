@@ -3,7 +3,7 @@
 Each cycle gives three numbers: its length, the ratio of the depths at its two ends and the height
 it reached. A stop shortens the cycle, eats energy and cuts the height; cycles that stay below the
 gap do none of this, which is the knee of the backbone. A coarse grid over gap, stiffness and
-damping finds the valley, least squares on the closed-form cycle its bottom.
+damping finds the neighbourhood, least squares on the closed-form cycle the minimum.
 """
 
 from __future__ import annotations
@@ -137,7 +137,7 @@ def fit_contact(
             tolerance=1e-5,
         )
 
-    # A few steps tell which start lies in the right valley.
+    # A few steps tell which start leads to the lowest minimum.
     best = descend([descend(starts, 8).x], 60)
     # Three unknowns more than without a stop, at least; 5 for each is far beyond chance.
     if capped(best.residuals) > _free_misfit(cycles, free) - 5.0 * (2 + cases):

@@ -68,11 +68,11 @@ def cycle(
         d, gap, still = depth[hit], g[hit], np.zeros(hit.size)
         free = (b[hit], w0[hit] ** 2)
         start = np.arccos(np.clip(-gap / d, -1.0, 1.0)) / w[hit]
-        touch = _solve(*free, -d, still, gap, still, half[hit], start, 1)
-        speed = _motion(*free, -d, still, touch)[1]
+        onset = _solve(*free, -d, still, gap, still, half[hit], start, 1)
+        speed = _motion(*free, -d, still, onset)[1]
         stay, peak, leave = _contact(mass, c1[hit] + c2[hit], k1[hit], k2[hit], gap, speed)
         home, deep = _to_minimum(b[hit], w[hit], gap, leave)
-        length[hit], after[hit], height[hit] = touch + stay + home, deep, peak
+        length[hit], after[hit], height[hit] = onset + stay + home, deep, peak
     lost = g <= -depth
     length[lost] = after[lost] = height[lost] = np.nan
     impact = np.zeros(depth.shape, dtype=bool)

@@ -20,7 +20,7 @@ from scipy.interpolate import CubicSpline
 
 from bayesimpact.data.recording import Recording
 from bayesimpact.response import local
-from bayesimpact.response.half_cycles import HalfCycles, half_cycles, rough_period
+from bayesimpact.response.half_cycles import HalfCycles, half_cycles, spectral_period
 
 Floats = NDArray[np.float64]
 
@@ -58,7 +58,7 @@ def displacement(samples: Floats, interval: float, order: int) -> Displacement:
     interval : s
     order : 0, 1 or 2
     """
-    period = rough_period(samples, order)
+    period = spectral_period(samples, order)
     noise = local.noise_level(samples, period)
     if order == 0:
         return Displacement(samples, None, noise)

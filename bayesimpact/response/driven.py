@@ -21,7 +21,7 @@ from bayesimpact.response.driven_displacement import (
     first_guess,
     without_base,
 )
-from bayesimpact.response.half_cycles import rough_period
+from bayesimpact.response.half_cycles import spectral_period
 from bayesimpact.response.weak_form import Rows, least_squares, rows_of
 
 Floats = NDArray[np.float64]
@@ -65,12 +65,12 @@ def estimate_driven(campaign: Campaign) -> Driven:
     read follow stiffnesses, gap and gain.
     """
     read = campaign.recordings
-    touch, biases = np.full(len(read), np.inf), np.array([r.samples.mean() for r in read])
+    onset, biases = np.full(len(read), np.inf), np.array([r.samples.mean() for r in read])
     guess = first_guess(read, campaign.mass, stop=campaign.stop)
     derived = not all(r.is_displacement for r in read)
     natural = 2 * np.pi * float(np.sqrt(guess.mass / guess.k1))
     if not derived:
-        natural = float(np.median([rough_period(r.samples) * r.interval for r in read]))
+        natural = float(np.median([spectral_period(r.samples) * r.interval for r in read]))
     for _ in range(ROUNDS_DERIVED if derived else ROUNDS):
         relative = [without_base(r, guess.gain) for r in read]
         moved = [displacement_under(r, guess, b) for r, b in zip(relative, biases, strict=True)]
@@ -78,29 +78,29 @@ def estimate_driven(campaign: Campaign) -> Driven:
         width = (STOPPED if campaign.stop else FREE) * natural
         rows = [rows_of(r, campaign.mass, width) for r in relative]
         if campaign.stop:
-            touch = np.array([_touch(seen, r, own) for r, own in enumerate(rows)])
-        found = _solve(seen, rows, touch)
+            onset = np.array([_onset(seen, r, own) for r, own in enumerate(rows)])
+        found = _solve(seen, rows, onset)
         biases = found.offset
         stiffness = found.k1 if found.k1 > 0.0 else campaign.mass * (2 * np.pi / natural) ** 2
         natural = 2 * np.pi * float(np.sqrt(campaign.mass / stiffness))
-        before, guess = guess, _guess(campaign, found, stiffness, touch)
+        before, guess = guess, _guess(campaign, found, stiffness, onset)
         if derived and guess.settled(before):
             break
     return _made_usable(seen, rows, found, stiffness)
 
 
-def _guess(campaign: Campaign, found: Driven, k1: float, touch: Floats) -> Guess:
+def _guess(campaign: Campaign, found: Driven, k1: float, onset: Floats) -> Guess:
     """What the next displacements are made with."""
     if not campaign.stop:
         return Guess(campaign.mass, k1, found.gain)
     known = found.k2[found.k2 > 0.01 * k1]
-    if not (np.isfinite(touch).any() and known.size):
+    if not (np.isfinite(onset).any() and known.size):
         return Guess(campaign.mass, k1, found.gain, 0.0)
     return Guess(campaign.mass, k1, found.gain, found.gap, float(np.median(known)))
 
 
 def _system(
-    campaign: Campaign, chosen: Sequence[int], rows: Sequence[Rows], touch: Floats
+    campaign: Campaign, chosen: Sequence[int], rows: Sequence[Rows], onset: Floats
 ) -> tuple[Floats, Floats]:
     """Matrix and right-hand side of the recordings `chosen`, whose rows and readings at impact
     these are; unknowns k1, c1, gain, [c2, k2 of every case], k1 times offsets.
@@ -120,8 +120,8 @@ def _system(
             block[:, 2] = -own.base[:, 2]
         else:
             target = target + own.base[:, 2]
-        if np.isfinite(touch[i]):
-            inside = np.maximum(recording.samples - touch[i], 0.0)
+        if np.isfinite(onset[i]):
+            inside = np.maximum(recording.samples - onset[i], 0.0)
             touched = own.of_force(inside)
             block[:, 3] = touched[:, 1]
             block[:, 4 + cases.index(recording.case)] = touched[:, 0]
@@ -132,11 +132,11 @@ def _system(
     return np.concatenate(blocks), np.concatenate(right)
 
 
-def _touch(campaign: Campaign, r: int, own: Rows) -> float:
+def _onset(campaign: Campaign, r: int, own: Rows) -> float:
     """Reading at which a recording, by itself, touches the stop; inf where none is seen."""
 
-    def left(touch: float) -> float:
-        return least_squares(*_system(campaign, [r], [own], np.array([touch])))[1]
+    def left(onset: float) -> float:
+        return least_squares(*_system(campaign, [r], [own], np.array([onset])))[1]
 
     low, high = np.quantile(campaign.recordings[r].samples, [LOW, HIGH])
     best, least = np.inf, left(np.inf) / SEEN
@@ -151,9 +151,9 @@ def _touch(campaign: Campaign, r: int, own: Rows) -> float:
     return best
 
 
-def _solve(campaign: Campaign, rows: Sequence[Rows], touch: Floats) -> Driven:
+def _solve(campaign: Campaign, rows: Sequence[Rows], onset: Floats) -> Driven:
     """Estimates without the initial motion."""
-    solution, _ = least_squares(*_system(campaign, range(len(rows)), rows, touch))
+    solution, _ = least_squares(*_system(campaign, range(len(rows)), rows, onset))
     k1, c1, gain = (float(x) for x in solution[:3])
     c2, k2 = 0.0, np.zeros(0)
     if campaign.stop:
@@ -161,11 +161,11 @@ def _solve(campaign: Campaign, rows: Sequence[Rows], touch: Floats) -> Driven:
     readings = [r.samples for r in campaign.recordings]
     offset = solution[-len(rows) :] / k1 if k1 > 0.0 else np.array([x.mean() for x in readings])
     free = any(r.input is not None and r.input.free for r in campaign.recordings)
-    seen, rest = np.isfinite(touch), _rest(rows, offset)
+    seen, rest = np.isfinite(onset), _rest(rows, offset)
     gap = np.inf
     if campaign.stop:  # never touched: no less than what was reached
         reached = [float(x.max()) for x in readings]
-        gap = float(np.median((touch - rest)[seen]) if seen.any() else max(reached - rest))
+        gap = float(np.median((onset - rest)[seen]) if seen.any() else max(reached - rest))
     none = np.zeros(len(rows))
     return Driven(k1, c1, gap, c2, k2, gain if free else 1.0, offset, none, none)
 

@@ -22,7 +22,7 @@ from scipy.signal import savgol_filter
 from bayesimpact.data.quantity import Quantity
 from bayesimpact.data.recording import Recording
 from bayesimpact.response.displacement import displacement_of
-from bayesimpact.response.half_cycles import rough_period
+from bayesimpact.response.half_cycles import spectral_period
 from bayesimpact.response.weak_form import least_squares, rows_of
 
 Floats = NDArray[np.float64]
@@ -72,7 +72,9 @@ def first_guess(
 
     free : take the gain as unknown everywhere: then any mass will do, and only ratios to it count
     """
-    natural = float(np.median([rough_period(r.samples, r.order) * r.interval for r in recordings]))
+    natural = float(
+        np.median([spectral_period(r.samples, r.order) * r.interval for r in recordings])
+    )
     k1, gain = mass * (2 * np.pi / natural) ** 2, 1.0
     for _ in range(ROUNDS):
         width = WIDTH * 2 * np.pi * float(np.sqrt(mass / k1))

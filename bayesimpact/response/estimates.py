@@ -18,12 +18,13 @@ import numpy as np
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.frozen import Picklable
 from bayesimpact.data.gaps import before_gap
+from bayesimpact.data.short_repr import short_repr
 from bayesimpact.errors import InputError
 from bayesimpact.response import local
 from bayesimpact.response.contact import Contact, Free, fit_contact
 from bayesimpact.response.driven import estimate_driven
 from bayesimpact.response.flight import Flight
-from bayesimpact.response.half_cycles import rough_period
+from bayesimpact.response.half_cycles import spectral_period
 from bayesimpact.response.observe import (
     Observed,
     look,
@@ -68,6 +69,8 @@ class Estimates(Picklable):
     sd: Mapping[str, float]
     impacts: Mapping[str, int]
     input_gain: float | None = None
+
+    __repr__ = short_repr
 
     @property
     def values(self) -> dict[str, float]:
@@ -147,7 +150,7 @@ def _driven(campaign: Campaign) -> Estimates:
         pairs = zip(recordings, values, strict=True)
         return MappingProxyType({r.name: float(value) for r, value in pairs})
 
-    noises = [local.noise_level(r.samples, rough_period(r.samples, r.order)) for r in recordings]
+    noises = [local.noise_level(r.samples, spectral_period(r.samples, r.order)) for r in recordings]
     free = any(r.input is not None and r.input.free for r in recordings)
     estimates = Estimates(
         k1=found.k1,

@@ -40,7 +40,7 @@ class HalfCycles:
         return np.diff(self.crossings)
 
 
-def rough_period(samples: Floats, order: int = 0) -> float:
+def spectral_period(samples: Floats, order: int = 0) -> float:
     """Period of the strongest component, in samples: good to some ten per cent.
 
     `order` says which time derivative of the displacement the samples are.

@@ -14,7 +14,7 @@ from bayesimpact.response.contact import Contact, Cycles
 from bayesimpact.response.cycles import cycle
 from bayesimpact.response.displacement import displacement_of
 from bayesimpact.response.flight import Arc, Flight, lower_arcs, solve_flight, waves_of
-from bayesimpact.response.half_cycles import half_cycles, rough_period
+from bayesimpact.response.half_cycles import half_cycles, spectral_period
 from bayesimpact.response.rest import rest_position
 
 Floats = NDArray[np.float64]
@@ -69,7 +69,7 @@ def look(campaign: Campaign) -> Observed:
     found = [displacement_of(r) for r in campaign.recordings]
     samples = [one.samples for one in found]
     intervals = [r.interval for r in campaign.recordings]
-    periods = [rough_period(x) for x in samples]
+    periods = [spectral_period(x) for x in samples]
     noises = [
         max(local.noise_level(x, p), DRIFT * float(np.ptp(x)) if r.order > 0 else 0.0)
         for x, p, r in zip(samples, periods, campaign.recordings, strict=True)

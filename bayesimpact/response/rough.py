@@ -21,7 +21,7 @@ from bayesimpact.errors import InputError
 from bayesimpact.response import local
 from bayesimpact.response.displacement import displacement_of
 from bayesimpact.response.estimates import Estimates, estimate
-from bayesimpact.response.half_cycles import HalfCycles, half_cycles, rough_period
+from bayesimpact.response.half_cycles import HalfCycles, half_cycles, spectral_period
 
 Floats = NDArray[np.float64]
 
@@ -51,7 +51,8 @@ def rough_estimates(campaign: Campaign) -> Estimates:
     rates = [_decay(one.halves) / one.interval for one in seen]
     c1 = max(2 * mass * float(np.median(rates)), 1e-4 * float(np.sqrt(k1 * mass)))
     starts = {
-        one.name: first_state(one.samples, one.interval, rough_period(one.samples)) for one in seen
+        one.name: first_state(one.samples, one.interval, spectral_period(one.samples))
+        for one in seen
     }
     highest = max(float(one.samples.max()) for one in seen)
     estimates = Estimates(
@@ -90,7 +91,7 @@ class _Seen:
 
 def _seen(recording: Recording) -> _Seen:
     found = displacement_of(recording)
-    period = rough_period(found.samples)
+    period = spectral_period(found.samples)
     rest = _rest(found.samples, period)
     samples = found.samples - rest
     level = local.noise_level(samples, period)

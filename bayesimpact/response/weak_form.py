@@ -89,19 +89,19 @@ def rows_of(recording: Recording, mass: float, width: float) -> Rows:
     phi, slope, bend, third = weights
     hop = max(1, half // 2)
     y = products(recording.samples, hop, phi, slope, bend)
-    push = np.zeros(y.shape[0])
+    drive = np.zeros(y.shape[0])
     if recording.input is not None:
         held, force = weights[recording.order], recording.input.shown(mass, dt)
         if recording.order == 0:
             # of a line between samples, to second order: the triangle's variance is dt^2 / 6
             held, force = phi + dt * dt * bend / 12.0, recording.input.force(mass, dt)
-        push = products(force, hop, held)[:, 0]
-    whole = np.full(push.size, phi.sum())
-    kept = np.ones(push.size, dtype=bool)
+        drive = products(force, hop, held)[:, 0]
+    whole = np.full(drive.size, phi.sum())
+    kept = np.ones(drive.size, dtype=bool)
     if recording.used is not None:
         kept = products(np.where(recording.used, 0.0, 1.0), hop, np.ones(phi.size))[:, 0] == 0.0
     weight = np.where(kept, 1.0, 0.0)
-    base = np.column_stack([y[:, 0], y[:, 1], push, whole]) * weight[:, None]
+    base = np.column_stack([y[:, 0], y[:, 1], drive, whole]) * weight[:, None]
     return Rows(*weights, base, -mass * y[:, 2] * weight, recording.order, hop)
 
 

@@ -78,7 +78,7 @@ def _faults(settings: Settings, ids: tuple[str, ...]) -> list[str]:
     """Faults that some rig shows on which these effects can stand."""
     cases = max(RIG_DESIGNS[name].cases for name in _possible(settings, ids))
     known = [
-        k for k, plant in PLANTED_FAULTS.items() if cases >= (2 if k == "case" else plant.stop)
+        k for k, entry in PLANTED_FAULTS.items() if cases >= (2 if k == "case" else entry.stop)
     ]
     return [*known, OTHER_RIG]
 
@@ -179,7 +179,7 @@ def _recorded(
                 "score": one.score,
                 "distinct": one.distinct,
                 "nearest": one.nearest,
-                "regimes": list(one.plant.regimes),
+                "regimes": list(one.entry.regimes),
                 "place_m": None if one.form.place is None else list(one.form.place),
             }
             for one in found

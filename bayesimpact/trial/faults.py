@@ -40,9 +40,9 @@ class PlantedFault:
 
 
 def _period(recording: Recording) -> float:
-    from bayesimpact.data.period import rough_period
+    from bayesimpact.data.period import crossing_period
 
-    return rough_period(recording.samples, 1.0) or recording.samples.size / 10
+    return crossing_period(recording.samples, 1.0) or recording.samples.size / 10
 
 
 def _new(
@@ -157,8 +157,8 @@ def plant_fault(
     campaign: Campaign, kind: str, noise: float, rng: Rng
 ) -> tuple[Campaign, dict[str, Any]] | None:
     """A campaign with one fault, and the truth about it; None where the rig cannot show it."""
-    plant = PLANTED_FAULTS[kind]
-    if (plant.stop and not campaign.stop) or (kind == "case" and len(campaign.cases) < 2):
+    entry = PLANTED_FAULTS[kind]
+    if (entry.stop and not campaign.stop) or (kind == "case" and len(campaign.cases) < 2):
         return None
     recordings = list(campaign.recordings)
     number = int(rng.integers(len(recordings)))
@@ -171,15 +171,15 @@ def plant_fault(
         one = replace(one, name=f"{one.name}_again")
         recordings.append(one)
     else:
-        spoiled, place, size = plant.put(one, noise, rng)
+        spoiled, place, size = entry.put(one, noise, rng)
         recordings[number] = _filtered(kind, one, spoiled, campaign.measurement.smoothing)
     truth = {
-        "id": plant.id,
+        "id": entry.id,
         "recording": one.name,
         "start_s": place[0],
         "end_s": place[1],
         "size": size,
-        "timed": plant.timed,
+        "timed": entry.timed,
     }
     return replace(campaign, recordings=tuple(recordings)), truth
 

@@ -40,7 +40,7 @@ def balance(site: Site, parts: tuple[Part, ...], piece: Piece) -> Balance:
     inertia = site.mass + carried
     laws = [(p.in_reaction, p.law(piece)) for p in parts if p.law is not None]
     free = [law for inside, law in laws if law is not None and not inside]
-    pushes = [law for inside, law in laws if law is not None and inside]
+    contact_laws = [law for inside, law in laws if law is not None and inside]
     levels = [p.friction(piece) for p in parts if p.friction is not None]
     dry = [level for level in levels if level is not None]
     rates = [
@@ -49,16 +49,16 @@ def balance(site: Site, parts: tuple[Part, ...], piece: Piece) -> Balance:
         if p.states
     ]
 
-    def push(t: float, y: float, v: float, state: State) -> float:
+    def contact_force(t: float, y: float, v: float, state: State) -> float:
         total = c2 * v + k2 * (y - gap)
-        for law in pushes:
+        for law in contact_laws:
             total += law(t, y, v, state)
         return total
 
     def drive(t: float, y: float, v: float, state: State) -> float:
         total = c1 * v + k1 * y
         if contact:
-            total += push(t, y, v, state)
+            total += contact_force(t, y, v, state)
         for law in free:
             total += law(t, y, v, state)
         return total
@@ -73,7 +73,7 @@ def balance(site: Site, parts: tuple[Part, ...], piece: Piece) -> Balance:
 
     def reaction(t: float, state: State) -> float:
         y, v = state[0], state[1]
-        return push(t, y, v, state) + carried * acceleration(t, y, v, state)
+        return contact_force(t, y, v, state) + carried * acceleration(t, y, v, state)
 
     def rhs(t: float, array: NDArray[np.float64]) -> State:
         state: State = array.tolist()

@@ -47,7 +47,7 @@ class Sized:
     strength : size in detection limits (of this effect beside its partner, for a pair; by the
         distance from the nearest entry of the catalogue, for a force outside it)
     score : expected score of this effect alone
-    form, plant : where it comes from
+    form, entry : where it comes from
     distinct, nearest : distance, in standard errors, from the effect of the catalogue that imitates
         it best, and which that is; None in a pair
     """
@@ -57,7 +57,7 @@ class Sized:
     strength: float
     score: float
     form: Form
-    plant: PlantedEffect
+    entry: PlantedEffect
     distinct: float | None = None
     nearest: str | None = None
 
@@ -81,20 +81,20 @@ def sized(sensitivity: Sensitivity, effect: str, form: Form, strength: float) ->
 
 def single(sensitivity: Sensitivity, effect: str, strength: float, least: float, rng: Rng) -> Sized:
     """One effect of `strength` detection limits; one that is on or off has at least `least`."""
-    plant = planted_effect_of(effect)
-    form = plant.form(sensitivity.design, rng)
+    entry = planted_effect_of(effect)
+    form = entry.form(sensitivity.design, rng)
     found = sized(sensitivity, effect, form, strength)
-    if found.score < LIMIT * least * (1 - CLOSE) and not plant.by_noise:
+    if found.score < LIMIT * least * (1 - CLOSE) and not entry.by_noise:
         raise Unsuitable(f"{effect} stands out by {found.score:.1f} standard errors only")
     apart = sensitivity.distinct(found.response, besides=effect)
     numbers = form.build(found.size)
-    return Sized(effect, numbers, found.score / LIMIT, found.score, form, plant, *apart)
+    return Sized(effect, numbers, found.score / LIMIT, found.score, form, entry, *apart)
 
 
 def outside(sensitivity: Sensitivity, effect: str, strength: float, rng: Rng) -> Sized:
     """A force outside the catalogue, `strength` limits away from the nearest single entry of it."""
-    plant = planted_effect_of(effect)
-    form = plant.form(sensitivity.design, rng)
+    entry = planted_effect_of(effect)
+    form = entry.form(sensitivity.design, rng)
 
     def score(size: float) -> float:
         return sensitivity.distinct(placed(sensitivity, effect, form, size).response)[0]
@@ -102,7 +102,7 @@ def outside(sensitivity: Sensitivity, effect: str, strength: float, rng: Rng) ->
     found = placed(sensitivity, effect, form, solve(score, form, LIMIT * strength))
     left, nearest = sensitivity.distinct(found.response)
     numbers = form.build(found.size)
-    return Sized(effect, numbers, left / LIMIT, found.score, form, plant, left, nearest)
+    return Sized(effect, numbers, left / LIMIT, found.score, form, entry, left, nearest)
 
 
 def pair(
@@ -110,7 +110,7 @@ def pair(
 ) -> tuple[Sized, ...]:
     """Two effects, each `strength` limits above what the other one could imitate of it."""
     planted = [planted_effect_of(e) for e in ids]
-    forms = [plant.form(sensitivity.design, rng) for plant in planted]
+    forms = [entry.form(sensitivity.design, rng) for entry in planted]
     both = list(zip(ids, forms, strict=True))
     found = [sized(sensitivity, effect, form, 1.0) for effect, form in both]
     own = _own_share(found, ids)
@@ -121,8 +121,8 @@ def pair(
                 raise Unsuitable(f"{effect} would have to be unphysically large")
             found[i] = placed(sensitivity, effect, form, size)
     own = _own_share(found, ids)
-    for one, (effect, _), plant in zip(found, both, planted, strict=True):
-        if one.score * own < 0.7 * LIMIT * least and not plant.by_noise:
+    for one, (effect, _), entry in zip(found, both, planted, strict=True):
+        if one.score * own < 0.7 * LIMIT * least and not entry.by_noise:
             raise Unsuitable(f"{effect} is hidden by its partner")
     return tuple(
         Sized(e, f.build(x.size), x.score * own / LIMIT, x.score, f, p)

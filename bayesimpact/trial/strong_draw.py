@@ -148,11 +148,11 @@ def _ids(settings: Settings, kind: str, design: Design, resting: bool, rng: Rng)
 
 
 def _fit(
-    names: tuple[str, ...], plants: Mapping[str, Any], design: Design, resting: bool
+    names: tuple[str, ...], entries: Mapping[str, Any], design: Design, resting: bool
 ) -> list[str]:
     """Those that this rig can show."""
     cases, recordings = len(design.rig.k2), len(design.releases)
-    return [e for e in names if plants[e].fits(cases, recordings) and not (resting and e in TIMED)]
+    return [e for e in names if entries[e].fits(cases, recordings) and not (resting and e in TIMED)]
 
 
 def _rivals(design: Design, ids: list[str], rng: Rng) -> dict[str, Any]:
@@ -161,9 +161,9 @@ def _rivals(design: Design, ids: list[str], rng: Rng) -> dict[str, Any]:
     result = {}
     known = tuple(e for e in CATALOGUE_STRONG if e not in ("pendulum_sine", *ids))
     for effect in _fit(known, CATALOGUE_STRONG, design, False):
-        plant = CATALOGUE_STRONG[effect]
-        if not slots.intersection(plant.slots):
-            form = plant.form(design, rng)
+        entry = CATALOGUE_STRONG[effect]
+        if not slots.intersection(entry.slots):
+            form = entry.form(design, rng)
             result[effect] = form.build(form.start)
     return result
 
@@ -224,7 +224,7 @@ def _truth(
                 "id": c.effect,
                 "outside": c.outside,
                 "parameters": c.form.build(c.size),
-                "regimes": list(c.plant.regimes),
+                "regimes": list(c.entry.regimes),
                 "place_m": None if c.form.place is None else list(c.form.place),
             }
             for c in found

@@ -103,16 +103,16 @@ class Chosen:
     effect: str
     form: Form
     size: float
-    plant: PlantedEffect
+    entry: PlantedEffect
     outside: bool
 
 
 def chosen(effect: str, design: Design, rng: Rng) -> Chosen:
     """Draw shape and size of one effect; a pendulum's gravity has its only size."""
     outside = effect in STRONG_OUTSIDE
-    plant = STRONG_OUTSIDE[effect] if outside else CATALOGUE_STRONG[effect]
-    form = plant.form(design, rng)
+    entry = STRONG_OUTSIDE[effect] if outside else CATALOGUE_STRONG[effect]
+    form = entry.form(design, rng)
     if effect == "pendulum_sine":
-        return Chosen(effect, form, form.largest, plant, outside)
+        return Chosen(effect, form, form.largest, entry, outside)
     size = form.largest * log_uniform(rng, SHARES.get(effect, SHARE)) if form.start > 0 else 0.0
-    return Chosen(effect, form, size, plant, outside)
+    return Chosen(effect, form, size, entry, outside)

@@ -35,7 +35,7 @@ from bayesimpact.model.added import flows
 from bayesimpact.model.oscillator import build_oscillator
 
 SCALES = (2.0, 1.0, 0.5, 0.25)  # of all step sizes
-STEPS = ("MAX_ANGLE", "MAX_ANGLE_PACE", "RAMP")
+STEPS = ("MAX_ANGLE", "MAX_ANGLE_OF_TIME", "RAMP")
 GRADED = ("SINCE", "UNTIL", "SINCE_TURN", "UNTIL_TURN")  # over a time's 3/4th power
 ROUNDS, REPEATS = 11, 3
 PAIRED = (1.0, 0.5)  # scales with which pairs of effects are simulated too

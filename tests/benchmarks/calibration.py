@@ -11,14 +11,18 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from pathlib import Path
 
+if __name__ == "__main__":  # imports go by the tests' folder, not by this one
+    sys.path[0] = str(Path(__file__).resolve().parents[1])
+
 import numpy as np
+from benchmarks.alarms import alarm, false_alarms
+from benchmarks.sbc import MODELS, replicate, verdicts
 from tqdm import tqdm
 
 from bayesimpact.cluster import executor
-from bayesimpact.trial.alarms import alarm, false_alarms
-from bayesimpact.trial.sbc import MODELS, replicate, verdicts
 from bayesimpact.trial.settings import Settings
 from bayesimpact.trial.stamp import origin
 

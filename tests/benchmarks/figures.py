@@ -16,10 +16,9 @@ if __name__ == "__main__":  # imports go by the tests' folder, not by this one
     sys.path[0] = str(Path(__file__).resolve().parents[1])
 
 import matplotlib as mpl
+from benchmarks.power_figures import limits_figure, power_figure
 from benchmarks.tables import stored
 from matplotlib.figure import Figure
-
-from bayesimpact.report.figures.power import limits_figure, power_figure
 
 HERE = Path(__file__).resolve().parent
 INK, ACCENT = "0.35", "tab:red"

@@ -3,7 +3,7 @@
     python tests/benchmarks/strange_campaigns.py [COMMAND...]
 
 Every campaign of tests/strange.py, which the door lets in, is given to COMMAND (`fit`; also
-`diagnose --quick`, which takes minutes where the misfit is gross): it has to end in a report, with
+`diagnose --quick`, which takes minutes where the misfit is large): it has to end in a report, with
 exit code 0 or 3. Exit codes, what was said and seconds go to strange_campaigns.json; a run that is
 interrupted keeps those that it has.
 """

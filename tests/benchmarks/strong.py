@@ -1,4 +1,4 @@
-"""Is the diagnosis right where the misfit is gross? Stores finished runs of strong trials.
+"""Is the diagnosis right where the misfit is large? Stores finished runs of strong trials.
 
     bayesimpact trial --regime strong --number 200 --seed 60000 --workers 2 --out strong
     python tests/benchmarks/strong.py strong

@@ -1,4 +1,4 @@
-"""Priors at the door: every kind is measured by its own quantiles, and no honest one is refused."""
+"""Priors at the door: each kind is measured by its own quantiles, no plausible one is refused."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ class Table:
     """Stands for the fits: a gain in log evidence over the base model for every set of effects.
 
     `forward` has what a fit reaches from a smaller model, where that ends in a worse place than
-    one from a larger model. `unfinished` has what is gained beyond where a climb gave up,
+    one from a larger model. `unfinished` has what is gained beyond where a climb did not converge,
     `once` where a model's first fit ends. `force` is the evidence of a free force in place of all
     effects, to which `beside` adds where there are effects that it may stand beside. `chi2` is
     that of every fit. `asked` are the sets that the equation of motion asks for, of all stretches

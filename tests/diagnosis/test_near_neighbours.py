@@ -14,7 +14,7 @@ from bayesimpact.trial.rig_chain import Chain
     ("amplitude", "seed"), [(0.25, 1), pytest.param(0.28, 2, marks=pytest.mark.long)]
 )
 def test_a_sine_is_told_from_its_cubic(amplitude: float, seed: int) -> None:
-    """Beside a gross misfit, where the equation of motion asks for spring_cubic first.
+    """Beside a large misfit, where the equation of motion asks for spring_cubic first.
 
     The quintic part of the sine, 0.4 % of its cubic one, speaks for the sine by some six nats.
     """

@@ -73,7 +73,7 @@ def problem() -> Target:
 
 
 def unfinished() -> Fit:
-    """A climb that gave up where the branch is ten times too fast."""
+    """An unconverged climb, where the branch is ten times too fast."""
     t = 0.002
     start = np.array([1.0 + STIFFNESS * TIME - 2000.0 * t, 2000.0, t, 1e-3])
     return find_mode(problem(), start, max_iterations=2)

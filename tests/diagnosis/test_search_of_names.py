@@ -193,7 +193,7 @@ def test_what_the_last_exchange_leads_to_is_rid_of_what_it_does_not_need(run, mo
 
 
 def test_a_better_end_of_the_same_set_settles_once_more(monkeypatch):
-    """What its effects are worth was told at the worse end."""
+    """What its effects contribute was told at the worse end."""
     first, better = (Table({}).candidate((A, B), gain) for gain in (40.0, 90.0))
     settling, eliminated = object.__new__(settle.Settling), []
     stand_ins = {
@@ -235,11 +235,11 @@ def test_no_exchange_is_tried_beside_which_a_force_explains_a_lot(run, beside, f
 
 def test_the_search_ends_when_a_free_force_will_beat_all_names(run):
     steps = {A: 100.0, f"{A} {B}": 120.0, f"{A} {B} {C}": 140.0}
-    hopeless, hopeful = Table(steps, force=2000.0), Table(steps, force=130.0)
-    run(hopeless)
-    run(hopeful)
-    assert max(map(len, hopeless.fitted)) == 1
-    assert max(map(len, hopeful.fitted)) == 3
+    dominated, promising = Table(steps, force=2000.0), Table(steps, force=130.0)
+    run(dominated)
+    run(promising)
+    assert max(map(len, dominated.fitted)) == 1
+    assert max(map(len, promising.fitted)) == 3
 
 
 def test_the_search_ends_when_a_free_force_explains_what_is_left(run):
@@ -307,7 +307,7 @@ def test_a_climb_that_gave_up_near_the_best_is_finished_before_it_loses(run):
 
 @pytest.mark.parametrize(("beside", "finished"), [(0.0, True), (20.0, False)])
 def test_the_best_model_s_valley_is_followed_where_that_may_be_all_it_lacks(run, beside, finished):
-    """A free force beside it gains 50 nats, or 70: more than a climb that gave up fell short of."""
+    """A free force beside it gains 50 nats, or 70: more than an unconverged climb fell short of."""
     table = Table({A: 470.0}, force=520.0, beside=beside, unfinished={A: 40.0})
     assert run(table).chosen.is_white == finished
     assert table.finished == [frozenset({A})] * finished

@@ -199,21 +199,21 @@ def test_a_model_without_a_line_has_nothing_to_be_steady(small):
 
 
 @pytest.mark.parametrize(
-    ("apart", "gross", "force", "hum"),
+    ("apart", "large_misfit", "force", "hum"),
     [(0.0, True, True, True), (0.0, False, True, False), (0.7, False, True, False),
      (2.0, False, False, False), (10.0, True, False, False)],
 )  # fmt: skip
-def test_a_line_in_the_band_of_the_motion_is_told_apart(apart, gross, force, hum):
+def test_a_line_in_the_band_of_the_motion_is_told_apart(apart, large_misfit, force, hum):
     """A plain oscillator swings at one frequency only; a force or a hum elsewhere may be one.
 
     `apart`: between both frequencies, in units of the reciprocal of the duration.
     """
     rig, fit = small_rig.PLAIN, plain_fit()
-    assert not shakes_in_own_band(fit, gross)
+    assert not shakes_in_own_band(fit, large_misfit)
     own_frequency = np.sqrt(rig.k1 / rig.mass) / (2 * np.pi)
     frequency = own_frequency + apart / campaign_scales(fit).duration
-    assert shakes_in_own_band(with_line(fit, frequency), gross) is force
-    assert shakes_in_own_band(with_line(fit, frequency, "sensor_hum"), gross) is hum
+    assert shakes_in_own_band(with_line(fit, frequency), large_misfit) is force
+    assert shakes_in_own_band(with_line(fit, frequency, "sensor_hum"), large_misfit) is hum
 
 
 @pytest.mark.parametrize("side", [-1, 1])

@@ -111,7 +111,7 @@ def test_file_is_the_term_for_every_kind(tmp_path: Any) -> None:
         own, p = law_of(term), numbers(term, effect(term, signed=True))
         for flag in ("where", "jump_at_turn", "jump_at_surface", "kink_at_turn", "polynomial"):
             assert getattr(law, flag) == getattr(own, flag), term.text()
-        for name in ("grain", "first_at_turn"):
+        for name in ("feature_length", "first_at_turn"):
             mine, its = getattr(law, name), getattr(own, name)
             assert (mine is None) == (its is None), term.text()
             if its is not None:

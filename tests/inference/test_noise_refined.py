@@ -120,9 +120,9 @@ def test_what_a_filter_leaves_of_white_noise_is_not_called_coloured(hum):
 def test_noise_that_is_known_stays(small, coloured):
     white = with_noise(small.fit, Noise(0.0, level=small_rig.NOISE))
     assert refined_noise(white) is white.target.likelihood.noise
-    gross = moved(coloured[0], "k1", 1.01)
-    assert gross.reduced_chi2 > 4
-    assert refined_noise(gross) is gross.target.likelihood.noise
+    wrong = moved(coloured[0], "k1", 1.01)
+    assert wrong.reduced_chi2 > 4
+    assert refined_noise(wrong) is wrong.target.likelihood.noise
 
 
 def test_a_declared_level_stays(coloured):

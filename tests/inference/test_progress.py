@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numba
 import numpy as np
 import pytest
 
+import bayesimpact as bi
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.models import Models
-from bayesimpact.inference.progress import Refit, progress_bar, refit_bar
+from bayesimpact.inference.progress import Refit, compilation_shown, progress_bar, refit_bar
 from bayesimpact.inference.sample import Progress
 
 WHERE = Progress(burning=False, steps=50, max_steps=200, tau=3.0, ess=1234.4)
@@ -60,3 +67,38 @@ def test_a_search_counts_its_refits() -> None:
         ("without coulomb_friction", 2),
     ]
     assert search.refits == 2
+
+
+@pytest.mark.parametrize("shown", [True, None])
+def test_the_first_call_is_not_silent_while_it_compiles(
+    shown: bool | None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    @numba.njit  # type: ignore[untyped-decorator]
+    def new(x: float) -> float:
+        return x + 1.0
+
+    new.py_func.__module__ = "bayesimpact.example"
+    with compilation_shown(shown, after=0.001):
+        new(1.0)
+    assert ("compiling bayesimpact.example.new" in capsys.readouterr().err) is bool(shown)
+
+
+def test_the_main_steps_show_what_they_compile(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a notebook `bi.fit` has no other sign of life."""
+    listening: list[bool] = []
+
+    @contextmanager
+    def shown(*_: object) -> Iterator[None]:
+        listening.append(True)
+        yield
+        listening.append(False)
+
+    def step(*_: object, **__: object) -> bool:
+        return listening[-1]
+
+    monkeypatch.setattr("bayesimpact.api.compilation_shown", shown)
+    for place in ("api.identify", "inference.posterior.sample", "diagnosis.diagnose.diagnose"):
+        monkeypatch.setattr(f"bayesimpact.{place}", step)
+    campaign = Campaign("any", 1.0, (Recording("a", "", np.zeros(4), 1.0),), stop=False)
+    assert all(call(campaign) is True for call in (bi.fit, bi.sample, bi.diagnose))
+    assert listening == [True, False] * 3

@@ -1,4 +1,4 @@
-"""Sampling: right answers, an honest verdict, and a resumed chain equal to the uninterrupted."""
+"""Sampling: right answers, a verdict that can fail, a resumed chain equal to the uninterrupted."""
 
 from __future__ import annotations
 

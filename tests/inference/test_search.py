@@ -80,7 +80,7 @@ TRUTH = np.array([808.0, 0.01, -6e-3, 0.02])  # k, c, y0, v0
 MASS = 0.5
 
 
-def swing(theta: Array) -> Array:
+def decay(theta: Array) -> Array:
     k, c, y0, v0 = (theta[:, i : i + 1] for i in range(4))
     decay = c / (2 * MASS)
     omega = np.sqrt(k / MASS - decay**2)
@@ -91,12 +91,12 @@ def swing(theta: Array) -> Array:
 @cache
 def recorded() -> Array:
     noise = 1e-5 * np.random.default_rng(5).normal(size=len(TIMES))
-    return swing(TRUTH[None])[0] + noise
+    return decay(TRUTH[None])[0] + noise
 
 
 def phase_locked(theta: Array) -> Array:
     """(N / 2) log of the sum of squares: the noise level profiled out, in nats."""
-    return 0.5 * len(TIMES) * np.log(np.sum((swing(theta) - recorded()) ** 2, axis=1))
+    return 0.5 * len(TIMES) * np.log(np.sum((decay(theta) - recorded()) ** 2, axis=1))
 
 
 def test_the_misfit_has_many_side_minima() -> None:

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagnosed import MODELS, diagnosed, diagnosis_figures, made_up_arrays
+from coarse_figures import draw_coarsely
+from diagnosed import LIMITS, MODELS, diagnosed, diagnosis_figures, made_up_arrays
 from matplotlib.collections import PathCollection
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
@@ -15,6 +16,7 @@ from matplotlib.text import Text
 
 from bayesimpact.report.archive import load_results, save_results
 from bayesimpact.report.captions import caption
+from bayesimpact.report.diagnosis_view import diagnosis_view
 from bayesimpact.report.figures.improvement import shifts
 from bayesimpact.report.figures.ranking import FREE_FORCE, MOST, ranked
 from bayesimpact.report.figures.save import all_figures, png
@@ -110,14 +112,25 @@ def test_captions_say_what_holds_for_this_diagnosis_only() -> None:
     assert "predicted" not in caption("improvement", free)
     assert "Impacts" in caption("gain", results) and "Impacts" not in caption("gain", free)
     assert "Nothing is missing" in caption("force_map", diagnosed(verdict="adequate"))
-    gross = diagnosed(fit={"before": {"reduced_chi2": 8510.0}})
-    assert "rough guide" in caption("force_map", gross)
+    large = diagnosed(fit={"before": {"reduced_chi2": 8510.0}})
+    assert "rough guide" in caption("force_map", large)
     assert "rough guide" not in caption("force_map", results)
 
 
 def test_limits_are_told_in_their_units() -> None:
     text = words(diagnosis_figures(diagnosed())["limits"]).replace("\N{NO-BREAK SPACE}", " ")
     assert "100 µN" in text and "95.0 N/m" in text and "detection limit" in text
+
+
+def test_limits_stand_in_one_order_under_one_name_in_table_and_figure() -> None:
+    """The table had the scan's order and titles, the figure its own order and ids."""
+    results = diagnosed(limits=LIMITS[::-1])
+    view = diagnosis_view(results)
+    assert view is not None
+    titles = [limit["title"] for limit in view["limits"]]
+    assert titles == ["quadratic drag", "relaxation of the obstacle"]
+    axis = diagnosis_figures(results)["limits"].axes[0]
+    assert [label.get_text() for label in axis.get_yticklabels()] == titles
 
 
 def test_shifts_are_in_deviations_of_the_base_model() -> None:
@@ -143,8 +156,10 @@ def test_any_number_of_recordings(count: int, cases: int) -> None:
         assert png(figure).startswith(b"\x89PNG")
 
 
-@pytest.mark.usefixtures("coarse_figures")
-def test_report_is_drawn_again_from_stored_results(tmp_path: Path) -> None:
+def test_report_is_drawn_again_from_stored_results(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    draw_coarsely(monkeypatch, pixels=True)  # the same to the pixel
     results = diagnosed(2, 1)
     save_results(results, tmp_path)
     loaded = load_results(tmp_path)

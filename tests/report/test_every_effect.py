@@ -56,7 +56,7 @@ def saved(name: str, figure: Figure, folder: Path) -> bytes:
 @pytest.fixture(autouse=True)
 def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     """What shows parameters is drawn, coarsely."""
-    coarse_figures.draw_coarsely(monkeypatch)
+    coarse_figures.draw_coarsely(monkeypatch, pixels=True)
     monkeypatch.setattr(save, "_saved", saved)
     monkeypatch.setattr(save, "DIAGNOSIS", (improvement_figures, gaussian_figures))
     monkeypatch.setattr(gaussian, "corner_figure", few_pairs)

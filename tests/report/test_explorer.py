@@ -159,7 +159,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("explorer")
     save_results(compared(), folder)
     with pytest.MonkeyPatch.context() as patch:
-        draw_coarsely(patch)
+        draw_coarsely(patch, pixels=True)
         return rewrite_report(folder).page
 
 

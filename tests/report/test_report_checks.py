@@ -88,9 +88,9 @@ def test_what_went_wrong_in_the_computation_is_said() -> None:
     apart = assessed(replace(results, search=replace(results.search, agree=False, distance=8.0)))
     assert "ended in different places" in apart.headline
     stuck = assessed(replace(apart, fit_converged=False))
-    assert "did not come to rest" in stuck.headline
+    assert "did not converge to the mode" in stuck.headline
     assert [c.title for c in stuck.failed] == [
-        "The climb to the mode came to rest",
+        "The fit converged to the mode",
         "Guess and global search end at the same mode",
         "The sampler converged",
     ]

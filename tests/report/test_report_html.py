@@ -196,6 +196,8 @@ def test_effects_and_model() -> None:
     text = page(results)[1].text
     assert "dry friction ( coulomb_friction ): F sign(v), sticking" in text
     assert "with dry friction describes" in text
+    assert "these are integrated in steps" in text and "nothing depends on a step" not in text
+    assert "so nothing depends on a step size." in page(make_results())[1].text
 
 
 def test_diagnosis_tells_its_story_first() -> None:
@@ -206,10 +208,11 @@ def test_diagnosis_tells_its_story_first() -> None:
     assert text.index("Diagnosis: what is missing is named") < text.index("Parameters Medians")
     for words in (
         "the suspension, wherever the mass moves (93 % of what is unexplained)",
+        "cases, most first 1, 2 recordings run_0",
         "displacement \N{MINUS SIGN}6.0 to 3.0 mm",
         "Probability > 0.999; it changes the log evidence by +812.3.",
         "force = 160 (150 to 170) µN",
-        "mass of the obstacle 0.010 +770.0",
+        "mass of the obstacle obstacle mass 0.010 +770.0",
         "reduced χ² 1.170 1.002",
         "residual rms 5.40 µm 5.00 µm",
         "whiteness p < 0.001 0.40",

@@ -10,7 +10,7 @@ from rigs import PAPER, paper_motion
 from bayesimpact.errors import InputError
 from bayesimpact.response.backbone import Backbone, backbone
 from bayesimpact.response.bilinear import bilinear_backbone
-from bayesimpact.response.half_cycles import half_cycles, rough_period
+from bayesimpact.response.half_cycles import half_cycles, spectral_period
 from bayesimpact.response.rest import rest_position
 
 RATIO = PAPER["c1"] / (2 * np.sqrt(PAPER["k1"] * PAPER["mass"]))
@@ -153,7 +153,7 @@ def test_scaling_and_mirroring() -> None:
 @pytest.mark.parametrize("sigma", [0.0, 5e-6, 3e-5])
 def test_rest_position_with_a_free_tail(sigma: float) -> None:
     samples = noisy(paper_motion() + 3e-5, sigma)
-    found = rest_position(samples, rough_period(samples), sigma)
+    found = rest_position(samples, spectral_period(samples), sigma)
     assert found == pytest.approx(3e-5, abs=2e-7 + 0.3 * sigma)
 
 
@@ -161,29 +161,31 @@ def test_rest_position_while_the_impacts_go_on() -> None:
     samples = noisy(paper_motion(1500) + 3e-5, 5e-6)
     middle = 0.5 * (samples[-160:].max() + samples[-160:].min())
     assert abs(middle) > 4e-4  # what the last swings lie about
-    assert rest_position(samples, rough_period(samples), 5e-6) == pytest.approx(3e-5, abs=1e-5)
+    assert rest_position(samples, spectral_period(samples), 5e-6) == pytest.approx(3e-5, abs=1e-5)
 
 
 def test_rest_position_when_soft_impacts_hardly_decay() -> None:
     """The last centres agree with each other, but between them the motion is no sine."""
     samples = noisy(paper_motion(4000, k2=240.0, c1=0.01, c2=0.01) + 3e-5, 5e-6)
-    assert rest_position(samples, rough_period(samples), 5e-6) == pytest.approx(3e-5, abs=3e-5)
+    assert rest_position(samples, spectral_period(samples), 5e-6) == pytest.approx(3e-5, abs=3e-5)
 
 
 def test_rest_position_of_a_preloaded_rig_is_where_it_settles() -> None:
     samples = noisy(paper_motion(g=-5e-4), 5e-6)
     settled = PAPER["k2"] * -5e-4 / (PAPER["k1"] + PAPER["k2"])
-    assert rest_position(samples, rough_period(samples), 5e-6) == pytest.approx(settled, abs=2e-6)
+    assert rest_position(samples, spectral_period(samples), 5e-6) == pytest.approx(
+        settled, abs=2e-6
+    )
 
 
 @pytest.mark.parametrize("changed", [{}, {"k2": 1e5}, {"g": 0.0}, {"c2": 60.0}, {"g": -5e-4}])
-def test_rough_period_is_of_the_right_size(changed: dict[str, float]) -> None:
+def test_spectral_period_is_of_the_right_size(changed: dict[str, float]) -> None:
     """Between that of the contact and that of free motion, whatever the noise after the decay."""
     samples = noisy(np.append(paper_motion(**changed), np.zeros(20_000)), 2e-5)
     p = PAPER | changed
     longest = 2 * np.pi * np.sqrt(p["mass"] / p["k1"]) / 1e-3
     shortest = 2 * np.pi * np.sqrt(p["mass"] / (p["k1"] + p["k2"])) / 1e-3
-    assert max(0.4 * longest, shortest) < rough_period(samples) < 1.1 * longest
+    assert max(0.4 * longest, shortest) < spectral_period(samples) < 1.1 * longest
 
 
 def test_no_swing_no_backbone() -> None:

@@ -8,7 +8,7 @@ import small_rig
 
 from bayesimpact.response.displacement import displacement
 from bayesimpact.response.estimates import estimate
-from bayesimpact.response.half_cycles import rough_period
+from bayesimpact.response.half_cycles import spectral_period
 from bayesimpact.trial.rig import motion
 
 NOISE = {1: 2e-4, 2: 2e-2}
@@ -47,7 +47,7 @@ def test_the_period_is_that_of_the_motion_whatever_is_read(rig):
     shortest, longest = np.diff(rising).min(), np.diff(rising).max()
     readings = (found.displacement, found.velocity, found.acceleration + 5.0)
     for order, reading in enumerate(readings):
-        assert 0.8 * shortest < rough_period(reading, order) < 1.2 * longest
+        assert 0.8 * shortest < spectral_period(reading, order) < 1.2 * longest
 
 
 @pytest.mark.parametrize("quantity", ["velocity", "acceleration"])

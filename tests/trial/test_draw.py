@@ -50,8 +50,8 @@ def test_every_effect_can_be_planted() -> None:
 def test_forms_are_what_the_rig_takes(effect: str) -> None:
     rng = np.random.default_rng(4)
     design = draw_rig_design("small", "white", rng)
-    plant = PLANTED_EFFECTS.get(effect) or OUTSIDE_EFFECTS[effect]
-    form = plant.form(design, rng)
+    entry = PLANTED_EFFECTS.get(effect) or OUTSIDE_EFFECTS[effect]
+    form = entry.form(design, rng)
     release = design.releases[0]
     planted = {effect: form.build(form.start)}
     reading = record(design.rig, release, planted, rate=design.rate, duration=0.2, rng=rng)

@@ -263,22 +263,22 @@ def test_damping_of_the_other_sign_feeds_the_motion():
 
 
 def test_coulomb_friction_takes_2_f_over_k_per_swing_and_holds_at_last():
-    """Exact piecewise-linear decay: swings of equal length, amplitude down by 2 F/k1 each."""
+    """Exact piecewise-linear decay: half cycles of equal length, amplitude down by 2 F/k1 each."""
     rig = Rig(mass=0.5, c1=0.0, k1=800.0)
     force = 0.3
     run = motion(
         rig, Release("r", "", -5e-3), {"coulomb_friction": {"force": force}}, rate=1e4, duration=1.2
     )
-    swing = pi / sqrt(rig.k1 / rig.mass)
+    half_cycle = pi / sqrt(rig.k1 / rig.mass)
     place, t, sign = -5e-3, 0.0, 1
     exact = np.full(run.times.size, np.nan)
     while abs(rig.k1 * place) > force:
         centre = -sign * force / rig.k1
-        here = (run.times >= t) & (run.times < t + swing)
-        exact[here] = centre + (place - centre) * np.cos(pi * (run.times[here] - t) / swing)
-        place, t, sign = 2 * centre - place, t + swing, -sign
+        here = (run.times >= t) & (run.times < t + half_cycle)
+        exact[here] = centre + (place - centre) * np.cos(pi * (run.times[here] - t) / half_cycle)
+        place, t, sign = 2 * centre - place, t + half_cycle, -sign
     exact[run.times >= t] = place
-    assert 5 < t / swing < 12
+    assert 5 < t / half_cycle < 12
     assert t < 1.0
     assert np.abs(run.displacement - exact).max() < 1e-12
     assert (run.velocity[run.times > t + 1e-4] == 0).all()

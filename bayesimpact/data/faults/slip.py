@@ -17,7 +17,7 @@ from bayesimpact.data.faults.fault import (
 from bayesimpact.data.faults.flat import equal_share, last_digit
 from bayesimpact.data.faults.local import best_form, foretell, robust_sd, rounding_error
 from bayesimpact.data.gaps import runs
-from bayesimpact.data.period import rough_period
+from bayesimpact.data.period import crossing_period
 from bayesimpact.data.recording import Recording
 
 USUAL = 99.0  # percentile of the statistic that the motion alone may reach
@@ -45,7 +45,7 @@ def find_slips(recording: Recording) -> list[Fault]:
     keeps the longest part without a slip: how many samples are missing need then not be known.
     """
     x = recording.samples
-    form = best_form(x, rough_period(x, 1.0))
+    form = best_form(x, crossing_period(x, 1.0))
     sides = foretell(x, form, 0, -0.5)
     jump = np.abs(sides.after - sides.before)
     jump = np.where(np.isfinite(jump), jump, 0.0)

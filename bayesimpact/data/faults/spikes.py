@@ -20,7 +20,7 @@ from bayesimpact.data.faults.fault import (
 from bayesimpact.data.faults.flat import last_digit
 from bayesimpact.data.faults.local import best_form, foretell, robust_sd, rounding_error
 from bayesimpact.data.gaps import excluded, runs, without
-from bayesimpact.data.period import rough_period
+from bayesimpact.data.period import crossing_period
 from bayesimpact.data.recording import Recording
 
 LONGEST = 5  # samples of one spike
@@ -56,7 +56,7 @@ def lone_spikes(recording: Recording) -> list[Fault]:
 def _foretold(recording: Recording) -> list[Spike]:
     """What `lone_spikes` finds, none touching another."""
     x = recording.samples
-    period = rough_period(x, 1.0)
+    period = crossing_period(x, 1.0)
     form = best_form(x, period)
     least = gaussian_threshold(x.size * LONGEST)
     found: list[tuple[float, float, Span]] = []

@@ -8,7 +8,7 @@ from scipy.ndimage import median_filter
 from bayesimpact.data.faults.fault import Array, Fault, amount, file_time
 from bayesimpact.data.faults.flat import reading_step
 from bayesimpact.data.hum import find_hum
-from bayesimpact.data.period import noise_level, rough_period
+from bayesimpact.data.period import crossing_period, noise_level
 from bayesimpact.data.recording import Recording
 
 BAND = 5.0  # standard deviations of the noise, or two steps, about the first reading
@@ -44,7 +44,7 @@ def find_start(recording: Recording) -> list[Fault]:
     quiet = recording.samples
     if hum is not None:
         quiet = quiet - hum.readings(np.arange(quiet.size, dtype=np.float64))
-    period = rough_period(quiet, 1.0)
+    period = crossing_period(quiet, 1.0)
     if period is None:
         return []
     half = int(min(WIDE, NARROW * period) - 1) // 2

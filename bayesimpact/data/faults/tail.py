@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from bayesimpact.data.faults.flat import reading_step
-from bayesimpact.data.period import rough_period
+from bayesimpact.data.period import crossing_period
 from bayesimpact.data.recording import Recording
 
 WITHIN = 1.5  # steps about the last readings: noise may cross the edge of a step
@@ -25,7 +25,7 @@ def without_tail(recording: Recording) -> tuple[Recording, str]:
     and "", where the tail is shorter than a free period.
     """
     x, step = recording.samples, reading_step(recording.samples)
-    period = rough_period(x, 1.0)
+    period = crossing_period(x, 1.0)
     if recording.input is not None or step == 0.0 or period is None:
         return recording, ""
     last = float(np.median(x[-max(int(period), 1) :]))

@@ -17,7 +17,7 @@ OBSTACLE_MASS, OBSTACLE_FREQUENCY, OBSTACLE_DAMPING = range(18, 21)
 FRAME_RATIO, FRAME_FREQUENCY, FRAME_DAMPING, ADHESION, RESTITUTION = range(21, 26)
 # columns of the table of laws, and its flags: bayesimpact.model.effects.effect.law_row
 LAW_FORCE, LAW_RATE, LAW_SURFACE, LAW_FLAGS = range(4)
-LAW_FIRST, LAW_PACE, LAW_GRAIN, LAW_TURN, LAW_TRAVEL, LAW_INITIAL, LAW_COLUMNS = range(4, 11)
+LAW_FIRST, LAW_TIME_RATE, LAW_FEATURE, LAW_TURN, LAW_TRAVEL, LAW_INITIAL, LAW_COLUMNS = range(4, 11)
 CONTACT_ONLY, KINK_AT_TURN, ROUGH_AT_TOUCH, POLYNOMIAL, PLACED = 1, 2, 4, 8, 16
 JUMP_AT_TURN, JUMP_AT_SURFACE = 32, 64
 # columns of the work array, one row per law and two per body of `resonator`: a law's state at the

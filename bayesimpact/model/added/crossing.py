@@ -87,7 +87,7 @@ def guess(f0: Any, d0: Any, f1: Any, d1: Any) -> Any:
 
 
 @inner()
-def locate(
+def step_to_event(
     event: Any,
     y: Any,
     v: Any,
@@ -203,7 +203,7 @@ def first_event(
     event, length = NONE, h
     if turn_matters(y, v, y1, v1, h, flow, w):
         event = typed(TURN)
-        length, y1, v1, n1 = locate(event, y, v, t, n0, h, y1, v1, n1, flow, w)
+        length, y1, v1, n1 = step_to_event(event, y, v, t, n0, h, y1, v1, n1, flow, w)
     for _ in range(ROUNDS):
         if length < h and event != LEAVE:
             foresee_force(y, v, n0, y1, v1, n1, t + length, length, flow, w)
@@ -211,5 +211,5 @@ def first_event(
         if found == NONE:
             break
         event = found
-        length, y1, v1, n1 = locate(event, y, v, t, n0, length, y1, v1, n1, flow, w)
+        length, y1, v1, n1 = step_to_event(event, y, v, t, n0, length, y1, v1, n1, flow, w)
     return event, length, y1, v1, n1

@@ -19,12 +19,12 @@ from bayesimpact.model.added.context import (
     K2,
     KINK_AT_TURN,
     LAW_COLUMNS,
+    LAW_FEATURE,
     LAW_FLAGS,
     LAW_FORCE,
-    LAW_GRAIN,
-    LAW_PACE,
     LAW_RATE,
     LAW_SURFACE,
+    LAW_TIME_RATE,
     LAW_TRAVEL,
     LAW_TURN,
     NOW,
@@ -54,11 +54,11 @@ from bayesimpact.model.compiled import inner
 
 MAX_ANGLE = 0.125  # longest step times natural frequency, rad
 MAX_ANGLE_PLAIN = 0.6  # the same where nothing is added: exact, but one turning point at most
-MAX_ANGLE_PACE = 0.32  # the same for an explicit dependence on time
+MAX_ANGLE_OF_TIME = 0.32  # the same for an explicit dependence on time
 FINER = 2.4  # of a body on a spring of its own: it is not small, as other added forces are
 LONGER = 1.28  # where no force depends on the velocity: the method for these is the more accurate
 SHORTER = 0.5  # where a force that does is not smooth at impact
-GRAINS = 1.1  # that a step may pass at the cycle's highest speed
+FEATURES = 1.1  # that a step may pass at the cycle's highest speed
 ROUND_UP = 0.3  # of a sample: steps end on samples, and may be that much longer for it
 RENEWED = 64  # longest steps after which a flow is chosen anew: the amplitude may have grown
 MOST_CUTS = 4096  # steps per sample at most
@@ -75,7 +75,7 @@ SINCE_TURN, UNTIL_TURN, MOST_SINCE, MOST_UNTIL = 0.8, 0.46, 1.0, 0.5
 ENDS_ON_TURNS = KINK_AT_TURN | JUMP_AT_TURN
 # a force without features admits longer steps the weaker it is: share of the linear force at which
 # they are the usual ones, and by how much they are shortened and lengthened at most
-SLIGHT, LEAST_GAIN, MOST_GAIN = 0.07, 0.4, 3.2
+SLIGHT, LEAST_LENGTHENING, MOST_LENGTHENING = 0.07, 0.4, 3.2
 OUTSIDE = 0.04  # of a force that does not depend on the motion: nothing feeds its errors back
 DRIVEN = 4.0  # times its static deflection: an amplitude that an input is expected to cause
 OFF_TURN, OFF_PASSAGE = np.cos(np.pi / 8), np.sin(np.pi / 8)  # of the cycle's four points
@@ -116,17 +116,21 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
                 m2, W, drag = body(which, w)
                 damping, stiffness = damping + m2 * drag, stiffness + m2 * W
                 force += m2 * W * s[GAP] if which == OBSTACLE else 0.0
-    slope, level, pace = 0.0, 0.0, abs(q[OMEGA]) if q[FORCE] != 0.0 else 0.0
-    pace, grain = max(pace, FINER * bodies), np.inf
+    slope, level, time_rate = 0.0, 0.0, abs(q[OMEGA]) if q[FORCE] != 0.0 else 0.0
+    time_rate, feature_length = max(time_rate, FINER * bodies), np.inf
     if count > 0:
         slope, level = linearize(y, v, t, mass, damping, stiffness, force, count, w)
         for k in range(count):
             law = w.acting[k]
             contact, z = 1.0 if touching else 0.0, w.work[WORK_COLUMNS * law + NOW]
-            if laws[LAW_COLUMNS * law + LAW_PACE] != 0:
-                pace = max(pace, law_value(law, LAW_PACE, y, v, t, z, s[GAP], contact, w))
-            if laws[LAW_COLUMNS * law + LAW_GRAIN] != 0:
-                grain = min(grain, law_value(law, LAW_GRAIN, y, v, t, z, s[GAP], contact, w))
+            if laws[LAW_COLUMNS * law + LAW_TIME_RATE] != 0:
+                time_rate = max(
+                    time_rate, law_value(law, LAW_TIME_RATE, y, v, t, z, s[GAP], contact, w)
+                )
+            if laws[LAW_COLUMNS * law + LAW_FEATURE] != 0:
+                feature_length = min(
+                    feature_length, law_value(law, LAW_FEATURE, y, v, t, z, s[GAP], contact, w)
+                )
             if laws[LAW_COLUMNS * law + LAW_TURN] != 0:
                 share = law_value(law, LAW_TURN, y, v, t, z, s[GAP], contact, w)
                 first_at_turn = min(first_at_turn, share)
@@ -135,8 +139,8 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
     forced = q[FORCE] != 0.0
     plain = count == 0 and not memory and not forced
     longest = MAX_ANGLE_PLAIN / np.sqrt(K) if plain else MAX_ANGLE / np.sqrt(K + b * b)
-    if pace > 0.0:
-        longest = min(longest, MAX_ANGLE_PACE / pace)
+    if time_rate > 0.0:
+        longest = min(longest, MAX_ANGLE_OF_TIME / time_rate)
     placed = placed and not memory
     if placed and not plain:
         longest *= LONGER
@@ -146,7 +150,7 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
     if joint:
         longest = MAX_ANGLE_PLAIN / (np.sqrt(K) + bodies)
         if listens(w):
-            longest = min(longest, MAX_ANGLE_PACE / pace)
+            longest = min(longest, MAX_ANGLE_OF_TIME / time_rate)
         longest = max(longest, w.interval / MOST_HOPS)
         longest = w.interval / np.ceil(w.interval / longest)
     flow = Flow(
@@ -155,29 +159,31 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
         bodies > 0.0, joint, longest,
     )  # fmt: skip
     if tame and not plain:
-        longest *= gain(y, v, t, pace, longest, flow, w)
+        longest *= lengthening(y, v, t, time_rate, longest, flow, w)
     if w.driven:
         longest = min(longest, w.interval)  # the input has a kink at every sample
-    if grain < np.inf:
-        longest = min(longest, GRAINS * grain / np.sqrt(K * (y - flow.rest) ** 2 + v * v))
+    if feature_length < np.inf:
+        longest = min(
+            longest, FEATURES * feature_length / np.sqrt(K * (y - flow.rest) ** 2 + v * v)
+        )
     return flow, longest
 
 
 @inner()
-def gain(y: Any, v: Any, t: Any, pace: Any, longest: Any, flow: Any, w: Any) -> Any:
+def lengthening(y: Any, v: Any, t: Any, time_rate: Any, longest: Any, flow: Any, w: Any) -> Any:
     """Length of the steps over the usual one: longer where what is added to the flow is weak.
 
     Its size is the largest at four points of a cycle, a quarter of it apart, each at another time
-    (phase, where there is a pace), over the linear force at the amplitude or, if that is larger, at
-    the release: the error of a step grows with it, and with the step's sixth power.
+    (phase, where there is a rate of time), over the linear force at the amplitude or, if that is
+    larger, at the release: the error of a step grows with it, and with the step's sixth power.
     """
     q, w0, largest = w.q, np.sqrt(flow.K), 0.0
     speed = np.sqrt(flow.K * (y - flow.rest) ** 2 + v * v)
     if w.driven:  # it may grow before the flow is renewed
         speed = max(speed, DRIVEN * strength(w) * flow.inverse / w0)
     y0, v0, wait = speed / w0 * OFF_TURN, speed * OFF_PASSAGE, RENEWED * longest / 3.0
-    if pace > 0.0:
-        wait = 0.5 * np.pi / pace
+    if time_rate > 0.0:
+        wait = 0.5 * np.pi / time_rate
     outside = left_out(flow.rest, 0.0, t, flow, w)
     for point in range(4):
         ys, vs, ts = y0, v0, t + point * wait
@@ -187,16 +193,16 @@ def gain(y: Any, v: Any, t: Any, pace: Any, longest: Any, flow: Any, w: Any) -> 
             ys, vs = -ys, -vs
         if flow.touching == 1.0:
             ys = max(ys, flow.gap - flow.rest)
-        if pace > 0.0 and point > 0:
+        if time_rate > 0.0 and point > 0:
             outside = left_out(flow.rest, 0.0, ts, flow, w)
         inside = left_out(flow.rest + ys, vs, ts, flow, w) - outside
         largest = max(largest, abs(inside) + OUTSIDE * abs(outside))
     largest += OUTSIDE * strength(w)
     if largest == 0.0:
-        return MOST_GAIN
+        return MOST_LENGTHENING
     speed = max(speed, np.sqrt(q[K1] / w.mass * q[Y0] * q[Y0] + q[V0] * q[V0]))
     weight = SLIGHT * w0 * speed / (flow.inverse * largest)
-    return min(max(np.sqrt(np.cbrt(weight)), LEAST_GAIN), MOST_GAIN)
+    return min(max(np.sqrt(np.cbrt(weight)), LEAST_LENGTHENING), MOST_LENGTHENING)
 
 
 @inner(forceinline=True)
@@ -259,7 +265,7 @@ def linearize(
         z = w.work[WORK_COLUMNS * law + NOW]
         bounded = w.laws[LAW_COLUMNS * law + LAW_SURFACE] != 0
         wide = w.laws[LAW_COLUMNS * law + LAW_FLAGS] & (POLYNOMIAL | ROUGH_AT_TOUCH) != 0
-        wide = wide and not bounded and w.laws[LAW_COLUMNS * law + LAW_PACE] == 0
+        wide = wide and not bounded and w.laws[LAW_COLUMNS * law + LAW_TIME_RATE] == 0
         start, end, speed = (low, high, 0.0) if wide else (y, y + shift, v)
         if beyond_surface(law, end, v, t, w):
             end = y - shift  # about to leave: what lies behind tells the stiffness

@@ -1,7 +1,7 @@
 """Laws with a state of their own, z' = rate(y, v, z).
 
 With the linear part alpha v - lambda z of the rate, z = zeta + x_u (y - rest) + x_v v, where zeta
-decays exactly and is only kicked by what is left. So a relaxation time far below the step is no
+decays exactly and is only driven by what is left. So a relaxation time far below the step is no
 difficulty: z then follows v, like a dashpot.
 """
 

@@ -171,7 +171,7 @@ class Law:
     surface : a smooth function of y or d whose zero is a kink of the force; steps end on it. (A
         force may jump at impact, being evaluated in contact only, and where a flag below says
         so; other jumps cost accuracy.)
-    pace : fastest rate at which the force depends on time explicitly, rad/s; steps resolve it
+    time_rate : fastest rate at which the force depends on time explicitly, rad/s; steps resolve it
     kink_at_turn : the force has a kink at v = 0; steps end on turning points
     rough_at_touch : the force is continuous but not smooth at d = 0; steps begin small there
     first_at_turn : shortest step at a turning point over the usual one, 1 or less, where the force
@@ -180,10 +180,10 @@ class Law:
         law then has no use of its own, is the direction of the motion: -1, 1, or 0 at rest
     jump_at_surface : the force jumps at its surface; z is the side: the sign of `surface`
     polynomial : between its kinks the force is a polynomial of low degree of y and v, and of sines
-        of time no faster than `pace`: it has no features that a look at four points of a cycle
+        of time no faster than `time_rate`: it has no features that a look at four points of a cycle
         misses, so steps may be longer where it is weak
-    grain : length, m, below which the force does look like a polynomial (a spline's knots lie that
-        far apart): a step passes about one of them
+    feature_length : length, m, below which the force does look like a polynomial (a spline's knots
+        lie that far apart): a step passes about one of them
     ignores_speed : the force does not depend on v: four evaluations a step are then enough, not six
     of_time : the force depends on time explicitly
 
@@ -197,8 +197,8 @@ class Law:
     rate: Callable[..., float] | None = None
     travel: Callable[..., float] | None = None
     surface: Callable[..., float] | None = None
-    pace: Callable[..., float] | None = None
-    grain: Callable[..., float] | None = None
+    time_rate: Callable[..., float] | None = None
+    feature_length: Callable[..., float] | None = None
     first_at_turn: Callable[..., float] | None = None
     kink_at_turn: bool = False
     rough_at_touch: bool = False
@@ -262,6 +262,10 @@ class Effect(Picklable):
     restates: str | None = None
     condition: Callable[[Scales], bool] | None = None
     size: Callable[[Numbers, Scales], Size] | None = None
+
+    def __repr__(self) -> str:
+        """One line."""
+        return f"<Effect {self.id}: {self.title}>"
 
     def __reduce_ex__(self, protocol: Any) -> Any:
         """Pickle an effect of the catalogue by its id: its functions cannot be pickled."""
@@ -330,7 +334,7 @@ def law_row(law: Law, first: int, initial: int = -1) -> list[int]:
     flags += 8 * law.polynomial + 16 * law.ignores_speed
     flags += 32 * law.jump_at_turn + 64 * law.jump_at_surface
     force, rate, surface = (address(f) if f else 0 for f in functions)
-    extents = (law.pace, law.grain, law.first_at_turn, law.travel)
+    extents = (law.time_rate, law.feature_length, law.first_at_turn, law.travel)
     addresses = [address(f) if f else 0 for f in extents]
     return [force, rate, surface, flags, first, *addresses, initial]
 

@@ -27,7 +27,7 @@ def force(
     return -p[0] * math.sin(6.283185307179586 * p[1] * t + p[2])
 
 
-def pace(
+def time_rate(
     y: float, v: float, d: float, t: float, z: float, touching: float, p: Numbers, q: Numbers
 ) -> float:
     """Angular frequency, rad/s."""
@@ -63,5 +63,5 @@ EFFECT = Effect(
             grid=lambda s: np.array([0.0, 0.5, 1.0, 1.5]) * math.pi,
         ),
     ),
-    law=Law(force, pace=pace, polynomial=True, ignores_speed=True, of_time=True),
+    law=Law(force, time_rate=time_rate, polynomial=True, ignores_speed=True, of_time=True),
 )

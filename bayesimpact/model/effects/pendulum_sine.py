@@ -28,7 +28,7 @@ def force(
     return q[1] * (math.sin(y) - y)
 
 
-def grain(
+def feature_length(
     y: float, v: float, d: float, t: float, z: float, touching: float, p: Numbers, q: Numbers
 ) -> float:
     """Angle over which a sine is a polynomial of low degree, rad."""
@@ -52,7 +52,7 @@ EFFECT = Effect(
         "The restoring torque is that of a pendulum, k1 sin(angle); it falls short of k1 times the "
         "angle by up to {size} ({share} of the peak elastic force)."
     ),
-    law=Law(force, grain=grain, polynomial=True, ignores_speed=True),
+    law=Law(force, feature_length=feature_length, polynomial=True, ignores_speed=True),
     condition=lambda s: s.angle,
     size=size,
 )

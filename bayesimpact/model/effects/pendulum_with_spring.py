@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 
 from bayesimpact.model.effects.effect import Effect, EffectParameter, Law, Numbers
-from bayesimpact.model.effects.pendulum_sine import grain
+from bayesimpact.model.effects.pendulum_sine import feature_length
 
 
 def force(
@@ -38,7 +38,7 @@ EFFECT = Effect(
         "short of a linear one by up to {size} ({share} of the peak elastic force)."
     ),
     parameters=(EffectParameter("stiffness", "N/m", scale=lambda s: s.stiffness, lower=0.0),),
-    law=Law(force, grain=grain, polynomial=True, ignores_speed=True),
+    law=Law(force, feature_length=feature_length, polynomial=True, ignores_speed=True),
     prefer="pendulum_sine",
     condition=lambda s: s.angle,
 )

@@ -29,7 +29,7 @@ def force(
     return p[0] * square * square * y
 
 
-def grain(
+def feature_length(
     y: float, v: float, d: float, t: float, z: float, touching: float, p: Numbers, q: Numbers
 ) -> float:
     """A share of the displacement at which the quintic force is as large as the linear one, m."""
@@ -50,5 +50,5 @@ EFFECT = Effect(
     parameters=(
         EffectParameter("stiffness", "N/m5", scale=lambda s: 0.05 * s.stiffness / s.amplitude**4),
     ),
-    law=Law(force, grain=grain, polynomial=True, ignores_speed=True),
+    law=Law(force, feature_length=feature_length, polynomial=True, ignores_speed=True),
 )

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from bayesimpact.diagnosis.words import title_of
 from bayesimpact.model.units import quantity
 from bayesimpact.report.diagnosis_view import probability
 from bayesimpact.report.figures.style import (
@@ -103,7 +104,7 @@ def _ranking(
 
 
 def in_words(ids: str) -> str:
-    """Ids as labels: their titles are too long for an axis."""
+    """Ids of a model's effects as a label: their titles are too long for an axis."""
     return ids.replace("_", " ")
 
 
@@ -126,31 +127,30 @@ def _known(limit: Mapping[str, Any]) -> bool:
 @styled
 def _limits(limits: Sequence[Mapping[str, Any]]) -> Figure:
     """Upper limit and detection limit of every effect over the size that would matter."""
-    ordered = sorted(limits, key=lambda x: x["upper95"] / x["practical_size"])
-    rows = np.arange(len(ordered))
-    figure = new_figure(_ROW * len(ordered) + _FRAME + 0.3)
+    rows = np.arange(len(limits))
+    figure = new_figure(_ROW * len(limits) + _FRAME + 0.3)
     axis = figure.subplots()
-    size = np.array([x["practical_size"] for x in ordered])
+    size = np.array([x["practical_size"] for x in limits])
     upper, detected = (
-        np.array([x[k] for x in ordered]) / size for k in ("upper95", "detection_limit")
+        np.array([x[k] for x in limits]) / size for k in ("upper95", "detection_limit")
     )
-    colours = [_ANSWERS.get(str(x.get("answer")), GREY) for x in ordered]
+    colours = [_ANSWERS.get(str(x.get("answer")), GREY) for x in limits]
     axis.hlines(rows, np.minimum(upper, detected), np.maximum(upper, detected), color=colours, lw=1)
     axis.scatter(upper, rows, c=colours, s=28, zorder=3, label="95 % upper limit")
     axis.scatter(detected, rows, c=colours, s=60, marker="|", zorder=3, label="detection limit")
     axis.axvline(1.0, color=BLACK, lw=0.9, ls=(0, (4, 3)))
-    _frame(axis, ordered)
+    _frame(axis, limits)
     figure.legend(loc="outside lower center", ncols=2)
     return figure
 
 
-def _frame(axis: Axes, ordered: Sequence[Mapping[str, Any]]) -> None:
+def _frame(axis: Axes, limits: Sequence[Mapping[str, Any]]) -> None:
     """Names on the left, upper limits in their units on the right."""
     axis.set_xscale("log")
-    rows_axis(axis, [in_words(x["id"]) for x in ordered])
+    rows_axis(axis, [title_of(x["id"]) for x in limits])
     axis.set_xlabel("size over the size that would matter in practice")
     axis.set_title("effects that were not found", loc="left")
-    _beside(axis, "95 % upper limit", [_size(x) for x in ordered])
+    _beside(axis, "95 % upper limit", [_size(x) for x in limits])
 
 
 def _size(limit: Mapping[str, Any]) -> str:

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 
-from bayesimpact.data.period import rough_period
+from bayesimpact.data.period import crossing_period
 from bayesimpact.model.units import display
 from bayesimpact.report.cycles import contacts, stop_level
 from bayesimpact.report.figures.style import (
@@ -121,7 +121,7 @@ def _period(results: Results) -> float:
     k1 = results.row("k1").median
     if k1 > 0 and np.isfinite(k1):
         return float(2 * np.pi * np.sqrt(results.mass / k1))
-    found = [rough_period(r.samples, r.interval) for r in results.recordings]
+    found = [crossing_period(r.samples, r.interval) for r in results.recordings]
     known = [period for period in found if period is not None]
     longest = max(float(r.times[-1]) for r in results.recordings)
     return float(np.median(known)) if known else longest / CLOSE_UP_CYCLES

@@ -1,4 +1,4 @@
-"""A light touch of a heavy obstacle, whose reaction is positive for less than a step, if at all.
+"""A light impact on a heavy obstacle, whose reaction is positive for less than a step, if at all.
 
 The contact is linear, so that its end follows from matrix exponentials: the reaction's summit and
 its way through zero, or the way back through the gap.

@@ -52,8 +52,8 @@ def test_one_and_two_are_the_simpler_laws():
     assert POWER.prefer == "quadratic_drag"
 
 
-def test_ratio_of_swings_under_structural_damping():
-    """Between turning points the motion is a free one of k1 (1 +- h), every swing the same share.
+def test_ratio_of_half_cycles_under_structural_damping():
+    """Between turning points the motion is a free one of k1 (1 +- h), each the same share.
 
     From rest at -a to y = 0 the spring is k1 (1 - h), from there on k1 (1 + h): the next turning
     point is a sqrt((1 - h) / (1 + h)), and half a period lasts the mean of both.
@@ -63,11 +63,11 @@ def test_ratio_of_swings_under_structural_damping():
     y = moved([STRUCTURAL], {"structural_damping.loss": h}, rig)
     half = 0.05 * (1 / np.sqrt(1 - h) + 1 / np.sqrt(1 + h))
     times = np.arange(rig.count) / rig.rate
-    swing = np.floor(times / half)
+    half_cycle = np.floor(times / half)
     ratio = np.sqrt((1 - h) / (1 + h))
     quarter = 0.05 / np.sqrt(1 - h)
-    inside = times - swing * half
-    start = rig.y0[0] * (-ratio) ** swing
+    inside = times - half_cycle * half
+    start = rig.y0[0] * (-ratio) ** half_cycle
     w = 10 * np.pi
     first = start * np.cos(w * np.sqrt(1 - h) * inside)
     second = -start * ratio * np.sin(w * np.sqrt(1 + h) * (inside - quarter))

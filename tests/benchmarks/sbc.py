@@ -14,6 +14,7 @@ from types import MappingProxyType
 from typing import Any, Literal
 
 import numpy as np
+from benchmarks.uniformity import critical_tail, smallest_tail
 from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
@@ -27,7 +28,6 @@ from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.oscillator import Oscillator, build_oscillator
 from bayesimpact.trial.rig import Effects, Release, Rig, make_campaign
 from bayesimpact.trial.rig_chain import Chain
-from bayesimpact.trial.uniformity import critical_tail, smallest_tail
 
 Array = NDArray[np.float64]
 Table = Mapping[str, Mapping[str, Any]]
@@ -144,7 +144,7 @@ def _width(row: Mapping[str, Any]) -> float:
 def _posterior(
     fit: Fit, method: Method, seed: int, rng: np.random.Generator
 ) -> tuple[Array, Array]:
-    """Draws (S, d), and weights (S,) that sum up to what they are worth in independent draws."""
+    """Draws (S, d), and weights (S,) whose sum is the equivalent number of independent draws."""
     if method == "emcee":
         draws = sample(fit, seed=seed).thinned(DRAWS, rng)
         return draws, np.ones(draws.shape[0])

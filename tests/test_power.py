@@ -4,11 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from bayesimpact.diagnosis.naming import DECISIVE
-from bayesimpact.report.figures.power import limits_figure, power_figure
-from bayesimpact.trial.designs import draw_rig_design
-from bayesimpact.trial.power import (
+from benchmarks.detection_power import (
     STRENGTHS,
     Power,
     bundled_design,
@@ -18,6 +14,10 @@ from bayesimpact.trial.power import (
     power_text,
     reaching,
 )
+from benchmarks.power_figures import limits_figure, power_figure
+
+from bayesimpact.diagnosis.naming import DECISIVE
+from bayesimpact.trial.designs import draw_rig_design
 from bayesimpact.trial.sensitivity import Sensitivity
 
 pytestmark = pytest.mark.long

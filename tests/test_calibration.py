@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from benchmarks import sbc
+from benchmarks.alarms import alarm, false_alarms
+from benchmarks.sbc import MODELS, Replicate, replicate, verdicts
+from benchmarks.uniformity import band, critical_tail, grid, smallest_tail
 from scipy import stats
 
-from bayesimpact.trial import sbc
-from bayesimpact.trial.alarms import alarm, false_alarms
-from bayesimpact.trial.sbc import MODELS, Replicate, replicate, verdicts
 from bayesimpact.trial.settings import Settings
-from bayesimpact.trial.uniformity import band, critical_tail, grid, smallest_tail
 
 pytestmark = pytest.mark.long
 

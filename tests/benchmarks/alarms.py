@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from benchmarks.uniformity import critical_tail, smallest_tail
 
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.force import missing_drift, missing_force
@@ -23,7 +24,6 @@ from bayesimpact.model.effects import SEARCHED
 from bayesimpact.trial.draw import draw
 from bayesimpact.trial.settings import Settings
 from bayesimpact.trial.summary import rate
-from bayesimpact.trial.uniformity import critical_tail, smallest_tail
 
 LEVEL = 0.99
 
