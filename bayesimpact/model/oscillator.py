@@ -192,15 +192,16 @@ class Oscillator:
 
     def read(self, r: int, motion: Array, theta: Array) -> Array:
         """Sensor, rest offset and filter on true displacements (or their time derivatives, as the
-        probe reads them), (B, n), of recording `r`."""
+        probe reads them), (B, n), of recording `r`.
+
+        What effects of the probe add to the true motion is summed: a set of them has no order.
+        """
         times = np.arange(motion.shape[1]) * self.intervals[r]
+        reading = motion + self.layout.slots(theta)[:, r, _OFFSET, None]
         for effect, positions in self.sensors:
             assert effect.observe is not None
-            motion = effect.observe(motion, times, theta[:, positions[r]])
-        offset = self.layout.slots(theta)[:, r, _OFFSET]
-        return measurement.smooth(
-            motion + offset[:, None], self.smoothing, float(self.intervals[r])
-        )
+            reading += effect.observe(motion, times, theta[:, positions[r]]) - motion
+        return measurement.smooth(reading, self.smoothing, float(self.intervals[r]))
 
     def displacements(self, theta: Array) -> tuple[Array, ...]:
         """True displacements of all recordings, (n_r,), m, for one parameter vector (d,)."""

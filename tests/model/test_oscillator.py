@@ -14,6 +14,7 @@ from bayesimpact.data.recording import Recording
 from bayesimpact.model.effects import Effect
 from bayesimpact.model.oscillator import Oscillator, build_oscillator
 from bayesimpact.model.simulate import simulate
+from bayesimpact.trial.rig_chain import Probe
 
 SAVGOL = Smoothing("savgol", window=21, polyorder=2)
 LAG = Smoothing("lag", time_constant=2e-3)
@@ -113,6 +114,20 @@ def test_the_probe_reads_the_true_displacement_before_the_rest_reading():
         wave = 1e-5 * np.sin(2 * np.pi * 13.0 * t + phases[f"sensor_hum.phase[{name}]"])
         distorted = y + 2.0 * y**2
         close(reading, distorted + wave + 1e-5 * t + OWN[name]["offset"])
+
+
+@pytest.mark.parametrize("turn", [1, -1])
+def test_effects_of_the_probe_have_no_order(turn):
+    """Each acts on the true displacement, as in the independent rig's chain."""
+    effects = tuple(BY_ID[i] for i in ("sensor_drift", "sensor_cubic", "sensor_quadratic"))[::turn]
+    oscillator = build_oscillator(campaign(), effects)
+    own = {"sensor_drift.rate": 1e-4, "sensor_cubic.gain": 300.0, "sensor_quadratic.gain": -2.0}
+    probe = Probe(quadratic=-2.0, cubic=300.0, drift=1e-4)
+    theta = vector(oscillator, **own)
+    for name, reading in zip("abc", oscillator.predict(theta), strict=True):
+        n, interval = SIZES[name]
+        expected = probe.reads(motion(name), interval * np.arange(n))
+        close(reading, expected + OWN[name]["offset"])
 
 
 def test_split_parameters_stay_in_the_exact_simulator():

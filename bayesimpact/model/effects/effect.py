@@ -224,8 +224,8 @@ class Effect(Picklable):
     It acts in one or more of four ways: `law` adds a force; `binds` feeds its parameters into slots
     of the oscillator (dry friction, mass of the obstacle, a gap of its own per recording, ...);
     `sets` fixes slots (c2 or g among them: the model then has no such unknown);
-    `observe(y (K, n), t (n,), p (K, n_p)) -> (K, n)` changes what the probe
-    reads.
+    `observe(y (K, n), t (n,), p (K, n_p)) -> (K, n)` changes what the probe reads: what it adds
+    to the true y is summed with what others add, so that a set of effects has no order.
 
     Attributes
     ----------
