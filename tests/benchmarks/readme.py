@@ -12,6 +12,7 @@ from typing import Any
 if __name__ == "__main__":  # imports go by the tests' folder, not by this one
     sys.path[0] = str(Path(__file__).resolve().parents[1])
 
+from benchmarks.coverage_tables import coverage_table, sensor_coverage_table
 from benchmarks.fault_tables import fault_table
 from benchmarks.robustness_tables import robustness_table
 from benchmarks.tables import HERE, grid, stored
@@ -187,20 +188,6 @@ def loops_table() -> str:
     return grid(("missing", "verdict", "`--quick`, s", "with sampling, s"), rows, foot)
 
 
-def coverage_table() -> str:
-    """Coverage of the intervals."""
-    c = stored("coverage")
-    rows = [
-        (name, f"{100 * row['coverage90']:.0f} %", str(row["n"]))
-        for name, row in c["parameters"].items()
-    ]
-    foot = (
-        f"{c['campaigns']} campaigns of nine recordings of {c['duration_s']:.0f} s from the "
-        f"independent generator, commit {c['commit']}, {c['date']}."
-    )
-    return grid(("parameter", "90 % intervals that hold the truth", "of"), rows, foot)
-
-
 def power_table() -> str:
     """How large an effect must be."""
     p = stored("power")
@@ -262,6 +249,7 @@ TABLES = {
     "startup": startup_table,
     "loops": loops_table,
     "coverage": coverage_table,
+    "sensor_coverage": sensor_coverage_table,
 }
 
 
