@@ -31,6 +31,7 @@ class RecordingResult:
     displacement : (n,) of the model from the true rest, m; empty where the readings tell it
     scale : of its noise, over that of the first recording's quantity
     input : label of the measured input, "" for a free decay
+    state : name of the recording that its y0 and v0 bear, where it is another channel of a motion
     """
 
     name: str
@@ -48,6 +49,7 @@ class RecordingResult:
     displacement: Array = field(default_factory=lambda: np.zeros(0))
     scale: float = 1.0
     input: str = ""
+    state: str = ""
 
     def motion(self, predicted: Array, offset: float) -> Array:
         """Displacement (n,), m, of a model that reads `predicted` (n,), from the true rest.
