@@ -49,7 +49,10 @@ def _kind(given: Input) -> tuple[str, bool, bool]:
 
 
 def check_channels(where: str, recordings: Sequence[Recording]) -> None:
-    """Refuse channels of one motion that cannot be; raises InputError."""
+    """Refuse gains that nothing tells, and channels of one motion that cannot be; InputError."""
+    if recordings and all(r.free_gain for r in recordings):
+        place = f"{where}, recording 1 ({recordings[0].name}), key gain"
+        raise InputError(place, '"free" of every recording', "a recording of known gain beside it")
     first: dict[str, Recording] = {}
     for number, recording in enumerate(recordings, 1):
         if not recording.motion_name:

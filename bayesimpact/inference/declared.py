@@ -198,7 +198,7 @@ def _bounds(
         if is_added(parameter.name):
             guess[i], lower[i], upper[i] = _range(owners[bare], scales)
         else:
-            guess[i] = estimates.values.get(parameter.name, noise.level)
+            guess[i] = estimates.start(parameter.name, noise.level)
             lower[i], upper[i] = sorted((guess[i] / WIDE, guess[i] * WIDE))
             if bare == "g":
                 lower[i], upper[i] = -0.2 * scales.amplitude, scales.amplitude

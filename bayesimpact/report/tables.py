@@ -26,6 +26,8 @@ from bayesimpact.model.units import (
 )
 from bayesimpact.report.results import Results, Row
 
+GAIN = "gain"  # of a probe
+
 
 @dataclass(frozen=True)
 class Cell:
@@ -155,13 +157,17 @@ def release_views(results: Results) -> list[dict[str, str]]:
     Channels of one motion have one state; units stand by the numbers where they differ.
     """
     columns = release_columns(results)
-    rows = []
+    rows, known = [], {row.name for row in results.rows}
     for r in results.recordings:
         cells = {"name": r.name, "case": r.case}
         for key, (scale, unit) in columns.items():
-            owner = r.name if key == "offset" else r.state or r.name
+            owner = r.name if key in ("offset", GAIN) else r.state or r.name
+            if key == GAIN and GAIN + f"[{owner}]" not in known:
+                cells[key] = "1, known"
+                continue
             row = results.row(f"{key}[{owner}]")
             shown = Display(scale, "") if unit else display(row.unit, _largest([row]))
+            shown = Display(1.0, "") if row.unit == "-" else shown
             half = _half(row) * shown.scale
             places = decimals(half)
             text = f"{number(row.median * shown.scale, places)} ± {number(half, places)}"
@@ -181,7 +187,7 @@ def _largest(rows: Sequence[Row]) -> float:
 def release_columns(results: Results) -> dict[str, tuple[float, str]]:
     """Nuisance -> (scale, unit) that suits all recordings; no unit where theirs differ."""
     columns = {}
-    for key in ("y0", "v0", "offset"):
+    for key in ("y0", "v0", "offset", GAIN):
         rows = [row for row in results.rows if row.name.startswith(f"{key}[")]
         if len({row.unit for row in rows}) > 1:
             columns[key] = (1.0, "")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -41,9 +42,26 @@ def test_a_report_shows_the_state_that_channels_share(tmp_path: Path) -> None:
         assert number(second) == pytest.approx(1e3 * offset, abs=0.06)
 
 
+def test_a_report_shows_a_gain_where_it_is_free(tmp_path: Path) -> None:
+    campaign = channels(0)
+    freed = tuple(replace(r, free_gain=r.name == "b_acc") for r in campaign.recordings)
+    made = fit_campaign(replace(campaign, recordings=freed), tmp_path)
+    assert made.converged and not made.failed
+    gains = {row["name"]: row["gain"] for row in release_views(load_results(tmp_path))}
+    assert number(gains.pop("b_acc")) == pytest.approx(1.0, abs=5e-4)
+    assert set(gains.values()) == {"1, known"}
+    page = (tmp_path / "report.html").read_text()
+    assert "gain of the probe" in page
+
+
 @pytest.mark.long
 def test_what_both_channels_feel_is_named(tmp_path: Path) -> None:
     campaign: Campaign = channels(1, {"spring_cubic": {"stiffness": 3e6}})
+    read = tuple(  # accelerometers read too much, and say that they may
+        replace(r, samples=1.03 * r.samples, free_gain=True) if r.order else r
+        for r in campaign.recordings
+    )
+    campaign = replace(campaign, recordings=read)
     made = diagnose_campaign(campaign, tmp_path, quick=True)
     assert made.diagnosis is not None and not made.failed
     assert made.diagnosis["verdict"] == "named"
