@@ -76,12 +76,12 @@ def found_mode(o: Oscillator, theta: np.ndarray) -> float:
     return seconds
 
 
-def measure(count: int = SAMPLES, **turns: int) -> dict[str, Any]:
+def measure(samples: int = SAMPLES, **turns: int) -> dict[str, Any]:
     """Seconds, microseconds and ratios, with a stop and without."""
-    result: dict[str, Any] = {"samples": count}
+    result: dict[str, Any] = {"samples": samples}
     threads = numba.get_num_threads()
     for stop in (True, False):
-        (driven, theta), (free, released) = (recorded(d, stop, count) for d in (True, False))
+        (driven, theta), (free, released) = (recorded(d, stop, samples) for d in (True, False))
         found_mode(recorded(True, stop, 4096)[0], theta)  # compiles
         seconds = found_mode(driven, theta)
         ours, plain = arguments(driven), arguments(free)

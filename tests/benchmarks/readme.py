@@ -13,9 +13,10 @@ if __name__ == "__main__":  # imports go by the tests' folder, not by this one
     sys.path[0] = str(Path(__file__).resolve().parents[1])
 
 from benchmarks.coverage_tables import coverage_table, sensor_coverage_table
+from benchmarks.driven_tables import driven_table, driven_trials_table
 from benchmarks.fault_tables import fault_table
 from benchmarks.robustness_tables import robustness_table
-from benchmarks.tables import HERE, grid, stored
+from benchmarks.tables import HERE, grid, measured, stored
 from benchmarks.trial_tables import (
     blind_table,
     controls_table,
@@ -29,17 +30,6 @@ from bayesimpact.model import effects
 
 EFFECTS = {effect.id: effect for effect in effects.EFFECTS}
 PAGE = HERE / "EVIDENCE.md"
-BUSY = 0.25  # cores busy with something else, from which on times are not to be trusted
-
-
-def measured(result: dict, *more: str) -> str:
-    """Where and when, what was not installed, and whether something else ran."""
-    parts = [result["machine"], *more, f"commit {result['commit']}", result["date"]]
-    if (result.get("others") or 0.0) > BUSY:
-        parts.append(f"{result['others']:.1f} of the cores busy with other work: to be repeated")
-    if result.get("absent"):
-        parts.append(f"not installed: {', '.join(result['absent'])}")
-    return f"{', '.join(parts)}."
 
 
 def duration(us: float) -> str:
@@ -250,6 +240,8 @@ TABLES = {
     "loops": loops_table,
     "coverage": coverage_table,
     "sensor_coverage": sensor_coverage_table,
+    "driven_trials": driven_trials_table,
+    "driven": driven_table,
 }
 
 
