@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from benchmarks import (
     bundled,
+    driven,
+    driven_trials,
     figures,
     loops,
     next_recording,
@@ -202,6 +204,59 @@ def test_a_timed_diagnosis_says_the_same_every_time() -> None:
     assert (found["s"], found["slowest_s"], found["processor_s"]) == (31.0, 33.0, 51.0)
     with pytest.raises(AssertionError):
         loops.summary([*runs, (30.0, 50.0, "named")])
+
+
+def test_a_long_driven_recording_is_timed_at_its_mode() -> None:
+    found = driven.measure(4096, count=1, repeats=1)
+    for key in ("stop", "no_stop"):
+        assert found[key]["mode_s"] > 0.0 and found[key]["driven_us"] > found[key]["floor_us"]
+
+
+def test_driven_trials_are_counted() -> None:
+    rows = [
+        {"seed": 3, "kind": "noise", "truth": None, "verdict": "adequate", "named": []},
+        {"seed": 4, "kind": "sweep", "truth": None, "verdict": "named", "named": ["spring_cubic"]},
+        {"seed": 5, "kind": "sweep", "truth": "spring_cubic", "verdict": "named",
+         "named": ["spring_cubic"], "inside": True},
+        {"seed": 6, "kind": "noise", "truth": "spring_cubic", "verdict": "ambiguous", "named": []},
+        {"seed": 7, "kind": "noise", "truth": "spring_cubic", "verdict": "named",
+         "named": ["quadratic_drag"]},
+    ]  # fmt: skip
+    found = driven_trials.summary(rows)
+    counts = {k: (v["hits"], v["of"]) for k, v in found["kinds"]["all"].items()}
+    assert counts == {"adequate": (1, 2), "named": (1, 3), "wrong": (2, 5), "inside": (1, 1)}
+    assert found["kinds"]["noise"]["named"]["of"] == 2 and found["seeds"] == [3, 7]
+
+
+def test_a_limit_of_a_driven_rig_is_the_spread_of_refits() -> None:
+    """The standard error of a planted size, against the sizes that fits of other noise find."""
+    id = "spring_cubic"
+    hidden = driven_trials.HIDDEN[id]
+    rig = driven_trials.driven_rig(0, "displacement", kind="noise")
+    gap = rig.truth["g"]
+    size = hidden.nominal({**rig.truth, "mass": rig.campaign.mass, "k2": rig.truth["k2[1]"]})
+    rig = driven_trials.driven_rig(
+        0, "displacement", driven_trials.law(hidden, size, gap), kind="noise"
+    )
+    expected = driven_trials.standard_error(rig, id, size)
+    (effect,) = (e for e in driven_trials.EFFECTS if e.id == id)
+    (recording,) = rig.campaign.recordings
+    made = driven_trials.build_oscillator(rig.campaign, [effect])
+    names = made.layout.names
+    truth = {**rig.truth, f"{id}.{hidden.parameter}": size, "sigma": rig.noise}
+    theta = np.array([truth[name] for name in names])
+    (clean,) = made.predict(theta)
+    steps = 1e-5 * np.maximum(np.abs(theta), [1e-3 if n[:2] in ("y0", "v0") else 0 for n in names])
+    likelihood = driven_trials.Likelihood(made, driven_trials.Noise())
+    (part,) = likelihood.linearise(theta, steps)
+    rng, found = np.random.default_rng(0), []
+    scale = np.linalg.norm(part.jacobian, axis=0)
+    for _ in range(400):  # least squares in the linear range
+        drawn = rig.noise * rng.standard_normal(recording.samples.size)
+        found.append(np.linalg.lstsq(part.jacobian / scale, drawn, rcond=None)[0] / scale)
+    at = list(part.columns).index(made.layout.index(f"{id}.{hidden.parameter}"))
+    assert np.std(np.array(found)[:, at]) == pytest.approx(expected, rel=0.15)
+    assert np.std(recording.samples - clean) == pytest.approx(rig.noise, rel=0.1)
 
 
 def proposed(after: list[float | None], verdict: str, named: list[str]) -> dict:

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from nptdms import ChannelObject, TdmsWriter
 from scipy.io import savemat
 from small_rig import record
 
@@ -24,6 +25,13 @@ def _csv(path: Path, recording: Recording) -> None:
 
 def _mat(path: Path, recording: Recording) -> None:
     savemat(path, {"t": recording.times, "x": recording.samples * 1e3})
+
+
+def _tdms(path: Path, recording: Recording) -> None:
+    said = {"wf_increment": recording.interval, "wf_start_offset": 0.0, "unit_string": "mm"}
+    force = ChannelObject("log", "force", 0.0 * recording.samples, {"unit_string": "N"})
+    with TdmsWriter(str(path)) as writer:
+        writer.write_segment([force, ChannelObject("log", "tip", recording.samples * 1e3, said)])
 
 
 def _run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
@@ -51,7 +59,9 @@ def _new(folder: Path, ending: str, writer: Callable[[Path, Recording], None]) -
     return made.stdout
 
 
-KINDS = pytest.mark.parametrize(("ending", "writer"), [("csv", _csv), ("mat", _mat)])
+KINDS = pytest.mark.parametrize(
+    ("ending", "writer"), [("csv", _csv), ("mat", _mat), ("tdms", _tdms)]
+)
 
 
 @KINDS

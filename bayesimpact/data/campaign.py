@@ -238,17 +238,23 @@ class Campaign(Picklable):
     def excerpt(self, duration: float) -> Campaign:
         """The first `duration` seconds of every recording; of driven ones, the largest motion.
 
-        An input may begin with rest.
+        An input may begin with rest. Channels of one motion are cut alike, as the first of them.
         """
-        kept = []
+        kept: list[Recording] = []
+        begins: dict[str, int] = {}
         for r in self.truncated(duration).recordings:
             whole = next(other for other in self.recordings if other.name == r.name)
             if r.input is None:
                 kept.append(r)
                 continue
+            n, both = r.samples.size, [o for o in self.recordings if o.motion_name == r.motion_name]
+            shared = min(o.samples.size for o in both) if r.motion_name else whole.samples.size
             power = np.cumsum(np.concatenate([[0.0], (whole.samples - whole.samples.mean()) ** 2]))
-            first = int(np.argmax(power[r.samples.size :] - power[: -r.samples.size]))
-            kept.append(whole.part(first, first + r.samples.size))
+            sums = power[n : shared + 1] - power[: max(shared + 1 - n, 0)]
+            first = int(np.argmax(sums)) if sums.size else 0
+            if r.motion_name:
+                first = begins.setdefault(r.motion_name, first)
+            kept.append(whole.part(first, first + n))
         return replace(self, recordings=tuple(kept))
 
     def thinned(self, interval: float) -> Campaign:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import filecmp
 import json
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,6 +24,8 @@ ASSUMED = "ASSUMED"
 NEEDED = "NEEDED"
 SHOWN = 20
 """Channels of one file that its comment lists."""
+FEW = 3
+"""Files that are named one by one where the same is assumed of them."""
 
 
 @dataclass(frozen=True)
@@ -121,9 +123,11 @@ def draft(title: str, looks: Sequence[Look], rig: Rig) -> Draft:
         if rig.stop is None
         else f"stop = {_toml(rig.stop)}",
     ]
+    said = {"": lines[1:]}
     taken: set[str] = set()
     for one in looks:
         lines += ["", *_listing(one), "[[recording]]", f"file = {_toml(one.file)}"]
+        begin = len(lines)
         stem = Path(one.file).stem
         if stem in taken:
             stem = next(
@@ -135,12 +139,30 @@ def draft(title: str, looks: Sequence[Look], rig: Rig) -> Draft:
             note = "" if rig.case else f"  # {ASSUMED}: recordings of one obstacle share a case"
             lines.append(f"case = {_toml(rig.case or '1')}{note}")
         lines += [] if one.own_kind else _keys(one, rig)
-    bare = [line.strip() for line in lines[1:]]
+        said[one.file] = lines[begin:]
+    told = _told(said)
     return Draft(
         "\n".join(lines) + "\n",
-        tuple(line for line in bare if f"# {ASSUMED}" in line),
-        tuple(line.lstrip("# ") for line in bare if f"{NEEDED}:" in line),
+        tuple(line for line in told if f"# {ASSUMED}" in line),
+        tuple(line for line in told if f"{NEEDED}:" in line),
     )
+
+
+def _told(said: Mapping[str, Sequence[str]]) -> list[str]:
+    """Every different line once, and of which files it is said where there are several.
+
+    said : file -> its lines; "" holds those of the whole campaign
+    """
+    files: dict[str, list[str]] = {}
+    for file, lines in said.items():
+        for line in lines:
+            files.setdefault(line.lstrip("# "), []).append(file)
+    every, found = len(said) - 1, []
+    for line, those in files.items():
+        few = ", ".join(those) if len(those) <= FEW else f"{len(those)} of {every} files"
+        alone = those == [""] or every == 1
+        found.append(line if alone else f"{'every file' if len(those) == every else few}: {line}")
+    return found
 
 
 def listing(channel: Channel) -> str:

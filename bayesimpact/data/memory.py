@@ -127,6 +127,8 @@ def _entry(where: str, given: object) -> dict[str, Any]:
             entry["case"] = given.case
         entry["times_s"] = given.start + given.times
         entry["used"] = given.used
+        entry["gain"] = "free" if given.free_gain else "known"
+        entry["motion"] = given.motion_name or None
         if given.input is not None:
             gain = "free" if given.input.free else "known"
             hold = "band_limited" if given.input.band_limited else "first_order"

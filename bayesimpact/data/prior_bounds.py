@@ -34,6 +34,21 @@ _FROM_ZERO = {"halfnormal": _GAUSS, "halfcauchy": _CAUCHY}
 Range = tuple[float, float]
 
 
+def prior_names(stop: bool, recordings: Sequence[Recording]) -> list[str]:
+    """Names a prior may carry: of one parameter, or of all that differ only in the brackets."""
+    names = ["c1", "k1"]
+    if any(r.input is not None and r.input.free for r in recordings):
+        names.append("input_gain")
+    if stop:
+        names += ["c2", "g", "k2"]
+        names += [f"k2[{case}]" for case in dict.fromkeys(r.case for r in recordings)]
+    freed = [f"gain[{r.name}]" for r in recordings if r.free_gain]
+    names += ["gain", *freed] if freed else []
+    for family in ("y0", "v0", "offset", "sigma"):
+        names += [family, *(f"{family}[{r.name}]" for r in recordings)]
+    return names
+
+
 def parameter_ranges(mass: float, recordings: Sequence[Recording]) -> dict[str, Range]:
     """Lowest and highest believable value, SI, by the parameter's name without its brackets."""
     periods = [crossing_period(r.samples, r.interval) or 0.5 * r.duration for r in recordings]
@@ -52,6 +67,7 @@ def parameter_ranges(mass: float, recordings: Sequence[Recording]) -> dict[str, 
         "v0": (-reach * fast, reach * fast),
         "offset": (float(min(readings)) - beyond, float(max(readings)) + beyond),
         "sigma": (FINEST * beyond, beyond),
+        "gain": (1.0 / FARTHER, FARTHER),
     }
 
 

@@ -21,7 +21,7 @@ from bayesimpact.data.foreign import file_bytes, is_foreign, read_foreign
 from bayesimpact.data.gaps import excluded_spans
 from bayesimpact.data.input_column import input_of, with_input
 from bayesimpact.data.period import crossing_period
-from bayesimpact.data.prior_bounds import check_prior, parameter_ranges
+from bayesimpact.data.prior_bounds import check_prior, parameter_ranges, prior_names
 from bayesimpact.data.quantity import Quantity, check_quantity, unit_of, with_article
 from bayesimpact.data.recording import Recording
 from bayesimpact.data.schema import (
@@ -250,6 +250,7 @@ def _recording(
         used=None if table.used is None else table.used[first:stop_at],
         input=input_of(where, entry, given, table.quantity),
         motion_name=entry.motion or "",
+        free_gain=entry.gain == "free",
     )
     key = "exclude_s" if entry.exclude_s else "resample"
     recording = excluded_spans(f"{where}, key {key}", recording, entry.exclude_s or ())
@@ -366,7 +367,7 @@ def _beams(where: str, table: CampaignTable) -> dict[str, Beam]:
 def _priors(
     where: str, table: CampaignTable, recordings: list[Recording]
 ) -> dict[str, MappingProxyType[str, Any]]:
-    names = _prior_names(bool(table.stop), recordings)
+    names = prior_names(bool(table.stop), recordings)
     ranges = parameter_ranges(table.mass_kg, recordings)
     for name, prior in table.priors.items():
         if name not in names and not _EFFECT_PARAMETER.fullmatch(name):
@@ -385,16 +386,3 @@ def _priors(
             )
         check_prior(f"{where}, [priors] {name}", name, prior.model_dump(), ranges)
     return {name: MappingProxyType(prior.model_dump()) for name, prior in table.priors.items()}
-
-
-def _prior_names(stop: bool, recordings: list[Recording]) -> list[str]:
-    """Names a prior may carry: of one parameter, or of all that differ only in the brackets."""
-    names = ["c1", "k1"]
-    if any(r.input is not None and r.input.free for r in recordings):
-        names.append("input_gain")
-    if stop:
-        names += ["c2", "g", "k2"]
-        names += [f"k2[{case}]" for case in dict.fromkeys(r.case for r in recordings)]
-    for family in ("y0", "v0", "offset", "sigma"):
-        names += [family, *(f"{family}[{r.name}]" for r in recordings)]
-    return names

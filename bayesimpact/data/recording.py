@@ -28,6 +28,7 @@ class Recording:
         mask is cut to the samples, so that a recording can be shortened at its end
     input : what drove the motion, cut to the samples in the same way; None for a free decay
     motion_name : of the motion of which this is one channel of several; "" where it is the only one
+    free_gain : the probe's gain is an unknown near 1, `gain[name]`; else it is 1
     """
 
     name: str
@@ -39,6 +40,7 @@ class Recording:
     used: NDArray[np.bool_] | None = None
     input: Input | None = None
     motion_name: str = ""
+    free_gain: bool = False
 
     def __repr__(self) -> str:
         """One line."""

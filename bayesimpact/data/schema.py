@@ -86,6 +86,9 @@ class RecordingTable(_Table):
     motion: Text | None = Field(
         None, description="in quotes, the same for all channels that recorded one motion"
     )
+    gain: Literal["known", "free"] = Field(
+        "known", description='"known" (1) or "free": an unknown near 1, gain[<recording>]'
+    )
     start_s: Time | None = Field(None, description=f"{NUMBER}, s on the file's own clock")
     end_s: Time | None = Field(None, description=f"{NUMBER}, s on the file's own clock")
     exclude_s: list[Annotated[list[Time], Field(min_length=2, max_length=2)]] | None = Field(

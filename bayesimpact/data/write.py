@@ -48,6 +48,8 @@ def write_campaign(
             lines.append(f"case = {_toml(recording.case)}")
         if recording.motion_name:
             lines.append(f"motion = {_toml(recording.motion_name)}")
+        if recording.free_gain:
+            lines.append('gain = "free"')
         if recording.input is not None:
             lines.append(f"input = {_toml(_input(recording.input))}")
         if recording.used is not None:

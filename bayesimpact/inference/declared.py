@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.channels import keepers
 from bayesimpact.inference.defaults import default_priors
 from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.horizon import best_climb
@@ -168,8 +169,9 @@ def _at_excerpt(short: Oscillator, guess: Array, period: float) -> tuple[Array, 
     """The guess (d,) with the states in which excerpts of driven recordings begin; their places."""
     moved, places = guess.copy(), []
     index = short.layout.index
-    for r in short.campaign.recordings:
-        if r.input is not None:
+    recordings = short.campaign.recordings
+    for r, keeper in zip(recordings, keepers(recordings), strict=True):
+        if r.input is not None and r.name == keeper:
             own = [index(f"y0[{r.name}]"), index(f"v0[{r.name}]")]
             samples = seen_displacement(r, both=True).samples
             if r.is_displacement:
@@ -196,7 +198,7 @@ def _bounds(
         if is_added(parameter.name):
             guess[i], lower[i], upper[i] = _range(owners[bare], scales)
         else:
-            guess[i] = estimates.values.get(parameter.name, noise.level)
+            guess[i] = estimates.start(parameter.name, noise.level)
             lower[i], upper[i] = sorted((guess[i] / WIDE, guess[i] * WIDE))
             if bare == "g":
                 lower[i], upper[i] = -0.2 * scales.amplitude, scales.amplitude

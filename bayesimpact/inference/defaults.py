@@ -9,6 +9,7 @@
 | v0 | uniform, +- 20 times the largest speed |
 | k2 | uniform, 0 to 1000 times the larger of the quick estimates of k1 and k2 |
 | sigma | log-uniform, eight decades about the estimate; log-normal, 10 %, about a stated noise |
+| gain | normal, 1 with a standard deviation of 0.1 |
 | input_gain | uniform, +- 100 times the quick estimate |
 | added effects | half-Cauchy (Cauchy with both signs) of a physical scale |
 | their shapes | log-normal, or log-uniform between two positive bounds or in their range |
@@ -35,9 +36,10 @@ from bayesimpact.inference.prior import (
 from bayesimpact.inference.priors import Priors, prior_from_table
 from bayesimpact.model.effects.effect import Effect, EffectParameter, Scales
 from bayesimpact.model.oscillator import Oscillator
-from bayesimpact.model.parameters import is_added
+from bayesimpact.model.parameters import GAIN, is_added
 from bayesimpact.response.estimates import Estimates
 
+GAIN_WIDTH = 0.1  # a calibration that is farther off is a wrong unit, and a fault
 SHAPE_WIDTH = 1.5  # of the log-normal prior of a depth, a time constant, a frequency
 
 
@@ -76,6 +78,8 @@ def _default(
         if campaign.measurement.noise is not None:
             return LogNormal(campaign.measurement.noise, 0.1)
         return LogUniform(1e-4 * noise.level, 1e4 * noise.level)
+    if kind == GAIN:
+        return Normal(1.0, GAIN_WIDTH)
     mass, k1 = campaign.mass, estimates.k1
     reach = 20 * max(r.motion(np.sqrt(k1 / mass)) for r in campaign.recordings)
     if kind == "offset":  # what is added to a reading is limited by the readings

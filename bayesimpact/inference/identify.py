@@ -159,8 +159,7 @@ def _with_declared(
 
 def initial_theta(oscillator: Oscillator, estimates: Estimates, noise: Noise) -> Array:
     """Parameter vector (d,) of the quick estimates."""
-    values = estimates.values
-    known = [values.get(name, noise.level) for name in oscillator.layout.names]
+    known = [estimates.start(name, noise.level) for name in oscillator.layout.names]
     return np.array(known)
 
 

@@ -20,7 +20,7 @@ from bayesimpact.model.derivatives import trajectories_and_derivatives
 from bayesimpact.model.measurement import smooth
 from bayesimpact.model.nearby import readings_near
 from bayesimpact.model.oscillator import Oscillator
-from bayesimpact.model.parameters import BASE_SLOTS, SLOTS
+from bayesimpact.model.parameters import BASE_SLOTS, SLOTS, Layout
 from bayesimpact.model.simulate import sums_of_squares
 
 Array = NDArray[np.float64]
@@ -193,15 +193,16 @@ class Likelihood:
         )  # fmt: skip
         result = []
         for r, (start, n) in enumerate(zip(o.starts, o.counts, strict=True)):
-            rows = slice(int(start), int(start + n))
-            predicted, jacobian = values[rows], slopes[rows].T
+            part = slice(int(start), int(start + n))
+            predicted, jacobian = values[part], slopes[part].T
             if codes[r] != 0:
                 predicted = np.full_like(predicted, np.nan)
             used = np.flatnonzero(columns[r] >= 0)
-            stacked = smooth(
-                np.vstack([predicted, jacobian[used]]), o.smoothing, float(o.intervals[r])
-            )
-            result.append(self._whitened(r, stacked[0], stacked[1:], columns[r, used]))
+            rows, places = np.vstack([predicted, jacobian[used]]), columns[r, used]
+            if (own := o.gains[r]) >= 0:
+                rows, places = _with_gain(rows, places, o.layout, theta, r, int(own))
+            stacked = smooth(rows, o.smoothing, float(o.intervals[r]))
+            result.append(self._whitened(r, stacked[0], stacked[1:], places))
         return tuple(result)
 
     def _differences(self, r: int, theta: Array, steps: Array, roughly: bool) -> Linearisation:
@@ -225,3 +226,19 @@ class Likelihood:
         for k in range(1, others + 1):
             jacobian += w[:, k : k + 1] * values[k::others]
         return self._whitened(r, values[0], jacobian, columns)
+
+
+def _with_gain(
+    rows: Array, places: Index, layout: Layout, theta: Array, r: int, gain: int
+) -> tuple[Array, Index]:
+    """Reading and derivatives (1 + k, n) of recording r under its probe's gain, and the gain's own.
+
+    The rest reading is added behind the gain.
+    """
+    offset = layout.slots(theta)[r, _OFFSET]
+    motion = rows[0] - offset
+    scaled = rows * theta[gain]
+    scaled[0] = motion * theta[gain] + offset
+    rest = 1 + np.flatnonzero(places == layout.columns[r, _OFFSET])
+    scaled[rest] = rows[rest]
+    return np.vstack([scaled, motion]), np.append(places, gain)

@@ -22,6 +22,7 @@ from bayesimpact.model.effects.effect import LAW_ROW, Effect, law_row
 from bayesimpact.model.motions import general_motions, motions
 from bayesimpact.model.parameters import (
     BASE_SLOTS,
+    GAIN,
     SLOTS,
     WITHOUT,
     Layout,
@@ -154,16 +155,25 @@ class Oscillator:
                 found.append((effect, np.array(rows, dtype=np.int64)))
         return tuple(found)
 
+    @cached_property
+    def gains(self) -> NDArray[np.int64]:
+        """Position in theta of every probe's gain, (R,); -1 where it is 1."""
+        positions = {name: i for i, name in enumerate(self.layout.names)}
+        names = [f"{GAIN}[{r.name}]" for r in self.campaign.recordings]
+        return np.array([positions.get(name, -1) for name in names], dtype=np.int64)
+
     def recording_columns(self, r: int) -> NDArray[np.int64]:
         """Positions in theta of everything that recording `r` depends on, sorted, (k,)."""
         used = [self.layout.columns[r][self.layout.columns[r] >= 0]]
         used += [positions[r] for _, positions in self.sensors]
+        used += [self.gains[r : r + 1]] if self.gains[r] >= 0 else []
         return np.unique(np.concatenate(used))
 
     @property
     def is_plain(self) -> bool:
         """True when predictions are the base simulator's plus the offset, and nothing else."""
-        return self.is_base and not self.sensors and self.smoothing is None
+        measured = not self.sensors and self.smoothing is None and bool(np.all(self.gains < 0))
+        return self.is_base and measured
 
     def predict(self, theta: Array) -> tuple[Array, ...]:
         """What the probe would read: per recording (..., n_r), for parameter vectors (..., d).
@@ -191,11 +201,13 @@ class Oscillator:
         return self.read(r, motions[np.where(other, np.cumsum(other), 0)], theta)
 
     def read(self, r: int, motion: Array, theta: Array) -> Array:
-        """Sensor, rest offset and filter on true displacements (or their time derivatives, as the
-        probe reads them), (B, n), of recording `r`.
+        """Gain, sensor, rest offset and filter on true displacements (or their time derivatives,
+        as the probe reads them), (B, n), of recording `r`.
 
-        What effects of the probe add to the true motion is summed: a set of them has no order.
+        What effects of the probe add to what it sees is summed: a set of them has no order.
         """
+        if self.gains[r] >= 0:
+            motion = motion * theta[:, self.gains[r], None]
         times = np.arange(motion.shape[1]) * self.intervals[r]
         reading = motion + self.layout.slots(theta)[:, r, _OFFSET, None]
         for effect, positions in self.sensors:

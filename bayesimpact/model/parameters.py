@@ -36,6 +36,7 @@ WITHOUT = {"restitution": 1.0}
 """Values of added slots that nothing feeds, where that is not 0."""
 
 INPUT_GAIN = "input_gain"
+GAIN = "gain"
 
 Role = Literal["physical", "effect", "nuisance", "noise"]
 _SHARED_UNITS = {"c1": "N s/m", "k1": "N/m", "c2": "N s/m", "g": "m"}
@@ -142,6 +143,8 @@ def build_layout(
         for nuisance, unit in _NUISANCE_UNITS.items():
             unit = reading_unit(unit, recording.order) if nuisance == "offset" else unit
             add(_nuisances(recording, keeper)[nuisance], unit, "nuisance")
+        if recording.free_gain:
+            add(f"{GAIN}[{recording.name}]", "-", "nuisance", 0.0)
     orders = [r.order for r in campaign.recordings]
     for name, order in zip(sigma_names(campaign, sigma_per_recording), orders, strict=False):
         add(name, reading_unit("m", order), "noise", 0.0)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from bayesimpact.data.campaign import Campaign, Smoothing
+from bayesimpact.data.channels import keepers
 from bayesimpact.data.gaps import runs
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification
@@ -169,6 +170,7 @@ def recording_results(fit: Fit) -> tuple[RecordingResult, ...]:
     """Every recording and what a fit makes of it."""
     likelihood = fit.target.likelihood
     recordings = fit.target.oscillator.campaign.recordings
+    states = keepers(recordings)
     shared = (fit.mode.size - 1) / len(recordings)  # parameters per recording
     found = []
     for r, (recording, predicted) in enumerate(zip(recordings, fit.predicted, strict=True)):
@@ -182,6 +184,7 @@ def recording_results(fit: Fit) -> tuple[RecordingResult, ...]:
                 samples=np.asarray(recording.samples),
                 excluded=() if recording.used is None else tuple(runs(~recording.used)),
                 input="" if recording.input is None else recording.input.label,
+                state="" if states[r] == recording.name else states[r],
                 predicted=np.asarray(predicted),
                 quantity=recording.quantity,
                 displacement=np.zeros(0) if recording.is_displacement else fit.displacements[r],

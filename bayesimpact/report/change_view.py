@@ -22,7 +22,7 @@ from bayesimpact.report.rows import Z90
 from bayesimpact.report.tables import symbol
 
 ALIKE = 10.0  # intervals that differ by less are told with the same digits
-NUISANCES = ("y0", "v0", "offset", "sigma")
+NUISANCES = ("y0", "v0", "offset", "gain", "sigma")
 
 
 def estimate(content: Mapping[str, Any], *, like: Mapping[str, Any] | None = None) -> str:

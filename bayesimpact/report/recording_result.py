@@ -32,6 +32,7 @@ class RecordingResult:
     displacement : (n,) of the model from the true rest, m; empty where the readings tell it
     scale : of its noise, over that of the first recording's quantity
     input : label of the measured input, "" for a free decay
+    state : name of the recording that its y0 and v0 bear, where it is another channel of a motion
     """
 
     name: str
@@ -49,6 +50,7 @@ class RecordingResult:
     displacement: Array = field(default_factory=lambda: np.zeros(0))
     scale: float = 1.0
     input: str = ""
+    state: str = ""
 
     __repr__ = short_repr
 

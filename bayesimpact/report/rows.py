@@ -28,6 +28,7 @@ _MEANINGS = {
     "y0": "displacement at the first sample",
     "v0": "velocity at the first sample",
     "offset": "rest reading of the probe",
+    "gain": "gain of the probe",
     "input_gain": "gain of the measured input",
     "sigma": "noise of the probe",
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
 
@@ -9,6 +10,7 @@ import numpy as np
 from markupsafe import Markup, escape
 
 from bayesimpact.model.units import (
+    Display,
     chi2,
     decimals,
     display,
@@ -23,6 +25,8 @@ from bayesimpact.model.units import (
     typeset,
 )
 from bayesimpact.report.results import Results, Row
+
+GAIN = "gain"  # of a probe
 
 
 @dataclass(frozen=True)
@@ -148,16 +152,26 @@ def residual_unit(results: Results) -> str:
 
 
 def release_views(results: Results) -> list[dict[str, str]]:
-    """Initial conditions and rest readings of every recording: median ± half of the interval."""
+    """Initial conditions and rest readings of every recording: median ± half of the interval.
+
+    Channels of one motion have one state; units stand by the numbers where they differ.
+    """
     columns = release_columns(results)
-    rows = []
+    rows, known = [], {row.name for row in results.rows}
     for r in results.recordings:
         cells = {"name": r.name, "case": r.case}
-        for key, (scale, _) in columns.items():
-            row = results.row(f"{key}[{r.name}]")
-            half = _half(row) * scale
+        for key, (scale, unit) in columns.items():
+            owner = r.name if key in ("offset", GAIN) else r.state or r.name
+            if key == GAIN and GAIN + f"[{owner}]" not in known:
+                cells[key] = "1, known"
+                continue
+            row = results.row(f"{key}[{owner}]")
+            shown = Display(scale, "") if unit else display(row.unit, _largest([row]))
+            shown = Display(1.0, "") if row.unit == "-" else shown
+            half = _half(row) * shown.scale
             places = decimals(half)
-            cells[key] = f"{number(row.median * scale, places)} ± {number(half, places)}"
+            text = f"{number(row.median * shown.scale, places)} ± {number(half, places)}"
+            cells[key] = f"{text} {typeset(shown.unit)}".rstrip()
         rows.append(cells)
     return rows
 
@@ -166,14 +180,19 @@ def _half(row: Row) -> float:
     return 0.5 * (row.ci90[1] - row.ci90[0])
 
 
+def _largest(rows: Sequence[Row]) -> float:
+    return float(np.max([max(abs(row.median), _half(row)) for row in rows]))
+
+
 def release_columns(results: Results) -> dict[str, tuple[float, str]]:
-    """Nuisance -> (scale, unit) that suits all recordings."""
+    """Nuisance -> (scale, unit) that suits all recordings; no unit where theirs differ."""
     columns = {}
-    for key in ("y0", "v0", "offset"):
+    for key in ("y0", "v0", "offset", GAIN):
         rows = [row for row in results.rows if row.name.startswith(f"{key}[")]
-        if rows:
-            size = float(np.max([max(abs(row.median), _half(row)) for row in rows]))
-            shown = display(rows[0].unit, size)
+        if len({row.unit for row in rows}) > 1:
+            columns[key] = (1.0, "")
+        elif rows:
+            shown = display(rows[0].unit, _largest(rows))
             columns[key] = (shown.scale, typeset(shown.unit))
     return columns
 

@@ -85,6 +85,12 @@ class Estimates(Picklable):
             named |= {f"{kind}[{name}]": value for name, value in table.items()}
         return named
 
+    def start(self, name: str, level: float) -> float:
+        """Where a search begins: the estimate of a base parameter, or for a gain 1, for others the
+        noise's `level`.
+        """
+        return self.values.get(name, 1.0 if name.startswith("gain[") else level)
+
     def with_unknown_errors(self) -> Estimates:
         """The same values, of which nobody knows how good they are."""
         unknown = {name: float("inf") for name in self.values}

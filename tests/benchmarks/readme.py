@@ -12,9 +12,11 @@ from typing import Any
 if __name__ == "__main__":  # imports go by the tests' folder, not by this one
     sys.path[0] = str(Path(__file__).resolve().parents[1])
 
+from benchmarks.coverage_tables import coverage_table, sensor_coverage_table
+from benchmarks.driven_tables import driven_table, driven_trials_table
 from benchmarks.fault_tables import fault_table
 from benchmarks.robustness_tables import robustness_table
-from benchmarks.tables import HERE, grid, stored
+from benchmarks.tables import HERE, grid, measured, stored
 from benchmarks.trial_tables import (
     blind_table,
     controls_table,
@@ -28,17 +30,6 @@ from bayesimpact.model import effects
 
 EFFECTS = {effect.id: effect for effect in effects.EFFECTS}
 PAGE = HERE / "EVIDENCE.md"
-BUSY = 0.25  # cores busy with something else, from which on times are not to be trusted
-
-
-def measured(result: dict, *more: str) -> str:
-    """Where and when, what was not installed, and whether something else ran."""
-    parts = [result["machine"], *more, f"commit {result['commit']}", result["date"]]
-    if (result.get("others") or 0.0) > BUSY:
-        parts.append(f"{result['others']:.1f} of the cores busy with other work: to be repeated")
-    if result.get("absent"):
-        parts.append(f"not installed: {', '.join(result['absent'])}")
-    return f"{', '.join(parts)}."
 
 
 def duration(us: float) -> str:
@@ -187,20 +178,6 @@ def loops_table() -> str:
     return grid(("missing", "verdict", "`--quick`, s", "with sampling, s"), rows, foot)
 
 
-def coverage_table() -> str:
-    """Coverage of the intervals."""
-    c = stored("coverage")
-    rows = [
-        (name, f"{100 * row['coverage90']:.0f} %", str(row["n"]))
-        for name, row in c["parameters"].items()
-    ]
-    foot = (
-        f"{c['campaigns']} campaigns of nine recordings of {c['duration_s']:.0f} s from the "
-        f"independent generator, commit {c['commit']}, {c['date']}."
-    )
-    return grid(("parameter", "90 % intervals that hold the truth", "of"), rows, foot)
-
-
 def power_table() -> str:
     """How large an effect must be."""
     p = stored("power")
@@ -262,6 +239,9 @@ TABLES = {
     "startup": startup_table,
     "loops": loops_table,
     "coverage": coverage_table,
+    "sensor_coverage": sensor_coverage_table,
+    "driven_trials": driven_trials_table,
+    "driven": driven_table,
 }
 
 

@@ -70,6 +70,21 @@ def test_what_is_missing_is_said(tmp_path: Path) -> None:
         np.testing.assert_allclose(recording.samples, decay(), rtol=1e-9)
 
 
+def test_what_is_assumed_of_several_files_is_said_once_and_of_which(tmp_path: Path) -> None:
+    made.bare_lvm(tmp_path / "a.lvm")
+    for name in "bcde":
+        made.npy(tmp_path / f"{name}.npy")
+    files = [tmp_path / "a.lvm", *(tmp_path / f"{name}.npy" for name in "bcde")]
+    told = _new(tmp_path, *files).output.partition("written: ")[2].splitlines()
+    assert [line for line in told if "ASSUMED: recordings of one" in line] == [
+        '  every file: case = "1"  # ASSUMED: recordings of one obstacle share a case'
+    ]
+    assert "  a.lvm: time_column = 1  # ASSUMED: it rises evenly, in s" in told
+    (rate,) = (line for line in told if "sample_rate_hz" in line)
+    assert rate.startswith("  4 of 5 files: sample_rate_hz = 1000.0  # NEEDED")
+    assert sum("mass_kg" in line for line in told) == 1
+
+
 def test_units_and_rates_can_be_said(tmp_path: Path) -> None:
     made.npy(tmp_path / "b.npy")
     result = _new(tmp_path, tmp_path / "b.npy", "--no-stop", "--unit", "mm", "--rate", 500)

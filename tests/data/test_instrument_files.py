@@ -35,6 +35,19 @@ def test_every_format(tmp_path: Path, kind: str) -> None:
     assert len(campaign.sha256) == 64
 
 
+def test_one_folder_of_all_formats(tmp_path: Path) -> None:
+    head, _, entry = ONE.partition("[[recording]]")
+    toml = head
+    for number, (name, writer, keys) in enumerate(made.FILES.values()):
+        file = Path(name).with_stem(f"r{number}").name
+        writer(tmp_path / file)
+        toml += "[[recording]]" + entry.format(file) + keys
+    campaign = load_campaign(write(tmp_path, toml, a=None, b=None))
+    assert [r.name for r in campaign.recordings] == [f"r{i}" for i in range(len(made.FILES))]
+    for recording in campaign.recordings:
+        np.testing.assert_allclose(recording.samples, decay(), rtol=2e-11, atol=1e-13)
+
+
 def test_windows_of_one_file(tmp_path: Path) -> None:
     made.tdms(tmp_path / "log.tdms")
     one, other = "start_s = 0\nend_s = 0.5\n", "start_s = 0.55\n"

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import small_rig
+from channel_rigs import channels
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.channels import keepers
@@ -15,23 +16,8 @@ from bayesimpact.data.read import load_campaign
 from bayesimpact.errors import InputError
 from bayesimpact.inference.identify import Identification, identify
 from bayesimpact.inference.nuisances import nuisance_step
-from bayesimpact.trial.rig_chain import Chain
 
-LEVELS = {"displacement": 5e-6, "acceleration": 1e-2}
 SHARED = ("c1", "k1", "g", "c2", "k2[1]", "k2[2]", "y0[a]", "v0[a]", "y0[c]")
-
-
-def channels(seed: int) -> Campaign:
-    """Three releases, each seen by a probe and an accelerometer of another sampling rate."""
-    rng, found = np.random.default_rng(seed), []
-    for quantity, level in LEVELS.items():
-        rate = 1000.0 if quantity == "displacement" else 800.0
-        campaign = small_rig.record(chain=Chain(), quantity=quantity, rate=rate)
-        for r in campaign.recordings:
-            samples = r.samples + level * rng.standard_normal(r.samples.size)
-            name = r.name if quantity == "displacement" else f"{r.name}_acc"
-            found.append(replace(r, name=name, samples=samples, motion_name=r.name))
-    return replace(campaign, recordings=tuple(found))
 
 
 def mode(campaign: Campaign, *, search: bool = False) -> Identification:

@@ -56,6 +56,8 @@ def _alone(fit: Fit, r: int, first: int) -> Fit:
     at = np.full(own.size, fit.target.likelihood.sigma_columns[r])  # but for the noise:
     known = own.columns[0] >= 0
     at[own.columns[0, known]] = whole.columns[r, known]  # channels share what has one name
+    if oscillator.gains[0] >= 0:
+        at[oscillator.gains[0]] = o.gains[r]
     priors = Priors(tuple(fit.target.priors.parameters[i] for i in at))
     start, sd = fit.mode[at], fit.sd[at]
     y = fit.displacements[r]

@@ -11,7 +11,7 @@ from effect_rigs import BY_ID
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.diagnosis.diagnose import diagnose
-from bayesimpact.diagnosis.faults.unfree_start import unfree_starts
+from bayesimpact.diagnosis.faults.unfree_start import _alone, unfree_starts
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.free_changes import motions_beside
@@ -73,6 +73,19 @@ def test_channels_of_one_motion_are_fitted_each_from_their_common_start():
     fit = fitted(replace(campaign, recordings=pair))
     assert "y0[other]" not in fit.names
     assert unfree_starts(fit) == ()
+
+
+def test_a_channel_of_free_gain_is_fitted_with_its_own_gain_and_prior() -> None:
+    campaign = plain()
+    one = campaign.recordings[0]
+    other = replace(one, name="other", samples=1.04 * one.samples, free_gain=True)
+    pair = tuple(replace(r, motion_name="first") for r in (one, other))
+    fit = fitted(replace(campaign, recordings=pair))
+    alone = _alone(fit, 1, 0)
+    assert alone.value("gain[other]") == pytest.approx(1.04, abs=0.1)
+    own, whole = (f.target.priors.parameters[f.names.index("gain[other]")] for f in (alone, fit))
+    assert own == whole
+    assert alone.reduced_chi2 == pytest.approx(1.0, abs=0.15)
 
 
 def test_physics_is_named_without_the_push():
