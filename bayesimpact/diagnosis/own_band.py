@@ -27,11 +27,13 @@ def shakes_in_own_band(fit: Fit, remains: bool) -> bool:
     """True when the model has a harmonic force or a hum at a frequency of the motion itself.
 
     There a decaying motion and a steady one differ only by phase, and the steady one passes for any
-    slow change of frequency or damping: over the whole band where something `remains`. A force,
-    which has a motion of its own to begin with, and a mode that rings down as the motion does, pass
-    for one always where the recordings are too short to tell both frequencies apart. At a multiple
-    of the motion's frequency such a mode is what any law that is not linear makes of the motion. A
-    line too slow for any recording to show it come and go passes for a drift.
+    slow change of frequency or damping: over the whole band where something `remains`, and as far
+    from its line as both decay. A mode that rings down there passes for a damping that changes with
+    amplitude, whether anything remains or not; a force, which has a motion of its own to begin
+    with, passes for one where the recordings are too short to tell both frequencies apart. At a
+    multiple of the motion's frequency such a mode is what any law that is not linear makes of the
+    motion, and so is a steady line where no recording decays enough to tell. A line too slow for
+    any recording to show it come and go passes for a drift.
     """
     recordings = fit.target.oscillator.campaign.recordings
     longest = max(r.duration for r in recordings)
@@ -41,7 +43,10 @@ def shakes_in_own_band(fit: Fit, remains: bool) -> bool:
         steady = is_steady(effect)
         for recording in recordings:
             motion = recording if steady else _without(recording, effect, fit)
+            decay = 0.0 if steady else fit.value(f"{effect.id}.decay")
             if remains and _moves_at(motion, frequency):
+                return True
+            if (remains or not steady) and _overlaps(motion, frequency, decay):
                 return True
             own_motion = effect.observe is None or not steady
             if not remains and own_motion and _is_unresolved(motion, frequency):
@@ -87,6 +92,12 @@ def _spectrum(recording: Recording, finer: int = 1, *, window: bool = False) -> 
     return np.asarray(np.abs(np.fft.rfft(samples, finer * samples.size)))
 
 
+def _strongest(recording: Recording) -> float:
+    """Frequency of the strongest line, Hz."""
+    duration = recording.samples.size * recording.interval
+    return float(1.0 + int(np.argmax(_spectrum(recording, FINER)[FINER:])) / FINER) / duration
+
+
 def _moves_at(recording: Recording, frequency: float) -> bool:
     """Whether a recording has a good part of its spectrum's peak at a frequency, Hz, or half a line
     that its duration resolves beside it.
@@ -98,6 +109,19 @@ def _moves_at(recording: Recording, frequency: float) -> bool:
     at = FINER * frequency * recording.samples.size * recording.interval
     near = spectrum[max(FINER, int(at) - FINER // 2) : int(at) + FINER // 2 + 2]
     return bool(near.size and near.max() > OWN_BAND * spectrum[FINER:].max())
+
+
+def _overlaps(recording: Recording, frequency: float, decay: float) -> bool:
+    """Whether a line at a frequency, Hz, that decays with a rate, 1/s, lies within both bandwidths,
+    and that of the duration, from a recording's strongest line.
+    """
+    x, duration = recording.samples, recording.samples.size * recording.interval
+    own = _strongest(recording)
+    envelope = np.abs(hilbert(x - x.mean()))
+    fallen = np.flatnonzero(envelope[np.argmax(envelope) :] < envelope.max() / np.e)
+    lasts = int(fallen[0]) if fallen.size else x.size
+    rates = decay + 1.0 / (lasts * recording.interval)
+    return bool(abs(frequency - own) < 1.0 / duration + rates / (2 * np.pi))
 
 
 def _is_unresolved(recording: Recording, frequency: float) -> bool:
@@ -113,9 +137,9 @@ def multiple_of(recording: Recording, frequency: float) -> int:
     the duration can tell; else 0.
     """
     duration = recording.samples.size * recording.interval
-    own = 1.0 + int(np.argmax(_spectrum(recording, FINER)[FINER:])) / FINER
-    multiple = round(frequency * duration / own)
-    near = abs(frequency * duration - multiple * own) < 1.0
+    own = _strongest(recording)
+    multiple = round(frequency / own)
+    near = abs(frequency - multiple * own) * duration < 1.0
     return multiple if near and 2 <= multiple <= MULTIPLES else 0
 
 

@@ -56,7 +56,7 @@ def test_ranges_follow_the_units_of_the_recordings() -> None:
     """Ten times the motion, a clock ten times slower: lengths and stiffness follow."""
     slower = [replace(r, samples=10 * r.samples, interval=10 * r.interval) for r in RIG.recordings]
     ranges = parameter_ranges(RIG.mass, slower)
-    factors = {"k1": 1e-2, "c1": 0.1, "k2": 1e-2, "c2": 0.1, "v0": 1.0}
+    factors = {"k1": 1e-2, "c1": 0.1, "k2": 1e-2, "c2": 0.1, "v0": 1.0, "gain": 1.0}
     for name, ends in RANGES.items():
         expected = np.array(ends) * factors.get(name, 10.0)
         np.testing.assert_allclose(ranges[name], expected, rtol=1e-9)

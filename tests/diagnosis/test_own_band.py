@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bayesimpact.data.recording import Recording
-from bayesimpact.diagnosis.own_band import _moves_at, _passes_for_harmonic, multiple_of
+from bayesimpact.diagnosis.own_band import _moves_at, _overlaps, _passes_for_harmonic, multiple_of
 
 INTERVAL, SAMPLES = 1.0 / 550.0, 242
 LINE = 1.0 / (INTERVAL * SAMPLES)  # Hz that the duration resolves
@@ -44,3 +44,14 @@ def test_a_steady_line_at_a_multiple_is_a_harmonic_where_the_motion_hardly_decay
     motion = Recording("filmed", "", np.exp(-rate * t) * np.cos(2 * np.pi * 0.99 * t), 1.0 / 30.0)
     assert _passes_for_harmonic(motion, times * 0.99) is passes
     assert multiple_of(motion, times * 0.99) == (round(times) if times in (2.0, 3.02) else 0)
+
+
+@pytest.mark.parametrize(("rate", "decay", "lines", "overlap"), [
+    (1.0, 0.0, 0.9, True), (1.0, 0.0, 1.6, False), (12.0, 0.0, 1.6, True),
+    (1.0, 12.0, 1.6, True), (12.0, 12.0, 3.5, False),
+])  # fmt: skip
+def test_lines_overlap_as_far_as_both_decay(rate, decay, lines, overlap):
+    """A mode beside a motion of the same band cannot be told from a damping that changes."""
+    t = INTERVAL * np.arange(SAMPLES)
+    motion = Recording("a", "", np.exp(-rate * t) * np.cos(2 * np.pi * 30.0 * t), INTERVAL)
+    assert _overlaps(motion, 30.0 + lines * LINE, decay) is overlap
