@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eigh
 
 from bayesimpact.data.html import html_table, resolved
 from bayesimpact.data.short_repr import short_repr
@@ -19,6 +20,7 @@ from bayesimpact.model.parameters import SLOTS
 
 Array = NDArray[np.float64]
 _OFFSET = SLOTS.index("offset")
+RANK = 1e-14  # of the largest eigenvalue: smaller ones are rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,5 +206,18 @@ def inverse(matrix: Array) -> Array:
         unit = matrix / np.outer(scale, scale)
         if not np.isfinite(unit).all():
             return np.full(matrix.shape, np.nan)
-        scaled = np.linalg.pinv(unit, rcond=1e-14, hermitian=True)
-        return np.asarray(scaled / np.outer(scale, scale))
+        return np.asarray(_pseudo_inverse(unit) / np.outer(scale, scale))
+
+
+def _pseudo_inverse(unit: Array) -> Array:
+    """Of a symmetric matrix with a diagonal of one.
+
+    LAPACK's divide and conquer, which NumPy calls, gave up on a well-conditioned matrix of 32 rows
+    (OpenBLAS on one processor); QR iteration, which is slower, does not.
+    """
+    try:
+        return np.asarray(np.linalg.pinv(unit, rcond=RANK, hermitian=True))
+    except np.linalg.LinAlgError:
+        values, vectors = eigh(unit, driver="ev")
+        kept = np.abs(values) > RANK * np.abs(values).max()
+        return np.asarray((vectors[:, kept] / values[kept]) @ vectors[:, kept].T)
