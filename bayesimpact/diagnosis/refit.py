@@ -163,9 +163,9 @@ def _stretched(target: Target, start: Array, steps: Array | None) -> tuple[Array
 def _or_from(found: Fit, theta: Array, reached: float, steps: Array | None, goal: float) -> Fit:
     """The end of a climb, or of one from where stretches lead to, if they `reached` more.
 
-    They do where they lead to another mode than a climb that ended in a side minimum (all six of 63
-    climbs of development that ended higher by way of them, but for one; it was unconverged and far
-    from the likeliest).
+    They do where they lead to another mode than a climb that ended in a side minimum. Of 47 climbs
+    of development with a large misfit three ended higher by way of stretches, all after they had
+    reached more; of 50 before, five did, and the one that had not was far from any likely model.
     """
     if not reached > found.log_posterior:
         return found
