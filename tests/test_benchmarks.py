@@ -23,6 +23,7 @@ from benchmarks import (
     scaling,
 )
 from benchmarks.kernel import campaign, check
+from benchmarks.record import stored
 from benchmarks.sampling import Sampled
 
 from bayesimpact.data.read import load_campaign
@@ -210,6 +211,18 @@ def test_a_long_driven_recording_is_timed_at_its_mode() -> None:
     found = driven.measure(4096, count=1, repeats=1)
     for key in ("stop", "no_stop"):
         assert found[key]["mode_s"] > 0.0 and found[key]["driven_us"] > found[key]["floor_us"]
+
+
+def test_what_a_run_has_finished_is_not_made_again(tmp_path):
+    file = tmp_path / "7.json"
+    made = []
+
+    def make():
+        made.append(file.exists())
+        return {"seed": 7}
+
+    assert stored(file, make) == stored(file, make) == {"seed": 7}
+    assert made == [False] and [f.name for f in tmp_path.iterdir()] == ["7.json"]
 
 
 def test_driven_trials_are_counted() -> None:

@@ -17,14 +17,21 @@ mean, those of displacements with 5 um (`test_the_three_probes_tell_as_much`).
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
+if __name__ == "__main__":  # imports go by the tests' folder, not by this one
+    sys.path[0] = str(Path(__file__).resolve().parents[1])
+
 import argparse
 import json
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import numpy as np
+from benchmarks.record import stored
 from scipy import stats
 
 from bayesimpact.data.campaign import Campaign
@@ -153,17 +160,13 @@ def run(
 ) -> list[Row]:
     """Campaigns that the folder lacks are run; rows of those asked for."""
     folder.mkdir(parents=True, exist_ok=True)
-    rows = []
-    for number, seed in enumerate(seeds):
-        file = folder / f"{quantity}-{seed}.json"
-        if not file.exists():
-            text = json.dumps(one(seed, quantity, number < sampled, **size))
-            part = file.with_suffix(".part")  # a killed run leaves no half of a file
-            part.write_text(text, encoding="utf-8")
-            part.replace(file)
-            print(quantity, seed, flush=True)
-        rows.append(json.loads(file.read_text(encoding="utf-8")))
-    return rows
+    return [
+        stored(
+            folder / f"{quantity}-{seed}.json",
+            partial(one, seed, quantity, number < sampled, **size),
+        )
+        for number, seed in enumerate(seeds)
+    ]
 
 
 def kept(folder: Path, quantity: Quantity) -> list[Row]:

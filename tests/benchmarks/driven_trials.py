@@ -21,9 +21,11 @@ import argparse
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
+from benchmarks.record import stored
 from driven_rigs import DrivenRig, driven_rig
 from driven_twin import Law
 
@@ -155,14 +157,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs=2, default=(320000, 320060))
     chosen = parser.parse_args()
     chosen.run.mkdir(parents=True, exist_ok=True)
-    rows = []
-    for seed in range(*chosen.seeds):
-        file = chosen.run / f"{seed}.json"
-        if not file.exists():
-            text = json.dumps(trial(seed))
-            file.write_text(text, encoding="utf-8")
-            print(text, flush=True)
-        rows.append(json.loads(file.read_text(encoding="utf-8")))
+    rows = [stored(chosen.run / f"{s}.json", partial(trial, s)) for s in range(*chosen.seeds)]
     result = {**origin(), **summary(rows), "rows": rows}
     STORE.write_text(json.dumps(result).replace('{"seed"', '\n{"seed"') + "\n", encoding="utf-8")
     print(json.dumps(result["kinds"], indent=1))

@@ -12,15 +12,22 @@ effect over its rivals.
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
+if __name__ == "__main__":  # imports go by the tests' folder, not by this one
+    sys.path[0] = str(Path(__file__).resolve().parents[1])
+
 import argparse
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from math import inf, sqrt
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from benchmarks.record import stored
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.recording import Recording
@@ -191,13 +198,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs=2, default=(82000, 82060))
     chosen = parser.parse_args()
     chosen.run.mkdir(parents=True, exist_ok=True)
-    rows = []
-    for seed in range(*chosen.seeds):
-        file = chosen.run / f"{seed}.json"
-        if not file.exists():
-            file.write_text(json.dumps(trial(seed)), encoding="utf-8")
-            print(seed, flush=True)
-        rows.append(json.loads(file.read_text(encoding="utf-8")))
+    rows = [stored(chosen.run / f"{s}.json", partial(trial, s)) for s in range(*chosen.seeds)]
     result = {**origin(), "settings": SETTINGS.document(), **summary(rows), "rows": rows}
     STORE.write_text(json.dumps(result).replace('{"seed"', '\n{"seed"') + "\n", encoding="utf-8")
     print(json.dumps({k: v for k, v in result.items() if k not in ("rows", "settings")}, indent=1))

@@ -26,6 +26,21 @@ REPEATS = 5
 FIELDS = ("date", "commit", "machine", "python", "numba", "numpy")
 
 
+def stored(file: Path, make: Callable[[], Mapping[str, Any]]) -> dict[str, Any]:
+    """What a file of a resumed run holds; made, told and written first where it is missing.
+
+    A run that is killed leaves no half of a file.
+    """
+    if not file.exists():
+        text = json.dumps(make())
+        part = file.with_suffix(".part")
+        part.write_text(text, encoding="utf-8")
+        part.replace(file)
+        print(file.stem, text, flush=True)
+    found: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+    return found
+
+
 def provenance(peers: Sequence[str] = ()) -> dict[str, Any]:
     """Date, commit (with a + when the package differs from it), machine, versions, `others`.
 
