@@ -40,7 +40,7 @@ def test_intervals_hold_the_truth_and_a_run_goes_on_where_it_stopped(
         held = [p[way] for p in found if way in p]
         assert len(held) == {"normal": 48, "sampled": 24}[way] and np.mean(held) > 0.75
     assert np.abs([p["z"] for p in found]).max() < 4.0
-    monkeypatch.setattr(coverage, "one", None)  # all are there: none is run again
+    monkeypatch.setattr(coverage, "one", pytest.fail)  # all are there: none is run again
     assert coverage.run(tmp_path, "velocity", range(2)) == rows[:2]
     assert coverage.kept(tmp_path, "acceleration") == rows[2:]
 
