@@ -18,7 +18,6 @@ from bayesimpact.diagnosis.force import missing_drift, missing_force
 from bayesimpact.diagnosis.naming import State, is_large, leaves_something
 from bayesimpact.diagnosis.own_band import shakes_in_own_band
 from bayesimpact.diagnosis.profile_likelihood import profiled
-from bayesimpact.diagnosis.promising import is_redundant
 from bayesimpact.diagnosis.refit import Candidate, exchanged, fit_from, grown, refit, without
 from bayesimpact.diagnosis.scan import Scan, scan
 from bayesimpact.diagnosis.scores import Score
@@ -111,14 +110,6 @@ class Models:
             for start in found.starts(score, count):
                 self.start(candidate, [start])
         return self.tried[key]
-
-    def fitted(self, state: State, scores: Sequence[Score]) -> list[Candidate]:
-        """Models with one more effect each."""
-        return [
-            self.fit_one(state.candidate, state.scan, score)
-            for score in scores
-            if not is_redundant(state.candidate, score.effect) and self.may_go_on()
-        ]
 
     def fit_more(self, candidate: Candidate, scores: Sequence[Score]) -> Candidate:
         """The candidate's model with all of these effects, from where the scores point to."""

@@ -16,12 +16,13 @@ from bayesimpact.diagnosis.budget import Budget
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.force import missing_contact
 from bayesimpact.diagnosis.models import STARTS, UNCONVERGED_SHORTFALL, Progress
-from bayesimpact.diagnosis.naming import Naming, State, is_large
+from bayesimpact.diagnosis.naming import Naming, State, explains_most, is_large
 from bayesimpact.diagnosis.pairs import promising_pairs
 from bayesimpact.diagnosis.promising import (
     NEAR_MARGIN,
     SCORE_UNDERESTIMATE,
     families,
+    is_redundant,
 )
 from bayesimpact.diagnosis.refit import (
     Candidate,
@@ -91,16 +92,28 @@ class _Search(Remaining):
         """The model that ever more effects lead to from the first of a beam, or beside it."""
         state = beam[0]
         while not state.is_white and self.may_go_on():
-            promising = [s for s in beam if self.may_grow(s)]
-            better = self.best_first(state, [c for s in promising for c in self.extended(s)])
+            found, waiting = self.extensions([s for s in beam if self.may_grow(s)])
+            better = self.best_first(state, found)
             if not better or self.promise(better[0]) <= self.promise(state.candidate):
                 break
             state = self.examine(better[0])
             if not state.is_white:
                 state = self.restarted(state)
             if not state.is_white:
-                beam = [state, *(self.examine(c) for c in self.beside(state, better))]
+                beside = [self.examine(c) for c in self.beside(state, better)]
+                beam = [state, *waiting, *beside]
         return state
+
+    def extensions(self, beam: Sequence[State]) -> tuple[list[Candidate], list[State]]:
+        """Models with one more effect than those of a beam, and what of the beam has to wait: where
+        the misfit is large all after the first that one effect explains most of.
+        """
+        found = list[Candidate]()
+        for i, state in enumerate(beam):
+            found += self.extended(state)
+            if any(explains_most(c.fit, state.candidate.fit) for c in found):
+                return found, list(beam[i + 1 :])
+        return found, []
 
     def may_grow(self, state: State) -> bool:
         """Whether a model may take in another effect."""
@@ -146,24 +159,34 @@ class _Search(Remaining):
     def extended(self, state: State) -> list[Candidate]:
         """Models with one more effect; from the base model on also the most promising pairs.
 
-        Only those that may overtake the best model so far, as far as scores tell.
+        Only those that may overtake the best model so far, as far as scores tell; and up to the
+        first that explains most of a large misfit, for beside that one the others are scored anew.
         """
-        behind = max(map(self.log_odds, self.tried.values())) - self.log_odds(state.candidate)
-        least = 0.0 if is_large(state.candidate.fit) else behind / SCORE_UNDERESTIMATE
-        scores = self.refit_candidates(state.scan, least)
-        scores = self.asked_beside(state.candidate, state.candidate, state.scan, scores)
-        found = self.fitted(state, scores)
-        if not self.may_go_on():
-            return found
-        if not state.candidate.effects:
+        chosen, found = state.candidate, list[Candidate]()
+        scores = self.refit_candidates(state.scan, self.least_gain(chosen))
+        for score in self.asked_beside(chosen, chosen, state.scan, scores):
+            if not self.may_go_on():
+                return found
+            if is_redundant(chosen, score.effect):
+                continue
+            found.append(self.fit_one(chosen, state.scan, score))
+            if explains_most(found[-1].fit, chosen.fit):
+                return found
+        if not chosen.effects:
             best_single = max((c.log_evidence for c in found), default=-np.inf)
             for pair in promising_pairs(state.scan, count=PAIRS):
-                expected = state.candidate.log_evidence + pair.gain
-                if expected > best_single + self.cost:
-                    found.append(self.fit_more(state.candidate, pair.scores))
-        if is_large(state.candidate.fit) and not self.asked.seen:
-            found += [self.fit_more(state.candidate, j) for j in families(state.scan)]
+                if chosen.log_evidence + pair.gain > best_single + self.cost:
+                    found.append(self.fit_more(chosen, pair.scores))
+        if is_large(chosen.fit) and not self.asked.seen:
+            found += [self.fit_more(chosen, j) for j in families(state.scan)]
         return found
+
+    def least_gain(self, chosen: Candidate) -> float:
+        """What an effect's score has to promise beside a model, nats."""
+        if is_large(chosen.fit):
+            return 0.0
+        behind = max(map(self.log_odds, self.tried.values())) - self.log_odds(chosen)
+        return behind / SCORE_UNDERESTIMATE
 
     def beside(self, state: State, found: Sequence[Candidate]) -> list[Candidate]:
         """Single effects that are extended beside the best model: each may be half of a pair.

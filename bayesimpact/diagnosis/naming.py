@@ -20,7 +20,14 @@ from bayesimpact.diagnosis.discrepancy import Discrepancy
 from bayesimpact.diagnosis.force import MissingForce
 from bayesimpact.diagnosis.refit import Candidate, tempered_evidence
 from bayesimpact.diagnosis.scan import Scan
-from bayesimpact.diagnosis.thresholds import ALPHA, DECISIVE, DOUBT, LARGE, largest_log_odds
+from bayesimpact.diagnosis.thresholds import (
+    ALPHA,
+    DECISIVE,
+    DOUBT,
+    EXCESS,
+    LARGE,
+    largest_log_odds,
+)
 from bayesimpact.inference.fit import Fit
 
 
@@ -188,6 +195,11 @@ class Naming:
 def is_large(fit: Fit) -> bool:
     """True when the residual dwarfs the noise."""
     return fit.reduced_chi2 > LARGE**2
+
+
+def explains_most(fit: Fit, of: Fit) -> bool:
+    """Whether a fit leaves less of a large misfit than what only imitates the truth would."""
+    return is_large(of) and EXCESS * fit.reduced_chi2 < of.reduced_chi2
 
 
 def leaves_something(fit: Fit) -> bool:

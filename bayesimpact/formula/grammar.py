@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.model.effects.effect import Energy, Regime
+from bayesimpact.model.effects.power_damping import SLOW
 
 Array = NDArray[np.float64]
 Region = Literal["everywhere", "contact", "beyond", "bump", "box"]
@@ -26,9 +27,6 @@ REGIONS: tuple[Region, ...] = ("everywhere", "contact", "beyond", "bump", "box")
 SYMBOLS = ("+", "*", "^", "abs", "sign", "exp", "step", "y", "v", "d", "t", "constant")
 NODE = math.log(len(SYMBOLS))
 """Nats per node of a formula."""
-
-SLOW = 1e-5
-"""m/s: below it a root of the speed is viscous, as in the catalogue's power_damping."""
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from bayesimpact.formula.grammar import REGIONS, SLOW, Power, Term
+from bayesimpact.formula.grammar import REGIONS, Power, Term
 from bayesimpact.model.effects.effect import (
     Effect,
     EffectParameter,
@@ -16,6 +16,7 @@ from bayesimpact.model.effects.effect import (
     Scales,
     Size,
 )
+from bayesimpact.model.effects.power_damping import SLOW
 from bayesimpact.model.power import power
 
 PREFIX = "formula_"

@@ -6,9 +6,10 @@ import json
 import textwrap
 from collections.abc import Sequence
 
-from bayesimpact.formula.grammar import SLOW, Power, Term
+from bayesimpact.formula.grammar import Power, Term
 from bayesimpact.formula.law import is_friction, law_of
 from bayesimpact.model.effects.effect import Effect
+from bayesimpact.model.effects.power_damping import SLOW
 
 HEAD = '''"""{title}
 

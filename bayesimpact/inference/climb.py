@@ -211,16 +211,22 @@ class Climb:
             return np.zeros(theta.size)
         return 0.5 * self.step(theta, replace(slope, vector=vector), damping)
 
+    def without_mode(self, here: Point, parts: tuple[Linearisation, ...]) -> Fit:
+        """The record of a climb that led to no mode of anything: the caller sees its value."""
+        unknown = np.full((here.theta.size, here.theta.size), np.nan)
+        return Fit(
+            self.target, here.theta, unknown, -np.inf, here.sums, False, self.iterations, parts
+        )
+
     def fit(self, here: Point, converged: bool) -> Fit:
         """The record of a climb that ends here."""
-        theta, sums, iterations = here.theta, here.sums, self.iterations
+        theta, sums = here.theta, here.sums
         if self.stale or self.roughly:
             self.refine()
         slope = self.linear(here)
         parts, matrix = slope.parts, slope.matrix
-        if not np.isfinite(matrix).all():  # not a mode of anything: the caller sees its value
-            unknown = np.full(matrix.shape, np.nan)
-            return Fit(self.target, theta, unknown, -np.inf, sums, False, iterations, parts)
+        if not np.isfinite(matrix).all():
+            return self.without_mode(here, parts)
         sizes, sigma = self.target.likelihood.sizes, theta[self.target.likelihood.sigma_columns]
         for column in np.unique(self.target.likelihood.sigma_columns):
             mine = self.target.likelihood.sigma_columns == column
@@ -229,8 +235,9 @@ class Climb:
             prior = self.target.priors.hessian(theta)[column]
             matrix[column, column] = max(information - prior, sizes[mine].sum() / level**2)
         return Fit(
-            self.target, theta, inverse(matrix), -here.value, sums, converged, iterations, parts
-        )
+            self.target, theta, inverse(matrix), -here.value, sums, converged,
+            self.iterations, parts,
+        )  # fmt: skip
 
 
 def best_sigma(target: Target, sums: Array) -> Array:

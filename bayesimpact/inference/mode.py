@@ -54,10 +54,12 @@ def find_mode(
     than a few such steps would (or than `LITTLE`, where differences promised more: not converged
     then). Where gains below `least_gain`, nats, decide nothing, two of them end a climb. So do two
     that fall short of what every step left would have to gain for a log posterior of `goal`: an end
-    below it is of no use.
+    below it is of no use. A start where no motion is finite leads nowhere: log posterior -inf.
     """
     climb = Climb(target, steps, slopes, held)
     here = climb.evaluate(start)
+    if not np.isfinite(here.value):
+        return climb.without_mode(here, ())
     damping, converged, last, stalls = FIRST_DAMPING, False, np.inf, 0
     while climb.iterations < max_iterations and not converged:
         slope = climb.linear(here)

@@ -25,9 +25,9 @@ class Table:
     one from a larger model. `unfinished` has what is gained beyond where a climb did not converge,
     `once` where a model's first fit ends. `force` is the evidence of a free force in place of all
     effects, to which `beside` adds where there are effects that it may stand beside. `chi2` is
-    that of every fit. `asked` are the sets that the equation of motion asks for, of all stretches
-    and `asked_in_flight`, or about a model, `asked_about`; `seen` what it gains by an effect, of
-    which `first` are tried.
+    that of every fit but those of `left`. `asked` are the sets that the equation of motion asks
+    for, of all stretches and `asked_in_flight`, or about a model, `asked_about`; `seen` what it
+    gains by an effect, of which `first` are tried.
     """
 
     def __init__(
@@ -45,7 +45,9 @@ class Table:
         asked_in_flight: tuple[str, ...] = (),
         asked_about: dict[str, tuple[str, ...]] | None = None,
         first: int = 4,
+        left: dict[str, float] | None = None,
     ) -> None:
+        self.left = {frozenset(k.split()): v for k, v in (left or {}).items()}
         self.asked_in_flight, self.first = asked_in_flight, first
         self.asked_about = {frozenset(k.split()): v for k, v in (asked_about or {}).items()}
         self.beside, self.chi2, self.asked, self.seen = beside, chi2, asked, seen or {}
@@ -66,8 +68,8 @@ class Table:
 
     def candidate(self, ids, gain: float) -> Candidate:
         fit = SimpleNamespace(
-            reduced_chi2=self.chi2, log_likelihood=gain + 10, log_posterior=gain, rms=1.0,
-            ids=tuple(ids), gain=gain,
+            reduced_chi2=self.left.get(frozenset(ids), self.chi2),
+            log_likelihood=gain + 10, log_posterior=gain, rms=1.0, ids=tuple(ids), gain=gain,
             converged=frozenset(ids) not in self.unfinished,
         )  # fmt: skip
         return Candidate(tuple(BY_ID[i] for i in ids), fit, gain)

@@ -124,6 +124,28 @@ def test_what_free_flight_asks_for_is_extended_beside_what_gains_more(run):
     assert chosen(run(table, (*EFFECTS, BY_ID[N]))) == {A, N}
 
 
+def test_one_effect_that_explains_most_of_a_large_misfit_ends_the_step(run):
+    """The others are scored anew beside it: less than a quarter left is no imitation."""
+    gains = {A: 300.0, C: 200.0, f"{A} {B}": ENOUGH}
+    table = Table(gains, chi2=100.0, left={A: 24.0})
+    assert chosen(run(table)) == {A, B}
+    assert table.fitted[:2] == [{A}, {A, B}]
+    more = Table(gains, chi2=100.0, left={A: 26.0})
+    run(more)
+    assert more.fitted[1] == {C}
+
+
+def test_what_waited_is_extended_where_that_leads_no_further(run):
+    """An effect beside the likelier model explains most, but not all, and no other the rest."""
+    gains = {A: 5.0, S: 200.0, f"{S} {C}": 300.0, f"{S} {C} {D}": 310.0, f"{A} {N}": ENOUGH}
+    table = Table(
+        gains, chi2=100.0, asked=(S, f"{S} {C}"), asked_in_flight=(A,), seen={D: 9.0, B: 8.0},
+        left={f"{S} {C} {D}": 20.0},
+    )  # fmt: skip
+    assert chosen(run(table, (*EFFECTS, BY_ID[N]))) == {A, N}
+    assert table.fitted.index(frozenset({S, C, D})) < table.fitted.index(frozenset({A, N}))
+
+
 def test_the_search_goes_on_where_leaving_out_has_made_room(run, monkeypatch):
     """Five effects are the most: with three that imitate one, a fourth and fifth find no place."""
     monkeypatch.setattr(ranked, "MOST_LARGE", 3)

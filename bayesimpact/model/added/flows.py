@@ -50,6 +50,7 @@ from bayesimpact.model.added.resonator import (
     share_of_frame,
 )
 from bayesimpact.model.added.second import listens
+from bayesimpact.model.added.step import added_force
 from bayesimpact.model.compiled import inner
 
 MAX_ANGLE = 0.125  # longest step times natural frequency, rad
@@ -73,6 +74,9 @@ FIRST, SINCE, UNTIL = 1.0 / 80.0, 0.46, 0.27
 # the same where it is not smooth at a turning point; not much longer there than the time itself
 SINCE_TURN, UNTIL_TURN, MOST_SINCE, MOST_UNTIL = 0.8, 0.46, 1.0, 0.5
 ENDS_ON_TURNS = KINK_AT_TURN | JUMP_AT_TURN
+# a mass that creeps under a root of its speed: longest step times the rate at which its speed
+# settles, by the difference of the force over that share of the speed
+STIFF, NEARBY = 1.5, 1.0 / 16.0
 # a force without features admits longer steps the weaker it is: share of the linear force at which
 # they are the usual ones, and by how much they are shortened and lengthened at most
 SLIGHT, LEAST_LENGTHENING, MOST_LENGTHENING = 0.07, 0.4, 3.2
@@ -330,6 +334,10 @@ def next_step(
             share, most = (SINCE_TURN, MOST_SINCE) if v * pull < 0.0 else (UNTIL_TURN, MOST_UNTIL)
             graded = min(share * root * np.sqrt(root), most * away)
             longest *= min(1.0, max(flow.first_at_turn, graded))
+        if v != 0.0 and not flow.placed:
+            lost = n0 - added_force(y, (1.0 + NEARBY) * v, t, NOW, flow, w)
+            rate = abs(flow.inverse * lost / (NEARBY * v))
+            longest = min(longest, STIFF / max(rate, STIFF / longest))
         return not_beyond(left, max(longest, least), w)
     longest = max(longest, least)
     stride = stride_of(longest, w)

@@ -6,8 +6,9 @@ At its null: c = 0 is the base model; n then means nothing. n = 1 is more of c1,
 quadratic_drag, which is simpler and preferred, n -> 0 is coulomb_friction but does not stick.
 Energy: dissipates, power -c |v|^(n + 1).
 Valid: 0.25 < n < 5; n of a half to one for lubricated guides and rubber, 1.5 to 1.75 for flow in
-narrow gaps (Blasius), 2 for wakes, 3 for losses in magnets and at large amplitude. Below 0.01 mm/s
-it is continued as a viscous law.
+narrow gaps (Blasius), 2 for wakes, 3 for losses in magnets and at large amplitude. Below 0.1 um/s
+it is continued as a viscous law. With an exponent below one the motion ends in a creep to rest,
+y' = -(k1 y / c)^(1 / n), which slows down so much that the mass seems to hang.
 Its absence shows as a damping that changes with amplitude as a^(n - 1): c_eq = c (w a)^(n - 1)
 times 2 Gamma(n / 2 + 1) / (sqrt(pi) Gamma(n / 2 + 3 / 2)).
 Source: Lazan 1968, Damping of Materials and Members, chapter 2; Elliott, Ghandchi Tehrani and
@@ -23,7 +24,9 @@ import numpy as np
 from bayesimpact.model.effects.effect import Effect, EffectParameter, Law, Numbers
 from bayesimpact.model.power import power
 
-SLOW = 1e-5  # m/s; below it the law is viscous, or a root of the speed would let the mass creep
+# m/s (rad/s); below it the law is viscous. Then the mass creeps home instead of hanging: a part of
+# a micrometre off within a recording, less than probes resolve
+SLOW = 1e-7
 
 
 def force(

@@ -43,6 +43,24 @@ def test_roots_of_the_speed(n):
         assert np.abs(difference).max() < 1e-9
 
 
+@pytest.mark.parametrize("n", [0.25, 0.31, 0.5])
+def test_creep_to_rest(n):
+    """Once inertia is negligible c |v|^n = k |y|: |y|^a grows as -a (k / c)^(1 / n) t, a = 1 - 1/n.
+
+    And the way there changes smoothly with the parameters: no chatter of steps that are too long.
+    """
+    rig = TestRig(**{**FREE.__dict__, "duration": 10.0})
+    c = 0.19 * (3 if n == 0.5 else 1)
+    y = power_law(c, n, rig)
+    first, a = int(4.0 * rig.rate), 1.0 - 1.0 / n
+    gone = (np.arange(rig.count) / rig.rate - 4.0)[first:]
+    expected = (np.abs(y[first]) ** a - a * (rig.k1 / c) ** (1 / n) * gone) ** (1 / a)
+    assert np.abs(np.abs(y[first:]) - expected).max() < 2e-7
+    assert np.ptp(np.sign(y[first:])) == 0.0
+    more, most = (power_law(c * (1.0 + k * 1e-4), n, rig) for k in (1, 2))
+    assert np.abs(most - 2 * more + y).max() < 0.01 * np.abs(more - y).max()
+
+
 def test_one_and_two_are_the_simpler_laws():
     rig = TestRig(duration=1.0)
     viscous = TestRig(duration=1.0, c1=rig.c1 + 0.1)
