@@ -102,7 +102,7 @@ def whitened(target: Target, values: Sequence[Array], sigma: Array) -> tuple[Arr
     """Signals (..., n_r) per recording, whitened and in units of the noise."""
     recordings, noise = target.oscillator.campaign.recordings, target.likelihood.noise
     rows = zip(values, recordings, sigma, strict=True)
-    return tuple(noise.whiten(v, r.interval, r.used, r.order) / s for v, r, s in rows)
+    return tuple(noise.whitened(r, v) / s for v, r, s in rows)
 
 
 def shape_points(effect: Effect, scales: Scales, finer: int = 1) -> list[dict[str, float]]:

@@ -277,7 +277,7 @@ def whitened_one(fit: Fit, r: int, values: Array, sigma: Array) -> Array:
     oscillator, noise = fit.target.oscillator, fit.target.likelihood.noise
     recording = oscillator.campaign.recordings[r]
     filtered = smooth(values, oscillator.smoothing, recording.interval)
-    white = noise.whiten(filtered, recording.interval, recording.used, recording.order)
+    white = noise.whitened(recording, filtered)
     return np.asarray(white / sigma[r])
 
 

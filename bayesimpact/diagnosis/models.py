@@ -60,7 +60,8 @@ class Models:
         """The better end of all climbs to the candidate's model, this one among them."""
         key = frozenset(candidate.ids)
         fit = candidate.fit
-        if shakes_in_own_band(fit, leaves_something(fit)) or is_refuted(fit):
+        lost = not np.isfinite(fit.log_posterior)  # its mode need not be finite either
+        if lost or shakes_in_own_band(fit, leaves_something(fit)) or is_refuted(fit):
             candidate = replace(candidate, log_evidence=-np.inf)
         held = self.tried.get(key)
         sooner = candidate.fit.converged and not (held and held.fit.converged)

@@ -84,7 +84,7 @@ def simulated(fit: Fit, rng: Rng) -> Campaign:
     noise, campaign = likelihood.noise, likelihood.oscillator.campaign
     recordings = []
     for recording, motion in zip(campaign.recordings, fit.predicted, strict=True):
-        raw = noise.coloured(rng, motion.size, recording.interval, noise.level, recording.order)
+        raw = noise.drawn(rng, recording, noise.level)
         added = smooth(raw, noise.smoothing, recording.interval)
         recordings.append(replace(recording, samples=motion + added))
     return replace(campaign, recordings=tuple(recordings))

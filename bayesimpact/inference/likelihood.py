@@ -85,9 +85,7 @@ class Likelihood:
     def log_volume(self) -> Array:
         """Log determinant of the whitening per recording, (R,)."""
         recordings = self.oscillator.campaign.recordings
-        return np.array(
-            [self.noise.log_volume(r.samples.size, r.interval, r.used, r.order) for r in recordings]
-        )
+        return np.array([self.noise.volume_of(r) for r in recordings])
 
     @cached_property
     def scales(self) -> Array:
@@ -135,7 +133,7 @@ class Likelihood:
             self.oscillator.campaign.recordings, self.oscillator.predict(theta), strict=True
         )
         noise = self.noise
-        return tuple(noise.whiten(r.samples - p, r.interval, r.used, r.order) for r, p in pairs)
+        return tuple(noise.whitened(r, r.samples - p) for r, p in pairs)
 
     def per_recording(self, theta: Array) -> Array:
         """Log likelihood of every recording, (B, R); -inf where inadmissible."""
@@ -179,7 +177,7 @@ class Likelihood:
         """Linearisation from a prediction (n,) and derivatives (k, n)."""
         recording = self.oscillator.campaign.recordings[r]
         stacked = np.vstack([recording.samples - predicted, jacobian])
-        white = self.noise.whiten(stacked, recording.interval, recording.used, recording.order)
+        white = self.noise.whitened(recording, stacked)
         return Linearisation(white[0], white[1:].T, columns)
 
     def _exact(self, theta: Array) -> tuple[Linearisation, ...]:

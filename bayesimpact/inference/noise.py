@@ -28,6 +28,8 @@ from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Smoothing
 from bayesimpact.data.gaps import runs
+from bayesimpact.data.recording import Recording
+from bayesimpact.inference.noise_spread import spread_of
 from bayesimpact.model.measurement import edge, gain
 
 Array = NDArray[np.float64]
@@ -55,6 +57,8 @@ class Noise:
     is_bound : the level is known to be no more than this; it may be less
     scales : level of readings that are a displacement, a velocity, an acceleration (or angles'),
         over that of the campaign's first quantity
+    growth : by which it is larger away from rest, and where the reading changes: 1/m and s/m, over
+        `level`, see `noise_growth`
     """
 
     correlation: float = 0.0
@@ -65,17 +69,39 @@ class Noise:
     source: str = "assumed"
     is_bound: bool = field(default=False, compare=False)
     scales: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    growth: tuple[float, float] = (0.0, 0.0)
 
     @property
     def is_white(self) -> bool:
         """True when whitening does nothing."""
-        return self.correlation == 0.0 and self.smoothing is None
+        return self.correlation == 0.0 and self.smoothing is None and not self.grows
+
+    @property
+    def grows(self) -> bool:
+        """True when the noise is not alike everywhere."""
+        return any(self.growth)
 
     @property
     def kind(self) -> str:
         """In words, for reports."""
         raw = "white" if self.correlation == 0.0 else f"AR(1), correlation {self.correlation:.2f}"
+        size, rate = self.growth
+        if size:
+            raw += f", growing with the reading ({100 * size * self.level:.2g} % of it)"
+        if rate:
+            jitter = f"{1e3 * rate * self.level:.2g} ms"
+            raw += f", growing with its rate (as where time stamps jitter by {jitter})"
         return raw if self.smoothing is None else f"{raw}, smoothed ({self.smoothing.kind})"
+
+    def whitened(self, recording: Recording, x: Array) -> Array:
+        """Whitened signals of a recording: (..., n) samples to (..., m) numbers."""
+        if self.grows:
+            x = x / self.spread(recording)
+        return self.whiten(x, recording.interval, recording.used, recording.order)
+
+    def spread(self, recording: Recording) -> Array:
+        """Standard deviation at every sample of a recording over `level`, (n,)."""
+        return spread_of(self.growth, recording)
 
     def whiten(self, x: Array, interval: float, used: Mask | None = None, order: int = 0) -> Array:
         """Whitened x: (..., n) samples to (..., m) numbers of variance sigma^2.
@@ -177,6 +203,21 @@ class Noise:
 
         white[1:] *= np.sqrt(1.0 - self.correlation**2)
         return np.asarray(lfilter([1.0], [1.0, -self.correlation], white), dtype=np.float64)
+
+    def drawn(self, rng: np.random.Generator, recording: Recording, sigma: float) -> Array:
+        """A draw of a recording's raw noise of level `sigma` (before any smoothing), (n,), m."""
+        size, order = recording.samples.size, recording.order
+        drawn = self.coloured(rng, size, recording.interval, sigma, order)
+        return drawn * self.spread(recording) if self.grows else drawn
+
+    def volume_of(self, recording: Recording) -> float:
+        """Log determinant of `whitened`."""
+        size, used = recording.samples.size, recording.used
+        found = self.log_volume(size, recording.interval, used, recording.order)
+        if not self.grows:
+            return found
+        spread = self.spread(recording)
+        return found - float(np.sum(np.log(spread if used is None else spread[used])))
 
     def with_smoothing(self, smoothing: Smoothing | None) -> Noise:
         """The same raw noise behind another filter."""

@@ -29,6 +29,7 @@ from bayesimpact.errors import InputError
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.noise_driven import driven_noise
 from bayesimpact.inference.noise_filtered import filtered_noise, lower
+from bayesimpact.inference.noise_growth import with_growth
 from bayesimpact.inference.noise_remainders import (
     KEPT,
     LARGEST,
@@ -54,7 +55,8 @@ def estimate_noise(campaign: Campaign) -> Noise:
 
     Free decays tell it best: recordings with a measured input only where there is none (see
     `driven_noise`). For recordings that were smoothed the remainders say what the filter left; the
-    raw level is scaled up by the filter's power (see `smoothed_level`).
+    raw level is scaled up by the filter's power (see `smoothed_level`). Of free decays of one
+    quantity that passed no filter it is told, too, whether the noise grows (`with_growth`).
     """
     known, smoothing = campaign.measurement.noise, campaign.measurement.smoothing
     orders = list(dict.fromkeys(r.order for r in campaign.recordings))
@@ -63,11 +65,12 @@ def estimate_noise(campaign: Campaign) -> Noise:
         for order in orders
     }
     noise = found[orders[0]]
-    if len(found) > 1:
+    if len(found) > 1:  # alike everywhere
         first, second, third = (found.get(o, noise).level / noise.level for o in range(3))
         return replace(noise, scales=(first, second, third))
     if known is None:
-        return noise
+        plain = smoothing is None and all(r.input is None for r in campaign.recordings)
+        return with_growth(noise, campaign.recordings) if plain else noise
     return Noise(noise.correlation, smoothing, known, 0.0, noise.correlation_error, "campaign.toml")
 
 

@@ -99,10 +99,7 @@ class Posterior:
         motion = oscillator.predict_recording(r, theta)
         recording = oscillator.campaign.recordings[r]
         sigma = theta[:, likelihood.sigma_columns[r]]
-        interval = recording.interval
-        draws = np.array(
-            [noise.coloured(rng, motion.shape[1], interval, s, recording.order) for s in sigma]
-        )
+        draws = np.array([noise.drawn(rng, recording, s) for s in sigma])
         return motion + smooth(draws, noise.smoothing, recording.interval)
 
 

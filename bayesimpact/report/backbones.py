@@ -83,11 +83,10 @@ def simulated(posterior: Posterior, r: int, count: int, rng: np.random.Generator
     recordings so noisy are like anything.
     """
     likelihood = posterior.fit.target.likelihood
-    noise, interval = likelihood.noise, float(likelihood.oscillator.intervals[r])
+    noise, recording = likelihood.noise, likelihood.oscillator.campaign.recordings[r]
     motion = likelihood.oscillator.predict_recording(r, posterior.thinned(count, rng))
-    order = int(likelihood.oscillator.orders[r])
-    raw = [noise.coloured(rng, motion.shape[1], interval, noise.level, order) for _ in motion]
-    return np.asarray(motion + smooth(np.array(raw), noise.smoothing, interval))
+    raw = [noise.drawn(rng, recording, noise.level) for _ in motion]
+    return np.asarray(motion + smooth(np.array(raw), noise.smoothing, recording.interval))
 
 
 def fraction_inside(checks: list[BackboneCheck]) -> float:

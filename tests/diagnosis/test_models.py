@@ -59,3 +59,17 @@ def test_an_effect_is_left_out_anew_where_its_model_has_reached_more(monkeypatch
         reached = search.keep(candidate("spring_cubic quadratic_drag", end))
         assert search.drop(reached, BY_ID["quadratic_drag"]).fit.log_likelihood == expected
     assert search.refits == 2
+
+
+def test_an_end_that_no_motion_has_is_not_looked_at(monkeypatch):
+    """Its mode need not be finite, and a frequency that is no number has no place in a spectrum."""
+    search = made_up(monkeypatch)
+
+    def looked_at(fit, remains):
+        assert np.isfinite(fit.log_posterior)
+        return False
+
+    monkeypatch.setattr(models, "shakes_in_own_band", looked_at)
+    kept = search.keep(candidate("sensor_hum", -np.inf))
+    assert kept.log_evidence == -np.inf
+    assert search.keep(candidate("sensor_hum", 20.0)).log_evidence == 20.0

@@ -57,7 +57,7 @@ def likeliest_shift(fit: Fit) -> Shift | None:
     likelihood, noise = fit.target.likelihood, fit.target.likelihood.noise
     (recording,), (near,) = fit.target.oscillator.campaign.recordings, fit.linearisation
     motion = np.gradient(fit.predicted[0])
-    velocity = noise.whiten(motion, recording.interval, recording.used, recording.order)
+    velocity = noise.whitened(recording, motion)
     white = np.vstack([near.residual, velocity, near.jacobian.T])
     count = recording.samples.size
     signals, start = noise.in_time(white, count, recording.interval, recording.used)
