@@ -111,7 +111,7 @@ class _Search(Remaining):
         found = list[Candidate]()
         for i, state in enumerate(beam):
             found += self.extended(state)
-            if any(explains_most(c.fit, state.candidate.fit) for c in found):
+            if any(explains_most(c, state.candidate) for c in found):
                 return found, list(beam[i + 1 :])
         return found, []
 
@@ -160,7 +160,8 @@ class _Search(Remaining):
         """Models with one more effect; from the base model on also the most promising pairs.
 
         Only those that may overtake the best model so far, as far as scores tell; and up to the
-        first that explains most of a large misfit, for beside that one the others are scored anew.
+        first that explains most of a large misfit: beside that one the others are scored anew, and
+        scores tell more there.
         """
         chosen, found = state.candidate, list[Candidate]()
         scores = self.refit_candidates(state.scan, self.least_gain(chosen))
@@ -170,7 +171,7 @@ class _Search(Remaining):
             if is_redundant(chosen, score.effect):
                 continue
             found.append(self.fit_one(chosen, state.scan, score))
-            if explains_most(found[-1].fit, chosen.fit):
+            if explains_most(found[-1], chosen):
                 return found
         if not chosen.effects:
             best_single = max((c.log_evidence for c in found), default=-np.inf)

@@ -197,9 +197,11 @@ def is_large(fit: Fit) -> bool:
     return fit.reduced_chi2 > LARGE**2
 
 
-def explains_most(fit: Fit, of: Fit) -> bool:
-    """Whether a fit leaves less of a large misfit than what only imitates the truth would."""
-    return is_large(of) and EXCESS * fit.reduced_chi2 < of.reduced_chi2
+def explains_most(found: Candidate, of: Candidate) -> bool:
+    """Whether a model leaves less of a large misfit than an imitation would, and no large one."""
+    if not is_large(of.fit) or is_large(found.fit) or not np.isfinite(found.log_evidence):
+        return False
+    return EXCESS * found.fit.reduced_chi2 < of.fit.reduced_chi2
 
 
 def leaves_something(fit: Fit) -> bool:
