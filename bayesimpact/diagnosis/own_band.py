@@ -28,12 +28,13 @@ def shakes_in_own_band(fit: Fit, remains: bool) -> bool:
 
     There a decaying motion and a steady one differ only by phase, and the steady one passes for any
     slow change of frequency or damping: over the whole band where something `remains`, and as far
-    from its line as both decay. A mode that rings down there passes for a damping that changes with
-    amplitude, whether anything remains or not; a force, which has a motion of its own to begin
-    with, passes for one where the recordings are too short to tell both frequencies apart. At a
-    multiple of the motion's frequency such a mode is what any law that is not linear makes of the
-    motion, and so is a steady line where no recording decays enough to tell. A line too slow for
-    any recording to show it come and go passes for a drift.
+    from its line as both decay. What a steady force makes the mass do is none of that. A mode that
+    rings down there passes for a damping that changes with amplitude, whether anything remains or
+    not; a force, which has a motion of its own to begin with, passes for one where the recordings
+    are too short to tell both frequencies apart. At a multiple of the motion's frequency such a
+    mode is what any law that is not linear makes of the motion, and so is a steady line where no
+    recording decays enough to tell. A line too slow for any recording to show it come and go passes
+    for a drift.
     """
     recordings = fit.target.oscillator.campaign.recordings
     longest = max(r.duration for r in recordings)
@@ -44,9 +45,9 @@ def shakes_in_own_band(fit: Fit, remains: bool) -> bool:
         for recording in recordings:
             motion = recording if steady else _without(recording, effect, fit)
             decay = 0.0 if steady else fit.value(f"{effect.id}.decay")
-            if remains and _moves_at(motion, frequency):
+            if remains and _moves_at(_unforced(motion, frequency, steady), frequency):
                 return True
-            if (remains or not steady) and _overlaps(motion, frequency, decay):
+            if (remains or not steady) and _overlaps(motion, frequency, decay, steady=steady):
                 return True
             own_motion = effect.observe is None or not steady
             if not remains and own_motion and _is_unresolved(motion, frequency):
@@ -68,6 +69,18 @@ def _without(recording: Recording, effect: Effect, fit: Fit) -> Recording:
     nothing = np.zeros((1, recording.samples.size))
     added = effect.observe(nothing, recording.times, np.array([row]))[0]
     return replace(recording, samples=recording.samples - added)
+
+
+def _unforced(recording: Recording, frequency: float, steady: bool) -> Recording:
+    """A recording without the sine of a steady frequency, Hz, that fits it best: the answer to a
+    force that lasts. Of a motion that decays or slides through the frequency most is left.
+    """
+    if not steady:
+        return recording
+    angle = 2 * np.pi * frequency * recording.times
+    columns = np.stack([np.ones(angle.size), np.cos(angle), np.sin(angle)], axis=1)
+    found = np.linalg.lstsq(columns, recording.samples, rcond=None)[0]
+    return replace(recording, samples=recording.samples - columns[:, 1:] @ found[1:])
 
 
 def _lines(fit: Fit) -> list[tuple[Effect, float]]:
@@ -111,16 +124,18 @@ def _moves_at(recording: Recording, frequency: float) -> bool:
     return bool(near.size and near.max() > OWN_BAND * spectrum[FINER:].max())
 
 
-def _overlaps(recording: Recording, frequency: float, decay: float) -> bool:
+def _overlaps(recording: Recording, frequency: float, decay: float, *, steady: bool) -> bool:
     """Whether a line at a frequency, Hz, that decays with a rate, 1/s, lies within both bandwidths,
-    and that of the duration, from a recording's strongest line.
+    and that of the duration, from a recording's strongest line. How long that lasts is seen without
+    what a steady force moves.
     """
-    x, duration = recording.samples, recording.samples.size * recording.interval
+    duration = recording.samples.size * recording.interval
+    x = _unforced(recording, frequency, steady).samples
     own = _strongest(recording)
-    envelope = np.abs(hilbert(x - x.mean()))
-    fallen = np.flatnonzero(envelope[np.argmax(envelope) :] < envelope.max() / np.e)
-    lasts = int(fallen[0]) if fallen.size else x.size
-    rates = decay + 1.0 / (lasts * recording.interval)
+    energy = (x - x.mean()) ** 2
+    # of exp(-a t), squared, the centroid is at 1 / (2 a); of what lasts throughout, in the middle
+    lasts = 2.0 * float(recording.times @ energy / energy.sum())
+    rates = decay + 1.0 / lasts
     return bool(abs(frequency - own) < 1.0 / duration + rates / (2 * np.pi))
 
 

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from bayesimpact.data.recording import Recording
-from bayesimpact.diagnosis.own_band import _moves_at, _overlaps, _passes_for_harmonic, multiple_of
+from bayesimpact.diagnosis.own_band import (
+    _moves_at,
+    _overlaps,
+    _passes_for_harmonic,
+    _unforced,
+    multiple_of,
+)
 
 INTERVAL, SAMPLES = 1.0 / 550.0, 242
 LINE = 1.0 / (INTERVAL * SAMPLES)  # Hz that the duration resolves
@@ -54,4 +60,28 @@ def test_lines_overlap_as_far_as_both_decay(rate, decay, lines, overlap):
     """A mode beside a motion of the same band cannot be told from a damping that changes."""
     t = INTERVAL * np.arange(SAMPLES)
     motion = Recording("a", "", np.exp(-rate * t) * np.cos(2 * np.pi * 30.0 * t), INTERVAL)
-    assert _overlaps(motion, 30.0 + lines * LINE, decay) is overlap
+    assert _overlaps(motion, 30.0 + lines * LINE, decay, steady=decay == 0.0) is overlap
+
+
+def test_what_a_steady_force_moves_is_not_the_motion_s_own():
+    """A decay at 30 Hz, driven at 19.8 Hz; one that slides through 19.8 Hz; one that decays there.
+
+    A steady sine may take the middle line of the last two off, not what is beside it.
+    """
+    t = INTERVAL * np.arange(SAMPLES)
+    driven = Recording(
+        "a", "", np.exp(-2.2 * t) * np.cos(60 * np.pi * t) + np.sin(2 * np.pi * 19.8 * t), INTERVAL
+    )
+    assert _moves_at(driven, 19.8) and not _moves_at(_unforced(driven, 19.8, True), 19.8)
+    for own in (decay(24.0, 16.0), decay(19.8, 19.8)):
+        assert _moves_at(_unforced(own, 19.8, True), 19.8)
+    assert _unforced(driven, 19.8, False) is driven
+
+
+def test_what_is_lost_at_once_does_not_say_how_long_a_motion_lasts():
+    """A release against a stop: most is lost in the first impacts, the rest rings for seconds."""
+    t = np.arange(6129) / 1000.0
+    envelope = np.exp(-0.4 * t) * (0.25 + 0.75 * np.exp(-t / 0.03))
+    motion = Recording("a", "", envelope * np.cos(2 * np.pi * 5.16 * t), 1e-3)
+    assert not _overlaps(motion, 3.46, 0.0, steady=True)
+    assert _overlaps(motion, 5.3, 0.0, steady=True)
