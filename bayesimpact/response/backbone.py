@@ -84,7 +84,7 @@ def backbone(
     its neighbours below. The upper branch pairs it with the upper extreme, the lower branch with
     the geometric mean of the two lower extremes around it. Amplitude and period then belong to the
     same instant and the decay cancels to first order: choose this to compare with
-    `bilinear_backbone(...).frequency`.
+    the closed form of the undamped oscillator.
 
     Two damping ratios:
 
