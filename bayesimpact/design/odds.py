@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Foretold:
+class PredictedRecording:
     """What a model foretells of one recording, whitened and in units of the noise.
 
     Attributes
@@ -89,8 +89,8 @@ class Odds:
 
 
 def expected_odds(
-    right: Foretold,
-    other: Foretold,
+    right: PredictedRecording,
+    other: PredictedRecording,
     draws: Array,
     left: Array | None = None,
     distance: float | None = None,
@@ -121,7 +121,7 @@ def expected_odds(
     return Odds(mean, means, np.sqrt(np.maximum(variances, 0.0)))
 
 
-def noise_alone(right: Foretold, other: Foretold) -> float:
+def noise_alone(right: PredictedRecording, other: PredictedRecording) -> float:
     """tr (W_i - W_j)^2: what noise contributes where both models foretell the same."""
     own, others = (x.taken.T @ x.taken for x in (right, other))
     both = right.taken.T @ other.taken

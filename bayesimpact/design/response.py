@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from bayesimpact.data.campaign import Campaign, Measurement
 from bayesimpact.data.recording import Recording
 from bayesimpact.design.beliefs import belief
-from bayesimpact.design.candidates import Design, usual_release
-from bayesimpact.design.hypotheses import Hypothesis, Rivalry
-from bayesimpact.design.odds import Foretold, Odds, expected_odds
+from bayesimpact.design.candidates import PlannedRecording, usual_release
+from bayesimpact.design.hypotheses import FittedModel, Rivalry
+from bayesimpact.design.odds import Odds, PredictedRecording, expected_odds
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.noise import Noise
 from bayesimpact.model.oscillator import Oscillator, build_oscillator
@@ -111,10 +111,10 @@ class Response:
         return self.linearised(self.mean)
 
     @cached_property
-    def foretold(self) -> Foretold:
+    def foretold(self) -> PredictedRecording:
         """The model's Gaussian for the recording."""
         mean, jacobian = self.at_mean
-        return Foretold(mean, jacobian @ self.root, self.shared.size)
+        return PredictedRecording(mean, jacobian @ self.root, self.shared.size)
 
     @property
     def is_finite(self) -> bool:
@@ -158,7 +158,7 @@ def odds_between(right: Response, other: Response, draws: Array) -> Odds:
         mean, jacobian = other.linearised(theta)
         if not np.isfinite(jacobian).all():
             break
-        foretold = Foretold(mean, jacobian @ other.root, other.shared.size)
+        foretold = PredictedRecording(mean, jacobian @ other.root, other.shared.size)
     return expected_odds(right.foretold, foretold, draws, left, distance)
 
 
@@ -173,7 +173,7 @@ def solved(matrix: Array, vector: Array, damping: float) -> Array:
     return np.asarray(scale * found)
 
 
-def response(hypothesis: Hypothesis, design: Design, rivals: Rivalry) -> Response:
+def response(hypothesis: FittedModel, design: PlannedRecording, rivals: Rivalry) -> Response:
     """A model's response to a design."""
     name = new_name(rivals)
     o = oscillator(hypothesis, design, rivals, name)
@@ -214,7 +214,9 @@ def new_name(rivals: Rivalry) -> str:
     return name
 
 
-def oscillator(hypothesis: Hypothesis, design: Design, rivals: Rivalry, name: str) -> Oscillator:
+def oscillator(
+    hypothesis: FittedModel, design: PlannedRecording, rivals: Rivalry, name: str
+) -> Oscillator:
     """A model of the one recording, whose samples are 0."""
     blank = Recording(
         name, design.case, np.zeros(design.samples), design.interval, quantity=rivals.quantity

@@ -184,7 +184,7 @@ def global_search(
     """
     k1 = float(guess[oscillator.layout.index("k1")])
     duration = SEARCH_CYCLES * 2 * np.pi / np.sqrt(k1 / oscillator.campaign.mass)
-    profile = _Profile(oscillator, guess, duration, scales)
+    profile = _ProfiledObjective(oscillator, guess, duration, scales)
     lower, upper = _within(priors, profile, guess, *profile.bounds(factor))
     result = metropolis_differential_evolution(
         profile,
@@ -202,7 +202,7 @@ def global_search(
 
 
 def _within(
-    priors: Priors, profile: _Profile, guess: Array, lower: Array, upper: Array
+    priors: Priors, profile: _ProfiledObjective, guess: Array, lower: Array, upper: Array
 ) -> tuple[Array, Array]:
     """Bounds cut to the priors' supports; a support beyond them is searched whole."""
     tiny = 1e-12 * np.maximum(np.abs(guess), 1e-30)
@@ -214,7 +214,7 @@ def _within(
     )
 
 
-class _Profile:
+class _ProfiledObjective:
     """Profiled objective (N / 2) log S of the physical parameters, nuisances eliminated."""
 
     def __init__(

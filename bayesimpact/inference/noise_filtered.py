@@ -25,7 +25,7 @@ from bayesimpact.inference.noise_remainders import (
     LARGEST,
     SMALLEST,
     WINDOWS_PER_PERIOD,
-    Remainder,
+    PolynomialRemainder,
     remainder_of,
 )
 from bayesimpact.inference.noise_windows import period_of
@@ -71,7 +71,9 @@ def lower(cycles: Noise, bound: Noise) -> Noise:
     return replace(bound, source="polynomial remainders behind the filter", is_bound=False)
 
 
-def _level(remainder: Remainder, smoothing: Smoothing, interval: float) -> tuple[float, float]:
+def _level(
+    remainder: PolynomialRemainder, smoothing: Smoothing, interval: float
+) -> tuple[float, float]:
     """Level of the raw noise of which the filter would leave this, and its relative error.
 
     Of the combinations that the filter let pass: in others rounding and motion count more.

@@ -15,7 +15,7 @@ from bayesimpact.data.channels import keepers
 from bayesimpact.data.gaps import runs
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification
-from bayesimpact.inference.noise import Noise as NoiseModel
+from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.posterior import Posterior
 from bayesimpact.model.measurement import gain
 from bayesimpact.report import checks
@@ -24,10 +24,10 @@ from bayesimpact.report.published import references as published_values
 from bayesimpact.report.results import (
     Array,
     BackboneSummary,
-    Chain,
+    ChainSummary,
     Draws,
     EffectSummary,
-    Noise,
+    NoiseSummary,
     Provenance,
     RecordingResult,
     Results,
@@ -112,7 +112,7 @@ def results_from_posterior(
 
 def _results(
     fit: Fit,
-    noise: NoiseModel,
+    noise: Noise,
     *,
     search: SearchSummary | None,
     provenance: Provenance,
@@ -126,7 +126,7 @@ def _results(
     oscillator = fit.target.oscillator
     campaign = oscillator.campaign
     m = campaign.measurement
-    chain = Chain(_smoothing(oscillator.smoothing), m.mass_sd, m.clock_sd, m.gain_sd)
+    chain = ChainSummary(_smoothing(oscillator.smoothing), m.mass_sd, m.clock_sd, m.gain_sd)
     beside = published_values(campaign) if references is None else references
     draws = None if posterior is None else posterior.draws
     told, left = diagnosis[0] or {}, (diagnosis[0] or {}).get("remainder")
@@ -140,7 +140,9 @@ def _results(
         effects=tuple(
             EffectSummary(e.id, e.title, e.equation, e.statement) for e in oscillator.acting
         ),
-        noise=Noise(noise.kind, noise.level, noise.level_error, noise.correlation, noise.source),
+        noise=NoiseSummary(
+            noise.kind, noise.level, noise.level_error, noise.correlation, noise.source
+        ),
         chain=chain,
         verdict="",
         headline="",
@@ -198,7 +200,7 @@ def recording_results(fit: Fit) -> tuple[RecordingResult, ...]:
     return tuple(found)
 
 
-def _noise_rms(noise: NoiseModel, interval: float) -> float:
+def _noise_rms(noise: Noise, interval: float) -> float:
     """Root mean square of the noise behind the measuring chain's filter, m."""
     if noise.smoothing is None:
         return noise.level

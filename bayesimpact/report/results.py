@@ -140,7 +140,7 @@ class Draws:
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class BackboneCurve:
     """One branch of a recording's backbone and the band of simulated ones.
 
     Attributes
@@ -178,7 +178,7 @@ class BackboneSummary:
     replicates : simulated recordings per recording
     """
 
-    curves: tuple[Curve, ...]
+    curves: tuple[BackboneCurve, ...]
     probability: float
     labels: tuple[str, ...]
     inside: Array
@@ -189,7 +189,7 @@ class BackboneSummary:
 
 
 @dataclass(frozen=True)
-class Check:
+class ChecklistItem:
     """One line of the checklist: status is "passed", "failed" or "note" (for information)."""
 
     title: str
@@ -209,7 +209,7 @@ class EffectSummary:
 
 
 @dataclass(frozen=True)
-class Noise:
+class NoiseSummary:
     """The noise as estimated from the recordings alone; level in m (or rad)."""
 
     kind: str
@@ -220,7 +220,7 @@ class Noise:
 
 
 @dataclass(frozen=True)
-class Chain:
+class ChainSummary:
     """What campaign.toml says of the measuring chain; uncertainties are relative standard ones."""
 
     smoothing: str
@@ -278,8 +278,8 @@ class Results:
     recordings: tuple[RecordingResult, ...]
     rows: tuple[Row, ...]
     effects: tuple[EffectSummary, ...]
-    noise: Noise
-    chain: Chain
+    noise: NoiseSummary
+    chain: ChainSummary
     verdict: str
     headline: str
     reduced_chi2: float
@@ -291,7 +291,7 @@ class Results:
     sampler: SamplerSummary | None
     draws: Draws | None
     backbone: BackboneSummary | None
-    checks: tuple[Check, ...]
+    checks: tuple[ChecklistItem, ...]
     provenance: Provenance
     before: Draws | None = None
     before_backbone: BackboneSummary | None = None
@@ -363,7 +363,7 @@ class Results:
         return self.rms / float(np.sqrt(np.mean(signal**2)))
 
     @property
-    def failed(self) -> tuple[Check, ...]:
+    def failed(self) -> tuple[ChecklistItem, ...]:
         """Checks that failed."""
         return tuple(c for c in self.checks if c.status == "failed")
 

@@ -50,7 +50,7 @@ class Piece:
 
 
 @dataclass(frozen=True)
-class Part:
+class RigPart:
     """Something added to the base oscillator; what it does not have stays at its default.
 
     Attributes

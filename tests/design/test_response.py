@@ -10,7 +10,7 @@ import pytest
 from rivals import base_rivalry, fitted, rivalry_of
 from scipy.optimize import least_squares
 
-from bayesimpact.design.candidates import Design, first_designs
+from bayesimpact.design.candidates import PlannedRecording, first_designs
 from bayesimpact.design.hypotheses import Rivalry
 from bayesimpact.design.odds import expected_odds
 from bayesimpact.design.response import Response, noise_at, odds_between, response
@@ -30,7 +30,7 @@ def damped(small: Identification) -> Rivalry:
     return replace(made, hypotheses=tuple(large))
 
 
-def release(rivals: Rivalry) -> Design:
+def release(rivals: Rivalry) -> PlannedRecording:
     (found,) = [d for d in first_designs(rivals) if d.case == "1" and d.kind == "release"][3:4]
     return found
 

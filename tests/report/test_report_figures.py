@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from synthetic import make_results
 
 from bayesimpact.report.figures.backbone import deviation
-from bayesimpact.report.figures.corner import Normal, corner_figure
+from bayesimpact.report.figures.corner import NormalLaw, corner_figure
 from bayesimpact.report.figures.recordings import (
     MOST,
     close_up,
@@ -162,7 +162,7 @@ def test_corner_tells_the_numbers_it_is_given() -> None:
 
 def test_corner_of_normal_laws_is_drawn_in_closed_form() -> None:
     covariance = np.array([[4.0, 1.5], [1.5, 1.0]])
-    law = Normal("posterior", ("k1", "c1"), ("N/m", "N s/m"), np.array([10.0, 5.0]), covariance)
+    law = NormalLaw("posterior", ("k1", "c1"), ("N/m", "N s/m"), np.array([10.0, 5.0]), covariance)
     figure = corner_figure(law)
     marginal = next(a for a in figure.axes if a.get_subplotspec().get_geometry()[2] == 0)
     x, density = marginal.lines[0].get_data()

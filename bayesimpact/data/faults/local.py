@@ -20,7 +20,7 @@ SHARE = 1 / 14  # of a period, at most: shorter than half a period against a sti
 
 
 @dataclass(frozen=True, eq=False)
-class Foretold:
+class OneSidedPrediction:
     """One-sided predictions at every sample; NaN within reach of an end.
 
     Attributes
@@ -52,7 +52,9 @@ def _weights(degree: int, length: int, at: float) -> tuple[Array, Array]:
     return value, slope
 
 
-def foretell(samples: Array, form: tuple[int, int], gap: int = 0, place: float = 0.0) -> Foretold:
+def foretell(
+    samples: Array, form: tuple[int, int], gap: int = 0, place: float = 0.0
+) -> OneSidedPrediction:
     """Predictions from samples i-m..i-1 and i+gap..i+gap+m-1, at i + place, for every i.
 
     A spike of `gap` samples that begins at i is left out on both sides; a slip before sample i is
@@ -62,7 +64,7 @@ def foretell(samples: Array, form: tuple[int, int], gap: int = 0, place: float =
     n = samples.size
     result = [np.full(n, np.nan) for _ in range(4)]
     if n < 2 * m + gap + 1:
-        return Foretold(*result)
+        return OneSidedPrediction(*result)
     window = np.lib.stride_tricks.sliding_window_view(samples, m)  # rows start at 0..n-m
     value, slope = _weights(degree, m, place)
     result[0][m:] = (window @ value)[: n - m]
@@ -72,7 +74,7 @@ def foretell(samples: Array, form: tuple[int, int], gap: int = 0, place: float =
     count = n - m - gap + 1
     result[1][:count] = (window @ value[::-1])[gap : gap + count]
     result[3][:count] = -(window @ slope[::-1])[gap : gap + count]
-    return Foretold(*result)
+    return OneSidedPrediction(*result)
 
 
 def rounding_error(form: tuple[int, int], place: float, step: float) -> float:
