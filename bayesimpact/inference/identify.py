@@ -11,11 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.inference.arviz_groups import arviz_groups, as_arviz, laplace_draws
 from bayesimpact.inference.declared import climbed, is_same_mode, search_declared
 from bayesimpact.inference.defaults import default_priors
 from bayesimpact.inference.fit import Fit, Target
@@ -80,6 +82,15 @@ class Identification:
     def agree(self) -> bool:
         """True when guess and search ended within 0.1 standard deviations of each other."""
         return self.from_search is None or is_same_mode(self.from_search, self.from_guess)
+
+    def to_arviz(self, *, lab_units: bool = False, seed: int = 0) -> Any:
+        """Draws of the Laplace approximation at the mode, as ArviZ takes them; nothing is sampled.
+
+        Groups and units as of `Posterior.to_arviz`, without sample_stats and predictions.
+        """
+        return as_arviz(
+            arviz_groups(self.fit, laplace_draws(self.fit, seed=seed), lab_units=lab_units)
+        )
 
 
 @linear_algebra_alone()
