@@ -66,9 +66,9 @@ def amount(value: float, unit: str, digits: int = 3, like: float | None = None) 
 def headline(results: Results) -> str:
     """The verdict in words."""
     model = model_name(results)
-    like = results.rms if results.verdict == "inadequate" else results.noise.level
     model = model[0].upper() + model[1:]
-    noise = amount(results.noise.level, results.unit, like=like)
+    noise = amount(results.noise.level, results.unit)
+    like = results.rms if results.verdict == "inadequate" else results.noise.level
     rms = amount(results.rms, results.unit, like=like)
     excess = float(np.sqrt(results.reduced_chi2))
     diagnosed = results.diagnosis is not None

@@ -296,3 +296,13 @@ def test_a_full_disk_is_no_failed_figure(tmp_path: Path) -> None:
 
     with pytest.raises(OSError, match="space"):
         save_drawn(full, make_results(1, 1, n=200, sampled=False), tmp_path)
+
+
+@pytest.mark.parametrize("sd", [0.9, 1.4, 2.3, 3.7, 5.0, 8.1])
+def test_every_axis_of_a_corner_plot_tells_its_scale(sd: float) -> None:
+    rng = np.random.default_rng(2)
+    values = np.array([808.5, 0.148]) + rng.standard_normal((500, 2)) * [sd * 1e-3, sd * 1e-6]
+    figure = corner_figure(Draws("posterior", ("k1", "c1"), ("N/m", "N s/m"), values))
+    below = [axis for axis in figure.axes if axis.get_xlabel()]
+    assert len(below) == 2 and all(len(axis.get_xticks()) > 1 for axis in below)
+    assert len(below[0].get_yticks()) > 1

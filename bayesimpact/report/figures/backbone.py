@@ -159,4 +159,4 @@ def _legend(figure: Figure, summary: BackboneSummary) -> None:
     words = [f"recorded, {words}" for words in BRANCH_WORDS.values()]
     words.append(f"{100 * summary.probability:.0f} % of simulated")
     pairs = {tuple: HandlerTuple(ndivide=None, pad=0.0)}
-    figure.legend(handles, words, loc="outside upper right", ncols=3, handler_map=pairs)
+    figure.legend(handles, words, loc="outside upper left", ncols=3, handler_map=pairs)

@@ -87,7 +87,7 @@ class DrawCloud(Cloud):
 
     def pair(self, axis: Axes, i: int, j: int) -> None:
         """Smoothed contours."""
-        quiet_arviz()  # corner imports it, aloud
+        quiet_arviz()  # corner imports it, with its announcement
         import corner
 
         corner.hist2d(

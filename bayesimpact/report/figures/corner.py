@@ -193,8 +193,12 @@ def _outer_labels(panels: np.ndarray, axes: list[LabScale], i: int) -> None:
 def _ticks(low: float, high: float) -> Array:
     """Round values well inside an axis, so that labels of neighbouring panels keep apart."""
     margin = 0.15 * (high - low)
-    ticks = np.asarray(MaxNLocator(3).tick_values(low, high))
-    return ticks[(ticks > low + margin) & (ticks < high - margin)]
+    for intervals in (3, 4, 6, 8):  # one tick alone would say nothing of the scale
+        ticks = np.asarray(MaxNLocator(intervals).tick_values(low, high))
+        ticks = ticks[(ticks > low + margin) & (ticks < high - margin)]
+        if ticks.size > 1:
+            break
+    return ticks
 
 
 def _legend(
