@@ -12,7 +12,7 @@ Kind = Literal["repeat", "release", "stop removed", "longer", "faster", "gap"]
 
 HEIGHTS = (0.25, 0.5, 0.75, 1.0, 1.25, 1.5)
 """Releases, in the highest one so far. Half as much again is what a probe chosen for the campaign
-may still read, and a model may still foretell.
+may still read, and a model may still predict.
 """
 WITHIN = 1.0
 """The same where a force has been learned: it is not known where the mass has not been."""

@@ -1,4 +1,4 @@
-"""The models that a diagnosis left open, as plain numbers: enough to simulate what each foretells.
+"""The models that a diagnosis left open, as plain numbers: enough to simulate what each predicts.
 
 They are kept in the results of a diagnosis and read back by `bayesimpact next`, which needs neither
 the recordings nor the search.

@@ -1,4 +1,4 @@
-"""What a model foretells of a recording that has not been made, with its sensitivities.
+"""What a model predicts of a recording that has not been made, with its sensitivities.
 
 Parameters that the new recording shares with the campaign keep their posterior. Those of its own
 (start values, rest reading, phases, the place of a stop that was moved) are nearly unknown: the
@@ -111,7 +111,7 @@ class Response:
         return self.linearised(self.mean)
 
     @cached_property
-    def foretold(self) -> PredictedRecording:
+    def prediction(self) -> PredictedRecording:
         """The model's Gaussian for the recording."""
         mean, jacobian = self.at_mean
         return PredictedRecording(mean, jacobian @ self.root, self.shared.size)
@@ -119,8 +119,8 @@ class Response:
     @property
     def is_finite(self) -> bool:
         """False where the motion fails, or runs away."""
-        foretold = self.foretold
-        return bool(np.isfinite(foretold.mean).all() and np.isfinite(foretold.factor).all())
+        prediction = self.prediction
+        return bool(np.isfinite(prediction.mean).all() and np.isfinite(prediction.factor).all())
 
 
 def odds_between(right: Response, other: Response, draws: Array) -> Odds:
@@ -130,9 +130,9 @@ def odds_between(right: Response, other: Response, draws: Array) -> Odds:
     linear projection, and again from where it leads while that gains. `draws` (S, shared) are
     standard normal numbers.
     """
-    goal = right.foretold.mean
+    goal = right.prediction.mean
     theta, shift = other.mean, np.zeros(other.prior.shape[0])
-    (mean, jacobian), foretold = other.at_mean, other.foretold
+    (mean, jacobian), prediction = other.at_mean, other.prediction
     left = goal - mean
     distance = float(left @ left)
     for _ in range(ROUNDS):
@@ -158,8 +158,8 @@ def odds_between(right: Response, other: Response, draws: Array) -> Odds:
         mean, jacobian = other.linearised(theta)
         if not np.isfinite(jacobian).all():
             break
-        foretold = PredictedRecording(mean, jacobian @ other.root, other.shared.size)
-    return expected_odds(right.foretold, foretold, draws, left, distance)
+        prediction = PredictedRecording(mean, jacobian @ other.root, other.shared.size)
+    return expected_odds(right.prediction, prediction, draws, left, distance)
 
 
 def solved(matrix: Array, vector: Array, damping: float) -> Array:

@@ -31,7 +31,7 @@ def release(
 ) -> tuple[float, float, float, float]:
     """Displacement and velocity at the first sample.
 
-    Up to the first touch, or the first release from the stop, the motion is linear in y0 and v0;
+    Up to the first contact, or the first release from the stop, the motion is linear in y0 and v0;
     both follow from a linear least-squares fit over these samples. Where the first event comes too
     soon for that, the first free period is simulated through its impacts and fitted.
 

@@ -181,7 +181,7 @@ def summary(rows: Sequence[Row]) -> Row:
         h for row in open_ for a in row["arms"].values() for h in a.get("halves", {}).values()
     ]
     known = np.log([[b / a, b / o] for b, a, o in halves if o]).reshape(-1, 2)
-    if len(known):  # how much narrower k2 became, in logarithms, over what was foretold
+    if len(known):  # how much narrower k2 became, in logarithms, over what was predicted
         ratio = known[:, 1] / known[:, 0]
         result["narrowing"] = {"median": float(np.median(ratio)), "intervals": len(known)}
     both = pairs(open_)

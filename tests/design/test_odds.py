@@ -12,7 +12,7 @@ Array = np.ndarray
 N, SHARED, OWN = 30, 3, 2
 
 
-def foretold(rng: np.random.Generator, scale: float, base: Array) -> PredictedRecording:
+def prediction(rng: np.random.Generator, scale: float, base: Array) -> PredictedRecording:
     """A linear model: a few shared parameters, and broad start values of the recording's own."""
     shared = scale * rng.standard_normal((N, SHARED))
     own = 40.0 * (base + 0.01 * rng.standard_normal((N, OWN)))
@@ -22,7 +22,7 @@ def foretold(rng: np.random.Generator, scale: float, base: Array) -> PredictedRe
 def models(seed: int) -> tuple[PredictedRecording, PredictedRecording]:
     rng = np.random.default_rng(seed)
     base = rng.standard_normal((N, OWN))
-    return foretold(rng, 0.4, base), foretold(rng, 0.8, base)
+    return prediction(rng, 0.4, base), prediction(rng, 0.8, base)
 
 
 def log_odds(data: Array, right: PredictedRecording, other: PredictedRecording) -> Array:

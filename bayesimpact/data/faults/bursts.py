@@ -1,7 +1,7 @@
 """Runs of bad readings close to each other, by a curve through the good ones on both sides.
 
-`spikes` foretells a reading from the few next to it on one side: where the next spike lies among
-those, neither side foretells anything. Here one polynomial goes through the readings on both sides
+`spikes` predicts a reading from the few next to it on one side: where the next spike lies among
+those, neither side predicts anything. Here one polynomial goes through the readings on both sides
 that are good, wherever those are, and says how far off the others lie. An impact is told from a
 spike by what it leaves beside it: a corner bends the curve away from the good readings too, by a
 share of its height that is known.

@@ -211,7 +211,7 @@ class Law:
 
 Numbers = Sequence[float]
 Size = tuple[float, str, float]
-"""How large an effect is: value, unit for displacements, share of its yardstick."""
+"""How large an effect is: value, unit for displacements, share of its reference."""
 Observe = Callable[
     [NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]
 ]
