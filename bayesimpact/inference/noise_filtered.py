@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
 from bayesimpact.data.campaign import Smoothing
@@ -30,8 +29,6 @@ from bayesimpact.inference.noise_remainders import (
 )
 from bayesimpact.inference.noise_windows import period_of
 from bayesimpact.model.measurement import covariance
-
-Array = NDArray[np.float64]
 
 SURE = 2.0  # standard errors: the lowest upper end counts, for the lowest level is one by chance
 LARGEST_ERROR = 0.1  # relative: fewer numbers tell a level only where there are no others

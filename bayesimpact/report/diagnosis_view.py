@@ -26,8 +26,6 @@ from bayesimpact.report.next_words import next_view
 from bayesimpact.report.results import Results
 from bayesimpact.report.tables import symbol
 
-Rows = list[dict[str, Any]]
-
 FORMULAS, UNLIKELY = 5, 1e-3
 """Formulas that are shown whatever their probability; the others from this probability on."""
 

@@ -20,8 +20,6 @@ from bayesimpact.report.recording_result import RecordingResult as RecordingResu
 
 Array = NDArray[np.float64]
 
-STATUSES = ("passed", "failed", "note")
-
 
 @dataclass(frozen=True, eq=False)
 class Row:

@@ -96,7 +96,6 @@ def write_fit(
     seed: int = 0,
     command: str = "",
     seconds: float = float("nan"),
-    references: Mapping[str, Mapping[str, float]] | None = None,
     diagnosis: Mapping[str, Any] | None = None,
     diagnosis_arrays: Mapping[str, Array] | None = None,
     failed: Mapping[str, str] | None = None,
@@ -110,7 +109,6 @@ def write_fit(
         seed=seed,
         command=command,
         seconds=seconds,
-        references=references,
         diagnosis=diagnosis,
         diagnosis_arrays=diagnosis_arrays,
     )
@@ -125,7 +123,6 @@ def write_posterior(
     before: Posterior | None = None,
     command: str = "",
     seconds: float = float("nan"),
-    references: Mapping[str, Mapping[str, float]] | None = None,
     diagnosis: Mapping[str, Any] | None = None,
     diagnosis_arrays: Mapping[str, Array] | None = None,
     failed: Mapping[str, str] | None = None,
@@ -140,7 +137,6 @@ def write_posterior(
         "before": before,
         "command": command,
         "seconds": seconds,
-        "references": references,
         "diagnosis": diagnosis,
         "diagnosis_arrays": diagnosis_arrays,
     }

@@ -1,7 +1,7 @@
 """What the strong trials plant: the catalogue in sorts, of which one trial holds at most one each.
 
 Effects of one sort look so alike in a decay that two of them at once are one effect in practice.
-Sizes are a share of the size beyond which the effect is no longer physical (`Form.largest`).
+Sizes are a share of the size beyond which the effect is no longer physical (`EffectForm.largest`).
 """
 
 from __future__ import annotations

@@ -101,8 +101,6 @@ def test_references_of_the_bundled_campaign(identification: Identification) -> N
     row = results_from_fit(identification).row("k2[1]")
     assert row.references["Table 2"] == 5350.156
     assert row.references["beam theory"] == pytest.approx(5276.3, rel=1e-4)
-    other = results_from_fit(identification, references={}).row("k2[1]")
-    assert other.references == {}
 
 
 def test_posterior_in_numbers(posterior: Posterior, identification: Identification) -> None:
