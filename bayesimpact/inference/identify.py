@@ -2,9 +2,9 @@
 
 Long recordings are phase-locked: the misfit has side minima in k1, one per lost cycle. The global
 search (differential evolution with the Metropolis criterion) therefore sees only the first cycles,
-where there are few; its winner and the quick guess are then carried to the full length over windows
-that double, each a least-squares polish with exact derivatives. Both ends are compared, so that a
-search that failed shows.
+where there are few; its winner and the initial guess are then carried to the full length over
+windows that double, each a least-squares polish with exact derivatives. Both ends are compared, so
+that a search that failed shows.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Identification:
     Attributes
     ----------
     fit : the better of the two ends
-    estimates : quick estimates from the recordings, the guess
+    estimates : initial estimates from the recordings, the guess
     noise : estimated from the recordings alone
     search : the global search, or None when it was left out
     from_guess, from_search : both ends; they should agree
@@ -169,7 +169,7 @@ def _with_declared(
 
 
 def initial_theta(oscillator: Oscillator, estimates: Estimates, noise: Noise) -> Array:
-    """Parameter vector (d,) of the quick estimates."""
+    """Parameter vector (d,) of the initial estimates."""
     known = [estimates.start(name, noise.level) for name in oscillator.layout.names]
     return np.array(known)
 

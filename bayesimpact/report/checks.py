@@ -179,7 +179,7 @@ def _search(results: Results) -> ChecklistItem:
         "Guess and global search end at the same mode",
         _status(results.search.agree),
         f"largest distance {significant(distance, 2)} standard deviations after polishing both",
-        "Two starts: quick estimates, and differential evolution in wide bounds about them.",
+        "Two starts: initial estimates, and differential evolution in wide bounds about them.",
     )
 
 

@@ -78,7 +78,7 @@ def backbone(
     Two estimators of the frequency:
 
     "half" (Tian et al., Eq. 1): f = 1 / (2 T) with T the half cycle above (below) rest. This is the
-    paper's, and what the quick estimates need: the lower branch knows nothing of the stop.
+    paper's, and what the initial estimates need: the lower branch knows nothing of the stop.
 
     "centred": the frequency of the whole cycle, from the half cycle above rest and half of each of
     its neighbours below. The upper branch pairs it with the upper extreme, the lower branch with

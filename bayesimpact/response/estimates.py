@@ -1,4 +1,4 @@
-"""Quick estimates of every parameter from the recordings alone: the start of the identification.
+"""Initial estimates of every parameter from the recordings alone: the start of the identification.
 
 k1, c1 and the rest readings come from the flights on the free side and from the free tails; gap,
 stiffness and damping of the stop from the cycles between lower turning points; y0 and v0 from the

@@ -74,7 +74,7 @@ def test_noise_alone_spreads_the_odds_of_models_that_agree() -> None:
 
 
 def test_what_parameters_imitate_tells_nothing_apart() -> None:
-    """A difference along a column of nearly unknown size is worth nothing; across it counts."""
+    """A difference along a column of nearly unknown size tells nothing; across it counts."""
     rng = np.random.default_rng(5)
     axes = np.linalg.qr(rng.standard_normal((N, 2)))[0]
     factor = 1e4 * axes[:, :1]
