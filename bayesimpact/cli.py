@@ -121,7 +121,7 @@ def new(
         raise InputError(str(folder / "campaign.toml"), "a campaign already", accepted)
     looks = draft.looks_at(folder, files)
     title = folder.resolve().name or "campaign"
-    made = draft.draft(title, looks, draft.Rig(mass, stop, case, unit, rate))
+    made = draft.draft(title, looks, draft.DraftedRig(mass, stop, case, unit, rate))
     file = draft.write(folder, looks, made)
     if plot:
         from bayesimpact.report.channel_figure import channel_figure

@@ -13,7 +13,7 @@ import numpy as np
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.faults.find import set_aside
-from bayesimpact.data.files import write_text
+from bayesimpact.data.files import strict, write_text
 from bayesimpact.design.document import next_document
 from bayesimpact.design.hypotheses import Rivalry, rivalry
 from bayesimpact.design.rank import proposals
@@ -206,7 +206,7 @@ def write_diagnosis(
 ) -> Written:
     """diagnosis.json, results, figures and report of a diagnosis, sampled or not, in `out`."""
     out.mkdir(parents=True, exist_ok=True)
-    plain = _strict(content)
+    plain = strict(content)
     write_text(out / DIAGNOSIS_FILE, json.dumps(plain, indent=1))
     if diagnosis.formulas is not None:
         write_text(out / EFFECT_FILE, found_file(diagnosis.formulas))
@@ -217,7 +217,7 @@ def write_diagnosis(
         arrays, failed["arrays of the diagnosis' figures"] = {}, reason(error)
     try:
         kept, models = rivals_content(rivalry(diagnosis))
-        arrays, plain = arrays | models, plain | {"hypotheses": _strict(kept)}
+        arrays, plain = arrays | models, plain | {"hypotheses": strict(kept)}
     except Exception as error:
         failed["models for `bayesimpact next`"] = reason(error)
     told: dict[str, Any] = {
@@ -259,7 +259,7 @@ def next_recording(
     content["sentence"] = sentence(content)
     old = (diagnosis.get("next") or {}).get("sentence", "")
     summary = str(diagnosis["summary"]).removesuffix(old).rstrip()
-    diagnosis |= {"summary": f"{summary} {content['sentence']}".rstrip(), "next": _strict(content)}
+    diagnosis |= {"summary": f"{summary} {content['sentence']}".rstrip(), "next": strict(content)}
     say("writing the report")
     write_text(folder / NEXT_FILE, json.dumps(diagnosis["next"], indent=1))
     told = {k: v for k, v in diagnosis.items() if k not in KEPT_APART}
@@ -279,16 +279,3 @@ def _rivals(folder: Path, results: Results, effects: Sequence[Effect]) -> Rivalr
         return rivals_from(results.diagnosis["verdict"], kept, arrays, effects)
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(str(folder), f"models that cannot be read ({error})", accepted) from None
-
-
-def _strict(value: Any) -> Any:
-    """The same with numbers that JSON does not know as null, and NumPy scalars as plain ones."""
-    if isinstance(value, dict):
-        return {k: _strict(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [_strict(v) for v in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    return value

@@ -2,7 +2,7 @@
 
 Search by differential evolution with the Metropolis criterion, then a least-squares polish with
 exact derivatives. The recordings were simulated at the values of Table 2, so these are the truth.
-`--quick` leaves out the global search and starts the polish from the quick estimates.
+`--quick` leaves out the global search and starts the polish from the initial estimates.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def main(argv: Sequence[str] | None = None) -> dict[str, float]:
         )
     print(f"reduced chi2 {found.fit.reduced_chi2:.4f}")
     if not options.quick:
-        print(f"search and quick estimates end at one mode: {'yes' if found.agree else 'no'}")
+        print(f"search and initial estimates end at one mode: {'yes' if found.agree else 'no'}")
 
     figure, (axis,) = panels(1, 1, (5.5, 3.2))
     for place, (name, z) in enumerate(away.items()):

@@ -13,8 +13,7 @@ from typing import Any
 
 import h5netcdf
 import numpy as np
-
-from bayesimpact.report.archive_arviz import read_posterior
+import xarray
 
 # Kills its process in place of the n-th renaming of a finished file: what was written is there in
 # full under another name, or not at all. n = 0: never; at the end it says how many there were.
@@ -115,8 +114,9 @@ def _content(file: Path) -> bytes:
     if file.suffix == ".json":
         return json.dumps(_same(json.loads(file.read_text())), sort_keys=True).encode()
     if file.name == "posterior.nc":
-        draws = read_posterior(file).groups["posterior"]
-        return b"".join(name.encode() + v.values.tobytes() for name, v in sorted(draws.items()))
+        with xarray.open_dataset(file, group="posterior", engine="h5netcdf") as draws:
+            names = sorted(map(str, draws.data_vars))
+            return b"".join(name.encode() + draws[name].values.tobytes() for name in names)
     if file.name == "results.nc":
         with h5netcdf.File(file, "r") as content:
             arrays = {k: v[...] for k, v in content.variables.items() if k != "record"}

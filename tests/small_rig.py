@@ -14,7 +14,7 @@ from bayesimpact.model.parameters import Layout
 from bayesimpact.trial import rig as generator
 from bayesimpact.trial.rig import Effects, Release, Rig, make_campaign, motion
 from bayesimpact.trial.rig_chain import Chain
-from bayesimpact.trial.rig_motion import Motion
+from bayesimpact.trial.rig_motion import RigMotion
 
 RIG = Rig(
     mass=0.503,
@@ -35,10 +35,10 @@ PLAIN = Rig(mass=0.503, c1=0.148, k1=808.556)  # without a stop
 PLAIN_RELEASES = (Release("a", "", -6.5e-3, 1e-3), Release("b", "", 4.5e-3))
 
 
-_MOTIONS: dict[str, Motion] = {}
+_MOTIONS: dict[str, RigMotion] = {}
 
 
-def _once(rig: Rig, release: Release, effects: Effects, **how: Any) -> Motion:
+def _once(rig: Rig, release: Release, effects: Effects, **how: Any) -> RigMotion:
     """The motion of a release; a campaign with another seed has the same under its noise."""
     key = repr((rig, release, effects, how))
     if key not in _MOTIONS:
@@ -76,7 +76,7 @@ def record(
         )
 
 
-def motion_of(number: int, rate: float = 1000.0, duration: float = 2.0) -> Motion:
+def motion_of(number: int, rate: float = 1000.0, duration: float = 2.0) -> RigMotion:
     """The true motion of one release of `RIG`."""
     return motion(RIG, RELEASES[number], rate=rate, duration=duration)
 

@@ -17,7 +17,7 @@ from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.inference.identify import Identification
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.report.archive import load_results, save_results
-from bayesimpact.report.figures.save import Drawn
+from bayesimpact.report.figures.save import SavedFigures
 
 Run = Callable[..., tuple[int, str, str]]
 FEW = tuple(e for e in EFFECTS if e.id in ("spring_cubic", "spring_quintic", "quadratic_drag"))
@@ -37,7 +37,7 @@ def short(campaign: Campaign) -> Campaign:
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Reports without their figures, which take ten times as long as all the rest."""
-    monkeypatch.setattr("bayesimpact.report.write.save_all", lambda *_: Drawn())
+    monkeypatch.setattr("bayesimpact.report.write.save_all", lambda *_: SavedFigures())
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +47,7 @@ def ambiguous(tmp_path_factory: pytest.TempPathFactory) -> Path:
     found = diagnose(campaign, rng=np.random.default_rng(0), effects=FEW, search=False)
     assert found.verdict == "ambiguous"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("bayesimpact.report.write.save_all", lambda *_: Drawn())
+        patch.setattr("bayesimpact.report.write.save_all", lambda *_: SavedFigures())
         bi.save(found, out)
     return out
 

@@ -29,7 +29,7 @@ FEW = 3
 
 
 @dataclass(frozen=True)
-class Rig:
+class DraftedRig:
     """What the user says of the rig and its recordings; None where nothing is said.
 
     `unit` is of readings, and `rate` in Hz of clocks, of which the files say nothing.
@@ -106,7 +106,7 @@ def _look(path: Path, file: str, outside: bool) -> Look:
     return Look(file, source, tuple(channels), None if plain else encoding, own)
 
 
-def draft(title: str, looks: Sequence[Look], rig: Rig) -> Draft:
+def draft(title: str, looks: Sequence[Look], rig: DraftedRig) -> Draft:
     """campaign.toml with one [[recording]] per file that may hold a response."""
     angle = any(
         is_angular(UNITS[c.unit][0]) for one in looks for c in guessed_response(one.channels)
@@ -221,7 +221,7 @@ def _listing(one: Look) -> list[str]:
     return lines
 
 
-def _keys(one: Look, rig: Rig) -> list[str]:
+def _keys(one: Look, rig: DraftedRig) -> list[str]:
     """The lines that choose the channel and its clock."""
     lines = [f"encoding = {_toml(one.encoding)}"] if one.encoding else []
     candidates = guessed_response(one.channels)

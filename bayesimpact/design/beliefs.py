@@ -10,8 +10,8 @@ from math import pi, sqrt
 
 import numpy as np
 
-from bayesimpact.design.candidates import Design, highest
-from bayesimpact.design.hypotheses import Hypothesis, Rivalry
+from bayesimpact.design.candidates import PlannedRecording, highest
+from bayesimpact.design.hypotheses import FittedModel, Rivalry
 from bayesimpact.model.effects.effect import EffectParameter
 from bayesimpact.model.oscillator import Oscillator
 from bayesimpact.model.parameters import bare_name, is_added
@@ -29,7 +29,7 @@ ridge that is too much: no step moves a recording by more than about its noise, 
 
 
 def belief(
-    hypothesis: Hypothesis, o: Oscillator, name: str, design: Design, rivals: Rivalry
+    hypothesis: FittedModel, o: Oscillator, name: str, design: PlannedRecording, rivals: Rivalry
 ) -> tuple[float, float, float, float]:
     """Mean, standard deviation and difference step of a parameter; its position in the model, or -1
     for one of the new recording's own.
@@ -44,7 +44,7 @@ def belief(
 
 
 def _own(
-    hypothesis: Hypothesis, name: str, order: int, design: Design, rivals: Rivalry
+    hypothesis: FittedModel, name: str, order: int, design: PlannedRecording, rivals: Rivalry
 ) -> tuple[float, float]:
     """Mean and standard deviation of a parameter of the new recording alone.
 
@@ -70,12 +70,12 @@ def _own(
     return mean, sd
 
 
-def _alike(hypothesis: Hypothesis, name: str) -> list[int]:
+def _alike(hypothesis: FittedModel, name: str) -> list[int]:
     """Positions of a parameter's values for the recordings so far."""
     return [i for n, i in hypothesis.known.items() if n.split("[")[0] == name.split("[")[0]]
 
 
-def _usual_sd(hypothesis: Hypothesis, name: str) -> float:
+def _usual_sd(hypothesis: FittedModel, name: str) -> float:
     """How well the recordings so far determine such a parameter; 0 where none has it."""
     alike = _alike(hypothesis, name)
     return float(np.median(hypothesis.sd[alike])) if alike else 0.0
@@ -86,13 +86,13 @@ def step_of(sd: float, value: float) -> float:
     return STEP * sd if sd > 0 else 1e-6 * max(abs(float(value)), 1e-6)
 
 
-def circular(hypothesis: Hypothesis, name: str) -> bool:
+def circular(hypothesis: FittedModel, name: str) -> bool:
     """Whether a parameter of an effect is a phase."""
     parameter = parameter_of(hypothesis, name)
     return parameter is not None and parameter.circular
 
 
-def parameter_of(hypothesis: Hypothesis, name: str) -> EffectParameter | None:
+def parameter_of(hypothesis: FittedModel, name: str) -> EffectParameter | None:
     """The record of an effect's parameter; None for one of the base oscillator."""
     if not is_added(name):
         return None
@@ -101,7 +101,7 @@ def parameter_of(hypothesis: Hypothesis, name: str) -> EffectParameter | None:
     return effect.parameter(rest.split("[")[0])
 
 
-def rate_of(hypothesis: Hypothesis, rivals: Rivalry) -> float:
+def rate_of(hypothesis: FittedModel, rivals: Rivalry) -> float:
     """Natural angular frequency in free flight, rad/s."""
     known = [hypothesis.mode[i] for n, i in hypothesis.known.items() if bare_name(n) == "k1"]
     return sqrt(max(float(np.mean(known)), 1e-300) / rivals.mass) if known else 1.0

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from bayesimpact.design.hypotheses import Release, Rivalry
+from bayesimpact.design.hypotheses import PastRelease, Rivalry
 
 Kind = Literal["repeat", "release", "stop removed", "longer", "faster", "gap"]
 
 HEIGHTS = (0.25, 0.5, 0.75, 1.0, 1.25, 1.5)
 """Releases, in the highest one so far. Half as much again is what a probe chosen for the campaign
-may still read, and a model may still foretell.
+may still read, and a model may still predict.
 """
 WITHIN = 1.0
 """The same where a force has been learned: it is not known where the mass has not been."""
@@ -23,7 +23,7 @@ GAP = 0.15
 
 
 @dataclass(frozen=True)
-class Design:
+class PlannedRecording:
     """One recording that could be made.
 
     Attributes
@@ -70,22 +70,26 @@ def sign(rivals: Rivalry) -> float:
     return 1.0 if sum(r.y0 for r in rivals.releases) > 0 else -1.0
 
 
-def repeats(rivals: Rivalry) -> tuple[Design, ...]:
+def repeats(rivals: Rivalry) -> tuple[PlannedRecording, ...]:
     """Every recording once more."""
     return tuple(
-        Design("repeat", r.case, r.y0, r.v0, r.duration, r.interval, rivals.stop, repeats=r.name)
+        PlannedRecording(
+            "repeat", r.case, r.y0, r.v0, r.duration, r.interval, rivals.stop, repeats=r.name
+        )
         for r in rivals.releases
     )
 
 
-def first_designs(rivals: Rivalry) -> tuple[Design, ...]:
+def first_designs(rivals: Rivalry) -> tuple[PlannedRecording, ...]:
     """Releases from several heights against every obstacle, and with the stop removed."""
     learned = any(i == "learned_force" for h in rivals.hypotheses for i in h.ids)
     heights = [h for h in HEIGHTS if h <= (WITHIN if learned else HEIGHTS[-1])]
     usual = usual_release(rivals.releases)
     side = sign(rivals) * highest(rivals)
     found = [
-        Design("release", case, h * side, 0.0, usual.duration, usual.interval, rivals.stop)
+        PlannedRecording(
+            "release", case, h * side, 0.0, usual.duration, usual.interval, rivals.stop
+        )
         for case in rivals.cases
         for h in heights
     ]
@@ -98,7 +102,7 @@ def first_designs(rivals: Rivalry) -> tuple[Design, ...]:
     return tuple(found)
 
 
-def variants(design: Design, rivals: Rivalry) -> tuple[Design, ...]:
+def variants(design: PlannedRecording, rivals: Rivalry) -> tuple[PlannedRecording, ...]:
     """The same release recorded for longer, sampled faster, and with another gap."""
     found = [
         replace(design, kind="longer", duration=LONGER * design.duration),
@@ -110,6 +114,6 @@ def variants(design: Design, rivals: Rivalry) -> tuple[Design, ...]:
     return tuple(found)
 
 
-def usual_release(releases: Sequence[Release]) -> Release:
+def usual_release(releases: Sequence[PastRelease]) -> PastRelease:
     """The longest recording: new ones are made like it."""
     return max(releases, key=lambda r: r.duration)

@@ -1,4 +1,4 @@
-"""The models that a diagnosis left open, as plain numbers: enough to simulate what each foretells.
+"""The models that a diagnosis left open, as plain numbers: enough to simulate what each predicts.
 
 They are kept in the results of a diagnosis and read back by `bayesimpact next`, which needs neither
 the recordings nor the search.
@@ -33,7 +33,7 @@ OPEN: frozenset[Verdict] = frozenset(("ambiguous", "partly", "unknown"))
 
 
 @dataclass(frozen=True, eq=False)
-class Hypothesis:
+class FittedModel:
     """One fitted model.
 
     Attributes
@@ -71,7 +71,7 @@ class Hypothesis:
 
 
 @dataclass(frozen=True)
-class Release:
+class PastRelease:
     """How one of the campaign's recordings was made.
 
     Attributes
@@ -107,13 +107,13 @@ class Rivalry:
     """
 
     verdict: Verdict
-    hypotheses: tuple[Hypothesis, ...]
+    hypotheses: tuple[FittedModel, ...]
     noise: Noise
     repetition: float
     mass: float
     stop: bool
     quantity: Quantity
-    releases: tuple[Release, ...]
+    releases: tuple[PastRelease, ...]
 
     @property
     def probabilities(self) -> Array:
@@ -145,7 +145,7 @@ def rivalry(d: Diagnosis) -> Rivalry:
     return Rivalry(
         d.verdict,
         tuple(
-            Hypothesis(
+            FittedModel(
                 c.fit.target.oscillator.acting,
                 c.fit.names,
                 c.fit.mode,
@@ -191,14 +191,14 @@ def usable(candidate: Candidate) -> bool:
     return bool(np.isfinite(candidate.log_evidence) and np.isfinite(fit.covariance).all())
 
 
-def releases(candidate: Candidate) -> tuple[Release, ...]:
+def releases(candidate: Candidate) -> tuple[PastRelease, ...]:
     """How the recordings of a campaign were made, by a model's mode."""
     fit = candidate.fit
     o = fit.target.oscillator
     slots = o.layout.slots(fit.mode)
     y0, v0 = (slots[:, SLOTS.index(name)] for name in ("y0", "v0"))
     return tuple(
-        Release(
+        PastRelease(
             r.name,
             r.case,
             float(y0[i]),

@@ -1,6 +1,6 @@
 """The ln odds that a recording is expected to give one model over another.
 
-Each model foretells the recording as a Gaussian: y = m + A u + e, with u and the noise e standard
+Each model predicts the recording as a Gaussian: y = m + A u + e, with u and the noise e standard
 normal, A the sensitivities times what the model's parameters are uncertain by (base parameters,
 sizes of effects, start values of the new recording), all whitened and in units of the noise. If
 model i is right, B the columns of A that the campaign shares, and the recording starts as intended,
@@ -27,8 +27,8 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Foretold:
-    """What a model foretells of one recording, whitened and in units of the noise.
+class PredictedRecording:
+    """What a model predicts of one recording, whitened and in units of the noise.
 
     Attributes
     ----------
@@ -89,8 +89,8 @@ class Odds:
 
 
 def expected_odds(
-    right: Foretold,
-    other: Foretold,
+    right: PredictedRecording,
+    other: PredictedRecording,
     draws: Array,
     left: Array | None = None,
     distance: float | None = None,
@@ -121,8 +121,8 @@ def expected_odds(
     return Odds(mean, means, np.sqrt(np.maximum(variances, 0.0)))
 
 
-def noise_alone(right: Foretold, other: Foretold) -> float:
-    """tr (W_i - W_j)^2: what noise contributes where both models foretell the same."""
+def noise_alone(right: PredictedRecording, other: PredictedRecording) -> float:
+    """tr (W_i - W_j)^2: what noise contributes where both models predict the same."""
     own, others = (x.taken.T @ x.taken for x in (right, other))
     both = right.taken.T @ other.taken
     return max(float(np.sum(own**2) + np.sum(others**2) - 2 * np.sum(both**2)), 0.0)

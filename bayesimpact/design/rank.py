@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from bayesimpact.design.candidates import Design, first_designs, repeats, variants
+from bayesimpact.design.candidates import PlannedRecording, first_designs, repeats, variants
 from bayesimpact.design.hypotheses import Rivalry
 from bayesimpact.design.information import updated_covariance
 from bayesimpact.design.odds import Odds
@@ -49,7 +49,7 @@ class Proposal:
     narrowing : 1 less the geometric mean of after over before, over stiffnesses and models
     """
 
-    design: Design
+    design: PlannedRecording
     odds: Array
     log_odds: float
     chance: float
@@ -70,7 +70,7 @@ def proposals(
     widest = max(len(h.names) for h in rivals.hypotheses)
     draws = rng.standard_normal((DRAWS, widest))
 
-    def proposed(designs: Sequence[Design]) -> list[Proposal]:
+    def proposed(designs: Sequence[PlannedRecording]) -> list[Proposal]:
         found = [assess(design, rivals, draws) for design in designs]
         return ranked([p for p in found if p is not None], rivals)
 
@@ -97,7 +97,7 @@ def ranked(found: Sequence[Proposal], rivals: Rivalry) -> list[Proposal]:
     return sorted(found, key=lambda p: (p.design.joins, *merit(p)), reverse=True)
 
 
-def assess(design: Design, rivals: Rivalry, draws: Array) -> Proposal | None:
+def assess(design: PlannedRecording, rivals: Rivalry, draws: Array) -> Proposal | None:
     """What a design is expected to bring; None where a model's motion fails or has no curvature.
 
     `draws` (S, at least d) are standard normal numbers, the same for all designs.

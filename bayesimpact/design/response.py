@@ -1,4 +1,4 @@
-"""What a model foretells of a recording that has not been made, with its sensitivities.
+"""What a model predicts of a recording that has not been made, with its sensitivities.
 
 Parameters that the new recording shares with the campaign keep their posterior. Those of its own
 (start values, rest reading, phases, the place of a stop that was moved) are nearly unknown: the
@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from bayesimpact.data.campaign import Campaign, Measurement
 from bayesimpact.data.recording import Recording
 from bayesimpact.design.beliefs import belief
-from bayesimpact.design.candidates import Design, usual_release
-from bayesimpact.design.hypotheses import Hypothesis, Rivalry
-from bayesimpact.design.odds import Foretold, Odds, expected_odds
+from bayesimpact.design.candidates import PlannedRecording, usual_release
+from bayesimpact.design.hypotheses import FittedModel, Rivalry
+from bayesimpact.design.odds import Odds, PredictedRecording, expected_odds
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.noise import Noise
 from bayesimpact.model.oscillator import Oscillator, build_oscillator
@@ -111,16 +111,16 @@ class Response:
         return self.linearised(self.mean)
 
     @cached_property
-    def foretold(self) -> Foretold:
+    def prediction(self) -> PredictedRecording:
         """The model's Gaussian for the recording."""
         mean, jacobian = self.at_mean
-        return Foretold(mean, jacobian @ self.root, self.shared.size)
+        return PredictedRecording(mean, jacobian @ self.root, self.shared.size)
 
     @property
     def is_finite(self) -> bool:
         """False where the motion fails, or runs away."""
-        foretold = self.foretold
-        return bool(np.isfinite(foretold.mean).all() and np.isfinite(foretold.factor).all())
+        prediction = self.prediction
+        return bool(np.isfinite(prediction.mean).all() and np.isfinite(prediction.factor).all())
 
 
 def odds_between(right: Response, other: Response, draws: Array) -> Odds:
@@ -130,9 +130,9 @@ def odds_between(right: Response, other: Response, draws: Array) -> Odds:
     linear projection, and again from where it leads while that gains. `draws` (S, shared) are
     standard normal numbers.
     """
-    goal = right.foretold.mean
+    goal = right.prediction.mean
     theta, shift = other.mean, np.zeros(other.prior.shape[0])
-    (mean, jacobian), foretold = other.at_mean, other.foretold
+    (mean, jacobian), prediction = other.at_mean, other.prediction
     left = goal - mean
     distance = float(left @ left)
     for _ in range(ROUNDS):
@@ -158,8 +158,8 @@ def odds_between(right: Response, other: Response, draws: Array) -> Odds:
         mean, jacobian = other.linearised(theta)
         if not np.isfinite(jacobian).all():
             break
-        foretold = Foretold(mean, jacobian @ other.root, other.shared.size)
-    return expected_odds(right.foretold, foretold, draws, left, distance)
+        prediction = PredictedRecording(mean, jacobian @ other.root, other.shared.size)
+    return expected_odds(right.prediction, prediction, draws, left, distance)
 
 
 def solved(matrix: Array, vector: Array, damping: float) -> Array:
@@ -173,7 +173,7 @@ def solved(matrix: Array, vector: Array, damping: float) -> Array:
     return np.asarray(scale * found)
 
 
-def response(hypothesis: Hypothesis, design: Design, rivals: Rivalry) -> Response:
+def response(hypothesis: FittedModel, design: PlannedRecording, rivals: Rivalry) -> Response:
     """A model's response to a design."""
     name = new_name(rivals)
     o = oscillator(hypothesis, design, rivals, name)
@@ -214,7 +214,9 @@ def new_name(rivals: Rivalry) -> str:
     return name
 
 
-def oscillator(hypothesis: Hypothesis, design: Design, rivals: Rivalry, name: str) -> Oscillator:
+def oscillator(
+    hypothesis: FittedModel, design: PlannedRecording, rivals: Rivalry, name: str
+) -> Oscillator:
     """A model of the one recording, whose samples are 0."""
     blank = Recording(
         name, design.case, np.zeros(design.samples), design.interval, quantity=rivals.quantity

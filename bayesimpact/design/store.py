@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Smoothing
-from bayesimpact.design.hypotheses import Hypothesis, Release, Rivalry
+from bayesimpact.design.hypotheses import FittedModel, PastRelease, Rivalry
 from bayesimpact.diagnosis.learned import (
     LEARNED,
     knots_of,
@@ -72,7 +72,7 @@ def rivals_from(
     return Rivalry(
         verdict,
         tuple(
-            Hypothesis(
+            FittedModel(
                 tuple(_effect(i, model["learned"], known) for i in model["effects"]),
                 tuple(model["names"]),
                 np.asarray(arrays[ARRAY.format(k, "mode")], dtype=np.float64),
@@ -86,7 +86,7 @@ def rivals_from(
         float(content["mass"]),
         bool(content["stop"]),
         content["quantity"],
-        tuple(Release(**r) for r in content["releases"]),
+        tuple(PastRelease(**r) for r in content["releases"]),
     )
 
 

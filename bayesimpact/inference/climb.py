@@ -172,7 +172,7 @@ class Climb:
         return here, damping
 
     def step(self, theta: Array, slope: Slope, damping: float) -> Array:
-        """Damped Gauss-Newton step; a parameter pushed against its bound stays there."""
+        """Damped Gauss-Newton step; a parameter at a bound that it would leave stays there."""
         matrix, vector = slope.matrix, slope.vector
         step = np.zeros(theta.size)
         free = self.moving

@@ -1,6 +1,6 @@
 """The mode of a base model that holds effects of the catalogue: a stop on either side, say.
 
-No quick estimate knows of these effects, so a global search decides where the fit begins: it
+No initial estimate knows of these effects, so a global search decides where the fit begins: it
 runs on the first cycles, with the general simulator, over the physical parameters and those of the
 effects. Start values come from the first samples and the tail of every recording. Searches are
 repeated until two ends of climbs, the best one among them, agree. Of a driven recording the search
@@ -33,7 +33,7 @@ from bayesimpact.response.rough import first_state
 
 Array = NDArray[np.float64]
 
-CYCLES = 6.0  # length of the window, in cycles of the quick estimate
+CYCLES = 6.0  # length of the window, in cycles of the initial estimate
 SAMPLES = 300  # of each recording in it
 EVALUATIONS = 600  # evaluations per parameter
 SEARCHES = 5  # at most
@@ -45,7 +45,7 @@ STEP = 1e-6  # of a parameter's reach: first step for differences, refined as er
 
 
 def campaign_sizes(campaign: Campaign, estimates: Estimates) -> Scales:
-    """Physical sizes of a campaign from its quick estimates alone."""
+    """Physical sizes of a campaign from its initial estimates alone."""
     rate = float(np.sqrt(estimates.k1 / campaign.mass))
     reach = max(r.motion(rate) for r in campaign.recordings)
     stiffness = float(np.mean([*estimates.k2.values()])) if estimates.k2 else 0.0

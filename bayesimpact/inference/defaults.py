@@ -3,14 +3,14 @@
 | parameter | default prior |
 |---|---|
 | c1 | uniform, 0 to critical damping of the suspension |
-| k1 | uniform, 0 to 100 times the quick estimate; less where that is an alias, 4 times at least |
+| k1 | uniform, 0 to 100 times the initial estimate; less where that is an alias, 4 times at least |
 | c2 | uniform, 0 to 20 times critical damping in contact |
 | g, y0, offset | uniform, +- 20 times the largest displacement |
 | v0 | uniform, +- 20 times the largest speed |
-| k2 | uniform, 0 to 1000 times the larger of the quick estimates of k1 and k2 |
+| k2 | uniform, 0 to 1000 times the larger of the initial estimates of k1 and k2 |
 | sigma | log-uniform, eight decades about the estimate; log-normal, 10 %, about a stated noise |
 | gain | normal, 1 with a standard deviation of 0.1 |
-| input_gain | uniform, +- 100 times the quick estimate |
+| input_gain | uniform, +- 100 times the initial estimate |
 | added effects | half-Cauchy (Cauchy with both signs) of a physical scale |
 | their shapes | log-normal, or log-uniform between two positive bounds or in their range |
 | states in which recordings begin | normal about their null, of the largest that they can be |

@@ -34,7 +34,7 @@ _START_TRIES = 200
 
 
 @dataclass(frozen=True, eq=False)
-class Target:
+class WhitenedDensity:
     """The log posterior as a function of whitened coordinates.
 
     Attributes
@@ -98,7 +98,7 @@ class Snapshot:
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
+class DrawBlock:
     """The draws between two snapshots.
 
     Attributes
@@ -119,7 +119,9 @@ def random_streams(seed: int, count: int) -> list[np.random.RandomState]:
     return [np.random.RandomState(np.random.MT19937(child)) for child in children]
 
 
-def start(target: Target, random: np.random.RandomState, walkers: int, *, wide: bool) -> Snapshot:
+def start(
+    target: WhitenedDensity, random: np.random.RandomState, walkers: int, *, wide: bool
+) -> Snapshot:
     """A feasible ensemble around the mode.
 
     Parameters
@@ -161,7 +163,7 @@ def start(target: Target, random: np.random.RandomState, walkers: int, *, wide: 
     return Snapshot(u, values, state, mixture, _FIRST_SHARE)
 
 
-def advance(snapshot: Snapshot, target: Target, steps: int) -> tuple[Snapshot, Stretch]:
+def advance(snapshot: Snapshot, target: WhitenedDensity, steps: int) -> tuple[Snapshot, DrawBlock]:
     """Runs emcee for some steps with the snapshot's frozen moves.
 
     Advancing by a + b steps equals advancing by a, then by b, bit for bit.
@@ -184,7 +186,7 @@ def advance(snapshot: Snapshot, target: Target, steps: int) -> tuple[Snapshot, S
         log_posterior=end.log_prob,
         random=sampler.random_state,
     )
-    return later, Stretch(sampler.get_chain(), sampler.get_log_prob(), tally)
+    return later, DrawBlock(sampler.get_chain(), sampler.get_log_prob(), tally)
 
 
 def acceptance(tally: NDArray[np.int64], move: str = "independence") -> float:
@@ -193,7 +195,7 @@ def acceptance(tally: NDArray[np.int64], move: str = "independence") -> float:
     return float((accepted + 1.0) / (proposed + 2.0))
 
 
-def adapt(snapshot: Snapshot, stretch: Stretch) -> Snapshot:
+def adapt(snapshot: Snapshot, stretch: DrawBlock) -> Snapshot:
     """Learns the independence proposal and its share from a stretch of burn-in.
 
     The second frame becomes the mean and covariance of the last three quarters of the stretch,

@@ -60,7 +60,7 @@ class Memory:
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class SearchState:
     """Between two generations: points (n, d), their values (n,), beaten parents (a, d), memory."""
 
     x: Array
@@ -78,20 +78,20 @@ class Step:
     uphill: Mask
 
 
-def first_state(objective: Objective, x: Array) -> State:
+def first_state(objective: Objective, x: Array) -> SearchState:
     """State of the first population (n, d)."""
     memory = Memory(np.full(MEMORY, 0.5), np.full(MEMORY, 0.5))
-    return State(x, evaluate(objective, x), np.empty((0, x.shape[1])), memory)
+    return SearchState(x, evaluate(objective, x), np.empty((0, x.shape[1])), memory)
 
 
 def generation(
-    state: State,
+    state: SearchState,
     objective: Objective,
     box: Box,
     temperature: float,
     pull: float,
     rng: np.random.Generator,
-) -> tuple[State, Step]:
+) -> tuple[SearchState, Step]:
     """One generation at a temperature; `pull` scales the attraction to the leaders."""
     x, f = state.x, state.f
     factor, rate = draw_factors(state.memory, len(x), rng)
@@ -100,7 +100,7 @@ def generation(
     f_trial = evaluate(objective, trial)
     accepted = accept(f, f_trial, temperature, rng)
     better = f_trial < f
-    following = State(
+    following = SearchState(
         x=np.where(accepted[:, None], trial, x),
         f=np.where(accepted, f_trial, f),
         archive=np.concatenate([state.archive, x[better]]),
@@ -200,11 +200,11 @@ def best(f: Array, count: int) -> npt.NDArray[np.intp]:
     return np.argsort(f, kind="stable")[:count]
 
 
-def shrink(state: State, size: int, rng: np.random.Generator) -> State:
+def shrink(state: SearchState, size: int, rng: np.random.Generator) -> SearchState:
     """The best `size` individuals, and the archive thinned at random to ARCHIVE times as many."""
     keep = best(state.f, size) if size < len(state.f) else np.arange(len(state.f))
     limit = round(ARCHIVE * len(keep))
     archive = state.archive
     if len(archive) > limit:
         archive = archive[rng.permutation(len(archive))[:limit]]
-    return State(state.x[keep], state.f[keep], archive, state.memory)
+    return SearchState(state.x[keep], state.f[keep], archive, state.memory)

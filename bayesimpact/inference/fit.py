@@ -212,8 +212,8 @@ def inverse(matrix: Array) -> Array:
 def _pseudo_inverse(unit: Array) -> Array:
     """Of a symmetric matrix with a diagonal of one.
 
-    LAPACK's divide and conquer, which NumPy calls, gave up on a well-conditioned matrix of 32 rows
-    (OpenBLAS on one processor); QR iteration, which is slower, does not.
+    LAPACK's divide and conquer, which NumPy calls, did not converge on a well-conditioned
+    matrix of 32 rows (OpenBLAS on one processor); QR iteration, which is slower, does not.
     """
     try:
         return np.asarray(np.linalg.pinv(unit, rcond=RANK, hermitian=True))

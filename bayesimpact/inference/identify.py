@@ -2,20 +2,22 @@
 
 Long recordings are phase-locked: the misfit has side minima in k1, one per lost cycle. The global
 search (differential evolution with the Metropolis criterion) therefore sees only the first cycles,
-where there are few; its winner and the quick guess are then carried to the full length over windows
-that double, each a least-squares polish with exact derivatives. Both ends are compared, so that a
-search that failed shows.
+where there are few; its winner and the initial guess are then carried to the full length over
+windows that double, each a least-squares polish with exact derivatives. Both ends are compared, so
+that a search that failed shows.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.inference.arviz_groups import arviz_groups, as_arviz, laplace_draws
 from bayesimpact.inference.declared import climbed, is_same_mode, search_declared
 from bayesimpact.inference.defaults import default_priors
 from bayesimpact.inference.fit import Fit, Target
@@ -53,7 +55,7 @@ class Identification:
     Attributes
     ----------
     fit : the better of the two ends
-    estimates : quick estimates from the recordings, the guess
+    estimates : initial estimates from the recordings, the guess
     noise : estimated from the recordings alone
     search : the global search, or None when it was left out
     from_guess, from_search : both ends; they should agree
@@ -80,6 +82,15 @@ class Identification:
     def agree(self) -> bool:
         """True when guess and search ended within 0.1 standard deviations of each other."""
         return self.from_search is None or is_same_mode(self.from_search, self.from_guess)
+
+    def to_arviz(self, *, lab_units: bool = False, seed: int = 0) -> Any:
+        """Draws of the Laplace approximation at the mode, as ArviZ takes them; nothing is sampled.
+
+        Groups and units as of `Posterior.to_arviz`, without sample_stats and predictions.
+        """
+        return as_arviz(
+            arviz_groups(self.fit, laplace_draws(self.fit, seed=seed), lab_units=lab_units)
+        )
 
 
 @linear_algebra_alone()
@@ -158,7 +169,7 @@ def _with_declared(
 
 
 def initial_theta(oscillator: Oscillator, estimates: Estimates, noise: Noise) -> Array:
-    """Parameter vector (d,) of the quick estimates."""
+    """Parameter vector (d,) of the initial estimates."""
     known = [estimates.start(name, noise.level) for name in oscillator.layout.names]
     return np.array(known)
 
@@ -184,7 +195,7 @@ def global_search(
     """
     k1 = float(guess[oscillator.layout.index("k1")])
     duration = SEARCH_CYCLES * 2 * np.pi / np.sqrt(k1 / oscillator.campaign.mass)
-    profile = _Profile(oscillator, guess, duration, scales)
+    profile = _ProfiledObjective(oscillator, guess, duration, scales)
     lower, upper = _within(priors, profile, guess, *profile.bounds(factor))
     result = metropolis_differential_evolution(
         profile,
@@ -202,7 +213,7 @@ def global_search(
 
 
 def _within(
-    priors: Priors, profile: _Profile, guess: Array, lower: Array, upper: Array
+    priors: Priors, profile: _ProfiledObjective, guess: Array, lower: Array, upper: Array
 ) -> tuple[Array, Array]:
     """Bounds cut to the priors' supports; a support beyond them is searched whole."""
     tiny = 1e-12 * np.maximum(np.abs(guess), 1e-30)
@@ -214,7 +225,7 @@ def _within(
     )
 
 
-class _Profile:
+class _ProfiledObjective:
     """Profiled objective (N / 2) log S of the physical parameters, nuisances eliminated."""
 
     def __init__(

@@ -33,16 +33,16 @@ _CHUNK_SAMPLES = 4_000_000  # predictions held at once, so that memory stays bou
 
 
 @dataclass(frozen=True)
-class Formula:
+class DifferenceFormula:
     """Difference formula: shifts in steps, weights per step of the centre and of the shifted."""
 
     shifts: tuple[float, ...]
     weights: tuple[float, ...]
 
 
-FORWARD = Formula((1.0,), (-1.0, 1.0))
-CENTRAL = Formula((1.0, -1.0), (0.0, 0.5, -0.5))
-INWARD = Formula((1.0, 2.0), (-1.5, 2.0, -0.5))  # to second order, from a bound
+FORWARD = DifferenceFormula((1.0,), (-1.0, 1.0))
+CENTRAL = DifferenceFormula((1.0, -1.0), (0.0, 0.5, -0.5))
+INWARD = DifferenceFormula((1.0, 2.0), (-1.5, 2.0, -0.5))  # to second order, from a bound
 
 
 @dataclass(frozen=True, eq=False)

@@ -224,7 +224,7 @@ class Noise:
         return replace(self, smoothing=smoothing)
 
     def _with_gaps(self, x: Array, used: Mask) -> Array:
-        """White or AR(1) noise: each sample less what the one before it, however far, foretells."""
+        """White or AR(1) noise: each sample less what the one before it, however far, predicts."""
         white = np.zeros_like(x)
         good = np.flatnonzero(used)
         if good.size == 0:

@@ -35,7 +35,7 @@ from bayesimpact.inference.noise_remainders import (
     LARGEST,
     SMALLEST,
     WINDOWS_PER_PERIOD,
-    Remainder,
+    PolynomialRemainder,
     remainder_of,
 )
 from bayesimpact.inference.noise_windows import period_of
@@ -144,7 +144,7 @@ def _rises(before: Noise, level: float, error: float = 0.0) -> bool:
     return bool(level > before.level * (1.02 + 3 * np.hypot(before.level_error, error)))
 
 
-def _restricted_ml(remainder: Remainder) -> Noise:
+def _restricted_ml(remainder: PolynomialRemainder) -> Noise:
     values, rho = remainder.values, 0.0
     sizes = np.abs(values).max(axis=1)
     if np.median(sizes) <= ROUNDING * sizes.max():

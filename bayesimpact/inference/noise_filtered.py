@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
 from bayesimpact.data.campaign import Smoothing
@@ -25,13 +24,11 @@ from bayesimpact.inference.noise_remainders import (
     LARGEST,
     SMALLEST,
     WINDOWS_PER_PERIOD,
-    Remainder,
+    PolynomialRemainder,
     remainder_of,
 )
 from bayesimpact.inference.noise_windows import period_of
 from bayesimpact.model.measurement import covariance
-
-Array = NDArray[np.float64]
 
 SURE = 2.0  # standard errors: the lowest upper end counts, for the lowest level is one by chance
 LARGEST_ERROR = 0.1  # relative: fewer numbers tell a level only where there are no others
@@ -71,7 +68,9 @@ def lower(cycles: Noise, bound: Noise) -> Noise:
     return replace(bound, source="polynomial remainders behind the filter", is_bound=False)
 
 
-def _level(remainder: Remainder, smoothing: Smoothing, interval: float) -> tuple[float, float]:
+def _level(
+    remainder: PolynomialRemainder, smoothing: Smoothing, interval: float
+) -> tuple[float, float]:
     """Level of the raw noise of which the filter would leave this, and its relative error.
 
     Of the combinations that the filter let pass: in others rounding and motion count more.

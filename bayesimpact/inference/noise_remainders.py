@@ -26,7 +26,7 @@ LEAST_OFF = 24  # remainders off turning points, better than many across a jump:
 
 
 @dataclass(frozen=True)
-class Remainder:
+class PolynomialRemainder:
     """What polynomials leave of one window length: (windows, freedom) numbers and their basis."""
 
     values: Array
@@ -39,7 +39,7 @@ def remainder_of(
     length: int,
     turns: bool,
     smoothing: Smoothing | None = None,
-) -> Remainder | None:
+) -> PolynomialRemainder | None:
     """What polynomials leave of windows of `length` samples; None where there are too few.
 
     turns : also of windows across turning points, where dry friction would show
@@ -61,10 +61,10 @@ def remainder_of(
 
     values = left(side)
     if not turns:
-        return Remainder(values, basis) if values.size >= LEAST_OFF else None
+        return PolynomialRemainder(values, basis) if values.size >= LEAST_OFF else None
     if side and values.size < LEAST_NUMBERS:  # hardly any free cycle: windows at the stop too
         values = left(False)
-    return Remainder(values, basis) if values.shape[0] >= 4 else None
+    return PolynomialRemainder(values, basis) if values.shape[0] >= 4 else None
 
 
 def _shapes(recording: Recording, hum: Hum | None, smoothing: Smoothing | None) -> list[Array]:

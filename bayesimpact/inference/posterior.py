@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import metadata
@@ -15,11 +15,17 @@ from numpy.typing import NDArray
 
 from bayesimpact.data.html import html_table, resolved
 from bayesimpact.errors import InputError
+from bayesimpact.inference.arviz_groups import ArvizDraws, arviz_groups, as_arviz, by_chain
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.sample import Chains, sample_posterior
 from bayesimpact.model.measurement import smooth
 
 Array = NDArray[np.float64]
+
+ARVIZ_DRAWS = 2000
+"""Most draws of every chain that ArviZ is given; evenly spaced ones where there are more."""
+_PREDICTED_VALUES = 2_000_000  # of all predictive draws together, so that the file stays small
+_PREDICTIVE_DRAWS = 40  # most
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +107,43 @@ class Posterior:
         sigma = theta[:, likelihood.sigma_columns[r]]
         draws = np.array([noise.drawn(rng, recording, s) for s in sigma])
         return motion + smooth(draws, noise.smoothing, recording.interval)
+
+    def to_arviz(self, *, lab_units: bool = False) -> Any:
+        """ArviZ's `InferenceData` (0.23) or `DataTree` (1.x), one chain per independent ensemble.
+
+        Groups: posterior, sample_stats, prior, log_likelihood (per recording), observed_data,
+        constant_data and posterior_predictive. At most `ARVIZ_DRAWS` draws of every chain, evenly
+        spaced: the attributes say by how many steps of the sampler. `lab_units`: mm, mN, ... in
+        place of SI, so that a summary shows digits.
+        """
+        return as_arviz(self.arviz_groups({"seed": self.seed}, lab_units=lab_units))
+
+    def arviz_groups(self, attrs: Mapping[str, Any], *, lab_units: bool = False) -> dict[str, Any]:
+        """The same as xarray Datasets by group, with further attributes."""
+        chains = self.chains
+        draws = by_chain(chains.draws)
+        every = -(-draws.shape[1] // ARVIZ_DRAWS)
+        own = {
+            "sampler_steps_per_saved_draw": every * chains.thin,
+            "converged": chains.converged,
+        }
+        given = ArvizDraws(
+            draws[:, ::every],
+            by_chain(chains.log_posterior)[:, ::every],
+            self._predictive(),
+            {**attrs, **own},
+        )
+        return arviz_groups(self.fit, given, lab_units=lab_units)
+
+    def _predictive(self) -> dict[str, NDArray[np.float32]]:
+        """Recording -> simulated recordings (1, draw, n), each drawn by itself."""
+        oscillator = self.fit.target.oscillator
+        count = max(4, min(_PREDICTIVE_DRAWS, _PREDICTED_VALUES // int(oscillator.counts.sum())))
+        rng = np.random.default_rng([self.seed, 1])
+        return {
+            recording.name: self.predictive(r, count, rng)[None].astype(np.float32)
+            for r, recording in enumerate(oscillator.campaign.recordings)
+        }
 
 
 def sample(

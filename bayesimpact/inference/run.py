@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.inference.ensemble import (
+    DrawBlock,
     Snapshot,
-    Stretch,
-    Target,
+    WhitenedDensity,
     acceptance,
     adapt,
     advance,
@@ -65,7 +65,7 @@ class Trace:
 class Run:
     """A run in progress: the snapshots, what is kept so far, and the block counter."""
 
-    def __init__(self, target: Target, snapshots: list[Snapshot], block: int) -> None:
+    def __init__(self, target: WhitenedDensity, snapshots: list[Snapshot], block: int) -> None:
         self.target = target
         self.snapshots = snapshots
         self.block = block
@@ -107,7 +107,7 @@ class Run:
             )
         self._count(content)
 
-    def _keep(self, stretches: list[Stretch]) -> dict[str, NDArray[Any]]:
+    def _keep(self, stretches: list[DrawBlock]) -> dict[str, NDArray[Any]]:
         before = self.trace.steps
         numbers = np.arange(before + 1, before + len(stretches[0].draws) + 1)
         draws = np.stack([stretch.draws for stretch in stretches])

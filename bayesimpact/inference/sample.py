@@ -24,7 +24,7 @@ from bayesimpact.errors import InputError
 from bayesimpact.inference.chainfile import ChainFolder
 from bayesimpact.inference.convergence import ConvergenceRecord, assess, autocorrelation_time
 from bayesimpact.inference.ensemble import (
-    Target,
+    WhitenedDensity,
     pack,
     random_streams,
     start,
@@ -209,7 +209,7 @@ def sample_posterior(
         "lower": [repr(float(value)) for value in bounds[0]],
         "upper": [repr(float(value)) for value in bounds[1]],
     }
-    target = Target(log_posterior, mode, cholesky(covariance), bounds[0], bounds[1])
+    target = WhitenedDensity(log_posterior, mode, cholesky(covariance), bounds[0], bounds[1])
     with ExitStack() as held:
         files = None
         if folder is not None:
@@ -277,7 +277,7 @@ def _check(
 
 
 def _begun(
-    files: ChainFolder | None, settings: Mapping[str, Any], target: Target, seed: int
+    files: ChainFolder | None, settings: Mapping[str, Any], target: WhitenedDensity, seed: int
 ) -> Run:
     if not np.isfinite(target(np.zeros((1, target.mode.size)))[0]):
         raise InputError("mode", "an inadmissible point", "a point of finite log posterior")
@@ -290,7 +290,9 @@ def _begun(
     return Run(target, snapshots, settings["block"])
 
 
-def _resumed(files: ChainFolder, settings: Mapping[str, Any], asked: Target, block: int) -> Run:
+def _resumed(
+    files: ChainFolder, settings: Mapping[str, Any], asked: WhitenedDensity, block: int
+) -> Run:
     """The saved run, with the mode and factor that it began with: those asked for may differ in
     the last bits when they were computed with another number of threads."""
     saved = files.start(settings)
@@ -305,7 +307,9 @@ def _resumed(files: ChainFolder, settings: Mapping[str, Any], asked: Target, blo
             f"a saved run whose mode is {np.abs(shift).max():.3g} standard deviations away",
             "a run of the same posterior; or start anew without resuming",
         )
-    target = Target(asked.function, saved["mode"], saved["factor"], asked.lower, asked.upper)
+    target = WhitenedDensity(
+        asked.function, saved["mode"], saved["factor"], asked.lower, asked.upper
+    )
     run = Run(target, unpack(saved), block)
     for content in files.blocks():
         try:

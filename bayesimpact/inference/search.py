@@ -52,7 +52,7 @@ from bayesimpact.errors import InputError
 from bayesimpact.inference.evolution import (
     Box,
     Objective,
-    State,
+    SearchState,
     Step,
     first_state,
     generation,
@@ -247,7 +247,9 @@ def _summary(f: Array, spent: int, temperature: float, step: Step) -> Generation
     )
 
 
-def _result(state: State, spent: int, track: list[Generation], tolerance: float) -> SearchResult:
+def _result(
+    state: SearchState, spent: int, track: list[Generation], tolerance: float
+) -> SearchResult:
     """The record of the whole search."""
     winner = int(np.argmin(state.f))
     columns = {

@@ -1,11 +1,11 @@
 """The oscillator with added effects, from event to event.
 
 Between two events the motion runs in steps that span as many samples as the accuracy admits, or a
-part of one. An event (touch, release, turning point, surface of a law) ends a step; it is located
-on the integrator's own trajectory, so that the state there is as accurate as anywhere. The parts:
-`added.context` (arrays, laws), `added.flows` (between events), `added.step` and `added.method`
-(how), `added.crossing` (when), `added.contact_state` (what then), `added.memory`, `added.rest`,
-`added.dense`, `added.second`, `added.resonator`.
+part of one. An event (contact onset or end, turning point, surface of a law) ends a step; it is
+located on the integrator's own trajectory, so that the state there is as accurate as anywhere. The
+parts: `added.context` (arrays, laws), `added.flows` (between events), `added.step` and
+`added.method` (how), `added.crossing` (when), `added.contact_state` (what then), `added.memory`,
+`added.rest`, `added.dense`, `added.second`, `added.resonator`.
 """
 
 from __future__ import annotations

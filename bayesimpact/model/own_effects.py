@@ -229,7 +229,7 @@ def _check_action(effect: Effect, place: _Place) -> None:
     if effect.size is not None:
         size = tried(place, place.of(effect, "size"), lambda: effect.size(numbers, USUAL))  # type: ignore[misc]
         if not (isinstance(size, tuple) and len(size) == 3):
-            accepted = "value, unit, share of its yardstick"
+            accepted = "value, unit, share of its reference"
             raise InputError(place.of(effect, "size"), repr(size)[:80], accepted)
     if effect.condition is not None:
         tried(place, place.of(effect, "condition"), lambda: effect.condition(USUAL))  # type: ignore[misc]

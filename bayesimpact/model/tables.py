@@ -35,7 +35,7 @@ class ResponseTables(NamedTuple):
 
     tables (2, ROWS, LENGTH + 1), series (2, 2, TERMS) : of the regimes last met
     keys (2, 3) : their b, K and w
-    history (2, 5) : how long the regimes lasted (see `quick`)
+    history (2, 5) : how long the regimes lasted (`return_time_prediction`)
     """
 
     tables: Floats

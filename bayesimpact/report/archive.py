@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import io
 import json
-import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bayesimpact.data.files import write_bytes, write_text
+from bayesimpact.data.files import strict, write_bytes, write_text
 from bayesimpact.errors import InputError
 from bayesimpact.report.codec import decode, encode
 from bayesimpact.report.results import Results, Row
@@ -127,7 +126,7 @@ def fit_json(results: Results) -> str:
         "versions": results.provenance.versions,
         "data_sha256": results.provenance.data_sha256,
     }
-    return json.dumps(_strict(content), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    return json.dumps(strict(content), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def _row(row: Row) -> dict[str, Any]:
@@ -144,16 +143,3 @@ def _row(row: Row) -> dict[str, Any]:
         "references": row.references,
         "prior": row.prior,
     }
-
-
-def _strict(value: Any) -> Any:
-    """The same content with arrays as lists and None for what JSON cannot say."""
-    if isinstance(value, np.ndarray):
-        return _strict(value.tolist())
-    if isinstance(value, dict):
-        return {k: _strict(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_strict(v) for v in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

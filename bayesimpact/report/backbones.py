@@ -7,7 +7,7 @@ import numpy as np
 from bayesimpact.diagnosis.whiteness import combined
 from bayesimpact.inference.posterior import Posterior
 from bayesimpact.model.measurement import smooth
-from bayesimpact.report.results import Array, BackboneSummary, Curve
+from bayesimpact.report.results import Array, BackboneCurve, BackboneSummary
 from bayesimpact.response.check import BackboneCheck, check_backbone
 from bayesimpact.response.displacement import displacement
 from bayesimpact.response.observe import DRIFT
@@ -96,7 +96,7 @@ def fraction_inside(checks: list[BackboneCheck]) -> float:
     return float(inside / sum(band.at.size for band in bands))
 
 
-def branch_curve(recording: str, case: str, check: BackboneCheck, side: str) -> Curve:
+def branch_curve(recording: str, case: str, check: BackboneCheck, side: str) -> BackboneCurve:
     """Frequency and damping of one side with their bands, where frequencies can be compared."""
     branch = getattr(check.backbone, side)
     frequency, damping = check.bands[f"{side} frequency"], check.bands[f"{side} damping ratio"]
@@ -106,7 +106,7 @@ def branch_curve(recording: str, case: str, check: BackboneCheck, side: str) -> 
     _, here, there = np.intersect1d(cycles, damping.at.astype(int), return_indices=True)
     ratio[here] = damping.recorded[there]
     ratio_band[here] = _stacked(damping.low, damping.median, damping.high)[there]
-    return Curve(
+    return BackboneCurve(
         recording=recording,
         case=case,
         branch=side,

@@ -15,19 +15,19 @@ from bayesimpact.data.channels import keepers
 from bayesimpact.data.gaps import runs
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification
-from bayesimpact.inference.noise import Noise as NoiseModel
+from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.posterior import Posterior
 from bayesimpact.model.measurement import gain
 from bayesimpact.report import checks
 from bayesimpact.report.backbones import backbone_summary
-from bayesimpact.report.published import references as published_values
+from bayesimpact.report.published import references
 from bayesimpact.report.results import (
     Array,
     BackboneSummary,
-    Chain,
+    ChainSummary,
     Draws,
     EffectSummary,
-    Noise,
+    NoiseSummary,
     Provenance,
     RecordingResult,
     Results,
@@ -48,7 +48,6 @@ def results_from_fit(
     seed: int = 0,
     command: str = "",
     seconds: float = float("nan"),
-    references: Mapping[str, Mapping[str, float]] | None = None,
     diagnosis: Mapping[str, Any] | None = None,
     diagnosis_arrays: Mapping[str, Array] | None = None,
 ) -> Results:
@@ -58,7 +57,6 @@ def results_from_fit(
     ----------
     identification : of `inference.identify`
     seed, command, seconds : for the provenance
-    references : label -> parameter -> value to set beside; None takes published values and beams
     diagnosis, diagnosis_arrays : content of diagnosis.json, and arrays for its figures
     """
     return _results(
@@ -66,7 +64,6 @@ def results_from_fit(
         identification.noise,
         search=_search(identification),
         provenance=_provenance(identification.fit, seed, command, seconds),
-        references=references,
         diagnosis=(diagnosis, diagnosis_arrays),
     )
 
@@ -79,7 +76,6 @@ def results_from_posterior(
     before: Posterior | None = None,
     command: str = "",
     seconds: float = float("nan"),
-    references: Mapping[str, Mapping[str, float]] | None = None,
     diagnosis: Mapping[str, Any] | None = None,
     diagnosis_arrays: Mapping[str, Array] | None = None,
 ) -> Results:
@@ -91,7 +87,7 @@ def results_from_posterior(
     identification : how the mode was found; None leaves the search out
     backbone : simulate recordings for the posterior-predictive check of the backbone
     before : posterior without the effects, shown beside this one unless it is the same
-    command, seconds, references, diagnosis, diagnosis_arrays : as in `results_from_fit`
+    command, seconds, diagnosis, diagnosis_arrays : as in `results_from_fit`
     """
     fit = posterior.fit
     before = None if before is posterior else before
@@ -101,7 +97,6 @@ def results_from_posterior(
         fit.target.likelihood.noise,
         search=None if identification is None else _search(identification),
         provenance=_provenance(fit, posterior.seed, command, seconds),
-        references=references,
         posterior=posterior,
         backbone=backbone_summary(posterior, rng) if backbone else None,
         before=before,
@@ -112,11 +107,10 @@ def results_from_posterior(
 
 def _results(
     fit: Fit,
-    noise: NoiseModel,
+    noise: Noise,
     *,
     search: SearchSummary | None,
     provenance: Provenance,
-    references: Mapping[str, Mapping[str, float]] | None,
     posterior: Posterior | None = None,
     backbone: BackboneSummary | None = None,
     before: Posterior | None = None,
@@ -126,8 +120,7 @@ def _results(
     oscillator = fit.target.oscillator
     campaign = oscillator.campaign
     m = campaign.measurement
-    chain = Chain(_smoothing(oscillator.smoothing), m.mass_sd, m.clock_sd, m.gain_sd)
-    beside = published_values(campaign) if references is None else references
+    chain = ChainSummary(_smoothing(oscillator.smoothing), m.mass_sd, m.clock_sd, m.gain_sd)
     draws = None if posterior is None else posterior.draws
     told, left = diagnosis[0] or {}, (diagnosis[0] or {}).get("remainder")
     summary = Results(
@@ -136,11 +129,15 @@ def _results(
         stop=campaign.stop,
         quantity=campaign.recordings[0].quantity,
         recordings=recording_results(fit),
-        rows=build_rows(fit, draws, chain, beside, told["parameters"]["after"] if left else None),
+        rows=build_rows(
+            fit, draws, chain, references(campaign), told["parameters"]["after"] if left else None
+        ),
         effects=tuple(
             EffectSummary(e.id, e.title, e.equation, e.statement) for e in oscillator.acting
         ),
-        noise=Noise(noise.kind, noise.level, noise.level_error, noise.correlation, noise.source),
+        noise=NoiseSummary(
+            noise.kind, noise.level, noise.level_error, noise.correlation, noise.source
+        ),
         chain=chain,
         verdict="",
         headline="",
@@ -198,7 +195,7 @@ def recording_results(fit: Fit) -> tuple[RecordingResult, ...]:
     return tuple(found)
 
 
-def _noise_rms(noise: NoiseModel, interval: float) -> float:
+def _noise_rms(noise: Noise, interval: float) -> float:
     """Root mean square of the noise behind the measuring chain's filter, m."""
     if noise.smoothing is None:
         return noise.level

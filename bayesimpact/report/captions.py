@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from bayesimpact.diagnosis.thresholds import LARGE
 from bayesimpact.report.figures.corner import MOST as MOST_CORNER
 from bayesimpact.report.figures.traces import MOST as MOST_TRACES
@@ -12,7 +15,7 @@ DIAGNOSIS = {
     "story": (
         "The cycle in which what was added explains most. Above: the recording and both models. "
         "Middle: the same less the base model: were it right, the points would scatter about the "
-        "orange line; they follow the blue one."
+        "orange line; the closer they follow the blue one, the more of it was found."
     ),
     "force": (
         "The force that the base model leaves unexplained, on the left-hand side of the equation "
@@ -28,14 +31,13 @@ DIAGNOSIS = {
     ),
     "gain": (
         "Where the extended model explains more: gain in log likelihood over the base model. A "
-        "gain of 1 nat makes a stretch e times likelier; small negative ones are chance."
+        "gain of 1 nat makes a stretch e times likelier; it explains less where the gain is "
+        "negative, which is chance where it is small."
     ),
     "ranking": (
         "Models that were fitted, by their log odds (evidence and the price of each added effect) "
         "behind the best one; linear up to 10 nats, logarithmic beyond. A name needs all rivals to "
-        "lie beyond the dashed line. Right: probability among the models tried. Blue: the model "
-        "that was chosen; where the verdict is unknown, that is one free force in the place of all "
-        "effects, with the odds that the linearised problem gives it."
+        "lie beyond the dashed line. Right: probability among the models tried."
     ),
     "limits": (
         "What the recordings rule out. Dots: 95 % upper limit of each effect's size; bars: a size "
@@ -72,8 +74,9 @@ def caption(name: str, results: Results) -> str:
     stem = name.split("_")[0]
     if stem in DIAGNOSIS:
         return DIAGNOSIS[stem] + _more(stem, results)
+    if stem == "fit":
+        return _fit(results, name.removeprefix("fit_").replace("_", " "))
     writer = {
-        "fit": _fit,
         "corner": _corner,
         "backbone": _backbone,
         "damping": _damping,
@@ -96,6 +99,8 @@ def _more(stem: str, results: Results) -> str:
             if "force_y" in arrays
             else ""
         )
+    if stem == "ranking":
+        return _chosen(diagnosis)
     if stem == "improvement" and "held_out_recordings" in arrays:
         words = " Right: gain in the log score with which each recording is predicted from the"
         return f"{words} others."
@@ -122,13 +127,26 @@ def _more(stem: str, results: Results) -> str:
     return words
 
 
-def _fit(results: Results) -> str:
+def _chosen(diagnosis: Mapping[str, Any]) -> str:
+    """What is drawn in blue among the models."""
+    if diagnosis.get("verdict") != "unknown":
+        return " Blue: the model that was chosen." if diagnosis.get("effects") else ""
+    if (diagnosis.get("evidence") or {}).get("free_force_log_odds") is None:
+        return " None was chosen."
+    return (
+        " Blue: one free force in the place of all effects, which was chosen, with the odds that "
+        "the linearised problem gives it."
+    )
+
+
+def _fit(results: Results, which: str) -> str:
+    head = "Recordings" if which == "fit" else f"{which.capitalize()}: recordings"
     stop = " The dashed line is the stop." if results.stop else ""
     close = "the deepest impact" if results.stop else "the first cycles after the release"
     return (
-        "Recordings (light) and model at the mode (line), residuals below, all on one scale; on "
-        f"the right {close}.{stop} Orange lines: twice the standard deviation of the noise "
-        "as estimated without the model."
+        f"{head} (light) and model at the mode (line), residuals below, all on one scale; on the "
+        f"right {close}.{stop} Orange lines: twice the standard deviation of the noise as "
+        "estimated without the model."
     )
 
 
@@ -181,8 +199,8 @@ def _damping(results: Results) -> str:
 def _search(results: Results) -> str:
     return (
         "The global search. Left: objective of the best and of the median individual above the "
-        "final best. Right: spread of the population, and the temperature of the Metropolis "
-        "criterion, which ends at 1 nat; after that only improvements are accepted."
+        "final best. Right: standard deviation of the population, and the temperature of the "
+        "Metropolis criterion, which ends at 1 nat; after that only improvements are accepted."
     )
 
 

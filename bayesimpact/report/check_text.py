@@ -112,7 +112,7 @@ def _recordings_block(campaign: Campaign) -> str:
 
 
 def _rest(recording: Recording) -> float:
-    """Reading about which a recording swings."""
+    """Reading about which a recording oscillates."""
     return float(np.median(recording.samples))
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from bayesimpact.model.units import chi2, display, number, p_value, p_words, significant, typeset
-from bayesimpact.report.results import Check, Results
+from bayesimpact.report.results import ChecklistItem, Results
 from bayesimpact.report.whiteness import whiteness
 
 __all__ = ["amount", "assess", "assessed", "model_name", "whiteness"]
@@ -66,9 +66,9 @@ def amount(value: float, unit: str, digits: int = 3, like: float | None = None) 
 def headline(results: Results) -> str:
     """The verdict in words."""
     model = model_name(results)
-    like = results.rms if results.verdict == "inadequate" else results.noise.level
     model = model[0].upper() + model[1:]
-    noise = amount(results.noise.level, results.unit, like=like)
+    noise = amount(results.noise.level, results.unit)
+    like = results.rms if results.verdict == "inadequate" else results.noise.level
     rms = amount(results.rms, results.unit, like=like)
     excess = float(np.sqrt(results.reduced_chi2))
     diagnosed = results.diagnosis is not None
@@ -123,7 +123,7 @@ def _trust(results: Results) -> str:
     return words
 
 
-def checklist(results: Results) -> tuple[Check, ...]:
+def checklist(results: Results) -> tuple[ChecklistItem, ...]:
     """All checks that the results allow."""
     found = [_misfit(results), _whiteness(results), _mode(results)]
     if results.search is not None:
@@ -139,11 +139,11 @@ def _status(passed: bool) -> str:
     return "passed" if passed else "failed"
 
 
-def _misfit(results: Results) -> Check:
+def _misfit(results: Results) -> ChecklistItem:
     z = results.chi2_z
     far = f"{abs(z):.1f}" if abs(z) < 100 else "more than 100"
     side = "above" if z > 0 else "below"
-    return Check(
+    return ChecklistItem(
         MISFIT,
         _status(results.verdict == "adequate"),
         f"reduced χ² {chi2(results.reduced_chi2)}, {far} standard errors {side} 1",
@@ -151,11 +151,11 @@ def _misfit(results: Results) -> Check:
     )
 
 
-def _whiteness(results: Results) -> Check:
+def _whiteness(results: Results) -> ChecklistItem:
     p = np.array([r.whiteness_p for r in results.recordings])
     low = int(np.sum(p < LEAST_P / p.size))
     smallest = p_value(float(np.nanmin(p))) if np.isfinite(p).any() else "undefined"
-    return Check(
+    return ChecklistItem(
         "Whitened residuals are white",
         "note",
         f"{p.size - low} of {p.size} recordings; smallest p: {smallest}",
@@ -163,27 +163,27 @@ def _whiteness(results: Results) -> Check:
     )
 
 
-def _mode(results: Results) -> Check:
+def _mode(results: Results) -> ChecklistItem:
     finding = "the last step was below a thousandth of a standard deviation"
-    return Check(
+    return ChecklistItem(
         "The fit converged to the mode",
         _status(results.fit_converged),
         finding if results.fit_converged else "it ran out of iterations",
     )
 
 
-def _search(results: Results) -> Check:
+def _search(results: Results) -> ChecklistItem:
     assert results.search is not None
     distance = results.search.distance
-    return Check(
+    return ChecklistItem(
         "Guess and global search end at the same mode",
         _status(results.search.agree),
         f"largest distance {significant(distance, 2)} standard deviations after polishing both",
-        "Two starts: quick estimates, and differential evolution in wide bounds about them.",
+        "Two starts: initial estimates, and differential evolution in wide bounds about them.",
     )
 
 
-def _sampler(results: Results) -> Check:
+def _sampler(results: Results) -> ChecklistItem:
     s = results.sampler
     assert s is not None
     least = number(float(min(s.ess_bulk.min(), s.ess_tail.min())), 0)
@@ -191,19 +191,19 @@ def _sampler(results: Results) -> Check:
         f"effective sample size {least} or more, "
         f"R-hat {np.max(s.rhat):.4f} or less between {s.ensembles} independent ensembles"
     )
-    return Check(
+    return ChecklistItem(
         "The sampler converged",
         _status(s.converged),
         finding if s.converged else "; ".join(s.reasons),
     )
 
 
-def _gaussian(results: Results) -> Check:
+def _gaussian(results: Results) -> ChecklistItem:
     ratio = np.array([row.posterior_sd / max(row.sd, 1e-300) for row in results.rows])
     worst = int(np.argmax(np.abs(np.log(np.maximum(ratio, 1e-300)))))
     furthest = results.rows[worst].name
     inside = bool(np.all((ratio > SD_RATIO[0]) & (ratio < SD_RATIO[1])))
-    return Check(
+    return ChecklistItem(
         "Standard deviations of draws and of the curvature at the mode agree",
         "passed" if inside else "note",
         f"ratios {ratio.min():.2f} to {ratio.max():.2f}; furthest from 1: {furthest}",
@@ -211,14 +211,14 @@ def _gaussian(results: Results) -> Check:
     )
 
 
-def _backbone(results: Results) -> Check:
+def _backbone(results: Results) -> ChecklistItem:
     b = results.backbone
     assert b is not None
     cases = [
         f"{label if label == 'all' else f'case {label}'}: {100 * inside:.0f} % inside, {p_words(p)}"
         for label, inside, p in zip(b.labels, b.inside, b.p_values, strict=True)
     ]
-    return Check(
+    return ChecklistItem(
         "Recorded backbones lie where simulated ones do",
         _status(bool(b.p_values[-1] > LEAST_P)),
         "; ".join(cases),

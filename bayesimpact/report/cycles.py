@@ -18,7 +18,7 @@ class Cycle:
     ----------
     recording : position among the recordings
     number : of the cycle, from 1; of the impact where there is a stop
-    first, last : samples from one touch (or upward passage through rest) to the next
+    first, last : samples from one contact onset (or upward passage through rest) to the next
     leave : sample at which contact ends; `first` where there is none
     gain : log likelihood that the extended model gains in it, nats
     """

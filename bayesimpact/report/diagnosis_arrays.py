@@ -28,7 +28,7 @@ def diagnosis_arrays(d: Diagnosis) -> dict[str, Array]:
     force_*, left_*, learned_*, gap : see `force_arrays`
     reference_*, formula_* : see `formula_arrays`
     gain : (R, bins) log likelihood gained per recording and stretch of time, nats
-    impact_gain : (R, K) the same from each touch to the next, NaN after the last
+    impact_gain : (R, K) the same from each contact onset to the next, NaN after the last
     before_predicted : (N,) reading of the base model, recordings one after the other, m
     before_chi2 : (R,) reduced chi2 of the base model
     spectrum : (k, 5) frequency, Hz; power of the whitened residual over that of the noise before
@@ -57,7 +57,7 @@ def diagnosis_arrays(d: Diagnosis) -> dict[str, Array]:
 
 
 def _impacts(d: Diagnosis) -> dict[str, Array]:
-    """Gain from each touch to the next, where residuals have a time and the rig has a stop."""
+    """Gain from contact onset to contact onset, where residuals have a time and there is a stop."""
     base, better = d.naming.base.candidate.fit, d.after
     oscillator = base.target.oscillator
     banded = base.target.likelihood.noise.smoothing is not None

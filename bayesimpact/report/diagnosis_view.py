@@ -20,12 +20,14 @@ from bayesimpact.model.units import (
     typeset,
 )
 from bayesimpact.report.change_view import NUISANCES, change_row, estimate
+from bayesimpact.report.formula_text import in_words
 from bayesimpact.report.limit_view import limit_row, not_found, seen
 from bayesimpact.report.next_words import next_view
 from bayesimpact.report.results import Results
 from bayesimpact.report.tables import symbol
 
-Rows = list[dict[str, Any]]
+FORMULAS, UNLIKELY = 5, 1e-3
+"""Formulas that are shown whatever their probability; the others from this probability on."""
 
 VERDICTS = {
     "adequate": "Nothing is missing",
@@ -56,6 +58,8 @@ def diagnosis_view(results: Results) -> dict[str, Any] | None:
     if diagnosis is None:
         return None
     before, after = (diagnosis.get("parameters", {}).get(k, {}) for k in ("before", "after"))
+    formulas = diagnosis.get("formulas") or ()
+    shown = [f for i, f in enumerate(formulas) if i < FORMULAS or _likely(f)]
     return {
         "verdict": verdict_words(diagnosis),
         "changed": diagnosis["verdict"] != "adequate",
@@ -67,17 +71,15 @@ def diagnosis_view(results: Results) -> dict[str, Any] | None:
             {
                 "id": other["id"],
                 "titles": titles_of(other["id"]),
-                "name": other["id"].replace("_", " "),  # as the figure of the models has it
+                "name": in_words(other["id"]),  # as the figure of the models has it
                 "probability": probability(other["probability"]),
                 "evidence": _plain(other["delta_log_evidence"], 1),
             }
             for other in diagnosis.get("alternatives", [])
         ],
         "remainder": remainder_rows(diagnosis.get("remainder"), unit, length),
-        "formulas": [
-            _formula(formula, "N m" if results.angular else "N")
-            for formula in diagnosis.get("formulas") or ()
-        ],
+        "formulas": [_formula(f, "N m" if results.angular else "N") for f in shown],
+        "formulas_left": len(formulas) - len(shown),
         "fit": _fit(diagnosis.get("fit", {}), unit) + _backbones(results),
         "held_out": _held_out(diagnosis.get("fit", {})),
         "parameters": [
@@ -85,10 +87,14 @@ def diagnosis_view(results: Results) -> dict[str, Any] | None:
             for name in before
             if name in after and name.partition("[")[0] not in NUISANCES
         ],
-        "limits": [limit_row(limit, remains=results.remains) for limit in not_found(diagnosis)],
+        "limits": [limit_row(limit, remains=results.remains) for limit in not_found(results)],
         "seen": seen(diagnosis),
         "next": next_view(diagnosis.get("next")),
     }
+
+
+def _likely(formula: Mapping[str, Any]) -> bool:
+    return (formula.get("probability") or 0.0) >= UNLIKELY
 
 
 def verdict_words(diagnosis: Mapping[str, Any]) -> str:

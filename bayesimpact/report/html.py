@@ -19,6 +19,7 @@ from bayesimpact.report.captions import caption
 from bayesimpact.report.checks import MISFIT
 from bayesimpact.report.diagnosis_view import diagnosis_view
 from bayesimpact.report.figures.save import DPI
+from bayesimpact.report.formula_text import written
 from bayesimpact.report.policy import with_policy
 from bayesimpact.report.results import Results
 from bayesimpact.report.story import corrected, story_rows
@@ -84,7 +85,8 @@ def environment() -> jinja2.Environment:
         lstrip_blocks=True,
     )
     made.filters["lower_first"] = lambda text: text[:1].lower() + text[1:]
-    made.filters["bound"] = bound
+    made.filters["bound"] = lambda text: bound(written(text))
+    made.filters["written"] = written
     return made
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from bayesimpact.model.units import MINUS, interval_decimals, number, quantity, readable
 from bayesimpact.report.change_view import NUISANCES, change_words
+from bayesimpact.report.formula_text import letter
 from bayesimpact.report.limit_view import not_found
 from bayesimpact.report.results import Results, Row
 
@@ -28,7 +29,7 @@ def latex_tables(results: Results) -> str:
     diagnosis = results.diagnosis or {}
     if diagnosis.get("verdict") not in (None, "adequate"):
         blocks.append(_models(diagnosis))
-    limits = [x for x in not_found(diagnosis) if x.get("upper95") is not None]
+    limits = [x for x in not_found(results) if x.get("upper95") is not None]
     if limits:
         blocks.append(_limits(limits))
     head = f"% {escaped(results.name)}: tables by bayesimpact; needs \\usepackage{{booktabs}}\n"
@@ -45,13 +46,16 @@ def escaped(text: str) -> str:
 def symbol(name: str) -> str:
     """A parameter's name: "k2[1]" becomes "$k_{2}$[1]"."""
     base, bracket, key = name.partition("[")
-    if "." in base:
+    known = letter(base)
+    if known is not None:
+        words = f"formula: ${known}$"
+    elif "." in base:
         words = base.replace("_", " ").replace(".", ": ")
     elif base[-1].isdigit():
         words = f"${base[:-1]}_{{{base[-1]}}}$"
     else:
         words = f"${base}$" if len(base) == 1 else base
-    plain = words if words.startswith("$") else escaped(words)
+    plain = words if "$" in words else escaped(words)
     return plain + escaped(bracket + key)
 
 

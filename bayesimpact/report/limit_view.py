@@ -10,6 +10,7 @@ from markupsafe import Markup
 
 from bayesimpact.diagnosis.words import title_of
 from bayesimpact.model.units import quantity, significant
+from bayesimpact.report.results import Results
 from bayesimpact.report.tables import symbol
 
 
@@ -23,17 +24,20 @@ def _own_name(parameter: str) -> str | Markup:
     return symbol(parameter) if len(parameter) <= 2 else parameter.replace("_", " ")
 
 
-def not_found(diagnosis: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+def not_found(results: Results) -> list[Mapping[str, Any]]:
     """Limits of effects of which nothing is seen: what is seen is not ruled out by its limit.
 
-    Those that are ruled out most clearly come first, in the table as in the figure.
+    Nor is what the model has already: where nothing is named, such a limit is of more of it. Those
+    that are ruled out most clearly come first, in the table as in the figure.
     """
 
     def over_practical(limit: Mapping[str, Any]) -> float:
         upper, practical = limit.get("upper95"), limit.get("practical_size")
         return float(upper / practical) if upper is not None and practical else inf
 
-    unseen = [x for x in diagnosis.get("limits", ()) if x.get("answer") != "present"]
+    limits = (results.diagnosis or {}).get("limits", ())
+    acting = {effect.id for effect in results.effects}
+    unseen = [x for x in limits if x.get("answer") != "present" and x["id"] not in acting]
     return sorted(unseen, key=over_practical)
 
 

@@ -20,8 +20,6 @@ from bayesimpact.report.recording_result import RecordingResult as RecordingResu
 
 Array = NDArray[np.float64]
 
-STATUSES = ("passed", "failed", "note")
-
 
 @dataclass(frozen=True, eq=False)
 class Row:
@@ -140,7 +138,7 @@ class Draws:
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class BackboneCurve:
     """One branch of a recording's backbone and the band of simulated ones.
 
     Attributes
@@ -178,7 +176,7 @@ class BackboneSummary:
     replicates : simulated recordings per recording
     """
 
-    curves: tuple[Curve, ...]
+    curves: tuple[BackboneCurve, ...]
     probability: float
     labels: tuple[str, ...]
     inside: Array
@@ -189,7 +187,7 @@ class BackboneSummary:
 
 
 @dataclass(frozen=True)
-class Check:
+class ChecklistItem:
     """One line of the checklist: status is "passed", "failed" or "note" (for information)."""
 
     title: str
@@ -209,7 +207,7 @@ class EffectSummary:
 
 
 @dataclass(frozen=True)
-class Noise:
+class NoiseSummary:
     """The noise as estimated from the recordings alone; level in m (or rad)."""
 
     kind: str
@@ -220,7 +218,7 @@ class Noise:
 
 
 @dataclass(frozen=True)
-class Chain:
+class ChainSummary:
     """What campaign.toml says of the measuring chain; uncertainties are relative standard ones."""
 
     smoothing: str
@@ -278,8 +276,8 @@ class Results:
     recordings: tuple[RecordingResult, ...]
     rows: tuple[Row, ...]
     effects: tuple[EffectSummary, ...]
-    noise: Noise
-    chain: Chain
+    noise: NoiseSummary
+    chain: ChainSummary
     verdict: str
     headline: str
     reduced_chi2: float
@@ -291,7 +289,7 @@ class Results:
     sampler: SamplerSummary | None
     draws: Draws | None
     backbone: BackboneSummary | None
-    checks: tuple[Check, ...]
+    checks: tuple[ChecklistItem, ...]
     provenance: Provenance
     before: Draws | None = None
     before_backbone: BackboneSummary | None = None
@@ -363,7 +361,7 @@ class Results:
         return self.rms / float(np.sqrt(np.mean(signal**2)))
 
     @property
-    def failed(self) -> tuple[Check, ...]:
+    def failed(self) -> tuple[ChecklistItem, ...]:
         """Checks that failed."""
         return tuple(c for c in self.checks if c.status == "failed")
 

@@ -12,7 +12,7 @@ from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.prior import Prior
 from bayesimpact.model.parameters import Parameter
 from bayesimpact.model.units import dimensions, per_mass_unit, significant
-from bayesimpact.report.results import Array, Chain, Row
+from bayesimpact.report.results import Array, ChainSummary, Row
 
 Z90 = 1.6448536269514722  # 95 % quantile of the standard normal distribution
 
@@ -37,7 +37,7 @@ _MEANINGS = {
 def build_rows(
     fit: Fit,
     draws: Array | None,
-    chain: Chain,
+    chain: ChainSummary,
     references: Mapping[str, Mapping[str, float]],
     told: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> tuple[Row, ...]:
@@ -99,7 +99,7 @@ def scaling_unit(parameter: Parameter) -> str:
 
 
 def widened(
-    median: float, ci90: tuple[float, float], unit: str, chain: Chain, *, angle: bool
+    median: float, ci90: tuple[float, float], unit: str, chain: ChainSummary, *, angle: bool
 ) -> tuple[float, float]:
     """A 90 % interval widened by the uncertainties of mass, clock and gain, in quadrature.
 

@@ -19,6 +19,7 @@ from bayesimpact.report.diagnosis_view import (
     size_words,
     verdict_words,
 )
+from bayesimpact.report.formula_text import written
 from bayesimpact.report.results import Results
 from bayesimpact.report.tables import symbol
 
@@ -88,9 +89,7 @@ def _physics(diagnosis: Mapping[str, Any]) -> list[str | Markup]:
         return ["a force that no effect of the catalogue explains; it was learned instead"]
     lines: list[str | Markup] = [
         Markup("{}, probability {} <code>{}</code>").format(
-            effect.get("title") or effect["id"].replace("_", " "),
-            probability(effect.get("probability")),
-            effect["id"],
+            _title(effect), probability(effect.get("probability")), effect["id"]
         )
         for effect in diagnosis.get("effects", ())
     ]
@@ -103,12 +102,15 @@ def _physics(diagnosis: Mapping[str, Any]) -> list[str | Markup]:
     ]
 
 
+def _title(effect: Mapping[str, Any]) -> str:
+    return written(effect.get("title") or effect["id"].replace("_", " "))
+
+
 def _size(results: Results, diagnosis: Mapping[str, Any]) -> list[str | Markup]:
     lines: list[str | Markup] = []
     for effect in diagnosis.get("effects", ()):
         if size_words(effect.get("size")):
-            title = effect.get("title") or effect["id"].replace("_", " ")
-            lines.append(f"{title}: {size_words(effect['size'])}")
+            lines.append(f"{_title(effect)}: {size_words(effect['size'])}")
         lines += [
             Markup("{} = {}").format(symbol(name), estimate(content))
             for name, content in effect.get("parameters", {}).items()

@@ -24,6 +24,7 @@ from bayesimpact.model.units import (
     span,
     typeset,
 )
+from bayesimpact.report.formula_text import letter, written
 from bayesimpact.report.results import Results, Row
 
 GAIN = "gain"  # of a probe
@@ -57,7 +58,10 @@ class ParameterView:
 def symbol(name: str) -> Markup:
     """A parameter's name for HTML: "k2[1]" with an italic k and a lowered 2."""
     base, bracket, key = name.partition("[")
-    if "." in base:
+    known = letter(base)
+    if known is not None:
+        html = Markup("<span class=effect>formula:</span> <i>{}</i>").format(known)
+    elif "." in base:
         effect, _, own = base.partition(".")
         words = (effect.replace("_", " "), own.replace("_", " "))
         html = Markup("<span class=effect>{}:</span> {}").format(*words)
@@ -93,7 +97,7 @@ def _view(row: Row, labels: list[str]) -> ParameterView:
     ratio_places = interval_decimals(ratio_low, ratio_high)
     return ParameterView(
         symbol=symbol(row.name),
-        meaning=row.meaning,
+        meaning=written(row.meaning),
         unit=typeset(shown.unit),
         median=number(row.median * shown.scale, places),
         interval=span(low, high, shown.scale, places),

@@ -184,7 +184,7 @@ def search_words(results: Results) -> str:
         else "ended in different places; the better is reported"
     )
     return (
-        "The mode was sought from two starts: quick estimates from the recordings, and the "
+        "The mode was sought from two starts: initial estimates from the recordings, and the "
         "winner of adaptive differential evolution with the Metropolis criterion over the first "
         "cycles of every recording, in wide bounds about these estimates. Both were carried to "
         f"the full length over growing windows by least squares. {end}. Both "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,6 @@ from bayesimpact.report.archive import load_results, save_results
 from bayesimpact.report.build import results_from_fit, results_from_posterior
 from bayesimpact.report.figures.save import reason
 from bayesimpact.report.figures.shares import save_all
-from bayesimpact.report.groups import inference_groups
 from bayesimpact.report.html import render, unfinished
 from bayesimpact.report.latex import latex_tables
 from bayesimpact.report.pdf import print_page
@@ -97,7 +96,6 @@ def write_fit(
     seed: int = 0,
     command: str = "",
     seconds: float = float("nan"),
-    references: Mapping[str, Mapping[str, float]] | None = None,
     diagnosis: Mapping[str, Any] | None = None,
     diagnosis_arrays: Mapping[str, Array] | None = None,
     failed: Mapping[str, str] | None = None,
@@ -111,7 +109,6 @@ def write_fit(
         seed=seed,
         command=command,
         seconds=seconds,
-        references=references,
         diagnosis=diagnosis,
         diagnosis_arrays=diagnosis_arrays,
     )
@@ -126,7 +123,6 @@ def write_posterior(
     before: Posterior | None = None,
     command: str = "",
     seconds: float = float("nan"),
-    references: Mapping[str, Mapping[str, float]] | None = None,
     diagnosis: Mapping[str, Any] | None = None,
     diagnosis_arrays: Mapping[str, Array] | None = None,
     failed: Mapping[str, str] | None = None,
@@ -141,7 +137,6 @@ def write_posterior(
         "before": before,
         "command": command,
         "seconds": seconds,
-        "references": references,
         "diagnosis": diagnosis,
         "diagnosis_arrays": diagnosis_arrays,
     }
@@ -153,13 +148,10 @@ def write_posterior(
     folder.mkdir(parents=True, exist_ok=True)
     save_results(results, folder)
     try:
-        archive_arviz.write_posterior(
-            folder / POSTERIOR_FILE,
-            inference_groups(posterior, results.provenance),
-            None
-            if before is None or before is posterior
-            else inference_groups(before, results.provenance),
-        )
+        made = asdict(results.provenance)
+        apart = None if before is None or before is posterior else before.arviz_groups(made)
+        after = posterior.arviz_groups(made)
+        archive_arviz.write_posterior(folder / POSTERIOR_FILE, after, apart)
     except OSError:
         raise
     except Exception as error:

@@ -78,13 +78,13 @@ def backbone(
     Two estimators of the frequency:
 
     "half" (Tian et al., Eq. 1): f = 1 / (2 T) with T the half cycle above (below) rest. This is the
-    paper's, and what the quick estimates need: the lower branch knows nothing of the stop.
+    paper's, and what the initial estimates need: the lower branch knows nothing of the stop.
 
     "centred": the frequency of the whole cycle, from the half cycle above rest and half of each of
     its neighbours below. The upper branch pairs it with the upper extreme, the lower branch with
     the geometric mean of the two lower extremes around it. Amplitude and period then belong to the
     same instant and the decay cancels to first order: choose this to compare with
-    `bilinear_backbone(...).frequency`.
+    the closed form of the undamped oscillator.
 
     Two damping ratios:
 

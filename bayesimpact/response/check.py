@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,10 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 from bayesimpact.data.frozen import Picklable
 from bayesimpact.data.short_repr import short_repr
 from bayesimpact.errors import InputError
-from bayesimpact.response.backbone import Backbone, Damping, Estimator, backbone
+from bayesimpact.response.backbone import Backbone, Damping, backbone
 
 Floats = NDArray[np.float64]
-Against = Literal["cycle", "amplitude"]
 
 CURVES = tuple(
     f"{side} {quantity}"
@@ -36,7 +34,7 @@ class Band:
 
     Attributes
     ----------
-    at : cycle number counted from 0, or amplitude in m
+    at : cycle number counted from 0
     recorded : the recording's curve
     low, median, high : 5 %, 50 % and 95 % quantiles of the simulations
     inside : fraction of the recorded points between `low` and `high`; NaN without points
@@ -81,11 +79,8 @@ def check_backbone(
     draws: ArrayLike,
     interval: float,
     *,
-    against: Against = "cycle",
     rest: float | None = None,
-    average: int = 1,
     noise: float | None = None,
-    estimator: Estimator = "half",
     damping: Damping = "local",
 ) -> BackboneCheck:
     """Compare the backbone of a recording with those of simulated recordings.
@@ -102,10 +97,7 @@ def check_backbone(
     samples : (n,) recording, m
     draws : (D, n) simulated recordings with noise and, where the chain has one, its filter; D >= 19
     interval : s
-    against : align the curves by cycle number, or by amplitude (frequency and damping ratio only;
-        amplitudes stay aligned by cycle)
-    rest, average, noise, estimator, damping : as for `backbone`; noise None takes the recording's
-        for all
+    rest, noise, damping : as for `backbone`; noise None takes the recording's for all
 
     Raises
     ------
@@ -117,31 +109,26 @@ def check_backbone(
         raise InputError("draws", f"shape {simulated.shape}", f"(19 or more, {recording.size})")
 
     def extract(signal: Floats, level: float | None) -> Backbone:
-        return backbone(
-            signal, interval, rest=rest, average=average, noise=level, estimator=estimator,
-            damping=damping,
-        )  # fmt: skip
+        return backbone(signal, interval, rest=rest, noise=level, damping=damping)
 
     own = extract(recording, noise)
     others = [extract(signal, own.noise) for signal in simulated]
-    return compare(own, others, against)
+    return compare(own, others)
 
 
-def compare(recorded: Backbone, simulated: list[Backbone], against: Against) -> BackboneCheck:
+def compare(recorded: Backbone, simulated: list[Backbone]) -> BackboneCheck:
     """The same from backbones that were extracted before; see `check_backbone`."""
     kept = np.ones(len(simulated), dtype=bool)
-    grids = {side: _grid(side, recorded, simulated, kept, against) for side in ("upper", "lower")}
+    counts = {side: _count(side, recorded, simulated, kept) for side in ("upper", "lower")}
     rows = [recorded, *(b for b, keep in zip(simulated, kept, strict=True) if keep)]
     bands, scores = {}, []
     for name in CURVES:
         side, quantity = name.split(" ", 1)
-        grid = grids[side]
-        table = np.array([_curve(b, side, quantity, grid, against) for b in rows])
-        table = table.reshape(len(rows), grid.size)
+        table = np.array(
+            [getattr(getattr(b, side), quantity.replace(" ", "_"))[: counts[side]] for b in rows]
+        )
         usable = np.isfinite(table).all(axis=0)
-        table, at = table[:, usable], grid[usable]
-        if quantity == "amplitude" and against == "amplitude":
-            at = np.flatnonzero(usable).astype(np.float64)
+        table, at = table[:, usable], np.flatnonzero(usable).astype(np.float64)
         score = _discrepancy(table)
         scores.append(score)
         bands[name] = _band(at, table, score)
@@ -155,37 +142,14 @@ def compare(recorded: Backbone, simulated: list[Backbone], against: Against) -> 
     )
 
 
-def _grid(
-    side: str,
-    recorded: Backbone,
-    simulated: list[Backbone],
-    kept: NDArray[np.bool_],
-    against: Against,
-) -> Floats:
-    """Places where the curves of one side are compared; marks simulations that end too early."""
+def _count(
+    side: str, recorded: Backbone, simulated: list[Backbone], kept: NDArray[np.bool_]
+) -> int:
+    """Cycles of one side that are compared; marks simulations that end too early."""
     sizes = np.array([getattr(b, side).times.size for b in simulated])
-    count = min(getattr(recorded, side).times.size, int(np.quantile(sizes, 0.05)))
+    count = min(int(getattr(recorded, side).times.size), int(np.quantile(sizes, 0.05)))
     kept &= sizes >= count
-    if against == "cycle" or count == 0:
-        return np.arange(count, dtype=np.float64)
-    every = [recorded, *simulated]
-    amplitudes = np.array(
-        [getattr(b, side).amplitude[:count] for b in every if getattr(b, side).times.size >= count]
-    )
-    return np.asarray(np.median(amplitudes, axis=0))
-
-
-def _curve(b: Backbone, side: str, quantity: str, grid: Floats, against: Against) -> Floats:
-    """One curve of a backbone at the places of the grid."""
-    branch = getattr(b, side)
-    values: Floats = getattr(branch, quantity.replace(" ", "_"))
-    if against == "cycle" or quantity == "amplitude":
-        return values[: grid.size]
-    known = np.isfinite(values)
-    if not known.any():
-        return np.full(grid.size, np.nan)
-    order = np.argsort(branch.amplitude[known])
-    return np.interp(grid, branch.amplitude[known][order], values[known][order])
+    return count
 
 
 def _discrepancy(table: Floats) -> Floats:

@@ -1,7 +1,7 @@
 """One cycle of the impact oscillator, from one lower turning point to the next, in closed form.
 
-The cycle is the quick estimates' measuring unit: its length, the next depth and the height reached
-on the side of the stop follow from the depth it starts at, and nothing needs to be integrated
+The initial estimates measure in cycles: the length of one, the next depth and the height reached on
+the side of the stop follow from the depth it starts at, and nothing needs to be integrated
 along the whole recording. So there is no phase to lock onto, and a wrong first guess still points
 the right way. All functions work on arrays of cycles.
 """

@@ -1,4 +1,4 @@
-"""Quick estimates where recordings have a measured input: the equation of motion in weak form.
+"""Initial estimates where recordings have a measured input: the equation of motion in weak form.
 
 Initial conditions do not enter there, and all unknowns but the gap are found by linear least
 squares over many stretches; the reading at which a recording touches the stop is scanned, for each

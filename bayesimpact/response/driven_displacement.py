@@ -82,10 +82,10 @@ def first_guess(
         for recording in recordings:
             relative = without_base(recording, gain)
             own = rows_of(relative, mass, width)
-            push = own.base[:, 2]
+            base_term = own.base[:, 2]
             own_gain = free or (relative.input is not None and relative.input.free)
             size = max(float(np.linalg.norm(own.target)), 1e-300)
-            known, unknown = (0.0, push) if own_gain else (push, 0.0 * push)
+            known, unknown = (0.0, base_term) if own_gain else (base_term, 0.0 * base_term)
             blocks.append(np.column_stack([own.base[:, :2], -unknown, -own.base[:, 3]]) / size)
             right.append((own.target + known) / size)
         solution, _ = least_squares(np.concatenate(blocks), np.concatenate(right))

@@ -1,4 +1,4 @@
-"""Quick estimates of every parameter from the recordings alone: the start of the identification.
+"""Initial estimates of every parameter from the recordings alone: the start of the identification.
 
 k1, c1 and the rest readings come from the flights on the free side and from the free tails; gap,
 stiffness and damping of the stop from the cycles between lower turning points; y0 and v0 from the
@@ -34,7 +34,7 @@ from bayesimpact.response.observe import (
     with_tails,
 )
 from bayesimpact.response.preloaded import estimate_preloaded, is_preloaded
-from bayesimpact.response.release import Oscillator, release
+from bayesimpact.response.release import RoughOscillator, release
 
 MEANS = 100.0  # the mean of a velocity or an acceleration is as good as that of so many samples
 
@@ -221,7 +221,7 @@ def _collect(
         start = release(
             observed.samples[r] - flight.offsets[r],
             recording.interval,
-            Oscillator(campaign.mass, c1, k1, c2, g, stiffness),
+            RoughOscillator(campaign.mass, c1, k1, c2, g, stiffness),
             max(observed.noises[r], 1e-12 * observed.size(r)),
         )
         bias = observed.biases[r]

@@ -1,4 +1,4 @@
-"""Quick estimates for a preloaded stop (g < 0): the mass rests against it.
+"""Initial estimates for a preloaded stop (g < 0): the mass rests against it.
 
 Mirrored at rest such a rig is an ordinary one: what was "on the stop" is its free motion, with
 stiffness k1 + k2 and damping c1 + c2, and cycles that leave the stop meet something softer, by k2

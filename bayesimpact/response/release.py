@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Oscillator:
+class RoughOscillator:
     """Rough parameters of the impact oscillator, SI; `g` infinite without a stop."""
 
     mass: float
@@ -27,11 +27,11 @@ class Oscillator:
 
 
 def release(
-    signal: Floats, interval: float, oscillator: Oscillator, noise: float
+    signal: Floats, interval: float, oscillator: RoughOscillator, noise: float
 ) -> tuple[float, float, float, float]:
     """Displacement and velocity at the first sample.
 
-    Up to the first touch, or the first release from the stop, the motion is linear in y0 and v0;
+    Up to the first contact, or the first release from the stop, the motion is linear in y0 and v0;
     both follow from a linear least-squares fit over these samples. Where the first event comes too
     soon for that, the first free period is simulated through its impacts and fitted.
 
@@ -80,7 +80,7 @@ def _linear(
 def _simulated(
     signal: Floats,
     interval: float,
-    o: Oscillator,
+    o: RoughOscillator,
     noise: float,
     start: tuple[float, float, float, float],
 ) -> tuple[float, float, float, float]:

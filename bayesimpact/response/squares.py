@@ -1,4 +1,4 @@
-"""Nonlinear least squares in the few unknowns of the quick estimates."""
+"""Nonlinear least squares in the few unknowns of the initial estimates."""
 
 from __future__ import annotations
 

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.files import strict
 from bayesimpact.data.read import load_campaign
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.document import document
@@ -95,20 +96,5 @@ def _found(campaign: Campaign, seed: int, search: bool) -> dict[str, Any]:
     seconds = time.perf_counter() - began
     versions = {name: metadata.version(name) for name in LIBRARIES}
     content = document(found, seed=seed, seconds=seconds, versions=versions)
-    result: dict[str, Any] = json.loads(json.dumps(finite(content)))
+    result: dict[str, Any] = json.loads(json.dumps(strict(content)))
     return result
-
-
-def finite(content: Any) -> Any:
-    """The same with null for numbers that JSON does not have, and plain numbers for NumPy's."""
-    if isinstance(content, Mapping):
-        return {str(k): finite(v) for k, v in content.items()}
-    if isinstance(content, list | tuple | np.ndarray):
-        return [finite(v) for v in content]
-    if isinstance(content, bool | np.bool_):
-        return bool(content)
-    if isinstance(content, int | np.integer):
-        return int(content)
-    if isinstance(content, float | np.floating):
-        return float(content) if np.isfinite(content) else None
-    return content

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from bayesimpact.data.campaign import Beam, Campaign
-from bayesimpact.trial.rig import Release, Rig, make_campaign
+from bayesimpact.trial.rig import Effects, Release, Rig, make_campaign
 from bayesimpact.trial.rig_chain import Chain
 from bayesimpact.trial.rig_files import TRUTH_FILE, write_campaign
 
@@ -58,13 +58,18 @@ def paper_campaign() -> Campaign:
 
     White probe noise of 5 um, rest readings scattered by 10 um; nothing else.
     """
-    rng = np.random.default_rng(20180615)
+    return _recorded("simulated at the values of Table 2", 20180615)
+
+
+def _recorded(words: str, seed: int, effects: Effects | None = None) -> Campaign:
+    rng = np.random.default_rng(seed)
     releases = paper_releases(rng)
     offsets = {release.name: float(10e-6 * rng.standard_normal()) for release in releases}
     return make_campaign(
-        "Impact rig, three beams (simulated at the values of Table 2)",
+        f"Impact rig, three beams ({words})",
         PAPER_RIG,
         releases,
+        effects,
         chain=Chain(noise=5e-6, offsets=offsets),
         rate=1000.0,
         duration=6.0,
@@ -87,20 +92,7 @@ tests/benchmarks/typical_draw.py."""
 
 def concealed_campaign(seed: int = CONCEALED_SEED) -> Campaign:
     """The campaign again, from a rig with two effects that the paper suspects of its own."""
-    rng = np.random.default_rng(seed)
-    releases = paper_releases(rng)
-    offsets = {release.name: float(10e-6 * rng.standard_normal()) for release in releases}
-    return make_campaign(
-        "Impact rig, three beams (simulated; something is concealed)",
-        PAPER_RIG,
-        releases,
-        CONCEALED_EFFECTS,
-        chain=Chain(noise=5e-6, offsets=offsets),
-        rate=1000.0,
-        duration=6.0,
-        rng=rng,
-        beams=PAPER_BEAMS,
-    )
+    return _recorded("simulated; something is concealed", seed, CONCEALED_EFFECTS)
 
 
 def concealed_truth() -> dict[str, object]:

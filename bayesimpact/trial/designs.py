@@ -111,7 +111,7 @@ RIG_DESIGNS: Mapping[str, RigDesign] = {
 
 
 @dataclass(frozen=True)
-class Design:
+class DrawnRig:
     """One drawn rig: everything about a campaign but the effects planted in it.
 
     Attributes
@@ -185,7 +185,7 @@ def draw_rig_design(
     noise_kind: str,
     rng: np.random.Generator,
     designs: Mapping[str, RigDesign] = RIG_DESIGNS,
-) -> Design:
+) -> DrawnRig:
     """Draw a rig of the kind `name` of `designs` with noise of the kind `noise_kind`."""
     ranges = designs[name]
     amplitude = log_uniform(rng, ranges.amplitude)
@@ -194,7 +194,7 @@ def draw_rig_design(
     frequency = sqrt(rig.k1 / rig.mass) / (2 * pi)
     duration = round(log_uniform(rng, ranges.cycles) / frequency * ranges.rate) / ranges.rate
     chain, measurement = _chain(ranges, noise_kind, rig, releases, amplitude, rng)
-    return Design(name, noise_kind, rig, releases, ranges.rate, duration, chain, measurement)
+    return DrawnRig(name, noise_kind, rig, releases, ranges.rate, duration, chain, measurement)
 
 
 def _rig(ranges: RigDesign, amplitude: float, rng: np.random.Generator) -> Rig:

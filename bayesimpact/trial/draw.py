@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from bayesimpact.errors import InputError, SimulationError
-from bayesimpact.trial.designs import RIG_DESIGNS, Design, draw_rig_design, log_uniform
-from bayesimpact.trial.drawn import Drawn
+from bayesimpact.trial.designs import RIG_DESIGNS, DrawnRig, draw_rig_design, log_uniform
+from bayesimpact.trial.drawn import DrawnTrial
 from bayesimpact.trial.faults import PLANTED_FAULTS, plant_fault
 from bayesimpact.trial.faults_rig import OTHER_RIG, another_rig
 from bayesimpact.trial.planted_effects import PLANTED_EFFECTS
@@ -26,10 +26,10 @@ Rng = np.random.Generator
 
 ATTEMPTS = 30
 
-__all__ = ["Drawn", "draw"]
+__all__ = ["DrawnTrial", "draw"]
 
 
-def draw(settings: Settings, seed: int) -> Drawn:
+def draw(settings: Settings, seed: int) -> DrawnTrial:
     """Draw the trial of one seed.
 
     Raises
@@ -53,7 +53,7 @@ def draw(settings: Settings, seed: int) -> Drawn:
     )
 
 
-def _attempt(settings: Settings, seed: int, kind: str, turn: int, rng: Rng) -> Drawn:
+def _attempt(settings: Settings, seed: int, kind: str, turn: int, rng: Rng) -> DrawnTrial:
     ids = _effects(settings, kind, turn, rng)
     rig_kind = str(rng.choice(_possible(settings, ids)))
     design = draw_rig_design(rig_kind, str(rng.choice(_noises(settings, ids))), rng)
@@ -83,15 +83,17 @@ def _faults(settings: Settings, ids: tuple[str, ...]) -> list[str]:
     return [*known, OTHER_RIG]
 
 
-def _with_fault(drawn: Drawn, design: Design, effects: Effects, kind: str, rng: Rng) -> Drawn:
+def _with_fault(
+    drawn: DrawnTrial, design: DrawnRig, effects: Effects, kind: str, rng: Rng
+) -> DrawnTrial:
     """The same trial with a fault in one recording."""
     if kind == OTHER_RIG:
         campaign, fault = another_rig(drawn.campaign, design, effects, rng)
-        return Drawn(campaign, {**drawn.truth, "fault": fault})
+        return DrawnTrial(campaign, {**drawn.truth, "fault": fault})
     planted = plant_fault(drawn.campaign, kind, drawn.truth["noise_m"], rng)
     if planted is None:
         raise Unsuitable(f"a rig that cannot show the fault {kind}")
-    return Drawn(planted[0], {**drawn.truth, "fault": planted[1]})
+    return DrawnTrial(planted[0], {**drawn.truth, "fault": planted[1]})
 
 
 def _effects(settings: Settings, kind: str, turn: int, rng: Rng) -> tuple[str, ...]:
@@ -150,10 +152,10 @@ def _recorded(
     settings: Settings,
     seed: int,
     kind: str,
-    design: Design,
+    design: DrawnRig,
     found: tuple[Sized, ...],
     rng: Rng,
-) -> Drawn:
+) -> DrawnTrial:
     effects = {one.effect: one.numbers for one in found}
     campaign = make_campaign(
         "blind trial",
@@ -186,4 +188,4 @@ def _recorded(
         ],
         "noise_rms_m": float(np.sqrt(np.mean(np.concatenate(noise) ** 2))),
     }
-    return Drawn(campaign, truth)
+    return DrawnTrial(campaign, truth)

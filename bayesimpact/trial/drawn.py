@@ -10,7 +10,7 @@ from bayesimpact.data.campaign import Campaign
 
 
 @dataclass(frozen=True, eq=False)
-class Drawn:
+class DrawnTrial:
     """A campaign and the truth about it, as a JSON object."""
 
     campaign: Campaign

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from bayesimpact.data.campaign import Campaign
-from bayesimpact.trial.designs import Design, log_uniform
+from bayesimpact.trial.designs import DrawnRig, log_uniform
 from bayesimpact.trial.rig import Effects, Rig, record
 
 OTHER_RIG = "other_rig"
@@ -17,7 +17,7 @@ SIZES = {"k1": (0.003, 0.15), "k2": (0.03, 0.5), "c1": (0.3, 3.0)}
 
 
 def another_rig(
-    campaign: Campaign, design: Design, effects: Effects, rng: np.random.Generator
+    campaign: Campaign, design: DrawnRig, effects: Effects, rng: np.random.Generator
 ) -> tuple[Campaign, dict[str, Any]]:
     """The campaign with one release recorded on another rig, and the truth about it."""
     number = int(rng.integers(len(campaign.recordings)))

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.trial.designs import Design
+from bayesimpact.trial.designs import DrawnRig
 from bayesimpact.trial.rig import Effects, Parameters
 from bayesimpact.trial.sensitivity import clean_readings
 from bayesimpact.trial.strong_effects import Chosen
@@ -38,7 +38,7 @@ class _Moved:
 
 
 def stand_outs(
-    design: Design, found: Sequence[Chosen], rivals: Mapping[str, Parameters] | None = None
+    design: DrawnRig, found: Sequence[Chosen], rivals: Mapping[str, Parameters] | None = None
 ) -> tuple[float, ...]:
     """Norm, in m (or rad), of what only this effect explains of the readings, one per effect.
 
@@ -78,15 +78,15 @@ def left_of(response: Array, columns: Columns) -> float:
 class _Player:
     """Plays the rig again with something changed."""
 
-    design: Design
+    design: DrawnRig
     effects: Effects
     still: tuple[Array, ...]
 
-    def changed(self, design: Design, effects: Effects) -> Array:
+    def changed(self, design: DrawnRig, effects: Effects) -> Array:
         """Change of all readings, (N,)."""
         return np.concatenate(self.parts(design, effects))
 
-    def parts(self, design: Design, effects: Effects) -> list[Array]:
+    def parts(self, design: DrawnRig, effects: Effects) -> list[Array]:
         """The same per recording."""
         readings = clean_readings(design, effects)
         return [a - b for a, b in zip(readings, self.still, strict=True)]
@@ -119,7 +119,7 @@ def _base_columns(play: _Player, found: Sequence[Chosen]) -> Columns:
     return columns + play.blocks([np.ones(s.size) for s in play.still], names)
 
 
-def _with(design: Design, **changes: object) -> Design:
+def _with(design: DrawnRig, **changes: object) -> DrawnRig:
     return replace(design, rig=replace(design.rig, **changes))  # type: ignore[arg-type]
 
 

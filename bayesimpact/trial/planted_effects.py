@@ -1,7 +1,7 @@
 """How every effect is planted: shapes drawn at random, one size left free, and where it acts.
 
-A `Form` turns a size into the effect's numbers, SI, as the rig takes them. Sizes are found later,
-in units of what the campaign could detect; `start` is a size that is certainly small.
+An `EffectForm` turns a size into the effect's numbers, SI, as the rig takes them. Sizes are found
+later, in units of what the campaign could detect; `start` is a size that is certainly small.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from types import MappingProxyType
 
 import numpy as np
 
-from bayesimpact.trial.designs import Design, log_uniform
+from bayesimpact.trial.designs import DrawnRig, log_uniform
 from bayesimpact.trial.rig import Effects, Parameters
 
 Rng = np.random.Generator
 
 
 @dataclass(frozen=True)
-class Form:
+class EffectForm:
     """An effect with its shape drawn and its size open.
 
     Attributes
@@ -55,7 +55,7 @@ class PlantedEffect:
     """
 
     regimes: tuple[str, ...]
-    form: Callable[[Design, Rng], Form]
+    form: Callable[[DrawnRig, Rng], EffectForm]
     obstacles: int = 0
     recordings: int = 1
     slots: tuple[str, ...] = ()
@@ -78,23 +78,25 @@ def sign_of(rng: Rng) -> float:
 
 
 def one_number(
-    name: str, scale: Callable[[Design], float], signed: bool = False
-) -> Callable[..., Form]:
+    name: str, scale: Callable[[DrawnRig], float], signed: bool = False
+) -> Callable[..., EffectForm]:
     """An effect with one number, small against its natural scale."""
 
-    def form(design: Design, rng: Rng) -> Form:
+    def form(design: DrawnRig, rng: Rng) -> EffectForm:
         sign = sign_of(rng) if signed else 1.0
-        return Form(lambda size: {name: sign * size}, 1e-4 * scale(design), largest=scale(design))
+        return EffectForm(
+            lambda size: {name: sign * size}, 1e-4 * scale(design), largest=scale(design)
+        )
 
     return form
 
 
-def _exponent(design: Design, rng: Rng) -> Form:
+def _exponent(design: DrawnRig, rng: Rng) -> EffectForm:
     sign = sign_of(rng)
-    return Form(lambda size: {"exponent": 1 + sign * size}, 1e-4, largest=0.4)
+    return EffectForm(lambda size: {"exponent": 1 + sign * size}, 1e-4, largest=0.4)
 
 
-def _per_case(design: Design, rng: Rng) -> Form:
+def _per_case(design: DrawnRig, rng: Rng) -> EffectForm:
     keys = list(design.rig.k2)
     shares = _contrast(len(keys), rng)
     c2 = design.rig.c2
@@ -102,10 +104,10 @@ def _per_case(design: Design, rng: Rng) -> Form:
     def build(size: float) -> Parameters:
         return {"c2": {k: c2 + size * s for k, s in zip(keys, shares, strict=True)}}
 
-    return Form(build, 1e-4 * c2, largest=0.9 * c2 / max(-shares.min(), 1e-9))
+    return EffectForm(build, 1e-4 * c2, largest=0.9 * c2 / max(-shares.min(), 1e-9))
 
 
-def _gaps(design: Design, rng: Rng) -> Form:
+def _gaps(design: DrawnRig, rng: Rng) -> EffectForm:
     keys = [r.name for r in design.releases]
     shares = _contrast(len(keys), rng)
     gap = design.rig.g
@@ -113,7 +115,7 @@ def _gaps(design: Design, rng: Rng) -> Form:
     def build(size: float) -> Parameters:
         return {"g": {k: gap + size * s for k, s in zip(keys, shares, strict=True)}}
 
-    return Form(build, 1e-5 * design.indentation, largest=0.2 * design.indentation)
+    return EffectForm(build, 1e-5 * design.indentation, largest=0.2 * design.indentation)
 
 
 def _contrast(size: int, rng: Rng) -> np.ndarray:
@@ -123,13 +125,13 @@ def _contrast(size: int, rng: Rng) -> np.ndarray:
     return np.asarray(values / np.sqrt(np.mean(values**2)))
 
 
-def _second_stage(design: Design, rng: Rng) -> Form:
+def _second_stage(design: DrawnRig, rng: Rng) -> EffectForm:
     at = design.indentation * rng.uniform(0.25, 0.65)
     k2 = design.contact_stiffness
-    return Form(lambda size: {"stiffness": size, "depth": at}, 1e-4 * k2, largest=2 * k2)
+    return EffectForm(lambda size: {"stiffness": size, "depth": at}, 1e-4 * k2, largest=2 * k2)
 
 
-def _hunt_crossley(design: Design, rng: Rng) -> Form:
+def _hunt_crossley(design: DrawnRig, rng: Rng) -> EffectForm:
     """Between a dashpot that grows with the depth, at size zero, and a stiffer or softer power."""
     chi = log_uniform(rng, (0.03, 0.3)) / design.speed
     sign = 1.0 if rng.random() < 0.8 else -1.0
@@ -137,32 +139,32 @@ def _hunt_crossley(design: Design, rng: Rng) -> Form:
     def build(size: float) -> Parameters:
         return {"exponent": 1 + sign * size, "damping": chi}
 
-    return Form(build, 1e-4, {"hunt_crossley": build(0.0)}, largest=1.0 if sign > 0 else 0.3)
+    return EffectForm(build, 1e-4, {"hunt_crossley": build(0.0)}, largest=1.0 if sign > 0 else 0.3)
 
 
-def _relaxation(design: Design, rng: Rng) -> Form:
+def _relaxation(design: DrawnRig, rng: Rng) -> EffectForm:
     time = log_uniform(rng, (0.1, 1.0)) / design.contact_omega
     k2 = design.contact_stiffness
-    return Form(lambda size: {"stiffness": size, "time": time}, 1e-4 * k2, largest=k2)
+    return EffectForm(lambda size: {"stiffness": size, "time": time}, 1e-4 * k2, largest=k2)
 
 
-def _obstacle_mass(design: Design, rng: Rng) -> Form:
+def _obstacle_mass(design: DrawnRig, rng: Rng) -> EffectForm:
     mass = design.rig.mass
     reference: Effects = {"contact_no_tension": {}}
-    return Form(lambda size: {"mass": size}, 1e-5 * mass, reference, largest=0.3 * mass)
+    return EffectForm(lambda size: {"mass": size}, 1e-5 * mass, reference, largest=0.3 * mass)
 
 
-def _adhesion(design: Design, rng: Rng) -> Form:
+def _adhesion(design: DrawnRig, rng: Rng) -> EffectForm:
     force = design.contact_stiffness * design.indentation
     reference: Effects = {"contact_no_tension": {}}
-    return Form(lambda size: {"force": size}, 1e-4 * force, reference, largest=0.3 * force)
+    return EffectForm(lambda size: {"force": size}, 1e-4 * force, reference, largest=0.3 * force)
 
 
-def _restitution(design: Design, rng: Rng) -> Form:
-    return Form(lambda size: {"coefficient": 1.0 - size}, 1e-5, largest=0.5)
+def _restitution(design: DrawnRig, rng: Rng) -> EffectForm:
+    return EffectForm(lambda size: {"coefficient": 1.0 - size}, 1e-5, largest=0.5)
 
 
-def _second_mode(design: Design, rng: Rng) -> Form:
+def _second_mode(design: DrawnRig, rng: Rng) -> EffectForm:
     """Faster than a contact; what it adds stays below a third of the depth of contact."""
     omega = design.contact_omega * log_uniform(rng, (1.5, 8.0))
     damping, sign = log_uniform(rng, (0.005, 0.1)), sign_of(rng)
@@ -171,30 +173,30 @@ def _second_mode(design: Design, rng: Rng) -> Form:
         return {"frequency": omega / (2 * pi), "damping": damping, "gain": sign * size}
 
     largest = 0.3 * omega**2 / design.contact_stiffness
-    return Form(build, 1e-5 * largest, largest=largest)
+    return EffectForm(build, 1e-5 * largest, largest=largest)
 
 
-def _obstacle_mode(design: Design, rng: Rng) -> Form:
+def _obstacle_mode(design: DrawnRig, rng: Rng) -> EffectForm:
     frequency = design.contact_omega / (2 * pi) * log_uniform(rng, (1.5, 6.0))
     damping, mass = log_uniform(rng, (0.005, 0.1)), design.rig.mass
 
     def build(size: float) -> Parameters:
         return {"mass": size, "frequency": frequency, "damping": damping}
 
-    return Form(build, 1e-5 * mass, largest=0.3 * mass)
+    return EffectForm(build, 1e-5 * mass, largest=0.3 * mass)
 
 
-def _base_motion(design: Design, rng: Rng) -> Form:
+def _base_motion(design: DrawnRig, rng: Rng) -> EffectForm:
     frequency = design.omega / (2 * pi) * log_uniform(rng, (1.5, 8.0))
     damping = log_uniform(rng, (0.005, 0.1))
 
     def build(size: float) -> Parameters:
         return {"frequency": frequency, "damping": damping, "mass_ratio": size}
 
-    return Form(build, 1e-5, largest=0.3)
+    return EffectForm(build, 1e-5, largest=0.3)
 
 
-def _forcing(design: Design, rng: Rng) -> Form:
+def _forcing(design: DrawnRig, rng: Rng) -> EffectForm:
     side = (0.4, 0.85) if rng.random() < 0.5 else (1.2, 4.0)
     frequency = design.omega / (2 * pi) * log_uniform(rng, side)
     phases = {r.name: float(rng.uniform(0, 2 * pi)) for r in design.releases}
@@ -203,16 +205,16 @@ def _forcing(design: Design, rng: Rng) -> Form:
     def build(size: float) -> Parameters:
         return {"amplitude": size, "frequency": frequency, "phase": phases}
 
-    return Form(build, 1e-5 * force, largest=0.2 * force)
+    return EffectForm(build, 1e-5 * force, largest=0.2 * force)
 
 
-def _opposite_stop(design: Design, rng: Rng) -> Form:
+def _opposite_stop(design: DrawnRig, rng: Rng) -> EffectForm:
     gap = design.amplitude * rng.uniform(0.5, 0.85)
     k1 = design.rig.k1
-    return Form(lambda size: {"stiffness": size, "gap": gap}, 1e-4 * k1, largest=5 * k1)
+    return EffectForm(lambda size: {"stiffness": size, "gap": gap}, 1e-4 * k1, largest=5 * k1)
 
 
-def _spring_piecewise(design: Design, rng: Rng) -> Form:
+def _spring_piecewise(design: DrawnRig, rng: Rng) -> EffectForm:
     """The damper takes a good share of what the spring stores."""
     gap = design.amplitude * rng.uniform(0.4, 0.8)
     time = log_uniform(rng, (0.1, 0.5)) / design.omega
@@ -221,36 +223,36 @@ def _spring_piecewise(design: Design, rng: Rng) -> Form:
     def build(size: float) -> Parameters:
         return {"stiffness": size, "gap": gap, "damping": time * size}
 
-    return Form(build, 1e-4 * k1, largest=5 * k1)
+    return EffectForm(build, 1e-4 * k1, largest=5 * k1)
 
 
-def _power_damping(design: Design, rng: Rng) -> Form:
+def _power_damping(design: DrawnRig, rng: Rng) -> EffectForm:
     """An exponent that none of the simpler laws has."""
     exponent = float(
         rng.choice([rng.uniform(0.3, 0.7), rng.uniform(1.4, 1.65), rng.uniform(2.5, 4)])
     )
     unit = design.rig.c1 * design.speed / design.speed**exponent
-    return Form(
+    return EffectForm(
         lambda size: {"coefficient": size, "exponent": exponent}, 1e-3 * unit, largest=10 * unit
     )
 
 
-def _bouc_wen(design: Design, rng: Rng) -> Form:
+def _bouc_wen(design: DrawnRig, rng: Rng) -> EffectForm:
     """A loop as wide as the amplitude."""
     decay, k1 = log_uniform(rng, (1.0, 5.0)) / design.amplitude, design.rig.k1
-    return Form(lambda size: {"stiffness": size, "decay": decay}, 1e-4 * k1, largest=k1)
+    return EffectForm(lambda size: {"stiffness": size, "decay": decay}, 1e-4 * k1, largest=k1)
 
 
-def _presliding(design: Design, rng: Rng) -> Form:
+def _presliding(design: DrawnRig, rng: Rng) -> EffectForm:
     """It slides over most of the amplitude."""
     way = design.amplitude * log_uniform(rng, (0.01, 0.1))
     force = design.rig.k1 * design.amplitude
-    return Form(
+    return EffectForm(
         lambda size: {"force": size, "displacement": way}, 1e-5 * force, largest=0.1 * force
     )
 
 
-def _hum(design: Design, rng: Rng) -> Form:
+def _hum(design: DrawnRig, rng: Rng) -> EffectForm:
     below = [f for f in (50.0, 60.0, 100.0, 150.0) if f < 0.4 * design.rate]
     frequency = float(rng.choice(below or [0.2 * design.rate])) * (1 + 1e-3 * rng.standard_normal())
     phases = {r.name: float(rng.uniform(0, 2 * pi)) for r in design.releases}
@@ -259,10 +261,10 @@ def _hum(design: Design, rng: Rng) -> Form:
     def build(size: float) -> Parameters:
         return {"amplitude": size, "frequency": frequency, "phase": phases}
 
-    return Form(build, 1e-6 * reach, largest=0.05 * reach)
+    return EffectForm(build, 1e-6 * reach, largest=0.05 * reach)
 
 
-def _released_mode(design: Design, rng: Rng) -> Form:
+def _released_mode(design: DrawnRig, rng: Rng) -> EffectForm:
     """Above the motion and below the band's end; every release excites it as it happens to."""
     natural, highest = design.omega / (2 * pi), 0.2 * design.rate
     frequency = log_uniform(rng, (1.5 * natural, max(min(8.0 * natural, highest), 2.0 * natural)))
@@ -277,14 +279,14 @@ def _released_mode(design: Design, rng: Rng) -> Form:
             "frequency": frequency, "decay": decay, "amplitude": amplitudes, "phase": phases
         }  # fmt: skip
 
-    return Form(build, 1e-6 * reach, largest=0.1 * reach)
+    return EffectForm(build, 1e-6 * reach, largest=0.1 * reach)
 
 
-def _smoothing(design: Design, rng: Rng) -> Form:
+def _smoothing(design: DrawnRig, rng: Rng) -> EffectForm:
     """An undeclared Savitzky-Golay filter; on or off, its window drawn."""
     contact = pi / design.contact_omega * design.rate
     window = 2 * int(rng.integers(3, max(4, int(min(10.0, 0.35 * contact)) + 1))) + 1
-    return Form(lambda size: {"window": window, "order": 2}, 0.0)
+    return EffectForm(lambda size: {"window": window, "order": 2}, 0.0)
 
 
 PLANTED_EFFECTS: Mapping[str, PlantedEffect] = {
@@ -308,7 +310,7 @@ PLANTED_EFFECTS: Mapping[str, PlantedEffect] = {
     "contact_second_stage": PlantedEffect(("contact",), _second_stage, 1),
     "hunt_crossley": PlantedEffect(("contact",), _hunt_crossley, 1, slots=("c2", "k2 d")),
     "contact_no_tension": PlantedEffect(
-        ("contact",), lambda d, r: Form(lambda s: {}, 0.0), 1, slots=("end",)
+        ("contact",), lambda d, r: EffectForm(lambda s: {}, 0.0), 1, slots=("end",)
     ),
     "contact_relaxation": PlantedEffect(("contact",), _relaxation, 1),
     "obstacle_mass": PlantedEffect(("contact",), _obstacle_mass, 1, slots=("end",)),
@@ -350,7 +352,9 @@ PLANTED_EFFECTS: Mapping[str, PlantedEffect] = {
     ),
     "sensor_hum": PlantedEffect(("measurement",), _hum, slots=("hum",)),
     "released_mode": PlantedEffect(("measurement",), _released_mode, slots=("hum",), free=True),
-    "pendulum_sine": PlantedEffect(("free",), lambda d, r: Form(lambda s: {}, 0.0), angle=True),
+    "pendulum_sine": PlantedEffect(
+        ("free",), lambda d, r: EffectForm(lambda s: {}, 0.0), angle=True
+    ),
     "pendulum_with_spring": PlantedEffect(
         ("free",), one_number("stiffness", lambda d: d.rig.k1), angle=True
     ),

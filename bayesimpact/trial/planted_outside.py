@@ -7,22 +7,22 @@ from math import pi
 
 import numpy as np
 
-from bayesimpact.trial.designs import Design
-from bayesimpact.trial.planted_effects import Form, PlantedEffect, one_number, sign_of
+from bayesimpact.trial.designs import DrawnRig
+from bayesimpact.trial.planted_effects import EffectForm, PlantedEffect, one_number, sign_of
 
 Rng = np.random.Generator
 
 
-def _local(design: Design, rng: Rng) -> tuple[float, float]:
+def _local(design: DrawnRig, rng: Rng) -> tuple[float, float]:
     """Place and width of a local force on the free side, m."""
     place = -design.amplitude * rng.uniform(0.2, 0.55)
     return place, design.amplitude * rng.uniform(0.05, 0.12)
 
 
-def _detent(design: Design, rng: Rng) -> Form:
+def _detent(design: DrawnRig, rng: Rng) -> EffectForm:
     place, width = _local(design, rng)
     sign, k1 = sign_of(rng), design.rig.k1
-    return Form(
+    return EffectForm(
         lambda size: {"stiffness": sign * size, "place": place, "width": width},
         1e-4 * k1,
         place=(place - 1.5 * width, place + 1.5 * width),
@@ -30,11 +30,11 @@ def _detent(design: Design, rng: Rng) -> Form:
     )
 
 
-def _friction_pad(design: Design, rng: Rng) -> Form:
+def _friction_pad(design: DrawnRig, rng: Rng) -> EffectForm:
     place, width = _local(design, rng)
     extra, speed = rng.uniform(0.5, 2.0), 0.1 * design.speed
     force = design.rig.k1 * design.amplitude
-    return Form(
+    return EffectForm(
         lambda size: {
             "force": size, "extra": extra * size, "speed": speed,
             "low": place - width, "high": place + width,
@@ -45,10 +45,10 @@ def _friction_pad(design: Design, rng: Rng) -> Form:
     )  # fmt: skip
 
 
-def _bump(design: Design, rng: Rng) -> Form:
+def _bump(design: DrawnRig, rng: Rng) -> EffectForm:
     place, width = _local(design, rng)
     c1 = design.rig.c1
-    return Form(
+    return EffectForm(
         lambda size: {"coefficient": size, "place": place, "width": width},
         1e-3 * c1,
         place=(place - 1.5 * width, place + 1.5 * width),
@@ -56,10 +56,10 @@ def _bump(design: Design, rng: Rng) -> Form:
     )
 
 
-def _brake(design: Design, rng: Rng) -> Form:
+def _brake(design: DrawnRig, rng: Rng) -> EffectForm:
     place, width = _local(design, rng)
     low, high, c1 = place - 2 * width, place + 2 * width, design.rig.c1
-    return Form(
+    return EffectForm(
         lambda size: {"coefficient": size, "low": low, "high": high},
         1e-3 * c1,
         place=(low, high),
@@ -67,10 +67,10 @@ def _brake(design: Design, rng: Rng) -> Form:
     )
 
 
-def _knock(design: Design, rng: Rng) -> Form:
+def _knock(design: DrawnRig, rng: Rng) -> EffectForm:
     time, width = design.duration * rng.uniform(0.2, 0.6), 0.5 * pi / design.omega
     sign, scale = sign_of(rng), design.rig.mass * design.speed
-    return Form(
+    return EffectForm(
         lambda size: {"impulse": sign * size, "time": time, "width": width},
         1e-5 * scale,
         largest=0.3 * scale,

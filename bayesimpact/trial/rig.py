@@ -31,9 +31,9 @@ from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 from bayesimpact.trial.rig_catalogue import CATALOGUE, Planted
 from bayesimpact.trial.rig_chain import Chain, Probe, measure
-from bayesimpact.trial.rig_motion import Motion, move, sampling
+from bayesimpact.trial.rig_motion import RigMotion, move, sampling
 from bayesimpact.trial.rig_outside import OUTSIDE
-from bayesimpact.trial.rig_parts import Part, Site
+from bayesimpact.trial.rig_parts import RigPart, Site
 from bayesimpact.trial.rig_strong import STRONG
 
 Parameters = Mapping[str, float | Mapping[str, float]]
@@ -96,7 +96,7 @@ def motion(
     duration: float,
     rtol: float = 1e-12,
     atol: float = 1e-14,
-) -> Motion:
+) -> RigMotion:
     """The true motion of one recording, before the measuring chain.
 
     Parameters
@@ -239,7 +239,7 @@ def _numbers(
     return numbers
 
 
-def _build(rig: Rig, release: Release, effects: Effects) -> tuple[Site, tuple[Part, ...]]:
+def _build(rig: Rig, release: Release, effects: Effects) -> tuple[Site, tuple[RigPart, ...]]:
     """The rig of one recording: its site first, then the parts, which may depend on it."""
     if rig.k2 and release.case not in rig.k2:
         raise InputError(f"{release.name}, case", release.case, ", ".join(rig.k2))
@@ -265,7 +265,7 @@ def _build(rig: Rig, release: Release, effects: Effects) -> tuple[Site, tuple[Pa
         chosen.append((planted, numbers))
         if planted.site is not None:
             site = planted.site(site, numbers)
-    parts: list[Part] = []
+    parts: list[RigPart] = []
     slot = 2
     for planted, numbers in chosen:
         if planted.part is not None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.trial.rig_parts import Law, Part, Piece, Site, State
+from bayesimpact.trial.rig_parts import Law, Piece, RigPart, Site, State
 
 STILL = 1e-13
 """Force that does not set a resting mass in motion, N: rounding must not keep a dead rig busy."""
@@ -32,7 +32,7 @@ class Balance:
     level: float
 
 
-def balance(site: Site, parts: tuple[Part, ...], piece: Piece) -> Balance:
+def balance(site: Site, parts: tuple[RigPart, ...], piece: Piece) -> Balance:
     """Sum up the base oscillator and its added parts for one piece of the motion."""
     c1, k1, c2, k2, gap = site.c1, site.k1, site.c2, site.k2, piece.gap
     sign, contact = piece.sign, piece.contact

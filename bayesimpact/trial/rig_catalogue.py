@@ -13,7 +13,7 @@ from math import pi, sin
 from bayesimpact.data.campaign import Smoothing
 from bayesimpact.trial.rig_chain import Chain, Probe
 from bayesimpact.trial.rig_modes import base_inertia, base_motion, obstacle_mode, second_mode
-from bayesimpact.trial.rig_parts import Law, Part, Piece, Rates, Site, State
+from bayesimpact.trial.rig_parts import Law, Piece, Rates, RigPart, Site, State
 
 Numbers = Mapping[str, float]
 Contact = Callable[[float, float], float]  # (d, v) -> N
@@ -40,7 +40,7 @@ class Planted:
     per_case: tuple[str, ...] = ()
     optional: tuple[str, ...] = ()
     obstacle: bool = False
-    part: Callable[[Site, Numbers, int], Part] | None = None
+    part: Callable[[Site, Numbers, int], RigPart] | None = None
     site: Callable[[Site, Numbers], Site] | None = None
     probe: Callable[[Probe, Numbers], Probe] | None = None
     chain: Callable[[Chain, Numbers], Chain] | None = None
@@ -56,23 +56,23 @@ def everywhere(law: Law) -> Callable[[Piece], Law]:
     return lambda piece: law
 
 
-def in_contact(force: Contact) -> Part:
+def in_contact(force: Contact) -> RigPart:
     """A force between mass and obstacle, given as a function of indentation and velocity."""
 
     def law(piece: Piece) -> Law | None:
         gap = piece.gap
         return (lambda t, y, v, state: force(y - gap, v)) if piece.contact else None
 
-    return Part(law, in_reaction=True)
+    return RigPart(law, in_reaction=True)
 
 
-def _damping_indentation(site: Site, p: Numbers, slot: int) -> Part:
+def _damping_indentation(site: Site, p: Numbers, slot: int) -> RigPart:
     """Lam d v (Hunt & Crossley 1975)."""
     lam = p["coefficient"]
     return in_contact(lambda d, v: lam * d * v)
 
 
-def _damping_speed(site: Site, p: Numbers, slot: int) -> Part:
+def _damping_speed(site: Site, p: Numbers, slot: int) -> RigPart:
     """B abs(v) v in contact."""
     b = p["coefficient"]
 
@@ -80,22 +80,22 @@ def _damping_speed(site: Site, p: Numbers, slot: int) -> Part:
         signed = b * piece.sign
         return (lambda t, y, v, state: signed * v * v) if piece.contact else None
 
-    return Part(law, in_reaction=True)
+    return RigPart(law, in_reaction=True)
 
 
-def _hardening(site: Site, p: Numbers, slot: int) -> Part:
+def _hardening(site: Site, p: Numbers, slot: int) -> RigPart:
     """K3 d^3."""
     k3 = p["stiffness"]
     return in_contact(lambda d, v: k3 * d * d * d)
 
 
-def _power_law(site: Site, p: Numbers, slot: int) -> Part:
+def _power_law(site: Site, p: Numbers, slot: int) -> RigPart:
     """What k2 d (d / 1 mm)^(n-1) adds to k2 d; odd in d where a unilateral contact goes below 0."""
     k2, power = site.k2, p["exponent"] - 1
     return in_contact(lambda d, v: k2 * d * ((abs(d) / MILLIMETRE) ** power - 1) if d else 0.0)
 
 
-def _hunt_crossley(site: Site, p: Numbers, slot: int) -> Part:
+def _hunt_crossley(site: Site, p: Numbers, slot: int) -> RigPart:
     """K2 d^n (1 + chi v), d in mm, less the k2 d that the site has; its c2 is put to zero."""
     k2, power, chi = site.k2, p["exponent"] - 1, p["damping"]
 
@@ -105,7 +105,7 @@ def _hunt_crossley(site: Site, p: Numbers, slot: int) -> Part:
     return in_contact(force)
 
 
-def _second_stage(site: Site, p: Numbers, slot: int) -> Part:
+def _second_stage(site: Site, p: Numbers, slot: int) -> RigPart:
     """Ks (d - ds) when d > ds."""
     ks, depth = p["stiffness"], p["depth"]
 
@@ -115,10 +115,10 @@ def _second_stage(site: Site, p: Numbers, slot: int) -> Part:
             return None
         return lambda t, y, v, state: ks * (y - edge)
 
-    return Part(law, in_reaction=True, depths=(depth,))
+    return RigPart(law, in_reaction=True, depths=(depth,))
 
 
-def _relaxation(site: Site, p: Numbers, slot: int) -> Part:
+def _relaxation(site: Site, p: Numbers, slot: int) -> RigPart:
     """Maxwell branch: force z, z' = kz v - z/tau in contact, z' = -z/tau in flight."""
     kz, decay = p["stiffness"], 1 / p["time"]
 
@@ -129,16 +129,16 @@ def _relaxation(site: Site, p: Numbers, slot: int) -> Part:
         feed = kz if piece.contact else 0.0
         return lambda t, y, v, state: (feed * v - decay * state[slot],)
 
-    return Part(law, in_reaction=True, states=(0.0,), rates=rates)
+    return RigPart(law, in_reaction=True, states=(0.0,), rates=rates)
 
 
-def _coulomb(site: Site, p: Numbers, slot: int) -> Part:
+def _coulomb(site: Site, p: Numbers, slot: int) -> RigPart:
     """F sign(v), sticking."""
     force = p["force"]
-    return Part(friction=lambda piece: lambda v: force)
+    return RigPart(friction=lambda piece: lambda v: force)
 
 
-def _drag(site: Site, p: Numbers, slot: int) -> Part:
+def _drag(site: Site, p: Numbers, slot: int) -> RigPart:
     """B abs(v) v."""
     b = p["coefficient"]
 
@@ -146,26 +146,26 @@ def _drag(site: Site, p: Numbers, slot: int) -> Part:
         signed = b * piece.sign
         return lambda t, y, v, state: signed * v * v
 
-    return Part(law)
+    return RigPart(law)
 
 
-def _spring_quadratic(site: Site, p: Numbers, slot: int) -> Part:
+def _spring_quadratic(site: Site, p: Numbers, slot: int) -> RigPart:
     kq = p["stiffness"]
-    return Part(everywhere(lambda t, y, v, state: kq * y * y))
+    return RigPart(everywhere(lambda t, y, v, state: kq * y * y))
 
 
-def _spring_cubic(site: Site, p: Numbers, slot: int) -> Part:
+def _spring_cubic(site: Site, p: Numbers, slot: int) -> RigPart:
     k3 = p["stiffness"]
-    return Part(everywhere(lambda t, y, v, state: k3 * y * y * y))
+    return RigPart(everywhere(lambda t, y, v, state: k3 * y * y * y))
 
 
-def _stiffness_drift(site: Site, p: Numbers, slot: int) -> Part:
+def _stiffness_drift(site: Site, p: Numbers, slot: int) -> RigPart:
     """What k1 (1 + r t) adds to k1."""
     growth = site.k1 * p["rate"]
-    return Part(everywhere(lambda t, y, v, state: growth * t * y))
+    return RigPart(everywhere(lambda t, y, v, state: growth * t * y))
 
 
-def _forcing(site: Site, p: Numbers, slot: int) -> Part:
+def _forcing(site: Site, p: Numbers, slot: int) -> RigPart:
     """-A sin(w t + phase)."""
     amplitude, omega, phase = p["amplitude"], 2 * pi * p["frequency"], p["phase"]
     period = 1 / p["frequency"]
@@ -173,20 +173,20 @@ def _forcing(site: Site, p: Numbers, slot: int) -> Part:
     def law(t: float, y: float, v: float, state: State) -> float:
         return -amplitude * sin(omega * t + phase)
 
-    return Part(everywhere(law), period=period)
+    return RigPart(everywhere(law), period=period)
 
 
-def _opposite_stop(site: Site, p: Numbers, slot: int) -> Part:
+def _opposite_stop(site: Site, p: Numbers, slot: int) -> RigPart:
     """Ks (y + gs) when y < -gs."""
     ks, place = p["stiffness"], -p["gap"]
 
     def law(piece: Piece) -> Law | None:
         return None if piece.above(place) else (lambda t, y, v, state: ks * (y - place))
 
-    return Part(law, kinks=(place,))
+    return RigPart(law, kinks=(place,))
 
 
-def _spring_piecewise(site: Site, p: Numbers, slot: int) -> Part:
+def _spring_piecewise(site: Site, p: Numbers, slot: int) -> RigPart:
     """Kp (y + gp) + cp v when y < -gp."""
     kp, place, cp = p["stiffness"], -p["gap"], p["damping"]
 
@@ -195,21 +195,21 @@ def _spring_piecewise(site: Site, p: Numbers, slot: int) -> Part:
             return None
         return lambda t, y, v, state: kp * (y - place) + cp * v
 
-    return Part(law, kinks=(place,))
+    return RigPart(law, kinks=(place,))
 
 
-def _pendulum(site: Site, p: Numbers, slot: int) -> Part:
+def _pendulum(site: Site, p: Numbers, slot: int) -> RigPart:
     """What K sin y adds to K y; K is k1 for a plain pendulum."""
     weight = p.get("stiffness", site.k1)
-    return Part(everywhere(lambda t, y, v, state: weight * (sin(y) - y)))
+    return RigPart(everywhere(lambda t, y, v, state: weight * (sin(y) - y)))
 
 
-def _spring_quintic(site: Site, p: Numbers, slot: int) -> Part:
+def _spring_quintic(site: Site, p: Numbers, slot: int) -> RigPart:
     k5 = p["stiffness"]
-    return Part(everywhere(lambda t, y, v, state: k5 * y**5))
+    return RigPart(everywhere(lambda t, y, v, state: k5 * y**5))
 
 
-def _power_damping(site: Site, p: Numbers, slot: int) -> Part:
+def _power_damping(site: Site, p: Numbers, slot: int) -> RigPart:
     """C abs(v)^n sign(v)."""
     c, exponent = p["coefficient"], p["exponent"]
 
@@ -217,10 +217,10 @@ def _power_damping(site: Site, p: Numbers, slot: int) -> Part:
         sign = piece.sign
         return lambda t, y, v, state: sign * c * max(sign * v, 0.0) ** exponent
 
-    return Part(law)
+    return RigPart(law)
 
 
-def _structural_damping(site: Site, p: Numbers, slot: int) -> Part:
+def _structural_damping(site: Site, p: Numbers, slot: int) -> RigPart:
     """H k1 abs(y) sign(v)."""
     share = p["loss"] * site.k1
 
@@ -229,10 +229,10 @@ def _structural_damping(site: Site, p: Numbers, slot: int) -> Part:
         signed = share * (piece.sign or -side) * side  # at rest it helps to hold against the spring
         return lambda t, y, v, state: signed * y
 
-    return Part(law, kinks=(0.0,))
+    return RigPart(law, kinks=(0.0,))
 
 
-def _bouc_wen(site: Site, p: Numbers, slot: int) -> Part:
+def _bouc_wen(site: Site, p: Numbers, slot: int) -> RigPart:
     """Force a z, z' = v - b abs(v) z, from the share `start` of 1 / b on."""
     stiffness, decay = p["stiffness"], p["decay"]
 
@@ -241,10 +241,10 @@ def _bouc_wen(site: Site, p: Numbers, slot: int) -> Part:
         return lambda t, y, v, state: (v * (1 - signed * state[slot]),)
 
     law = everywhere(lambda t, y, v, state: stiffness * state[slot])
-    return Part(law, states=(p.get("start", 0.0) / decay if decay else 0.0,), rates=rates)
+    return RigPart(law, states=(p.get("start", 0.0) / decay if decay else 0.0,), rates=rates)
 
 
-def _presliding(site: Site, p: Numbers, slot: int) -> Part:
+def _presliding(site: Site, p: Numbers, slot: int) -> RigPart:
     """Dahl's friction: force F u, u' = v (1 - u sign(v)) / x, from u = `start` on."""
     force, way = p["force"], p["displacement"]
 
@@ -253,7 +253,7 @@ def _presliding(site: Site, p: Numbers, slot: int) -> Part:
         return lambda t, y, v, state: (v * (1 - sign * state[slot]) / way,)
 
     law = everywhere(lambda t, y, v, state: force * state[slot])
-    return Part(law, states=(p.get("start", 0.0),), rates=rates)
+    return RigPart(law, states=(p.get("start", 0.0),), rates=rates)
 
 
 def _smoothing(chain: Chain, p: Numbers) -> Chain:

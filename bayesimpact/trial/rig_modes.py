@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 from math import pi
 
-from bayesimpact.trial.rig_parts import Law, Part, Piece, Rates, Site, State
+from bayesimpact.trial.rig_parts import Law, Piece, Rates, RigPart, Site, State
 
 
-def second_mode(site: Site, p: Mapping[str, float], slot: int) -> Part:
+def second_mode(site: Site, p: Mapping[str, float], slot: int) -> RigPart:
     """q'' + 2 z w q' + w^2 q = b F, F between obstacle and mass; the probe sees y + q."""
     omega = 2 * pi * p["frequency"]
     drag, stiffness, gain = 2 * p["damping"] * omega, omega**2, p["gain"]
@@ -21,10 +21,10 @@ def second_mode(site: Site, p: Mapping[str, float], slot: int) -> Part:
     def struck(state: State, impulse: float) -> None:
         state[slot + 1] += gain * impulse
 
-    return Part(states=(0.0, 0.0), heard=heard, struck=struck, seen=(slot,))
+    return RigPart(states=(0.0, 0.0), heard=heard, struck=struck, seen=(slot,))
 
 
-def obstacle_mode(site: Site, p: Mapping[str, float], slot: int) -> Part:
+def obstacle_mode(site: Site, p: Mapping[str, float], slot: int) -> RigPart:
     """A mass on a spring and a damper inside the obstacle; they move with it in contact."""
     omega, mass = 2 * pi * p["frequency"], p["mass"]
     drag, stiffness = 2 * p["damping"] * omega, omega**2
@@ -47,7 +47,7 @@ def obstacle_mode(site: Site, p: Mapping[str, float], slot: int) -> Part:
 
         return change
 
-    return Part(law, in_reaction=True, states=(0.0, 0.0), rates=rates, period=1 / p["frequency"])
+    return RigPart(law, in_reaction=True, states=(0.0, 0.0), rates=rates, period=1 / p["frequency"])
 
 
 def base_inertia(site: Site, p: Mapping[str, float]) -> Site:
@@ -55,7 +55,7 @@ def base_inertia(site: Site, p: Mapping[str, float]) -> Site:
     return replace(site, mass=site.mass / (1 + p["mass_ratio"]))
 
 
-def base_motion(site: Site, p: Mapping[str, float], slot: int) -> Part:
+def base_motion(site: Site, p: Mapping[str, float], slot: int) -> RigPart:
     """The frame's displacement X and its velocity; `site.mass` is m / (1 + r) already."""
     omega, ratio, left = 2 * pi * p["frequency"], p["mass_ratio"], site.mass
     drag, stiffness = 2 * p["damping"] * omega, omega**2
@@ -73,4 +73,4 @@ def base_motion(site: Site, p: Mapping[str, float], slot: int) -> Part:
     def law(piece: Piece) -> Law:
         return lambda t, y, v, state: -left * hold(state)
 
-    return Part(law, states=(0.0, 0.0), felt=felt, struck=struck, period=1 / p["frequency"])
+    return RigPart(law, states=(0.0, 0.0), felt=felt, struck=struck, period=1 / p["frequency"])

@@ -29,7 +29,7 @@ from scipy.optimize import brentq
 
 from bayesimpact.errors import SimulationError
 from bayesimpact.trial.rig_balance import Balance, balance
-from bayesimpact.trial.rig_parts import Part, Piece, Site, State
+from bayesimpact.trial.rig_parts import Piece, RigPart, Site, State
 
 _FLIGHT, _CONTACT, _RELEASED = range(3)  # released: left by a unilateral obstacle, still above g
 _TURN, _SURFACE, _REACTION, _SLIP = range(4)
@@ -41,7 +41,7 @@ _STALLS = 50  # pieces in a row that may last less than a femtosecond before giv
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class RigMotion:
     """The true motion at the sampling instants.
 
     Attributes
@@ -64,12 +64,12 @@ class Motion:
 
 def move(
     site: Site,
-    parts: tuple[Part, ...],
+    parts: tuple[RigPart, ...],
     times: NDArray[np.float64],
     *,
     rtol: float = 1e-12,
     atol: float = 1e-14,
-) -> Motion:
+) -> RigMotion:
     """Integrate the motion of `site` with `parts` added, from t = 0 to the last of `times`.
 
     Parameters
@@ -88,7 +88,7 @@ def move(
         tuple(t for t in instants if t <= run.end) for instants in (run.touches, run.leaves)
     )
     y, v, a = run.samples
-    return Motion(times, y, v, a, touches, leaves)
+    return RigMotion(times, y, v, a, touches, leaves)
 
 
 class _Run:
@@ -97,7 +97,7 @@ class _Run:
     def __init__(
         self,
         site: Site,
-        parts: tuple[Part, ...],
+        parts: tuple[RigPart, ...],
         times: NDArray[np.float64],
         rtol: float,
         atol: float,
@@ -333,4 +333,4 @@ def sampling(rate: float, duration: float) -> NDArray[np.float64]:
     return np.arange(round(rate * duration)) / rate
 
 
-__all__ = ["Motion", "move", "sampling"]
+__all__ = ["RigMotion", "move", "sampling"]

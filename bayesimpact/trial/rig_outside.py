@@ -9,10 +9,10 @@ from collections.abc import Callable, Mapping
 from math import exp, pi, sin
 
 from bayesimpact.trial.rig_catalogue import Numbers, Planted, everywhere, in_contact
-from bayesimpact.trial.rig_parts import Law, Part, Piece, Rates, Site, State
+from bayesimpact.trial.rig_parts import Law, Piece, Rates, RigPart, Site, State
 
 
-def _detent(site: Site, p: Numbers, slot: int) -> Part:
+def _detent(site: Site, p: Numbers, slot: int) -> RigPart:
     """Magnetic detent: pulls towards `place` with `stiffness` x exp(-x^2/width^2)."""
     stiffness, place, scale = p["stiffness"], p["place"], 1 / p["width"] ** 2
 
@@ -20,14 +20,14 @@ def _detent(site: Site, p: Numbers, slot: int) -> Part:
         x = y - place
         return stiffness * x * exp(-x * x * scale)
 
-    return Part(everywhere(law))
+    return RigPart(everywhere(law))
 
 
 def _inside(piece: Piece, low: float, high: float) -> bool:
     return piece.above(low) and not piece.above(high)
 
 
-def _friction_pad(site: Site, p: Numbers, slot: int) -> Part:
+def _friction_pad(site: Site, p: Numbers, slot: int) -> RigPart:
     """Stribeck friction from `low` to `high`: (force + extra exp(-v^2/speed^2)) sign(v)."""
     force, extra, scale = p["force"], p["extra"], 1 / p["speed"] ** 2
     low, high = p["low"], p["high"]
@@ -37,20 +37,20 @@ def _friction_pad(site: Site, p: Numbers, slot: int) -> Part:
             return None
         return lambda v: force + extra * exp(-v * v * scale)
 
-    return Part(friction=friction, kinks=(low, high))
+    return RigPart(friction=friction, kinks=(low, high))
 
 
-def _damping_bump(site: Site, p: Numbers, slot: int) -> Part:
+def _damping_bump(site: Site, p: Numbers, slot: int) -> RigPart:
     """Damping near one place: `coefficient` exp(-(y - place)^2/width^2) v."""
     coefficient, place, scale = p["coefficient"], p["place"], 1 / p["width"] ** 2
 
     def law(t: float, y: float, v: float, state: State) -> float:
         return coefficient * exp(-((y - place) ** 2) * scale) * v
 
-    return Part(everywhere(law))
+    return RigPart(everywhere(law))
 
 
-def _eddy_brake(site: Site, p: Numbers, slot: int) -> Part:
+def _eddy_brake(site: Site, p: Numbers, slot: int) -> RigPart:
     """Viscous brake that acts between `low` and `high` only."""
     coefficient, low, high = p["coefficient"], p["low"], p["high"]
 
@@ -59,10 +59,10 @@ def _eddy_brake(site: Site, p: Numbers, slot: int) -> Part:
             return None
         return lambda t, y, v, state: coefficient * v
 
-    return Part(law, kinks=(low, high))
+    return RigPart(law, kinks=(low, high))
 
 
-def _resonator(site: Site, p: Numbers, slot: int) -> Part:
+def _resonator(site: Site, p: Numbers, slot: int) -> RigPart:
     """A loose part of `mass` on a spring and a damper; starts where and as fast as the mass."""
     mass = p["mass"]
     spring = mass * (2 * pi * p["frequency"]) ** 2
@@ -75,28 +75,28 @@ def _resonator(site: Site, p: Numbers, slot: int) -> Part:
         return lambda t, y, v, state: (state[slot + 1], pull(y, v, state) / mass)
 
     law = everywhere(lambda t, y, v, state: pull(y, v, state))
-    return Part(law, states=(site.y0, site.v0), rates=rates)
+    return RigPart(law, states=(site.y0, site.v0), rates=rates)
 
 
-def _damping_drift(site: Site, p: Numbers, slot: int) -> Part:
+def _damping_drift(site: Site, p: Numbers, slot: int) -> RigPart:
     """Damping that grows with time: c1 (1 + r t)."""
     growth = site.c1 * p["rate"]
-    return Part(everywhere(lambda t, y, v, state: growth * t * v))
+    return RigPart(everywhere(lambda t, y, v, state: growth * t * v))
 
 
-def _contact_friction(site: Site, p: Numbers, slot: int) -> Part:
+def _contact_friction(site: Site, p: Numbers, slot: int) -> RigPart:
     """Rubbing against the obstacle: force sign(v) in contact; not a part of its normal reaction."""
     force = p["force"]
-    return Part(friction=lambda piece: (lambda v: force) if piece.contact else None)
+    return RigPart(friction=lambda piece: (lambda v: force) if piece.contact else None)
 
 
-def _contact_preload(site: Site, p: Numbers, slot: int) -> Part:
+def _contact_preload(site: Site, p: Numbers, slot: int) -> RigPart:
     """A constant force in contact: the obstacle rests on a support with this force."""
     force = p["force"]
     return in_contact(lambda d, v: force)
 
 
-def _knock(site: Site, p: Numbers, slot: int) -> Part:
+def _knock(site: Site, p: Numbers, slot: int) -> RigPart:
     """A knock on the frame: half a sine of `impulse` (N s) from `time` on, `width` long."""
     start, width = p["time"], p["width"]
     peak = p["impulse"] * pi / (2 * width)
@@ -105,7 +105,7 @@ def _knock(site: Site, p: Numbers, slot: int) -> Part:
         inside = start <= t <= start + width
         return -peak * sin(pi * (t - start) / width) if inside else 0.0
 
-    return Part(everywhere(law), times=(start, start + width), period=2 * width)
+    return RigPart(everywhere(law), times=(start, start + width), period=2 * width)
 
 
 OUTSIDE: Mapping[str, Planted] = {

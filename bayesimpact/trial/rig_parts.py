@@ -50,7 +50,7 @@ class Piece:
 
 
 @dataclass(frozen=True)
-class Part:
+class RigPart:
     """Something added to the base oscillator; what it does not have stays at its default.
 
     Attributes
@@ -64,7 +64,7 @@ class Part:
     rates : Piece -> time derivatives of the own states
     heard : in place of `rates`, where the states follow the force between obstacle and mass
     felt : in place of `rates`, where the states follow the acceleration of the mass
-    struck : (state, impulse of the obstacle on the mass, N s) changes the own states at a touch
+    struck : (state, impulse of the obstacle on the mass, N s) changes own states at contact onset
     seen : positions in the state of what the probe sees beside the mass
     kinks : displacements at which the law is not smooth, m
     depths : the same, counted from the current gap, m

@@ -9,10 +9,10 @@ from collections.abc import Mapping
 from math import exp
 
 from bayesimpact.trial.rig_catalogue import Numbers, Planted, in_contact
-from bayesimpact.trial.rig_parts import Part, Site
+from bayesimpact.trial.rig_parts import RigPart, Site
 
 
-def _contact_bump(site: Site, p: Numbers, slot: int) -> Part:
+def _contact_bump(site: Site, p: Numbers, slot: int) -> RigPart:
     """A narrow rise of the obstacle's force: `force` exp(-(d - depth)^2/width^2) in contact."""
     force, depth, scale = p["force"], p["depth"], 1 / p["width"] ** 2
     return in_contact(lambda d, v: force * exp(-((d - depth) ** 2) * scale))

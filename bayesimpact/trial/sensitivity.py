@@ -29,7 +29,7 @@ from bayesimpact.inference.prior import LogUniform, Normal, Prior
 from bayesimpact.inference.priors import Priors
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.oscillator import build_oscillator
-from bayesimpact.trial.designs import Design
+from bayesimpact.trial.designs import DrawnRig
 from bayesimpact.trial.rig import Effects, record
 from bayesimpact.trial.rig_chain import Probe, measure
 from bayesimpact.trial.rig_motion import sampling
@@ -41,7 +41,7 @@ RTOL, ATOL = 1e-9, 1e-11  # of the rig's motion: errors far below the noise, at 
 WIDE = 1e3  # prior widths relative to the true values: no information
 
 
-def clean_readings(design: Design, effects: Effects) -> tuple[Array, ...]:
+def clean_readings(design: DrawnRig, effects: Effects) -> tuple[Array, ...]:
     """What the chain would record without noise and rounding, per recording (n,), m."""
     chain = replace(design.chain, noise=0.0, rounding=0.0)
     rng = np.random.default_rng(0)  # multiplied by a noise of zero
@@ -61,7 +61,7 @@ def clean_readings(design: Design, effects: Effects) -> tuple[Array, ...]:
     )
 
 
-def true_parameters(design: Design) -> dict[str, float]:
+def true_parameters(design: DrawnRig) -> dict[str, float]:
     """Base parameters and nuisances by the package's names, SI."""
     rig = design.rig
     values = {"c1": rig.c1, "k1": rig.k1}
@@ -74,7 +74,7 @@ def true_parameters(design: Design) -> dict[str, float]:
     return values
 
 
-def truth_of_rig(settings: Settings, seed: int, kind: str, design: Design) -> dict[str, Any]:
+def truth_of_rig(settings: Settings, seed: int, kind: str, design: DrawnRig) -> dict[str, Any]:
     """What every trial's truth says of its rig and recordings."""
     return {
         "schema": "bayesimpact/trial-truth/1",
@@ -113,7 +113,7 @@ class Rival:
 class Sensitivity:
     """Measures planted effects against what one design can detect."""
 
-    def __init__(self, design: Design, rng: np.random.Generator) -> None:
+    def __init__(self, design: DrawnRig, rng: np.random.Generator) -> None:
         self.design = design
         self.clean = clean_readings(design, {})
         self.fit = _fit(design, _noisy(design, self.clean, rng))
@@ -159,21 +159,21 @@ class Sensitivity:
         return x
 
 
-def misfit(design: Design, readings: Sequence[Array]) -> Array:
+def misfit(design: DrawnRig, readings: Sequence[Array]) -> Array:
     """What the base model, fitted to readings, leaves of them, (N,), in standard deviations."""
     fit = _fit(design, readings)
     left = np.concatenate([part.residual for part in fit.linearisation])
     return np.asarray(left / design.chain.noise)
 
 
-def _noisy(design: Design, clean: Sequence[Array], rng: np.random.Generator) -> list[Array]:
+def _noisy(design: DrawnRig, clean: Sequence[Array], rng: np.random.Generator) -> list[Array]:
     """Readings with the chain's noise."""
     chain = replace(design.chain, offsets={}, rounding=0.0)
     times = sampling(design.rate, design.duration)
     return [c + measure(np.zeros(times.size), times, Probe(), chain, "", rng) for c in clean]
 
 
-def _fit(design: Design, readings: Sequence[Array]) -> Fit:
+def _fit(design: DrawnRig, readings: Sequence[Array]) -> Fit:
     """The base model fitted to readings, from the true parameters on."""
     recordings = tuple(
         Recording(release.name, release.case, reading, 1 / design.rate, quantity=design.quantity)
@@ -190,7 +190,7 @@ def _fit(design: Design, readings: Sequence[Array]) -> Fit:
     return find_mode(target, np.array([truth[name] for name in oscillator.layout.names]))
 
 
-def _wide(name: str, value: float, design: Design) -> Prior:
+def _wide(name: str, value: float, design: DrawnRig) -> Prior:
     if name == "sigma":
         return LogUniform(value / WIDE, value * WIDE)
     scales = {"v0": design.speed, "y0": design.amplitude, "offset": design.amplitude}

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.errors import BayesimpactError
-from bayesimpact.trial.planted_effects import PLANTED_EFFECTS, Form, PlantedEffect
+from bayesimpact.trial.planted_effects import PLANTED_EFFECTS, EffectForm, PlantedEffect
 from bayesimpact.trial.planted_outside import OUTSIDE_EFFECTS
 from bayesimpact.trial.rig import Parameters
 from bayesimpact.trial.sensitivity import Sensitivity
@@ -56,7 +56,7 @@ class Sized:
     numbers: Parameters
     strength: float
     score: float
-    form: Form
+    form: EffectForm
     entry: PlantedEffect
     distinct: float | None = None
     nearest: str | None = None
@@ -67,13 +67,13 @@ def planted_effect_of(effect: str) -> PlantedEffect:
     return PLANTED_EFFECTS.get(effect) or OUTSIDE_EFFECTS[effect]
 
 
-def placed(sensitivity: Sensitivity, effect: str, form: Form, size: float) -> Placed:
+def placed(sensitivity: Sensitivity, effect: str, form: EffectForm, size: float) -> Placed:
     """The effect at a given size."""
     response = sensitivity.response({effect: form.build(size)}, form.reference)
     return Placed(size, float(np.linalg.norm(response)), response)
 
 
-def sized(sensitivity: Sensitivity, effect: str, form: Form, strength: float) -> Placed:
+def sized(sensitivity: Sensitivity, effect: str, form: EffectForm, strength: float) -> Placed:
     """The effect at `strength` detection limits; at its only size when it is on or off."""
     size = solve(lambda s: placed(sensitivity, effect, form, s).score, form, LIMIT * strength)
     return placed(sensitivity, effect, form, size)
@@ -139,7 +139,7 @@ def _own_share(found: Sequence[Placed], ids: Sequence[str]) -> float:
     return float(np.sqrt(1 - cosine**2))
 
 
-def solve(score: Callable[[float], float], form: Form, target: float) -> float:
+def solve(score: Callable[[float], float], form: EffectForm, target: float) -> float:
     """Size whose score is `target`: a power of the size, near enough, found as we go."""
     size = form.start
     if size == 0:

@@ -21,8 +21,8 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import BayesimpactError, InputError, SimulationError
 from bayesimpact.inference.identify import identify
-from bayesimpact.trial.designs import Design, log_uniform
-from bayesimpact.trial.drawn import Drawn
+from bayesimpact.trial.designs import DrawnRig, log_uniform
+from bayesimpact.trial.drawn import DrawnTrial
 from bayesimpact.trial.identifiable import stand_outs
 from bayesimpact.trial.rig import record
 from bayesimpact.trial.sensitivity import clean_readings, truth_of_rig
@@ -55,7 +55,7 @@ MOST = 4  # effects in one trial
 REST = (0.3, 2.0)  # duration of a rest segment, free periods
 
 
-def draw_strong(settings: Settings, seed: int) -> Drawn:
+def draw_strong(settings: Settings, seed: int) -> DrawnTrial:
     """Draw the trial of one seed; kinds come in turn, and rigs with, without a stop, pendulums.
 
     Raises
@@ -78,7 +78,7 @@ def draw_strong(settings: Settings, seed: int) -> Drawn:
 
 def _attempt(
     settings: Settings, seed: int, kind: str, group: str, thrown: Mapping[str, int], rng: Rng
-) -> Drawn:
+) -> DrawnTrial:
     resting = bool(rng.random() < settings.rest)
     rig_kind = str(rng.choice([b for b in GROUPS[group] if b in settings.rig_kinds]))
     design = draw_rig(rig_kind, str(rng.choice(settings.noises)), rng)
@@ -114,10 +114,10 @@ def _attempt(
     }
     for planted, size in zip(truth["planted"], own, strict=True):
         planted["strength"] = size / noise / LIMIT
-    return Drawn(campaign, truth)
+    return DrawnTrial(campaign, truth)
 
 
-def _ids(settings: Settings, kind: str, design: Design, resting: bool, rng: Rng) -> list[str]:
+def _ids(settings: Settings, kind: str, design: DrawnRig, resting: bool, rng: Rng) -> list[str]:
     """Effects of the trial: at most one of a sort, the force outside the catalogue last."""
     count = int(rng.integers(2, MOST + 1))
     pendulum = is_pendulum(design.rig_kind)
@@ -148,14 +148,14 @@ def _ids(settings: Settings, kind: str, design: Design, resting: bool, rng: Rng)
 
 
 def _fit(
-    names: tuple[str, ...], entries: Mapping[str, Any], design: Design, resting: bool
+    names: tuple[str, ...], entries: Mapping[str, Any], design: DrawnRig, resting: bool
 ) -> list[str]:
     """Those that this rig can show."""
     cases, recordings = len(design.rig.k2), len(design.releases)
     return [e for e in names if entries[e].fits(cases, recordings) and not (resting and e in TIMED)]
 
 
-def _rivals(design: Design, ids: list[str], rng: Rng) -> dict[str, Any]:
+def _rivals(design: DrawnRig, ids: list[str], rng: Rng) -> dict[str, Any]:
     """Every other effect of the catalogue that this rig can show, each a little of it."""
     slots = {s for e in ids if e in CATALOGUE_STRONG for s in CATALOGUE_STRONG[e].slots}
     result = {}
@@ -168,7 +168,7 @@ def _rivals(design: Design, ids: list[str], rng: Rng) -> dict[str, Any]:
     return result
 
 
-def base_misfit(design: Design, readings: tuple[Array, ...]) -> float:
+def base_misfit(design: DrawnRig, readings: tuple[Array, ...]) -> float:
     """Rms of what the base model leaves of readings without noise, m or rad.
 
     The fit is the one that every command begins with; a little white noise is added for it, for it
@@ -183,7 +183,7 @@ def base_misfit(design: Design, readings: tuple[Array, ...]) -> float:
     return float(np.sqrt(max(rms**2 - small**2, 0.0)))
 
 
-def _rests(design: Design, rng: Rng) -> dict[str, float]:
+def _rests(design: DrawnRig, rng: Rng) -> dict[str, float]:
     """Seconds at rest before the release, for every recording."""
     period = 2 * np.pi / design.omega
     return {
@@ -193,7 +193,7 @@ def _rests(design: Design, rng: Rng) -> dict[str, float]:
 
 
 def _recorded(
-    design: Design, effects: Mapping[str, Any], rests: Mapping[str, float], rng: Rng
+    design: DrawnRig, effects: Mapping[str, Any], rests: Mapping[str, float], rng: Rng
 ) -> Campaign:
     samples = [
         record(
@@ -205,7 +205,7 @@ def _recorded(
     return _campaign(design, samples)
 
 
-def _campaign(design: Design, samples: list[Array]) -> Campaign:
+def _campaign(design: DrawnRig, samples: list[Array]) -> Campaign:
     quantity = "angle" if is_pendulum(design.rig_kind) else "displacement"
     recordings = tuple(
         Recording(r.name, r.case, s, 1 / design.rate, quantity=quantity)  # type: ignore[arg-type]
@@ -215,7 +215,7 @@ def _campaign(design: Design, samples: list[Array]) -> Campaign:
 
 
 def _truth(
-    settings: Settings, seed: int, kind: str, design: Design, found: list[Chosen]
+    settings: Settings, seed: int, kind: str, design: DrawnRig, found: list[Chosen]
 ) -> dict[str, Any]:
     return {
         **truth_of_rig(settings, seed, kind, design),

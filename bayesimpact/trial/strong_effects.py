@@ -1,7 +1,7 @@
 """What the strong trials plant: the catalogue in sorts, of which one trial holds at most one each.
 
 Effects of one sort look so alike in a decay that two of them at once are one effect in practice.
-Sizes are a share of the size beyond which the effect is no longer physical (`Form.largest`).
+Sizes are a share of the size beyond which the effect is no longer physical (`EffectForm.largest`).
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesimpact.model.effects import UNTRIED
-from bayesimpact.trial.designs import Design, Range, log_uniform
-from bayesimpact.trial.planted_effects import PLANTED_EFFECTS, Form, PlantedEffect
+from bayesimpact.trial.designs import DrawnRig, Range, log_uniform
+from bayesimpact.trial.planted_effects import PLANTED_EFFECTS, EffectForm, PlantedEffect
 from bayesimpact.trial.planted_outside import OUTSIDE_EFFECTS
 
 Rng = np.random.Generator
@@ -56,18 +56,18 @@ TIMED = ("stiffness_drift", "sensor_drift", "damping_drift", "knock")
 """Effects that count time from the first sample: none in a recording that begins at rest."""
 
 
-def _pendulum(design: Design, rng: Rng) -> Form:
+def _pendulum(design: DrawnRig, rng: Rng) -> EffectForm:
     """A plain pendulum: all of the linear stiffness is gravity's."""
     k1 = design.rig.k1
-    return Form(lambda size: {"stiffness": size}, 1e-4 * k1, largest=k1)
+    return EffectForm(lambda size: {"stiffness": size}, 1e-4 * k1, largest=k1)
 
 
-def _bump(design: Design, rng: Rng) -> Form:
+def _bump(design: DrawnRig, rng: Rng) -> EffectForm:
     depth = design.indentation * rng.uniform(0.3, 0.7)
     width = design.indentation * rng.uniform(0.03, 0.08)
     force = 0.1 * design.contact_stiffness * design.indentation
     place = design.rig.g + depth
-    return Form(
+    return EffectForm(
         lambda size: {"force": size, "depth": depth, "width": width},
         1e-3 * force,
         place=(place - 1.5 * width, place + 1.5 * width),
@@ -101,13 +101,13 @@ class Chosen:
     """An effect with its shape and size drawn."""
 
     effect: str
-    form: Form
+    form: EffectForm
     size: float
     entry: PlantedEffect
     outside: bool
 
 
-def chosen(effect: str, design: Design, rng: Rng) -> Chosen:
+def chosen(effect: str, design: DrawnRig, rng: Rng) -> Chosen:
     """Draw shape and size of one effect; a pendulum's gravity has its only size."""
     outside = effect in STRONG_OUTSIDE
     entry = STRONG_OUTSIDE[effect] if outside else CATALOGUE_STRONG[effect]

@@ -14,7 +14,7 @@ from math import sqrt
 import numpy as np
 
 from bayesimpact.data.campaign import Measurement
-from bayesimpact.trial.designs import Design, Range, RigDesign, draw_rig_design
+from bayesimpact.trial.designs import DrawnRig, Range, RigDesign, draw_rig_design
 from bayesimpact.trial.rig_chain import Chain
 
 _DAMPING = (2e-3, 2e-2)
@@ -69,7 +69,7 @@ def is_pendulum(rig_kind: str) -> bool:
     return rig_kind in GROUPS["pendulum"]
 
 
-def draw_rig(rig_kind: str, noise_kind: str, rng: np.random.Generator) -> Design:
+def draw_rig(rig_kind: str, noise_kind: str, rng: np.random.Generator) -> DrawnRig:
     """A rig, its releases and rest readings; what noise there is will be set by `with_noise`."""
     kind = "white" if is_pendulum(rig_kind) else noise_kind
     design = draw_rig_design(rig_kind, kind, rng, STRONG_RIGS)
@@ -78,7 +78,7 @@ def draw_rig(rig_kind: str, noise_kind: str, rng: np.random.Generator) -> Design
     return replace(design, noise_kind="encoder")
 
 
-def noise_range(design: Design) -> Range:
+def noise_range(design: DrawnRig) -> Range:
     """Smallest and largest standard deviation of the noise that the probe may have, m or rad."""
     if is_pendulum(design.rig_kind):
         return STEPS[0] * ENCODER_SD, STEPS[1] * ENCODER_SD
@@ -86,7 +86,7 @@ def noise_range(design: Design) -> Range:
     return low * design.amplitude, high * design.amplitude
 
 
-def with_noise(design: Design, noise: float) -> Design:
+def with_noise(design: DrawnRig, noise: float) -> DrawnRig:
     """The same rig with noise of this standard deviation in all, m or rad; an encoder's steps."""
     old = design.chain
     offsets = {name: value * noise / old.noise for name, value in old.offsets.items()}

@@ -23,7 +23,7 @@ from bayesimpact.diagnosis.scan import scan
 from bayesimpact.diagnosis.thresholds import DECISIVE, p_value_of
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.trial.bundle import PAPER_HEIGHTS, PAPER_RIG
-from bayesimpact.trial.designs import Design
+from bayesimpact.trial.designs import DrawnRig
 from bayesimpact.trial.planted_effects import PLANTED_EFFECTS
 from bayesimpact.trial.rig import Release
 from bayesimpact.trial.rig_chain import Chain
@@ -74,7 +74,7 @@ class Power:
         return float(self.limit * strength ** (1 / self.exponent))
 
 
-def bundled_design(recordings: int = 9) -> Design:
+def bundled_design(recordings: int = 9) -> DrawnRig:
     """The bundled rig and its chain with any number of recordings, obstacles in turn."""
     releases = []
     for i in range(recordings):
@@ -82,7 +82,7 @@ def bundled_design(recordings: int = 9) -> Design:
         height = PAPER_HEIGHTS[i // 3 % 3][1] * (1 - 0.02 * (i // 9))
         releases.append(Release(f"case{case}_{i // 3 + 1}", case, height, 1e-3 * (-1) ** i))
     chain = Chain(noise=5e-6, offsets={r.name: 1e-5 * (-1) ** i for i, r in enumerate(releases)})
-    return Design("paper", "white", PAPER_RIG, tuple(releases), 1000.0, 6.0, chain, Measurement())
+    return DrawnRig("paper", "white", PAPER_RIG, tuple(releases), 1000.0, 6.0, chain, Measurement())
 
 
 def critical_score(sensitivity: Sensitivity, rng: np.random.Generator) -> float:

@@ -31,7 +31,7 @@ from benchmarks.record import stored
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.recording import Recording
-from bayesimpact.design.candidates import Design
+from bayesimpact.design.candidates import PlannedRecording
 from bayesimpact.design.hypotheses import Rivalry, rivalry
 from bayesimpact.design.rank import Z90, Proposal, proposals
 from bayesimpact.diagnosis.diagnose import diagnose
@@ -65,7 +65,9 @@ LARGEST = 50.0
 Row = dict[str, Any]
 
 
-def recorded(truth: Mapping[str, Any], design: Design, rng: np.random.Generator) -> Recording:
+def recorded(
+    truth: Mapping[str, Any], design: PlannedRecording, rng: np.random.Generator
+) -> Recording:
     """The rig's recording of a design, released by hand as the trial's others."""
     p = truth["parameters"]
     k2 = {name[3:-1]: value for name, value in p.items() if name.startswith("k2[")}
@@ -179,7 +181,7 @@ def summary(rows: Sequence[Row]) -> Row:
         h for row in open_ for a in row["arms"].values() for h in a.get("halves", {}).values()
     ]
     known = np.log([[b / a, b / o] for b, a, o in halves if o]).reshape(-1, 2)
-    if len(known):  # how much narrower k2 became, in logarithms, over what was foretold
+    if len(known):  # how much narrower k2 became, in logarithms, over what was predicted
         ratio = known[:, 1] / known[:, 0]
         result["narrowing"] = {"median": float(np.median(ratio)), "intervals": len(known)}
     both = pairs(open_)

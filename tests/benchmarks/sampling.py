@@ -21,7 +21,7 @@ from bayesimpact.inference.convergence import (
     effective_sizes,
     quiet_arviz,
 )
-from bayesimpact.inference.ensemble import Target, random_streams, start
+from bayesimpact.inference.ensemble import WhitenedDensity, random_streams, start
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.posterior import sample
 from bayesimpact.inference.prior import LogUniform, Uniform
@@ -59,13 +59,13 @@ class Sampled:
     times: float | None = None
 
 
-def whitened(fit: Fit) -> Target:
+def whitened(fit: Fit) -> WhitenedDensity:
     """The log posterior as a function of u."""
     target = fit.target
     bounds = np.array([(p.lower, p.upper) for p in target.oscillator.layout.parameters])
     lower = np.maximum(bounds[:, 0], target.priors.lower)
     upper = np.minimum(bounds[:, 1], target.priors.upper)
-    return Target(target, fit.mode, cholesky(fit.covariance), lower, upper)
+    return WhitenedDensity(target, fit.mode, cholesky(fit.covariance), lower, upper)
 
 
 def moments(draws: Array) -> tuple[Array, Array, Array, Array, Array]:
@@ -84,7 +84,7 @@ def moments(draws: Array) -> tuple[Array, Array, Array, Array, Array]:
     return mean, sd, sd / np.sqrt(sizes[0]), sd / np.sqrt(2.0 * sizes[1]), bulk
 
 
-def in_theta(target: Target, u: Array) -> Array:
+def in_theta(target: WhitenedDensity, u: Array) -> Array:
     """Draws (..., d) in parameters instead of u."""
     return target.theta(u.reshape(-1, u.shape[-1])).reshape(u.shape)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bayesimpact.data.campaign import Campaign
-from bayesimpact.data.draft import Rig, draft, looks_at
+from bayesimpact.data.draft import DraftedRig, draft, looks_at
 from bayesimpact.data.quantity import QUANTITIES, reading_unit, unit_of
 from bayesimpact.data.read import load_campaign
 from bayesimpact.errors import InputError
@@ -65,7 +65,7 @@ def test_a_label_in_brackets_and_a_choice_by_quantity(tmp_path):
         (folder / "campaign.toml").write_text(entry + f'quantity = "{quantity}"\n')
         (recording,) = load_campaign(folder).recordings
         np.testing.assert_allclose(recording.samples, WAVE * factor, rtol=1e-8)
-    made = draft("t", looks_at(folder, [folder / "a.txt"]), Rig(mass=1.0, stop=False))
+    made = draft("t", looks_at(folder, [folder / "a.txt"]), DraftedRig(mass=1.0, stop=False))
     assert 'quantity = "velocity"' in made.toml and not made.needed
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bayesimpact.design.hypotheses import Hypothesis, Rivalry, releases
+from bayesimpact.design.hypotheses import FittedModel, Rivalry, releases
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.refit import Candidate, base_candidate, refit
 from bayesimpact.diagnosis.scan import scan
@@ -35,7 +35,7 @@ def rivalry_of(models: list[Candidate], verdict: str = "ambiguous") -> Rivalry:
     made = Rivalry(
         "ambiguous",
         tuple(
-            Hypothesis(m.effects, m.fit.names, m.fit.mode, m.fit.covariance, 0.0) for m in models
+            FittedModel(m.effects, m.fit.names, m.fit.mode, m.fit.covariance, 0.0) for m in models
         ),
         first.likelihood.noise,
         1.0,

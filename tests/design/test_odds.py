@@ -6,26 +6,26 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from bayesimpact.design.odds import Foretold, expected_odds
+from bayesimpact.design.odds import PredictedRecording, expected_odds
 
 Array = np.ndarray
 N, SHARED, OWN = 30, 3, 2
 
 
-def foretold(rng: np.random.Generator, scale: float, base: Array) -> Foretold:
+def prediction(rng: np.random.Generator, scale: float, base: Array) -> PredictedRecording:
     """A linear model: a few shared parameters, and broad start values of the recording's own."""
     shared = scale * rng.standard_normal((N, SHARED))
     own = 40.0 * (base + 0.01 * rng.standard_normal((N, OWN)))
-    return Foretold(rng.standard_normal(N), np.hstack([shared, own]), SHARED)
+    return PredictedRecording(rng.standard_normal(N), np.hstack([shared, own]), SHARED)
 
 
-def models(seed: int) -> tuple[Foretold, Foretold]:
+def models(seed: int) -> tuple[PredictedRecording, PredictedRecording]:
     rng = np.random.default_rng(seed)
     base = rng.standard_normal((N, OWN))
-    return foretold(rng, 0.4, base), foretold(rng, 0.8, base)
+    return prediction(rng, 0.4, base), prediction(rng, 0.8, base)
 
 
-def log_odds(data: Array, right: Foretold, other: Foretold) -> Array:
+def log_odds(data: Array, right: PredictedRecording, other: PredictedRecording) -> Array:
     """ln odds of data (S, n) by the densities themselves."""
     one, two = (
         multivariate_normal(m.mean, np.eye(N) + m.factor @ m.factor.T).logpdf(data)
@@ -34,7 +34,7 @@ def log_odds(data: Array, right: Foretold, other: Foretold) -> Array:
     return np.asarray(one - two)
 
 
-def drawn(model: Foretold, draws: Array, rng: np.random.Generator) -> Array:
+def drawn(model: PredictedRecording, draws: Array, rng: np.random.Generator) -> Array:
     """Recordings (S, n) that start as intended, parameters from `draws`."""
     noise = rng.standard_normal((draws.shape[0], N))
     return np.asarray(model.mean + draws @ model.common.T + noise)
@@ -64,7 +64,9 @@ def test_each_draw_has_its_own_mean_and_spread() -> None:
 
 def test_noise_alone_spreads_the_odds_of_models_that_agree() -> None:
     rng = np.random.default_rng(7)
-    right, other = (Foretold(np.zeros(N), 5 * rng.standard_normal((N, 4)), 0) for _ in range(2))
+    right, other = (
+        PredictedRecording(np.zeros(N), 5 * rng.standard_normal((N, 4)), 0) for _ in range(2)
+    )
     odds = expected_odds(right, other, np.empty((1, 0)))
     obtained = log_odds(rng.standard_normal((20_000, N)), right, other)
     assert abs(obtained.std() / odds.sds[0] - 1) < 4 / np.sqrt(obtained.size)
@@ -72,14 +74,14 @@ def test_noise_alone_spreads_the_odds_of_models_that_agree() -> None:
 
 
 def test_what_parameters_imitate_tells_nothing_apart() -> None:
-    """A difference along a column of nearly unknown size is worth nothing; across it counts."""
+    """A difference along a column of nearly unknown size tells nothing; across it counts."""
     rng = np.random.default_rng(5)
     axes = np.linalg.qr(rng.standard_normal((N, 2)))[0]
     factor = 1e4 * axes[:, :1]
-    right = Foretold(np.zeros(N), factor, 0)
+    right = PredictedRecording(np.zeros(N), factor, 0)
     draws = np.empty((1, 0))
-    along = expected_odds(right, Foretold(6.0 * axes[:, 0], factor, 0), draws)
-    across = expected_odds(right, Foretold(6.0 * axes[:, 1], factor, 0), draws)
+    along = expected_odds(right, PredictedRecording(6.0 * axes[:, 0], factor, 0), draws)
+    across = expected_odds(right, PredictedRecording(6.0 * axes[:, 1], factor, 0), draws)
     assert along.mean == pytest.approx(0.0, abs=1e-6)
     assert across.mean == pytest.approx(18.0) and across.sds[0] == pytest.approx(6.0)
 

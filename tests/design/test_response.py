@@ -1,4 +1,4 @@
-"""What models foretell of a recording: against the simulator, a refit and recordings made so."""
+"""What models predict of a recording: against the simulator, a refit and recordings made so."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from rivals import base_rivalry, fitted, rivalry_of
 from scipy.optimize import least_squares
 
-from bayesimpact.design.candidates import Design, first_designs
+from bayesimpact.design.candidates import PlannedRecording, first_designs
 from bayesimpact.design.hypotheses import Rivalry
 from bayesimpact.design.odds import expected_odds
 from bayesimpact.design.response import Response, noise_at, odds_between, response
@@ -30,12 +30,12 @@ def damped(small: Identification) -> Rivalry:
     return replace(made, hypotheses=tuple(large))
 
 
-def release(rivals: Rivalry) -> Design:
+def release(rivals: Rivalry) -> PlannedRecording:
     (found,) = [d for d in first_designs(rivals) if d.case == "1" and d.kind == "release"][3:4]
     return found
 
 
-def test_the_base_model_foretells_what_the_simulator_does(small: Identification) -> None:
+def test_the_base_model_predicts_what_the_simulator_does(small: Identification) -> None:
     rivals = base_rivalry(small)
     design, value = release(rivals), small.fit.value
     found = response(rivals.hypotheses[0], design, rivals)
@@ -87,7 +87,7 @@ def test_the_criterion_holds_where_the_problem_is_not_linear(small: Identificati
     two = response(replace(off, covariance=wide), design, rivals)
     draws = np.zeros((1, one.shared.size))
     found = odds_between(one, two, draws)
-    linear = expected_odds(one.foretold, two.foretold, draws)
+    linear = expected_odds(one.prediction, two.prediction, draws)
     left = imitated(one, two)
     assert left < 0.5 * linear_criterion(one, two)
     assert 2 * (found.mean - linear.mean) + linear_criterion(one, two) == pytest.approx(left, abs=3)
@@ -95,8 +95,8 @@ def test_the_criterion_holds_where_the_problem_is_not_linear(small: Identificati
 
 def linear_criterion(right: Response, other: Response) -> float:
     """T of the linear problem."""
-    difference = right.foretold.mean - other.foretold.mean
-    return float(difference @ other.foretold.weighed(difference))
+    difference = right.prediction.mean - other.prediction.mean
+    return float(difference @ other.prediction.weighed(difference))
 
 
 def imitated(right: Response, other: Response) -> float:
@@ -108,7 +108,7 @@ def imitated(right: Response, other: Response) -> float:
     def misfit(u: np.ndarray) -> np.ndarray:
         theta = other.mean.copy()
         theta[other.moving] += root @ u
-        return np.concatenate([right.foretold.mean - other.predicted(theta), u])
+        return np.concatenate([right.prediction.mean - other.predicted(theta), u])
 
     start = np.zeros(other.prior.shape[0])
     return float(2 * least_squares(misfit, start, x_scale="jac", xtol=1e-12).cost)
@@ -119,7 +119,7 @@ def test_the_criterion_is_what_a_refit_leaves(damped: Rivalry) -> None:
     one, two = (response(h, release(damped), damped) for h in damped.hypotheses)
     draws = np.zeros((1, one.shared.size))
     found = odds_between(one, two, draws)
-    linear = expected_odds(one.foretold, two.foretold, draws)
+    linear = expected_odds(one.prediction, two.prediction, draws)
     rest = linear.mean - 0.5 * linear_criterion(one, two)
     assert linear_criterion(one, two) > 10
     assert 2 * (found.mean - rest) == pytest.approx(imitated(one, two), rel=0.02, abs=0.02)

@@ -13,7 +13,7 @@ from bayesimpact.inference.evolution import (
     MEMORY,
     Box,
     Memory,
-    State,
+    SearchState,
     accept,
     cross,
     draw_factors,
@@ -227,7 +227,7 @@ def test_a_slot_whose_rates_were_all_zero_stays_terminal() -> None:
 
 def test_shrinking_keeps_the_best_and_thins_the_archive() -> None:
     x = np.arange(10.0)[:, None]
-    state = State(x, np.array([5, 0, 3, 9, 8, 1, 7, 2, 6, 4.0]), np.zeros((40, 1)), memory())
+    state = SearchState(x, np.array([5, 0, 3, 9, 8, 1, 7, 2, 6, 4.0]), np.zeros((40, 1)), memory())
     after = shrink(state, 4, np.random.default_rng(10))
     assert sorted(after.f) == [0, 1, 2, 3]
     np.testing.assert_array_equal(np.sort(after.x[:, 0]), [1, 2, 5, 7])

@@ -19,7 +19,7 @@ from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.horizon import growing_horizon
 from bayesimpact.inference.identify import (
     Identification,
-    _Profile,
+    _ProfiledObjective,
     global_search,
     identify,
     initial_theta,
@@ -209,7 +209,7 @@ def test_nuisances_are_at_their_best_for_any_candidate():
     oscillator = build_oscillator(campaign)
     estimates, noise = estimate(campaign), estimate_noise(campaign)
     guess = initial_theta(oscillator, estimates, noise)
-    profile = _Profile(oscillator, guess, 0.4)
+    profile = _ProfiledObjective(oscillator, guess, 0.4)
     centre = np.mean(profile.bounds(3.0), axis=0)
     x = centre + 0.02 * np.random.default_rng(0).standard_normal((4, centre.size)) * np.abs(
         np.where(profile.positive, 1.0, profile.reach)

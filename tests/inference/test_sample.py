@@ -13,7 +13,14 @@ from scipy.special import digamma, polygamma
 import bayesimpact.inference.sample as sample_module
 from bayesimpact.errors import InputError, SimulationError
 from bayesimpact.inference.convergence import autocorrelation_time
-from bayesimpact.inference.ensemble import Stretch, Target, adapt, advance, random_streams, start
+from bayesimpact.inference.ensemble import (
+    DrawBlock,
+    WhitenedDensity,
+    adapt,
+    advance,
+    random_streams,
+    start,
+)
 from bayesimpact.inference.sample import sample_posterior
 
 
@@ -112,7 +119,7 @@ def test_no_walker_starts_or_ends_inadmissible():
 
 def test_start_is_feasible_and_the_second_one_is_wider():
     _, mode, covariance = correlated()
-    target = Target(
+    target = WhitenedDensity(
         lambda x: np.where(x[:, 0] > mode[0], 0.0, -np.inf),
         mode,
         np.linalg.cholesky(covariance),
@@ -140,7 +147,9 @@ def test_same_seed_same_chain_whatever_the_global_state(uninterrupted):
 
 
 def test_advancing_in_parts_equals_advancing_at_once():
-    target = Target(Interrupted(), np.ones(3), np.eye(3), np.full(3, -9.0), np.full(3, 9.0))
+    target = WhitenedDensity(
+        Interrupted(), np.ones(3), np.eye(3), np.full(3, -9.0), np.full(3, 9.0)
+    )
     first = start(target, random_streams(0, 1)[0], 8, wide=False)
     kept = first.walkers.copy()
     at_once, stretch = advance(first, target, 30)
@@ -154,19 +163,21 @@ def test_advancing_in_parts_equals_advancing_at_once():
 
 def test_adapting_learns_centre_scatter_and_share():
     """A stretch of independent draws around (3, 0) with standard deviations (2, 0.5)."""
-    target = Target(Interrupted(), np.ones(2), np.eye(2), np.full(2, -9.0), np.full(2, 9.0))
+    target = WhitenedDensity(
+        Interrupted(), np.ones(2), np.eye(2), np.full(2, -9.0), np.full(2, 9.0)
+    )
     first = start(target, random_streams(0, 1)[0], 40, wide=False)
     rng = np.random.default_rng(0)
     draws = rng.standard_normal((100, 40, 2)) * [2.0, 0.5] + [3.0, 0.0]
     tally = np.array([[2000, 1800], [1000, 1000], [500, 100], [300, 50], [200, 50]])
-    later = adapt(first, Stretch(draws, np.zeros((100, 40)), tally))
+    later = adapt(first, DrawBlock(draws, np.zeros((100, 40)), tally))
     frame = later.mixture.frames[1]
     np.testing.assert_allclose(frame.centre, [3.0, 0.0], atol=0.15)
     np.testing.assert_allclose(frame.factor @ frame.factor.T, np.diag([4.0, 0.25]), atol=0.3)
     assert later.mixture.weights[1].sum() > 0.8
     assert later.mixture.weights.sum() == pytest.approx(1.0)
     assert later.share == pytest.approx(0.85)
-    poor = adapt(first, Stretch(draws, np.zeros((100, 40)), tally * [1, 0]))
+    poor = adapt(first, DrawBlock(draws, np.zeros((100, 40)), tally * [1, 0]))
     assert poor.share < 0.3
 
 

@@ -10,11 +10,11 @@ import numpy as np
 from bayesimpact.model.units import per_mass_unit
 from bayesimpact.report import checks
 from bayesimpact.report.results import (
+    BackboneCurve,
     BackboneSummary,
-    Chain,
-    Curve,
+    ChainSummary,
     Draws,
-    Noise,
+    NoiseSummary,
     Provenance,
     RecordingResult,
     Results,
@@ -68,7 +68,7 @@ def recording(
                            chi2, 0.4)  # fmt: skip
 
 
-def curve(name: str, case: str, branch: str, rng: np.random.Generator) -> Curve:
+def curve(name: str, case: str, branch: str, rng: np.random.Generator) -> BackboneCurve:
     """A branch of 12 swings."""
     amplitude = np.linspace(6e-3, 1e-3, 12)
     frequency = 6.39 + 200 * amplitude
@@ -78,8 +78,9 @@ def curve(name: str, case: str, branch: str, rng: np.random.Generator) -> Curve:
     def band(x: np.ndarray, half: float) -> np.ndarray:
         return np.stack([x - half, x, x + half], axis=1)
 
-    return Curve(name, case, branch, np.arange(12) / 6.4, amplitude, frequency + noise, damping,
-                 band(frequency, 2e-3), band(damping, 1e-4))  # fmt: skip
+    times = np.arange(12) / 6.4
+    bands = band(frequency, 2e-3), band(damping, 1e-4)
+    return BackboneCurve(name, case, branch, times, amplitude, frequency + noise, damping, *bands)
 
 
 def make_results(
@@ -131,8 +132,8 @@ def make_results(
     made = Results(
         name="rig <1> & others", mass=MASS, stop=stop, quantity="displacement",
         recordings=recordings, rows=table, effects=(),
-        noise=Noise("white", NOISE, 0.003, 0.0, "polynomial remainders"),
-        chain=Chain("", 0.0, 0.0, 0.0), verdict="", headline="", reduced_chi2=chi2,
+        noise=NoiseSummary("white", NOISE, 0.003, 0.0, "polynomial remainders"),
+        chain=ChainSummary("", 0.0, 0.0, 0.0), verdict="", headline="", reduced_chi2=chi2,
         chi2_z=(chi2 - 1) / np.sqrt(2 / (count * n)), log_posterior=1234.5,
         covariance=np.diag([r.sd**2 for r in table]), fit_converged=True, search=search,
         sampler=sampler, draws=draws, backbone=backbone, checks=(),
@@ -142,7 +143,7 @@ def make_results(
     return checks.assessed(replace(made, **changes))
 
 
-def with_chain(results: Results, chain: Chain) -> Results:
+def with_chain(results: Results, chain: ChainSummary) -> Results:
     """The same results with stated uncertainties of mass, clock and gain."""
     table = tuple(
         replace(r, total90=widened(r.median, r.ci90, r.unit, chain, angle=False))

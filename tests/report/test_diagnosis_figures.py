@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,6 +22,8 @@ from bayesimpact.report.figures.improvement import shifts
 from bayesimpact.report.figures.ranking import FREE_FORCE, MOST, ranked
 from bayesimpact.report.figures.save import all_figures, png
 from bayesimpact.report.figures.style import AFTER, BLACK
+from bayesimpact.report.limit_view import not_found
+from bayesimpact.report.results import EffectSummary
 from bayesimpact.report.write import rewrite_report
 
 NAMES = {"force_map", "gain", "ranking", "limits", "improvement", "shifts", "bands"}
@@ -115,6 +118,41 @@ def test_captions_say_what_holds_for_this_diagnosis_only() -> None:
     large = diagnosed(fit={"before": {"reduced_chi2": 8510.0}})
     assert "rough guide" in caption("force_map", large)
     assert "rough guide" not in caption("force_map", results)
+
+
+def test_the_caption_of_the_models_says_what_is_blue() -> None:
+    assert "the model that was chosen" in caption("ranking", diagnosed())
+    unknown = {"verdict": "unknown", "effects": []}
+    assert "None was chosen" in caption("ranking", diagnosed(**unknown, evidence={}))
+    free = {"free_force_log_odds": 900.0}
+    assert "one free force" in caption("ranking", diagnosed(**unknown, evidence=free))
+
+
+def test_recordings_are_captioned_by_their_case() -> None:
+    assert caption("fit_case_2", diagnosed()).startswith("Case 2: recordings")
+    assert caption("fit", diagnosed()).startswith("Recordings")
+
+
+def test_what_the_model_has_is_not_ruled_out() -> None:
+    results = diagnosed(verdict="unknown", effects=[])
+    listed = {limit["id"] for limit in not_found(results)}
+    known = next(iter(listed))
+    acting = (EffectSummary(known, "", ""),)
+    assert {x["id"] for x in not_found(replace(results, effects=acting))} == listed - {known}
+
+
+def test_one_wide_interval_does_not_hide_the_other_shifts() -> None:
+    def estimate(low: float, middle: float, high: float) -> dict[str, Any]:
+        return {"unit": "N/m", "median": middle, "ci90": [low, high]}
+
+    before = {"c1": estimate(0.13, 0.134, 0.138), "k1": estimate(806.0, 807.0, 808.0)}
+    near = {"c1": estimate(0.13, 0.135, 0.14), "k1": estimate(800.0, 808.0, 816.0)}
+    wide = {**near, "c1": estimate(2.0, 18.0, 52.0)}
+    scales = {}
+    for name, after in (("near", near), ("wide", wide)):
+        told = diagnosed(parameters={"before": before, "after": after})
+        scales[name] = diagnosis_figures(told)["shifts"].axes[0].get_xscale()
+    assert scales == {"near": "linear", "wide": "symlog"}
 
 
 def test_limits_are_told_in_their_units() -> None:

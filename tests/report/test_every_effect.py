@@ -20,7 +20,7 @@ from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification
 from bayesimpact.report.archive import load_results
 from bayesimpact.report.figures import gaussian, save
-from bayesimpact.report.figures.corner import Normal, corner_figure
+from bayesimpact.report.figures.corner import NormalLaw, corner_figure
 from bayesimpact.report.figures.gaussian import gaussian_figures
 from bayesimpact.report.figures.improvement import improvement_figures
 from bayesimpact.report.write import Written, write_fit
@@ -28,11 +28,11 @@ from bayesimpact.report.write import Written, write_fit
 VERDICTS = ("named", "ambiguous", "unknown")
 
 
-def few_pairs(after: Normal, *, before: Normal, **told: Any) -> Figure:
+def few_pairs(after: NormalLaw, *, before: NormalLaw, **told: Any) -> Figure:
     """The corner plot of two parameters: the first of the base model and the last added one."""
     assert len(after.names) == after.mean.size
 
-    def some(law: Normal) -> Normal:
+    def some(law: NormalLaw) -> NormalLaw:
         ends = [0, len(law.names) - 1]
         names, units = (tuple(text[i] for i in ends) for text in (law.names, law.units))
         return replace(law, names=names, units=units, mean=law.mean[ends],

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from synthetic import make_results
 
 from bayesimpact.report.figures.backbone import deviation
-from bayesimpact.report.figures.corner import Normal, corner_figure
+from bayesimpact.report.figures.corner import NormalLaw, corner_figure
 from bayesimpact.report.figures.recordings import (
     MOST,
     close_up,
@@ -162,7 +162,7 @@ def test_corner_tells_the_numbers_it_is_given() -> None:
 
 def test_corner_of_normal_laws_is_drawn_in_closed_form() -> None:
     covariance = np.array([[4.0, 1.5], [1.5, 1.0]])
-    law = Normal("posterior", ("k1", "c1"), ("N/m", "N s/m"), np.array([10.0, 5.0]), covariance)
+    law = NormalLaw("posterior", ("k1", "c1"), ("N/m", "N s/m"), np.array([10.0, 5.0]), covariance)
     figure = corner_figure(law)
     marginal = next(a for a in figure.axes if a.get_subplotspec().get_geometry()[2] == 0)
     x, density = marginal.lines[0].get_data()
@@ -296,3 +296,13 @@ def test_a_full_disk_is_no_failed_figure(tmp_path: Path) -> None:
 
     with pytest.raises(OSError, match="space"):
         save_drawn(full, make_results(1, 1, n=200, sampled=False), tmp_path)
+
+
+@pytest.mark.parametrize("sd", [0.9, 1.4, 2.3, 3.7, 5.0, 8.1])
+def test_every_axis_of_a_corner_plot_tells_its_scale(sd: float) -> None:
+    rng = np.random.default_rng(2)
+    values = np.array([808.5, 0.148]) + rng.standard_normal((500, 2)) * [sd * 1e-3, sd * 1e-6]
+    figure = corner_figure(Draws("posterior", ("k1", "c1"), ("N/m", "N s/m"), values))
+    below = [axis for axis in figure.axes if axis.get_xlabel()]
+    assert len(below) == 2 and all(len(axis.get_xticks()) > 1 for axis in below)
+    assert len(below[0].get_yticks()) > 1

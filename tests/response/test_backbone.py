@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from bilinear import bilinear_backbone
 from numpy.typing import NDArray
 from rigs import PAPER, paper_motion
 
 from bayesimpact.errors import InputError
 from bayesimpact.response.backbone import Backbone, backbone
-from bayesimpact.response.bilinear import bilinear_backbone
 from bayesimpact.response.half_cycles import half_cycles, spectral_period
 from bayesimpact.response.rest import rest_position
 

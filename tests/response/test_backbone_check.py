@@ -30,14 +30,13 @@ def pool() -> list[Backbone]:
     return [extracted(recorded(seed)) for seed in range(360)]
 
 
-@pytest.mark.parametrize("against", ["cycle", "amplitude"])
-def test_calibrated_under_the_truth(pool: list[Backbone], against: str) -> None:
+def test_calibrated_under_the_truth(pool: list[Backbone]) -> None:
     """Every recording in turn against 60 others: p uniform, 90 % of the points in the band."""
     rng = np.random.default_rng(1)
     checks = []
     for own in range(0, 360, 2):
         others = rng.choice(np.delete(np.arange(360), own), 60, replace=False)
-        checks.append(compare(pool[own], [pool[i] for i in others], against))
+        checks.append(compare(pool[own], [pool[i] for i in others]))
     # 60 draws make steps of 1/61; the pool is shared, so the p-values are not quite independent.
     assert kstest([c.p_value for c in checks], "uniform").statistic < 0.12
     for name in CURVES:
@@ -70,7 +69,7 @@ def test_through_the_front_door(pool: list[Backbone]) -> None:
 def test_a_wrong_parameter_shows(
     pool: list[Backbone], changed: dict[str, float], curve: str
 ) -> None:
-    check = compare(extracted(recorded(7, **changed)), pool[:100], "cycle")
+    check = compare(extracted(recorded(7, **changed)), pool[:100])
     assert check.p_value < 0.05
     assert check.bands[curve].p_value < 0.02
     assert check.bands[curve].inside < 0.7
@@ -87,17 +86,9 @@ def test_the_extractors_bias_cancels(pool: list[Backbone]) -> None:
     assert biased.p_value > 0.03
 
 
-def test_bands_against_amplitude_are_curves_of_the_same_backbone(pool: list[Backbone]) -> None:
-    check = compare(pool[0], pool[1:80], "amplitude")
-    band = check.bands["upper frequency"]
-    assert np.all(np.diff(band.at) < 0)
-    assert band.at[0] == pytest.approx(np.median([b.upper.amplitude[0] for b in pool[:80]]))
-    assert band.median[0] > band.median[-1]
-
-
 def test_draws_that_end_early_are_left_out(pool: list[Backbone]) -> None:
     short = extracted(recorded(5)[:100])
-    check = compare(pool[0], [*pool[1:60], short], "cycle")
+    check = compare(pool[0], [*pool[1:60], short])
     assert check.draws == 59
     assert check.bands["upper frequency"].at.size > 8
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from bilinear import bilinear_backbone
 from rigs import PAPER, paper_motion
 
-from bayesimpact.errors import InputError
 from bayesimpact.response.backbone import backbone
-from bayesimpact.response.bilinear import bilinear_backbone, contact_stiffness
 
 RIG = (PAPER["mass"], PAPER["k1"], PAPER["g"], PAPER["k2"])
 
@@ -63,26 +62,3 @@ def test_a_stiffer_stop_lowers_the_upper_backbone_over_amplitude() -> None:
     ]
     at = [np.interp(9.0, c.upper_frequency, c.upper_amplitude) for c in curves]
     assert at[0] < at[1]
-
-
-def test_contact_stiffness_inverts_the_half_period() -> None:
-    for k2 in (40.0, 2959.0, 5350.0, 1e6):
-        for amplitude in (1.3e-3, 6e-3):
-            above = 0.5 / bilinear_backbone(*RIG[:3], k2, amplitude).upper_frequency[0]
-            found = contact_stiffness(*RIG[:3], amplitude, above)
-            assert found == pytest.approx(k2, rel=1e-6)
-
-
-def test_contact_stiffness_at_its_ends() -> None:
-    w1 = np.sqrt(PAPER["k1"] / PAPER["mass"])
-    assert contact_stiffness(*RIG[:3], 5e-3, np.pi / w1) == 0.0
-    assert contact_stiffness(*RIG[:3], 1e-3, 0.01) == 0.0
-    flight = 2 * np.arcsin(PAPER["g"] / 5e-3) / w1
-    assert contact_stiffness(*RIG[:3], 5e-3, 0.99 * flight) == np.inf
-
-
-@pytest.mark.parametrize("bad", [{"mass": 0.0}, {"k1": -1.0}, {"g": -1e-3}, {"k2": -1.0}])
-def test_bad_input_is_refused(bad: dict[str, float]) -> None:
-    values = {"mass": 1.0, "k1": 1.0, "g": 0.1, "k2": 1.0, "amplitude": 1.0} | bad
-    with pytest.raises(InputError):
-        bilinear_backbone(**values)

@@ -1,4 +1,4 @@
-"""Quick estimates over many random rigs, and over the special ones."""
+"""Initial estimates over many random rigs, and over the special ones."""
 
 from __future__ import annotations
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from rigs import PAPER, paper_motion
 
-from bayesimpact.response.release import Oscillator, release
+from bayesimpact.response.release import RoughOscillator, release
 
-RIG = Oscillator(**PAPER)
+RIG = RoughOscillator(**PAPER)
 NOISE = 5e-6
 
 
@@ -53,7 +53,7 @@ def test_on_a_hard_stop_that_lets_go_between_two_samples(y0: float, v0: float) -
 
 
 def test_without_a_stop() -> None:
-    free = Oscillator(PAPER["mass"], PAPER["c1"], PAPER["k1"], 0.0, np.inf, 0.0)
+    free = RoughOscillator(PAPER["mass"], PAPER["c1"], PAPER["k1"], 0.0, np.inf, 0.0)
     samples = paper_motion(400, k2=0.0, c2=0.0, g=1.0, y0=3e-3, v0=0.1)
     y0, v0, sd_y0, sd_v0 = release(samples, 1e-3, free, NOISE)
     assert y0 == pytest.approx(3e-3, abs=1e-9)
@@ -64,7 +64,7 @@ def test_without_a_stop() -> None:
 
 def test_a_motion_that_creeps_back_without_a_swing() -> None:
     """Strongly damped: its two rates lie orders of magnitude apart."""
-    creeping = Oscillator(PAPER["mass"], 4e4, PAPER["k1"], 0.0, np.inf, 0.0)
+    creeping = RoughOscillator(PAPER["mass"], 4e4, PAPER["k1"], 0.0, np.inf, 0.0)
     b = creeping.c1 / (2 * creeping.mass)
     slow = b - np.sqrt(b**2 - creeping.k1 / creeping.mass)
     t = np.arange(4000) * 1e-3

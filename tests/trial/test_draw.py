@@ -14,7 +14,7 @@ from bayesimpact.model.effects import EFFECTS
 from bayesimpact.trial.blind import campaign_files, sealed_text
 from bayesimpact.trial.designs import NOISES, RIG_DESIGNS, depth, draw_rig_design
 from bayesimpact.trial.draw import draw
-from bayesimpact.trial.planted_effects import PLANTED_EFFECTS, Form
+from bayesimpact.trial.planted_effects import PLANTED_EFFECTS, EffectForm
 from bayesimpact.trial.planted_outside import OUTSIDE_EFFECTS
 from bayesimpact.trial.rig import Release, motion, record
 from bayesimpact.trial.rig_catalogue import CATALOGUE
@@ -212,7 +212,7 @@ def test_the_wrong_sign_imitates_nothing(sensitivity: Sensitivity) -> None:
 
 
 def test_sizes_are_found_on_curves() -> None:
-    form = Form(lambda size: {}, start=1e-3, largest=10.0)
+    form = EffectForm(lambda size: {}, start=1e-3, largest=10.0)
     for power in (0.7, 1.0, 2.0):
         size = solve(lambda s, p=power: 50 * s**p, form, 10.0)
         assert 50 * size**power == pytest.approx(10.0, rel=0.05)

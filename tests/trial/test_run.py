@@ -13,11 +13,11 @@ from click.testing import CliRunner
 
 from bayesimpact.cli import main
 from bayesimpact.cluster import executor
-from bayesimpact.data.files import UNFINISHED
+from bayesimpact.data.files import UNFINISHED, strict
 from bayesimpact.data.lock import locked
 from bayesimpact.errors import InputError
 from bayesimpact.trial import run
-from bayesimpact.trial.blind import finite, open_seal, seal, sealed_text
+from bayesimpact.trial.blind import open_seal, seal, sealed_text
 from bayesimpact.trial.run import run_trials
 from bayesimpact.trial.settings import Settings, settings_from
 
@@ -224,7 +224,7 @@ def test_settings_survive_their_document() -> None:
 def test_what_json_does_not_have() -> None:
     import numpy as np
 
-    found = finite({"a": float("nan"), "b": (np.float64(1), np.int64(2)), "c": np.array([np.inf])})
+    found = strict({"a": float("nan"), "b": (np.float64(1), np.int64(2)), "c": np.array([np.inf])})
     assert json.loads(json.dumps(found, allow_nan=False)) == {"a": None, "b": [1.0, 2], "c": [None]}
 
 

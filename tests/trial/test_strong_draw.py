@@ -14,7 +14,7 @@ from bayesimpact.inference.identify import identify
 from bayesimpact.trial.blind import campaign_files, sealed_text
 from bayesimpact.trial.designs import draw_rig_design
 from bayesimpact.trial.draw import draw
-from bayesimpact.trial.drawn import Drawn
+from bayesimpact.trial.drawn import DrawnTrial
 from bayesimpact.trial.identifiable import left_of, stand_outs
 from bayesimpact.trial.rig import Rig
 from bayesimpact.trial.sensitivity import Sensitivity
@@ -46,12 +46,12 @@ SORT_OF = {effect: sort for sort, names in SORTS.items() for effect in names}
 
 
 @pytest.fixture(scope="module")
-def pendulum() -> Drawn:
+def pendulum() -> DrawnTrial:
     return draw(PENDULUM, 2)
 
 
 @pytest.fixture(scope="module")
-def decay() -> Drawn:
+def decay() -> DrawnTrial:
     return draw(DECAY, 1)
 
 
@@ -62,7 +62,7 @@ def test_every_sort_and_group_is_of_known_things() -> None:
     assert len(SORT_OF) == sum(map(len, SORTS.values()))  # an effect is of one sort
 
 
-def test_the_same_seed_gives_the_same_bits(pendulum: Drawn) -> None:
+def test_the_same_seed_gives_the_same_bits(pendulum: DrawnTrial) -> None:
     again = draw(PENDULUM, 2)
     assert sealed_text(again.truth) == sealed_text(pendulum.truth)
     files = campaign_files(pendulum.campaign, pendulum.truth["rounding_m"])
@@ -83,7 +83,7 @@ def test_the_misfit_is_what_the_truth_says(name: str, request: pytest.FixtureReq
     assert isinstance(truth["rejected"], dict) and not truth["rest_s"]
 
 
-def test_an_encoder_reads_steps(pendulum: Drawn, tmp_path) -> None:
+def test_an_encoder_reads_steps(pendulum: DrawnTrial, tmp_path) -> None:
     truth = pendulum.truth
     step = truth["rounding_m"]
     assert STEPS[0] <= step <= STEPS[1] * (1 + 1e-9)

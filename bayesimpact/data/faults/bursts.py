@@ -1,7 +1,7 @@
 """Runs of bad readings close to each other, by a curve through the good ones on both sides.
 
-`spikes` foretells a reading from the few next to it on one side: where the next spike lies among
-those, neither side foretells anything. Here one polynomial goes through the readings on both sides
+`spikes` predicts a reading from the few next to it on one side: where the next spike lies among
+those, neither side predicts anything. Here one polynomial goes through the readings on both sides
 that are good, wherever those are, and says how far off the others lie. An impact is told from a
 spike by what it leaves beside it: a corner bends the curve away from the good readings too, by a
 share of its height that is known.
@@ -36,7 +36,7 @@ MOST = 0.1  # of the samples: with more, a window holds too many to say which ar
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class LocalPolynomial:
     """The polynomial through the good samples about a place.
 
     Attributes
@@ -132,7 +132,7 @@ def _of_form(x: Array, used: Mask, degree: int, beside: int) -> list[Spike]:
             continue
         if max(first - near[0], near[-1] - end + 1) > REACH * beside:
             continue
-        curve = Curve(near.astype(np.float64), degree)
+        curve = LocalPolynomial(near.astype(np.float64), degree)
         run = np.arange(first, end, dtype=np.float64)
         rms, missed = curve.misses(x[near], run, x[first:end])
         size, leverage = float(missed[np.argmax(np.abs(missed))]), curve.leverage(run)

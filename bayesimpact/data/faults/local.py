@@ -1,7 +1,7 @@
-"""What the samples just before and just after a place foretell there: one-sided polynomials.
+"""What the samples just before and just after a place predict there: one-sided polynomials.
 
-An impact is a corner: what lies before it foretells it badly, what lies after it well, or the other
-way round. A reading that neither side foretells, while both agree, is no motion.
+An impact is a corner: what lies before it predicts it badly, what lies after it well, or the other
+way round. A reading that neither side predicts, while both agree, is no motion.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 FORMS = ((2, 5), (2, 7), (2, 9), (3, 8), (2, 12), (3, 12), (3, 16), (3, 24))
-"""Degree and samples of the polynomials; the pair that foretells a recording best is taken."""
+"""Degree and samples of the polynomials; the pair that predicts a recording best is taken."""
 SHARE = 1 / 14  # of a period, at most: shorter than half a period against a stiff stop
 
 
 @dataclass(frozen=True, eq=False)
-class Foretold:
+class OneSidedPrediction:
     """One-sided predictions at every sample; NaN within reach of an end.
 
     Attributes
@@ -52,7 +52,9 @@ def _weights(degree: int, length: int, at: float) -> tuple[Array, Array]:
     return value, slope
 
 
-def foretell(samples: Array, form: tuple[int, int], gap: int = 0, place: float = 0.0) -> Foretold:
+def predict_sides(
+    samples: Array, form: tuple[int, int], gap: int = 0, place: float = 0.0
+) -> OneSidedPrediction:
     """Predictions from samples i-m..i-1 and i+gap..i+gap+m-1, at i + place, for every i.
 
     A spike of `gap` samples that begins at i is left out on both sides; a slip before sample i is
@@ -62,7 +64,7 @@ def foretell(samples: Array, form: tuple[int, int], gap: int = 0, place: float =
     n = samples.size
     result = [np.full(n, np.nan) for _ in range(4)]
     if n < 2 * m + gap + 1:
-        return Foretold(*result)
+        return OneSidedPrediction(*result)
     window = np.lib.stride_tricks.sliding_window_view(samples, m)  # rows start at 0..n-m
     value, slope = _weights(degree, m, place)
     result[0][m:] = (window @ value)[: n - m]
@@ -72,7 +74,7 @@ def foretell(samples: Array, form: tuple[int, int], gap: int = 0, place: float =
     count = n - m - gap + 1
     result[1][:count] = (window @ value[::-1])[gap : gap + count]
     result[3][:count] = -(window @ slope[::-1])[gap : gap + count]
-    return Foretold(*result)
+    return OneSidedPrediction(*result)
 
 
 def rounding_error(form: tuple[int, int], place: float, step: float) -> float:
@@ -84,5 +86,5 @@ def best_form(samples: Array, period: float | None) -> tuple[int, int]:
     """The form whose predictions of the next sample are off least, by the bulk."""
     longest = max(5.0, SHARE * (period or samples.size))
     forms = [form for form in FORMS if form[1] <= longest]
-    errors = [robust_sd(samples - foretell(samples, form, 1).before) for form in forms]
+    errors = [robust_sd(samples - predict_sides(samples, form, 1).before) for form in forms]
     return forms[int(np.argmin(errors))]

@@ -15,7 +15,7 @@ from bayesimpact.data.faults.fault import (
     gaussian_threshold,
 )
 from bayesimpact.data.faults.flat import equal_share, last_digit
-from bayesimpact.data.faults.local import best_form, foretell, robust_sd, rounding_error
+from bayesimpact.data.faults.local import best_form, predict_sides, robust_sd, rounding_error
 from bayesimpact.data.gaps import runs
 from bayesimpact.data.period import crossing_period
 from bayesimpact.data.recording import Recording
@@ -46,7 +46,7 @@ def find_slips(recording: Recording) -> list[Fault]:
     """
     x = recording.samples
     form = best_form(x, crossing_period(x, 1.0))
-    sides = foretell(x, form, 0, -0.5)
+    sides = predict_sides(x, form, 0, -0.5)
     jump = np.abs(sides.after - sides.before)
     jump = np.where(np.isfinite(jump), jump, 0.0)
     if recording.used is not None:
@@ -113,11 +113,11 @@ def _both_sides_hold(
     x: Array, place: int, form: tuple[int, int], level: float, least: float
 ) -> bool:
     """Whether the samples next to the jump follow from their own side."""
-    ahead = foretell(x, form, 1, 0.0)
+    ahead = predict_sides(x, form, 1, 0.0)
     near = range(2)
     left = [x[place - 1 - k] - ahead.before[place - 1 - k] for k in near]
     right = [x[place + k] - ahead.after[place + k] for k in near]
-    sides = foretell(x, form, 0, -0.5)
+    sides = predict_sides(x, form, 0, -0.5)
     size = abs(float(sides.after[place] - sides.before[place]))
     return bool(np.nanmax(np.abs([*left, *right])) < max(2 * least * level, 0.25 * size))
 
@@ -127,10 +127,10 @@ def _meet_across(x: Array, place: int, form: tuple[int, int]) -> bool:
 
     They meet where their distance is what noise makes of it, and the jump without the gap is not.
     """
-    near = foretell(x, form, 0, -0.5)
+    near = predict_sides(x, form, 0, -0.5)
     jump = near.after[place] - near.before[place]
     for gap in range(1, WIDEST + 1):
-        sides = foretell(x, form, gap, 0.5 * (gap - 1))
+        sides = predict_sides(x, form, gap, 0.5 * (gap - 1))
         apart = sides.after - sides.before
         noise = CHANCE * robust_sd(apart)
         for first in (place - gap, place):

@@ -1,4 +1,4 @@
-"""`recording_spikes`: readings that neither their past nor their future foretells.
+"""`recording_spikes`: readings that neither their past nor their future predicts.
 
 Spikes close to each other are found by `bursts`.
 """
@@ -18,7 +18,7 @@ from bayesimpact.data.faults.fault import (
     times_of,
 )
 from bayesimpact.data.faults.flat import last_digit
-from bayesimpact.data.faults.local import best_form, foretell, robust_sd, rounding_error
+from bayesimpact.data.faults.local import best_form, predict_sides, robust_sd, rounding_error
 from bayesimpact.data.gaps import excluded, runs, without
 from bayesimpact.data.period import crossing_period
 from bayesimpact.data.recording import Recording
@@ -38,11 +38,11 @@ def find_spikes(recording: Recording) -> list[Fault]:
     """
     close = find_bursts(recording)
     rest = without(recording, [one.span for one in close]) if close else recording
-    return _fault(recording, [*close, *_foretold(rest)])
+    return _fault(recording, [*close, *_unpredicted(rest)])
 
 
 def lone_spikes(recording: Recording) -> list[Fault]:
-    """Up to five samples in a row far off what both sides foretell alike; impacts are none.
+    """Up to five samples in a row far off what both sides predict alike; impacts are none.
 
     A brief contact is a spike of the acceleration away from the stop: such a one does not count.
 
@@ -50,10 +50,10 @@ def lone_spikes(recording: Recording) -> list[Fault]:
     deviations. It has to pass the Gaussian threshold and four times the 97th percentile over the
     recording, which is what the corners of the motion itself reach.
     """
-    return _fault(recording, _foretold(recording))
+    return _fault(recording, _unpredicted(recording))
 
 
-def _foretold(recording: Recording) -> list[Spike]:
+def _unpredicted(recording: Recording) -> list[Spike]:
     """What `lone_spikes` finds, none touching another."""
     x = recording.samples
     period = crossing_period(x, 1.0)
@@ -108,7 +108,7 @@ def _of_width(
     deviation = np.full((width, x.size), np.nan)
     differ = np.zeros(x.size)
     for k in range(width):
-        sides = foretell(x, form, width, float(k))
+        sides = predict_sides(x, form, width, float(k))
         here = np.full(x.size, np.nan)
         here[: x.size - k] = x[k:]
         left, right = here - sides.before, here - sides.after

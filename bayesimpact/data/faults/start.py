@@ -123,7 +123,9 @@ def _grown(centred: Array, peak: int, period: float) -> bool:
     way = side * centred[int(peak - UNCROSSED * period) : peak]
     if way.min() > -0.02 * height:
         return True
-    before = np.abs(centred[: max(int(peak - 0.25 * period), 1)])  # a free swing has two sides
+    before = np.abs(
+        centred[: max(int(peak - 0.25 * period), 1)]
+    )  # a free oscillation has two sides
     return bool(height > GROWTH * float(before.max()))
 
 

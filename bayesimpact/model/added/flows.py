@@ -314,8 +314,8 @@ def next_step(
 ) -> Any:
     """Length of the next step, and whether it ends on a sample; n0 is `added_force` at its start.
 
-    Near a touch that is not smooth the steps follow from the motion alone, not from the samples, so
-    that they change smoothly with the parameters.
+    Near a contact onset that is not smooth the steps follow from the motion alone, not from
+    the samples, so that they change smoothly with the parameters.
     """
     least = w.interval / MOST_CUTS
     left = j * w.interval - t

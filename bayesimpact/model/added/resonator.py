@@ -11,7 +11,7 @@ counted from the frame, m (y'' + X'') + N = 0 and X'' + 2 z w X' + w^2 X = r N /
     m (1 - n) y'' + N + [force of a body of mass n m that follows y] = 0,     n = r / (1 + r)
 
 with W = w^2 (1 - n), 2 beta = 2 z w (1 - n), X = n (x - y). What follows y and y' of the force is
-counted into the linear flow; x itself decays and turns exactly, and is only kicked by P (as a
+counted into the linear flow; x itself decays and turns exactly, and takes impulses of P (as a
 law's state in `memory`: Lawson 1967).
 """
 

@@ -21,7 +21,14 @@ from types import MappingProxyType
 
 import numpy as np
 
-from bayesimpact.model.effects.effect import Effect, EffectParameter, Numbers, Scales, Size
+from bayesimpact.model.effects.effect import (
+    Effect,
+    EffectParameter,
+    Numbers,
+    Scales,
+    Size,
+    damping_ratio,
+)
 
 
 def size(p: Numbers, s: Scales) -> Size:
@@ -48,14 +55,7 @@ EFFECT = Effect(
             null=None,
             grid=lambda s: np.geomspace(0.4, 12.0, 32) * s.natural_frequency,
         ),
-        EffectParameter(
-            "damping",
-            "-",
-            scale=lambda s: 0.02,
-            lower=0.0,
-            null=None,
-            grid=lambda s: np.array([0.01, 0.05]),
-        ),
+        damping_ratio(0.02),
         EffectParameter("mass_ratio", "-", scale=lambda s: 0.03, lower=0.0),
     ),
     binds=MappingProxyType(

@@ -4,7 +4,7 @@ Equation: lam d v in contact, d = y - g, lam in N s/m2 (for angles N m s/rad2).
 At its null: lam = 0 is the base model.
 Energy: dissipates for lam > 0, power -lam d v^2.
 Valid: compliant contacts in which the damping material is engaged gradually; not for a dashpot
-that is already moving at first touch.
+that is already moving when contact begins.
 Its absence shows as contact damping that grows with the depth of an impact; the force is
 continuous at impact.
 Source: Hunt and Crossley 1975, J. Appl. Mech. 42:440, Eq. 9 with n = 1; lam = 3 (1 - e) k2 / (2

@@ -148,6 +148,31 @@ class EffectParameter:
         return self.null is None and self.replaces is None and self.fixed is None
 
 
+def phase() -> EffectParameter:
+    """The phase of something periodic, one of every recording."""
+    return EffectParameter(
+        "phase",
+        "rad",
+        scale=lambda s: math.pi,
+        null=None,
+        scope="recording",
+        circular=True,
+        grid=lambda s: np.array([0.0, 0.5, 1.0, 1.5]) * math.pi,
+    )
+
+
+def damping_ratio(scale: float) -> EffectParameter:
+    """The damping ratio of a mode, about `scale`."""
+    return EffectParameter(
+        "damping",
+        "-",
+        scale=lambda s: scale,
+        lower=0.0,
+        null=None,
+        grid=lambda s: np.array([0.01, 0.05]),
+    )
+
+
 @dataclass(frozen=True)
 class Law:
     """A force on the left-hand side of the equation of motion, as plain functions of floats.
@@ -211,7 +236,7 @@ class Law:
 
 Numbers = Sequence[float]
 Size = tuple[float, str, float]
-"""How large an effect is: value, unit for displacements, share of its yardstick."""
+"""How large an effect is: value, unit for displacements, share of its reference."""
 Observe = Callable[
     [NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]
 ]

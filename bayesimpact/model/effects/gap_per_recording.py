@@ -4,7 +4,7 @@ Equation: g -> g[recording], m (for angles rad).
 At its null: all equal is the base model.
 Energy: conserves.
 Valid: a rig that was touched between recordings: obstacle re-clamped, bolt deformed, temperature.
-Its absence shows as touches that come too early in some recordings and too late in others, from
+Its absence shows as contacts that begin too early in some recordings and too late in others, from
 the first impact to the last.
 Source: Tian et al., section 4, where the gap is allowed to differ between recordings.
 Status: exact; runs in the closed-form simulator.

@@ -6,7 +6,7 @@ At its null: step = 0 is the base model.
 Energy: dissipates nothing by itself: the gap changes while the obstacle is unloaded.
 Valid: plastic flattening, wear or seating of a bolt at loads that change little; every recording
 starts anew.
-Its absence shows as touches that come ever later, in proportion to the number of impacts so far.
+Its absence shows as contacts that begin ever later, in proportion to the number of impacts so far.
 Source: Tian et al., section 4 (plastic deformation of the bolt); Archard 1953, J. Appl. Phys.
 24:981.
 Status: exact between events; compiled against two independent integrators.

@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 
-from bayesimpact.model.effects.effect import Effect, EffectParameter, Law, Numbers
+from bayesimpact.model.effects.effect import Effect, EffectParameter, Law, Numbers, phase
 
 
 def force(
@@ -53,15 +53,7 @@ EFFECT = Effect(
             spectral=True,
             grid=lambda s: np.array([0.5, 0.8, 1.25, 2.0, 3.0, 5.0]) * s.natural_frequency,
         ),
-        EffectParameter(
-            "phase",
-            "rad",
-            scale=lambda s: math.pi,
-            null=None,
-            scope="recording",
-            circular=True,
-            grid=lambda s: np.array([0.0, 0.5, 1.0, 1.5]) * math.pi,
-        ),
+        phase(),
     ),
     law=Law(force, time_rate=time_rate, polynomial=True, ignores_speed=True, of_time=True),
 )

@@ -1,7 +1,7 @@
 """The obstacle has a mass: it is picked up at impact and left when its force vanishes.
 
 Equation: v+ = m v / (m + m2) at impact; in contact the moving mass is m + m2; contact ends when m2
-y'' + c2 v + k2 d = 0; m2 in kg (for angles kg m2). Every touch finds the obstacle at rest at y =
+y'' + c2 v + k2 d = 0; m2 in kg (for angles kg m2). Every contact finds the obstacle at rest at y =
 g.
 At its null: m2 = 0 is contact_no_tension, which is simpler and preferred.
 Energy: dissipates m m2 v^2 / (2 (m + m2)) at impact; what the obstacle carries off at release is

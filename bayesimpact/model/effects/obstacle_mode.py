@@ -22,7 +22,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from bayesimpact.model.effects.effect import Effect, EffectParameter
+from bayesimpact.model.effects.effect import Effect, EffectParameter, damping_ratio
 
 EFFECT = Effect(
     id="obstacle_mode",
@@ -48,14 +48,7 @@ EFFECT = Effect(
             null=None,
             grid=lambda s: np.geomspace(0.8, 12.0, 32) * s.contact_rate / (2.0 * math.pi),
         ),
-        EffectParameter(
-            "damping",
-            "-",
-            scale=lambda s: 0.03,
-            lower=0.0,
-            null=None,
-            grid=lambda s: np.array([0.01, 0.05]),
-        ),
+        damping_ratio(0.03),
     ),
     binds=MappingProxyType(
         {"obstacle_mass": "mass", "obstacle_frequency": "frequency", "obstacle_damping": "damping"}

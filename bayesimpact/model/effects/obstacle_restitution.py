@@ -1,7 +1,7 @@
 """A loss in the instant of impact: the mass goes on with a share of its speed.
 
-Equation: v+ = r v at every touch from outside, r without unit; the contact then goes on as in the
-base model.
+Equation: v+ = r v at every contact onset from outside, r without unit; the contact then goes
+on as in the base model.
 At its null: r = 1 is the base model.
 Energy: dissipates (1 - r^2) m v^2 / 2 at impact.
 Valid: a thin hard layer or a light part that is hit before the obstacle yields, much faster than

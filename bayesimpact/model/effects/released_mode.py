@@ -14,12 +14,10 @@ Status: exact.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.model.effects.effect import Effect, EffectParameter
+from bayesimpact.model.effects.effect import Effect, EffectParameter, phase
 
 Array = NDArray[np.float64]
 
@@ -66,15 +64,7 @@ EFFECT = Effect(
             null=None,
             grid=lambda s: np.array([1.0, 4.0, 16.0]) / s.duration,
         ),
-        EffectParameter(
-            "phase",
-            "rad",
-            scale=lambda s: math.pi,
-            null=None,
-            scope="recording",
-            circular=True,
-            grid=lambda s: np.array([0.0, 0.5, 1.0, 1.5]) * math.pi,
-        ),
+        phase(),
     ),
     observe=observe,
     prefer="sensor_hum",

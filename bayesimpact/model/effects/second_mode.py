@@ -22,7 +22,14 @@ from types import MappingProxyType
 
 import numpy as np
 
-from bayesimpact.model.effects.effect import Effect, EffectParameter, Numbers, Scales, Size
+from bayesimpact.model.effects.effect import (
+    Effect,
+    EffectParameter,
+    Numbers,
+    Scales,
+    Size,
+    damping_ratio,
+)
 
 
 def size(p: Numbers, s: Scales) -> Size:
@@ -52,14 +59,7 @@ EFFECT = Effect(
             null=None,
             grid=lambda s: np.geomspace(0.8, 20.0, 32) * s.contact_rate / (2.0 * math.pi),
         ),
-        EffectParameter(
-            "damping",
-            "-",
-            scale=lambda s: 0.02,
-            lower=0.0,
-            null=None,
-            grid=lambda s: np.array([0.01, 0.05]),
-        ),
+        damping_ratio(0.02),
         EffectParameter("gain", "1/kg", scale=lambda s: 0.3 / s.mass),
     ),
     binds=MappingProxyType(

@@ -12,12 +12,10 @@ Status: exact.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.model.effects.effect import Effect, EffectParameter
+from bayesimpact.model.effects.effect import Effect, EffectParameter, phase
 
 Array = NDArray[np.float64]
 
@@ -46,15 +44,7 @@ EFFECT = Effect(
             spectral=True,
             grid=lambda s: mains(0.5 / s.interval),
         ),
-        EffectParameter(
-            "phase",
-            "rad",
-            scale=lambda s: math.pi,
-            null=None,
-            scope="recording",
-            circular=True,
-            grid=lambda s: np.array([0.0, 0.5, 1.0, 1.5]) * math.pi,
-        ),
+        phase(),
     ),
     observe=observe,
 )

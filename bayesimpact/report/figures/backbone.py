@@ -22,7 +22,7 @@ from bayesimpact.report.figures.style import (
     position,
     styled,
 )
-from bayesimpact.report.results import BackboneSummary, Curve, Results
+from bayesimpact.report.results import BackboneCurve, BackboneSummary, Results
 
 PER_PAGE = 3
 MOST = 12
@@ -122,7 +122,7 @@ def _grid(cases: Sequence[str]) -> tuple[Figure, np.ndarray]:
     return figure, panels
 
 
-def _curves(summary: BackboneSummary, case: str) -> list[Curve]:
+def _curves(summary: BackboneSummary, case: str) -> list[BackboneCurve]:
     return [c for c in summary.curves if c.case == case and c.times.size]
 
 
@@ -159,4 +159,4 @@ def _legend(figure: Figure, summary: BackboneSummary) -> None:
     words = [f"recorded, {words}" for words in BRANCH_WORDS.values()]
     words.append(f"{100 * summary.probability:.0f} % of simulated")
     pairs = {tuple: HandlerTuple(ndivide=None, pad=0.0)}
-    figure.legend(handles, words, loc="outside upper right", ncols=3, handler_map=pairs)
+    figure.legend(handles, words, loc="outside upper left", ncols=3, handler_map=pairs)

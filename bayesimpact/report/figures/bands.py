@@ -43,7 +43,7 @@ def _figure(results: Results, before: BackboneSummary, after: BackboneSummary) -
     figure.supylabel("recorded \N{MINUS SIGN} simulated (half-widths of the band)", fontsize=9)
     handles, labels = panels[0, 0].get_legend_handles_labels()
     unique = dict(zip(labels, handles, strict=True))
-    figure.legend(unique.values(), unique.keys(), loc="outside upper right", ncols=2)
+    figure.legend(unique.values(), unique.keys(), loc="outside upper left", ncols=2)
     return figure
 
 

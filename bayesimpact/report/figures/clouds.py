@@ -22,7 +22,7 @@ _CIRCLE = np.linspace(0.0, 2 * np.pi, 121)
 
 
 @dataclass(frozen=True, eq=False)
-class Normal:
+class NormalLaw:
     """A normal law of p parameters: mean (p,) and covariance (p, p), SI; names as in `Draws`."""
 
     label: str
@@ -37,7 +37,7 @@ class Normal:
         return np.asarray(self.mean + np.outer([-2.0, 0.0, 2.0], np.sqrt(np.diag(self.covariance))))
 
 
-Law = Draws | Normal
+Law = Draws | NormalLaw
 
 
 class Cloud(ABC):
@@ -87,7 +87,7 @@ class DrawCloud(Cloud):
 
     def pair(self, axis: Axes, i: int, j: int) -> None:
         """Smoothed contours."""
-        quiet_arviz()  # corner imports it, aloud
+        quiet_arviz()  # corner imports it, with its announcement
         import corner
 
         corner.hist2d(
@@ -145,7 +145,7 @@ def plotted(law: Law, names: tuple[str, ...], axes: list[LabScale], colour: str)
     """A posterior on the axes of the plot, in the order of `names`."""
     columns = [law.names.index(name) if name in law.names else -1 for name in names]
     known = np.array(columns) >= 0
-    if isinstance(law, Normal):
+    if isinstance(law, NormalLaw):
         scale = np.array([axis.scale for axis in axes])
         mean = [axis(law.mean[c]) for axis, c in zip(axes, columns, strict=True)]
         covariance = law.covariance[np.ix_(columns, columns)] * np.outer(scale, scale)

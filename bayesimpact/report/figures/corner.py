@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from bayesimpact.model.units import decimals, display, number, typeset
-from bayesimpact.report.figures.clouds import LEVELS, Cloud, Law, Normal, plotted
+from bayesimpact.report.figures.clouds import LEVELS, Cloud, Law, NormalLaw, plotted
 from bayesimpact.report.figures.style import (
     BLACK,
     BLUE,
@@ -27,7 +27,7 @@ from bayesimpact.report.figures.style import (
     styled,
 )
 
-__all__ = ["LEVELS", "Normal", "corner_figure"]
+__all__ = ["LEVELS", "NormalLaw", "corner_figure"]
 
 MOST = 12
 """Parameters in one corner plot; the first of the table are taken."""
@@ -90,7 +90,7 @@ def _grid(count: int) -> tuple[Figure, np.ndarray]:
 
 
 def _estimate(law: Law, k: int) -> Estimate:
-    if isinstance(law, Normal):
+    if isinstance(law, NormalLaw):
         half = 1.6448536269514722 * float(np.sqrt(law.covariance[k, k]))
         mean = float(law.mean[k])
         return mean, mean - half, mean + half
@@ -193,8 +193,12 @@ def _outer_labels(panels: np.ndarray, axes: list[LabScale], i: int) -> None:
 def _ticks(low: float, high: float) -> Array:
     """Round values well inside an axis, so that labels of neighbouring panels keep apart."""
     margin = 0.15 * (high - low)
-    ticks = np.asarray(MaxNLocator(3).tick_values(low, high))
-    return ticks[(ticks > low + margin) & (ticks < high - margin)]
+    for intervals in (3, 4, 6, 8):  # one tick alone would say nothing of the scale
+        ticks = np.asarray(MaxNLocator(intervals).tick_values(low, high))
+        ticks = ticks[(ticks > low + margin) & (ticks < high - margin)]
+        if ticks.size > 1:
+            break
+    return ticks
 
 
 def _legend(

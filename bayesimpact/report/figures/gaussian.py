@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bayesimpact.report.change_view import NUISANCES
-from bayesimpact.report.figures.corner import Normal, corner_figure
+from bayesimpact.report.figures.corner import NormalLaw, corner_figure
 from bayesimpact.report.results import Results
 
 
@@ -23,7 +23,7 @@ def gaussian_figures(results: Results) -> Mapping[str, Figure]:
         return {}
     shown = results.select("physical", "effect")
     columns = [i for i, row in enumerate(results.rows) if row in shown]
-    after = Normal(
+    after = NormalLaw(
         "with what was added",
         tuple(row.name for row in shown),
         tuple(row.unit for row in shown),
@@ -33,7 +33,7 @@ def gaussian_figures(results: Results) -> Mapping[str, Figure]:
     mode = arrays["before_mode"]
     table = list(diagnosis["parameters"]["before"].items())[: mode.size]
     columns = [i for i, (name, _) in enumerate(table) if name.partition("[")[0] not in NUISANCES]
-    before = Normal(
+    before = NormalLaw(
         "base model",
         tuple(table[i][0] for i in columns),
         tuple(table[i][1]["unit"] for i in columns),

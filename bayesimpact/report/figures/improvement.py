@@ -29,6 +29,7 @@ from bayesimpact.report.rows import Z90
 
 MOST = 16
 """Parameters shown; those that moved most."""
+WIDE, LINEAR = 300.0, 10.0  # an axis that reaches beyond the first is logarithmic from the second
 FAR = 1000.0  # standard deviations: beyond, they tell a narrow interval, no large shift
 _ROW = 0.24  # in
 
@@ -157,6 +158,10 @@ def _shifts(moved: list[tuple[str, Array, Array]], unit: str) -> Figure:
             axis.plot(values[1], i + offset, "o", color=colour, ms=5)
     axis.axvline(0.0, color=GREY, lw=0.7)
     rows_axis(axis, [symbol(name) for name, *_ in moved])
+    if max(np.abs(after).max() for _, _, after in moved) > WIDE:
+        axis.set_xscale("symlog", linthresh=LINEAR)  # one wide interval would hide all others
+        axis.xaxis.set_major_formatter("{x:g}")
+        unit += f", logarithmic beyond {LINEAR:g}"
     axis.set_xlabel(f"shift from the base model ({unit})")
     axis.set_title("parameters and 90 % intervals", loc="left")
     handles = [

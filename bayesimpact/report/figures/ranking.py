@@ -22,6 +22,7 @@ from bayesimpact.report.figures.style import (
     rows_axis,
     styled,
 )
+from bayesimpact.report.formula_text import in_words
 from bayesimpact.report.limit_view import not_found
 from bayesimpact.report.results import Results
 
@@ -41,7 +42,7 @@ def ranking_figures(results: Results) -> Mapping[str, Figure]:
     models = ranked(evidence, force=diagnosis.get("verdict") == "unknown")
     if len(models) > 1:
         figures["ranking"] = _ranking(models, chosen(diagnosis), evidence.get("decisive"))
-    limits = [x for x in not_found(diagnosis) if _known(x)]
+    limits = [x for x in not_found(results) if _known(x)]
     if limits:
         figures["limits"] = _limits(limits)
     return figures
@@ -101,11 +102,6 @@ def _ranking(
     axis.set_title("models tried, best first", loc="left")
     _beside(axis, "probability", [probability(float(w)) for w in weight])
     return figure
-
-
-def in_words(ids: str) -> str:
-    """Ids of a model's effects as a label: their titles are too long for an axis."""
-    return ids.replace("_", " ")
 
 
 def _beside(axis: Axes, title: str, cells: Sequence[str]) -> None:

@@ -113,7 +113,7 @@ def _legend(figure: Figure, motion: Axes, residual: Axes) -> None:
     for axis in (motion, residual):
         for handle, words in zip(*axis.get_legend_handles_labels(), strict=True):
             found.setdefault(words, handle)
-    figure.legend(found.values(), found.keys(), loc="upper right", ncols=4, markerscale=2)
+    figure.legend(found.values(), found.keys(), loc="upper left", ncols=4, markerscale=2)
 
 
 def _period(results: Results) -> float:

@@ -33,7 +33,7 @@ LONGEST_NAME = 40
 
 
 @dataclass(frozen=True)
-class Drawn:
+class SavedFigures:
     """PNG files by the name of the figure; the reason, by what could not be drawn."""
 
     pictures: Mapping[str, bytes] = field(default_factory=dict)
@@ -108,7 +108,7 @@ def save_figures(figures: Mapping[str, Figure], folder: Path) -> dict[str, bytes
     return {name: _saved(name, figure, folder) for name, figure in figures.items()}
 
 
-def save_drawn(draw: Drawer, results: Results, folder: Path) -> Drawn:
+def save_drawn(draw: Drawer, results: Results, folder: Path) -> SavedFigures:
     """Draw and save what one function draws; a figure that fails leaves its reason, not a gap.
 
     Raises
@@ -120,7 +120,7 @@ def save_drawn(draw: Drawer, results: Results, folder: Path) -> Drawn:
     except OSError:
         raise
     except Exception as error:
-        return Drawn(failed={draw.__name__.strip("_").replace("_", " "): reason(error)})
+        return SavedFigures(failed={draw.__name__.strip("_").replace("_", " "): reason(error)})
     pictures, failed = {}, {}
     for name, figure in figures.items():
         try:
@@ -129,7 +129,7 @@ def save_drawn(draw: Drawer, results: Results, folder: Path) -> Drawn:
             raise
         except Exception as error:
             failed[name.replace("_", " ")] = reason(error)
-    return Drawn(pictures, failed)
+    return SavedFigures(pictures, failed)
 
 
 def reason(error: Exception) -> str:

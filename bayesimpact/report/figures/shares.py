@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 
 from bayesimpact.report.archive import load_results
-from bayesimpact.report.figures.save import Drawn, drawers, file_name, save_drawn
+from bayesimpact.report.figures.save import SavedFigures, drawers, file_name, save_drawn
 from bayesimpact.report.results import Results
 
 FIGURES = "figures"
@@ -22,10 +22,10 @@ MODULE = "bayesimpact.report.figures.shares"
 PATIENCE = 300.0
 """Seconds for which a second process may go on after the first one is done."""
 
-Share = dict[int, Drawn]  # by the position of who drew
+Share = dict[int, SavedFigures]  # by the position of who drew
 
 
-def save_all(results: Results, folder: Path) -> Drawn:
+def save_all(results: Results, folder: Path) -> SavedFigures:
     """All figures of the results that `folder` holds, into its folder of figures.
 
     Returns
@@ -50,7 +50,7 @@ def save_all(results: Results, folder: Path) -> Drawn:
         second = None if told is None else read(told, folder)
         found |= save_share(results, folder, 1, 2) if second is None else second
     ordered = [found[i] for i in sorted(found)]
-    return Drawn(
+    return SavedFigures(
         {name: data for drawn in ordered for name, data in drawn.pictures.items()},
         {name: reason for drawn in ordered for name, reason in drawn.failed.items()},
     )
@@ -92,7 +92,7 @@ def read(told: bytes, folder: Path) -> Share | None:
     """What the other process has saved; None where its answer is not one."""
     try:
         return {
-            int(i): Drawn(
+            int(i): SavedFigures(
                 {n: (folder / FIGURES / f"{file_name(n)}.png").read_bytes() for n in names}, failed
             )
             for i, (names, failed) in json.loads(told).items()

@@ -74,7 +74,7 @@ def _figure(results: Results, cycle: Cycle, before: Array) -> Figure:
     panels[-1].set_xlabel(label("time since the first sample", "s"))
     panels[0].set_title(
         f"{best_gain(results)}: {_gain(results, cycle, before)}",
-        loc="left",
+        loc="right",
     )
     panels[0].set_xlim(t[0], t[-1])
     return figure
@@ -93,8 +93,8 @@ def _gain(results: Results, cycle: Cycle, before: Array) -> str:
 
 
 def _legend(axis: Axes) -> None:
-    """Above the panel, clear of the data."""
-    axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, borderaxespad=0.1)
+    """Above the panel, clear of the data, on the left: a narrow screen shows that side first."""
+    axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, borderaxespad=0.1)
 
 
 def _motion(

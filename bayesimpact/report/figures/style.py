@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from bayesimpact.model.units import Display, decimals, display, number, readable, reading, typeset
+from bayesimpact.report.formula_text import in_words, letter
 from bayesimpact.report.results import RecordingResult, Results
 
 Array = NDArray[np.float64]
@@ -22,7 +23,7 @@ R = TypeVar("R")
 
 # Okabe and Ito (2008), Color Universal Design.
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
-YELLOW, BLUE, RED, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
+BLUE, RED, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
 GREY = "#8A8A8A"
 RECORDED, MODEL = SKY, RED
 BEFORE, AFTER = ORANGE, BLUE
@@ -140,7 +141,10 @@ def symbol(name: str) -> str:
     """A parameter's name in mathtext: "k2[1]" becomes "$k_2$[1]"."""
     base, _, key = name.partition("[")
     key = key.rstrip("]")
-    if "." in base:
+    known = letter(base)
+    if known is not None:
+        base = f"${known}$"
+    elif "." in base:
         base = base.partition(".")[2].replace("_", " ")
     elif base == "sigma":
         base = r"$\sigma$"
@@ -154,7 +158,7 @@ def symbol(name: str) -> str:
 def full_symbol(name: str) -> str:
     """`symbol`, with the effect that an added parameter belongs to: "gap wear: step"."""
     effect, dot, _ = name.partition("[")[0].partition(".")
-    return f"{effect.replace('_', ' ')}: {symbol(name)}" if dot else symbol(name)
+    return f"{in_words(effect)}: {symbol(name)}" if dot else symbol(name)
 
 
 @dataclass(frozen=True)

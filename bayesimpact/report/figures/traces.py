@@ -48,5 +48,5 @@ def trace_figure(sampler: SamplerSummary) -> Figure:
         Line2D([], [], color=CYCLE[e % len(CYCLE)], label=f"ensemble {e + 1}")
         for e in range(sampler.ensembles)
     ]
-    figure.legend(handles=handles, loc="outside upper right", ncols=min(6, len(handles)))
+    figure.legend(handles=handles, loc="outside upper left", ncols=min(6, len(handles)))
     return figure

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter, savgol_filter
 
 from bayesimpact.data.bundled import bundled_campaign
-from bayesimpact.data.faults.bursts import MOST, Curve, find_bursts
+from bayesimpact.data.faults.bursts import MOST, LocalPolynomial, find_bursts
 from bayesimpact.data.faults.find import recording_faults
 from bayesimpact.data.faults.spikes import find_spikes, lone_spikes
 from bayesimpact.data.quantity import Quantity
@@ -159,7 +159,7 @@ def test_the_share_of_a_corner_that_good_samples_show(degree: int, beside: int) 
     """Against polynomials fitted by `polyfit` to corners and steps anywhere."""
     rng, run = np.random.default_rng(6), np.arange(3.0)
     good = np.concatenate([np.arange(-beside, 0), np.arange(3, 3 + beside)])
-    curve = Curve(1.0 * good, degree)
+    curve = LocalPolynomial(1.0 * good, degree)
     largest = 0.0
     for place in rng.uniform(-beside, beside + 3, 3000):
         for power in (0, 1):

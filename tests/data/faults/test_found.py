@@ -15,7 +15,7 @@ from bayesimpact.data.faults.clipped import find_clipped
 from bayesimpact.data.faults.fault import Fault
 from bayesimpact.data.faults.find import find_faults, recording_faults, set_aside
 from bayesimpact.data.faults.flat import reading_step
-from bayesimpact.data.faults.local import FORMS, foretell, rounding_error
+from bayesimpact.data.faults.local import FORMS, predict_sides, rounding_error
 from bayesimpact.data.faults.slip import find_slips
 from bayesimpact.data.read import load_campaign
 from bayesimpact.data.recording import Recording
@@ -124,7 +124,7 @@ def test_rounded_readings_that_repeat_where_a_smoothed_motion_turns_are_none(see
 def test_rounding_moves_a_prediction_no_further_than_its_bound(form: tuple[int, int]) -> None:
     rng = np.random.default_rng(1)
     x, step = np.cumsum(rng.standard_normal(4000)), 0.7
-    exact, rounded = (foretell(y, form, 0, -0.5) for y in (x, np.round(x / step) * step))
+    exact, rounded = (predict_sides(y, form, 0, -0.5) for y in (x, np.round(x / step) * step))
     error = np.abs(rounded.before - exact.before)
     bound = rounding_error(form, -0.5, step)
     assert 0.5 * bound < np.nanmax(error) <= bound
