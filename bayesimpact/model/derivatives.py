@@ -33,8 +33,10 @@ from bayesimpact.model.sensitivity_pass import Columns, sensitivity_pass, worksp
 from bayesimpact.model.tables import ResponseTables, response_tables
 from bayesimpact.model.threads import in_shares
 
-#: Events for which there is room at first; a recording with more is run once more.
+#: Events for which there is room at first, at least, and samples for one more; a recording with
+#: more of them is run once more.
 EVENTS = 256
+SAMPLES_PER_EVENT = 8
 
 
 @inner()
@@ -81,7 +83,8 @@ def work(
     q = np.empty(11)
     unused = np.empty((12, 12))
     active = np.empty(11, dtype=np.uint64)
-    first_events = np.empty((EVENTS, 2))
+    longest = counts[items[0] : items[1]].max() if items[1] > items[0] else 0
+    first_events = np.empty((EVENTS + longest // SAMPLES_PER_EVENT, 2))
     mine, room = response_tables(), workspace(size, samples.size > 0)
     for b in range(rows[0], rows[1]):
         for r in range(items[0], items[1]):

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.model.blocks import Sink
 from bayesimpact.model.compiled import compiled, inner
+from bayesimpact.model.driven_events import LONGEST, expand, next_rise, terms_needed
 from bayesimpact.model.flow import impulse_response, second_response
 from bayesimpact.model.normalized import (
     K2,
@@ -49,7 +50,8 @@ Floats = NDArray[np.float64]
 #: Rate times time below which responses are power series.
 EARLY = 0.5
 TERMS = 14
-MAX_STEPS = 20_000
+#: Stretches without an event after which an interval is given up.
+MAX_STRETCHES = 40_000
 #: Events after which a recording of n samples is given up: EVENTS_AT_LEAST + EVENTS_PER_SAMPLE n.
 EVENTS_AT_LEAST = 1000
 EVENTS_PER_SAMPLE = 50
@@ -144,64 +146,148 @@ def reading_driven(
     return rate * rate * (p - beta * v - K * y)
 
 
-@inner(forceinline=True)
-def may_rise(
-    beta: float, K: float, z: float, v: float, p: float, r: float, level: float, horizon: float
-) -> bool:
-    """Say whether z can reach the level within the horizon at all, by a bound of z''.
+class Regime(NamedTuple):
+    """What one side of the stop needs in every interval.
 
-    With e^2 = v^2 + K (z - p / K)^2 the rate of e is at most abs(r) s.
+    beta, K, S, D, B, R : as in `Responses`, after one interval
+    rest : force per mass of the undeformed contact, k2 g / m, or 0
+    sign, height : 1 and g in flight; -1 and -g in contact, where -y rises to leave; g may be inf
+    longest : stretch that is expanded at once, in intervals
+    path (n,) : room for its series
     """
-    rate = math.sqrt(K) + beta
-    u = z - p / K
-    bound = rate * (math.sqrt(v * v + K * u * u) + 0.5 * abs(r) * horizon * horizon)
-    bound += abs(r) * horizon
-    return z + horizon * (max(v, 0.0) + 0.5 * bound * horizon) >= level
+
+    beta: float
+    K: float
+    S: float
+    D: float
+    B: float
+    R: float
+    rest: float
+    sign: float
+    height: float
+    longest: float
+    path: Floats
 
 
-@compiled()
-def next_rise(
-    beta: float, K: float, z: float, v: float, p: float, r: float, level: float, horizon: float
-) -> tuple[float, float]:
-    """Return (t, z'(t)) at the first rise through `level` within the horizon; inf if there is none,
-    nan on failure.
-
-    Steps that provably cannot jump over a crossing: while v s + M s^2 / 2 is less than the distance
-    to the level, M a bound of z'' (see `may_rise`), nothing crosses; close to a crossing the
-    largest such step is Newton's, from below.
+class Drive(NamedTuple):
+    """What a recording adds to the motion it reads: gain of the input, and per mass and interval,
+    the offset of the probe, and the input.
     """
+
+    gain: float
+    pushing: float
+    offset: float
+    wave: Wave
+
+
+class Point(NamedTuple):
+    """Where a motion is: displacement, velocity, in contact or not; and its events so far."""
+
+    y: float
+    v: float
+    contact: bool
+    events: int
+
+
+@inner()
+def regime_of(beta: float, K: float, rest: float, sign: float, gap: float) -> Regime:
+    """One regime, in sampling intervals."""
+    whole = responses(beta, K, 1.0)
     rate = math.sqrt(K) + beta
-    shortest = min(1e-9 / rate, 1e-9 * horizon)
-    t, position, speed = 0.0, z, v
-    for _ in range(MAX_STEPS):
-        distance = level - position
-        if distance <= 0.0 and speed > 0.0 and t > 0.0:
-            return t, speed
-        left = horizon - t
-        if not left > 0.0:
-            return math.inf, 0.0
-        distance = max(distance, 0.0)
-        longest = min(1.0 / rate, left)
-        u = position - (p + r * t) / K
-        energy = math.sqrt(speed * speed + K * u * u)
-        bound = rate * (energy + 0.5 * abs(r) * longest * longest) + abs(r) * longest
-        if bound == 0.0:
-            return math.inf, 0.0
-        root = math.sqrt(speed * speed + 2.0 * bound * distance)
-        step = 2.0 * distance / (root + speed) if speed > 0.0 else (root - speed) / bound
-        sure = speed > 0.0 and step < longest and bound * step <= 0.1 * speed
-        step = min(max(step, shortest), longest)
-        t = horizon if step == left else t + step
-        position, speed = advance_driven(responses(beta, K, t), z, v, p, r)
-        if sure:  # the speed hardly changes any more: plain Newton
-            for _ in range(6):
-                step = (level - position) / speed
-                t += step
-                position, speed = advance_driven(responses(beta, K, t), z, v, p, r)
-                if abs(step) <= 4e-16 * t:
-                    break
-            return (t, speed) if t <= horizon else (math.inf, 0.0)
-    return math.nan, 0.0
+    longest = min(1.0, LONGEST / rate)
+    path = np.empty(terms_needed(rate * longest))
+    return Regime(
+        beta, K, whole.S, whole.D, whole.B, whole.R, rest, sign, sign * gap, longest, path
+    )
+
+
+@inner(fastmath={"contract"})
+def glide(
+    side: Regime, first: int, y: float, v: float, drive: Drive, sink: Sink
+) -> tuple[int, float, float, float]:
+    """Read the samples from `first` on, up to one after which the motion may reach the stop.
+
+    Returns (i, y, v, sum of squares): the last sample read, and the motion there. Over an interval
+    z is at most the larger of its values at the ends and M / 8, M a bound of z'': with
+    e^2 = v^2 + K (z - p / K)^2 the rate of e is at most abs(r) s.
+    """
+    gain, pushing, offset, wave = drive
+    beta, K, S, D, B, R, rest, sign, height, _, _ = side
+    C, KS, inverse, root = D + beta * S, K * S, 1.0 / K, math.sqrt(K)
+    # what v, z - p / K and r add to the bound
+    by_v = 0.125 * (root + beta)
+    by_u, by_r = by_v * root, 0.5 * by_v + 0.125
+    data, out, speeds, held = sink.data, sink.out, sink.speeds, wave.held
+    order, compared, written = sink.order, sink.data.size > 0, sink.out.size > 0
+    last, total, i = held.size - 1, 0.0, first
+    following = pushing * held[i]
+    while True:
+        if compared or written:
+            pushed = pushing * wave.shown[i] + rest
+            read = reading_driven(order, sink.rate, beta, K, y, v, pushed)
+            read += offset + gain * wave.carried[i]
+            if compared:
+                residual = data[i] - read
+                total += residual * residual
+            else:
+                out[i] = read
+                if speeds.size > 0:
+                    speeds[i] = v
+        if i == last:
+            break
+        now, following = following, pushing * held[i + 1]
+        p, r = now + rest, following - now
+        y_next = C * y + (S * v + (p * B + r * R))
+        v_next = D * v - (KS * y - (p * S + r * B))
+        margin = by_v * abs(v) + by_u * abs(y - p * inverse) + by_r * abs(r)
+        if not (sign * y + margin < height and sign * y_next + margin < height):
+            break
+        y, v = y_next, v_next
+        i += 1
+    return i, y, v, total
+
+
+@inner()
+def cross(
+    start: Point, sides: tuple[Regime, Regime], i: int, p: float, r: float, events: Floats,
+    limit: int,
+) -> tuple[Point, int]:  # fmt: skip
+    """Bring a motion that may reach the stop through interval i; return it and a code.
+
+    p, r : force per mass, and its rise, of the input alone
+    events, limit : where events are noted, and after how many of them to give up
+    """
+    y, v, contact, count = start
+    t, steps = 0.0, 0
+    while True:
+        side = sides[1] if contact else sides[0]
+        left = 1.0 - t
+        h = min(left, side.longest)
+        scale = side.sign * h * h
+        now = scale * (p + r * t + side.rest)
+        bh, Kh = side.beta * h, side.K * h * h
+        end, speed, bound = expand(
+            side.path, bh, Kh, side.sign * y, side.sign * v * h, now, scale * h * r
+        )
+        if not math.isfinite(end + speed):
+            return Point(y, v, contact, count), OVERFLOW
+        x, rise = next_rise(side.path, side.height, end, speed, bound)
+        steps += 1
+        if math.isnan(x) or steps > MAX_STRETCHES:
+            return Point(y, v, contact, count), SEARCH_FAILED
+        if x <= 1.0:
+            t, y, v = t + x * h, side.sign * side.height, side.sign * rise / h
+            contact, steps = not contact, 0
+            if count < events.shape[0]:
+                events[count, 0] = i + t
+                events[count, 1] = v
+            count += 1
+            if count > limit:
+                return Point(y, v, contact, count), TOO_MANY_EVENTS
+        else:
+            t, y, v = t + h, side.sign * end, side.sign * speed / h
+            if h == left:
+                return Point(y, v, contact, count), OK
 
 
 @inner()
@@ -222,66 +308,32 @@ def run_driven(
     if code != OK:
         return math.inf, 0, code
     motion = scale(q, mass, interval)
-    stop, contact = has_stop(q), begins_in_contact(q)
     per_mass = interval * interval / mass
-    gain = q[A] * per_mass
-    hold = per_mass * q[K2] * q[G] if stop else 0.0
-    free = responses(2.0 * motion.b_flight, motion.K_flight, 1.0)
-    touching = free
-    if stop:
-        touching = responses(2.0 * motion.b_contact, motion.K_contact, 1.0)
-    data, out, speeds, events = sink.data, sink.out, sink.speeds, sink.events
+    drive = Drive(q[A], q[A] * per_mass, q[OFFSET], wave)
+    free = regime_of(2.0 * motion.b_flight, motion.K_flight, 0.0, 1.0, math.inf)
+    sides = (free, free)
+    if has_stop(q):
+        free = regime_of(2.0 * motion.b_flight, motion.K_flight, 0.0, 1.0, motion.gap)
+        rest = per_mass * q[K2] * q[G]
+        sides = (
+            free, regime_of(2.0 * motion.b_contact, motion.K_contact, rest, -1.0, motion.gap)
+        )  # fmt: skip
+    at = Point(q[Y0], q[V0] * interval, begins_in_contact(q), 0)
     limit = EVENTS_AT_LEAST + EVENTS_PER_SAMPLE * n
-    y, v = q[Y0], q[V0] * interval
-    total, count = 0.0, 0
-    offset, order, rate = q[OFFSET], sink.order, sink.rate
-    compared, written = data.size > 0, out.size > 0
-    for i in range(n):
-        if compared or written:
-            beta, K, level = free.beta, free.K, 0.0
-            if contact:
-                beta, K, level = touching.beta, touching.K, hold
-            pushed = gain * wave.shown[i] + level
-            read = reading_driven(order, rate, beta, K, y, v, pushed)
-            read += offset + q[A] * wave.carried[i]
-            if compared:
-                residual = data[i] - read
-                total += residual * residual
-            else:
-                out[i] = read
-                if speeds.size > 0:
-                    speeds[i] = v
+    total, i = 0.0, 0
+    while True:
+        side = sides[1] if at.contact else sides[0]
+        i, y, v, squares = glide(side, i, at.y, at.v, drive, sink)
+        total += squares
+        at = Point(y, v, at.contact, at.events)
         if i == n - 1:
             break
-        p = gain * held[i]
-        r = gain * held[i + 1] - p
-        if not stop:
-            y, v = advance_driven(free, y, v, p, r)
-            continue
-        t = 0.0
-        while True:
-            flow, level, sign = (touching, hold, -1.0) if contact else (free, 0.0, 1.0)
-            now, left = p + r * t + level, 1.0 - t
-            z, zv, height = sign * y, sign * v, sign * motion.gap
-            wait, speed = math.inf, 0.0
-            if may_rise(flow.beta, flow.K, z, zv, sign * now, sign * r, height, left):
-                wait, speed = next_rise(
-                    flow.beta, flow.K, z, zv, sign * now, sign * r, height, left
-                )
-                if math.isnan(wait):
-                    return math.inf, count, SEARCH_FAILED
-            if not wait <= left:
-                after = flow if t == 0.0 else responses(flow.beta, flow.K, left)
-                y, v = advance_driven(after, y, v, now, r)
-                break
-            t, y, v = t + wait, motion.gap, sign * speed
-            contact = not contact
-            if count < events.shape[0]:
-                events[count, 0] = i + t
-                events[count, 1] = v
-            count += 1
-            if count > limit:
-                return math.inf, count, TOO_MANY_EVENTS
-    if not math.isfinite(total + y * 0.0):
-        return math.inf, count, OVERFLOW
-    return total, count, OK
+        p = drive.pushing * held[i]
+        r = drive.pushing * held[i + 1] - p
+        at, code = cross(at, sides, i, p, r, sink.events, limit)
+        if code != OK:
+            return math.inf, at.events, code
+        i += 1
+    if not math.isfinite(total + at.y * 0.0):
+        return math.inf, at.events, OVERFLOW
+    return total, at.events, OK

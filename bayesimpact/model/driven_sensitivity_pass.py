@@ -29,12 +29,15 @@ from bayesimpact.model.normalized import (
     begins_in_contact,
     scale,
 )
+from bayesimpact.model.sensitivities import dot
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 COLUMNS = 8
 RESIDUAL = 11
+#: Samples whose products are added up at once.
+ROWS = 120
 
 
 @inner()
@@ -106,23 +109,14 @@ def fill_row(
 
 
 @inner()
-def record(
-    i: int, read: float, row: Floats, data: Floats, values: Floats, jacobian: Floats, gram: Floats
-) -> None:
-    """Write sample i, which is read so, or add its products to `gram` (12, 12).
-
-    row : (12,) its derivatives, and room for the residual
-    """
-    if data.size == 0:
-        values[i] = read
-        for k in range(RESIDUAL):
-            jacobian[i, k] = row[k]
-        return
-    row[RESIDUAL] = data[i] - read
+def add_rows(gram: Floats, rows: Floats, count: int) -> None:
+    """Add to `gram` (12, 12) the products of the first `count` columns of `rows` (12, n)."""
     for k in range(RESIDUAL + 1):
-        mine = row[k]
-        for h in range(RESIDUAL + 1):
-            gram[k, h] += mine * row[h]
+        for h in range(k, RESIDUAL + 1):
+            total = dot(rows[k, :count], rows[h, :count])
+            gram[k, h] += total
+            if h > k:
+                gram[h, k] += total
 
 
 @inner()
@@ -154,6 +148,7 @@ def driven_sensitivity_pass(
     touching = responses(2.0 * motion.b_contact, motion.K_contact, 1.0)
     y, v, e = q[Y0], q[V0] * interval, typed(0)
     held, rate = wave.held, 1.0 / interval
+    rows, kept = np.empty((RESIDUAL + 1, ROWS)), 0  # what was not yet added to gram
     for i in range(held.size):
         side, level, beta, K = 0, 0.0, free.beta, free.K
         if contact:
@@ -164,7 +159,18 @@ def driven_sensitivity_pass(
         fill_row(row, order, rate, beta, K, slopes, side, y, v, dy, dv, gain, at_once)
         read = reading_driven(order, rate, beta, K, y, v, q[A] * pushed + level)
         read += q[OFFSET] + q[A] * wave.carried[i]
-        record(i, read, row, data, values, jacobian, gram)
+        # here, not in a function of its own: that would take three times as long
+        if data.size == 0:
+            values[i] = read
+            jacobian[i] = row[:RESIDUAL]
+        else:
+            row[RESIDUAL] = data[i] - read
+            for k in range(RESIDUAL + 1):
+                rows[k, kept] = row[k]
+            kept += 1
+            if kept == ROWS:
+                add_rows(gram, rows, kept)
+                kept = 0
         if i == held.size - 1:
             break
         now = per_mass * held[i]
@@ -190,3 +196,4 @@ def driven_sensitivity_pass(
         p = q[A] * (now + rise * t) + level
         carry_driven(after, slopes, side, y, v, p, r, now_A + rise_A * t, rise_A, dy, dv)
         y, v = advance_driven(after, y, v, p, r)
+    add_rows(gram, rows, kept)

@@ -6,7 +6,8 @@ Filtered noise drives the rig for 215 s, sampled at 610 Hz, as the public Silver
 are the mode from the raw recording (global search included; everything compiled before) and one
 likelihood, beside a decay of that length: its plain recurrence (`recurrence.py`), our likelihood of
 it, and the sum of squared differences of two stored arrays, below which nothing can be. The mode is
-checked against the truth first. Times are medians over rounds, on one core. Writes driven.json.
+checked against the truth first. Likelihoods are medians of CPU time over rounds, on one core.
+Writes driven.json.
 """
 
 from __future__ import annotations
@@ -95,6 +96,7 @@ def measure(samples: int = SAMPLES, **turns: int) -> dict[str, Any]:
                 "decay": lambda: sums_of_squares(alone, *plain),  # noqa: B023
                 "driven": lambda: sums_of_squares(many, *ours),  # noqa: B023
             },
+            clock=time.process_time,
             **turns,
         )
         numba.set_num_threads(threads)

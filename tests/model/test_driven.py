@@ -35,10 +35,15 @@ def _force(kind: str, n: int = 400) -> np.ndarray:
 
 
 def _oscillator(
-    force: np.ndarray, *, stop: bool, effect: str = "", free: bool = True
+    force: np.ndarray,
+    *,
+    stop: bool,
+    effect: str = "",
+    free: bool = True,
+    interval: float = INTERVAL,
 ) -> Oscillator:
     recording = Recording(
-        "a", "1" if stop else "", np.zeros(force.size), INTERVAL, input=Input(force, free=free)
+        "a", "1" if stop else "", np.zeros(force.size), interval, input=Input(force, free=free)
     )
     effects = [e for e in EFFECTS if e.id == effect]
     return build_oscillator(Campaign("rig", VALUES["mass"], (recording,), stop=stop), effects)
