@@ -135,7 +135,7 @@ def _overlaps(recording: Recording, frequency: float, decay: float, *, steady: b
     energy = (x - x.mean()) ** 2
     # of exp(-a t), squared, the centroid is at 1 / (2 a); of what lasts throughout, in the middle
     lasts = 2.0 * float(recording.times @ energy / energy.sum())
-    rates = decay + 1.0 / lasts
+    rates = decay + 1.0 / max(lasts, recording.interval)
     return bool(abs(frequency - own) < 1.0 / duration + rates / (2 * np.pi))
 
 

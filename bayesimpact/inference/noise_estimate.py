@@ -55,8 +55,9 @@ def estimate_noise(campaign: Campaign) -> Noise:
 
     Free decays tell it best: recordings with a measured input only where there is none (see
     `driven_noise`). For recordings that were smoothed the remainders say what the filter left; the
-    raw level is scaled up by the filter's power (see `smoothed_level`). Of free decays of one
-    quantity that passed no filter it is told, too, whether the noise grows (`with_growth`).
+    raw level is scaled up by the filter's power (see `smoothed_level`). Of free decays of
+    displacements or angles that passed no filter it is told, too, whether the noise grows
+    (`with_growth`).
     """
     known, smoothing = campaign.measurement.noise, campaign.measurement.smoothing
     orders = list(dict.fromkeys(r.order for r in campaign.recordings))
@@ -69,7 +70,9 @@ def estimate_noise(campaign: Campaign) -> Noise:
         first, second, third = (found.get(o, noise).level / noise.level for o in range(3))
         return replace(noise, scales=(first, second, third))
     if known is None:
-        plain = smoothing is None and all(r.input is None for r in campaign.recordings)
+        plain = smoothing is None and all(
+            r.input is None and r.order == 0 for r in campaign.recordings
+        )
         return with_growth(noise, campaign.recordings) if plain else noise
     return Noise(noise.correlation, smoothing, known, 0.0, noise.correlation_error, "campaign.toml")
 

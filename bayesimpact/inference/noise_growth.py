@@ -25,7 +25,7 @@ from scipy.stats import chi2
 from bayesimpact.data.hum import find_hum
 from bayesimpact.data.recording import Recording
 from bayesimpact.inference.noise import Noise
-from bayesimpact.inference.noise_remainders import DEGREE, KEPT, SMALLEST
+from bayesimpact.inference.noise_remainders import DEGREE, KEPT, LARGEST, SMALLEST
 from bayesimpact.inference.noise_spread import smoothed
 from bayesimpact.inference.noise_windows import centred, period_of, smooth_parts, windows
 
@@ -87,14 +87,15 @@ def with_growth(noise: Noise, recordings: Sequence[Recording]) -> Noise:
 
 def _energies(noise: Noise, recordings: Sequence[Recording]) -> Energies | None:
     """None where windows are too short to follow a rate, or too few, or hold a hum."""
-    length = int(min(period_of(r) for r in recordings) / WINDOWS_PER_PERIOD)
+    shortest = min(period_of(r) for r in recordings)
+    length = min(int(shortest / WINDOWS_PER_PERIOD), LARGEST)
     if length < SMALLEST or any(find_hum(r.samples, r.interval) for r in recordings):
         return None
     basis = null_space(np.vander(np.linspace(-1, 1, length), DEGREE + 1).T)
     covariance = basis.T @ toeplitz(noise.correlation ** np.arange(length)) @ basis
     side, parts = any(r.case for r in recordings), []
     for r in recordings:
-        where = windows(length, smooth_parts(r, side=side, turns=r.order == 0))
+        where = windows(length, smooth_parts(r, side=side, turns=True))
         size, rate = smoothed(r)
         parts.append((centred(r.samples)[where] @ basis, size[where], rate[where]))
     values, size, rate = (np.concatenate(part) for part in zip(*parts, strict=True))
