@@ -155,6 +155,17 @@ def test_likely_sets_are_told_by_what_they_share_and_what_they_differ_in():
     assert "missing in the measuring chain, not in the mechanics; the likeliest" in said
 
 
+def test_a_second_mode_is_mechanics():
+    """The probe reads it beside the oscillator's motion; a hum is the chain's."""
+    for effect, where in (
+        ("released_mode", "which the probe sees beside"),
+        ("sensor_hum", "chain"),
+    ):
+        said = told("named", (BY_ID[effect],), ("",), place("measurement"))
+        assert where in said
+        assert ("not in the mechanics" in said) is (effect == "sensor_hum")
+
+
 def test_a_group_of_which_one_is_needed_is_told():
     cubic, sine, five = (BY_ID[i] for i in ("spring_cubic", "pendulum_sine", "spring_quintic"))
     said = told("unknown", (), (), place("free"), either=((cubic, sine),))
