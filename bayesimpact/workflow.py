@@ -13,7 +13,8 @@ import numpy as np
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.faults.find import set_aside
-from bayesimpact.data.files import strict, write_text
+from bayesimpact.data.files import write_text
+from bayesimpact.data.strict_json import strict
 from bayesimpact.design.document import next_document
 from bayesimpact.design.hypotheses import Rivalry, rivalry
 from bayesimpact.design.rank import proposals

@@ -7,12 +7,9 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 UNFINISHED = ".bayesimpact-"  # begins the name of a file that is being written
 _DEPTHS = ("", "*/", "*/*/")  # below a results folder, where files are written
@@ -43,19 +40,6 @@ def _umask() -> int:
 def write_text(path: Path, text: str) -> None:
     """Write a text file in one go; what UTF-8 cannot say (bytes of a foreign path) becomes a ?."""
     write_bytes(path, text.encode("utf-8", "replace"))
-
-
-def strict(content: Any) -> Any:
-    """Content as strict JSON has it: arrays as lists, NumPy's numbers as plain ones, and null for
-    those that are not finite.
-    """
-    if isinstance(content, Mapping):
-        return {str(k): strict(v) for k, v in content.items()}
-    if isinstance(content, np.ndarray | np.generic):
-        content = content.tolist()
-    if isinstance(content, list | tuple):
-        return [strict(v) for v in content]
-    return None if isinstance(content, float) and not np.isfinite(content) else content
 
 
 def write_bytes(path: Path, content: bytes | memoryview) -> None:

@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from bayesimpact.data.files import strict, write_bytes, write_text
+from bayesimpact.data.files import write_bytes, write_text
+from bayesimpact.data.strict_json import strict
 from bayesimpact.errors import InputError
 from bayesimpact.report.codec import decode, encode
 from bayesimpact.report.results import Results, Row

@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from bayesimpact.data.campaign import Campaign
-from bayesimpact.data.files import strict
 from bayesimpact.data.read import load_campaign
+from bayesimpact.data.strict_json import strict
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.document import document
 from bayesimpact.errors import InputError

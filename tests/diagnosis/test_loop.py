@@ -13,11 +13,11 @@ import small_rig
 from effect_rigs import BY_ID
 from scipy import stats
 
+from bayesimpact.data.strict_json import strict
 from bayesimpact.diagnosis.comparable import Comparable
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.document import document
 from bayesimpact.diagnosis.loop import Diagnosis
-from bayesimpact.workflow import _strict
 
 CATALOGUE = tuple(
     BY_ID[i]
@@ -54,7 +54,7 @@ def unknown() -> Diagnosis:
 
 def written(diagnosis: Diagnosis, **draws) -> dict:
     content = document(diagnosis, seed=3, seconds=1.5, versions={"numpy": "2"}, **draws)
-    return json.loads(json.dumps(_strict(content), allow_nan=False))
+    return json.loads(json.dumps(strict(content), allow_nan=False))
 
 
 def physical_z(fit, mean=None, sd=None) -> dict[str, float]:

@@ -15,6 +15,7 @@ from effect_rigs import BY_ID
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.faults.noise import loud_recordings
 from bayesimpact.data.faults.spikes import find_spikes
+from bayesimpact.data.strict_json import strict
 from bayesimpact.diagnosis import diagnose as module
 from bayesimpact.diagnosis import recording_faults as faults
 from bayesimpact.diagnosis.budget import begin
@@ -26,7 +27,6 @@ from bayesimpact.diagnosis.recording_faults import Corrected, Step, cleaned_camp
 from bayesimpact.diagnosis.simpler import makes_idle
 from bayesimpact.inference.identify import identify
 from bayesimpact.trial.rig import Release
-from bayesimpact.workflow import _strict
 
 CATALOGUE = tuple(BY_ID[i] for i in ("coulomb_friction", "gap_per_recording", "sensor_drift"))
 
@@ -47,7 +47,7 @@ def spiked(samples: np.ndarray) -> np.ndarray:
 
 def written(found: Diagnosis) -> dict:
     content = document(found, seed=0, seconds=1.0, versions={})
-    return json.loads(json.dumps(_strict(content), allow_nan=False))
+    return json.loads(json.dumps(strict(content), allow_nan=False))
 
 
 @pytest.mark.parametrize(

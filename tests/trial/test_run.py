@@ -13,8 +13,9 @@ from click.testing import CliRunner
 
 from bayesimpact.cli import main
 from bayesimpact.cluster import executor
-from bayesimpact.data.files import UNFINISHED, strict
+from bayesimpact.data.files import UNFINISHED
 from bayesimpact.data.lock import locked
+from bayesimpact.data.strict_json import strict
 from bayesimpact.errors import InputError
 from bayesimpact.trial import run
 from bayesimpact.trial.blind import open_seal, seal, sealed_text
