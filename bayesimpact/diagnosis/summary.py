@@ -77,10 +77,9 @@ def summary(found: Findings) -> str:
             f"is missing too. {statements}{_groups(found)}{found.cost}{found.remains}{found.faults}"
         )
     place = REGIMES[found.location.regime]
-    if found.location.regime == "measurement" and all(e.family == "modes" for e in found.effects):
-        place = (
-            "which the probe sees beside the oscillator's motion"  # mechanics, but no force on it
-        )
+    modes = all(e.family == "modes" for e in found.effects)
+    if found.location.regime == "measurement" and modes:  # mechanics, but no force on the mass
+        place = "which the probe sees beside the oscillator's motion"
     return f"The base model leaves out {titles}, {place}. {statements}{found.cost}{found.faults}"
 
 

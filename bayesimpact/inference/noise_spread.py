@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.recording import Recording
+from bayesimpact.inference.noise_windows import centred
 from bayesimpact.response.half_cycles import spectral_period
 
 Array = NDArray[np.float64]
@@ -23,8 +24,7 @@ def smoothed(recording: Recording) -> tuple[Array, Array]:
     """
     from scipy.signal import savgol_filter
 
-    x, interval = recording.samples, recording.interval
-    x = x - float(np.median(x[-max(x.size // 5, 1) :]))
+    x, interval = centred(recording.samples), recording.interval
     half = max(int(0.5 * spectral_period(x, recording.order) / WINDOWS_PER_PERIOD), 2)
     length = min(2 * half + 1, (x.size - 1) // 2 * 2 + 1)
     if length <= DEGREE:
