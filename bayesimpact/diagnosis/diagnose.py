@@ -8,7 +8,9 @@
 3. Physics is searched. Where that ends in doubt, the recordings are compared beside it, and it is
    searched once more with the other steps corrected, unless an answer that explains everything
    needs all of its effects beside these: the simpler of two such answers stays.
-4. A start that is no free decay yet, and spikes, may only show against a fit with that physics:
+4. An answer that explains everything keeps the corrections of 2 and 3 only where, beside its
+   effects, the recordings as they were still differ by more than chance.
+5. A start that is no free decay yet, and spikes, may only show against a fit with that physics:
    then once more without them.
 
 All searches have one budget of computing, which begins with the first. What is left of it after one
@@ -30,7 +32,7 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.diagnosis.budget import Budget, begin
 from bayesimpact.diagnosis.decision import Verdict
 from bayesimpact.diagnosis.extend import campaign_scales
-from bayesimpact.diagnosis.faults.compare import base_failed, gain
+from bayesimpact.diagnosis.faults.compare import base_failed, gain, misfits
 from bayesimpact.diagnosis.faults.outliers import residual_spikes
 from bayesimpact.diagnosis.faults.unfree_start import BETTER, unfree_starts
 from bayesimpact.diagnosis.loop import Diagnosis, Progress, diagnose_fit
@@ -41,6 +43,7 @@ from bayesimpact.diagnosis.recording_faults import (
     Step,
     cleaned_campaign,
     comparisons,
+    fitted_beside,
     shared_effects,
     with_steps,
     without_faults,
@@ -85,18 +88,29 @@ class Searches:
     progress: Progress
     budget: Budget
 
-    def search(self, corrected: Corrected) -> Diagnosis:
-        """Whatever is left of the budget."""
-        return _of_corrected(
-            corrected,
+    def search(self, corrected: Corrected, first: Fit | None = None) -> Diagnosis:
+        """With what is left of the budget, from the model of `first` on where that is given."""
+        for fault in corrected.faults:
+            words = f"{fault.recording}: {fault.statement} ({fault.id})"
+            self.progress(f"set aside or corrected: {words}")
+        if corrected.filtered is not None:
+            self.progress("the noise spectrum proves a filter: fitted through it")
+        found = diagnose_fit(
+            corrected.identification,
             rng=self.rng,
             effects=self.effects,
             progress=self.progress,
             budget=self.budget,
+            first=first,
         )
+        return _of_corrected(found, corrected, rng=self.rng)
 
     def again(
-        self, found: Diagnosis, corrected: Callable[[], Corrected], is_better: Better
+        self,
+        found: Diagnosis,
+        corrected: Callable[[], Corrected],
+        is_better: Better,
+        first: Fit | None = None,
     ) -> Diagnosis:
         """An answer, or the one with other corrections where that `is_better`.
 
@@ -104,7 +118,7 @@ class Searches:
         """
         if not self.budget.may_search_again():
             return unfinished(found)
-        other = self.search(corrected())
+        other = self.search(corrected(), first)
         if is_better(other, found):
             return other
         return found if other.naming.finished else unfinished(found)
@@ -157,6 +171,7 @@ def diagnose(
         found = _beside_faults(found, certain, doubtful, searches, search)
     elif certain is not cleaned and not proved and found.verdict not in OPEN:
         found = searches.again(found, lambda: cleaned, lambda other, _: is_settled(other))
+    found = _without_needless_faults(found, cleaned, searches)
     found = _without_unfree_start(found, campaign, searches)
     found = _without_late_spikes(found, campaign, searches)
     undecided = found.corrected is not None and found.corrected.is_open
@@ -217,6 +232,20 @@ def _beside_faults(
     return searches.again(found, lambda: again, is_simpler)
 
 
+def _without_needless_faults(found: Diagnosis, before: Corrected, searches: Searches) -> Diagnosis:
+    """The answer without faults that comparing showed, where beside its effects all recordings
+    agree as they were: had its physics been known, nothing would have been compared.
+    """
+    needless = found.corrected is not None and len(found.corrected.compared) > len(before.compared)
+    beside = [e for e in found.effects if e in found.after.target.oscillator.effects]
+    if not (needless and beside and is_settled(found)) or any(map(is_formula, beside)):
+        return found
+    fit = fitted_beside(before, beside, found.after)
+    if fit is None or misfits(fit):
+        return found
+    return searches.again(found, lambda: before, is_simpler, fit)
+
+
 def _without_unfree_start(found: Diagnosis, as_read: Campaign, searches: Searches) -> Diagnosis:
     """Where a large misfit remains: the answer without first instants that keep a model from the
     rest, if that leaves less of it.
@@ -247,21 +276,9 @@ def _without_late_spikes(found: Diagnosis, as_read: Campaign, searches: Searches
     )
 
 
-def _of_corrected(
-    corrected: Corrected,
-    *,
-    rng: np.random.Generator,
-    effects: Sequence[Effect],
-    progress: Progress,
-    budget: Budget,
-) -> Diagnosis:
-    """The diagnosis of a campaign whose faults are set aside or corrected."""
-    for fault in corrected.faults:
-        progress(f"set aside or corrected: {fault.recording}: {fault.statement} ({fault.id})")
+def _of_corrected(found: Diagnosis, corrected: Corrected, *, rng: np.random.Generator) -> Diagnosis:
+    """What was found on a campaign whose faults are set aside or corrected, these included."""
     through = corrected.identification
-    if corrected.filtered is not None:
-        progress("the noise spectrum proves a filter: fitted through it")
-    found = diagnose_fit(through, rng=rng, effects=effects, progress=progress, budget=budget)
     if corrected.filtered is not None:
         campaign = through.fit.target.oscillator.campaign
         measurement = replace(campaign.measurement, smoothing=None)

@@ -114,14 +114,18 @@ def diagnose_fit(
     effects: Sequence[Effect] = SEARCHED,
     progress: Progress | None = None,
     budget: Budget | None = None,
+    first: Fit | None = None,
 ) -> Diagnosis:
-    """The loop from a base fit on; with a budget of its own where none is given."""
+    """The loop from a base fit on; with a budget of its own where none is given.
+
+    The search begins with the model of `first`, where that is given.
+    """
     say, budget = progress or (lambda message: None), budget or begin()
     base = identification.fit
     if base.target.oscillator.smoothing is not None:  # a chain has one filter
         effects = [e for e in effects if e.id != SAVITZKY_GOLAY.id]
     scales = campaign_scales(base)
-    naming = name(base, effects, scales, rng=rng, progress=say, budget=budget)
+    naming = name(base, effects, scales, rng=rng, progress=say, budget=budget, first=first)
     decision = decide(naming)
     after, state = extension(naming, decision, scales, say)
     answer = Answer(naming, decision, after, state)

@@ -48,6 +48,7 @@ def name(
     rng: np.random.Generator,
     progress: Progress | None = None,
     budget: Budget | None = None,
+    first: Fit | None = None,
 ) -> Naming:
     """Find the effects that the base model of `fit` leaves out.
 
@@ -58,14 +59,18 @@ def name(
     noise level allows, for what remains may yet be explained; effects that the odds do not demand
     are left out afterwards, and each that stays is exchanged for every other that might do what it
     does. Where the misfit was large, the search begins with what the equation of motion asks for,
-    and goes on from a model that has settled and still leaves something.
+    and goes on from a model that has settled and still leaves something. It begins with the model
+    of `first` instead, a fit to the same campaign, where that is given.
 
     A search that has used up the `budget` begins no more refits, and names nothing that it has not
     compared with all that might do the same.
     """
     search = _Search(effects, scales, rng, progress or (lambda message: None), budget)
     base = search.examine(base_candidate(fit))
-    beam = search.asked_for(base) if search.is_large else [base]
+    if first is not None:
+        beam = [search.examine(base_candidate(first))]
+    else:
+        beam = search.asked_for(base) if search.is_large else [base]
     begun = set[frozenset[str]]()
     while True:
         state = search.grown(beam)

@@ -126,8 +126,7 @@ def comparisons(
     if campaign.keep_faults:
         return ()
     effects = shared_effects(beside)
-    values = {} if fit is None else {n: fit.value(n) for n in fit.target.oscillator.layout.names}
-    model = SharedModel(noise, effects, values)
+    model = SharedModel(noise, effects, _values(fit))
     whole = model.fitted(campaign) if effects else base
     if whole is None:
         return ()
@@ -136,6 +135,18 @@ def comparisons(
         for one in compare_recordings(whole, model)
     ]
     return tuple(tuple(step) for _, step in groupby(found, key=lambda one: one.after))
+
+
+def fitted_beside(before: Corrected, effects: Sequence[Effect], fit: Fit) -> Fit | None:
+    """The campaign's fit with effects, from where those of `fit` stand; None where it has none."""
+    base, noise = before.identification.fit, before.identification.noise
+    model = SharedModel(noise, tuple(effects), _values(fit))
+    return model.fitted(base.target.oscillator.campaign)
+
+
+def _values(fit: Fit | None) -> dict[str, float]:
+    """Parameter -> value; empty without a fit."""
+    return {} if fit is None else {n: fit.value(n) for n in fit.target.oscillator.layout.names}
 
 
 def shared_effects(effects: Sequence[Effect]) -> tuple[Effect, ...]:

@@ -197,6 +197,39 @@ def test_faults_that_do_nothing_that_the_effects_do_are_not_searched_beside(
     assert module._beside_faults(found, found.corrected, (), asked, False) is again
 
 
+@pytest.mark.parametrize("needed", [False, True])
+def test_faults_that_the_physics_makes_needless_are_taken_back(
+    monkeypatch: pytest.MonkeyPatch, needed: bool
+) -> None:
+    """What comparing showed before the physics was known, and nothing shows beside it."""
+    compared = module.comparisons
+    sizes = {"spring_quadratic": {"stiffness": 2e3}}
+    right = small_rig.record(64, sizes, duration=1.5)
+    first, second, *others = right.recordings
+    scaled = replace(
+        right, recordings=(first, replace(second, samples=1.02 * second.samples), *others)
+    )
+    read, corrected = (scaled, right) if needed else (right, scaled)
+    (fault,) = (c.fault for step in _steps_of_a_gain(compared) for c in step)
+    steps = ((Compared(fault, corrected, 100.0, 1.0),),)
+    monkeypatch.setattr(module, "comparisons", lambda *_: steps)
+    monkeypatch.setattr(module, "promised_gains", lambda *_, **__: np.zeros(1))
+    catalogue = (BY_ID["spring_quadratic"], *CATALOGUE)
+    found = diagnose(read, rng=np.random.default_rng(0), effects=catalogue, search=False)
+    assert found.verdict == "named" and "spring_quadratic" in [e.id for e in found.effects]
+    assert found.corrected is not None and bool(found.corrected.faults) is needed
+
+
+def _steps_of_a_gain(compared) -> tuple[Step, ...]:
+    """The step that a gain of 5 % in a recording makes."""
+    campaign = small_rig.record(61, duration=1.5)
+    first, second, *others = campaign.recordings
+    loud = replace(second, samples=1.05 * second.samples)
+    campaign = replace(campaign, recordings=(first, loud, *others))
+    rng = np.random.default_rng(0)
+    return compared(cleaned_campaign(campaign, rng=rng, search=False), campaign)
+
+
 @pytest.mark.parametrize(("effects", "searches"), [(3, 1), (10**7, 2)])
 def test_a_proved_fault_is_not_searched_without(
     monkeypatch: pytest.MonkeyPatch, effects: int, searches: int
@@ -205,9 +238,9 @@ def test_a_proved_fault_is_not_searched_without(
     asked = []
     of_corrected = module._of_corrected
 
-    def remains(corrected: Corrected, **others) -> Diagnosis:
+    def remains(found: Diagnosis, corrected: Corrected, **others) -> Diagnosis:
         asked.append(corrected)
-        return replace(of_corrected(corrected, **others), verdict="partly")
+        return replace(of_corrected(found, corrected, **others), verdict="partly")
 
     monkeypatch.setattr(module, "_of_corrected", remains)
     monkeypatch.setattr(module, "promised_gains", lambda *_, **__: np.ones(effects))
