@@ -116,6 +116,35 @@ def test_every_format_is_resampled_as_a_csv(tmp_path: Path, name: str, keys: str
         _read(tmp_path, name, "")
 
 
+def _in_memory(times: np.ndarray, samples: np.ndarray) -> Recording:
+    entry = {"name": "a", "samples": samples, "unit": "mm", "times_s": times, "resample": True}
+    return bi.Campaign.from_arrays([entry], name="rig", mass_kg=0.5, stop=False).recordings[0]
+
+
+def test_missing_rows_of_an_even_clock_move_no_reading() -> None:
+    """Written to its own interval, or finer: what is there keeps its place, the rest is set aside.
+
+    The places are spread nearly as evenly as a slow clock's steps.
+    """
+    times = np.arange(1200) * 2e-3
+    samples = -6.0 * np.exp(-0.15 * times) * np.cos(2 * np.pi * 6.4 * times)
+    lost = [180, 511, 512, 823]
+    kept = np.setdiff1d(np.arange(times.size), lost)
+    for early in (0.0, 0.37e-3):
+        read = _in_memory(np.round(times + early, 5)[kept], samples[kept])
+        assert read.interval == pytest.approx(2e-3, rel=1e-6)
+        assert read.used is not None and list(np.flatnonzero(~read.used)) == lost
+        np.testing.assert_allclose(read.samples[kept], 1e-3 * samples[kept], rtol=0, atol=1e-15)
+
+
+def test_stamps_of_a_slow_clock_lack_no_rows() -> None:
+    """Milliseconds of a clock at 995 Hz: every two hundredth step is two."""
+    times = np.arange(1200) / 995.0
+    samples = -6.0 * np.exp(-0.15 * times) * np.cos(2 * np.pi * 6.4 * times)
+    read = _in_memory(np.round(times, 3), samples)
+    assert read.used is None and read.interval == pytest.approx(1 / 995.0, rel=1e-4)
+
+
 def test_samples_in_memory_are_resampled_as_a_csv(tmp_path: Path) -> None:
     _text("time_s,displacement_mm")(tmp_path / "a.csv")
     entry = {"name": "a", "samples": MM, "unit": "mm", "times_s": TIMES, "resample": True}

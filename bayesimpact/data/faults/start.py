@@ -9,6 +9,7 @@ from bayesimpact.data.faults.fault import Array, Fault, amount, file_time
 from bayesimpact.data.faults.flat import reading_step
 from bayesimpact.data.hum import find_hum
 from bayesimpact.data.period import crossing_period, noise_level
+from bayesimpact.data.quantity import order_of
 from bayesimpact.data.recording import Recording
 
 BAND = 5.0  # standard deviations of the noise, or two steps, about the first reading
@@ -56,12 +57,13 @@ def find_start(recording: Recording) -> list[Fault]:
     band = max(BAND * noise, 2.0 * step, LEAST_BAND * height)
     natural = np.sqrt(2.0 * band / max(height, band)) * period / (2 * np.pi)
     least = max(NATURAL * natural + COARSE, SHORTEST * period, FEWEST)
+    moves = order_of(recording.quantity) > 0 and _moves(quiet, band)
     hand = _grown(x - settled, peak, period)
     if not hand:
         peak = _pushed(x - settled, band, period)
         hand = peak > 0
     rest = _leaves(x, peak if hand else 0, band, None if hum is None else hum.frequency)
-    if not hand and rest <= least:
+    if not hand and (moves or rest <= least):
         return []
     first = rest if not hand else max(rest, peak)
     if first > 0.7 * x.size:
@@ -84,6 +86,14 @@ def find_start(recording: Recording) -> list[Fault]:
             action="cut",
         )
     ]
+
+
+def _moves(x: Array, band: float) -> bool:
+    """Whether the first readings of a speed or an acceleration are not those of a rest.
+
+    At rest either is none, and over a motion that begins and ends near rest its mean is none.
+    """
+    return bool(abs(np.median(x[:FEWEST]) - x.mean()) > band)
 
 
 def _leaves(x: Array, first: int, band: float, hum: float | None) -> int:

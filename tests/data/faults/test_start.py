@@ -59,3 +59,29 @@ def test_a_coarse_turning_point_is_no_rest(before: float, noise: float) -> None:
     y += noise * np.random.default_rng(0).standard_normal(t.size)
     found = recording_faults(Recording("p", "", y, 1 / 24))
     assert [f.id for f in found if f.action != "notice"] == []
+
+
+def bouncing(rest: float) -> Recording:
+    """Accelerations, m/s2 at 20 kHz, of a mass of 1 kg at 20 Hz before a stop 500 times as stiff,
+    held for `rest` s and released 5 mm away from it.
+    """
+    k, c, gap = (2 * np.pi * 20.0) ** 2, 0.5, 2e-3
+
+    def acceleration(y, v):
+        return -(k * y + c * v + np.where(y > gap, 500 * k * (y - gap), 0.0))
+
+    t = np.arange(8000) / 20e3
+    found = solve_ivp(
+        lambda _, s: [s[1], acceleration(*s)], (0, t[-1]), [-5e-3, 0.0], t_eval=t, max_step=5e-5
+    )
+    held = round(20e3 * rest)
+    a = np.concatenate([np.zeros(held), acceleration(*found.y)])
+    a += 0.5 * np.random.default_rng(3).standard_normal(a.size)
+    return Recording("p", "1", a, 1 / 20e3, quantity="acceleration")
+
+
+@pytest.mark.parametrize("rest", [0.0, 0.03])
+def test_an_acceleration_of_release_is_no_rest(rest: float) -> None:
+    """It stays near its first reading for as long as contacts that are far larger allow."""
+    found = [f for f in recording_faults(bouncing(rest)) if f.id == "recording_start"]
+    assert [round(f.size, 3) for f in found] == ([rest] if rest else [])
