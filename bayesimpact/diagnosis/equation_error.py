@@ -74,7 +74,7 @@ class Path:
 
 
 @dataclass(frozen=True, eq=False)
-class Term:
+class EffectColumns:
     """One effect at one point of its shape grid.
 
     Attributes
@@ -194,7 +194,7 @@ def without_rest(path: Path, x: Array) -> Array:
 
 def terms_of(
     fit: Fit, effects: Iterable[Effect], scales: Scales, paths: Sequence[Path]
-) -> list[Term]:
+) -> list[EffectColumns]:
     """What every effect adds to the equation of motion, at every point of a finer shape grid."""
     found = []
     for effect in effects:
@@ -217,7 +217,7 @@ def _term(
     scales: Scales,
     shapes: Mapping[str, float],
     paths: Sequence[Path],
-) -> Term | None:
+) -> EffectColumns | None:
     layout = target.oscillator.layout
     theta = transfer(fit, layout, (effect,), scales, shapes)
     sizes = size_parameters(target, effect)
@@ -236,7 +236,7 @@ def _term(
     seen = [i for i in range(len(names)) if any(np.any(c[:, i]) for c in columns)]
     if not seen or not all(np.isfinite(c).all() for c in columns):
         return None
-    return Term(
+    return EffectColumns(
         effect, shapes, tuple(names[i] for i in seen), tuple(c[:, seen] for c in columns),
         tuple(one_sided[i] for i in seen),
     )  # fmt: skip

@@ -13,7 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.diagnosis.equation_error import Path, Term, base_columns, measured_paths, terms_of
+from bayesimpact.diagnosis.equation_error import (
+    EffectColumns,
+    Path,
+    base_columns,
+    measured_paths,
+    terms_of,
+)
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
 
@@ -35,7 +41,7 @@ class EffectSet:
     log_odds : over the base model, as far as this problem tells
     """
 
-    terms: tuple[Term, ...]
+    terms: tuple[EffectColumns, ...]
     values: Mapping[str, float]
     log_odds: float
 

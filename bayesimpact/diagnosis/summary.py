@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from bayesimpact.diagnosis.locate import Location
-from bayesimpact.diagnosis.words import REGIMES, Shift, listed, span, title_of
+from bayesimpact.diagnosis.words import REGIMES, ParameterShift, listed, span, title_of
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.effects.effect import Effect
 from bayesimpact.model.units import two_digits
@@ -40,7 +40,7 @@ class Findings:
     statements: tuple[str, ...] = ()
     location: Location | None = None
     alternatives: tuple[str, ...] = ()
-    shifts: Mapping[str, Shift] = field(default_factory=dict)
+    shifts: Mapping[str, ParameterShift] = field(default_factory=dict)
     detectable: str = ""
     remains: str = ""
     faults: str = ""
@@ -150,7 +150,7 @@ def _capital(words: str) -> str:
     return words[:1].upper() + words[1:]
 
 
-def _moved(shifts: Mapping[str, Shift], cause: str) -> str:
+def _moved(shifts: Mapping[str, ParameterShift], cause: str) -> str:
     """What the added physics does to the obstacle's stiffness, or to what it moves most surely."""
     chosen = [n for n in shifts if n.startswith("k2")] or list(shifts)
     if not chosen:

@@ -48,7 +48,7 @@ def left_open(effect: Effect, values: Mapping[str, Mapping[str, Any]]) -> str:
 
 
 @dataclass(frozen=True)
-class Shift:
+class ParameterShift:
     """How adding physics changed a parameter: `share` of its value before, towards `after`.
 
     Where the interval after is wide, `share` is that of its end next to the value before, and
@@ -61,7 +61,7 @@ class Shift:
 
 def parameter_shifts(
     before: Mapping[str, Mapping[str, Any]], after: Mapping[str, Mapping[str, Any]]
-) -> dict[str, Shift]:
+) -> dict[str, ParameterShift]:
     """Changes of shared parameters that their intervals prove; the others are left out."""
     shifts = {}
     for name, old in before.items():
@@ -74,7 +74,7 @@ def parameter_shifts(
     return shifts
 
 
-def parameter_shift(old: Mapping[str, Any], new: Mapping[str, Any]) -> Shift | None:
+def parameter_shift(old: Mapping[str, Any], new: Mapping[str, Any]) -> ParameterShift | None:
     """Change of one parameter; None where its intervals before and after overlap."""
     (low, high), start = new["ci90"], old["median"]
     overlap = old["ci90"][0] <= high and old["ci90"][1] >= low
@@ -83,7 +83,7 @@ def parameter_shift(old: Mapping[str, Any], new: Mapping[str, Any]) -> Shift | N
     near, far = sorted((low, high), key=lambda end: abs(end - start))
     shares = [(value - start) / abs(start) for value in (new["median"], near, far)]
     wide = abs(shares[2]) > 2 * abs(shares[1])  # two digits of the median would mean nothing
-    return Shift(shares[1], least=True) if wide else Shift(shares[0])
+    return ParameterShift(shares[1], least=True) if wide else ParameterShift(shares[0])
 
 
 def excludes(content: Mapping[str, Any], value: float) -> bool:

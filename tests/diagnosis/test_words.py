@@ -12,7 +12,7 @@ from effect_rigs import BY_ID
 from bayesimpact.diagnosis.remainder import Remainder
 from bayesimpact.diagnosis.summary import Findings, summary
 from bayesimpact.diagnosis.words import (
-    Shift,
+    ParameterShift,
     failure,
     left_open,
     nearest,
@@ -35,14 +35,14 @@ def test_shifts_are_what_adding_does():
     before = {"k1": entry(808.0, 1.0), "k2[1]": entry(5300.0, 10.0), "y0[a]": entry(1.0, 0.1)}
     after = {"k1": entry(809.0, 1.0), "k2[1]": entry(5035.0, 10.0), "y0[a]": entry(2.0, 0.1)}
     shifts = parameter_shifts(before, after)  # k1 has not moved beyond its intervals
-    assert shifts == {"k2[1]": Shift(pytest.approx(-0.05))}
+    assert shifts == {"k2[1]": ParameterShift(pytest.approx(-0.05))}
     assert parameter_shifts({"g": entry(1.0, 0.1)}, {}) == {}
 
 
 def test_a_wide_interval_proves_its_nearer_end_only():
     """Once told: "c1 was 99 % too low" beside a 90 % interval of 0.45 to 14."""
     old = {"median": 0.025, "ci90": [0.0249, 0.0251]}
-    assert parameter_shift(old, {"median": 2.0, "ci90": [0.45, 3.0]}) == Shift(
+    assert parameter_shift(old, {"median": 2.0, "ci90": [0.45, 3.0]}) == ParameterShift(
         pytest.approx(17.0), least=True
     )
     # a normal law cut at zero: nothing is likelier than what its interval leaves out there
@@ -50,10 +50,10 @@ def test_a_wide_interval_proves_its_nearer_end_only():
     assert parameter_shift(old, {"median": 2.0, "ci90": [0.024, 3.0]}) is None
     said = told(
         "partly", (BY_ID["coulomb_friction"],), ("",), place("free"), (),
-        {"c1": Shift(17.0, least=True), "k1": Shift(0.058)}, "",
+        {"c1": ParameterShift(17.0, least=True), "k1": ParameterShift(0.058)}, "",
     )  # fmt: skip
     assert "Adding it raises k1 by 5.8 %" in said and "c1" not in said
-    said = told("unknown", (), (), place("free"), (), {"c1": Shift(17.0, least=True)}, "")
+    said = told("unknown", (), (), place("free"), (), {"c1": ParameterShift(17.0, least=True)}, "")
     assert "Fitting a force in its place raises c1 to at least 18 times its value" in said
 
 
@@ -112,7 +112,11 @@ def place(regime: str):
 
 def test_the_paragraph():
     friction = (BY_ID["coulomb_friction"],)
-    shifts = {"k1": Shift(0.2), "k2[1]": Shift(-0.082), "k2[2]": Shift(0.03)}
+    shifts = {
+        "k1": ParameterShift(0.2),
+        "k2[1]": ParameterShift(-0.082),
+        "k2[2]": ParameterShift(0.03),
+    }
     said = told("adequate", (), (), None, (), {}, "Limits.")
     assert said.startswith("Nothing is missing") and said.endswith("Limits.")
     said = told("named", friction, ("It rubs.",), place("free"), (), shifts, "")
@@ -124,7 +128,7 @@ def test_the_paragraph():
         and "cannot tell" in said
         and "obstacle" in said
     )
-    said = told("unknown", (), (), place("contact"), (), {"k1": Shift(0.04)}, "")
+    said = told("unknown", (), (), place("contact"), (), {"k1": ParameterShift(0.04)}, "")
     assert "\N{MINUS SIGN}2.0 to 1.5 mm" in said and "0.012 N rms" in said
     assert "raises k1 by 4.0 %" in said
     said = told("partly", friction, ("It rubs.",), place("free"), (), {}, "", " More.")
@@ -176,7 +180,7 @@ def test_a_group_of_which_one_is_needed_is_told():
 
 
 def test_what_a_model_with_more_effects_does_is_not_said_of_those_named():
-    friction, shifts = (BY_ID["coulomb_friction"],), {"k1": Shift(0.2)}
+    friction, shifts = (BY_ID["coulomb_friction"],), {"k1": ParameterShift(0.2)}
     for more, cause in ((True, "The fitted model raises"), (False, "Adding it raises")):
         assert cause in told("partly", friction, ("",), place("free"), (), shifts, more=more)
 

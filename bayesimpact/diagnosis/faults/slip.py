@@ -30,7 +30,7 @@ EDGE = 8  # samples at either end, after which a shift is told from the start va
 
 
 @dataclass(frozen=True)
-class Shift:
+class SampleShift:
     """From a sample on, a recording comes `samples` too early (> 0: lost) or too late.
 
     Attributes
@@ -48,7 +48,7 @@ class Shift:
     gain: float
 
 
-def likeliest_shift(fit: Fit) -> Shift | None:
+def likeliest_shift(fit: Fit) -> SampleShift | None:
     """The shift that explains most of the residual of a fit to one recording, if any does.
 
     None where the gain stays below what white noise reaches at one of its samples with a chance of
@@ -78,7 +78,7 @@ def likeliest_shift(fit: Fit) -> Shift | None:
     near_best = np.flatnonzero(nats > nats[best] - PLACE)
     first = round(start / recording.interval)
     earliest, place, latest = (first + int(i) for i in (near_best[0], best, near_best[-1]))
-    return Shift(place, earliest, latest, float(slope[best] / size[best]), float(nats[best]))
+    return SampleShift(place, earliest, latest, float(slope[best] / size[best]), float(nats[best]))
 
 
 def _from_here_on(x: Array) -> Array:
@@ -106,7 +106,7 @@ def put_right(recording: Recording, between: tuple[int, int], samples: int) -> R
 
 def find_shift(
     campaign: Campaign, recording: Recording, model: SharedModel
-) -> tuple[Shift, Fit] | None:
+) -> tuple[SampleShift, Fit] | None:
     """The shift of a recording, in whole samples, and the fit to it with that put right."""
     own = own_fit(campaign, recording, model)
     shift = None if own is None or recording.input is not None else likeliest_shift(own)
@@ -128,7 +128,7 @@ def find_shift(
     return replace(shift, samples=float(samples)), fit
 
 
-def slip_fault(recording: Recording, shift: Shift) -> Fault:
+def slip_fault(recording: Recording, shift: SampleShift) -> Fault:
     """The slip as a record; its remedy keeps the longer part."""
     size, count = recording.samples.size, int(shift.samples)
     if shift.earliest >= size - shift.latest:
