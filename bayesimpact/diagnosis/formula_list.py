@@ -66,12 +66,14 @@ class Formulas:
     named : whether the first one is named
     seen_as : coefficients (2 knots,) that the learned force would have if the first formula were
         true; empty where there is no learned force of the displacement
+    fit : of the likeliest formula that was fitted in full
     """
 
     ranked: tuple[Formula, ...]
     reference: Fit
     named: bool
     seen_as: Array
+    fit: Fit
 
     __repr__ = short_repr
 

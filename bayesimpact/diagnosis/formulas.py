@@ -105,7 +105,7 @@ def with_formulas(
         state = _examined(fitted[first], effects, scales, rng)
         named = state.is_white
     seen = scores.seen[:, list(first.terms)] @ np.array(first.sizes)
-    found_formulas = Formulas(rows, answer.after, named, seen)
+    found_formulas = Formulas(rows, answer.after, named, seen, fitted[first].fit)
     if not named or state is None:
         decision = _needed(answer.decision, naming)
         return replace(answer, decision=decision, formulas=found_formulas)

@@ -21,7 +21,8 @@ class Remainder:
     rms : of the residual less the noise, m
     share : the same over the rms of the signal about its mean
     over_noise : rms residual over the noise
-    regime, displacement, recordings : where, from the force that would explain it
+    regime, displacement, recordings : where, from the force of the guess where that has effects,
+        else from the free force that would explain it
     guess : a formula, ids that the likeliest larger model adds, or a form of force; "" for none
     """
 
@@ -43,11 +44,17 @@ def remainder(
     over = float(np.sqrt(after.reduced_chi2))
     rms = after.rms * float(np.sqrt(max(1.0 - 1.0 / max(over, 1.0) ** 2, 0.0)))
     signal = after.signal
-    best = max(naming.tried, key=naming.log_odds).fit
-    place = locate(left.candidate.fit, best, left.unknown, ())
+    guess = likeliest_formula(formulas)
+    better = max(naming.tried, key=naming.log_odds).fit
+    if formulas is not None and guess:
+        better = formulas.fit
+    have, effects = set(left.candidate.ids), better.target.oscillator.effects
+    explains = bool(guess) or have < {e.id for e in effects}
+    more = tuple(e for e in effects if e.id not in have) if explains else ()
+    place = locate(left.candidate.fit, better, left.unknown, more)
     return Remainder(
         rms, rms / signal, over, place.regime, place.displacement, place.recordings,
-        likeliest_formula(formulas) or next_guess(naming, left),
+        guess or next_guess(naming, left),
     )  # fmt: skip
 
 

@@ -203,8 +203,10 @@ def test_no_effect_is_named_that_the_likeliest_formula_makes_idle(
     assert not found.formulas.named and found.after is before.after
     assert tuple(e.id for e in found.decision.effects) == others
     assert found.decision.verdict == ("partly" if others else "unknown")
-    guess = remainder(found.naming, found.after, found.state, found.formulas).guess
-    assert guess == "a force " + formula_text(found.formulas.ranked[0].terms)
+    left = remainder(found.naming, found.after, found.state, found.formulas)
+    assert left.guess == "a force " + formula_text(found.formulas.ranked[0].terms)
+    low, high = (x - DETENT["place"] for x in left.displacement)  # where the formula acts
+    assert -2 * DETENT["width"] < low < 0 < high < 2 * DETENT["width"]
     scored = replace(found.formulas.ranked[0], refitted=False)
     assert not likeliest_formula(replace(found.formulas, ranked=(scored,)))
 
