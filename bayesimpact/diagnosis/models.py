@@ -98,8 +98,10 @@ class Models:
             return held.scan
         return scan(candidate.fit, effects, self.scales, rng=self.rng)
 
-    def fit_one(self, candidate: Candidate, found: Scan, score: Score) -> Candidate:
-        """One more effect, from the best points of its shape grid.
+    def fit_one(
+        self, candidate: Candidate, found: Scan, score: Score, rival: Candidate | None = None
+    ) -> Candidate:
+        """One more effect, from the best points of its shape grid, to be compared with a `rival`.
 
         A model that is known is fitted from here too where the score promises more than it has
         reached: it may have come to rest in a side minimum.
@@ -109,7 +111,7 @@ class Models:
         if not self.is_known(key) or promised > self.tried[key].fit.log_likelihood + MORE:
             count = 1 if is_large(candidate.fit) else STARTS  # grids do not tell much there
             for start in found.starts(score, count):
-                self.start(candidate, [start])
+                self.start(candidate, [start], rival)
         return self.tried[key]
 
     def fit_more(self, candidate: Candidate, scores: Sequence[Score]) -> Candidate:
@@ -119,14 +121,22 @@ class Models:
             self.start(candidate, scores)
         return self.tried[key]
 
-    def start(self, candidate: Candidate, scores: Sequence[Score]) -> None:
-        """Fit a model from where scores on a candidate point to, once."""
+    def start(
+        self, candidate: Candidate, scores: Sequence[Score], rival: Candidate | None = None
+    ) -> None:
+        """Fit a model from where scores on a candidate point to, once.
+
+        It is of no use where it explains less than the candidate, whose effects it has; an effect
+        alone may, for beside others it may still be right.
+        """
         shapes = tuple((s.effect.id, *sorted(s.shapes.items())) for s in scores)
         begun = (candidate.ids, candidate.fit.log_posterior, shapes)
         if begun not in self.begun:
             self.begun.add(begun)
             self.tell("fitting " + " + ".join((*candidate.ids, *(s.effect.id for s in scores))))
-            self.keep(refit(candidate.fit, scores, self.scales, goal=self.goal()))
+            least = candidate.fit.log_likelihood if candidate.effects else -np.inf
+            goal = max(self.goal(rival), least)
+            self.keep(refit(candidate.fit, scores, self.scales, goal=goal))
 
     def fit_sets(self, about: Candidate, most: int, flight: bool) -> list[Candidate]:
         """Models that the equation of motion asks for about a model, in flight or altogether.
@@ -176,8 +186,10 @@ class Models:
         kept = first | {s.effect.id for s in promising if s.effect.id not in seen}
         return [s for s in found.best() if s.effect.id in kept]
 
-    def goal(self) -> float:
-        """Log likelihood below which no climb matters: minus infinity, as long as none is known."""
+    def goal(self, rival: Candidate | None = None) -> float:
+        """Log likelihood below which no climb matters, to models that are to be compared with a
+        `rival`: minus infinity, as long as none is known.
+        """
         return -np.inf
 
     def may_go_on(self) -> bool:
@@ -208,7 +220,7 @@ class Models:
         if begun not in self.begun:
             self.begun.add(begun)
             self.tell(f"{new.id} in place of {old.id} in " + " + ".join(candidate.ids))
-            self.keep(exchanged(candidate, old, new, self.scales, goal=self.goal()))
+            self.keep(exchanged(candidate, old, new, self.scales, goal=self.goal(candidate)))
 
     def finished(self, candidate: Candidate) -> Candidate:
         """A model whose climb did not converge, at the highest point of its profile likelihood."""

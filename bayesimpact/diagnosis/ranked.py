@@ -65,12 +65,14 @@ class Ranked(Models):
         base = self.states[frozenset()]
         return self.log_odds(base.candidate) + base.unknown.log_evidence / self.repetition()
 
-    def goal(self) -> float:
-        """Log likelihood that a model must reach to come within the decisive odds of one that
-        leaves nothing: no evidence is above the largest likelihood. Minus infinity without one.
+    def goal(self, rival: Candidate | None = None) -> float:
+        """Log likelihood that a model must reach to come within the decisive odds of a `rival`, and
+        of one that leaves nothing: no evidence is above the largest likelihood. Minus infinity
+        without one.
         """
-        complete = [s.candidate for s in self.states.values() if s.is_white]
-        reached = max(map(self.log_odds, complete), default=-np.inf)
+        known = [s.candidate for s in self.states.values() if s.is_white]
+        known += [] if rival is None else [rival]
+        reached = max(map(self.log_odds, known), default=-np.inf)
         return self.repetition() * (reached - DECISIVE)
 
     def best(self, size: int) -> Candidate:

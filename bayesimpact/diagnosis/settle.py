@@ -84,7 +84,7 @@ class Settling(Ranked):
                 effect, scores, large, self.asked.first(rest, chosen) if large else ()
             ):
                 if self.may_go_on() and not is_redundant(rest, score.effect):
-                    self.fit_one(rest, found, score)
+                    self.fit_one(rest, found, score, chosen)
                     if not score.effect.has_size:
                         self.exchange_on_off(chosen, effect, score.effect)
 
