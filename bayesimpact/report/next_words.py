@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from bayesimpact.model.units import decimals, number, quantity, significant
+from bayesimpact.report.formula_text import titles
 
 Content = Mapping[str, Any]
 
@@ -123,7 +124,7 @@ def next_view(content: Content | None) -> dict[str, Any] | None:
     return {
         "sentence": content["sentence"],
         "rivals": [
-            (" + ".join(r["effects"]) or "the base model", _percent(r["probability"]))
+            (titles(" + ".join(r["effects"])) or "the base model", _percent(r["probability"]))
             for r in content["rivals"]
         ]
         if content["open"]
