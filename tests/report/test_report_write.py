@@ -17,7 +17,7 @@ from bayesimpact.data.campaign import Campaign, Measurement
 from bayesimpact.data.read import load_campaign
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
-from bayesimpact.inference.arviz_groups import open_arviz
+from bayesimpact.inference.arviz_groups import as_arviz, open_arviz
 from bayesimpact.inference.convergence import quiet_arviz
 from bayesimpact.inference.identify import Identification, identify
 from bayesimpact.inference.posterior import Posterior, sample
@@ -153,14 +153,19 @@ def test_posterior_for_arviz(posterior: Posterior, identification: Identificatio
     assert list(drawn["y0"].coords["recording"].values) == ["case1_a", "case3_b"]
     assert drawn.sizes["chain"] == 2
     likelihood = data["log_likelihood"]["displacement"]
-    assert likelihood.sizes["recording"] == 2 and likelihood.sizes["draw"] == drawn.sizes["draw"]
+    parts = [str(name).split()[0] for name in likelihood.coords["half_cycle"].values]
+    assert list(dict.fromkeys(parts)) == ["case1_a", "case3_b"]
+    assert likelihood.sizes["draw"] == drawn.sizes["draw"]
+    begins = data["constant_data"]["half_cycle_start"].values
+    assert begins[0] == 0.0 and begins.size == len(parts) and begins.max() < 1.2
     assert told(data)["seed"] == 3 and told(data)["converged"]
     # One draw's log likelihood, from its parameters
     target = posterior.fit.target
     theta = posterior.chains.draws[1, 0, 0]
     assert float(drawn["k1"][1, 0]) == theta[posterior.names.index("k1")]
     expected = target.likelihood.per_recording(theta[None])[0]
-    assert np.allclose(likelihood.values[1, 0], expected, rtol=1e-12)
+    whole = [likelihood.values[1, 0][np.array(parts) == n].sum() for n in dict.fromkeys(parts)]
+    assert np.allclose(whole, expected, rtol=1e-6)
     predicted = data["posterior_predictive"]["case1_a"].values[0]
     recorded = identification.fit.target.oscillator.campaign.recordings[0].samples
     # Simulated recordings differ from the real one by the noise of both.
@@ -170,6 +175,19 @@ def test_posterior_for_arviz(posterior: Posterior, identification: Identificatio
     assert float(data["constant_data"]["mass"]) == posterior.fit.target.oscillator.campaign.mass
     assert data["prior"]["k2"].dims == drawn["k2"].dims
     assert float(data["prior"]["k1"].std()) > 100 * float(drawn["k1"].std())
+
+
+def test_half_cycles_may_be_left_out_and_recordings_may_not(posterior: Posterior) -> None:
+    arviz, groups = quiet_arviz(), posterior.arviz_groups({})
+    found = arviz.loo(as_arviz(groups), pointwise=True)
+    assert float(np.max(found.pareto_k)) < 0.7  # what importance weights can bear
+    # of a model that is right, the effective number is that of the parameters
+    effective = found.p if hasattr(found, "p") else found.p_loo  # ArviZ 1.x, 0.23
+    assert 0.6 * len(posterior.names) < effective < 1.4 * len(posterior.names)
+    likelihood = groups["log_likelihood"]
+    name = likelihood["half_cycle"].str.split("part", " ").isel(part=0)
+    apart = groups | {"log_likelihood": likelihood.groupby(name.rename("recording")).sum()}
+    assert float(np.max(arviz.loo(as_arviz(apart), pointwise=True).pareto_k)) > 0.7
 
 
 def test_lab_units_for_arviz(posterior: Posterior) -> None:
