@@ -5,8 +5,8 @@ Leaving one part out asks how well all others predict it, and counts the parts a
   by the next, and the difference of two models comes with a standard error that is far too small.
 - Recordings neither: each has a release and a rest reading of its own, which nothing else tells.
   Left out, these fall back to their priors, and the importance weights fail (Pareto k above 0.7).
-- A half cycle, from one passage through rest to the next, is one whole impact or one free half
-  swing between impacts; the motion before and after it tells its release, and what the model lacks
+- A half cycle, from one passage through rest to the next, holds one whole impact or the free half
+  cycle between two; the motion before and after it tells its release, and what the model lacks
   shows in each anew.
 """
 
