@@ -78,8 +78,8 @@ def _blocks(likelihood: Likelihood, r: int, displacement: Array) -> Blocks:
     sizes = likelihood.sizes[r] * held / held.sum()
     volumes = likelihood.log_volume[r] * held / held.sum()
     if noise.grows:
-        spread = counted * np.log(noise.spread(recording))
-        own = np.add.reduceat(spread, first)
+        logs = counted * np.log(noise.relative_sd(recording))
+        own = np.add.reduceat(logs, first)
         volumes += held / held.sum() * own.sum() - own
     return Blocks(first, sizes, volumes, shift)
 

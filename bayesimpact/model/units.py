@@ -40,7 +40,7 @@ class Dimensions:
     time: float
     length: float
 
-    def spread(self, mass_sd: float, clock_sd: float, gain_sd: float) -> float:
+    def relative_sd(self, mass_sd: float, clock_sd: float, gain_sd: float) -> float:
         """Relative standard uncertainty from those of mass, clock and gain (independent)."""
         parts = (self.mass * mass_sd, self.time * clock_sd, self.length * gain_sd)
         return sqrt(sum(p * p for p in parts))
