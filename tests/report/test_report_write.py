@@ -23,14 +23,13 @@ from bayesimpact.inference.identify import Identification, identify
 from bayesimpact.inference.posterior import Posterior, sample
 from bayesimpact.report.archive import load_results
 from bayesimpact.report.backbones import backbone_summary
-from bayesimpact.report.build import results_from_fit, results_from_posterior
+from bayesimpact.report.build import ReportContext, results_from_fit, results_from_posterior
 from bayesimpact.report.figures.gaussian import gaussian_figures
 from bayesimpact.report.rows import Z90
 from bayesimpact.report.write import (
     POSTERIOR_FILE,
     REPORT_FILE,
     rewrite_report,
-    write_fit,
     write_posterior,
     write_results,
 )
@@ -54,7 +53,7 @@ def posterior(identification: Identification) -> Posterior:
 
 
 def test_fit_in_numbers(identification: Identification) -> None:
-    results = results_from_fit(identification, seed=5, command="bayesimpact fit x")
+    results = results_from_fit(identification, ReportContext("bayesimpact fit x", seed=5))
     fit = identification.fit
     assert results.kind == "fit" and results.draws is None and results.sampler is None
     assert results.verdict == "adequate"
@@ -77,14 +76,16 @@ def test_what_remains_is_in_every_table(identification: Identification) -> None:
     """Once the page told c1 as 5 (0 to 14) in one table and as 0.0205 (0.0205 to 0.0205) below."""
     told = {"c1": {"unit": "N s/m", "median": 0.2, "ci90": [0.1, 0.4]}}
     diagnosis = {"remainder": {"rms_m": 1e-6}, "parameters": {"before": {}, "after": told}}
-    results = results_from_fit(identification, diagnosis=diagnosis)
+    results = results_from_fit(identification, ReportContext(diagnosis=diagnosis))
     row = results.row("c1")
     assert (row.median, row.ci90, results.centre) == (0.2, (0.1, 0.4), "median")
     assert row.ratio[1:] == pytest.approx((0.1 / 0.503, 0.4 / 0.503))
     assert row.mode == identification.fit.mode[0] and results.row("k1").ci90[0] > 800
     arrays = {"before_chi2": np.ones(2)}
     assert gaussian_figures(replace(results, diagnosis_arrays=arrays)) == {}
-    certain = results_from_fit(identification, diagnosis=diagnosis | {"remainder": None})
+    certain = results_from_fit(
+        identification, ReportContext(diagnosis=diagnosis | {"remainder": None})
+    )
     assert certain.row("c1").median == row.mode and certain.centre == "mode"
 
 
@@ -123,7 +124,7 @@ def test_folder_of_a_posterior(
     posterior: Posterior, identification: Identification, tmp_path: Path
 ) -> None:
     base = replace(posterior, seed=4)
-    results = write_posterior(posterior, identification, tmp_path, command="x", before=base).results
+    results = write_posterior(posterior, identification, tmp_path, before=base).results
     names = {f.name for f in tmp_path.iterdir()}
     assert names == {"results.nc", "fit.json", POSTERIOR_FILE, REPORT_FILE, "figures"}
     assert load_results(tmp_path).headline == results.headline
@@ -255,7 +256,7 @@ def softening_pendulum() -> Campaign:
 @pytest.mark.usefixtures("coarse_figures")
 def test_report_of_a_linear_oscillator_that_does_not_fit(tmp_path: Path) -> None:
     found = identify(softening_pendulum(), rng=np.random.default_rng(1), search=False)
-    results = write_fit(found, tmp_path, seed=1).results
+    results = write_results(results_from_fit(found), tmp_path).results
     assert results.verdict == "inadequate"
     page = (tmp_path / REPORT_FILE).read_text()
     body = page.index('class="verdict bad"')
