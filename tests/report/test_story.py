@@ -86,6 +86,9 @@ def test_formulas_of_a_learned_force() -> None:
     formulas = [{"formula": "a abs(v) v", "unit": "N s2/m2", "log_odds": 12.34, "probability": 0.8}]
     text = page(diagnosed(verdict="unknown", effects=[], formulas=formulas))[1].text
     assert "a abs( v ) v N s²/m² +12.3 0.80" in text
+    rooted = [{**formulas[0], "formula": "A |v|^1.5 sign(v)", "unit": "N s1.5/m1.5"}]
+    source, _ = page(diagnosed(verdict="unknown", effects=[], formulas=rooted), ("story",))
+    assert "N\N{NO-BREAK SPACE}s<sup>1.5</sup>/m<sup>1.5</sup>" in source
 
 
 ROOT = effect_of(Term("everywhere", speed=Power(1.5, True)), 1.0, 0.01, 1.0, signed=True)
