@@ -22,8 +22,8 @@ from bayesimpact.inference.likelihood import Likelihood
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-MOST_BLOCKS = 200
-"""Most parts of a recording: of longer ones each part is several half cycles."""
+MOST_BLOCKS = 1000
+"""Most parts of all recordings together; where more would be, a part is several half cycles."""
 _CHUNK_SAMPLES = 4_000_000  # residuals held at once, so that memory stays bounded
 
 
@@ -70,7 +70,8 @@ def _blocks(likelihood: Likelihood, r: int, displacement: Array) -> Blocks:
     shift = round(start / recording.interval)
     counted[:shift] = counted[shift + signal.size :] = 0.0
     passages = np.flatnonzero(np.diff(displacement > 0.0)) + 1
-    every = -(-(passages.size + 1) // MOST_BLOCKS)
+    most = max(MOST_BLOCKS // len(likelihood.sizes), 1)
+    every = -(-(passages.size + 1) // most)
     first = np.append(0, passages[every - 1 :: every])
     ends = np.append(first[1:], counted.size)
     held = np.array([counted[a:b].sum() for a, b in zip(first, ends, strict=True)])

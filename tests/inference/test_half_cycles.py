@@ -54,7 +54,7 @@ def test_parts_add_up_to_the_recordings(
     np.testing.assert_allclose(whole, likelihood.per_recording(theta), rtol=1e-9)
     monkeypatch.setattr(half_cycles, "_CHUNK_SAMPLES", 1)
     np.testing.assert_allclose(log_likelihood(likelihood, theta, blocks), found, rtol=1e-12)
-    monkeypatch.setattr(half_cycles, "MOST_BLOCKS", 3)
+    monkeypatch.setattr(half_cycles, "MOST_BLOCKS", 10)  # of three recordings
     fewer = half_cycle_blocks(likelihood, theta[0])
     assert all(b.first.size <= 3 for b in fewer)
     total = log_likelihood(likelihood, theta, fewer).sum(axis=1)
