@@ -359,8 +359,8 @@ def effects(ctx: click.Context, own: Path | None, seed: int, quiet: bool) -> Non
     With --check, a table of checks of your own: units, limit at the null value, sign of the energy,
     convergence of the steps, derivatives. Exit code 2 when one failed.
     """
-    from bayesimpact.model.effects import UNTRIED
-    from bayesimpact.model.effects.catalogue import catalogue
+    from bayesimpact.model.effects import EFFECTS
+    from bayesimpact.model.effects.catalogue import listing
 
     if own is not None:
         from bayesimpact.diagnosis.effect_check import check_effect
@@ -371,14 +371,8 @@ def effects(ctx: click.Context, own: Path | None, seed: int, quiet: bool) -> Non
             if not quiet or check.result == "failed":
                 click.echo(f"{check.effect}  {check.name:<32} {check.result:<8} {check.detail}")
         ctx.exit(BAD_INPUT if any(check.result == "failed" for check in checks) else 0)
-    for row in catalogue():
-        click.echo(f"{row.id}\n    {row.title}: {row.equation}   [{row.family}]")
-        if row.id in UNTRIED:
-            click.echo("    not looked for, but where `effects=` of the library names it")
-        for parameter in row.parameters:
-            null = "" if parameter.null == "-" else f", vanishes at {parameter.null}"
-            scope = "" if parameter.scope == "campaign" else f", one per {parameter.scope}"
-            click.echo(f"    {parameter.name} ({parameter.unit}{null}{scope})")
+    for effect in EFFECTS:
+        click.echo("\n".join(listing(effect)))
 
 
 main.add_command(fleet)

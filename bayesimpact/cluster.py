@@ -40,11 +40,11 @@ def safe_path() -> Iterator[None]:
             os.environ["PYTHONSAFEPATH"] = before
 
 
-Spread = Callable[[Callable[..., Any], Iterator[tuple[Key, Job]]], Iterator[tuple[Key, Any]]]
+Distribute = Callable[[Callable[..., Any], Iterator[tuple[Key, Job]]], Iterator[tuple[Key, Any]]]
 
 
 @contextmanager
-def executor(workers: int, scheduler: str | None) -> Iterator[Spread]:
+def executor(workers: int, scheduler: str | None) -> Iterator[Distribute]:
     """A way to run jobs (key, arguments) -> (key, result), as they finish."""
     if scheduler is None and workers <= 1:
         yield here
@@ -79,12 +79,12 @@ def here(
         yield key, function(*arguments)
 
 
-def _on(client: Any) -> Spread:
+def _on(client: Any) -> Distribute:
     import distributed
 
     completed: Any = distributed.as_completed
 
-    def spread(
+    def distribute(
         function: Callable[..., Any], jobs: Iterator[tuple[Key, Job]]
     ) -> Iterator[tuple[Key, Any]]:
         waiting: dict[Any, Key] = {}
@@ -108,7 +108,7 @@ def _on(client: Any) -> Spread:
             more()
             yield key, result
 
-    return spread
+    return distribute
 
 
 def _lost(future: Any) -> dict[str, str]:

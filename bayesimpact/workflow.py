@@ -31,12 +31,12 @@ from bayesimpact.inference.progress import progress_bar, refit_bar
 from bayesimpact.model.effects import EFFECTS, SEARCHED
 from bayesimpact.model.effects.effect import Effect
 from bayesimpact.report.archive import load_results
-from bayesimpact.report.build import versions
+from bayesimpact.report.build import ReportContext, results_from_fit, versions
 from bayesimpact.report.diagnosis_arrays import diagnosis_arrays
 from bayesimpact.report.figures.save import reason
 from bayesimpact.report.next_words import sentence
 from bayesimpact.report.results import Results
-from bayesimpact.report.write import Written, write_fit, write_posterior, write_results
+from bayesimpact.report.write import Written, write_posterior, write_results
 
 DIAGNOSIS_FILE = "diagnosis.json"
 NEXT_FILE = "next.json"
@@ -89,7 +89,8 @@ def fit_campaign(
     identification = identify(campaign, rng=np.random.default_rng(seed))
     seconds = time.perf_counter() - began
     say("writing the report")
-    made = write_fit(identification, out, seed=seed, command=command, seconds=seconds)
+    context = ReportContext(command, seconds, seed)
+    made = write_results(results_from_fit(identification, context), out)
     return Outcome(made.results, identification.fit.converged, failed=made.failed)
 
 
@@ -113,7 +114,8 @@ def sample_campaign(
     posterior = sampled(identification, seed, out / CHAIN_FOLDER, resume, say, bar)
     seconds = time.perf_counter() - began
     say("writing the report")
-    made = write_posterior(posterior, identification, out, command=command, seconds=seconds)
+    context = ReportContext(command, seconds)
+    made = write_posterior(posterior, identification, out, context=context)
     converged = identification.fit.converged and posterior.chains.converged
     return Outcome(made.results, converged, failed=made.failed)
 
@@ -221,17 +223,12 @@ def write_diagnosis(
         arrays, plain = arrays | models, plain | {"hypotheses": strict(kept)}
     except Exception as error:
         failed["models for `bayesimpact next`"] = reason(error)
-    told: dict[str, Any] = {
-        "command": command,
-        "seconds": float(content["seconds"]),
-        "diagnosis": plain,
-        "diagnosis_arrays": arrays,
-        "failed": failed,
-    }
+    context = ReportContext(command, float(content["seconds"]), seed, plain, arrays)
     if after is None:
         final = replace(diagnosis.identification, fit=diagnosis.after, search=None)
-        return write_fit(final, out, seed=seed, **told)
-    return write_posterior(after, diagnosis.identification, out, before=before, **told)
+        return write_results(results_from_fit(final, context), out, failed)
+    found = diagnosis.identification
+    return write_posterior(after, found, out, before=before, context=context, failed=failed)
 
 
 def next_recording(

@@ -13,6 +13,7 @@ from pathlib import Path
 import matplotlib
 import pytest
 from matplotlib.figure import Figure
+from PIL import Image
 
 from bayesimpact.report.figures import save, shares
 from bayesimpact.report.figures.style import STYLE
@@ -30,6 +31,14 @@ def saved(name: str, figure: Figure, folder: Path) -> bytes:
     with matplotlib.rc_context(STYLE), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         figure.savefig(stream, format="png", dpi=12)
+    return written(name, stream.getvalue(), folder)
+
+
+def blank(name: str, figure: Figure, folder: Path) -> bytes:
+    """An empty picture as large as the figure."""
+    width, height = (round(save.DPI * float(x)) for x in figure.get_size_inches())
+    stream = io.BytesIO()
+    Image.new("1", (width, height)).save(stream, format="png")
     return written(name, stream.getvalue(), folder)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from bayesimpact.data.readers import text
@@ -40,16 +41,10 @@ def read_foreign(source: Path, entry: RecordingTable, data: bytes) -> Table:
             if getattr(entry, key) is not None:
                 raise InputError(f"{source}, key {key}", "a key of text files", "none of it here")
     channels = read_channels(source, data, encoding=entry.encoding, skip_rows=entry.skip_rows or 0)
-    wanted = Wanted(
-        column=entry.channel if column is None else column,
-        time_column=entry.time_column,
-        block=entry.block,
+    wanted = replace(
+        _wanted(entry, entry.channel if column is None else column),
         unit=entry.unit,
         quantity=entry.quantity,
-        sample_rate=entry.sample_rate_hz,
-        start=entry.start_s,
-        end=entry.end_s,
-        resample=entry.resample,
     )
     return choose(source, channels, wanted)
 
@@ -64,17 +59,20 @@ def read_input(source: Path, entry: RecordingTable, data: bytes) -> Table:
         accepted = "the name of a column in quotes, or its number counted from 1"
         raise InputError(f"{source}, input, key column", "nothing", accepted)
     channels = read_channels(source, data, encoding=entry.encoding, skip_rows=entry.skip_rows or 0)
-    wanted = Wanted(
-        column=given.column,
+    return choose(source, channels, replace(_wanted(entry, given.column), kind=given.kind))
+
+
+def _wanted(entry: RecordingTable, column: str | int | None) -> Wanted:
+    """A column on the clock and in the stretch that an entry states."""
+    return Wanted(
+        column=column,
         time_column=entry.time_column,
         block=entry.block,
         sample_rate=entry.sample_rate_hz,
         start=entry.start_s,
         end=entry.end_s,
         resample=entry.resample,
-        kind=given.kind,
     )
-    return choose(source, channels, wanted)
 
 
 def file_bytes(source: Path, where: str) -> bytes | None:

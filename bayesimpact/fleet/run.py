@@ -130,9 +130,9 @@ def run_fleet(
             rows[name] = known
     say(len(rows))
     missing = [name for name in campaigns if name not in rows]
-    with executor(workers, scheduler) as spread:
+    with executor(workers, scheduler) as distribute:
         jobs = ((name, (campaigns[name], work)) for name in missing)
-        for name, answered in spread(campaign_job, jobs):
+        for name, answered in distribute(campaign_job, jobs):
             rows[name] = store.keep(name, answered, work.identity(campaigns[name]))
             say(1)
     return [rows[s.name] for s in plan.sessions]

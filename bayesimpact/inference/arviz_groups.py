@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.inference.convergence import quiet_arviz
 from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.half_cycles import half_cycle_blocks, log_likelihood
 from bayesimpact.model.units import display, reading
 
 Array = NDArray[np.float64]
@@ -26,6 +27,7 @@ Variables = dict[str, tuple[tuple[str, ...], NDArray[Any], dict[str, str]]]
 """Name -> names of the axes, values, attributes: as xarray takes them."""
 
 SAMPLE_DIMS = ("chain", "draw")
+PART = "half_cycle"
 ENGINE = "h5netcdf"
 PRIOR_DRAWS = 500
 _INDEXED = re.compile(r"(?P<base>[^\[\]]+)\[(?P<key>.+)\]")
@@ -62,9 +64,10 @@ def by_chain(draws: NDArray[Any]) -> NDArray[Any]:
 def arviz_groups(fit: Fit, draws: ArvizDraws, *, lab_units: bool = False) -> dict[str, Any]:
     """Groups posterior, prior, log_likelihood, observed_data, constant_data and those in `draws`.
 
-    The log-likelihood has one value per recording and draw: neighbouring samples of one motion are
-    not independent under any wrong model, recordings are. Predictive draws are fewer than the
-    others; each recording has its own time axis. `lab_units`: mm, mN, ... and not SI.
+    The log-likelihood has one value per half cycle and draw, which may be left out one at a time:
+    see `half_cycles` for why not samples or recordings; constant_data says where each begins.
+    Predictive draws are fewer than the others; each recording has its own time axis. `lab_units`:
+    mm, mN, ... and not SI.
     """
     oscillator, likelihood = fit.target.oscillator, fit.target.likelihood
     campaign = oscillator.campaign
@@ -85,10 +88,12 @@ def arviz_groups(fit: Fit, draws: ArvizDraws, *, lab_units: bool = False) -> dic
     axes = {name: f"time_{name}" for name in recordings}
     if draws.log_posterior is not None:
         groups["sample_stats"] = {"lp": (SAMPLE_DIMS, draws.log_posterior, {"units": ""})}
-    values = likelihood.per_recording(draws.parameters.reshape(-1, draws.parameters.shape[-1]))
+    flat = draws.parameters.reshape(-1, draws.parameters.shape[-1])
+    blocks = half_cycle_blocks(likelihood, fit.mode)
+    values = log_likelihood(likelihood, flat, blocks).astype(np.float32)
     values = values.reshape(*draws.parameters.shape[:2], -1)
     quantity = campaign.recordings[0].quantity
-    groups["log_likelihood"] = {quantity: ((*SAMPLE_DIMS, "recording"), values, {"units": ""})}
+    groups["log_likelihood"] = {quantity: ((*SAMPLE_DIMS, PART), values, {"units": ""})}
     if draws.predictive:
         groups["posterior_predictive"] = {
             name: ((*SAMPLE_DIMS, axes[name]), x * np.float32(scale[name]), told[name])
@@ -102,7 +107,17 @@ def arviz_groups(fit: Fit, draws: ArvizDraws, *, lab_units: bool = False) -> dic
     groups["constant_data"] = {
         "mass": ((), np.array(campaign.mass), {"units": "kg m2" if campaign.angular else "kg"}),
         "interval": (("recording",), intervals, {"units": "s"}),
+        f"{PART}_start": (
+            (PART,),
+            np.concatenate([b.first * h for b, h in zip(blocks, intervals, strict=True)]),
+            {"units": "s"},
+        ),
     }
+    coords[PART] = [
+        f"{n} {k}"
+        for n, b in zip(recordings, blocks, strict=True)
+        for k in range(1, b.first.size + 1)
+    ]
     times = {axes[name]: r.times.tolist() for name, r in recordings.items()}
     model = {
         "campaign": campaign.name,

@@ -209,8 +209,8 @@ def adapt(snapshot: Snapshot, stretch: DrawBlock) -> Snapshot:
 
     def learn(points: Array) -> Frame:
         centre = points.mean(axis=0)
-        spread = np.einsum("ni,nj->ij", points - centre, points - centre) / len(points)
-        factor = cholesky(trust * spread + (1.0 - trust) * np.eye(dimension))
+        covariance = np.einsum("ni,nj->ij", points - centre, points - centre) / len(points)
+        factor = cholesky(trust * covariance + (1.0 - trust) * np.eye(dimension))
         return Frame(trust * centre, factor)
 
     held_out = walkers // 3

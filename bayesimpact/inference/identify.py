@@ -246,9 +246,9 @@ class _ProfiledObjective:
 
     def bounds(self, factor: float) -> tuple[Array, Array]:
         centre = self.guess[self.physical]
-        spread = np.where(self.positive, np.log(factor), factor * self.reach)
+        half = np.where(self.positive, np.log(factor), factor * self.reach)
         middle = np.where(self.positive, np.log(np.maximum(centre, 1e-300)), centre)
-        return middle - spread, middle + spread
+        return middle - half, middle + half
 
     def encode(self, theta: Array, otherwise: Array) -> Array:
         """Search coordinates of theta's physical part; `otherwise` where there is no finite one."""

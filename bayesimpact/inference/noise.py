@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from bayesimpact.data.campaign import Smoothing
 from bayesimpact.data.gaps import runs
 from bayesimpact.data.recording import Recording
-from bayesimpact.inference.noise_spread import spread_of
+from bayesimpact.inference.noise_sd import relative_sd
 from bayesimpact.model.measurement import edge, gain
 
 Array = NDArray[np.float64]
@@ -96,12 +96,12 @@ class Noise:
     def whitened(self, recording: Recording, x: Array) -> Array:
         """Whitened signals of a recording: (..., n) samples to (..., m) numbers."""
         if self.grows:
-            x = x / self.spread(recording)
+            x = x / self.relative_sd(recording)
         return self.whiten(x, recording.interval, recording.used, recording.order)
 
-    def spread(self, recording: Recording) -> Array:
+    def relative_sd(self, recording: Recording) -> Array:
         """Standard deviation at every sample of a recording over `level`, (n,)."""
-        return spread_of(self.growth, recording)
+        return relative_sd(self.growth, recording)
 
     def whiten(self, x: Array, interval: float, used: Mask | None = None, order: int = 0) -> Array:
         """Whitened x: (..., n) samples to (..., m) numbers of variance sigma^2.
@@ -208,7 +208,7 @@ class Noise:
         """A draw of a recording's raw noise of level `sigma` (before any smoothing), (n,), m."""
         size, order = recording.samples.size, recording.order
         drawn = self.coloured(rng, size, recording.interval, sigma, order)
-        return drawn * self.spread(recording) if self.grows else drawn
+        return drawn * self.relative_sd(recording) if self.grows else drawn
 
     def volume_of(self, recording: Recording) -> float:
         """Log determinant of `whitened`."""
@@ -216,8 +216,8 @@ class Noise:
         found = self.log_volume(size, recording.interval, used, recording.order)
         if not self.grows:
             return found
-        spread = self.spread(recording)
-        return found - float(np.sum(np.log(spread if used is None else spread[used])))
+        sd = self.relative_sd(recording)
+        return found - float(np.sum(np.log(sd if used is None else sd[used])))
 
     def with_smoothing(self, smoothing: Smoothing | None) -> Noise:
         """The same raw noise behind another filter."""

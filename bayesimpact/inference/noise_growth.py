@@ -26,7 +26,7 @@ from bayesimpact.data.hum import find_hum
 from bayesimpact.data.recording import Recording
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.noise_remainders import DEGREE, KEPT, LARGEST, SMALLEST
-from bayesimpact.inference.noise_spread import smoothed
+from bayesimpact.inference.noise_sd import smoothed
 from bayesimpact.inference.noise_windows import centred, period_of, smooth_parts, windows
 
 Array = NDArray[np.float64]

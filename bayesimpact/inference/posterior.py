@@ -111,10 +111,10 @@ class Posterior:
     def to_arviz(self, *, lab_units: bool = False) -> Any:
         """ArviZ's `InferenceData` (0.23) or `DataTree` (1.x), one chain per independent ensemble.
 
-        Groups: posterior, sample_stats, prior, log_likelihood (per recording), observed_data,
-        constant_data and posterior_predictive. At most `ARVIZ_DRAWS` draws of every chain, evenly
-        spaced: the attributes say by how many steps of the sampler. `lab_units`: mm, mN, ... in
-        place of SI, so that a summary shows digits.
+        Groups: posterior, sample_stats, prior, log_likelihood (per half cycle, for `az.loo`: see
+        `inference.half_cycles`), observed_data, constant_data and posterior_predictive. At most
+        `ARVIZ_DRAWS` draws of every chain, evenly spaced: the attributes say by how many steps of
+        the sampler. `lab_units`: mm, mN, ... in place of SI, so that a summary shows digits.
         """
         return as_arviz(self.arviz_groups({"seed": self.seed}, lab_units=lab_units))
 

@@ -144,7 +144,6 @@ def metropolis_differential_evolution(
     tolerance: float = 0.1,
     metropolis: bool = True,
     coldest: float = 1.0,
-    start: npt.ArrayLike | None = None,
     callback: Callable[[Generation], None] | None = None,
 ) -> SearchResult:
     """Minimise `objective` within bounds; the module's docstring describes the algorithm.
@@ -162,7 +161,6 @@ def metropolis_differential_evolution(
     metropolis : False for greedy selection (T = 0, no exploring), which is plain L-SHADE
     coldest : last temperature of the cooling, unit of f: the difference that should not matter.
         1 is right for a negative log posterior
-    start : (k, d) points within the bounds that take the first k places of the first population
     callback : called after every generation
 
     Raises
@@ -174,7 +172,7 @@ def metropolis_differential_evolution(
     budget = 3000 * dimension if evaluations is None else evaluations
     size = max(24, min(9 * dimension, budget // 110)) if population is None else population
     _check_settings(size, budget, tolerance, coldest)
-    state = first_state(objective, _first_population(box, size, start, rng))
+    state = first_state(objective, box.latin_hypercube(size, rng))
     hottest = _first_temperature(state.f, coldest) if metropolis else 0.0
     spent = size
     track: list[Generation] = []
@@ -189,17 +187,6 @@ def metropolis_differential_evolution(
         if callback is not None:
             callback(track[-1])
     return _result(state, spent, track, tolerance)
-
-
-def _first_population(
-    box: Box, size: int, start: npt.ArrayLike | None, rng: np.random.Generator
-) -> Array:
-    """(size, d) points spread over the bounds, the given ones first."""
-    x = box.latin_hypercube(size, rng)
-    if start is not None:
-        given = _checked_start(start, size, box)
-        x[: len(given)] = given
-    return x
 
 
 def _first_temperature(f: Array, coldest: float) -> float:
@@ -286,16 +273,6 @@ def _checked_box(lower: npt.ArrayLike, upper: npt.ArrayLike) -> Box:
         at = int(np.argmin(usable))
         raise InputError(f"bounds[{at}]", f"{low[at]} to {high[at]}", "finite, lower < upper")
     return Box(low, high)
-
-
-def _checked_start(start: npt.ArrayLike, size: int, box: Box) -> Array:
-    """Points (k, d) within the bounds, k at most `size`."""
-    given = np.array(start, dtype=np.float64)
-    if given.ndim != 2 or given.shape[1] != len(box.lower) or len(given) > size:
-        raise InputError("start", f"shape {given.shape}", f"(k, {len(box.lower)}), k up to {size}")
-    if not ((given >= box.lower) & (given <= box.upper)).all():
-        raise InputError("start", "a point out of bounds", "points within the bounds")
-    return given
 
 
 def _check_settings(size: int, budget: int, tolerance: float, coldest: float) -> None:

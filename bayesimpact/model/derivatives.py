@@ -22,13 +22,12 @@ from bayesimpact.model.arguments import (
     check_samples,
     no_samples,
 )
-from bayesimpact.model.basis import FORCED, PLAIN
 from bayesimpact.model.batch import Floats, Ints, Span, gather, run_any
 from bayesimpact.model.blocks import Sink
 from bayesimpact.model.compiled import compiled, inner
 from bayesimpact.model.driven import wave_of
 from bayesimpact.model.driven_sensitivity_pass import driven_sensitivity_pass
-from bayesimpact.model.normalized import OK, OVERFLOW, A
+from bayesimpact.model.normalized import OK, OVERFLOW, PHASE, A
 from bayesimpact.model.sensitivity_pass import Columns, sensitivity_pass, workspace
 from bayesimpact.model.tables import ResponseTables, response_tables
 from bayesimpact.model.threads import in_shares
@@ -40,14 +39,11 @@ SAMPLES_PER_EVENT = 8
 
 
 @inner()
-def wanted(active: Columns, columns: Ints, forced: bool) -> Columns:
-    """Return those q of one recording, columns (11,), whose derivatives are wanted, in `active`.
-
-    The force's are only there with the basis for it.
-    """
+def wanted(active: Columns, columns: Ints) -> Columns:
+    """Return those q of one recording, columns (11,), whose derivatives are wanted, in `active`."""
     count = 0
     for i in range(11):
-        if columns[i] >= 0 and (forced or i < 7 or i == 10):
+        if columns[i] >= 0 and not A <= i <= PHASE:
             active[count] = i
             count += 1
     return active[:count]
@@ -72,7 +68,7 @@ def find_events(
 @compiled(nogil=True)
 def work(
     theta: Floats, columns: Ints, constants: Floats, mass: float, samples: Floats, starts: Ints,
-    counts: Ints, intervals: Floats, orders: Ints, waves: Floats, first_wave: Ints, size: int,
+    counts: Ints, intervals: Floats, orders: Ints, waves: Floats, first_wave: Ints,
     rows: Span, items: Span, out: Floats, values: Floats, jacobian: Floats, codes: Ints,
 ) -> None:  # fmt: skip
     """Fill one share of `codes` (B, R), and of the Gram matrices `out` (B, R, 12, 12).
@@ -85,7 +81,7 @@ def work(
     active = np.empty(11, dtype=np.uint64)
     longest = counts[items[0] : items[1]].max() if items[1] > items[0] else 0
     first_events = np.empty((EVENTS + longest // SAMPLES_PER_EVENT, 2))
-    mine, room = response_tables(), workspace(size, samples.size > 0)
+    mine, room = response_tables(), workspace(samples.size > 0)
     for b in range(rows[0], rows[1]):
         for r in range(items[0], items[1]):
             gather(q, theta[b], columns[r], constants[r])
@@ -111,7 +107,7 @@ def work(
                 else:
                     sensitivity_pass(
                         q, mass, intervals[r], n, orders[r], events,
-                        wanted(active, columns[r], size > PLAIN), data, own, slopes, gram, room,
+                        wanted(active, columns[r]), data, own, slopes, gram, room,
                     )  # fmt: skip
                 if not math.isfinite(gram.sum() + own.sum() + slopes.sum()):
                     code = OVERFLOW
@@ -194,13 +190,12 @@ def _work(
     batch, recordings = len(model.theta), len(model.columns)
     codes = np.empty((batch, recordings), dtype=np.int64)
     waves, first_wave = check_inputs(inputs, model)
-    # derivatives with respect to a harmonic force are wanted also where it is 0
-    harmonic = first_wave < 0
-    forced = np.any((model.columns[:, A] >= 0) & harmonic)
-    forced = forced or np.any((model.constants[:, A] != 0.0) & harmonic)
+    harmonic = (model.columns[:, A] >= 0) | (model.constants[:, A] != 0.0)
+    if np.any(harmonic & (first_wave < 0)):
+        raise InputError("derivatives", "a harmonic force", "no force, or a measured input")
     before = (
         model.theta, model.columns, model.constants, float(mass), data, first, model.counts,
-        model.intervals, model.orders, waves, first_wave, FORCED if forced else PLAIN,
+        model.intervals, model.orders, waves, first_wave,
     )  # fmt: skip
 
     by_rows = batch >= recordings

@@ -134,7 +134,7 @@ def driven_sensitivity_pass(
     motion = scale(q, mass, interval)
     contact = begins_in_contact(q)
     per_mass = interval * interval / mass
-    hold = per_mass * q[K2] * q[G] if q[G] < math.inf else 0.0
+    contact_constant = per_mass * q[K2] * q[G] if q[G] < math.inf else 0.0
     wanted, row = np.zeros(COLUMNS), np.zeros(RESIDUAL + 1)
     dy, dv, slopes = np.zeros(COLUMNS), np.zeros(COLUMNS), np.empty((2, 3, COLUMNS))
     for k in range(COLUMNS):
@@ -152,7 +152,7 @@ def driven_sensitivity_pass(
     for i in range(held.size):
         side, level, beta, K = 0, 0.0, free.beta, free.K
         if contact:
-            side, level, beta, K = 1, hold, touching.beta, touching.K
+            side, level, beta, K = 1, contact_constant, touching.beta, touching.K
         # of an acceleration the input is a part, and a probe may see the base move
         pushed = per_mass * wave.shown[i]
         at_once = wave.carried[i] + (rate * rate * pushed if order == 2 else 0.0)
@@ -179,7 +179,7 @@ def driven_sensitivity_pass(
         now_A, rise_A = now * wanted[A], rise * wanted[A]
         t = 0.0
         while e < events.shape[0] and events[e, 0] <= i + 1.0:
-            flow, side, level = (touching, 1, hold) if contact else (free, 0, 0.0)
+            flow, side, level = (touching, 1, contact_constant) if contact else (free, 0, 0.0)
             wait = events[e, 0] - i - t
             after = responses(flow.beta, flow.K, wait)
             p = q[A] * (now + rise * t) + level
@@ -191,7 +191,7 @@ def driven_sensitivity_pass(
             t, y, v = events[e, 0] - i, motion.gap, events[e, 1]
             contact = not contact
             e += 1
-        flow, side, level = (touching, 1, hold) if contact else (free, 0, 0.0)
+        flow, side, level = (touching, 1, contact_constant) if contact else (free, 0, 0.0)
         after = flow if t == 0.0 else responses(flow.beta, flow.K, 1.0 - t)
         p = q[A] * (now + rise * t) + level
         carry_driven(after, slopes, side, y, v, p, r, now_A + rise_A * t, rise_A, dy, dv)

@@ -50,7 +50,7 @@ from bayesimpact.model.added.flows import RENEWED, first_step, flow_from, next_s
 from bayesimpact.model.added.memory import keep_memory, relax
 from bayesimpact.model.added.method import quarters
 from bayesimpact.model.added.resonator import ROWS
-from bayesimpact.model.added.rest import hold
+from bayesimpact.model.added.rest import stick
 from bayesimpact.model.added.second import added_reading, listens, respond
 from bayesimpact.model.added.step import added_force, step
 from bayesimpact.model.arguments import Inputs
@@ -201,7 +201,7 @@ def walk(w: Any) -> Any:
         if events < 0:
             return TOO_MANY_EVENTS
         if v == 0.0 and w.q[FRICTION] > 0.0 and w.s[SLIDING] == 0.0:
-            t, j = hold(y, t, j, w)
+            t, j = stick(y, t, j, w)
         else:
             y, v, t, j = section(y, v, t, j, w)
     return OK

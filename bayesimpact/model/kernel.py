@@ -57,10 +57,10 @@ def run(
     stop, contact = has_stop(q), begins_in_contact(q)
     forced = motion.force != 0.0
     prepare(response_tables, 0, motion.b_flight, motion.K_flight, motion.w, forced)
-    quick = stop and not forced and 2.0 * motion.b_flight + math.sqrt(motion.K_flight) < SLOW
+    predictable = stop and not forced and 2.0 * motion.b_flight + math.sqrt(motion.K_flight) < SLOW
     if stop:
         prepare(response_tables, 1, motion.b_contact, motion.K_contact, motion.w, forced)
-        quick = quick and 2.0 * motion.b_contact + math.sqrt(motion.K_contact) < SLOW
+        predictable = predictable and 2.0 * motion.b_contact + math.sqrt(motion.K_contact) < SLOW
 
     limit = EVENTS_AT_LEAST + EVENTS_PER_SAMPLE * n
     t, y, v = 0.0, q[Y0], q[V0] * interval
@@ -68,7 +68,7 @@ def run(
     count = i = typed(0)
     response_tables.history[:] = 0.0
     while True:
-        if quick and count > 0:
+        if predictable and count > 0:
             contact, t, v, i, count, passed = return_time_prediction(
                 response_tables, sink, motion, n, limit, contact, t, v, i, count
             )

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.model.basis import D_, E_, F_, G_, H_, ONE, S_
+from bayesimpact.model.basis import D_, G_, H_, ONE, S_
 from bayesimpact.model.compiled import inner
 
 Floats = NDArray[np.float64]
@@ -30,11 +30,11 @@ def prefix_grams(prefixes: Floats, tables: Floats, side: int) -> None:
 
 
 @inner(fastmath={"reassoc", "contract", "nsz"})
-def plain_moments(
+def sum_moments(
     moments: Floats, slot: int, tables: Floats, side: int, data: Floats, first: int, end: int,
     shift: float, u: float, m: float,
 ) -> float:  # fmt: skip
-    """Write into moments[slot] the residuals of samples first..end-1 times the PLAIN basis.
+    """Write into moments[slot] the residuals of samples first..end-1 times the basis.
 
     Returns the sum of their squares. u, m : coefficients of D and S in the motion.
     """
@@ -57,36 +57,15 @@ def plain_moments(
     return total
 
 
-@inner(fastmath={"reassoc", "contract", "nsz"})
-def forced_moments(
-    moments: Floats, slot: int, tables: Floats, side: int, data: Floats, first: int, end: int,
-    shift: float, u: float, m: float, fs: float, fc: float,
-) -> float:  # fmt: skip
-    """As `plain_moments`, with a force, for the whole basis."""
-    table = tables[side]
-    moments[slot] = 0.0
-    total = 0.0
-    for j in range(end - first):
-        r = data[first + j] - shift - (table[D_, j] * u + table[S_, j] * m)
-        r -= table[E_, j] * fs + table[F_, j] * fc
-        total += r * r
-        for k in range(table.shape[0]):
-            moments[slot, k] += r * table[k, j]
-    return total
-
-
 @inner(fastmath={"contract"})
 def write_rows(
     stack: Floats, slot: int, active: Columns, tables: Floats, side: int, shift: float, u: float,
-    m: float, fs: float, fc: float, values: Floats, jacobian: Floats,
+    m: float, values: Floats, jacobian: Floats,
 ) -> None:  # fmt: skip
     """Write the values (n,) and the rows of J (n, 11) of one block."""
     table = tables[side]
     for j in range(values.size):
         values[j] = shift + table[D_, j] * u + table[S_, j] * m
-    if table.shape[0] > E_:
-        for j in range(values.size):
-            values[j] += fs * table[E_, j] + fc * table[F_, j]
     for i in active:
         for j in range(values.size):
             total = (
@@ -97,6 +76,3 @@ def write_rows(
             jacobian[j, i] = (
                 total + stack[i, slot, G_] * table[G_, j] + stack[i, slot, H_] * table[H_, j]
             )
-        for k in range(E_, table.shape[0]):
-            for j in range(values.size):
-                jacobian[j, i] += stack[i, slot, k] * table[k, j]

@@ -14,9 +14,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.model.basis import D_, E_, F_, G_, H_, ONE, P_, PLAIN, PR, S_, UC, US, X_, XR
+from bayesimpact.model.basis import D_, G_, H_, ONE, S_
 from bayesimpact.model.compiled import inner
-from bayesimpact.model.normalized import C1, C2, K1, K2, OFFSET, PHASE, A, G, W
+from bayesimpact.model.normalized import C1, C2, K1, K2, OFFSET, G
 
 Floats = NDArray[np.float64]
 Columns = NDArray[np.uint64]
@@ -49,7 +49,7 @@ def fill_coefficients(
     stack: Floats, slot: int, active: Columns, slopes: Floats, side: int, beta: float, K: float,
     u: float, v: float, dy: Floats, dv: Floats,
 ) -> None:  # fmt: skip
-    """Write the PLAIN coefficients of the motion from (u, v), relative to the rest."""
+    """Write the coefficients of the motion from (u, v), relative to the rest."""
     m = v + beta * u
     pull = K * u
     for i in active:
@@ -64,40 +64,13 @@ def fill_coefficients(
 
 
 @inner()
-def fill_forced_coefficients(
-    stack: Floats, slot: int, active: Columns, slopes: Floats, side: int, q: Floats, mass: float,
-    interval: float, t: float,
-) -> tuple[float, float]:  # fmt: skip
-    """Write the other coefficients; return the force's sine and cosine part (per mass) at t."""
-    per_mass = interval * interval / mass
-    angle = q[W] * interval * t + q[PHASE]
-    sin, cos = math.sin(angle) * per_mass, math.cos(angle) * per_mass
-    fs, fc = q[A] * sin, q[A] * cos
-    for i in active:
-        for k in range(E_, UC + 1):
-            stack[i, slot, k] = 0.0
-        beta_i, K_i = slopes[side, 0, i], slopes[side, 1, i]
-        stack[i, slot, X_], stack[i, slot, XR] = -K_i * fs, -beta_i * fs
-        stack[i, slot, P_], stack[i, slot, PR] = -K_i * fc, -beta_i * fc
-        if i == A:
-            stack[i, slot, E_], stack[i, slot, F_] = sin, cos
-        elif i == W:
-            stack[i, slot, E_], stack[i, slot, F_] = fc * interval * t, -fs * interval * t
-            stack[i, slot, US], stack[i, slot, UC] = -interval * fs, interval * fc
-        elif i == PHASE:
-            stack[i, slot, E_], stack[i, slot, F_] = fc, -fs
-    return fs, fc
-
-
-@inner()
 def fill_reading(
     stack: Floats, here: int, slot: int, active: Columns, order: int, interval: float, beta: float,
-    K: float, w: float,
+    K: float,
 ) -> None:  # fmt: skip
     """Write into `slot` the coefficients of the order-th time derivative of those in `here`.
 
-    The basis is closed under it: S' = D, D' = -2 b D - K S, G' = H, H' = S - 2 b H - K G, and with
-    a force E' = S - w F, F' = w E, Us' = F + w Uc, Uc' = E - w Us; X and P as S * E and S * F.
+    The basis is closed under it: S' = D, D' = -2 b D - K S, G' = H, H' = S - 2 b H - K G.
     """
     rate = 1.0 / interval
     for i in active:
@@ -108,15 +81,6 @@ def fill_reading(
             c[ONE] = 0.0
             c[S_], c[D_] = rate * (H - K * D), rate * (S - beta * D)
             c[G_], c[H_] = -rate * K * H, rate * (G - beta * H)
-            if c.size > PLAIN:
-                E, F, X, Xr, P, Pr, Us, Uc = (
-                    c[E_], c[F_], c[X_], c[XR], c[P_], c[PR], c[US], c[UC],
-                )  # fmt: skip
-                c[S_] += rate * E
-                c[E_], c[F_] = rate * (w * F + Xr + Uc), rate * (Pr + Us - w * E)
-                c[X_], c[XR] = -rate * K * Xr, rate * (X - beta * Xr)
-                c[P_], c[PR] = -rate * K * Pr, rate * (P - beta * Pr)
-                c[US], c[UC] = -rate * w * Uc, rate * w * Us
         if i == OFFSET:  # a constant is added to the reading, whatever is read
             c[:] = 0.0
             c[ONE] = 1.0
@@ -127,7 +91,7 @@ def carry(
     stack: Floats, slot: int, active: Columns, beta: float, K: float, S: float, D: float, G: float,
     H: float, dy: Floats, dv: Floats,
 ) -> None:  # fmt: skip
-    """Bring (dy, dv) to the time at which the PLAIN basis is 1, S, D, G, H."""
+    """Bring (dy, dv) to the time at which the basis is 1, S, D, G, H."""
     D_rate = -beta * D - K * S
     H_rate = S - beta * H - K * G
     for i in active:
@@ -135,17 +99,6 @@ def carry(
         d, e = stack[i, slot, 3], stack[i, slot, 4]
         dy[i] = a + b * S + c * D + d * G + e * H
         dv[i] = b * D + c * D_rate + d * H + e * H_rate
-
-
-@inner(forceinline=True, fastmath={"contract"})
-def carry_forced(
-    stack: Floats, slot: int, active: Columns, value: Floats, rate: Floats, dy: Floats, dv: Floats
-) -> None:
-    """Add to (dy, dv) what the rest of the basis brings, given its values and rates of change."""
-    for i in active:
-        for k in range(PLAIN, value.size):
-            dy[i] += stack[i, slot, k] * value[k]
-            dv[i] += stack[i, slot, k] * rate[k]
 
 
 @inner(forceinline=True, fastmath={"contract"})
@@ -159,15 +112,6 @@ def multiply(
     count: int,
 ) -> None:
     """Write into `products` the rows of a block times the sums over its `count` samples."""
-    size = prefixes.shape[2]
-    if size > PLAIN:
-        for i in active:
-            for k in range(size):
-                total = 0.0
-                for m in range(size):
-                    total += prefixes[side, count, k, m] * stack[i, slot, m]
-                products[i, slot, k] = total
-        return
     w = prefixes[side, count]
     w00, w01, w02, w03, w04 = w[0, 0], w[0, 1], w[0, 2], w[0, 3], w[0, 4]
     w11, w12, w13, w14 = w[1, 1], w[1, 2], w[1, 3], w[1, 4]

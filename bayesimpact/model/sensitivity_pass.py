@@ -20,19 +20,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.model import basis
-from bayesimpact.model.basis import fill_basis, fill_basis_series, fill_table, plain_basis
+from bayesimpact.model.basis import SIZE, basis_at, fill_basis_series, fill_table
 from bayesimpact.model.blocks import reading_of
 from bayesimpact.model.compiled import inner, typed
-from bayesimpact.model.moments import forced_moments, plain_moments, prefix_grams, write_rows
+from bayesimpact.model.moments import prefix_grams, sum_moments, write_rows
 from bayesimpact.model.normalized import C2, OFFSET, V0, Y0, G, begins_in_contact, scale
 from bayesimpact.model.sensitivities import (
     RESIDUAL,
     add_products,
     carry,
-    carry_forced,
     fill_coefficients,
-    fill_forced_coefficients,
     fill_reading,
     fill_slopes,
     multiply,
@@ -49,12 +46,12 @@ BLOCKS = 64
 class Workspace(NamedTuple):
     """Room for `sensitivity_pass`, kept from recording to recording.
 
-    tables (2, basis, LENGTH), series (2, 3, TERMS), prefixes (2, LENGTH + 1, basis, basis),
-    keys (2, 3) : of both regimes
+    tables (2, SIZE, LENGTH), series (2, 3, TERMS), prefixes (2, LENGTH + 1, SIZE, SIZE),
+    keys (2, 2) : of both regimes, with their b and K
     slopes (2, 3, 11) : derivatives of their 2 b, K and rest
-    stack, products (11, BLOCKS + 1, basis), moments (BLOCKS, basis) : of the blocks; the last row
+    stack, products (11, BLOCKS + 1, SIZE), moments (BLOCKS, SIZE) : of the blocks; the last row
         holds the motion's own coefficients where the probe reads a derivative of it
-    point (2, basis), dy (11,), dv (11,) : at one time
+    point (SIZE,), dy (11,), dv (11,) : at one time
     """
 
     tables: Floats
@@ -71,33 +68,32 @@ class Workspace(NamedTuple):
 
 
 @inner()
-def workspace(size: int, with_grams: bool) -> Workspace:
-    """Return an empty workspace for a basis of `size`."""
+def workspace(with_grams: bool) -> Workspace:
+    """Return an empty workspace."""
     lengths = LENGTH + 1 if with_grams else 0
     return Workspace(
-        np.empty((2, size, LENGTH)),
+        np.empty((2, SIZE, LENGTH)),
         np.empty((2, 3, TERMS)),
-        np.empty((2, lengths, size, size)),
-        np.full((2, 3), np.nan),
+        np.empty((2, lengths, SIZE, SIZE)),
+        np.full((2, 2), np.nan),
         np.empty((2, 3, 11)),
-        np.empty((11, BLOCKS + 1, size)),
-        np.empty((11, BLOCKS + 1, size)),
-        np.empty((BLOCKS, size)),
-        np.empty((2, size)),
+        np.empty((11, BLOCKS + 1, SIZE)),
+        np.empty((11, BLOCKS + 1, SIZE)),
+        np.empty((BLOCKS, SIZE)),
+        np.empty(SIZE),
         np.empty(11),
         np.empty(11),
     )
 
 
 @inner()
-def refill(room: Workspace, side: int, b: float, K: float, w: float) -> None:
+def refill(room: Workspace, side: int, b: float, K: float) -> None:
     """Fill tables, series and prefix sums of one regime."""
-    forced = room.tables.shape[1] > basis.PLAIN
-    fill_table(room.tables[side], room.point[0], room.point[1], b, K, w, forced)
+    fill_table(room.tables[side], room.point, b, K)
     fill_basis_series(room.series[side], b, K)
     if room.prefixes.shape[1] > 0:
         prefix_grams(room.prefixes, room.tables, side)
-    room.keys[side, 0], room.keys[side, 1], room.keys[side, 2] = b, K, w
+    room.keys[side, 0], room.keys[side, 1] = b, K
 
 
 @inner(fastmath={"contract"})
@@ -112,23 +108,22 @@ def sensitivity_pass(
     active : the q whose derivatives are wanted
     values, jacobian : (n,), (n, 11)
     """
-    tables, series, prefixes, keys, slopes, stack, products, moments, point, dy, dv = room
+    tables, series, prefixes, keys, slopes, stack, products, moments, _, dy, dv = room
     motion = scale(q, mass, interval)
     contact = begins_in_contact(q)
-    forced = tables.shape[1] > basis.PLAIN
     fill_slopes(slopes, q, mass, interval)
     dy[:], dv[:] = 0.0, 0.0
     dy[Y0], dv[V0], dy[OFFSET] = 1.0, interval, 1.0
     t, y, v = 0.0, q[Y0], q[V0] * interval
-    squares = fs = fc = 0.0
+    squares = 0.0
     i = slot = typed(0)
     for e in range(events.shape[0] + 1):
         if contact:
             side, b, K, rest = 1, motion.b_contact, motion.K_contact, motion.rest
         else:
             side, b, K, rest = 0, motion.b_flight, motion.K_flight, 0.0
-        if keys[side, 0] != b or keys[side, 1] != K or keys[side, 2] != motion.w:
-            refill(room, side, b, K, motion.w)
+        if keys[side, 0] != b or keys[side, 1] != K:
+            refill(room, side, b, K)
         beta = 2.0 * b
         slow = beta + math.sqrt(K) < SLOW
         last = e == events.shape[0]
@@ -139,32 +134,23 @@ def sensitivity_pass(
             m = v + beta * u
             here = slot if order == 0 else BLOCKS
             fill_coefficients(stack, here, active, slopes, side, beta, K, u, v, dy, dv)
-            if forced:
-                fs, fc = fill_forced_coefficients(
-                    stack, here, active, slopes, side, q, mass, interval, t
-                )
             if t == i and i < end:
                 block = min(i + LENGTH, end)
-                shift, ur, vr, fsr, fcr = reading_of(
-                    order, 1.0 / interval, b, K, motion.w, rest, motion.offset, u, v, fs, fc
+                shift, ur, vr, _, _ = reading_of(
+                    order, 1.0 / interval, b, K, motion.w, rest, motion.offset, u, v, 0.0, 0.0
                 )
                 mr = vr + beta * ur
                 if order > 0:
-                    fill_reading(stack, here, slot, active, order, interval, beta, K, motion.w)
+                    fill_reading(stack, here, slot, active, order, interval, beta, K)
                 if data.size == 0:
                     write_rows(
-                        stack, slot, active, tables, side, shift, ur, mr, fsr, fcr, values[i:block],
+                        stack, slot, active, tables, side, shift, ur, mr, values[i:block],
                         jacobian[i:block],
                     )  # fmt: skip
                 else:
-                    if forced:
-                        squares += forced_moments(
-                            moments, slot, tables, side, data, i, block, shift, ur, mr, fsr, fcr
-                        )
-                    else:
-                        squares += plain_moments(
-                            moments, slot, tables, side, data, i, block, shift, ur, mr
-                        )
+                    squares += sum_moments(
+                        moments, slot, tables, side, data, i, block, shift, ur, mr
+                    )
                     multiply(stack, products, slot, active, prefixes, side, block - i)
                 slot += 1
                 i = block
@@ -172,17 +158,9 @@ def sensitivity_pass(
                 break
             to_event = i == end
             target = events[e, 0] if to_event else float(i)
-            if forced:
-                fill_basis(point[0], point[1], b, K, motion.w, forced, target - t)
-                S, D, second, third = point[0, 1], point[0, 2], point[0, 3], point[0, 4]
-            else:
-                S, D, second, third = plain_basis(tables, series, side, b, K, slow, target - t)
+            S, D, second, third = basis_at(tables, series, side, b, K, slow, target - t)
             carry(stack, here, active, beta, K, S, D, second, third, dy, dv)
             y, v = rest + D * u + S * m, D * v - S * (K * u)
-            if forced:
-                carry_forced(stack, here, active, point[0], point[1], dy, dv)
-                y += fs * point[0, basis.E_] + fc * point[0, basis.F_]
-                v += fs * point[1, basis.E_] + fc * point[1, basis.F_]
             if slot == BLOCKS:
                 slot = add_products(gram, stack, products, moments, slot, active, data.size)
             if to_event:

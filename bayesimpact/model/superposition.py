@@ -74,9 +74,9 @@ def motion_along(oscillator: Oscillator, r: int, q: Array, reach: float) -> Moti
 def _steps(v: Array, d: Array, h: float) -> Array:
     """Weights of the first and of the last point of every step, (2, n - 1), s.
 
-    The trapezoidal rule with Gregory's corrections at every touch and turn, where forces jump: a
-    sum over a whole cycle is then as good as its ends. The rest of a step to that moment is the
-    integral of the parabola through the three nearest points on its side.
+    The trapezoidal rule with Gregory's corrections at every contact onset and turning point, where
+    forces jump: a sum over a whole cycle is then as good as its ends. The rest of a step to that
+    moment is the integral of the parabola through the three nearest points on its side.
     """
     weights = np.full((2, v.size - 1), 0.5 * h)
     for x, rate in ((v, None), (d, v)):

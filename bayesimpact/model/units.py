@@ -40,7 +40,7 @@ class Dimensions:
     time: float
     length: float
 
-    def spread(self, mass_sd: float, clock_sd: float, gain_sd: float) -> float:
+    def relative_sd(self, mass_sd: float, clock_sd: float, gain_sd: float) -> float:
         """Relative standard uncertainty from those of mass, clock and gain (independent)."""
         parts = (self.mass * mass_sd, self.time * clock_sd, self.length * gain_sd)
         return sqrt(sum(p * p for p in parts))
@@ -131,10 +131,13 @@ def readable(unit: str, size: float) -> Display:
 
 
 def typeset(unit: str) -> str:
-    """A unit for print: "N s2/m2" becomes "N s²/m²", with spaces that do not break."""
+    """A unit for print: "N s2/m2" becomes "N s²/m²", "N s1.5" "N s^1.5" for there is no raised dot;
+    with spaces that do not break.
+    """
     if unit in ("-", "1", ""):
         return ""
-    raised = re.sub(r"(?<=[A-Za-z])-?\d+", lambda m: m[0].translate(_SUPERSCRIPT), unit)
+    powers = re.sub(r"(?<=[A-Za-z])(?=-?\d+\.\d)", "^", unit)
+    raised = re.sub(r"(?<=[A-Za-z])-?\d+", lambda m: m[0].translate(_SUPERSCRIPT), powers)
     raised = re.sub(r"^u(?=[A-Za-z])", "µ", raised)
     return raised.replace(" ", "\N{NO-BREAK SPACE}")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from importlib import metadata
 from typing import Any
@@ -42,30 +43,32 @@ TRACE_STEPS = 400
 TRACE_WALKERS = 6
 
 
-def results_from_fit(
-    identification: Identification,
-    *,
-    seed: int = 0,
-    command: str = "",
-    seconds: float = float("nan"),
-    diagnosis: Mapping[str, Any] | None = None,
-    diagnosis_arrays: Mapping[str, Array] | None = None,
-) -> Results:
-    """Results of a fit: intervals are those of the Laplace approximation at the mode.
+@dataclass(frozen=True, eq=False)
+class ReportContext:
+    """What a fit or a posterior does not know of itself.
 
-    Parameters
+    Attributes
     ----------
-    identification : of `inference.identify`
-    seed, command, seconds : for the provenance
-    diagnosis, diagnosis_arrays : content of diagnosis.json, and arrays for its figures
+    command, seconds, seed : for the provenance; a posterior knows its seed
+    diagnosis, arrays : content of diagnosis.json, and arrays for its figures
     """
-    return _results(
-        identification.fit,
-        identification.noise,
-        search=_search(identification),
-        provenance=_provenance(identification.fit, seed, command, seconds),
-        diagnosis=(diagnosis, diagnosis_arrays),
-    )
+
+    command: str = ""
+    seconds: float = float("nan")
+    seed: int = 0
+    diagnosis: Mapping[str, Any] | None = None
+    arrays: Mapping[str, Array] | None = None
+
+
+NO_CONTEXT = ReportContext()
+
+
+def results_from_fit(
+    identification: Identification, context: ReportContext = NO_CONTEXT
+) -> Results:
+    """Results of a fit: intervals are those of the Laplace approximation at the mode."""
+    search, noise = _search(identification), identification.noise
+    return _results(identification.fit, noise, search=search, context=context)
 
 
 def results_from_posterior(
@@ -74,10 +77,7 @@ def results_from_posterior(
     *,
     backbone: bool = True,
     before: Posterior | None = None,
-    command: str = "",
-    seconds: float = float("nan"),
-    diagnosis: Mapping[str, Any] | None = None,
-    diagnosis_arrays: Mapping[str, Array] | None = None,
+    context: ReportContext = NO_CONTEXT,
 ) -> Results:
     """Results of a posterior: intervals are percentiles of its draws.
 
@@ -87,7 +87,6 @@ def results_from_posterior(
     identification : how the mode was found; None leaves the search out
     backbone : simulate recordings for the posterior-predictive check of the backbone
     before : posterior without the effects, shown beside this one unless it is the same
-    command, seconds, diagnosis, diagnosis_arrays : as in `results_from_fit`
     """
     fit = posterior.fit
     before = None if before is posterior else before
@@ -96,12 +95,11 @@ def results_from_posterior(
         fit,
         fit.target.likelihood.noise,
         search=None if identification is None else _search(identification),
-        provenance=_provenance(fit, posterior.seed, command, seconds),
+        context=replace(context, seed=posterior.seed),
         posterior=posterior,
         backbone=backbone_summary(posterior, rng) if backbone else None,
         before=before,
         before_backbone=backbone_summary(before, rng) if backbone and before is not None else None,
-        diagnosis=(diagnosis, diagnosis_arrays),
     )
 
 
@@ -110,19 +108,19 @@ def _results(
     noise: Noise,
     *,
     search: SearchSummary | None,
-    provenance: Provenance,
+    context: ReportContext,
     posterior: Posterior | None = None,
     backbone: BackboneSummary | None = None,
     before: Posterior | None = None,
     before_backbone: BackboneSummary | None = None,
-    diagnosis: tuple[Mapping[str, Any] | None, Mapping[str, Array] | None] = (None, None),
 ) -> Results:
     oscillator = fit.target.oscillator
     campaign = oscillator.campaign
     m = campaign.measurement
     chain = ChainSummary(_smoothing(oscillator.smoothing), m.mass_sd, m.clock_sd, m.gain_sd)
     draws = None if posterior is None else posterior.draws
-    told, left = diagnosis[0] or {}, (diagnosis[0] or {}).get("remainder")
+    told = context.diagnosis or {}
+    left = told.get("remainder")
     summary = Results(
         name=campaign.name,
         mass=campaign.mass,
@@ -153,11 +151,11 @@ def _results(
         else _draws(posterior, "posterior" if before is None else "with added effects"),
         backbone=backbone,
         checks=(),
-        provenance=provenance,
+        provenance=_provenance(campaign, context),
         before=None if before is None else _draws(before, "without added effects"),
         before_backbone=before_backbone,
-        diagnosis=diagnosis[0],
-        diagnosis_arrays=diagnosis[1] or {},
+        diagnosis=context.diagnosis,
+        diagnosis_arrays=context.arrays or {},
         notes=campaign.notes,
     )
     return checks.assessed(summary)
@@ -286,15 +284,14 @@ def _smoothing(smoothing: Smoothing | None) -> str:
     return f"Savitzky-Golay, {smoothing.window} samples, order {smoothing.polyorder}"
 
 
-def _provenance(fit: Fit, seed: int, command: str, seconds: float) -> Provenance:
-    campaign: Campaign = fit.target.oscillator.campaign
+def _provenance(campaign: Campaign, context: ReportContext) -> Provenance:
     return Provenance(
-        command=command,
-        seed=seed,
+        command=context.command,
+        seed=context.seed,
         date=datetime.now(UTC).isoformat(timespec="seconds"),
         data_sha256=campaign.sha256,
         versions=versions(),
-        seconds=seconds,
+        seconds=context.seconds,
     )
 
 

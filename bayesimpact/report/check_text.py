@@ -7,6 +7,7 @@ import numpy as np
 from bayesimpact.data.campaign import SECOND_STOP, Campaign
 from bayesimpact.data.period import crossing_period
 from bayesimpact.data.recording import Recording
+from bayesimpact.data.text_table import text_table
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.noise_estimate import raw_noise
 from bayesimpact.model.parameters import build_layout
@@ -101,14 +102,8 @@ def _recordings_block(campaign: Campaign) -> str:
         numbers = [1 / r.interval, r.start, r.duration, period, *(x * scale for x in shown)]
         row = [r.name, r.case or "-", str(r.samples.size), *(f"{x:.4g}" for x in numbers)]
         rows.append([*row, envelope_bars(r)])
-    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    lines = []
-    for row in rows:
-        cells = [cell.rjust(width) for cell, width in zip(row, widths, strict=True)]
-        cells[0], cells[-1] = row[0].ljust(widths[0]), row[-1]
-        lines.append("  ".join(cells))
-    lines.append("(first and largest are counted from rest, the median of the readings)")
-    return "\n".join([*lines, *_inputs(campaign)])
+    remark = "(first and largest are counted from rest, the median of the readings)"
+    return "\n".join([*text_table(rows, left=(0, -1)), remark, *_inputs(campaign)])
 
 
 def _rest(recording: Recording) -> float:

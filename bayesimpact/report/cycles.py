@@ -65,7 +65,7 @@ def contacts(results: Results, recording: RecordingResult) -> tuple[Array, float
     return recording.displacement, gap if results.stop and np.isfinite(gap) else None
 
 
-def touches(y: Array, level: float) -> np.ndarray:
+def contact_onsets(y: Array, level: float) -> np.ndarray:
     """Samples (k,) before which a motion (n,) rises through a level."""
     return np.flatnonzero((y[1:] >= level) & (y[:-1] < level)) + 1
 
@@ -87,7 +87,7 @@ def cycles(results: Results) -> list[Cycle]:
     found = []
     for r, (recording, old) in enumerate(zip(results.recordings, before, strict=True)):
         y, level = contacts(results, recording)
-        starts = touches(y, float(np.mean(y)) if level is None else level)
+        starts = contact_onsets(y, float(np.mean(y)) if level is None else level)
         gain = replace(recording, predicted=old).residual ** 2 - recording.residual**2
         total = np.concatenate([[0.0], np.cumsum(gain / (2 * recording.noise_rms**2))])
         for k, (first, last) in enumerate(pairwise(starts)):

@@ -68,8 +68,8 @@ def _impacts(d: Diagnosis) -> dict[str, Array]:
     for r, (y, _) in enumerate(trajectory_points(base)):
         old, new = (f.linearisation[r].residual / sigma_of(base)[r] for f in (base, better))
         total = np.concatenate([[0.0], np.cumsum(0.5 * (old**2 - new**2))])
-        touches = np.flatnonzero((y[1:] >= gaps[r]) & (y[:-1] < gaps[r]))
-        rows.append(np.diff(total[touches]))
+        onsets = np.flatnonzero((y[1:] >= gaps[r]) & (y[:-1] < gaps[r]))
+        rows.append(np.diff(total[onsets]))
     if not max(row.size for row in rows):
         return {}
     table = np.full((len(rows), max(row.size for row in rows)), np.nan)

@@ -18,10 +18,10 @@ import numpy as np
 from bayesimpact.model.units import display, typeset
 from bayesimpact.report.cycles import (
     before_predicted,
+    contact_onsets,
     contacts,
     stop_level,
     telling_cycle,
-    touches,
 )
 from bayesimpact.report.figures.force_map import force_unit
 from bayesimpact.report.figures.recordings import shown_recordings
@@ -96,7 +96,7 @@ def explorer_data(results: Results) -> str:
                 typeset(response(results, recording).unit),
                 typeset(unit.unit),
             ],
-            "impacts": [] if touched is None else touches(motion, touched).tolist(),
+            "impacts": [] if touched is None else contact_onsets(motion, touched).tolist(),
             "best": best.first if best is not None and best.recording == r else None,
             "samples": _floats(recording.samples[:size] * response(results, recording).scale),
             "residuals": [

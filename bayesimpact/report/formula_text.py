@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import re
 
+from markupsafe import Markup, escape
+
+from bayesimpact.diagnosis.words import listed, title_of, titles_of
 from bayesimpact.formula.law import PREFIX
 
 LETTERS = {"size": "A", "place": "p", "width": "w", "fade": "u"}
@@ -12,6 +15,8 @@ LETTERS = {"size": "A", "place": "p", "width": "w", "fade": "u"}
 _POWER = re.compile(r"\^(\d+)(?![\d.])")
 _RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 _MINUS = re.compile(r"(?<=[(\s])-(?=[\s(|yd\d])")
+_ROOT = re.compile(r"\^(\d*\.\d+)")
+_LETTER = re.compile(r"(?<![\w&#;])([A-Cpwuyvdt])(?!\w)")
 
 
 def written(text: str) -> str:
@@ -22,10 +27,54 @@ def written(text: str) -> str:
     return _MINUS.sub("\N{MINUS SIGN}", raised)
 
 
+def raised(text: str) -> Markup:
+    """A text with formulas in it for HTML: as `written`, and "^1.5" raised too."""
+    return Markup(_ROOT.sub(r"<sup>\1</sup>", str(escape(written(text)))))
+
+
+def typeset_formula(text: str) -> Markup:
+    """A formula for HTML: "A |v|^1.5 sign(v)" with italic letters and a raised 1.5."""
+    return Markup(_LETTER.sub(r"<i>\1</i>", str(raised(text))))
+
+
+def latex_formula(text: str) -> str:
+    """A formula in LaTeX's mathematics, in place of its id."""
+    powers = re.sub(r"\^([\d.]+)", r"^{\1}", text)
+    named = re.sub(r"\b([a-z]{2,})\b", r"\\mathrm{\1}", powers)
+    return "$" + named.replace(" ", r"\,") + "$"
+
+
+def is_formula(effect_id: str) -> bool:
+    """Whether an id is a formula's, which is made of it and nothing to read."""
+    return effect_id.startswith(PREFIX)
+
+
+def effect_title(effect_id: str, title: str = "") -> str:
+    """What an effect is called, in HTML: a formula typeset, else words."""
+    title = title or effect_id.replace("_", " ")
+    if not is_formula(effect_id):
+        return written(title)
+    return Markup("force {}").format(typeset_formula(title.removeprefix("force ")))
+
+
+def titles(ids: str) -> str:
+    """What effects are called, of ids joined by " + "; a formula has its name elsewhere."""
+    parts = ids.split(" + ")
+    if not any(map(is_formula, parts)):
+        return titles_of(ids)
+    return listed("a formula" if is_formula(part) else title_of(part) for part in parts)
+
+
+def as_code(effect_id: str) -> Markup:
+    """An id as it is typed, after a blank; empty where a formula's is in it."""
+    made = any(map(is_formula, effect_id.split(" + ")))
+    return Markup() if made else Markup(" <code>{}</code>").format(effect_id)
+
+
 def letter(name: str) -> str | None:
     """The letter that stands for a parameter of a formula; None for other parameters."""
     effect, _, own = name.partition(".")
-    return LETTERS.get(own) if effect.startswith(PREFIX) else None
+    return LETTERS.get(own) if is_formula(effect) else None
 
 
 def in_words(ids: str) -> str:
@@ -33,4 +82,4 @@ def in_words(ids: str) -> str:
     left out, for it is no name.
     """
     parts = ids.split(" + ")
-    return " + ".join("formula" if p.startswith(PREFIX) else p.replace("_", " ") for p in parts)
+    return " + ".join("formula" if is_formula(p) else p.replace("_", " ") for p in parts)

@@ -19,7 +19,13 @@ from bayesimpact.report.captions import caption
 from bayesimpact.report.checks import MISFIT
 from bayesimpact.report.diagnosis_view import diagnosis_view
 from bayesimpact.report.figures.save import DPI
-from bayesimpact.report.formula_text import written
+from bayesimpact.report.formula_text import (
+    as_code,
+    effect_title,
+    is_formula,
+    raised,
+    typeset_formula,
+)
 from bayesimpact.report.policy import with_policy
 from bayesimpact.report.results import Results
 from bayesimpact.report.story import corrected, story_rows
@@ -85,8 +91,10 @@ def environment() -> jinja2.Environment:
         lstrip_blocks=True,
     )
     made.filters["lower_first"] = lambda text: text[:1].lower() + text[1:]
-    made.filters["bound"] = lambda text: bound(written(text))
-    made.filters["written"] = written
+    made.filters["bound"] = lambda text: raised(bound(text))
+    made.filters |= {"raised": raised, "typeset_formula": typeset_formula, "as_code": as_code}
+    made.filters["effect_title"] = effect_title
+    made.tests["formula"] = is_formula
     return made
 
 
@@ -154,10 +162,10 @@ def _contents(results: Results, groups: Mapping[str, list[Picture]]) -> list[tup
         ("explore", "Explore", True),
         ("diagnosis", "Diagnosis", results.diagnosis is not None),
         ("parameters", "Parameters", True),
+        ("posterior", "Posterior", bool(groups["corner"])),
         ("checks", "Checks", True),
         ("recordings", "Recordings and fit", True),
         ("releases", "Initial conditions", True),
-        ("posterior", "Posterior", bool(groups["corner"])),
         ("backbone", "Backbone", bool(groups["backbone"])),
         ("search", "Search", bool(groups["search"])),
         ("sampler", "Sampler", results.sampler is not None),

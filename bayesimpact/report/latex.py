@@ -8,7 +8,7 @@ from typing import Any
 
 from bayesimpact.model.units import MINUS, interval_decimals, number, quantity, readable
 from bayesimpact.report.change_view import NUISANCES, change_words
-from bayesimpact.report.formula_text import letter
+from bayesimpact.report.formula_text import is_formula, latex_formula, letter
 from bayesimpact.report.limit_view import not_found
 from bayesimpact.report.results import Results, Row
 
@@ -101,7 +101,7 @@ def _models(diagnosis: Mapping[str, Any]) -> str:
         rows.append((symbol(name), *first[:2], *second, change))
     if not rows:
         return ""
-    ids = ", ".join(r"\texttt{" + escaped(e["id"]) + "}" for e in diagnosis.get("effects", ()))
+    ids = ", ".join(map(_name, diagnosis.get("effects", ())))
     caption = "Parameters of the base model and with what was added" + (
         f" ({ids})." if ids else "."
     )
@@ -115,6 +115,13 @@ def _models(diagnosis: Mapping[str, Any]) -> str:
         "change",
     )
     return _table(caption, "lrlrllr", head, rows)
+
+
+def _name(effect: Mapping[str, Any]) -> str:
+    """An effect's id, or the formula that it is."""
+    if is_formula(effect["id"]) and effect.get("title"):
+        return "force " + latex_formula(effect["title"].removeprefix("force "))
+    return r"\texttt{" + escaped(effect["id"]) + "}"
 
 
 def _limits(limits: Sequence[Mapping[str, Any]]) -> str:

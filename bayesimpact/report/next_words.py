@@ -8,7 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from bayesimpact.data.text_table import text_table
 from bayesimpact.model.units import decimals, number, quantity, significant
+from bayesimpact.report.formula_text import titles
 
 Content = Mapping[str, Any]
 
@@ -123,7 +125,7 @@ def next_view(content: Content | None) -> dict[str, Any] | None:
     return {
         "sentence": content["sentence"],
         "rivals": [
-            (" + ".join(r["effects"]) or "the base model", _percent(r["probability"]))
+            (titles(" + ".join(r["effects"])) or "the base model", _percent(r["probability"]))
             for r in content["rivals"]
         ]
         if content["open"]
@@ -144,11 +146,7 @@ def table_lines(content: Content) -> list[str]:
     heads = ["", "recording", "ln odds", "settles", f"{view['stiffness']} narrower"]
     rows = [heads, *map(list, view["rows"])]
     kept = [0, 1, *([2] if view["has_odds"] else []), *([3] if view["has_chance"] else []), 4]
-    width = {k: max(len(row[k]) for row in rows) for k in kept}
-    lines = [
-        "  ".join(row[k].ljust(width[k]) if k == 1 else row[k].rjust(width[k]) for k in kept)
-        for row in rows
-    ]
+    lines = text_table([[row[k] for k in kept] for row in rows], left=(1,))
     return [*lines, *([APART_WORDS] if _has_apart(content) else [])]
 
 

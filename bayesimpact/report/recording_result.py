@@ -6,12 +6,10 @@ from dataclasses import dataclass, field
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesimpact.data.quantity import Quantity, unit_of
 from bayesimpact.data.short_repr import short_repr
-
-Array = NDArray[np.float64]
+from bayesimpact.report.codec import Array as Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,14 +11,12 @@ from dataclasses import dataclass, field
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesimpact.data.html import html_table, resolved
 from bayesimpact.data.quantity import Quantity, is_angular, unit_of
 from bayesimpact.data.short_repr import short_repr
+from bayesimpact.report.codec import Array as Array
 from bayesimpact.report.recording_result import RecordingResult as RecordingResult
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

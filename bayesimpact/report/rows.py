@@ -106,8 +106,10 @@ def widened(
     The three are independent of one another and of the statistical error; how much each counts
     follows from the unit (`model.units`).
     """
-    spread = dimensions(unit, angle=angle).spread(chain.mass_sd, chain.clock_sd, chain.gain_sd)
-    systematic = Z90 * abs(median) * spread
+    relative = dimensions(unit, angle=angle).relative_sd(
+        chain.mass_sd, chain.clock_sd, chain.gain_sd
+    )
+    systematic = Z90 * abs(median) * relative
     return (
         median - float(np.hypot(median - ci90[0], systematic)),
         median + float(np.hypot(ci90[1] - median, systematic)),

@@ -7,7 +7,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from bayesimpact.diagnosis.words import title_of, titles_of
+from bayesimpact.diagnosis.words import title_of
 from bayesimpact.model.units import percent, significant, span_of
 from bayesimpact.model.units import quantity as amount
 from bayesimpact.report.change_view import NUISANCES, estimate
@@ -19,7 +19,7 @@ from bayesimpact.report.diagnosis_view import (
     size_words,
     verdict_words,
 )
-from bayesimpact.report.formula_text import written
+from bayesimpact.report.formula_text import as_code, effect_title, titles
 from bayesimpact.report.results import Results
 from bayesimpact.report.tables import symbol
 
@@ -88,29 +88,29 @@ def _physics(diagnosis: Mapping[str, Any]) -> list[str | Markup]:
     if diagnosis["verdict"] == "unknown":
         return ["a force that no effect of the catalogue explains; it was learned instead"]
     lines: list[str | Markup] = [
-        Markup("{}, probability {} <code>{}</code>").format(
-            _title(effect), probability(effect.get("probability")), effect["id"]
+        Markup("{}, probability {}{}").format(
+            _title(effect), probability(effect.get("probability")), as_code(effect["id"])
         )
         for effect in diagnosis.get("effects", ())
     ]
     others = diagnosis.get("alternatives", ()) if diagnosis["verdict"] == "ambiguous" else ()
     return lines + [
-        Markup("or {}, probability {} <code>{}</code>").format(
-            titles_of(other["id"]), probability(other.get("probability")), other["id"]
+        Markup("or {}, probability {}{}").format(
+            titles(other["id"]), probability(other.get("probability")), as_code(other["id"])
         )
         for other in others
     ]
 
 
 def _title(effect: Mapping[str, Any]) -> str:
-    return written(effect.get("title") or effect["id"].replace("_", " "))
+    return effect_title(effect["id"], effect.get("title", ""))
 
 
 def _size(results: Results, diagnosis: Mapping[str, Any]) -> list[str | Markup]:
     lines: list[str | Markup] = []
     for effect in diagnosis.get("effects", ()):
         if size_words(effect.get("size")):
-            lines.append(f"{_title(effect)}: {size_words(effect['size'])}")
+            lines.append(Markup("{}: {}").format(_title(effect), size_words(effect["size"])))
         lines += [
             Markup("{} = {}").format(symbol(name), estimate(content))
             for name, content in effect.get("parameters", {}).items()

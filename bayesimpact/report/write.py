@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 from bayesimpact.data.files import write_text
 from bayesimpact.inference.identify import Identification
 from bayesimpact.inference.posterior import Posterior
 from bayesimpact.report import archive_arviz
 from bayesimpact.report.archive import load_results, save_results
-from bayesimpact.report.build import results_from_fit, results_from_posterior
+from bayesimpact.report.build import NO_CONTEXT, ReportContext, results_from_posterior
 from bayesimpact.report.figures.save import reason
 from bayesimpact.report.figures.shares import save_all
 from bayesimpact.report.html import render, unfinished
 from bayesimpact.report.latex import latex_tables
 from bayesimpact.report.pdf import print_page
-from bayesimpact.report.results import Array, Results
+from bayesimpact.report.results import Results
 
 REPORT_FILE = "report.html"
 POSTERIOR_FILE = "posterior.nc"
@@ -89,62 +89,29 @@ def more_files(folder: Path, *, pdf: bool, latex: bool) -> list[Path]:
     return files
 
 
-def write_fit(
-    identification: Identification,
-    folder: Path,
-    *,
-    seed: int = 0,
-    command: str = "",
-    seconds: float = float("nan"),
-    diagnosis: Mapping[str, Any] | None = None,
-    diagnosis_arrays: Mapping[str, Array] | None = None,
-    failed: Mapping[str, str] | None = None,
-) -> Written:
-    """Write the results of a fit; parameters as in `build.results_from_fit`.
-
-    `failed` is what could not be made before, with its reason, for the page.
-    """
-    results = results_from_fit(
-        identification,
-        seed=seed,
-        command=command,
-        seconds=seconds,
-        diagnosis=diagnosis,
-        diagnosis_arrays=diagnosis_arrays,
-    )
-    return write_results(results, folder, failed)
-
-
 def write_posterior(
     posterior: Posterior,
     identification: Identification | None,
     folder: Path,
     *,
     before: Posterior | None = None,
-    command: str = "",
-    seconds: float = float("nan"),
-    diagnosis: Mapping[str, Any] | None = None,
-    diagnosis_arrays: Mapping[str, Array] | None = None,
+    context: ReportContext = NO_CONTEXT,
     failed: Mapping[str, str] | None = None,
 ) -> Written:
     """Write the results of sampling, and posterior.nc for ArviZ.
 
-    Parameters as in `build.results_from_posterior`; `failed` as in `write_fit`. The results are
+    Parameters as in `build.results_from_posterior`; `failed` as in `write_results`. The results are
     written first: neither the backbone check nor ArviZ can lose them.
     """
     without = dict(failed or {})
-    told: dict[str, Any] = {
-        "before": before,
-        "command": command,
-        "seconds": seconds,
-        "diagnosis": diagnosis,
-        "diagnosis_arrays": diagnosis_arrays,
-    }
+    make = partial(
+        results_from_posterior, posterior, identification, before=before, context=context
+    )
     try:
-        results = results_from_posterior(posterior, identification, **told)
+        results = make()
     except Exception as error:
         without["backbone"] = reason(error)
-        results = results_from_posterior(posterior, identification, backbone=False, **told)
+        results = make(backbone=False)
     folder.mkdir(parents=True, exist_ok=True)
     save_results(results, folder)
     try:

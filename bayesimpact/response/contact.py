@@ -261,7 +261,7 @@ def _contact(best: Minimum, cycles: Cycles, free: Free, cases: int, scale: float
     g, c2, k2, c1, k1 = _unpack(best.x, free, scale)
     end = cycle(cycles.depth, free.mass, c1, k1, c2, g, k2[cycles.case])
     touched = np.array([bool(end.impact[cycles.case == case].any()) for case in range(cases)])
-    sd = best.spread(typical_variance(best.residuals), 1e-4)
+    sd = best.standard_errors(typical_variance(best.residuals), 1e-4)
     return Contact(
         g=g,
         c2=c2,

@@ -158,7 +158,7 @@ def solve_flight(
     freedom = max(1, blocks.values.size - 2 * blocks.arc_count - 3)
     variance = float(np.sum(found.residuals**2)) / freedom
     rms = float(np.sqrt(variance)) * unit
-    sd_omega, sd_decay = found.spread(variance)
+    sd_omega, sd_decay = found.standard_errors(variance)
     offsets, waves, spread = blocks.solve(w, b)
     step = 1e-4
     slope = (blocks.solve(w * (1 + step), b)[0] - blocks.solve(w * (1 - step), b)[0]) / (2 * step)
@@ -220,25 +220,25 @@ class _Blocks:
     def _project(self, w: float, b: float) -> tuple[Floats, Floats, Floats, Floats]:
         """Orthonormal pair of columns per arc, and the triangular factor between (p, q) and it."""
         # The envelope is one where it is largest, so that no decay rate overflows on a long arc.
-        envelope = np.exp(-b * self.times - self._spread(abs(b) * self.reach))
+        envelope = np.exp(-b * self.times - self._per_sample(abs(b) * self.reach))
         cosine, sine = envelope * np.cos(w * self.times), envelope * np.sin(w * self.times)
         r11 = np.sqrt(self._sum(cosine**2))
-        first = cosine / self._spread(r11)
+        first = cosine / self._per_sample(r11)
         r12 = self._sum(first * sine)
-        second = sine - first * self._spread(r12)
+        second = sine - first * self._per_sample(r12)
         r22 = np.sqrt(self._sum(second**2))
-        return first, second / self._spread(r22), np.stack([r11, r12]), r22
+        return first, second / self._per_sample(r22), np.stack([r11, r12]), r22
 
     def _sum(self, x: Floats) -> Floats:
         return np.add.reduceat(x, self.starts)
 
-    def _spread(self, per_arc: Floats) -> Floats:
+    def _per_sample(self, per_arc: Floats) -> Floats:
         return np.repeat(per_arc, self.sizes)
 
     def _without(self, x: Floats, first: Floats, second: Floats) -> Floats:
         """`x` less its part along both columns of its arc."""
-        left = x - first * self._spread(self._sum(first * x))
-        return np.asarray(left - second * self._spread(self._sum(second * x)))
+        left = x - first * self._per_sample(self._sum(first * x))
+        return np.asarray(left - second * self._per_sample(self._sum(second * x)))
 
     def _offsets(self, left: Floats, ones: Floats) -> tuple[Floats, float]:
         if self.fixed is not None:
@@ -254,7 +254,7 @@ class _Blocks:
         left = self._without(self.values, first, second)
         ones = self._without(np.ones_like(self.values), first, second)
         offsets, _ = self._offsets(left, ones)
-        return np.asarray(left - ones * self._spread(offsets[self.owner]))
+        return np.asarray(left - ones * self._per_sample(offsets[self.owner]))
 
     def solve(self, w: float, b: float) -> tuple[Floats, tuple[Floats, ...], float]:
         """Offsets per recording, waves per recording, and sd of the offsets for unit noise."""
@@ -262,7 +262,7 @@ class _Blocks:
         left = self._without(self.values, first, second)
         ones = self._without(np.ones_like(self.values), first, second)
         offsets, spread = self._offsets(left, ones)
-        signal = self.values - self._spread(offsets[self.owner])
+        signal = self.values - self._per_sample(offsets[self.owner])
         z1, z2 = self._sum(first * signal), self._sum(second * signal)
         q = z2 / r22
         p = (z1 - upper[1] * q) / upper[0]

@@ -151,7 +151,7 @@ def _fit(mirror: _Mirror) -> tuple[Floats, Floats] | None:
     linear = _residuals(np.array([1.2, 0.5, 0.5, 0.0]), mirror)
     if capped(best.residuals) > capped(linear) - 15.0:
         return None
-    return best.x, best.spread(typical_variance(best.residuals), 1e-4)
+    return best.x, best.standard_errors(typical_variance(best.residuals), 1e-4)
 
 
 def _result(

@@ -108,5 +108,5 @@ def _simulated(
     )
     level = max(noise / size, float(np.sqrt(2 * best.cost / signal.size)))
     y0, v0 = best.x * size
-    sd_y0, sd_v0 = best.spread(level**2) * size
+    sd_y0, sd_v0 = best.standard_errors(level**2) * size
     return float(y0), float(v0) * rate, float(sd_y0), float(sd_v0) * rate

@@ -29,7 +29,7 @@ class Minimum:
     jacobian: Floats
     cost: float
 
-    def spread(self, variance: float, floor: float = 0.0) -> Floats:
+    def standard_errors(self, variance: float, floor: float = 0.0) -> Floats:
         """Standard errors (p,) for residuals of this variance, `floor` added to the information.
 
         With a floor, a direction that the data do not fix has a large but finite error.

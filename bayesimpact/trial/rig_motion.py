@@ -51,15 +51,15 @@ class RigMotion:
         probe looks, further modes included
     acceleration : (n,), m/s2, of the mass, by its equation of motion; a sample at the very end of
         a contact or a flight takes what follows
-    touches, leaves : instants at which contacts began and ended, s
+    onsets, ends : instants at which contacts began and ended, s
     """
 
     times: NDArray[np.float64]
     displacement: NDArray[np.float64]
     velocity: NDArray[np.float64]
     acceleration: NDArray[np.float64]
-    touches: tuple[float, ...]
-    leaves: tuple[float, ...]
+    onsets: tuple[float, ...]
+    ends: tuple[float, ...]
 
 
 def move(
@@ -84,11 +84,11 @@ def move(
     """
     run = _Run(site, parts, times, rtol, atol)
     run.finish()
-    touches, leaves = (
-        tuple(t for t in instants if t <= run.end) for instants in (run.touches, run.leaves)
+    onsets, ends = (
+        tuple(t for t in instants if t <= run.end) for instants in (run.onsets, run.ends)
     )
     y, v, a = run.samples
-    return RigMotion(times, y, v, a, touches, leaves)
+    return RigMotion(times, y, v, a, onsets, ends)
 
 
 class _Run:
@@ -113,8 +113,8 @@ class _Run:
         periods = self.end * sqrt(site.k1 / site.mass) / (2 * pi)
         self.left = _STEPS + int(_PER_PERIOD * periods)
         self.gap = site.gap
-        self.touches: list[float] = []
-        self.leaves: list[float] = []
+        self.onsets: list[float] = []
+        self.ends: list[float] = []
         self.last_sign = 1
         self.slip = 0  # direction in which friction has just given way
         self.breaks = sorted(t for part in parts for t in part.times)
@@ -126,13 +126,13 @@ class _Run:
         """A recording that starts beyond the gap starts in contact, without an exchange."""
         if self.site.y0 <= self.gap:
             return _FLIGHT
-        self.touches.append(0.0)
+        self.onsets.append(0.0)
         self.mode = _CONTACT
         sign = 1 if self.site.v0 >= 0 else -1
         if self.site.unilateral:
             forces = balance(self.site, self.parts, self._piece_going(sign))
             if forces.reaction(0.0, self.state) <= -self.site.adhesion:
-                self.touches.clear()
+                self.onsets.clear()
                 return _RELEASED
         return _CONTACT
 
@@ -301,7 +301,7 @@ class _Run:
         return not self.site.unilateral or force <= 0
 
     def _touch(self) -> None:
-        self.touches.append(self.t)
+        self.onsets.append(self.t)
         self.mode = _CONTACT
         before = self.state[1]
         share = self.site.mass / (self.site.mass + self.site.obstacle_mass)
@@ -311,8 +311,8 @@ class _Run:
                 part.struck(self.state, self.site.mass * (before - self.state[1]))
 
     def _leave(self) -> None:
-        self.leaves.append(self.t)
-        self.gap = self.site.gap + len(self.leaves) * self.site.gap_step
+        self.ends.append(self.t)
+        self.gap = self.site.gap + len(self.ends) * self.site.gap_step
         self.mode = _RELEASED if self.state[0] > self.gap else _FLIGHT
 
 

@@ -81,10 +81,10 @@ def run_trials(
     store = Store(out, settings)
     store.mend_log()
     say = step or (lambda stage, count: None)
-    with executor(workers, scheduler) as spread:
+    with executor(workers, scheduler) as distribute:
         missing = [seed for seed in seeds if not store.is_drawn(seed)]
         say("drawing", len(seeds) - len(missing))
-        for seed, drawn in spread(draw_job, ((seed, (settings, seed)) for seed in missing)):
+        for seed, drawn in distribute(draw_job, ((seed, (settings, seed)) for seed in missing)):
             store.keep_drawn(seed, drawn)
             say("drawing", 1)
         digest = store.publish(seeds)
@@ -94,7 +94,7 @@ def run_trials(
         say("diagnosing", len(seeds) - len(missing))
         how = (settings.search, settings.report)
         jobs = ((seed, (store.files(seed), *how)) for seed in missing)
-        for seed, answered in spread(answer_job, jobs):
+        for seed, answered in distribute(answer_job, jobs):
             store.finish(seed, answered, keep)
             say("diagnosing", 1)
     return [store.result(seed) for seed in seeds]

@@ -30,9 +30,9 @@ def summary_text(summary: Mapping[str, Any]) -> str:
         _rate("right place", summary["place"]),
         _rate("sizes inside 90 % interval", summary["sizes_inside"]),
         "",
-        *_spread("base fit over noise, %", summary["concealed"], 100),
-        *_spread("held-out gain when right, nats", summary["held_out_gain"], 1),
-        *_spread("seconds per diagnosis", summary["seconds"], 1),
+        *_quartiles("base fit over noise, %", summary["concealed"], 100),
+        *_quartiles("held-out gain when right, nats", summary["held_out_gain"], 1),
+        *_quartiles("seconds per diagnosis", summary["seconds"], 1),
     ]
     lines += added_text(summary, _rate)
     for group, table in summary["coverage"].items():
@@ -52,7 +52,7 @@ def _rate(title: str, r: Mapping[str, Any]) -> str:
     )
 
 
-def _spread(title: str, q: Mapping[str, Any], factor: float) -> list[str]:
+def _quartiles(title: str, q: Mapping[str, Any], factor: float) -> list[str]:
     if not q["count"]:
         return []
     low, high = (factor * x for x in q["quartiles"])

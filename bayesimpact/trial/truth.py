@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from bayesimpact.data.text_table import text_table
 from bayesimpact.errors import InputError
 from bayesimpact.model.units import decimals, display, number, signed, significant, typeset
 from bayesimpact.report.rows import Z90
@@ -56,7 +57,7 @@ def compared(diagnosis: Mapping[str, Any], truth: Mapping[str, Any]) -> list[str
         f"base fit: what it leaves is {rms / noise:.3f} times the noise",
         f"hidden: {hidden}",
         f"answer: {named} ({diagnosis['verdict']})",
-        *_table(rows),
+        *text_table(rows),
         "(median ± half of the 90 % interval; off: from the truth, in standard deviations)",
     ]
 
@@ -77,15 +78,3 @@ def _estimate(estimate: Mapping[str, Any] | None, truth: float) -> tuple[str, st
 def _size(value: float, unit: str) -> str:
     shown = display(unit, abs(value))
     return f"{significant(value * shown.scale, 7).rstrip('0').rstrip('.')} {typeset(shown.unit)}"
-
-
-def _table(rows: Sequence[tuple[str, ...]]) -> list[str]:
-    """Columns of text, the first to the left and the others to the right."""
-    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    return [
-        "  ".join(
-            cell.ljust(width) if i == 0 else cell.rjust(width)
-            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in rows
-    ]

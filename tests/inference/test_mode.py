@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import small_rig
 from effect_rigs import BY_ID
-from made_up_valley import valley
+from made_up_banana import banana
 from scipy.optimize import least_squares, minimize_scalar
 
 from bayesimpact.data.campaign import Smoothing
@@ -281,7 +281,7 @@ def test_iterations_are_limited():
 def test_a_curved_valley_is_followed_to_its_end(steep, iterations):
     """Without bent steps it takes 16 and 1742."""
     start = np.array([-1.2, 1.0, 1.0])
-    fit = find_mode(valley(steep=steep), start, max_iterations=iterations)
+    fit = find_mode(banana(steep=steep), start, max_iterations=iterations)
     assert fit.converged
     np.testing.assert_allclose(fit.mode[:2], 1.0, atol=1e-4)
 
@@ -289,27 +289,27 @@ def test_a_curved_valley_is_followed_to_its_end(steep, iterations):
 def test_a_climb_that_will_not_reach_its_goal_ends_early():
     """Neither at once nor later where the goal lies within reach."""
     start, options = np.array([-1.2, 1.0, 1.0]), {"max_iterations": 300}
-    whole = find_mode(valley(steep=1e4), start, **options)
+    whole = find_mode(banana(steep=1e4), start, **options)
     assert whole.converged and whole.iterations > 100
-    lost = find_mode(valley(steep=1e4), start, goal=whole.log_posterior + 100.0, **options)
+    lost = find_mode(banana(steep=1e4), start, goal=whole.log_posterior + 100.0, **options)
     assert not lost.converged and lost.iterations < 0.5 * whole.iterations
-    begun = find_mode(valley(steep=1e4), start, max_iterations=1)
-    found = find_mode(valley(steep=1e4), start, goal=begun.log_posterior, **options)
+    begun = find_mode(banana(steep=1e4), start, max_iterations=1)
+    found = find_mode(banana(steep=1e4), start, goal=begun.log_posterior, **options)
     assert found.converged and found.iterations == whole.iterations
 
 
 def test_rough_derivatives_end_the_climb_where_they_tell_no_more():
-    """Off by a tenth they lead nowhere in a steep valley; the climb neither goes on nor claims."""
+    """Off by a tenth they lead nowhere in a steep banana; the climb neither goes on nor claims."""
     start = np.array([1.01, 1.0201, 1.0])
-    fit = find_mode(valley(rough=0.1, steep=1e3), start, max_iterations=300)
+    fit = find_mode(banana(rough=0.1, steep=1e3), start, max_iterations=300)
     assert fit.iterations < 200 and not fit.converged
-    near = find_mode(valley(rough=0.3), start, max_iterations=300, tolerance=1e-6)
+    near = find_mode(banana(rough=0.3), start, max_iterations=300, tolerance=1e-6)
     assert near.converged
     assert abs(near.mode[0] - 1.0) < 0.01 * near.sd[0]
 
 
 def test_rough_derivatives_lead_near_the_mode_and_finer_ones_to_it():
-    problem = valley(rougher=0.05)
+    problem = banana(rougher=0.05)
     fit = find_mode(problem, np.array([-1.2, 1.0, 1.0]), steps=np.full(3, 1e-3))
     assert fit.converged
     np.testing.assert_allclose(fit.mode[:2], 1.0, atol=1e-4)
@@ -317,10 +317,10 @@ def test_rough_derivatives_lead_near_the_mode_and_finer_ones_to_it():
     assert asked[0] and not asked[-1] and asked == sorted(asked, reverse=True)
 
 
-def test_a_climb_by_differences_that_gains_little_gives_up():
+def test_a_climb_by_differences_that_gains_little_fails():
     """Derivatives that promise more than a standard deviation and gain a tenth of a nat."""
     start = np.array([0.5, 0.25, 1.0])
-    problem = valley(rough=0.03, steep=1e3)
+    problem = banana(rough=0.03, steep=1e3)
     fit = find_mode(problem, start, steps=np.full(3, 1e-3), max_iterations=300)
     assert not fit.converged and fit.iterations < 60
     assert find_mode(problem, start, max_iterations=300).iterations == 300
@@ -329,22 +329,22 @@ def test_a_climb_by_differences_that_gains_little_gives_up():
 def test_a_climb_ends_where_new_derivatives_gain_nothing():
     """Also without more damping; were that asked for, it would take 188 iterations, not 79."""
     start = np.array([1.01, 1.0201, 1.0])
-    fit = find_mode(valley(rough=0.4), start, max_iterations=300)
+    fit = find_mode(banana(rough=0.4), start, max_iterations=300)
     assert fit.converged and fit.iterations < 120
     assert abs(fit.mode[0] - 1.0) < 0.1 * fit.sd[0]
 
 
 def test_steps_that_all_fail_are_no_convergence():
     """Derivatives of the wrong sign: damping shrinks the steps until nothing moves."""
-    fit = find_mode(valley(sign=-1.0), np.array([-1.2, 1.0, 1.0]))
+    fit = find_mode(banana(sign=-1.0), np.array([-1.2, 1.0, 1.0]))
     assert not fit.converged
     np.testing.assert_array_equal(fit.mode[:2], [-1.2, 1.0])
 
 
-@pytest.mark.parametrize("gives_up", [False, True])
-def test_inverse_of_matrices_of_mixed_scales(gives_up, monkeypatch):
+@pytest.mark.parametrize("fails", [False, True])
+def test_inverse_of_matrices_of_mixed_scales(fails, monkeypatch):
     """Also where LAPACK's divide and conquer does not converge."""
-    if gives_up:
+    if fails:
 
         def pinv(*args, **options):
             raise np.linalg.LinAlgError("Eigenvalues did not converge")

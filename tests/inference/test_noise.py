@@ -71,7 +71,7 @@ def test_band_says_the_right_standard_error_of_a_decay(rho, smoothing):
 
 @pytest.mark.parametrize("smoothing", [SAVGOL, LAG])
 def test_band_keeps_a_slow_signal(smoothing):
-    """A smoothed sine of 7 Hz is worth as much as the raw one, up to the samples at the ends."""
+    """A smoothed sine of 7 Hz tells as much as the raw one, up to the samples at the ends."""
     t = np.arange(2000) * INTERVAL
     wave = np.sin(2 * np.pi * 7 * t) * np.exp(-0.3 * t)
     white = Noise(smoothing=smoothing).whiten(smooth(wave, smoothing, INTERVAL), INTERVAL)

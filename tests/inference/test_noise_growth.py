@@ -68,12 +68,12 @@ def test_whitened_is_of_one_level_and_its_volume_is_that_of_the_scaling():
     noise = Noise(0.3, growth=(500.0, 20.0))
     spread = np.sqrt(1.0 + (500.0 * y) ** 2 + (20.0 * v) ** 2)
     inner = slice(20, -20)  # the ends of smoothing polynomials tell less
-    np.testing.assert_allclose(noise.spread(recording)[inner], spread[inner], rtol=0.02)
+    np.testing.assert_allclose(noise.relative_sd(recording)[inner], spread[inner], rtol=0.02)
     drawn = np.array([noise.drawn(np.random.default_rng(k), recording, 2.0) for k in range(200)])
     white = noise.whitened(recording, drawn)
     assert np.abs(white.std(axis=0) / 2.0 - 1.0).max() < 5 * np.sqrt(0.5 / 200)
     plain = replace(noise, growth=(0.0, 0.0))
-    expected = plain.volume_of(recording) - np.sum(np.log(noise.spread(recording)))
+    expected = plain.volume_of(recording) - np.sum(np.log(noise.relative_sd(recording)))
     assert noise.volume_of(recording) == pytest.approx(expected)
 
 

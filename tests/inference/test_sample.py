@@ -231,11 +231,11 @@ def test_progress_is_told_after_every_block():
 
 
 def test_rarely_accepted_proposals_lengthen_the_burn_in():
-    """A curved, narrow valley in 12 dimensions."""
+    """A curved, narrow density in 12 dimensions."""
 
     def log_posterior(x):
-        valley = (x[:, 1:] - 2.0 * x[:, :1] ** 2) / 0.05
-        return -0.5 * (x[:, 0] ** 2 + np.square(valley).sum(axis=1))
+        across = (x[:, 1:] - 2.0 * x[:, :1] ** 2) / 0.05
+        return -0.5 * (x[:, 0] ** 2 + np.square(across).sum(axis=1))
 
     covariance = np.diag([1.0] + [0.0025] * 11)
     chains = sample_posterior(

@@ -312,19 +312,6 @@ def test_same_seed_same_search_and_no_global_state() -> None:
     assert not np.array_equal(one.best, other.best)
 
 
-def test_given_points_enter_the_first_population() -> None:
-    given = np.array([[1.0] * 6, [0.5] * 6])
-    first: list[Array] = []
-
-    def objective(x: Array) -> Array:
-        first.append(x.copy())
-        return rosenbrock(x)
-
-    result = run(objective, -5, 10, 6, 0, evaluations=500, start=given)
-    np.testing.assert_array_equal(first[0][:2], given)
-    assert result.value == 0.0  # the given point is the minimum: the incumbent stays
-
-
 def test_callback_and_history_say_the_same() -> None:
     told: list[Generation] = []
     result = run(rastrigin, -5.12, 5.12, 5, 0, evaluations=2000, callback=told.append)
@@ -368,11 +355,6 @@ def test_results_are_frozen() -> None:
         ({"tolerance": np.nan}, "tolerance"),
         ({"coldest": 0.0}, "coldest"),
         ({"coldest": np.inf}, "coldest"),
-        ({"start": [0.5, 0.5, 0.5]}, "start"),
-        ({"start": [[0.5, 0.5]]}, "start"),
-        ({"start": [[0.5, 0.5, 1.5]]}, "start"),
-        ({"start": [[0.5, 0.5, np.nan]]}, "start"),
-        ({"start": np.full((28, 3), 0.5)}, "start"),
         ({"objective": lambda x: x}, "objective"),
         ({"objective": lambda x: np.full(len(x), -np.inf)}, "objective"),
     ],

@@ -51,7 +51,7 @@ def test_accelerations_beside_a_jump_are_set_aside_and_said():
     aside = [np.flatnonzero(~r.used) for r in kept.recordings if r.used is not None]
     assert len(aside) == 3 and f"{sum(x.size for x in aside)} accelerations" in kept.notes[-1]
     truth = small_rig.motion_of(0)
-    events = np.sort(np.concatenate([truth.touches, truth.leaves]))
+    events = np.sort(np.concatenate([truth.onsets, truth.ends]))
     np.testing.assert_array_equal(aside[0], np.rint(events * 1000.0).astype(int))
     again, _ = recorded("velocity", 1)
     assert all(

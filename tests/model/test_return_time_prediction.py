@@ -20,7 +20,7 @@ REST = GAP * (1 - FLIGHT[1] / CONTACT[1])
 MOTION = NormalizedParameters(*FLIGHT, *CONTACT, REST, GAP, 0.0, 0.0, 0.0, 0.0)
 
 
-def lane(v, guess, limit, contact=False):
+def predicted(v, guess, limit, contact=False):
     """Predict from the stop with a made-up expectation of the first stretch."""
     mine = response_tables()
     prepare(mine, 0, *FLIGHT, 0.0, False)
@@ -46,14 +46,14 @@ def truth(v, contact=False):
 @pytest.mark.parametrize("off", [0.0, 0.3, -2.0, 9.0, -9.0])
 def test_guesses_near_and_far_lead_to_the_crossing(off):
     wait, speed = truth(-2e-4)
-    found = lane(-2e-4, wait + off, 1)
+    found = predicted(-2e-4, wait + off, 1)
     assert len(found) == 1
     np.testing.assert_allclose(found[0], (wait, speed), rtol=1e-13)
 
 
 def test_contact():
     wait, speed = truth(2e-4, contact=True)
-    found = lane(2e-4, wait + 0.4, 1, contact=True)
+    found = predicted(2e-4, wait + 0.4, 1, contact=True)
     np.testing.assert_allclose(found[0], (wait, speed), rtol=1e-13)
 
 
@@ -63,18 +63,18 @@ def test_a_later_crossing_is_not_taken():
     # it is there: the undisturbed flight rises through the gap once more
     z, v = advance(*FLIGHT, GAP, -2e-4, *impulse_response(*FLIGHT, later))
     assert abs(z - GAP) < 1e-3 * GAP and v > 0
-    assert len(lane(-2e-4, later, 1)) == 0
+    assert len(predicted(-2e-4, later, 1)) == 0
 
 
 @pytest.mark.parametrize("guess", [math.nan, math.inf, 1e300, 0.49, 1e5])
 def test_nonsense_is_left_to_the_general_search(guess):
-    found = lane(-2e-4, guess, 1)
+    found = predicted(-2e-4, guess, 1)
     if len(found):
         np.testing.assert_allclose(found[0], truth(-2e-4), rtol=1e-13)
 
 
 def test_stretches_follow_each_other():
-    found = lane(-2e-4, truth(-2e-4)[0], 12)
+    found = predicted(-2e-4, truth(-2e-4)[0], 12)
     assert len(found) == 12
     t, v, contact = 0.0, -2e-4, False
     for time, speed in found:

@@ -140,6 +140,7 @@ def test_uncertainty_of_mass_clock_and_gain_widens_by_dimensions() -> None:
         ("N s/m", 0.148, 1.0, "N s/m"),
         ("N", 1.6e-4, 1e6, "µN"),
         ("N/m3", 7e5, 1e-3, "kN/m³"),
+        ("N s1.5/m1.5", 2.0, 1.0, "N s^1.5/m^1.5"),
         ("kg", 6.3e-5, 1e6, "mg"),
         ("rad", 4.7e-4, 1e6, "µrad"),
         ("rad", 0.5, 1.0, "rad"),

@@ -19,11 +19,12 @@ from matplotlib.figure import Figure
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification
 from bayesimpact.report.archive import load_results
+from bayesimpact.report.build import ReportContext, results_from_fit
 from bayesimpact.report.figures import gaussian, save
 from bayesimpact.report.figures.corner import NormalLaw, corner_figure
 from bayesimpact.report.figures.gaussian import gaussian_figures
 from bayesimpact.report.figures.improvement import improvement_figures
-from bayesimpact.report.write import Written, write_fit
+from bayesimpact.report.write import Written, write_results
 
 VERDICTS = ("named", "ambiguous", "unknown")
 
@@ -95,7 +96,8 @@ def written(small: Identification, fit: Fit, folder: Path, verdict: str = "named
     arrays = made_up_arrays(3, 2)
     arrays |= {"before_mode": small.fit.mode, "before_covariance": small.fit.covariance}
     final = replace(small, fit=fit, search=None)
-    return write_fit(final, folder, diagnosis=content, diagnosis_arrays=arrays)
+    context = ReportContext(diagnosis=content, arrays=arrays)
+    return write_results(results_from_fit(final, context), folder)
 
 
 @pytest.mark.parametrize(

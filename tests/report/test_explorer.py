@@ -17,7 +17,7 @@ from diagnosed import diagnosed
 from synthetic import make_results, row
 
 from bayesimpact.report.archive import save_results
-from bayesimpact.report.cycles import cycles, telling_cycle, touches
+from bayesimpact.report.cycles import contact_onsets, cycles, telling_cycle
 from bayesimpact.report.explorer import MOST_SAMPLES, explorer_data, explorer_words, scripts
 from bayesimpact.report.figures.force_map import force_unit
 from bayesimpact.report.figures.recordings import close_up
@@ -33,7 +33,7 @@ def compared(count: int = 3, cases: int = 2, n: int = 600) -> Results:
     if n != 600:
         results = replace(results, recordings=make_results(count, cases, n=n).recordings)
     before = [r.predicted.copy() for r in results.recordings]
-    third = touches(results.recordings[0].predicted, 1.1095e-3)[2]
+    third = contact_onsets(results.recordings[0].predicted, 1.1095e-3)[2]
     before[0][third : third + 100] += 20e-6
     arrays = dict(results.diagnosis_arrays) | {"before_predicted": np.concatenate(before)}
     return replace(results, diagnosis_arrays=arrays)
@@ -59,9 +59,10 @@ def test_data_are_those_of_the_recordings() -> None:
             # half of one of 32767 steps up to the largest, here below 40 um
             assert np.max(np.abs(integers(packed) - 1e6 * (r.samples - model))) < 40 / 32767
         assert item["level"] == pytest.approx(1.1095)
-        assert item["impacts"] == touches(r.predicted, 1.1095e-3).tolist()
+        assert item["impacts"] == contact_onsets(r.predicted, 1.1095e-3).tolist()
     assert (
-        content["recordings"][0]["best"] == touches(results.recordings[0].predicted, 1.1095e-3)[2]
+        content["recordings"][0]["best"]
+        == contact_onsets(results.recordings[0].predicted, 1.1095e-3)[2]
     )
     assert content["first"] == 0 and "<" not in explorer_data(results)
 
@@ -191,7 +192,7 @@ def test_choose_zoom_and_switch_in_a_browser(tab: Tab, report: Path) -> None:
     tab.drag("#explore .u-over", 0.25, 0.5)
     assert shown(tab) == pytest.approx((0.15, 0.3), abs=0.01)
     tab.run(PART.format("best") + ".click()")
-    third = touches(results.recordings[0].predicted, 1.1095e-3)[2] * 1e-3
+    third = contact_onsets(results.recordings[0].predicted, 1.1095e-3)[2] * 1e-3
     start, end = shown(tab)
     assert start < third < end < start + 0.2
     tab.run(PART.format("previous") + ".click()")

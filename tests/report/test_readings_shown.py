@@ -11,7 +11,7 @@ from synthetic import make_results
 
 from bayesimpact.model.units import display
 from bayesimpact.report.codec import decode, encode
-from bayesimpact.report.cycles import contacts, stop_level, touches
+from bayesimpact.report.cycles import contact_onsets, contacts, stop_level
 from bayesimpact.report.explorer import explorer_data
 from bayesimpact.report.figures.style import position, response, response_word
 from bayesimpact.report.results import Results
@@ -59,9 +59,9 @@ def test_impacts_are_those_of_the_motion_not_of_the_reading() -> None:
         assert stop_level(results, here) is None  # no acceleration is that of the gap
         motion, gap = contacts(results, here)
         assert gap == pytest.approx(1.1e-3)
-        expected = touches(there.predicted, 1.1e-3)
+        expected = contact_onsets(there.predicted, 1.1e-3)
         assert expected.size > 2
-        np.testing.assert_array_equal(touches(motion, gap), expected)
+        np.testing.assert_array_equal(contact_onsets(motion, gap), expected)
     (item, _) = json.loads(explorer_data(results))["recordings"]
     assert item["level"] is None and item["impacts"] == expected.tolist()
     assert item["words"][0] == "acceleration" and item["words"][1] == "m/s²"

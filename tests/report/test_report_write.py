@@ -17,20 +17,19 @@ from bayesimpact.data.campaign import Campaign, Measurement
 from bayesimpact.data.read import load_campaign
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
-from bayesimpact.inference.arviz_groups import open_arviz
+from bayesimpact.inference.arviz_groups import as_arviz, open_arviz
 from bayesimpact.inference.convergence import quiet_arviz
 from bayesimpact.inference.identify import Identification, identify
 from bayesimpact.inference.posterior import Posterior, sample
 from bayesimpact.report.archive import load_results
 from bayesimpact.report.backbones import backbone_summary
-from bayesimpact.report.build import results_from_fit, results_from_posterior
+from bayesimpact.report.build import ReportContext, results_from_fit, results_from_posterior
 from bayesimpact.report.figures.gaussian import gaussian_figures
 from bayesimpact.report.rows import Z90
 from bayesimpact.report.write import (
     POSTERIOR_FILE,
     REPORT_FILE,
     rewrite_report,
-    write_fit,
     write_posterior,
     write_results,
 )
@@ -54,7 +53,7 @@ def posterior(identification: Identification) -> Posterior:
 
 
 def test_fit_in_numbers(identification: Identification) -> None:
-    results = results_from_fit(identification, seed=5, command="bayesimpact fit x")
+    results = results_from_fit(identification, ReportContext("bayesimpact fit x", seed=5))
     fit = identification.fit
     assert results.kind == "fit" and results.draws is None and results.sampler is None
     assert results.verdict == "adequate"
@@ -77,14 +76,16 @@ def test_what_remains_is_in_every_table(identification: Identification) -> None:
     """Once the page told c1 as 5 (0 to 14) in one table and as 0.0205 (0.0205 to 0.0205) below."""
     told = {"c1": {"unit": "N s/m", "median": 0.2, "ci90": [0.1, 0.4]}}
     diagnosis = {"remainder": {"rms_m": 1e-6}, "parameters": {"before": {}, "after": told}}
-    results = results_from_fit(identification, diagnosis=diagnosis)
+    results = results_from_fit(identification, ReportContext(diagnosis=diagnosis))
     row = results.row("c1")
     assert (row.median, row.ci90, results.centre) == (0.2, (0.1, 0.4), "median")
     assert row.ratio[1:] == pytest.approx((0.1 / 0.503, 0.4 / 0.503))
     assert row.mode == identification.fit.mode[0] and results.row("k1").ci90[0] > 800
     arrays = {"before_chi2": np.ones(2)}
     assert gaussian_figures(replace(results, diagnosis_arrays=arrays)) == {}
-    certain = results_from_fit(identification, diagnosis=diagnosis | {"remainder": None})
+    certain = results_from_fit(
+        identification, ReportContext(diagnosis=diagnosis | {"remainder": None})
+    )
     assert certain.row("c1").median == row.mode and certain.centre == "mode"
 
 
@@ -123,7 +124,7 @@ def test_folder_of_a_posterior(
     posterior: Posterior, identification: Identification, tmp_path: Path
 ) -> None:
     base = replace(posterior, seed=4)
-    results = write_posterior(posterior, identification, tmp_path, command="x", before=base).results
+    results = write_posterior(posterior, identification, tmp_path, before=base).results
     names = {f.name for f in tmp_path.iterdir()}
     assert names == {"results.nc", "fit.json", POSTERIOR_FILE, REPORT_FILE, "figures"}
     assert load_results(tmp_path).headline == results.headline
@@ -153,14 +154,19 @@ def test_posterior_for_arviz(posterior: Posterior, identification: Identificatio
     assert list(drawn["y0"].coords["recording"].values) == ["case1_a", "case3_b"]
     assert drawn.sizes["chain"] == 2
     likelihood = data["log_likelihood"]["displacement"]
-    assert likelihood.sizes["recording"] == 2 and likelihood.sizes["draw"] == drawn.sizes["draw"]
+    parts = [str(name).split()[0] for name in likelihood.coords["half_cycle"].values]
+    assert list(dict.fromkeys(parts)) == ["case1_a", "case3_b"]
+    assert likelihood.sizes["draw"] == drawn.sizes["draw"]
+    begins = data["constant_data"]["half_cycle_start"].values
+    assert begins[0] == 0.0 and begins.size == len(parts) and begins.max() < 1.2
     assert told(data)["seed"] == 3 and told(data)["converged"]
     # One draw's log likelihood, from its parameters
     target = posterior.fit.target
     theta = posterior.chains.draws[1, 0, 0]
     assert float(drawn["k1"][1, 0]) == theta[posterior.names.index("k1")]
     expected = target.likelihood.per_recording(theta[None])[0]
-    assert np.allclose(likelihood.values[1, 0], expected, rtol=1e-12)
+    whole = [likelihood.values[1, 0][np.array(parts) == n].sum() for n in dict.fromkeys(parts)]
+    assert np.allclose(whole, expected, rtol=1e-6)
     predicted = data["posterior_predictive"]["case1_a"].values[0]
     recorded = identification.fit.target.oscillator.campaign.recordings[0].samples
     # Simulated recordings differ from the real one by the noise of both.
@@ -170,6 +176,19 @@ def test_posterior_for_arviz(posterior: Posterior, identification: Identificatio
     assert float(data["constant_data"]["mass"]) == posterior.fit.target.oscillator.campaign.mass
     assert data["prior"]["k2"].dims == drawn["k2"].dims
     assert float(data["prior"]["k1"].std()) > 100 * float(drawn["k1"].std())
+
+
+def test_half_cycles_may_be_left_out_and_recordings_may_not(posterior: Posterior) -> None:
+    arviz, groups = quiet_arviz(), posterior.arviz_groups({})
+    found = arviz.loo(as_arviz(groups), pointwise=True)
+    assert float(np.max(found.pareto_k)) < 0.7  # what importance weights can bear
+    # of a model that is right, the effective number is that of the parameters
+    effective = found.p if hasattr(found, "p") else found.p_loo  # ArviZ 1.x, 0.23
+    assert 0.6 * len(posterior.names) < effective < 1.4 * len(posterior.names)
+    likelihood = groups["log_likelihood"]
+    name = likelihood["half_cycle"].str.split("part", " ").isel(part=0)
+    apart = groups | {"log_likelihood": likelihood.groupby(name.rename("recording")).sum()}
+    assert float(np.max(arviz.loo(as_arviz(apart), pointwise=True).pareto_k)) > 0.7
 
 
 def test_lab_units_for_arviz(posterior: Posterior) -> None:
@@ -237,7 +256,7 @@ def softening_pendulum() -> Campaign:
 @pytest.mark.usefixtures("coarse_figures")
 def test_report_of_a_linear_oscillator_that_does_not_fit(tmp_path: Path) -> None:
     found = identify(softening_pendulum(), rng=np.random.default_rng(1), search=False)
-    results = write_fit(found, tmp_path, seed=1).results
+    results = write_results(results_from_fit(found), tmp_path).results
     assert results.verdict == "inadequate"
     page = (tmp_path / REPORT_FILE).read_text()
     body = page.index('class="verdict bad"')

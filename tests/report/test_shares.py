@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import os
+import shutil
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from diagnosed import diagnosed
 
+import bayesimpact
 from bayesimpact.report.archive import save_results
-from bayesimpact.report.figures.save import all_figures, drawers
+from bayesimpact.report.figures.save import DPI, all_figures, drawers
 from bayesimpact.report.figures.shares import read, save_all, started
+from bayesimpact.report.html import png_size
 from bayesimpact.report.results import Results
 
 
@@ -39,9 +45,38 @@ def test_one_process_draws_all_where_no_other_starts(
     assert list(save_all(told, tmp_path).pictures) == list(all_figures(told))
 
 
-def test_the_second_process_draws_every_other_group(told: Results, tmp_path: Path) -> None:
+def test_the_second_process_draws_every_other_group_and_obeys_no_working_folder(
+    told: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where this process would: started in a folder that is on its module path."""
+    here = tmp_path / "here"
+    here.mkdir()
+    for name in ("json", "matplotlib", "bayesimpact", "sitecustomize"):
+        (here / f"{name}.py").write_text("raise SystemExit(3)\n")
+    monkeypatch.chdir(here)
+    monkeypatch.setenv("PYTHONPATH", str(here))
+    for entry in ("", ".", str(here)):
+        monkeypatch.syspath_prepend(entry)
     other = started(tmp_path)
     assert other is not None
     names, _ = other.communicate()
     found = read(names, tmp_path)
     assert found is not None and found.keys() == set(range(1, len(drawers(told)), 2))
+
+
+def test_both_processes_run_the_package_that_was_called(told: Results, tmp_path: Path) -> None:
+    """Another one than the interpreter's own, whose every picture has fewer points."""
+    few = replace(told, diagnosis_arrays={}, draws=None, before=None)
+    save_results(few, tmp_path)
+    other = tmp_path / "other" / "bayesimpact"
+    shutil.copytree(Path(bayesimpact.__file__).parent, other)
+    saving, dpi = other / "report" / "figures" / "save.py", DPI // 3
+    saving.write_text(saving.read_text().replace(f"\nDPI = {DPI}\n", f"\nDPI = {dpi}\n"))
+    subprocess.run(
+        [sys.executable, "-P", "-m", "bayesimpact", "report", str(tmp_path), "--quiet"],
+        env=os.environ | {"PYTHONPATH": str(other.parent)},
+        check=True,
+    )
+    for name, figure in all_figures(few).items():
+        width, _ = png_size((tmp_path / "figures" / f"{name}.png").read_bytes())
+        assert abs(width - dpi * figure.get_size_inches()[0]) <= 1, name

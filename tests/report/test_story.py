@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
 from diagnosed import DIAGNOSIS, LIMITS, diagnosed, estimate
 from markupsafe import Markup
 from test_report_html import page
 
+from bayesimpact.formula.grammar import Power, Term
+from bayesimpact.formula.law import effect_of
 from bayesimpact.report.diagnosis_view import diagnosis_view
-from bayesimpact.report.results import Results
+from bayesimpact.report.latex import latex_tables
+from bayesimpact.report.results import EffectSummary, Results
 from bayesimpact.report.story import corrected, story_rows
 
 
@@ -81,7 +85,32 @@ def test_sizes_in_units_and_per_cent_and_what_remains() -> None:
 def test_formulas_of_a_learned_force() -> None:
     formulas = [{"formula": "a abs(v) v", "unit": "N s2/m2", "log_odds": 12.34, "probability": 0.8}]
     text = page(diagnosed(verdict="unknown", effects=[], formulas=formulas))[1].text
-    assert "a abs(v) v N s²/m² +12.3 0.80" in text
+    assert "a abs( v ) v N s²/m² +12.3 0.80" in text
+    rooted = [{**formulas[0], "formula": "A |v|^1.5 sign(v)", "unit": "N s1.5/m1.5"}]
+    source, _ = page(diagnosed(verdict="unknown", effects=[], formulas=rooted), ("story",))
+    assert "N\N{NO-BREAK SPACE}s<sup>1.5</sup>/m<sup>1.5</sup>" in source
+
+
+ROOT = effect_of(Term("everywhere", speed=Power(1.5, True)), 1.0, 0.01, 1.0, signed=True)
+"""A formula that is an effect of a diagnosis."""
+
+
+@pytest.mark.parametrize("sampled", [False, True])
+def test_a_formula_is_typeset_wherever_an_effect_of_the_catalogue_has_its_id(sampled: bool) -> None:
+    named = {**DIAGNOSIS["effects"][0], "id": ROOT.id, "title": ROOT.title}  # type: ignore[dict-item, index]
+    named["parameters"] = {f"{ROOT.id}.size": estimate(0.01, 0.001, "N")}
+    others = [{"id": f"{ROOT.id} + gap_wear", "probability": 0.3, "delta_log_evidence": 1.0}]
+    results = replace(
+        diagnosed(sampled=sampled, effects=[named], alternatives=others, verdict="ambiguous"),
+        effects=(EffectSummary(ROOT.id, ROOT.title, ROOT.equation),),
+    )
+    source, parsed = page(results, ("story",))
+    formula = "<i>A</i> |<i>v</i>|<sup>1.5</sup> sign(<i>v</i>)"
+    assert source.count(f"force {formula}") >= 3  # physics, diagnosis, model
+    assert "a formula and a gap that grows" in parsed.text
+    assert ROOT.id not in parsed.text and ROOT.id.replace("_", " ") not in parsed.text
+    latex = latex_tables(results)
+    assert r"force $A\,|v|^{1.5}\,\mathrm{sign}(v)$" in latex and "formula" not in latex
 
 
 def test_alternatives_are_told_when_several_fit_alike() -> None:

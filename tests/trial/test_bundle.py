@@ -47,8 +47,8 @@ def test_noise_of_paper_campaign_is_white_and_5_um():
 
 def test_touches_of_the_paper_rig_become_weaker_and_cease():
     run = motion(PAPER_RIG, Release("r", "1", -6.5e-3), rate=1000, duration=6)
-    assert 25 < len(run.touches) < 40
-    assert len(run.leaves) == len(run.touches)
-    assert all(a < b for a, b in pairwise(run.touches))
-    assert run.touches[-1] < 5.5
+    assert 25 < len(run.onsets) < 40
+    assert len(run.ends) == len(run.onsets)
+    assert all(a < b for a, b in pairwise(run.onsets))
+    assert run.onsets[-1] < 5.5
     assert run.displacement[-150:].max() < PAPER_RIG.g

@@ -42,7 +42,7 @@ def test_free_decay_is_the_damped_cosine():
     t = np.arange(6000) / 1000
     exact = np.exp(-b * t) * (-6e-3 * np.cos(w * t) + (0.05 - b * 6e-3) / w * np.sin(w * t))
     assert np.abs(run.displacement - exact).max() < 1e-12
-    assert run.touches == ()
+    assert run.onsets == ()
 
 
 def linear_motion(c, k, load, mass, y, v):
@@ -82,7 +82,7 @@ def test_impacts_follow_the_exact_piecewise_linear_motion():
     release = Release("r", "2", -6.2e-3, 0.02)
     run = motion(PAPER_RIG, release, rate=500, duration=1.5)
     exact = exact_bilinear(PAPER_RIG, "2", release.y0, release.v0, run.times)
-    assert len(run.touches) == 13
+    assert len(run.onsets) == 13
     assert np.abs(run.displacement - exact).max() < 1e-12
 
 
@@ -94,18 +94,18 @@ def test_period_with_an_elastic_stop():
     d = g * k1 / (k1 + k2)
     period = (pi + 2 * asin(g / amplitude)) / w1 + 2 / w2 * acos(d / hypot(d, vg / w2))
     run = motion(LOSSLESS, Release("r", "1", -amplitude), rate=100, duration=6)
-    gaps = np.diff(run.touches)
+    gaps = np.diff(run.onsets)
     assert gaps.size > 30
     assert np.abs(gaps - period).max() < 1e-11
-    assert np.abs(np.diff(run.leaves) - period).max() < 1e-11
+    assert np.abs(np.diff(run.ends) - period).max() < 1e-11
 
 
 @pytest.mark.parametrize(("excess", "touches"), [(1e-9, 7), (-1e-9, 0)])
 def test_grazing_contact_shorter_than_any_step_is_seen(excess, touches):
     """It lasts 2 sqrt(2 x 1e-9) / w1 = 2 us; the integrator's steps are milliseconds."""
     run = motion(LOSSLESS, Release("r", "1", -1e-3 * (1 + excess)), rate=100, duration=1.1)
-    assert len(run.touches) == touches
-    lasting = np.subtract(run.leaves, run.touches)
+    assert len(run.onsets) == touches
+    lasting = np.subtract(run.ends, run.onsets)
     assert np.allclose(lasting, 2 * sqrt(2e-9) / 40, rtol=0.02)
 
 
@@ -127,7 +127,7 @@ def test_sampling_rate_does_not_change_the_motion():
 
 def test_recording_that_starts_beyond_the_gap_starts_in_contact():
     run = motion(PAPER_RIG, Release("r", "1", 2e-3, -0.01), rate=1000, duration=0.1)
-    assert run.touches[0] == 0.0
+    assert run.onsets[0] == 0.0
     k2 = PAPER_RIG.k2["1"]
     force = PAPER_RIG.k1 * 2e-3 + k2 * 0.9e-3 - 0.01 * (PAPER_RIG.c1 + PAPER_RIG.c2)
     slope = (run.velocity[1] - run.velocity[0]) / 1e-3
@@ -137,7 +137,7 @@ def test_recording_that_starts_beyond_the_gap_starts_in_contact():
 def test_preloaded_stop_comes_to_rest_in_contact():
     rig = Rig(mass=0.5, c1=2.0, k1=800.0, c2=10.0, g=-1e-3, k2={"1": 5000.0})
     run = motion(rig, Release("r", "1", -4e-3), rate=1000, duration=4)
-    assert len(run.touches) == len(run.leaves) + 1
+    assert len(run.onsets) == len(run.ends) + 1
     assert run.displacement[-1] == pytest.approx(-1e-3 * 5000 / 5800, abs=1e-9)
 
 

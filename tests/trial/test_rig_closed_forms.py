@@ -17,17 +17,17 @@ RELEASE = Release("r", "1", -6e-3, 0.01)
 
 def test_gap_of_the_ith_contact_is_g_plus_i_steps():
     run = motion(PAPER_RIG, RELEASE, {"gap_wear": {"step": 2e-5}}, rate=1e5, duration=1)
-    gaps = 1.1e-3 + 2e-5 * np.arange(len(run.touches))
-    assert len(run.touches) > 6
-    at_touch = np.interp(run.touches, run.times, run.displacement)
-    at_leave = np.interp(run.leaves, run.times, run.displacement)
+    gaps = 1.1e-3 + 2e-5 * np.arange(len(run.onsets))
+    assert len(run.onsets) > 6
+    at_touch = np.interp(run.onsets, run.times, run.displacement)
+    at_leave = np.interp(run.ends, run.times, run.displacement)
     assert np.abs(at_touch - gaps).max() < 1e-9
     assert np.abs(at_leave - gaps[: at_leave.size]).max() < 1e-9
 
 
 def test_shrinking_gap_does_not_touch_again_on_the_way_back():
     run = motion(PAPER_RIG, RELEASE, {"gap_wear": {"step": -2e-5}}, rate=1000, duration=1)
-    assert np.diff(run.touches).min() > 0.08
+    assert np.diff(run.onsets).min() > 0.08
 
 
 def test_fast_relaxation_is_a_damper_and_slow_relaxation_a_spring():

@@ -132,7 +132,7 @@ def test_stick_and_slip_under_forcing_against_the_naive_twin():
     held = run.velocity == 0
     assert 1000 < held.sum() < 7000
     assert np.diff(held.astype(int)).clip(0).sum() >= 3  # it sticks several times
-    assert len(run.touches) > 1
+    assert len(run.onsets) > 1
 
 
 NULL = {
@@ -229,7 +229,7 @@ def energy_in_flight(effect, parameters=None):
 )
 def test_conservative_effects_keep_the_energy(effect):
     energy, run = energy_in_flight(effect)
-    assert len(run.touches) > 10
+    assert len(run.onsets) > 10
     assert np.ptp(energy) < 2e-10 * energy[0]
 
 
@@ -323,7 +323,7 @@ def test_touching_obstacle_shares_its_momentum():
         rate=1e5,
         duration=0.3,
     )
-    touch, leave = run.touches[0], run.leaves[0]
+    touch, leave = run.onsets[0], run.ends[0]
     i, j = np.searchsorted(run.times, [touch, leave])
 
     def velocity_at(instant, samples):  # linear extrapolation over at most two samples
@@ -348,7 +348,7 @@ def test_touching_obstacle_shares_its_momentum():
 
 def test_obstacle_that_cannot_pull_lets_go_where_its_force_vanishes():
     run = motion(PAPER_RIG, RELEASE, {"contact_no_tension": {}}, rate=1e5, duration=0.3)
-    for leave in run.leaves:
+    for leave in run.ends:
         y = np.interp(leave, run.times, run.displacement)
         v = np.interp(leave, run.times, run.velocity)
         assert v < 0
@@ -358,7 +358,7 @@ def test_obstacle_that_cannot_pull_lets_go_where_its_force_vanishes():
 def test_pushing_obstacle_follows_the_mass_beyond_the_gap():
     effects = {"contact_no_tension": {}, "contact_preload": {"force": 1.0}}
     run = against_naive(effects, RELEASE, duration=0.35, step=1e-4, tolerance=1e-11)
-    assert np.interp(run.leaves[0], run.times, run.displacement) < 1.1e-3 - 1e-5
+    assert np.interp(run.ends[0], run.times, run.displacement) < 1.1e-3 - 1e-5
 
 
 def test_released_mass_is_free_until_it_has_been_below_the_gap():
@@ -368,8 +368,8 @@ def test_released_mass_is_free_until_it_has_been_below_the_gap():
         run = motion(
             rig, Release("r", "1", y0, -0.05), {"contact_no_tension": {}}, rate=1000, duration=1
         )
-        assert run.touches == ((0.0,) if y0 > -4.8e-3 else ())
-        assert len(run.leaves) == len(run.touches)
+        assert run.onsets == ((0.0,) if y0 > -4.8e-3 else ())
+        assert len(run.ends) == len(run.onsets)
         energy = 0.25 * run.velocity[2:] ** 2 + 400 * run.displacement[2:] ** 2
         assert np.ptp(energy) < 1e-10 * energy[0]
         assert run.displacement.max() > 4.5e-3

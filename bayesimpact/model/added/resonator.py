@@ -76,7 +76,7 @@ def row(which: Any, w: Any) -> Any:
 
 @inner(forceinline=True)
 def own_force(which: Any, column: Any, w: Any) -> Any:
-    """What a body's own displacement and velocity push with, N."""
+    """What a body's own displacement and velocity exert as a force, N."""
     m2, W, drag = body(which, w)
     at = row(which, w)
     return m2 * (W * w.work[at + column] + drag * w.work[at + WORK_COLUMNS + column])

@@ -17,7 +17,7 @@ from bayesimpact.model.compiled import inner
 
 
 @inner()
-def hold(y: Any, t: Any, j: Any, w: Any) -> Any:
+def stick(y: Any, t: Any, j: Any, w: Any) -> Any:
     """Rest under dry friction until the other forces exceed it: (t, next sample)."""
     second, shown = listens(w), y if w.order == 0 else 0.0
     if w.size == 0 and w.q[FORCE] == 0.0 and fastest_body(True, w) == 0.0:

@@ -1,9 +1,7 @@
 """Figures drawn by two processes, for matplotlib keeps Python's lock while it draws.
 
-    python -P -E -m bayesimpact.report.figures.shares FOLDER
-
-is the second one: it draws every other group of figures of the results in FOLDER, and says as JSON
-which figures they are. With -P and -E nothing is imported from the working folder or PYTHONPATH.
+The second one draws every other group of figures of the results in a folder, and says as JSON which
+figures they are.
 """
 
 from __future__ import annotations
@@ -14,6 +12,7 @@ import sys
 from pathlib import Path
 
 from bayesimpact.report.archive import load_results
+from bayesimpact.report.figures.same_package import command
 from bayesimpact.report.figures.save import SavedFigures, drawers, file_name, save_drawn
 from bayesimpact.report.results import Results
 
@@ -67,10 +66,9 @@ def _answer(other: subprocess.Popen[bytes]) -> bytes | None:
 
 def started(folder: Path) -> subprocess.Popen[bytes] | None:
     """The second process; None where no interpreter can be started."""
-    command = [sys.executable, "-P", "-E", "-m", MODULE, str(folder.absolute())]
     try:
         return subprocess.Popen(
-            command,
+            command(MODULE, str(folder.absolute())),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -107,7 +105,3 @@ def main() -> None:
     found = save_share(load_results(folder), folder, 1, 2)
     said = {i: [list(drawn.pictures), dict(drawn.failed)] for i, drawn in found.items()}
     sys.stdout.write(json.dumps(said))
-
-
-if __name__ == "__main__":
-    main()

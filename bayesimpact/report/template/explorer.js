@@ -127,7 +127,7 @@
     state.impact = Math.min(Math.max(number, 0), r.impacts.length - 1);
     around(r.impacts[state.impact]);
   }
-  function around(first) { // from shortly before a touch until the motion has left the stop
+  function around(first) { // from shortly before a contact until the motion has left the stop
     const r = content.recordings[state.recording], y = data.models[data.models.length - 1];
     let last = first;
     if (r.level === null) last = first + Math.round(0.1 * y.length);

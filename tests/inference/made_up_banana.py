@@ -1,4 +1,4 @@
-"""A curved valley in place of an oscillator's likelihood."""
+"""A banana-shaped density in place of an oscillator's likelihood."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from bayesimpact.model.parameters import Parameter
 
 
 @dataclass
-class Valley:
+class Banana:
     """Rosenbrock's residuals 10 (y - x^2), 1 - x (and zeros) in place of an oscillator's.
 
     Derivatives may have the wrong `sign`, or be off by the relative error `rough` (or, where rough
@@ -63,6 +63,6 @@ class Valley:
         return (Linearisation(self.residuals(theta[None])[0][0], jacobian, np.array([0, 1])),)
 
 
-def valley(**kind: float) -> Target:
+def banana(**kind: float) -> Target:
     priors = Priors((Uniform(-9, 9), Uniform(-9, 9), LogUniform(1e-6, 1e6)))
-    return Target(Valley(**kind), priors)
+    return Target(Banana(**kind), priors)

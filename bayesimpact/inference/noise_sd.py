@@ -34,7 +34,7 @@ def smoothed(recording: Recording) -> tuple[Array, Array]:
 
 
 @lru_cache(maxsize=KEPT)
-def spread_of(growth: tuple[float, float], recording: Recording) -> Array:
+def relative_sd(growth: tuple[float, float], recording: Recording) -> Array:
     """Standard deviation of the noise over its level, (n,), read-only.
 
     growth : by the reading's distance from where it settles, and by its rate

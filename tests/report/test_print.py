@@ -1,0 +1,52 @@
+"""A report on A4: full pages, headings with what they head, nothing cut off, pictures as drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from browser import Tab, browser, chromium
+from coarse_figures import blank, draw_coarsely
+from diagnosed import diagnosed
+from printed import PAGE, boxes, fills
+from synthetic import make_results
+
+from bayesimpact.report.archive import save_results
+from bayesimpact.report.figures import save
+from bayesimpact.report.results import Results
+from bayesimpact.report.write import rewrite_report
+
+pytestmark = pytest.mark.skipif(chromium() is None, reason="no Chromium here")
+
+HEADS = ("H1", "H2", "H3")
+REPORTS = {
+    "posterior": make_results(9, 3),
+    "diagnosis": diagnosed(9, 3, sampled=False),
+    "one recording": diagnosed(1, 1),
+    "many": diagnosed(24, 6),
+}
+
+
+@pytest.fixture(scope="module")
+def tab() -> Iterator[Tab]:
+    found = chromium()
+    assert found is not None
+    with browser(found) as tab:
+        yield tab
+
+
+@pytest.mark.parametrize("results", REPORTS.values(), ids=REPORTS)
+def test_pages_are_full_and_whole(
+    tab: Tab, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, results: Results
+) -> None:
+    draw_coarsely(monkeypatch)
+    monkeypatch.setattr(save, "_saved", blank)
+    save_results(results, tmp_path)
+    printed = boxes(tab, rewrite_report(tmp_path).page)
+    assert min(fills(printed)[:-1], default=1.0) > 0.5, fills(printed)
+    for page in {b.page for b in printed}:
+        last = max((b for b in printed if b.page == page), key=lambda b: b.bottom)
+        assert last.tag not in HEADS, last
+    assert max(b.right for b in printed) <= PAGE[0] + 1
+    assert {round(b.stretch, 2) for b in printed} == {1.0}
