@@ -18,7 +18,16 @@ from bayesimpact.diagnosis.force import missing_drift, missing_force
 from bayesimpact.diagnosis.naming import State, is_large, leaves_something
 from bayesimpact.diagnosis.own_band import shakes_in_own_band
 from bayesimpact.diagnosis.profile_likelihood import profiled
-from bayesimpact.diagnosis.refit import Candidate, exchanged, fit_from, grown, refit, without
+from bayesimpact.diagnosis.refit import (
+    TO_THE_MODE,
+    Candidate,
+    Enough,
+    exchanged,
+    fit_from,
+    grown,
+    refit,
+    without,
+)
 from bayesimpact.diagnosis.scan import Scan, scan
 from bayesimpact.diagnosis.scores import Score
 from bayesimpact.diagnosis.smoothing import is_refuted
@@ -126,7 +135,7 @@ class Models:
         if begun not in self.begun:
             self.begun.add(begun)
             self.tell("fitting " + " + ".join((*candidate.ids, *(s.effect.id for s in scores))))
-            self.keep(refit(candidate.fit, scores, self.scales, goal=self.goal()))
+            self.keep(refit(candidate.fit, scores, self.scales, enough=self.enough()))
 
     def fit_sets(self, about: Candidate, most: int, flight: bool) -> list[Candidate]:
         """Models that the equation of motion asks for about a model, in flight or altogether.
@@ -176,9 +185,9 @@ class Models:
         kept = first | {s.effect.id for s in promising if s.effect.id not in seen}
         return [s for s in found.best() if s.effect.id in kept]
 
-    def goal(self) -> float:
-        """Log likelihood below which no climb matters: minus infinity, as long as none is known."""
-        return -np.inf
+    def enough(self) -> Enough:
+        """When climbs may end early: as long as nothing is known, at the mode."""
+        return TO_THE_MODE
 
     def may_go_on(self) -> bool:
         """Whether the budget allows for more refits."""
@@ -199,7 +208,8 @@ class Models:
         if step not in self.dropped:
             self.dropped.add(step)
             self.tell("without " + effect.id)
-            self.keep(without(candidate, effect, self.scales))
+            enough = replace(self.enough(), goal=-np.inf)
+            self.keep(without(candidate, effect, self.scales, enough=enough))
         return self.tried[frozenset(i for i in candidate.ids if i != effect.id)]
 
     def exchange_on_off(self, candidate: Candidate, old: Effect, new: Effect) -> None:
@@ -208,7 +218,7 @@ class Models:
         if begun not in self.begun:
             self.begun.add(begun)
             self.tell(f"{new.id} in place of {old.id} in " + " + ".join(candidate.ids))
-            self.keep(exchanged(candidate, old, new, self.scales, goal=self.goal()))
+            self.keep(exchanged(candidate, old, new, self.scales, enough=self.enough()))
 
     def finished(self, candidate: Candidate) -> Candidate:
         """A model whose climb did not converge, at the highest point of its profile likelihood."""

@@ -82,7 +82,7 @@ def name(
             break
         begun.add(key)
         beam = [state]
-    return search.naming(base, state)
+    return search.naming(base, search.at_its_mode(state))
 
 
 class _Search(Remaining):

@@ -7,9 +7,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from bayesimpact.diagnosis.models import UNCONVERGED_SHORTFALL, Models
-from bayesimpact.diagnosis.naming import is_large
+from bayesimpact.diagnosis.naming import State, is_large
 from bayesimpact.diagnosis.promising import refit_candidates
-from bayesimpact.diagnosis.refit import Candidate, residual_repetition, tempered_evidence
+from bayesimpact.diagnosis.refit import (
+    LITTLE,
+    Candidate,
+    Enough,
+    grown,
+    residual_repetition,
+    tempered_evidence,
+)
 from bayesimpact.diagnosis.scan import Scan
 from bayesimpact.diagnosis.scores import Score
 from bayesimpact.diagnosis.thresholds import DECISIVE
@@ -64,6 +71,21 @@ class Ranked(Models):
         """
         base = self.states[frozenset()]
         return self.log_odds(base.candidate) + base.unknown.log_evidence / self.repetition()
+
+    def enough(self) -> Enough:
+        """When climbs may end early. Where the misfit is large, as near to the mode as odds ask
+        for, which count each repeated sample of a residual once.
+        """
+        least = LITTLE * self.repetition() if self.is_large else 0.0
+        return Enough(self.goal(), least)
+
+    def at_its_mode(self, state: State) -> State:
+        """The same model where its climb, which ended early, leads in the end (`enough`)."""
+        candidate = state.candidate
+        if candidate.fit.converged or not (candidate.effects and self.is_large):
+            return state
+        self.tell("fitting " + " + ".join(candidate.ids) + " to the end")
+        return self.examine(grown(candidate, candidate.effects, self.scales))
 
     def goal(self) -> float:
         """Log likelihood that a model must reach to come within the decisive odds of one that

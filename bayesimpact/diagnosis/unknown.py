@@ -12,6 +12,7 @@ from bayesimpact.diagnosis.learned import LEARNED, knots_of, refined_force
 from bayesimpact.diagnosis.naming import is_large, leaves_something
 from bayesimpact.diagnosis.refit import (
     ITERATIONS,
+    LITTLE,
     TOLERANCE,
     Candidate,
     best_start,
@@ -24,7 +25,6 @@ from bayesimpact.model.effects.effect import Effect, Scales
 Array = NDArray[np.float64]
 
 INTERVALS = (3, 7, 21, 42)  # between the knots; each divides a finer one
-LITTLE = 0.1  # nats of odds: a climb that gains less by a step decides nothing
 
 
 def learn_force(fit: Fit, force: MissingForce, scales: Scales) -> Fit:

@@ -49,7 +49,7 @@ def test_a_set_reaches_no_less_than_what_it_contains(monkeypatch, reached, again
 def test_an_effect_is_left_out_anew_where_its_model_has_reached_more(monkeypatch):
     """What a worse end of the larger model led to says little of the smaller one."""
 
-    def without(larger, effect, scales):
+    def without(larger, effect, scales, *, enough):
         left = " ".join(i for i in larger.ids if i != effect.id)
         return candidate(left, larger.fit.log_likelihood - 5.0)
 
