@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bayesimpact.diagnosis.models import UNCONVERGED_SHORTFALL, Models
-from bayesimpact.diagnosis.naming import State, is_large
+from bayesimpact.diagnosis.naming import State, is_large, leaves_something
 from bayesimpact.diagnosis.promising import refit_candidates
 from bayesimpact.diagnosis.refit import (
     LITTLE,
@@ -64,6 +64,14 @@ class Ranked(Models):
         if self.repeated is None or self.repeated[0] is not best:
             self.repeated = best, residual_repetition(best.fit)
         return self.repeated[1]
+
+    def leads_on(self, state: State, larger: Candidate) -> bool:
+        """Whether a larger model is the next one. Of what a large misfit has become, where that is
+        no more than the noise, odds must demand more: such an effect would be left out again.
+        """
+        if self.is_large and not leaves_something(state.candidate.fit):
+            return self.log_odds(larger) >= self.log_odds(state.candidate) + DECISIVE
+        return self.promise(larger) > self.promise(state.candidate)
 
     def force_gain(self) -> float:
         """What a free force in place of all effects would be worth, as far as scores tell, each

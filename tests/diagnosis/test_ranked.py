@@ -11,7 +11,7 @@ from effect_rigs import BY_ID
 from bayesimpact.diagnosis import ranked
 from bayesimpact.diagnosis.ranked import Ranked
 from bayesimpact.diagnosis.refit import LITTLE, TO_THE_MODE, Candidate
-from bayesimpact.diagnosis.thresholds import LARGE
+from bayesimpact.diagnosis.thresholds import DECISIVE, LARGE
 
 REPETITION = 30.0
 
@@ -59,3 +59,22 @@ def test_a_model_that_is_chosen_is_climbed_to_its_mode(monkeypatch, times, conve
     found = search.at_its_mode(chosen)
     assert begun == ([(chosen.candidate.ids, chosen.candidate.effects)] if again else [])
     assert found == "examined" if again else found is chosen
+
+
+@pytest.mark.parametrize(
+    ("times", "chi2", "more", "leads"),
+    [
+        (2.0, 1.0, DECISIVE - 1.0, False),  # within the noise, less than decisive
+        (2.0, 1.0, DECISIVE + 1.0, True),
+        (2.0, 5.0, DECISIVE - 1.0, True),  # more than the noise: any gain
+        (0.5, 1.0, DECISIVE - 1.0, True),  # the misfit was never large
+    ],
+)
+def test_what_odds_would_leave_out_again_is_not_taken_in(monkeypatch, times, chi2, more, leads):
+    search = searching(monkeypatch, times * LARGE**2)
+    monkeypatch.setattr(ranked, "leaves_something", lambda fit: fit.reduced_chi2 > 1.0)
+    small, large = state("spring_cubic", chi2), state("spring_cubic power_damping", chi2)
+    odds = {1: 0.0, 2: more}
+    monkeypatch.setattr(search, "log_odds", lambda c: odds[len(c.effects)])
+    monkeypatch.setattr(search, "promise", lambda c: 30.0 * odds[len(c.effects)])
+    assert search.leads_on(small, large.candidate) == leads

@@ -31,6 +31,7 @@ def run(monkeypatch):
         monkeypatch.setattr(models, "Asked", table.asks)
         monkeypatch.setattr(models, "shakes_in_own_band", lambda fit, remains: False)
         monkeypatch.setattr(models, "leaves_something", lambda fit: False)
+        monkeypatch.setattr(ranked, "leaves_something", lambda fit: fit.reduced_chi2 > 1.0)
         monkeypatch.setattr(models, "is_refuted", lambda fit: fit.ids == refuted)
         monkeypatch.setattr(models, "scan", table.scan)
         monkeypatch.setattr(models, "profiled", table.profiled)
