@@ -63,6 +63,7 @@ class Models:
         self.dropped: set[tuple[frozenset[str], float, str]] = set()
         self.profiled: set[frozenset[str]] = set()
         self.refits = 0
+        self.look = 0.0  # s, that the last model took to be scored
         self.repeated: tuple[Candidate, float] | None = None
 
     def keep(self, candidate: Candidate) -> Candidate:
@@ -89,9 +90,11 @@ class Models:
         if held is not None and held.candidate is candidate:
             return held
         self.progress("scoring what " + (" + ".join(candidate.ids) or "the base model") + " lacks")
+        begun = self.budget.left
         found = scan(candidate.fit, self.effects, self.scales, rng=self.rng)
         force = missing_force(candidate.fit, self.scales, rng=self.rng)
         drift = missing_drift(candidate.fit, self.scales, rng=self.rng)
+        self.look = begun - self.budget.left
         state = State(candidate, found, force, drift)
         self.states[frozenset(candidate.ids)] = state
         unconverged = candidate.effects and not candidate.fit.converged
@@ -191,7 +194,7 @@ class Models:
 
     def may_go_on(self) -> bool:
         """Whether the budget allows for more refits."""
-        return self.budget.may_search_on()
+        return self.budget.may_search_on(self.look)
 
     def tell(self, words: str) -> None:
         """Count a refit, and say which."""

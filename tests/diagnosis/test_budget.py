@@ -13,7 +13,14 @@ import pytest
 import small_rig
 from effect_rigs import BY_ID
 
-from bayesimpact.diagnosis.budget import ANOTHER, COMPARISONS, PATIENCE, Budget, begin
+from bayesimpact.diagnosis.budget import (
+    ANOTHER,
+    COMPARISONS,
+    LOOKS,
+    PATIENCE,
+    Budget,
+    begin,
+)
 from bayesimpact.diagnosis.document import document
 from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.diagnosis.naming import Naming
@@ -57,6 +64,17 @@ def test_a_budget_is_used_up_by_its_clock_alone() -> None:
     assert not budget.may_search_again() and budget.may_go_on()
     clock.now += ANOTHER - 1.0
     assert budget.left == 0.0 and not budget.may_go_on()
+
+
+def test_a_search_keeps_time_for_its_comparisons() -> None:
+    """The longer a model takes to be scored, the more of it; at most half of all."""
+    for look, kept in ((0.0, COMPARISONS), (5.0, LOOKS * 5.0), (50.0, PATIENCE / 2)):
+        clock = Clock()
+        budget = begin(clock)
+        clock.now = PATIENCE - kept - 1.0
+        assert budget.may_search_on(look)
+        clock.now += 1.0
+        assert not budget.may_search_on(look)
 
 
 def searches(

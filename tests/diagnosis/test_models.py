@@ -9,6 +9,7 @@ import pytest
 from effect_rigs import BY_ID
 
 from bayesimpact.diagnosis import models
+from bayesimpact.diagnosis.budget import COMPARISONS, LOOKS, PATIENCE, begin
 from bayesimpact.diagnosis.models import Models
 from bayesimpact.diagnosis.refit import Candidate
 
@@ -73,3 +74,21 @@ def test_an_end_that_no_motion_has_is_not_looked_at(monkeypatch):
     kept = search.keep(candidate("sensor_hum", -np.inf))
     assert kept.log_evidence == -np.inf
     assert search.keep(candidate("sensor_hum", 20.0)).log_evidence == 20.0
+
+
+def test_a_search_keeps_time_for_comparisons_by_how_long_a_look_takes(monkeypatch):
+    now, took = [0.0], 9.0
+
+    def scan(fit, effects, scales, *, rng):
+        now[0] += took
+
+    monkeypatch.setattr(models, "scan", scan)
+    for force in ("missing_force", "missing_drift"):
+        monkeypatch.setattr(models, force, lambda fit, scales, *, rng: None)
+    search = made_up(monkeypatch)
+    search.budget = begin(lambda: now[0])
+    search.examine(candidate("", 0.0))
+    now[0] = PATIENCE - COMPARISONS - 1.0
+    assert search.budget.may_search_on() and not search.may_go_on()
+    now[0] = PATIENCE - LOOKS * took - 1.0
+    assert search.may_go_on()
