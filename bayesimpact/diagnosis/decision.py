@@ -15,8 +15,9 @@ Let S be the likeliest set of effects that the search reached.
      effect that has fewer effects or parameters; if it has more than S itself, one that has no
      more: more to fit with makes imitation easy, and the rest of the truth may be among it,
    - `EXCESS` times as much is left without it, other effects refitted: of the misfit above the
-     noise, or of the force about the motion's own frequencies. An effect that imitates what the
-     catalogue lacks may put the phase right, but leaves most of the force,
+     noise, or, where a force of time is all that S leaves, of that force about the motion's own
+     frequencies. An effect that imitates what the catalogue lacks may put the phase right, but
+     leaves most of the force,
    - its size is apart from none at all by `APART` of its own standard deviations, with what the
      remainder may have done to it in them (`discrepancy`),
    - no set without it, with a residual force of whichever form is likeliest, is likelier than S
@@ -225,6 +226,8 @@ def stands_out(naming: Naming, effect: Effect) -> bool:
     )
     if without_it > EXCESS * with_it:
         return True
+    if naming.own is not None and not naming.own.leaves_noise:
+        return False  # what is left is no force of time: a size of one says nothing
     return naming.power.get(smaller, 0.0) > EXCESS * naming.power.get(ids, np.inf)
 
 
