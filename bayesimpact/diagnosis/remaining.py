@@ -102,4 +102,5 @@ class Remaining(Settling):
         """A model with the likelier form of a residual force beside its effects."""
         beside = " + ".join(state.candidate.ids) or "the base model"
         self.progress(f"fitting a residual force beside {beside}")
-        return with_force(state.candidate, state.unknown, self.scales)
+        least = self.enough().least_gain
+        return with_force(state.candidate, state.unknown, self.scales, least_gain=least)

@@ -17,6 +17,7 @@ from bayesimpact.diagnosis.budget import (
     ANOTHER,
     COMPARISONS,
     LOOKS,
+    MOST_KEPT,
     PATIENCE,
     Budget,
     begin,
@@ -24,7 +25,7 @@ from bayesimpact.diagnosis.budget import (
 from bayesimpact.diagnosis.document import document
 from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.diagnosis.naming import Naming
-from bayesimpact.diagnosis.refit import Candidate
+from bayesimpact.diagnosis.refit import Candidate, Enough
 from bayesimpact.diagnosis.remaining import Remaining
 from bayesimpact.diagnosis.simpler import may_be_simpler
 
@@ -67,8 +68,8 @@ def test_a_budget_is_used_up_by_its_clock_alone() -> None:
 
 
 def test_a_search_keeps_time_for_its_comparisons() -> None:
-    """The longer a model takes to be scored, the more of it; at most half of all."""
-    for look, kept in ((0.0, COMPARISONS), (5.0, LOOKS * 5.0), (50.0, PATIENCE / 2)):
+    """The longer a model takes to be scored, the more of it; at most a share of all."""
+    for look, kept in ((0.0, COMPARISONS), (5.0, LOOKS * 5.0), (50.0, MOST_KEPT * PATIENCE)):
         clock = Clock()
         budget = begin(clock)
         clock.now = PATIENCE - kept - 1.0
@@ -225,12 +226,20 @@ def test_no_residual_force_is_fitted_once_the_time_is_up() -> None:
 )
 def test_a_residual_force_is_said_to_stand_beside_a_model(effects, named, monkeypatch) -> None:
     module = importlib.import_module("bayesimpact.diagnosis.remaining")
-    monkeypatch.setattr(module, "with_force", lambda candidate, unknown, scales: candidate)
+    least: list[float] = []
+
+    def fitted(candidate: Any, *others: Any, least_gain: float) -> Any:
+        least.append(least_gain)
+        return candidate
+
+    monkeypatch.setattr(module, "with_force", fitted)
     said: list[str] = []
     search = Remaining((), None, np.random.default_rng(0), said.append, Budget(Clock(), 0.0))
+    monkeypatch.setattr(search, "enough", lambda: Enough(least_gain=2.0))
     state: Any = SimpleNamespace(candidate=Candidate(effects, SimpleNamespace(), 0.0), unknown=None)
     search.with_residual(state)
     assert said == [f"fitting a residual force beside {named}"]
+    assert least == [2.0]  # no farther than other climbs of the search
 
 
 @pytest.mark.parametrize(

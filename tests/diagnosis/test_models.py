@@ -77,7 +77,7 @@ def test_an_end_that_no_motion_has_is_not_looked_at(monkeypatch):
 
 
 def test_a_search_keeps_time_for_comparisons_by_how_long_a_look_takes(monkeypatch):
-    now, took = [0.0], 9.0
+    now, took = [0.0], 6.0
 
     def scan(fit, effects, scales, *, rng):
         now[0] += took

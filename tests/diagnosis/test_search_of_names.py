@@ -40,7 +40,7 @@ def run(monkeypatch):
         monkeypatch.setattr(search, "missing_contact", table.contact)
         monkeypatch.setattr(search, "learn_force", lambda fit, force, scales: force.fit)
         monkeypatch.setattr(ranked, "residual_repetition", lambda fit: repetition)
-        monkeypatch.setattr(remaining, "with_force", lambda candidate, force, scales: candidate)
+        monkeypatch.setattr(remaining, "with_force", lambda candidate, *others, **near: candidate)
         monkeypatch.setattr(remaining, "discrepancy", lambda fit: None)
         monkeypatch.setattr(remaining, "may_be_needed", lambda naming, effect: True)
         monkeypatch.setattr(remaining, "is_imitated", lambda naming: False)
