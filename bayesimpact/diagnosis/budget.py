@@ -53,6 +53,12 @@ class Budget:
         """
         return self.left > max(COMPARISONS, min(LOOKS * look, MOST_KEPT * self.seconds))
 
+    def may_compare_on(self, look: float = 0.0) -> bool:
+        """Whether another fit that an answer is compared with may begin: where models take long to
+        be scored (`look`, s), also when the time is up, for an answer without tells nothing.
+        """
+        return self.left > -min(LOOKS * look, MOST_KEPT * self.seconds)
+
     def may_search_again(self) -> bool:
         """Whether another search may begin: with too little left it would compare too little."""
         return self.left >= ANOTHER

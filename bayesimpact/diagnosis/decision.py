@@ -217,17 +217,24 @@ def leads_without(naming: Naming, group: Group) -> bool:
     )
 
 
+def misses(naming: Naming, effect: Effect) -> bool:
+    """Whether `EXCESS` times as much misfit is left without an effect."""
+    ids = frozenset(naming.chosen.candidate.ids)
+    with_it, without_it = (
+        misfit_above_noise(naming, naming.states[key].candidate.fit)
+        for key in (ids, ids - {effect.id})
+    )
+    return without_it > EXCESS * with_it
+
+
 def stands_out(naming: Naming, effect: Effect) -> bool:
     """Whether `EXCESS` times as much is left without an effect, of misfit or of force."""
-    ids = frozenset(naming.chosen.candidate.ids)
-    smaller = ids - {effect.id}
-    with_it, without_it = (
-        misfit_above_noise(naming, naming.states[key].candidate.fit) for key in (ids, smaller)
-    )
-    if without_it > EXCESS * with_it:
+    if misses(naming, effect):
         return True
     if naming.own is not None and not naming.own.leaves_noise:
         return False  # what is left is no force of time: a size of one says nothing
+    ids = frozenset(naming.chosen.candidate.ids)
+    smaller = ids - {effect.id}
     return naming.power.get(smaller, 0.0) > EXCESS * naming.power.get(ids, np.inf)
 
 

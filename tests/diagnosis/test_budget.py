@@ -76,6 +76,10 @@ def test_a_search_keeps_time_for_its_comparisons() -> None:
         assert budget.may_search_on(look)
         clock.now += 1.0
         assert not budget.may_search_on(look)
+        clock.now = PATIENCE + (kept if look else 0.0) - 1.0
+        assert budget.may_compare_on(look) and budget.may_go_on() == (look == 0.0)
+        clock.now += 1.0
+        assert not budget.may_compare_on(look)
 
 
 def searches(
