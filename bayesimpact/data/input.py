@@ -74,6 +74,13 @@ class Input:
         """Samples first..end-1."""
         return replace(self, samples=self.samples[first:end])
 
+    @property
+    def weakened(self) -> float:
+        """Share of its root mean square that lines between its samples lose, 0 to 1."""
+        power = np.abs(np.fft.rfft(self.samples - self.samples.mean())) ** 2
+        lost = 1.0 - np.sinc(np.fft.rfftfreq(self.samples.size)) ** 2
+        return float(np.sqrt((power @ lost**2) / power.sum()))
+
     def force(self, mass: float, interval: float) -> Floats:
         """The forces on the mass between which lines are drawn, (n,), N, for a gain of 1."""
         force = self.shown(mass, interval)

@@ -15,8 +15,9 @@ Let S be the likeliest set of effects that the search reached.
      effect that has fewer effects or parameters; if it has more than S itself, one that has no
      more: more to fit with makes imitation easy, and the rest of the truth may be among it,
    - `EXCESS` times as much is left without it, other effects refitted: of the misfit above the
-     noise, or of the force about the motion's own frequencies. An effect that imitates what the
-     catalogue lacks may put the phase right, but leaves most of the force,
+     noise, or, where a force of time is all that S leaves, of that force about the motion's own
+     frequencies. An effect that imitates what the catalogue lacks may put the phase right, but
+     leaves most of the force,
    - its size is apart from none at all by `APART` of its own standard deviations, with what the
      remainder may have done to it in them (`discrepancy`),
    - no set without it, with a residual force of whichever form is likeliest, is likelier than S
@@ -216,15 +217,24 @@ def leads_without(naming: Naming, group: Group) -> bool:
     )
 
 
+def misses(naming: Naming, effect: Effect) -> bool:
+    """Whether `EXCESS` times as much misfit is left without an effect."""
+    ids = frozenset(naming.chosen.candidate.ids)
+    with_it, without_it = (
+        misfit_above_noise(naming, naming.states[key].candidate.fit)
+        for key in (ids, ids - {effect.id})
+    )
+    return without_it > EXCESS * with_it
+
+
 def stands_out(naming: Naming, effect: Effect) -> bool:
     """Whether `EXCESS` times as much is left without an effect, of misfit or of force."""
+    if misses(naming, effect):
+        return True
+    if naming.own is not None and not naming.own.leaves_noise:
+        return False  # what is left is no force of time: a size of one says nothing
     ids = frozenset(naming.chosen.candidate.ids)
     smaller = ids - {effect.id}
-    with_it, without_it = (
-        misfit_above_noise(naming, naming.states[key].candidate.fit) for key in (ids, smaller)
-    )
-    if without_it > EXCESS * with_it:
-        return True
     return naming.power.get(smaller, 0.0) > EXCESS * naming.power.get(ids, np.inf)
 
 

@@ -18,7 +18,16 @@ from bayesimpact.diagnosis.force import missing_drift, missing_force
 from bayesimpact.diagnosis.naming import State, is_large, leaves_something
 from bayesimpact.diagnosis.own_band import shakes_in_own_band
 from bayesimpact.diagnosis.profile_likelihood import profiled
-from bayesimpact.diagnosis.refit import Candidate, exchanged, fit_from, grown, refit, without
+from bayesimpact.diagnosis.refit import (
+    TO_THE_MODE,
+    Candidate,
+    Enough,
+    exchanged,
+    fit_from,
+    grown,
+    refit,
+    without,
+)
 from bayesimpact.diagnosis.scan import Scan, scan
 from bayesimpact.diagnosis.scores import Score
 from bayesimpact.diagnosis.smoothing import is_refuted
@@ -54,6 +63,7 @@ class Models:
         self.dropped: set[tuple[frozenset[str], float, str]] = set()
         self.profiled: set[frozenset[str]] = set()
         self.refits = 0
+        self.look = 0.0  # s, that the last model took to be scored
         self.repeated: tuple[Candidate, float] | None = None
 
     def keep(self, candidate: Candidate) -> Candidate:
@@ -80,9 +90,11 @@ class Models:
         if held is not None and held.candidate is candidate:
             return held
         self.progress("scoring what " + (" + ".join(candidate.ids) or "the base model") + " lacks")
+        begun = self.budget.left
         found = scan(candidate.fit, self.effects, self.scales, rng=self.rng)
         force = missing_force(candidate.fit, self.scales, rng=self.rng)
         drift = missing_drift(candidate.fit, self.scales, rng=self.rng)
+        self.look = begun - self.budget.left
         state = State(candidate, found, force, drift)
         self.states[frozenset(candidate.ids)] = state
         unconverged = candidate.effects and not candidate.fit.converged
@@ -135,8 +147,9 @@ class Models:
             self.begun.add(begun)
             self.tell("fitting " + " + ".join((*candidate.ids, *(s.effect.id for s in scores))))
             least = candidate.fit.log_likelihood if candidate.effects else -np.inf
-            goal = max(self.goal(rival), least)
-            self.keep(refit(candidate.fit, scores, self.scales, goal=goal))
+            enough = self.enough(rival)
+            enough = replace(enough, goal=max(enough.goal, least))
+            self.keep(refit(candidate.fit, scores, self.scales, enough=enough))
 
     def fit_sets(self, about: Candidate, most: int, flight: bool) -> list[Candidate]:
         """Models that the equation of motion asks for about a model, in flight or altogether.
@@ -186,15 +199,15 @@ class Models:
         kept = first | {s.effect.id for s in promising if s.effect.id not in seen}
         return [s for s in found.best() if s.effect.id in kept]
 
-    def goal(self, rival: Candidate | None = None) -> float:
-        """Log likelihood below which no climb matters, to models that are to be compared with a
-        `rival`: minus infinity, as long as none is known.
+    def enough(self, rival: Candidate | None = None) -> Enough:
+        """When climbs may end early, to models that are to be compared with a `rival`: as long as
+        nothing is known, at the mode.
         """
-        return -np.inf
+        return TO_THE_MODE
 
     def may_go_on(self) -> bool:
         """Whether the budget allows for more refits."""
-        return self.budget.may_search_on()
+        return self.budget.may_search_on(self.look)
 
     def tell(self, words: str) -> None:
         """Count a refit, and say which."""
@@ -211,7 +224,8 @@ class Models:
         if step not in self.dropped:
             self.dropped.add(step)
             self.tell("without " + effect.id)
-            self.keep(without(candidate, effect, self.scales))
+            enough = replace(self.enough(), goal=-np.inf)
+            self.keep(without(candidate, effect, self.scales, enough=enough))
         return self.tried[frozenset(i for i in candidate.ids if i != effect.id)]
 
     def exchange_on_off(self, candidate: Candidate, old: Effect, new: Effect) -> None:
@@ -220,7 +234,8 @@ class Models:
         if begun not in self.begun:
             self.begun.add(begun)
             self.tell(f"{new.id} in place of {old.id} in " + " + ".join(candidate.ids))
-            self.keep(exchanged(candidate, old, new, self.scales, goal=self.goal(candidate)))
+            enough = self.enough(candidate)
+            self.keep(exchanged(candidate, old, new, self.scales, enough=enough))
 
     def finished(self, candidate: Candidate) -> Candidate:
         """A model whose climb did not converge, at the highest point of its profile likelihood."""

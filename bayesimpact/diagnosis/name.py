@@ -87,7 +87,7 @@ def name(
             break
         begun.add(key)
         beam = [state]
-    return search.naming(base, state)
+    return search.naming(base, search.at_its_mode(state))
 
 
 class _Search(Remaining):
@@ -99,7 +99,7 @@ class _Search(Remaining):
         while not state.is_white and self.may_go_on():
             found, waiting = self.extensions([s for s in beam if self.may_grow(s)])
             better = self.best_first(state, found)
-            if not better or self.promise(better[0]) <= self.promise(state.candidate):
+            if not better or not self.leads_on(state, better[0]):
                 break
             state = self.examine(better[0])
             if not state.is_white:

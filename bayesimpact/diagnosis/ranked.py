@@ -7,9 +7,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from bayesimpact.diagnosis.models import UNCONVERGED_SHORTFALL, Models
-from bayesimpact.diagnosis.naming import is_large
+from bayesimpact.diagnosis.naming import State, is_large, leaves_something
 from bayesimpact.diagnosis.promising import refit_candidates
-from bayesimpact.diagnosis.refit import Candidate, residual_repetition, tempered_evidence
+from bayesimpact.diagnosis.refit import (
+    LITTLE,
+    Candidate,
+    Enough,
+    grown,
+    residual_repetition,
+    tempered_evidence,
+)
 from bayesimpact.diagnosis.scan import Scan
 from bayesimpact.diagnosis.scores import Score
 from bayesimpact.diagnosis.thresholds import DECISIVE
@@ -58,12 +65,35 @@ class Ranked(Models):
             self.repeated = best, residual_repetition(best.fit)
         return self.repeated[1]
 
+    def leads_on(self, state: State, larger: Candidate) -> bool:
+        """Whether a larger model is the next one. Of what a large misfit has become, where that is
+        no more than the noise, odds must demand more: such an effect would be left out again.
+        """
+        if self.is_large and not leaves_something(state.candidate.fit):
+            return self.log_odds(larger) >= self.log_odds(state.candidate) + DECISIVE
+        return self.promise(larger) > self.promise(state.candidate)
+
     def force_gain(self) -> float:
         """What a free force in place of all effects would be worth, as far as scores tell, each
         independent sample counted once.
         """
         base = self.states[frozenset()]
         return self.log_odds(base.candidate) + base.unknown.log_evidence / self.repetition()
+
+    def enough(self, rival: Candidate | None = None) -> Enough:
+        """When climbs may end early. Where the misfit is large, as near to the mode as odds ask
+        for, which count each repeated sample of a residual once.
+        """
+        least = LITTLE * self.repetition() if self.is_large else 0.0
+        return Enough(self.goal(rival), least)
+
+    def at_its_mode(self, state: State) -> State:
+        """The same model where its climb, which ended early, leads in the end (`enough`)."""
+        candidate = state.candidate
+        if candidate.fit.converged or not (candidate.effects and self.is_large):
+            return state
+        self.tell("fitting " + " + ".join(candidate.ids) + " to the end")
+        return self.examine(grown(candidate, candidate.effects, self.scales))
 
     def goal(self, rival: Candidate | None = None) -> float:
         """Log likelihood that a model must reach to come within the decisive odds of a `rival`, and

@@ -33,6 +33,7 @@ TOLERANCE = 0.02  # last step of a refit, standard deviations
 ITERATIONS = 40
 SHARES = (0.5, 0.25, 0.125, 0.0625)  # of the predicted shift, where the whole of it goes too far
 GAINED = 1.0  # nats: what gains less than this over a model that it contains begins again
+LITTLE = 0.1  # nats of odds: a climb that gains less by a step decides nothing
 WHITE_SD = 4.0  # one lag of 16,000 of white noise lies beyond: none in a recording
 
 
@@ -72,19 +73,37 @@ class Candidate:
         return np.asarray(np.clip(np.linalg.eigvalsh(shares), 0.0, 1.0))
 
 
+@dataclass(frozen=True)
+class Enough:
+    """When a climb may end early, see `find_mode`.
+
+    Attributes
+    ----------
+    goal : log likelihood, nats, below which an end is of no use
+    least_gain : of a step, nats: less decides nothing
+    """
+
+    goal: float = -np.inf
+    least_gain: float = 0.0
+
+
+TO_THE_MODE = Enough()
+
+
 def base_candidate(fit: Fit) -> Candidate:
     """The base model as a candidate."""
     return Candidate(fit.target.oscillator.effects, fit, model_evidence(fit))
 
 
-def refit(fit: Fit, scores: Sequence[Score], scales: Scales, *, goal: float = -np.inf) -> Candidate:
+def refit(
+    fit: Fit, scores: Sequence[Score], scales: Scales, *, enough: Enough = TO_THE_MODE
+) -> Candidate:
     """Fit the model of `fit` with the effects of `scores` added.
 
     The scores are linear predictions. The climb begins at the best point between the unshifted
     model and the predicted one; one that gains nothing begins again at either end. Where the misfit
     is large, predictions point beyond the mode and side minima lie close: there a climb over
-    growing stretches of the recordings is taken too. A climb that will not reach a log likelihood
-    of `goal` ends early.
+    growing stretches of the recordings is taken too.
     """
     effects = (*fit.target.oscillator.effects, *(s.effect for s in scores))
     shapes = {name: value for s in scores for name, value in s.shapes.items()}
@@ -97,9 +116,10 @@ def refit(fit: Fit, scores: Sequence[Score], scales: Scales, *, goal: float = -n
         fit, target, step_sizes(names, target.oscillator.acting, scales, scores)
     )
     start = best_start(target, unshifted, predicted, steps)
-    goal += prior_at(target, unshifted)
+    goal = enough.goal + prior_at(target, unshifted)
     options: dict[str, Any] = {
-        "steps": steps, "tolerance": TOLERANCE, "max_iterations": ITERATIONS, "goal": goal
+        "steps": steps, "tolerance": TOLERANCE, "max_iterations": ITERATIONS, "goal": goal,
+        "least_gain": enough.least_gain,
     }  # fmt: skip
     if fit.reduced_chi2 > LARGE**2:
         found = of_two_ways(target, start, unshifted, steps, goal)
@@ -214,9 +234,12 @@ def best_start(target: Target, unshifted: Array, predicted: Array, steps: Array)
     return np.asarray(unshifted + shares[best] * (predicted - unshifted))
 
 
-def without(candidate: Candidate, effect: Effect, scales: Scales) -> Candidate:
+def without(
+    candidate: Candidate, effect: Effect, scales: Scales, *, enough: Enough = TO_THE_MODE
+) -> Candidate:
     """The candidate's model without one of its effects, refitted."""
-    return _refitted(candidate, tuple(e for e in candidate.effects if e.id != effect.id), scales)
+    rest = tuple(e for e in candidate.effects if e.id != effect.id)
+    return _refitted(candidate, rest, scales, enough)
 
 
 def grown(candidate: Candidate, effects: tuple[Effect, ...], scales: Scales) -> Candidate:
@@ -225,18 +248,18 @@ def grown(candidate: Candidate, effects: tuple[Effect, ...], scales: Scales) -> 
 
 
 def exchanged(
-    candidate: Candidate, old: Effect, new: Effect, scales: Scales, *, goal: float = -np.inf
+    candidate: Candidate, old: Effect, new: Effect, scales: Scales, *, enough: Enough = TO_THE_MODE
 ) -> Candidate:
     """The candidate's model with an effect that has no size in the place of one of its own.
 
     Such an effect cannot grow from nothing, so the climb begins where the imitated one stands.
     """
     effects = (*(e for e in candidate.effects if e.id != old.id), new)
-    return _refitted(candidate, effects, scales, goal)
+    return _refitted(candidate, effects, scales, enough)
 
 
 def _refitted(
-    candidate: Candidate, effects: tuple[Effect, ...], scales: Scales, goal: float = -np.inf
+    candidate: Candidate, effects: tuple[Effect, ...], scales: Scales, enough: Enough = TO_THE_MODE
 ) -> Candidate:
     """A model fitted from the candidate's mode, effects that it lacks at their null."""
     target = extend(candidate.fit, effects, scales)
@@ -244,9 +267,10 @@ def _refitted(
     start = transfer(candidate.fit, layout, effects, scales, {})
     sizes = step_sizes(layout.names, target.oscillator.acting, scales, ())
     steps = difference_steps(candidate.fit, target, sizes)
-    goal += prior_at(target, start)
+    goal = enough.goal + prior_at(target, start)
     options: dict[str, Any] = {
-        "steps": steps, "tolerance": TOLERANCE, "max_iterations": ITERATIONS, "goal": goal
+        "steps": steps, "tolerance": TOLERANCE, "max_iterations": ITERATIONS, "goal": goal,
+        "least_gain": enough.least_gain,
     }  # fmt: skip
     found = find_mode(target, start, **options)
     if not np.isfinite(found.log_posterior):  # an effect that is gone had kept the motion bounded

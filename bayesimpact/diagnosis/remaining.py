@@ -11,6 +11,7 @@ from bayesimpact.diagnosis.decision import (
     is_imitated,
     leads_without,
     may_be_needed,
+    misses,
     ordered,
 )
 from bayesimpact.diagnosis.discrepancy import Discrepancy, discrepancy
@@ -40,9 +41,10 @@ class Remaining(Settling):
         alone = [(e,) for e in ordered(found, chosen.effects)]
         groups = [g if leads_without(found, g) else group_of(found, g[0]) for g in alone]
         leading = [g for g in groups if leads_without(found, g)]
-        without = {g[0].id: discrepancy(smaller[g[0].id].fit) for g in leading}
         own = left if left is not None and left.fit is chosen.fit else discrepancy(chosen.fit)
         if own is not None:
+            doubtful = [g[0].id for g in leading if own.leaves_noise and not misses(found, g[0])]
+            without = {i: discrepancy(smaller[i].fit) for i in doubtful}
             power = {
                 frozenset(smaller[i].ids): d.power for i, d in without.items() if d is not None
             }
@@ -68,7 +70,7 @@ class Remaining(Settling):
         residual = dict(found.residual)
         for candidate in candidates:
             key = frozenset(candidate.ids)
-            if key not in residual and self.budget.may_go_on():
+            if key not in residual and self.budget.may_compare_on(self.look):
                 residual[key] = self.with_residual(self.examine(candidate))
         late = any(frozenset(c.ids) not in residual for c in candidates)
         return replace(
@@ -102,4 +104,5 @@ class Remaining(Settling):
         """A model with the likelier form of a residual force beside its effects."""
         beside = " + ".join(state.candidate.ids) or "the base model"
         self.progress(f"fitting a residual force beside {beside}")
-        return with_force(state.candidate, state.unknown, self.scales)
+        least = self.enough().least_gain
+        return with_force(state.candidate, state.unknown, self.scales, least_gain=least)

@@ -12,6 +12,7 @@ from bayesimpact.diagnosis.learned import LEARNED, knots_of, refined_force
 from bayesimpact.diagnosis.naming import is_large, leaves_something
 from bayesimpact.diagnosis.refit import (
     ITERATIONS,
+    LITTLE,
     TOLERANCE,
     Candidate,
     best_start,
@@ -24,11 +25,11 @@ from bayesimpact.model.effects.effect import Effect, Scales
 Array = NDArray[np.float64]
 
 INTERVALS = (3, 7, 21, 42)  # between the knots; each divides a finer one
-LITTLE = 0.1  # nats of odds: a climb that gains less by a step decides nothing
 
 
-def learn_force(fit: Fit, force: MissingForce, scales: Scales) -> Fit:
-    """Fit the parameters and the coefficients of a free force together.
+def learn_force(fit: Fit, force: MissingForce, scales: Scales, *, least_gain: float = 0.0) -> Fit:
+    """Fit the parameters and the coefficients of a free force together; `least_gain` as in
+    `find_mode`.
 
     The linearised problem says where to begin; where that is worse than no force, the climb begins
     between both.
@@ -46,29 +47,33 @@ def learn_force(fit: Fit, force: MissingForce, scales: Scales) -> Fit:
     floor = 1e-9 * np.repeat([scales.force, scales.force / scales.speed], force.knots)
     sizes = dict(zip(coefficient_names(force.knots), np.maximum(sd, floor), strict=True))
     steps = difference_steps(fit, target, sizes)
-    return _climbed(target, best_start(target, unshifted, start, steps), steps, fit)
+    return _climbed(target, best_start(target, unshifted, start, steps), steps, fit, least_gain)
 
 
-def _climbed(target: Target, start: Array, steps: Array, before: Fit) -> Fit:
+def _climbed(target: Target, start: Array, steps: Array, before: Fit, least: float) -> Fit:
     """The mode; where the misfit is large, as near as odds ask for, which count each repeated
     sample of a residual once.
     """
-    least = LITTLE * residual_repetition(before) if is_large(before) else 0.0
+    if is_large(before):
+        least = max(least, LITTLE * residual_repetition(before))
     return find_mode(
         target, start, steps=steps, tolerance=TOLERANCE, max_iterations=ITERATIONS, least_gain=least
     )
 
 
-def with_force(candidate: Candidate, force: MissingForce, scales: Scales) -> Candidate:
-    """A model with a residual force beside its effects, fitted in full.
+def with_force(
+    candidate: Candidate, force: MissingForce, scales: Scales, *, least_gain: float = 0.0
+) -> Candidate:
+    """A model with a residual force beside its effects, fitted in full, or to where steps gain less
+    than `least_gain`.
 
     The linearised problem chooses how fine the force is; where something remains beside the force,
     a finer one is fitted from there, as long as that is likelier.
     """
-    fit = learn_force(candidate.fit, force, scales)
+    fit = learn_force(candidate.fit, force, scales, least_gain=least_gain)
     best = Candidate(fit.target.oscillator.effects, fit, model_evidence(fit))
     while leaves_something(best.fit) and (factors := finer_factors(best.effects[-1])):
-        fit = _refined(candidate.fit, best.fit, factors[0], scales)
+        fit = _refined(candidate.fit, best.fit, factors[0], scales, least_gain)
         finer = Candidate(fit.target.oscillator.effects, fit, model_evidence(fit))
         if not finer.log_evidence > best.log_evidence:
             break
@@ -83,7 +88,7 @@ def finer_factors(effect: Effect) -> list[int]:
     return [n // own for n in INTERVALS if knots.reach == 0.0 and n > own and n % own == 0]
 
 
-def _refined(before: Fit, found: Fit, factor: int, scales: Scales) -> Fit:
+def _refined(before: Fit, found: Fit, factor: int, scales: Scales, least: float) -> Fit:
     """A model with its learned force on finer knots, fitted from where it stands.
 
     Cubic splines on nested knots: the finer one begins as exactly the same force.
@@ -99,7 +104,7 @@ def _refined(before: Fit, found: Fit, factor: int, scales: Scales) -> Fit:
     values[:, 1] = np.repeat(np.median(own[:, :, 1], axis=1), more)
     known |= dict(zip(coefficient_names(more), values, strict=True))
     start, sd = np.array([known[name] for name in target.oscillator.layout.names]).T
-    return _climbed(target, start, 0.05 * np.maximum(sd, 1e-12 * np.abs(start)), found)
+    return _climbed(target, start, 0.05 * np.maximum(sd, 1e-12 * np.abs(start)), found, least)
 
 
 def coefficient_names(knots: int) -> tuple[str, ...]:

@@ -79,14 +79,20 @@ def estimate_noise(campaign: Campaign) -> Noise:
 
 def _of_one(recordings: Sequence[Recording], smoothing: Smoothing | None) -> Noise:
     """Of recordings of one quantity, behind a filter or none."""
-    free = [r for r in recordings if r.input is None]
     if smoothing is None:
-        return raw_noise(free) if free else driven_noise(recordings, raw_noise(recordings))
+        return unfiltered_noise(recordings)
+    free = [r for r in recordings if r.input is None]
     if not free:
         return filtered_noise(recordings, smoothing)
     from bayesimpact.inference.spectrum import smoothed_noise
 
     return lower(smoothed_noise(free, smoothing), filtered_noise(free, smoothing))
+
+
+def unfiltered_noise(recordings: Sequence[Recording]) -> Noise:
+    """Of recordings of one quantity that passed no filter: of free decays, where there are any."""
+    free = [r for r in recordings if r.input is None]
+    return raw_noise(free) if free else driven_noise(recordings, raw_noise(recordings))
 
 
 def raw_noise(recordings: Sequence[Recording]) -> Noise:

@@ -9,11 +9,14 @@ from bayesimpact.data.period import crossing_period
 from bayesimpact.data.recording import Recording
 from bayesimpact.data.text_table import text_table
 from bayesimpact.inference.noise import Noise
-from bayesimpact.inference.noise_estimate import raw_noise
+from bayesimpact.inference.noise_estimate import unfiltered_noise
 from bayesimpact.model.parameters import build_layout
 
 BARS = "▁▂▃▄▅▆▇█"
 COLUMNS = 40
+# of an input, lost between its samples: an error that a gain cannot take up; a sine loses as much
+# with 18 samples a period
+WEAKENED = 0.01
 
 
 def measured_noise(campaign: Campaign) -> Noise | None:
@@ -21,7 +24,7 @@ def measured_noise(campaign: Campaign) -> Noise | None:
     if campaign.measurement.smoothing is not None:
         return None
     first = campaign.recordings[0].quantity
-    return raw_noise([r for r in campaign.recordings if r.quantity == first])
+    return unfiltered_noise([r for r in campaign.recordings if r.quantity == first])
 
 
 def campaign_text(campaign: Campaign, noise: Noise | None) -> str:
@@ -77,6 +80,12 @@ def _recording_warnings(recording: Recording, *, stop: bool) -> list[str]:
     if per_period < 20:
         poorly = "contacts are" if stop else "what changes within one is"
         warnings.append(f"only {per_period:.0f} samples per period: {poorly} seen poorly")
+    given = recording.input
+    if given is not None and not given.band_limited and given.weakened > WEAKENED:
+        warnings.append(
+            f"lines between the samples of its input lose {100 * given.weakened:.2g} % of it: if "
+            'it passed an anti-aliasing filter, set hold = "band_limited" in input'
+        )
     if recording.duration < 5 * period:
         warnings.append(f"only {recording.duration / period:.1f} periods: damping is seen poorly")
     rest = np.median(recording.samples[recording.samples.size // 2 :])

@@ -74,10 +74,10 @@ class Table:
         )  # fmt: skip
         return Candidate(tuple(BY_ID[i] for i in ids), fit, gain)
 
-    def refit(self, fit, scores, scales, *, goal) -> Candidate:
+    def refit(self, fit, scores, scales, *, enough) -> Candidate:
         ids = (*fit.ids, *(s.effect.id for s in scores))
         self.fitted.append(key := frozenset(ids))
-        self.goals[key] = goal
+        self.goals[key] = enough.goal
         reached = self.forward.get(key, self.gain(ids))
         return self.candidate(ids, self.once.pop(key, reached))
 
@@ -106,11 +106,11 @@ class Table:
             has_stop=bool(self.asked_in_flight), seen=set(self.seen), about=about, first=first
         )
 
-    def without(self, candidate, effect, scales) -> Candidate:
+    def without(self, candidate, effect, scales, *, enough) -> Candidate:
         ids = [i for i in candidate.ids if i != effect.id]
         return self.candidate(ids, self.gain(ids))
 
-    def exchanged(self, candidate, old, new, scales, *, goal) -> Candidate:
+    def exchanged(self, candidate, old, new, scales, *, enough) -> Candidate:
         ids = [i for i in candidate.ids if i != old.id] + [new.id]
         return self.candidate(ids, self.gain(ids))
 

@@ -13,11 +13,19 @@ import pytest
 import small_rig
 from effect_rigs import BY_ID
 
-from bayesimpact.diagnosis.budget import ANOTHER, COMPARISONS, PATIENCE, Budget, begin
+from bayesimpact.diagnosis.budget import (
+    ANOTHER,
+    COMPARISONS,
+    LOOKS,
+    MOST_KEPT,
+    PATIENCE,
+    Budget,
+    begin,
+)
 from bayesimpact.diagnosis.document import document
 from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.diagnosis.naming import Naming
-from bayesimpact.diagnosis.refit import Candidate
+from bayesimpact.diagnosis.refit import Candidate, Enough
 from bayesimpact.diagnosis.remaining import Remaining
 from bayesimpact.diagnosis.simpler import may_be_simpler
 
@@ -57,6 +65,21 @@ def test_a_budget_is_used_up_by_its_clock_alone() -> None:
     assert not budget.may_search_again() and budget.may_go_on()
     clock.now += ANOTHER - 1.0
     assert budget.left == 0.0 and not budget.may_go_on()
+
+
+def test_a_search_keeps_time_for_its_comparisons() -> None:
+    """The longer a model takes to be scored, the more of it; at most a share of all."""
+    for look, kept in ((0.0, COMPARISONS), (5.0, LOOKS * 5.0), (50.0, MOST_KEPT * PATIENCE)):
+        clock = Clock()
+        budget = begin(clock)
+        clock.now = PATIENCE - kept - 1.0
+        assert budget.may_search_on(look)
+        clock.now += 1.0
+        assert not budget.may_search_on(look)
+        clock.now = PATIENCE + (kept if look else 0.0) - 1.0
+        assert budget.may_compare_on(look) and budget.may_go_on() == (look == 0.0)
+        clock.now += 1.0
+        assert not budget.may_compare_on(look)
 
 
 def searches(
@@ -207,12 +230,20 @@ def test_no_residual_force_is_fitted_once_the_time_is_up() -> None:
 )
 def test_a_residual_force_is_said_to_stand_beside_a_model(effects, named, monkeypatch) -> None:
     module = importlib.import_module("bayesimpact.diagnosis.remaining")
-    monkeypatch.setattr(module, "with_force", lambda candidate, unknown, scales: candidate)
+    least: list[float] = []
+
+    def fitted(candidate: Any, *others: Any, least_gain: float) -> Any:
+        least.append(least_gain)
+        return candidate
+
+    monkeypatch.setattr(module, "with_force", fitted)
     said: list[str] = []
     search = Remaining((), None, np.random.default_rng(0), said.append, Budget(Clock(), 0.0))
+    monkeypatch.setattr(search, "enough", lambda: Enough(least_gain=2.0))
     state: Any = SimpleNamespace(candidate=Candidate(effects, SimpleNamespace(), 0.0), unknown=None)
     search.with_residual(state)
     assert said == [f"fitting a residual force beside {named}"]
+    assert least == [2.0]  # no farther than other climbs of the search
 
 
 @pytest.mark.parametrize(

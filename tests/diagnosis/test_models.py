@@ -9,6 +9,7 @@ import pytest
 from effect_rigs import BY_ID
 
 from bayesimpact.diagnosis import models
+from bayesimpact.diagnosis.budget import COMPARISONS, LOOKS, PATIENCE, begin
 from bayesimpact.diagnosis.models import Models
 from bayesimpact.diagnosis.refit import Candidate
 
@@ -49,7 +50,7 @@ def test_a_set_reaches_no_less_than_what_it_contains(monkeypatch, reached, again
 def test_an_effect_is_left_out_anew_where_its_model_has_reached_more(monkeypatch):
     """What a worse end of the larger model led to says little of the smaller one."""
 
-    def without(larger, effect, scales):
+    def without(larger, effect, scales, *, enough):
         left = " ".join(i for i in larger.ids if i != effect.id)
         return candidate(left, larger.fit.log_likelihood - 5.0)
 
@@ -73,3 +74,21 @@ def test_an_end_that_no_motion_has_is_not_looked_at(monkeypatch):
     kept = search.keep(candidate("sensor_hum", -np.inf))
     assert kept.log_evidence == -np.inf
     assert search.keep(candidate("sensor_hum", 20.0)).log_evidence == 20.0
+
+
+def test_a_search_keeps_time_for_comparisons_by_how_long_a_look_takes(monkeypatch):
+    now, took = [0.0], 6.0
+
+    def scan(fit, effects, scales, *, rng):
+        now[0] += took
+
+    monkeypatch.setattr(models, "scan", scan)
+    for force in ("missing_force", "missing_drift"):
+        monkeypatch.setattr(models, force, lambda fit, scales, *, rng: None)
+    search = made_up(monkeypatch)
+    search.budget = begin(lambda: now[0])
+    search.examine(candidate("", 0.0))
+    now[0] = PATIENCE - COMPARISONS - 1.0
+    assert search.budget.may_search_on() and not search.may_go_on()
+    now[0] = PATIENCE - LOOKS * took - 1.0
+    assert search.may_go_on()

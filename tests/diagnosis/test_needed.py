@@ -169,6 +169,16 @@ def test_an_effect_may_stand_out_by_the_force_that_is_left_without_it():
         assert judge(replace(found, power=power)) == verdict
 
 
+@pytest.mark.parametrize(("leaves_noise", "verdict"), [(True, "partly"), (False, "unknown")])
+def test_a_force_of_time_that_leaves_more_than_noise_lets_nothing_stand_out(leaves_noise, verdict):
+    found = remaining(something_left(), 15.0, 10.0)
+    power = {frozenset([FRICTION]): 1.0, frozenset[str](): 2 * EXCESS}
+    assert (
+        judge(replace(found, power=power, own=SimpleNamespace(leaves_noise=leaves_noise)))
+        == verdict
+    )
+
+
 def test_odds_are_those_beside_a_force_of_time_where_one_remains():
     """What the force explains of the base model as well is no evidence for an effect."""
     found = remaining(something_left(), 100.0, 10.0)

@@ -17,7 +17,9 @@ from bayesimpact.diagnosis.directions import directions
 from bayesimpact.diagnosis.evidence import SPREADS, common_spread, log_evidence
 from bayesimpact.diagnosis.extend import campaign_scales, extend, transfer
 from bayesimpact.diagnosis.refit import (
+    TO_THE_MODE,
     Candidate,
+    Enough,
     base_candidate,
     fit_from,
     or_by_stretches,
@@ -219,6 +221,23 @@ def test_a_refit_finds_what_was_planted(planted):
     occam = np.log(2 / np.sqrt(2 * np.pi) / scale) + np.log(np.sqrt(2 * np.pi) * sd)
     expected = 0.5 * z**2 + occam
     assert found.log_evidence - base.log_evidence == pytest.approx(expected, abs=0.05 * z**2 + 1)
+
+
+def test_climbs_are_told_when_they_are_near_enough(planted, monkeypatch):
+    fit, scales = planted
+    scores, asked = [score_of(fit, scales, "coulomb_friction")], []
+    found = refit(fit, scores, scales)
+
+    def climbed(target, start, **options):
+        asked.append(options["least_gain"])
+        return found.fit
+
+    monkeypatch.setattr(refits, "find_mode", climbed)
+    for enough, least in ((TO_THE_MODE, 0.0), (Enough(least_gain=2.0), 2.0)):
+        refit(fit, scores, scales, enough=enough)
+        without(found, BY_ID["coulomb_friction"], scales, enough=enough)
+        assert set(asked) == {least}
+        asked.clear()
 
 
 def test_evidence_of_an_added_effect_by_importance_sampling(planted):

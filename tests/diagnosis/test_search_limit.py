@@ -18,11 +18,13 @@ CATALOGUE = [BY_ID[i] for i in ("coulomb_friction", "quadratic_drag", "spring_cu
 
 
 def searched(*, looks: int):
-    """What a search finds that may look at its clock so many times before the time is up."""
+    """What a search finds that may look at its clock so many times before the time is up, beside
+    its beginning and how long the base model takes to be scored.
+    """
     effects = {"spring_cubic": {"stiffness": 4e5}, "quadratic_drag": {"coefficient": 0.3}}
     campaign = small_rig.record(7, effects, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES)
     fit = identify(campaign, rng=np.random.default_rng(0), search=False).fit
-    times = itertools.chain([0.0] * (1 + looks), itertools.repeat(PATIENCE + 1.0))
+    times = itertools.chain([0.0] * (3 + looks), itertools.repeat(PATIENCE + 1.0))
     scales = campaign_scales(fit)
     budget = begin(lambda: next(times))
     return name(fit, CATALOGUE, scales, rng=np.random.default_rng(0), budget=budget)

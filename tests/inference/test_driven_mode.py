@@ -126,6 +126,25 @@ def test_noise_from_the_gap_that_an_input_leaves() -> None:
     assert "above the input's band" in noise.source and not noise.is_bound
 
 
+def test_noise_from_the_gap_in_a_short_recording() -> None:
+    recording = _band_limited(1200, 0.3, 2e-3)
+    noise = estimate_noise(Campaign("rig", 1.0, (recording,), stop=False))
+    assert noise.level == pytest.approx(2e-3, rel=0.35)  # of bands that differ, the loudest
+    assert "above the input's band" in noise.source
+
+
+def test_a_hum_in_the_input_hides_nothing_of_its_gap() -> None:
+    """The recorder's filter cuts the noise above the hum: there it would seem to be less."""
+    recording = _band_limited(8192, 0.3, 0.0)
+    noise = np.fft.rfft(2e-3 * np.random.default_rng(3).standard_normal(8192))
+    noise[np.fft.rfftfreq(8192) > 0.42] *= 1e-2
+    hum = 0.05 * np.sin(2 * np.pi * 0.425 * np.arange(8192))
+    samples = recording.samples + np.fft.irfft(noise, 8192)
+    humming = replace(recording, samples=samples, input=Input(recording.input.samples + hum))
+    found = estimate_noise(Campaign("rig", 1.0, (humming,), stop=False))
+    assert 1.8e-3 < found.level < 2.8e-3 and found.is_bound  # the loudest of its bands
+
+
 def test_noise_without_a_gap_is_a_bound_that_a_residual_lowers() -> None:
     recording = _band_limited(8192, 0.5, 2e-3)
     noise = estimate_noise(Campaign("rig", 1.0, (recording,), stop=False))
