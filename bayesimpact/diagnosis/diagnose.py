@@ -90,20 +90,14 @@ class Searches:
 
     def search(self, corrected: Corrected, first: Fit | None = None) -> Diagnosis:
         """With what is left of the budget, from the model of `first` on where that is given."""
-        for fault in corrected.faults:
-            words = f"{fault.recording}: {fault.statement} ({fault.id})"
-            self.progress(f"set aside or corrected: {words}")
-        if corrected.filtered is not None:
-            self.progress("the noise spectrum proves a filter: fitted through it")
-        found = diagnose_fit(
-            corrected.identification,
+        return _of_corrected(
+            corrected,
             rng=self.rng,
             effects=self.effects,
             progress=self.progress,
             budget=self.budget,
             first=first,
         )
-        return _of_corrected(found, corrected, rng=self.rng)
 
     def again(
         self,
@@ -276,9 +270,24 @@ def _without_late_spikes(found: Diagnosis, as_read: Campaign, searches: Searches
     )
 
 
-def _of_corrected(found: Diagnosis, corrected: Corrected, *, rng: np.random.Generator) -> Diagnosis:
-    """What was found on a campaign whose faults are set aside or corrected, these included."""
+def _of_corrected(
+    corrected: Corrected,
+    *,
+    rng: np.random.Generator,
+    effects: Sequence[Effect],
+    progress: Progress,
+    budget: Budget,
+    first: Fit | None,
+) -> Diagnosis:
+    """The diagnosis of a campaign whose faults are set aside or corrected."""
+    for fault in corrected.faults:
+        progress(f"set aside or corrected: {fault.recording}: {fault.statement} ({fault.id})")
     through = corrected.identification
+    if corrected.filtered is not None:
+        progress("the noise spectrum proves a filter: fitted through it")
+    found = diagnose_fit(
+        through, rng=rng, effects=effects, progress=progress, budget=budget, first=first
+    )
     if corrected.filtered is not None:
         campaign = through.fit.target.oscillator.campaign
         measurement = replace(campaign.measurement, smoothing=None)

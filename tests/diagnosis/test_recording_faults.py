@@ -238,9 +238,9 @@ def test_a_proved_fault_is_not_searched_without(
     asked = []
     of_corrected = module._of_corrected
 
-    def remains(found: Diagnosis, corrected: Corrected, **others) -> Diagnosis:
+    def remains(corrected: Corrected, **others) -> Diagnosis:
         asked.append(corrected)
-        return replace(of_corrected(found, corrected, **others), verdict="partly")
+        return replace(of_corrected(corrected, **others), verdict="partly")
 
     monkeypatch.setattr(module, "_of_corrected", remains)
     monkeypatch.setattr(module, "promised_gains", lambda *_, **__: np.ones(effects))
