@@ -52,7 +52,7 @@ def remainder(
 
 
 def beyond_noise(fit: Fit) -> float:
-    """Rms of what a fit leaves, less the noise, m; all of it where the noise may be next to none."""
+    """Rms of what a fit leaves less the noise, m; all of it where the noise may be next to none."""
     if fit.target.likelihood.noise.is_bound:
         return fit.rms
     return fit.rms * float(np.sqrt(max(1.0 - 1.0 / max(fit.reduced_chi2, 1.0), 0.0)))
