@@ -18,7 +18,7 @@ class Remainder:
 
     Attributes
     ----------
-    rms : of the residual less the noise, m
+    rms : of the residual less the noise, m; of all of it where of the noise only a bound is known
     share : the same over the rms of the signal about its mean
     over_noise : rms residual over the noise
     regime, displacement, recordings : where, from the force of the guess where that has effects,
@@ -42,7 +42,7 @@ def remainder(
     if left is None:
         return None
     over = float(np.sqrt(after.reduced_chi2))
-    rms = after.rms * float(np.sqrt(max(1.0 - 1.0 / max(over, 1.0) ** 2, 0.0)))
+    rms = beyond_noise(after)
     signal = after.signal
     guess = likeliest_formula(formulas)
     better = max(naming.tried, key=naming.log_odds).fit
@@ -56,6 +56,13 @@ def remainder(
         rms, rms / signal, over, place.regime, place.displacement, place.recordings,
         guess or next_guess(naming, left),
     )  # fmt: skip
+
+
+def beyond_noise(fit: Fit) -> float:
+    """Rms of what a fit leaves less the noise, m; all of it where the noise may be next to none."""
+    if fit.target.likelihood.noise.is_bound:
+        return fit.rms
+    return fit.rms * float(np.sqrt(max(1.0 - 1.0 / max(fit.reduced_chi2, 1.0), 0.0)))
 
 
 def likeliest_formula(formulas: Formulas | None) -> str:

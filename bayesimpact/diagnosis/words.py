@@ -125,7 +125,8 @@ def remaining(left: Remainder | None, unit: str = "m") -> str:
     if left.rms > 0.0:
         size = (
             f"{two_digits(left.rms, unit)} rms ({two_digits(100 * left.share)} % of the signal; "
-            f"the residual is {two_digits(left.over_noise)} times the noise)"
+            f"the residual is {two_digits(left.over_noise)} times the noise"
+            f"{', of which only a bound is known' if left.over_noise < 1.0 else ''})"
         )
     guess = f"; likeliest: {titles_of(left.guess)}" if left.guess else ""
     return (

@@ -202,10 +202,14 @@ def test_a_search_keeps_time_for_what_its_answer_is_compared_with() -> None:
     assert list(found.residual.values()) == [base]
 
 
-def test_no_residual_force_is_fitted_once_the_time_is_up() -> None:
-    """The first one may take the time of the second; without that the search is not finished."""
+@pytest.mark.parametrize("look", [0.0, 5.0])
+def test_no_residual_force_is_fitted_once_the_time_is_up(look: float) -> None:
+    """The first one may take the time of the second, without which the search is not finished; but
+    where models take long to be scored.
+    """
     clock = Clock()
     search = Remaining((), None, np.random.default_rng(0), pytest.fail, Budget(clock, 0.0))
+    search.look = look
     first, second = (
         Candidate(effects, SimpleNamespace(), 0.0) for effects in ((), (BY_ID["coulomb_friction"],))
     )
@@ -221,7 +225,8 @@ def test_no_residual_force_is_fitted_once_the_time_is_up() -> None:
     found = search.with_forces(naming, [first])
     assert list(found.residual.values()) == [first] and found.finished
     found = search.with_forces(found, [first, second])
-    assert list(found.residual.values()) == [first] and not found.finished
+    assert list(found.residual.values()) == [first, second][: 1 + (look > 0.0)]
+    assert found.finished == (look > 0.0)
 
 
 @pytest.mark.parametrize(

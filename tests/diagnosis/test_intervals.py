@@ -104,4 +104,5 @@ def test_the_force_of_time_of_the_chosen_model_is_built_once(monkeypatch) -> Non
     assert found.verdict == "partly" and found.after is found.naming.chosen.candidate.fit
     assert len({id(fit) for fit in built}) == len(built) > 0
     assert any(fit is found.after for fit in built)
+    assert not any(fit is found.before for fit in built)  # its misfit tells enough
     assert found.naming.own is None
