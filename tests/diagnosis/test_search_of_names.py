@@ -75,9 +75,7 @@ def test_where_the_misfit_is_large_what_gains_most_per_effect_comes_first(run):
 
 @pytest.mark.parametrize("most", [ENOUGH, 320.0])
 def test_climbs_have_the_goal_to_come_near_what_they_are_compared_with(run, most):
-    """A model that leaves nothing, or the one that is exchanged: its odds less the decisive ones.
-    An effect alone has none.
-    """
+    """A model that leaves nothing, or the one that is exchanged; effects alone have none."""
     gains = {A: 300.0, B: 20.0, f"{A} {B}": most, f"{A} {C}": 310.0, f"{B} {D}": 310.0}
     table = Table(gains, chi2=100.0)
     assert chosen(run(table)) == {A, B}
