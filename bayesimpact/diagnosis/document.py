@@ -163,13 +163,16 @@ def _practical(d: Diagnosis, limit: Limit) -> float:
 
 
 def _detectable(d: Diagnosis) -> str:
-    budget = [(x.k2_bias, x.effect_id) for x in d.limits if x.answer != "cannot tell"]
-    if not budget:
+    """By how much what was not found may move k2; without a stop the parameter that moves most."""
+    stop = d.before.target.oscillator.campaign.stop
+    told = [x for x in d.limits if x.answer != "cannot tell"]
+    moved = [(x.k2_bias if stop else x.bias, "k2" if stop else x.biased, x.effect_id) for x in told]
+    if not moved:
         return ""
-    worst = max(budget)
+    sd, name, effect_id = max(moved)
     return (
-        f"What could still hide below its limit moves k2 by at most {worst[0]:.1f} of its standard "
-        f"deviations ({worst[1]})."
+        f"What could still hide below its limit moves {name} by at most {sd:.1f} of its standard "
+        f"deviations ({effect_id})."
     )
 
 

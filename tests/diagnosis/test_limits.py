@@ -9,8 +9,9 @@ import pytest
 from effect_rigs import BY_ID
 from scipy import stats
 
+from bayesimpact.diagnosis.document import _detectable
 from bayesimpact.diagnosis.extend import campaign_scales
-from bayesimpact.diagnosis.limits import _answer, limits, upper_limit
+from bayesimpact.diagnosis.limits import Limit, _answer, limits, upper_limit
 from bayesimpact.diagnosis.scan import scan
 
 
@@ -86,3 +87,12 @@ def test_hidden_bias_is_what_the_limit_would_do(found):
     assert friction.biased == fit.names[int(np.argmax(sizes))]
     k2 = [i for i, n in enumerate(fit.names) if n.startswith("k2")]
     assert friction.k2_bias == pytest.approx(np.abs(shift / fit.sd)[k2].max())
+
+
+@pytest.mark.parametrize(("stop", "told"), [("one-sided", "k2 by at most 0.7"), (False, "k1")])
+def test_what_could_hide_moves_a_parameter_that_is_there(stop, told: str) -> None:
+    one = Limit("gap_wear", "rate", "m/s", 1.0, 1.0, 1.0, "absent", 3.2, "k1", 0.7)
+    oscillator = SimpleNamespace(campaign=SimpleNamespace(stop=stop))
+    before = SimpleNamespace(target=SimpleNamespace(oscillator=oscillator))
+    words = _detectable(SimpleNamespace(limits=(one,), before=before))
+    assert f"moves {told}" in words
