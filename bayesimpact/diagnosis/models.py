@@ -228,8 +228,8 @@ class Models:
             self.keep(without(candidate, effect, self.scales, enough=enough))
         return self.tried[frozenset(i for i in candidate.ids if i != effect.id)]
 
-    def exchange_on_off(self, candidate: Candidate, old: Effect, new: Effect) -> None:
-        """An effect without a size in the place of another, from where that one stands, once."""
+    def exchange_in_place(self, candidate: Candidate, old: Effect, new: Effect) -> None:
+        """An effect in the place of another, fitted from where that one stands, once."""
         begun = (candidate.ids, candidate.fit.log_posterior, old.id, new.id)
         if begun not in self.begun:
             self.begun.add(begun)

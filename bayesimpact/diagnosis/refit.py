@@ -250,9 +250,10 @@ def grown(candidate: Candidate, effects: tuple[Effect, ...], scales: Scales) -> 
 def exchanged(
     candidate: Candidate, old: Effect, new: Effect, scales: Scales, *, enough: Enough = TO_THE_MODE
 ) -> Candidate:
-    """The candidate's model with an effect that has no size in the place of one of its own.
+    """The candidate's model with an effect in the place of one of its own.
 
-    Such an effect cannot grow from nothing, so the climb begins where the imitated one stands.
+    The climb begins where that one stands: an effect without a size cannot grow from nothing, and
+    the model without either may be a side minimum from which another one does not.
     """
     effects = (*(e for e in candidate.effects if e.id != old.id), new)
     return _refitted(candidate, effects, scales, enough)

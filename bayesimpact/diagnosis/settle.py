@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
+
 from bayesimpact.diagnosis.naming import State, is_large
 from bayesimpact.diagnosis.promising import families, in_place_of, is_redundant
 from bayesimpact.diagnosis.ranked import Ranked
 from bayesimpact.diagnosis.refit import Candidate
+from bayesimpact.diagnosis.scan import Scan
+from bayesimpact.diagnosis.scores import Score
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.model.effects.effect import Effect
 
@@ -80,19 +84,29 @@ class Settling(Ranked):
                         self.fit_more(rest, joint)
             scores = self.asked_beside(rest, chosen, found, self.refit_candidates(found))
             large = is_large(rest.fit)
-            for score in in_place_of(
-                effect, scores, large, self.asked.first(rest, chosen) if large else ()
-            ):
+            asked = self.asked.first(rest, chosen) if self.is_large else set[str]()
+            promising = in_place_of(effect, scores, large, asked if large else ())
+            for score in promising:
                 if self.may_go_on() and not is_redundant(rest, score.effect):
                     self.fit_one(rest, found, score, chosen)
                     if not score.effect.has_size:
-                        self.exchange_on_off(chosen, effect, score.effect)
+                        self.exchange_in_place(chosen, effect, score.effect)
+            # where the rest of a large misfit stands in a side minimum, scores do not see these
+            for new in _unseen(found, asked - {effect.id}, promising):
+                if self.may_go_on() and not is_redundant(rest, new):
+                    self.exchange_in_place(chosen, effect, new)
 
     def simplified(self, chosen: Candidate, effect: Effect) -> list[Candidate]:
         """What an effect refines in its place, whatever scores on a model without both say."""
         found = []
         for simpler in self.effects:
             if simpler.id == effect.prefer and simpler.id not in chosen.ids and self.may_go_on():
-                self.exchange_on_off(chosen, effect, simpler)
+                self.exchange_in_place(chosen, effect, simpler)
                 found.append(self.tried[frozenset(chosen.ids) - {effect.id} | {simpler.id}])
         return found
+
+
+def _unseen(found: Scan, asked: Collection[str], promising: Sequence[Score]) -> list[Effect]:
+    """Effects that are asked for and can stand beside a model, but are not promising by scores."""
+    known = {s.effect.id for s in promising}
+    return [s.effect for s in found.best() if s.effect.id in asked and s.effect.id not in known]
