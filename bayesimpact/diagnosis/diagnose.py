@@ -230,9 +230,9 @@ def _without_needless_faults(found: Diagnosis, before: Corrected, searches: Sear
     """The answer without faults that comparing showed, where beside its effects all recordings
     agree as they were: had its physics been known, nothing would have been compared.
     """
-    needless = found.corrected is not None and len(found.corrected.compared) > len(before.compared)
+    more = found.corrected is not None and len(found.corrected.compared) > len(before.compared)
     beside = [e for e in found.effects if e in found.after.target.oscillator.effects]
-    if not (needless and beside and is_settled(found)) or any(map(is_formula, beside)):
+    if not (more and beside and is_settled(found)) or any(map(is_formula, beside)):
         return found
     fit = fitted_beside(before, beside, found.after)
     if fit is None or misfits(fit):

@@ -246,7 +246,12 @@ def effect_id(term: Term) -> str:
 
 def is_formula(effect: Effect) -> bool:
     """Whether an effect is a term of a formula."""
-    return effect.family == FAMILY and effect.id.startswith(PREFIX)
+    return effect.family == FAMILY and is_formula_id(effect.id)
+
+
+def is_formula_id(effect_id: str) -> bool:
+    """Whether an id is a formula's, which is made of it and nothing to read."""
+    return effect_id.startswith(PREFIX)
 
 
 def starts_of(term: Term) -> dict[str, float]:

@@ -7,7 +7,7 @@ import re
 from markupsafe import Markup, escape
 
 from bayesimpact.diagnosis.words import listed, title_of, titles_of
-from bayesimpact.formula.law import PREFIX
+from bayesimpact.formula.law import is_formula_id
 
 LETTERS = {"size": "A", "place": "p", "width": "w", "fade": "u"}
 """Letters that `formula.grammar` gives to the parameters of a term."""
@@ -44,15 +44,10 @@ def latex_formula(text: str) -> str:
     return "$" + named.replace(" ", r"\,") + "$"
 
 
-def is_formula(effect_id: str) -> bool:
-    """Whether an id is a formula's, which is made of it and nothing to read."""
-    return effect_id.startswith(PREFIX)
-
-
 def effect_title(effect_id: str, title: str = "") -> str:
     """What an effect is called, in HTML: a formula typeset, else words."""
     title = title or effect_id.replace("_", " ")
-    if not is_formula(effect_id):
+    if not is_formula_id(effect_id):
         return written(title)
     return Markup("force {}").format(typeset_formula(title.removeprefix("force ")))
 
@@ -60,21 +55,21 @@ def effect_title(effect_id: str, title: str = "") -> str:
 def titles(ids: str) -> str:
     """What effects are called, of ids joined by " + "; a formula has its name elsewhere."""
     parts = ids.split(" + ")
-    if not any(map(is_formula, parts)):
+    if not any(map(is_formula_id, parts)):
         return titles_of(ids)
-    return listed("a formula" if is_formula(part) else title_of(part) for part in parts)
+    return listed("a formula" if is_formula_id(part) else title_of(part) for part in parts)
 
 
 def as_code(effect_id: str) -> Markup:
     """An id as it is typed, after a blank; empty where a formula's is in it."""
-    made = any(map(is_formula, effect_id.split(" + ")))
+    made = any(map(is_formula_id, effect_id.split(" + ")))
     return Markup() if made else Markup(" <code>{}</code>").format(effect_id)
 
 
 def letter(name: str) -> str | None:
     """The letter that stands for a parameter of a formula; None for other parameters."""
     effect, _, own = name.partition(".")
-    return LETTERS.get(own) if is_formula(effect) else None
+    return LETTERS.get(own) if is_formula_id(effect) else None
 
 
 def in_words(ids: str) -> str:
@@ -82,4 +77,4 @@ def in_words(ids: str) -> str:
     left out, for it is no name.
     """
     parts = ids.split(" + ")
-    return " + ".join("formula" if is_formula(p) else p.replace("_", " ") for p in parts)
+    return " + ".join("formula" if is_formula_id(p) else p.replace("_", " ") for p in parts)

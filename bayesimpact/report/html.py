@@ -13,6 +13,7 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
+from bayesimpact.formula.law import is_formula_id
 from bayesimpact.model.units import bound, reading, typeset
 from bayesimpact.report import explorer, tables, words
 from bayesimpact.report.captions import caption
@@ -22,7 +23,6 @@ from bayesimpact.report.figures.save import DPI
 from bayesimpact.report.formula_text import (
     as_code,
     effect_title,
-    is_formula,
     raised,
     typeset_formula,
 )
@@ -94,7 +94,7 @@ def environment() -> jinja2.Environment:
     made.filters["bound"] = lambda text: raised(bound(text))
     made.filters |= {"raised": raised, "typeset_formula": typeset_formula, "as_code": as_code}
     made.filters["effect_title"] = effect_title
-    made.tests["formula"] = is_formula
+    made.tests["formula"] = is_formula_id
     return made
 
 

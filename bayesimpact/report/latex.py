@@ -6,9 +6,10 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from bayesimpact.formula.law import is_formula_id
 from bayesimpact.model.units import MINUS, interval_decimals, number, quantity, readable
 from bayesimpact.report.change_view import NUISANCES, change_words
-from bayesimpact.report.formula_text import is_formula, latex_formula, letter
+from bayesimpact.report.formula_text import latex_formula, letter
 from bayesimpact.report.limit_view import not_found
 from bayesimpact.report.results import Results, Row
 
@@ -119,7 +120,7 @@ def _models(diagnosis: Mapping[str, Any]) -> str:
 
 def _name(effect: Mapping[str, Any]) -> str:
     """An effect's id, or the formula that it is."""
-    if is_formula(effect["id"]) and effect.get("title"):
+    if is_formula_id(effect["id"]) and effect.get("title"):
         return "force " + latex_formula(effect["title"].removeprefix("force "))
     return r"\texttt{" + escaped(effect["id"]) + "}"
 

@@ -17,6 +17,7 @@ from nptdms import ChannelObject, TdmsWriter
 from scipy.io import savemat
 
 import bayesimpact as bi
+from bayesimpact.data.gaps import FEW_STEPS, _rounded_interval
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 
@@ -135,6 +136,16 @@ def test_missing_rows_of_an_even_clock_move_no_reading() -> None:
         assert read.interval == pytest.approx(2e-3, rel=1e-6)
         assert read.used is not None and list(np.flatnonzero(~read.used)) == lost
         np.testing.assert_allclose(read.samples[kept], 1e-3 * samples[kept], rtol=0, atol=1e-15)
+
+
+def test_rows_that_are_missing_by_chance_are_not_spread_evenly() -> None:
+    """`FEW_STEPS` places of 6,000 keep within `EVENLY` in less than one draw of a hundred."""
+    rng, alike = np.random.default_rng(0), 0
+    for _ in range(300):
+        kept = np.setdiff1d(np.arange(6000), rng.choice(np.arange(1, 5999), FEW_STEPS, False))
+        times = 0.01 * kept
+        alike += _rounded_interval(times, np.diff(times)) is not None
+    assert alike < 3
 
 
 def test_stamps_of_a_slow_clock_lack_no_rows() -> None:
