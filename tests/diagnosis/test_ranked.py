@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from effect_rigs import BY_ID
 
-from bayesimpact.diagnosis import ranked
+from bayesimpact.diagnosis import models, ranked
 from bayesimpact.diagnosis.ranked import Ranked
 from bayesimpact.diagnosis.refit import LITTLE, TO_THE_MODE, Candidate
 from bayesimpact.diagnosis.thresholds import DECISIVE, LARGE
@@ -78,3 +78,15 @@ def test_what_odds_would_leave_out_again_is_not_taken_in(monkeypatch, times, chi
     monkeypatch.setattr(search, "log_odds", lambda c: odds[len(c.effects)])
     monkeypatch.setattr(search, "promise", lambda c: 30.0 * odds[len(c.effects)])
     assert search.leads_on(small, large.candidate) == leads
+
+
+@pytest.mark.parametrize("ids", ["", "spring_cubic"])
+def test_a_larger_model_is_of_no_use_below_the_one_that_it_contains(monkeypatch, ids):
+    """But an effect alone may be: beside others it may still be right."""
+    search, ends = searching(monkeypatch, 2.0 * LARGE**2), []
+    smaller = state(ids, 1.0).candidate
+    smaller.fit.log_posterior = smaller.fit.log_likelihood = 70.0
+    monkeypatch.setattr(models, "refit", lambda *_, enough: ends.append(enough.goal))
+    monkeypatch.setattr(search, "keep", lambda candidate: candidate)
+    search.start(smaller, [SimpleNamespace(effect=BY_ID["quadratic_drag"], shapes={})])
+    assert ends == [70.0 if ids else -np.inf]

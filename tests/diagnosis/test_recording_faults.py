@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
 
@@ -215,7 +216,17 @@ def test_faults_that_the_physics_makes_needless_are_taken_back(
     monkeypatch.setattr(module, "comparisons", lambda *_: steps)
     monkeypatch.setattr(module, "promised_gains", lambda *_, **__: np.zeros(1))
     catalogue = (BY_ID["spring_quadratic"], *CATALOGUE)
-    found = diagnose(read, rng=np.random.default_rng(0), effects=catalogue, search=False)
+    told: list[str] = []
+    found = diagnose(
+        read,
+        rng=np.random.default_rng(0),
+        effects=catalogue,
+        search=False,
+        progress=lambda m: told.append(str(m)),
+    )
+    base = "scoring what the base model lacks"
+    after = [b for a, b in pairwise(told) if a == base]
+    assert [b.startswith("scoring what ") for b in after] == ([False] if needed else [False, True])
     assert found.verdict == "named" and "spring_quadratic" in [e.id for e in found.effects]
     assert found.corrected is not None and bool(found.corrected.faults) is needed
 
