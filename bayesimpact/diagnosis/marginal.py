@@ -12,7 +12,7 @@ O'Hagan 2001, J. R. Stat. Soc. B 63:425).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,12 +25,16 @@ from bayesimpact.inference.likelihood import Linearisation
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
+Residuals = Callable[[Array], Sequence[Array]]  # of theta (d,): one array per recording
+
 REACH = 40.0  # of ln k: from a force far below the noise to one far above it
 TINY = 1e-12  # of what is left; less is rounding
 SHARES = (1.0, 0.5, 0.25, 0.1)  # of a Gauss-Newton step: the first one that gains is taken
 STEPS = 4  # with the same derivatives
 RENEWALS = 4  # at most, of the derivatives
 GAINED = 0.1  # nats: what gains less is the mode
+NEAR = 2.0  # of ln k: as far as one step of the parameters is expected to move it
+CLOSE = 0.02  # of ln k; K knots make that less than K / 8 of its square, nats
 STEP = 0.05  # of a standard deviation, other parameters as they are: for differences
 
 
@@ -59,7 +63,9 @@ class Products:
     parts : per recording
     columns : per recording, positions in theta of its derivatives
     jacobians : per recording, in units of the noise
-    along : per recording, responses times derivatives and, last, residual
+    along : all responses times derivatives and, last, residual, (K, d + 1), one recording's after
+        the other's; 0 where its motion does not depend on a parameter
+    squares : (K,) products of the responses
     whole : products of J and, last, the residual, (d + 1, d + 1)
     total : number of samples
     """
@@ -67,37 +73,35 @@ class Products:
     parts: tuple[Part, ...]
     columns: tuple[Index, ...]
     jacobians: tuple[Array, ...]
-    along: tuple[Array, ...]
+    along: Array
+    squares: Array
     whole: Array
     total: float
 
     def beside(self, log_k: float) -> tuple[Array, float]:
         """[J r]' (1 + k D D')^-1 [J r] and log |1 + k D D'|."""
-        found, volume, k = self.whole.copy(), 0.0, float(np.exp(log_k))
-        for part, at, along in zip(self.parts, self.columns, self.along, strict=True):
-            weights = k / (1.0 + k * part.squares)
-            where = np.append(at, found.shape[0] - 1)
-            found[np.ix_(where, where)] -= along.T @ (weights[:, None] * along)
-            volume += float(np.log1p(k * part.squares).sum())
-        return found, volume
+        strength = float(np.exp(log_k)) * self.squares
+        weights = float(np.exp(log_k)) / (1.0 + strength)
+        found = self.whole - self.along.T @ (weights[:, None] * self.along)
+        return found, float(np.log1p(strength).sum())
 
     @property
     def bounds(self) -> tuple[float, float]:
         """Of ln k."""
-        least = -np.log(max(float(part.squares.max()) for part in self.parts)) - 0.1 * REACH
+        least = -np.log(float(self.squares.max())) - 0.1 * REACH
         return least, least + REACH
 
     def at(self, residuals: Sequence[Array]) -> Products:
         """The same derivatives with other residuals, in units of the noise."""
-        whole, along = self.whole.copy(), []
+        whole, along = self.whole.copy(), self.along.copy()
         whole[-1] = whole[:, -1] = 0.0
-        rows = zip(self.parts, self.columns, self.jacobians, self.along, residuals, strict=True)
-        for part, at, jacobian, before, left in rows:
+        for at, jacobian, left in zip(self.columns, self.jacobians, residuals, strict=True):
             whole[at, -1] += jacobian.T @ left
             whole[-1, -1] += left @ left
-            along.append(np.column_stack([before[:, :-1], part.responses.T @ left]))
         whole[-1, :-1] = whole[:-1, -1]
-        return replace(self, along=tuple(along), whole=whole)
+        pairs = zip(self.parts, residuals, strict=True)
+        along[:, -1] = np.concatenate([part.responses.T @ left for part, left in pairs])
+        return replace(self, along=along, whole=whole)
 
 
 def products(fit: Fit, parts: Sequence[Part], linear: Sequence[Linearisation]) -> Products:
@@ -109,11 +113,13 @@ def products(fit: Fit, parts: Sequence[Part], linear: Sequence[Linearisation]) -
         at = np.append(lin.columns, size)
         own = np.column_stack([lin.jacobian, lin.residual]) / level
         whole[np.ix_(at, at)] += own.T @ own
-        along.append(part.responses.T @ own)
+        along.append(np.zeros((part.squares.size, size + 1)))
+        along[-1][:, at] = part.responses.T @ own
     columns = tuple(lin.columns for lin in linear)
     jacobians = tuple(lin.jacobian / level for lin in linear)
     total = float(likelihood.sizes.sum())
-    return Products(tuple(parts), columns, jacobians, tuple(along), whole, total)
+    squares = np.concatenate([part.squares for part in parts])
+    return Products(tuple(parts), columns, jacobians, np.concatenate(along), squares, whole, total)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,44 +128,52 @@ class _Point:
 
     theta: Array
     found: Products
+    log_k: float
     value: float
     step: Array
 
 
-def gain(fit: Fit, parts: Sequence[Part]) -> float:
-    """What the force adds to a model's log evidence, its size and the noise level at their best."""
+def gain(fit: Fit, parts: Sequence[Part], least: float = -np.inf) -> float:
+    """What the force adds to a model's log evidence, its size and the noise level at their best;
+    where that is less than `least` by the derivatives at the fit's mode, what these say.
+    """
     priors, likelihood = fit.target.priors, fit.target.likelihood
     free = fit.target.oscillator.layout.roles("physical", "effect", "nuisance")
-    here = _climbed(fit, _point(fit, fit.mode, products(fit, parts, fit.linearisation)))
-    level, total = likelihood.noise.level, here.found.total
+    start = _point(fit, fit.mode, products(fit, parts, fit.linearisation))
+    level, total = likelihood.noise.level, start.found.total
     unit = float(np.sum(likelihood.log_volume)) - total * np.log(level * np.sqrt(2 * np.pi))
     alone = fit.log_likelihood + 0.5 * _log_volume(fit.covariance[np.ix_(free, free)])
     alone += float(np.ravel(priors.log_density(fit.mode[None]))[0])
-    return float(unit + here.value - alone)
+    known = float(unit - alone)
+    straight = _stepped(fit, start, _by_derivatives(fit))
+    if known + straight.value < least:
+        return known + straight.value
+    return known + _climbed(fit, start).value
 
 
 def _climbed(fit: Fit, start: _Point) -> _Point:
     """The mode beside the force, from the fit's own."""
-    here = _stepped(fit, start)
+    residuals = _simulated(fit)
+    here = _stepped(fit, start, residuals)
     steps = STEP / np.sqrt(np.diag(inverse(fit.covariance)))
     for _ in range(RENEWALS):
         linear = fit.target.likelihood.linearise(here.theta, steps, roughly=True)
         if not all(np.isfinite(part.jacobian).all() for part in linear):
             break
-        renewed = _point(fit, here.theta, products(fit, start.found.parts, linear))
+        renewed = _point(fit, here.theta, products(fit, start.found.parts, linear), here.log_k)
         if not np.isfinite(renewed.value):
             break
-        further = _stepped(fit, renewed)
+        further = _stepped(fit, renewed, residuals)
         here, gained = further, further.value - renewed.value
         if gained < GAINED:
             break
     return here
 
 
-def _stepped(fit: Fit, here: _Point) -> _Point:
+def _stepped(fit: Fit, here: _Point, residuals: Residuals) -> _Point:
     """As far as the derivatives at a point lead."""
     for _ in range(STEPS):
-        points = (_moved(fit, here, share) for share in SHARES)
+        points = (_moved(fit, here, share, residuals) for share in SHARES)
         further = next((p for p in points if p is not None and p.value > here.value), here)
         gained, here = further.value - here.value, further
         if gained < GAINED:
@@ -167,48 +181,85 @@ def _stepped(fit: Fit, here: _Point) -> _Point:
     return here
 
 
-def _moved(fit: Fit, here: _Point, share: float) -> _Point | None:
-    """A share of the step on, with the true residual there; None where the motion runs away."""
+def _moved(fit: Fit, here: _Point, share: float, residuals: Residuals) -> _Point | None:
+    """A share of the step on, with the residuals there; None where the motion runs away."""
     target = fit.target
     bounds = np.array([(p.lower, p.upper) for p in target.oscillator.layout.parameters])
     lower = np.maximum(bounds[:, 0], target.priors.lower)
     upper = np.minimum(bounds[:, 1], target.priors.upper)
     theta = np.clip(here.theta + share * here.step, lower, upper)
-    left = [
-        row[0] / target.likelihood.noise.level for row in target.likelihood.residuals(theta[None])
-    ]
+    left = residuals(theta)
     if not all(np.isfinite(row).all() for row in left):
         return None
-    return _point(fit, theta, here.found.at(left))
+    return _point(fit, theta, here.found.at(left), here.log_k)
 
 
-def _point(fit: Fit, theta: Array, found: Products) -> _Point:
+def _simulated(fit: Fit) -> Residuals:
+    """The residuals of a model's motion, in units of the noise."""
+    likelihood = fit.target.likelihood
+
+    def residuals(theta: Array) -> list[Array]:
+        return [row[0] / likelihood.noise.level for row in likelihood.residuals(theta[None])]
+
+    return residuals
+
+
+def _by_derivatives(fit: Fit) -> Residuals:
+    """Residuals as the derivatives at the mode say, in units of the noise."""
+    level = fit.target.likelihood.noise.level
+
+    def residuals(theta: Array) -> list[Array]:
+        change = theta - fit.mode
+        return [
+            (lin.residual - lin.jacobian @ change[lin.columns]) / level for lin in fit.linearisation
+        ]
+
+    return residuals
+
+
+def _point(fit: Fit, theta: Array, found: Products, near: float | None = None) -> _Point:
+    """About theta, of a force whose ln k is sought `near` one first."""
     layout, priors = fit.target.oscillator.layout, fit.target.priors
     free, noise = layout.roles("physical", "effect", "nuisance"), layout.roles("noise")
     information, slope = np.array(priors.information(theta)), np.nan_to_num(priors.gradient(theta))
     information[noise], slope[noise] = 1.0, 0.0  # held
 
-    def spread(own: Array, left: float) -> Array:
-        return inverse(own * found.total / left + np.diag(information))
+    def precision(matrix: Array) -> tuple[Array, float]:
+        left = max(float(matrix[-1, -1]), TINY * float(found.whole[-1, -1]))
+        return matrix[:-1, :-1] * found.total / left + np.diag(information), left
 
     def minus(log_k: float) -> float:
         matrix, volume = found.beside(log_k)
-        left = max(float(matrix[-1, -1]), TINY * float(found.whole[-1, -1]))
+        known, left = precision(matrix)
         chance = found.total * (1.0 + np.log(left / found.total)) + volume
-        return float(
-            0.5 * (chance - _log_volume(spread(matrix[:-1, :-1], left)[np.ix_(free, free)]))
-        )
+        return float(0.5 * (chance + _log_volume(known[np.ix_(free, free)])))
 
-    best = minimize_scalar(minus, bounds=found.bounds, method="bounded")
-    matrix, _ = found.beside(float(best.x))
-    left = max(float(matrix[-1, -1]), TINY * float(found.whole[-1, -1]))
-    step = spread(matrix[:-1, :-1], left) @ (matrix[:-1, -1] * found.total / left + slope)
+    log_k, least = _least(minus, found.bounds, near)
+    matrix, _ = found.beside(log_k)
+    known, left = precision(matrix)
+    step = inverse(known) @ (matrix[:-1, -1] * found.total / left + slope)
     prior = float(np.ravel(priors.log_density(theta[None]))[0])
-    return _Point(theta, found, prior - float(best.fun), step)
+    return _Point(theta, found, log_k, prior - least, step)
 
 
-def _log_volume(covariance: Array) -> float:
-    """Log determinant."""
-    sd = np.sqrt(np.diag(covariance))
-    scaled = float(np.linalg.slogdet(covariance / np.outer(sd, sd))[1])
-    return float(scaled + 2.0 * np.log(sd).sum())
+def _least(
+    of: Callable[[float], float], bounds: tuple[float, float], near: float | None
+) -> tuple[float, float]:
+    """Where a function of ln k is least, and its value: about a point, where one is given and that
+    is no end of where it was sought.
+    """
+    options = {"xatol": CLOSE}
+    if near is not None:
+        about = max(bounds[0], near - NEAR), min(bounds[1], near + NEAR)
+        best = minimize_scalar(of, bounds=about, method="bounded", options=options)
+        if np.diff(np.clip([best.x - 2 * CLOSE, best.x + 2 * CLOSE], *about))[0] > 3 * CLOSE:
+            return float(best.x), float(best.fun)
+    best = minimize_scalar(of, bounds=bounds, method="bounded", options=options)
+    return float(best.x), float(best.fun)
+
+
+def _log_volume(matrix: Array) -> float:
+    """Log determinant of a covariance or a precision."""
+    scale = np.sqrt(np.diag(matrix))
+    scaled = float(np.linalg.slogdet(matrix / np.outer(scale, scale))[1])
+    return float(scaled + 2.0 * np.log(scale).sum())

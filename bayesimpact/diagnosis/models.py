@@ -13,6 +13,7 @@ import numpy as np
 
 from bayesimpact.diagnosis.asked import Asked
 from bayesimpact.diagnosis.budget import Budget, begin
+from bayesimpact.diagnosis.discrepancy import Discrepancy
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.force import missing_drift, missing_force
 from bayesimpact.diagnosis.naming import State, is_large, leaves_something
@@ -65,6 +66,7 @@ class Models:
         self.refits = 0
         self.look = 0.0  # s, that the last model took to be scored
         self.repeated: tuple[Candidate, float] | None = None
+        self.left: Discrepancy | None = None  # beside every model, see `Ranked.weigh_remainder`
 
     def keep(self, candidate: Candidate) -> Candidate:
         """The better end of all climbs to the candidate's model, this one among them."""

@@ -76,6 +76,7 @@ def name(
         state = search.grown(beam)
         if not search.may_be_named(state):
             break
+        search.weigh_remainder()
         smaller = search.eliminated(state)
         made_room = smaller is not state and frozenset(smaller.candidate.ids) not in begun
         if not search.is_large or smaller.is_white or not made_room:
@@ -95,7 +96,7 @@ class _Search(Remaining):
 
     def grown(self, beam: list[State]) -> State:
         """The model that ever more effects lead to from the first of a beam, or beside it."""
-        state = beam[0]
+        state, self.left = beam[0], None
         while not state.is_white and self.may_go_on():
             found, waiting = self.extensions([s for s in beam if self.may_grow(s)])
             better = self.best_first(state, found)

@@ -130,7 +130,8 @@ class Naming:
             return tempered_evidence(candidate, self.repetition)
         if not np.isfinite(candidate.log_evidence):
             return candidate.log_evidence
-        return candidate.log_evidence + self.beside.gain(candidate.fit)
+        alone = candidate.log_evidence
+        return alone + self.beside.gain(candidate.fit, alone)
 
     def promise(self, candidate: Candidate) -> float:
         """Log posterior odds with every sample counted, up to a constant: how much is explained."""

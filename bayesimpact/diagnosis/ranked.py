@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from bayesimpact.diagnosis.discrepancy import discrepancy
 from bayesimpact.diagnosis.models import UNCONVERGED_SHORTFALL, Models
 from bayesimpact.diagnosis.naming import State, is_large, leaves_something
 from bayesimpact.diagnosis.promising import refit_candidates
@@ -54,9 +55,29 @@ class Ranked(Models):
         return candidate.log_evidence - self.cost * len(candidate.effects)
 
     def log_odds(self, candidate: Candidate) -> float:
+        """Log posterior odds up to a constant: beside the force of time that remains where one does
+        (`weigh_remainder`), else each independent sample counted once.
+        """
+        if self.left is None or not np.isfinite(candidate.log_evidence):
+            return self.tempered_odds(candidate)
+        alone = candidate.log_evidence
+        gained = self.left.gain(candidate.fit, alone)
+        return alone + gained - self.cost * len(candidate.effects)
+
+    def tempered_odds(self, candidate: Candidate) -> float:
         """Log posterior odds up to a constant, each independent sample counted once."""
         evidence = tempered_evidence(candidate, self.repetition())
         return evidence - self.cost * len(candidate.effects)
+
+    def weigh_remainder(self) -> None:
+        """From now on models are compared beside what the nearest one leaves, where the misfit was
+        large and that is a force of time: many samples of it are no evidence by themselves.
+        """
+        nearest = min(self.tried.values(), key=lambda c: c.fit.reduced_chi2).fit
+        if self.left is not None and self.left.fit is nearest:
+            return
+        left = discrepancy(nearest) if self.is_large and leaves_something(nearest) else None
+        self.left = left if left is not None and left.leaves_noise else None
 
     def repetition(self) -> float:
         """Samples per independent one in the residual of the best model so far."""
@@ -102,7 +123,7 @@ class Ranked(Models):
         """
         known = [s.candidate for s in self.states.values() if s.is_white]
         known += [] if rival is None else [rival]
-        reached = max(map(self.log_odds, known), default=-np.inf)
+        reached = max(map(self.tempered_odds, known), default=-np.inf)
         return self.repetition() * (reached - DECISIVE)
 
     def best(self, size: int) -> Candidate:

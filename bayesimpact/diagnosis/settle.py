@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 from bayesimpact.diagnosis.naming import State, is_large
-from bayesimpact.diagnosis.promising import families, in_place_of, is_redundant
+from bayesimpact.diagnosis.promising import NEAR_BEST, families, in_place_of, is_redundant
 from bayesimpact.diagnosis.ranked import Ranked
 from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.scan import Scan
@@ -22,6 +22,7 @@ class Settling(Ranked):
     def settled(self, state: State) -> State:
         """The model that neither leaving out nor exchanging an effect improves."""
         for _ in range(EXCHANGES):
+            self.weigh_remainder()
             state = self.eliminated(state)
             for candidate in self.near(state):
                 if self.may_go_on():
@@ -91,6 +92,8 @@ class Settling(Ranked):
                     self.fit_one(rest, found, score, chosen)
                     if not score.effect.has_size:
                         self.exchange_in_place(chosen, effect, score.effect)
+            if _is_seen(effect, found, rest, chosen):
+                continue
             # where the rest of a large misfit stands in a side minimum, scores do not see these
             for new in _unseen(found, asked - {effect.id}, promising):
                 if self.may_go_on() and not is_redundant(rest, new):
@@ -104,6 +107,14 @@ class Settling(Ranked):
                 self.exchange_in_place(chosen, effect, simpler)
                 found.append(self.tried[frozenset(chosen.ids) - {effect.id} | {simpler.id}])
         return found
+
+
+def _is_seen(effect: Effect, found: Scan, rest: Candidate, chosen: Candidate) -> bool:
+    """Whether scores on a model see, of the effect that was left out of it, what it is known to do:
+    then they can be believed about others in its place.
+    """
+    own = max((s.gain for s in found.best() if s.effect.id == effect.id), default=0.0)
+    return own > NEAR_BEST * (chosen.fit.log_likelihood - rest.fit.log_likelihood)
 
 
 def _unseen(found: Scan, asked: Collection[str], promising: Sequence[Score]) -> list[Effect]:

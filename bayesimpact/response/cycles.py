@@ -8,10 +8,13 @@ the right way. All functions work on arrays of cycles.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from bayesimpact.model.compiled import compiled, inner
 
 Floats = NDArray[np.float64]
 
@@ -57,102 +60,110 @@ def cycle(
     -------
     CycleEnd of (n,) arrays.
     """
-    depth, c1, k1, c2, g, k2 = np.broadcast_arrays(depth, c1, k1, c2, g, k2)
-    b, w0 = c1 / (2 * mass), np.sqrt(k1 / mass)
-    w = np.sqrt(np.maximum(w0**2 - b**2, 1e-6 * w0**2))
-    half = np.pi / w
-    height = np.asarray(depth * np.exp(-b * half))
-    length, after = 2 * half, depth * np.exp(-2 * b * half)
-    hit = np.flatnonzero((height > g) & ((k2 != 0) | (c2 != 0)) & (g > -depth))
-    if hit.size:
-        d, gap, still = depth[hit], g[hit], np.zeros(hit.size)
-        free = (b[hit], w0[hit] ** 2)
-        start = np.arccos(np.clip(-gap / d, -1.0, 1.0)) / w[hit]
-        onset = _solve(*free, -d, still, gap, still, half[hit], start, 1)
-        speed = _motion(*free, -d, still, onset)[1]
-        stay, peak, leave = _contact(mass, c1[hit] + c2[hit], k1[hit], k2[hit], gap, speed)
-        home, deep = _to_minimum(b[hit], w[hit], gap, leave)
-        length[hit], after[hit], height[hit] = onset + stay + home, deep, peak
-    lost = g <= -depth
-    length[lost] = after[lost] = height[lost] = np.nan
-    impact = np.zeros(depth.shape, dtype=bool)
-    impact[hit] = True
-    return CycleEnd(length, after, height, impact)
+    rows = np.broadcast_arrays(depth, float(mass), c1, k1, c2, g, k2)
+    ends, impact = _ends(*(np.ascontiguousarray(row, dtype=np.float64) for row in rows))
+    return CycleEnd(ends[0], ends[1], ends[2], impact)
 
 
-def _contact(
-    mass: float, c: Floats, k1: Floats, k2: Floats, g: Floats, speed: Floats
-) -> tuple[Floats, Floats, Floats]:
-    """Time on the stop, highest displacement, velocity when leaving."""
+@compiled()
+def _ends(depth, mass, c1, k1, c2, g, k2):  # type: ignore[no-untyped-def]
+    """Length, next depth and height (3, n) of the cycles, and whether they touch (n,)."""
+    ends, impact = np.empty((3, depth.size)), np.zeros(depth.size, np.bool_)
+    for i in range(depth.size):
+        one = _end(depth[i], mass[i], c1[i], k1[i], c2[i], g[i], k2[i])
+        ends[0, i], ends[1, i], ends[2, i], impact[i] = one
+    return ends, impact
+
+
+@inner()
+def _end(depth, mass, c1, k1, c2, g, k2):  # type: ignore[no-untyped-def]
+    if g <= -depth:
+        return math.nan, math.nan, math.nan, False
+    b, square = c1 / (2 * mass), k1 / mass
+    w = math.sqrt(max(square - b**2, 1e-6 * square))
+    half = math.pi / w
+    height = depth * math.exp(-b * half)
+    if not (height > g and (k2 != 0 or c2 != 0)):
+        return 2 * half, depth * math.exp(-2 * b * half), height, False
+    start = math.acos(min(max(-g / depth, -1.0), 1.0)) / w
+    onset = _time(b, square, -depth, 0.0, g, 0.0, half, start, 1)
+    speed = _motion(b, square, -depth, 0.0, onset)[1]
+    stay, peak, leave = _contact(mass, c1 + c2, k1, k2, g, speed)
+    if math.isnan(stay):
+        return math.nan, math.nan, peak, True
+    home, deep = _to_minimum(b, w, g, leave)
+    return onset + stay + home, deep, peak, True
+
+
+@inner()
+def _contact(mass, c, k1, k2, g, speed):  # type: ignore[no-untyped-def]
+    """Time on the stop, highest displacement, velocity when leaving; NaN where it never leaves."""
     b, square = c / (2 * mass), (k1 + k2) / mass
     centre = k2 * g / (k1 + k2)
     u = g - centre
-    root = np.sqrt(np.abs(square - b**2)) + 1e-9 * np.sqrt(square)
+    root = math.sqrt(abs(square - b**2)) + 1e-9 * math.sqrt(square)
     under = square > b**2
     across = square * u + b * speed
     # Overdamped: without a turning point the mass creeps to rest inside the stop.
-    creeps = ~under & (across <= 0)
-    ratio = np.where(across > 0, speed * root / np.where(across > 0, across, 1.0), 0.5)
-    over = np.arctanh(np.clip(ratio, 0.0, 1 - 1e-12))
-    turn = np.where(under, np.arctan2(speed * root, across), over) / root
-    highest = _motion(b, square, u, speed, turn)[0]
-    end = np.where(under, turn + np.pi / root, 2 * turn)
-    for _ in range(40):
-        still = ~under & ~creeps & (_motion(b, square, u, speed, end)[0] > u)
-        if not still.any():
-            break
-        end = np.where(still, 2 * end, end)
-    stays = creeps | (_motion(b, square, u, speed, end)[0] > u)
-    stay = _solve(b, square, u, speed, u, turn, end, np.minimum(2 * turn, 0.5 * (turn + end)), -1)
-    leave = _motion(b, square, u, speed, stay)[1]
-    stay = np.where(stays, np.nan, stay)
-    return stay, centre + highest, leave
+    creeps = not under and across <= 0
+    if under:
+        turn = math.atan2(speed * root, across) / root
+        end = turn + math.pi / root
+    else:
+        ratio = speed * root / across if across > 0 else 0.5
+        turn = math.atanh(min(max(ratio, 0.0), 1 - 1e-12)) / root
+        end = 2 * turn
+        for _ in range(40):
+            if creeps or not _motion(b, square, u, speed, end)[0] > u:
+                break
+            end *= 2
+    peak = centre + _motion(b, square, u, speed, turn)[0]
+    if creeps or _motion(b, square, u, speed, end)[0] > u:
+        return math.nan, peak, math.nan
+    start = min(2 * turn, 0.5 * (turn + end))
+    stay = _time(b, square, u, speed, u, turn, end, start, -1)
+    return stay, peak, _motion(b, square, u, speed, stay)[1]
 
 
-def _to_minimum(b: Floats, w: Floats, g: Floats, speed: Floats) -> tuple[Floats, Floats]:
+@inner()
+def _to_minimum(b, w, g, speed):  # type: ignore[no-untyped-def]
     """Time from leaving the stop (speed < 0) to the next minimum, and its depth."""
     p, q = g, (speed + b * g) / w
-    phase = np.arctan2(w * q - b * p, w * p + b * q) % np.pi
-    value = np.exp(-b * phase / w) * (p * np.cos(phase) + q * np.sin(phase))
-    phase = np.where(value > 0, phase + np.pi, phase)
-    value = np.exp(-b * phase / w) * (p * np.cos(phase) + q * np.sin(phase))
+    phase = math.atan2(w * q - b * p, w * p + b * q) % math.pi
+    value = math.exp(-b * phase / w) * (p * math.cos(phase) + q * math.sin(phase))
+    if value > 0:
+        phase += math.pi
+        value = math.exp(-b * phase / w) * (p * math.cos(phase) + q * math.sin(phase))
     return phase / w, -value
 
 
-def _motion(b: Floats, square: Floats, u: Floats, v: Floats, t: Floats) -> tuple[Floats, Floats]:
+@inner()
+def _motion(b, square, u, v, t):  # type: ignore[no-untyped-def]
     """Position and velocity of u'' + 2 b u' + square u = 0 after time t."""
     s = square - b**2
-    root = np.sqrt(np.abs(s)) + 1e-9 * np.sqrt(square)
-    x = root * t
-    fast, slow = np.exp(-(b + root) * t), np.exp(-np.maximum(b - root, 0.0) * t)
-    decay = np.exp(-b * t)
-    c = np.where(s > 0, decay * np.cos(x), 0.5 * (slow + fast))
-    d = np.where(s > 0, decay * np.sin(x), 0.5 * (slow - fast)) / root
+    root = math.sqrt(abs(s)) + 1e-9 * math.sqrt(square)
+    if s > 0:
+        decay = math.exp(-b * t)
+        c, d = decay * math.cos(root * t), decay * math.sin(root * t) / root
+    else:
+        fast, slow = math.exp(-(b + root) * t), math.exp(-max(b - root, 0.0) * t)
+        c, d = 0.5 * (slow + fast), 0.5 * (slow - fast) / root
     return u * c + (v + b * u) * d, v * c - (square * u + b * v) * d
 
 
-def _solve(
-    b: Floats,
-    square: Floats,
-    u: Floats,
-    v: Floats,
-    target: Floats,
-    low: Floats,
-    high: Floats,
-    start: Floats,
-    sign: int,
-) -> Floats:
+@inner()
+def _time(b, square, u, v, target, low, high, start, sign):  # type: ignore[no-untyped-def]
     """When the motion passes `target` between `low` and `high`, rising (+1) or falling (-1)."""
-    t = np.clip(start, low, high)
-    low, high = low.astype(np.float64), high.astype(np.float64)
+    t = min(max(start, low), high)
     for _ in range(14):
         value, slope = _motion(b, square, u, v, t)
-        before = sign * (value - target) < 0
-        low, high = np.where(before, t, low), np.where(before, high, t)
-        with np.errstate(over="ignore"):
-            step = t - (value - target) / np.where(slope == 0, np.inf, slope)
-        inside = (step >= low) & (step <= high)
-        last, t = t, np.where(inside, step, 0.5 * (low + high))
-        if np.all(np.abs(t - last) <= 1e-13 * np.abs(t)):
+        if sign * (value - target) < 0:
+            low = t
+        else:
+            high = t
+        step = t - (value - target) / slope if slope != 0 else t
+        last = t
+        t = step if low <= step <= high else 0.5 * (low + high)
+        if abs(t - last) <= 1e-13 * abs(t):
             break
-    return np.asarray(t)
+    return t

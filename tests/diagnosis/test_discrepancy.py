@@ -11,10 +11,12 @@ from scipy import stats
 from scipy.optimize import minimize
 
 from bayesimpact.data.campaign import Campaign
-from bayesimpact.diagnosis.discrepancy import Discrepancy, discrepancy
+from bayesimpact.diagnosis import marginal
+from bayesimpact.diagnosis.discrepancy import UNDERRATED, Discrepancy, discrepancy
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.force import missing_force
 from bayesimpact.diagnosis.intervals import intervals
+from bayesimpact.diagnosis.marginal import gain
 from bayesimpact.diagnosis.refit import base_candidate, fit_from
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.diagnosis.unknown import learn_force
@@ -120,7 +122,7 @@ def test_the_gain_is_that_of_a_dense_covariance():
     alone += 0.5 * np.linalg.slogdet(fit.covariance[np.ix_(free, free)])[1]
     volume = float(np.sum(target.likelihood.log_volume))
     expected = -best.fun + volume - alone
-    assert found.gain(fit) == pytest.approx(expected, abs=max(0.1, free.size**2 / size))
+    assert gain(fit, found.parts) == pytest.approx(expected, abs=max(0.1, free.size**2 / size))
     assert expected > 100.0
 
 
@@ -135,7 +137,7 @@ def test_a_law_that_is_there_leads_a_force_of_time_and_a_false_one_does_not():
         with_it = fit_from(fit, (cubic,), {}, campaign_scales(fit))
         beside = left_by(with_it.fit)
         odds = with_it.log_evidence - base_candidate(fit).log_evidence
-        odds += beside.gain(with_it.fit) - beside.gain(fit)
+        odds += gain(with_it.fit, beside.parts) - gain(fit, beside.parts)
         assert (odds > DECISIVE) == needed, (stiffness, odds)
 
 
@@ -264,5 +266,29 @@ def test_a_gain_does_not_depend_on_where_the_fit_ended():
     totals = []
     for start in (fit, climb.fit(climb.evaluate(away), True)):
         volume = 0.5 * np.linalg.slogdet(start.covariance)[1]
-        totals.append(start.log_posterior + volume + found.gain(start))
+        totals.append(start.log_posterior + volume + gain(start, found.parts))
     assert totals[1] == pytest.approx(totals[0], abs=0.5)
+
+
+def test_a_model_far_behind_is_weighed_to_first_order(monkeypatch):
+    """The mode beside the force is sought where it may come near the likeliest model."""
+    campaign = shaken(5, 1e-2, effects={"spring_cubic": {"stiffness": 2e6}})
+    fit = plain_fit(campaign)
+    cubic = next(e for e in EFFECTS if e.id == "spring_cubic")
+    with_it = fit_from(fit, (cubic,), {}, campaign_scales(fit))
+    found, alone = left_by(with_it.fit), base_candidate(fit).log_evidence
+    whole = gain(fit, found.parts)
+    climbed = []
+    monkeypatch.setattr(
+        marginal, "_climbed", lambda of, start: climbed.append(of) or marginal._stepped(
+            of, start, marginal._simulated(of)
+        )
+    )  # fmt: skip
+    leader = found.gain(with_it.fit, with_it.log_evidence) + with_it.log_evidence
+    assert climbed == [with_it.fit]
+    near = replace(found, _gains={with_it.fit: (alone + whole, 0.0)})
+    near.gain(fit, alone)
+    assert climbed == [with_it.fit, fit]
+    far = replace(found, _gains={with_it.fit: (alone + whole + 2 * UNDERRATED, 0.0)})
+    assert far.gain(fit, alone) == pytest.approx(whole, abs=UNDERRATED)
+    assert climbed == [with_it.fit, fit] and np.isfinite(leader)

@@ -185,7 +185,7 @@ def test_odds_are_those_beside_a_force_of_time_where_one_remains():
     alone = found.log_odds(found.chosen.candidate)
     for share, verdict in ((100.0 - COST - DECISIVE + 0.1, "unknown"), (50.0, "partly")):
         base = found.base.candidate.fit
-        beside = SimpleNamespace(gain=lambda fit, own=share, base=base: own if fit is base else 0.0)
+        beside = SimpleNamespace(gain=lambda fit, _, own=(base, share): own[1] * (fit is own[0]))
         seen = replace(found, beside=beside)
         assert seen.log_odds(found.chosen.candidate) == pytest.approx(alone - share)
         assert judge(seen) == verdict

@@ -37,11 +37,12 @@ def run(monkeypatch):
         monkeypatch.setattr(models, "profiled", table.profiled)
         for module in (search, models):
             monkeypatch.setattr(module, "model_evidence", lambda fit: fit.gain)
+        for module in (ranked, remaining):
+            monkeypatch.setattr(module, "discrepancy", lambda fit: None)
         monkeypatch.setattr(search, "missing_contact", table.contact)
         monkeypatch.setattr(search, "learn_force", lambda fit, force, scales: force.fit)
         monkeypatch.setattr(ranked, "residual_repetition", lambda fit: repetition)
         monkeypatch.setattr(remaining, "with_force", lambda candidate, *others, **near: candidate)
-        monkeypatch.setattr(remaining, "discrepancy", lambda fit: None)
         monkeypatch.setattr(remaining, "may_be_needed", lambda naming, effect: True)
         monkeypatch.setattr(remaining, "is_imitated", lambda naming: False)
         monkeypatch.setattr(search, "promising_pairs", lambda scan, count: ())
@@ -215,24 +216,6 @@ def test_what_the_last_exchange_leads_to_is_rid_of_what_it_does_not_need(run, mo
         forward={f"{B} {D}": 310.0},
     )
     assert chosen(run(table)) == {B, D}
-
-
-def test_a_better_end_of_the_same_set_settles_once_more(monkeypatch):
-    """What its effects contribute was told at the worse end."""
-    first, better = (Table({}).candidate((A, B), gain) for gain in (40.0, 90.0))
-    settling, eliminated = object.__new__(settle.Settling), []
-    stand_ins = {
-        "eliminated": lambda state: eliminated.append(state.candidate.fit.gain) or state,
-        "near": lambda state: [state.candidate],
-        "may_go_on": lambda: True,
-        "exchange": lambda candidate: None,
-        "best": lambda size: better,
-        "examine": lambda candidate: SimpleNamespace(candidate=candidate),
-    }
-    for name, stand_in in stand_ins.items():
-        monkeypatch.setattr(settling, name, stand_in, raising=False)
-    found = settling.settled(SimpleNamespace(candidate=first))
-    assert found.candidate is better and eliminated == [40.0, 90.0]
 
 
 def test_an_exchange_begins_at_rivals_too(run):

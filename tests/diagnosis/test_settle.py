@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 from effect_rigs import BY_ID
-from made_up_models import Table
+from made_up_models import A, B, Table
 
+from bayesimpact.diagnosis import ranked
 from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.scan import Scan
 from bayesimpact.diagnosis.settle import Settling
@@ -19,17 +20,19 @@ HYSTERESIS = "hysteresis_bouc_wen"
 
 
 def model(ids: str, chi2: float) -> Candidate:
-    fit: Any = SimpleNamespace(reduced_chi2=chi2, converged=True, log_likelihood=0.0)
+    fit: Any = SimpleNamespace(reduced_chi2=chi2, converged=True, log_likelihood=-500.0 * chi2)
     return Candidate(tuple(BY_ID[i] for i in ids.split()), fit, 0.0)
 
 
-@pytest.mark.parametrize("base", [400.0, 4.0])
-def test_laws_that_are_asked_for_take_the_place_where_scores_see_nothing_of_them(base) -> None:
-    """Where the misfit was large the model without either law may stand in a side minimum."""
+@pytest.mark.parametrize(("base", "seen"), [(400.0, 100.0), (400.0, 1000.0), (4.0, 100.0)])
+def test_laws_that_are_asked_for_take_the_place_where_scores_see_nothing(base, seen) -> None:
+    """Where the misfit was large the model without either law may stand in a side minimum; not
+    where scores there see what the law that was left out is known to do, 1,450 nats.
+    """
     search: Any = Settling((), None, np.random.default_rng(0), lambda words: None)
     search.states = {frozenset(): SimpleNamespace(candidate=model("", base))}
     search.asked = SimpleNamespace(seen={DRAG}, first=lambda rest, about: {DRAG, HYSTERESIS})
-    gains = {HYSTERESIS: 100.0, SPRING: 90.0, DRAG: 0.0}
+    gains = {HYSTERESIS: seen, SPRING: 0.9 * seen, DRAG: 0.0}
     scores = tuple(Table.score(BY_ID[i], gain) for i, gain in gains.items())
     search.drop = lambda chosen, effect: model(FRICTION, 3.9)
     search.simplified = lambda chosen, effect: []
@@ -39,4 +42,51 @@ def test_laws_that_are_asked_for_take_the_place_where_scores_see_nothing_of_them
     search.exchange_in_place = lambda chosen, old, new: in_place.append((old.id, new.id))
     search.exchange(model(f"{FRICTION} {HYSTERESIS}", 1.0))
     assert SPRING in fitted and DRAG not in fitted
-    assert ((HYSTERESIS, DRAG) in in_place) == (base > 9.0)
+    assert ((HYSTERESIS, DRAG) in in_place) == (base > 9.0 and seen < 725.0)
+
+
+def test_a_better_end_of_the_same_set_settles_once_more(monkeypatch):
+    """What its effects contribute was told at the worse end."""
+    first, better = (
+        Table({}).candidate((BY_ID[FRICTION], BY_ID[DRAG]), gain) for gain in (40.0, 90.0)
+    )
+    settling, eliminated = object.__new__(Settling), []
+    stand_ins = {
+        "weigh_remainder": lambda: None,
+        "eliminated": lambda state: eliminated.append(state.candidate.fit.gain) or state,
+        "near": lambda state: [state.candidate],
+        "may_go_on": lambda: True,
+        "exchange": lambda candidate: None,
+        "best": lambda size: better,
+        "examine": lambda candidate: SimpleNamespace(candidate=candidate),
+    }
+    for name, stand_in in stand_ins.items():
+        monkeypatch.setattr(settling, name, stand_in, raising=False)
+    found = settling.settled(SimpleNamespace(candidate=first))
+    assert found.candidate is better and eliminated == [40.0, 90.0]
+
+
+@pytest.mark.parametrize(
+    ("base", "misses", "noise", "weighed"),
+    [(400.0, True, True, True), (4.0, True, True, False), (400.0, False, True, False),
+     (400.0, True, False, False)],
+)  # fmt: skip
+def test_models_are_weighed_beside_what_remains(monkeypatch, base, misses, noise, weighed) -> None:
+    """Where the misfit was large, something is left and a force of time describes it."""
+    search: Any = Settling((BY_ID[DRAG],), None, np.random.default_rng(0), lambda words: None)
+    near, far = model(f"{FRICTION} {SPRING}", 2.0), model(FRICTION, 3.0)
+    search.states = {frozenset(): SimpleNamespace(candidate=model("", base))}
+    search.tried = {frozenset(c.ids): c for c in (far, near)}
+    monkeypatch.setattr(ranked, "residual_repetition", lambda fit: 1.0)
+    monkeypatch.setattr(ranked, "leaves_something", lambda fit: misses)
+    gains = {near.fit.reduced_chi2: 0.0, far.fit.reduced_chi2: 20.0}
+    force = SimpleNamespace(
+        fit=near.fit, leaves_noise=noise, gain=lambda fit, alone: gains[fit.reduced_chi2]
+    )
+    asked: list[Any] = []
+    monkeypatch.setattr(ranked, "discrepancy", lambda fit: asked.append(fit) or force)
+    search.weigh_remainder()
+    search.weigh_remainder()
+    led = search.log_odds(far) - search.log_odds(near)
+    assert led == pytest.approx(search.cost + 20.0 * weighed)
+    assert asked == [near.fit] * (1 if weighed else 2 * (base > 9.0 and misses))
