@@ -47,9 +47,7 @@ def test_laws_that_are_asked_for_take_the_place_where_scores_see_nothing(base, s
 
 def test_a_better_end_of_the_same_set_settles_once_more(monkeypatch):
     """What its effects contribute was told at the worse end."""
-    first, better = (
-        Table({}).candidate((BY_ID[FRICTION], BY_ID[DRAG]), gain) for gain in (40.0, 90.0)
-    )
+    first, better = (Table({}).candidate((A, B), gain) for gain in (40.0, 90.0))
     settling, eliminated = object.__new__(Settling), []
     stand_ins = {
         "weigh_remainder": lambda: None,
