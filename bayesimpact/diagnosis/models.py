@@ -165,7 +165,8 @@ class Models:
                 if not self.may_go_on():
                     break
                 self.tell("fitting " + " + ".join(e.id for e in chosen.effects))
-                self.keep(fit_from(problem.fit, chosen.effects, chosen.values, self.scales))
+                start, goal = chosen.values, self.contained(key).fit.log_likelihood
+                self.keep(fit_from(problem.fit, chosen.effects, start, self.scales, goal=goal))
             found.append(self.no_worse(self.tried[key]))
             if not is_large(found[-1].fit):
                 break
@@ -175,13 +176,16 @@ class Models:
         """A model that has reached no less than what it contains: a climb that began elsewhere and
         ended lower begins again from there.
         """
-        ids = set(candidate.ids)
-        parts = [c for c in self.tried.values() if set(c.ids) < ids]
-        best = max(parts, key=lambda c: c.fit.log_likelihood, default=candidate)
+        best = self.contained(frozenset(candidate.ids))
         if not best.fit.log_likelihood > candidate.fit.log_likelihood + SAME:
             return candidate
         self.tell("fitting " + " + ".join(candidate.ids) + " once more")
         return self.keep(grown(best, candidate.effects, self.scales))
+
+    def contained(self, ids: frozenset[str]) -> Candidate:
+        """The model with some of these effects, or none, that explains most."""
+        parts = [c for key, c in self.tried.items() if key < ids]
+        return max(parts, key=lambda c: c.fit.log_likelihood)
 
     @cached_property
     def asked(self) -> Asked:

@@ -133,9 +133,16 @@ def refit(
 
 
 def fit_from(
-    fit: Fit, effects: Sequence[Effect], values: Mapping[str, float], scales: Scales
+    fit: Fit,
+    effects: Sequence[Effect],
+    values: Mapping[str, float],
+    scales: Scales,
+    *,
+    goal: float = -np.inf,
 ) -> Candidate:
-    """Fit a base model with effects from given values of parameters, over growing stretches."""
+    """Fit a base model with effects from given values of parameters, over growing stretches; to an
+    end of use where that reaches a log likelihood of `goal`.
+    """
     target = extend(fit, effects, scales)
     layout, acting = target.oscillator.layout, target.oscillator.acting
     start = transfer(fit, layout, effects, scales, values)
@@ -146,16 +153,12 @@ def fit_from(
                 values[parameter.name], low, min(parameter.upper, target.priors.upper[i])
             )
     steps = difference_steps(fit, target, step_sizes(layout.names, acting, scales, ()))
-    found = by_growing_horizon(target, start, steps)
-    return Candidate(tuple(effects), found, model_evidence(found))
-
-
-def by_growing_horizon(target: Target, start: Array, steps: Array) -> Fit:
-    """The mode that ever longer stretches lead to, shapes of effects held at first."""
-    return growing_horizon(
+    found = growing_horizon(
         target, start,
         steps=steps, held=_shapes(target), tolerance=TOLERANCE, max_iterations=ITERATIONS,
+        goal=goal + prior_at(target, start),
     )  # fmt: skip
+    return Candidate(tuple(effects), found, model_evidence(found))
 
 
 def of_two_ways(target: Target, start: Array, first: Array, steps: Array, goal: float) -> Fit:

@@ -36,14 +36,17 @@ def growing_horizon(
     held: Sequence[int] = (),
     tolerance: float = 1e-3,
     max_iterations: int = 60,
+    goal: float = -np.inf,
 ) -> Fit:
     """Climb from `start` (d,) to a mode by way of the modes for ever longer stretches.
 
     Parameters `held` stay where they start until the whole recordings count: what a short stretch
-    does not tell, it should not move. Other arguments as for `find_mode`.
+    does not tell, it should not move. Other arguments as for `find_mode`, of the last climb.
     """
     theta = by_stretches(target, start, steps=steps, held=held)
-    return find_mode(target, theta, steps=steps, tolerance=tolerance, max_iterations=max_iterations)
+    return find_mode(
+        target, theta, steps=steps, tolerance=tolerance, max_iterations=max_iterations, goal=goal
+    )
 
 
 def by_stretches(

@@ -81,7 +81,7 @@ class Table:
         reached = self.forward.get(key, self.gain(ids))
         return self.candidate(ids, self.once.pop(key, reached))
 
-    def fit_from(self, fit, effects, values, scales) -> Candidate:
+    def fit_from(self, fit, effects, values, scales, *, goal) -> Candidate:
         self.fitted.append(frozenset(e.id for e in effects))
         return self.candidate([e.id for e in effects], self.gain(self.fitted[-1]))
 

@@ -92,3 +92,27 @@ def test_a_search_keeps_time_for_comparisons_by_how_long_a_look_takes(monkeypatc
     assert search.budget.may_search_on() and not search.may_go_on()
     now[0] = PATIENCE - LOOKS * took - 1.0
     assert search.may_go_on()
+
+
+def test_a_set_that_is_asked_for_must_reach_what_it_contains(monkeypatch):
+    """Its climb is told to: one that began elsewhere and will end lower is of no use."""
+    goals = []
+
+    def fit_from(fit, effects, values, scales, *, goal):
+        goals.append((tuple(e.id for e in effects), goal))
+        return candidate(" ".join(e.id for e in effects), 200.0)
+
+    monkeypatch.setattr(models, "fit_from", fit_from)
+    search = made_up(monkeypatch)
+    search.keep(candidate("", 40.0))
+    search.keep(candidate("spring_cubic", 120.0))
+    larger = ["coulomb_friction", "coulomb_friction quadratic_drag", "spring_cubic quadratic_drag"]
+    sets = [
+        SimpleNamespace(effects=tuple(BY_ID[i] for i in ids.split()), values={}) for ids in larger
+    ]
+    problem = SimpleNamespace(best=lambda most: sets[:1], fit=None)
+    search.asked = SimpleNamespace(about=lambda about, flight: problem)
+    for one in sets:
+        problem.best = lambda most, one=one: [one]
+        search.fit_sets(search.tried[frozenset()], 3, False)
+    assert [goal for _, goal in goals] == [40.0, 200.0, 120.0]

@@ -385,3 +385,13 @@ def test_values_of_their_own_gain_nothing_on_a_control(small, effect_id):
     assert set(candidate.fit.target.replaced) == {slot}
     back = without(candidate, BY_ID[effect_id], scales)
     assert back.log_evidence == pytest.approx(base.log_evidence, abs=1e-3)
+
+
+def test_a_climb_from_given_values_ends_where_it_will_not_reach_its_goal(planted):
+    fit, scales = planted
+    friction, start = (BY_ID["coulomb_friction"],), {"coulomb_friction.force": 4e-3}
+    whole = fit_from(fit, friction, start, scales)
+    told = fit_from(fit, friction, start, scales, goal=whole.fit.log_likelihood + 1e7)
+    assert told.fit.iterations < whole.fit.iterations
+    within = fit_from(fit, friction, start, scales, goal=whole.fit.log_likelihood - 10.0)
+    assert within.log_evidence == pytest.approx(whole.log_evidence, abs=0.01)
