@@ -98,11 +98,11 @@ def sigma_of(fit: Fit) -> Array:
     return fit.mode[fit.target.likelihood.sigma_columns]
 
 
-def whitened(target: Target, values: Sequence[Array], sigma: Array) -> tuple[Array, ...]:
-    """Signals (..., n_r) per recording, whitened and in units of the noise."""
-    recordings, noise = target.oscillator.campaign.recordings, target.likelihood.noise
-    rows = zip(values, recordings, sigma, strict=True)
-    return tuple(noise.whitened(r, v) / s for v, r, s in rows)
+def whitened(fit: Fit, values: Sequence[Array]) -> tuple[Array, ...]:
+    """Changes (..., n_r) of what is seen per recording, whitened and in units of the noise."""
+    recordings, noise = fit.target.oscillator.campaign.recordings, fit.target.likelihood.noise
+    rows = zip(values, fit.slopes, recordings, sigma_of(fit), strict=True)
+    return tuple(noise.whitened(r, v * slope) / s for v, slope, r, s in rows)
 
 
 def shape_points(effect: Effect, scales: Scales, finer: int = 1) -> list[dict[str, float]]:
@@ -141,18 +141,16 @@ def _direction(
     target = extend(fit, effects, scales)
     layout = target.oscillator.layout
     theta = transfer(fit, layout, effects, scales, shapes)
-    sigma = sigma_of(fit)
     sizes = size_parameters(target, effect)
     if not sizes:
-        change = [
-            b - a for a, b in zip(fit.predicted, target.oscillator.predict(theta), strict=True)
-        ]
-        parts = tuple(p[:, None] for p in whitened(target, change, sigma))
+        change = [b - a for a, b in zip(fit.seen, target.oscillator.predict(theta), strict=True)]
+        parts = tuple(p[:, None] for p in whitened(fit, change))
         return Direction(effect, dict(shapes), (effect.id,), parts, True)
-    base = whitened(target, target.oscillator.predict(theta), sigma)
+    base = whitened(fit, target.oscillator.predict(theta))
     columns = []
     for name, parameter in sizes:
-        response = _response(target, theta, base, sigma, layout.index(name), parameter, scales)
+        index = layout.index(name)
+        response = _response(fit, target, theta, base, index, parameter, scales)
         if response is None:
             return None
         columns.append(response)
@@ -164,10 +162,10 @@ def _direction(
 
 
 def _response(
+    fit: Fit,
     target: Target,
     theta: Array,
     base: tuple[Array, ...],
-    sigma: Array,
     index: int,
     parameter: EffectParameter,
     scales: Scales,
@@ -177,7 +175,7 @@ def _response(
     for _ in range(4):
         moved = theta.copy()
         moved[index] += step
-        values = whitened(target, target.oscillator.predict(moved), sigma)
+        values = whitened(fit, target.oscillator.predict(moved))
         change = [b - a for a, b in zip(base, values, strict=True)]
         with np.errstate(over="ignore", invalid="ignore"):
             norm = float(np.sqrt(sum(float(c.ravel() @ c.ravel()) for c in change)))

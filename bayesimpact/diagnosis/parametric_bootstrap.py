@@ -76,15 +76,18 @@ def parametric_bootstrap(
 
 def simulated(fit: Fit, rng: Rng) -> Campaign:
     """The fit's campaign recorded once more: its motion with fresh noise of the level that the
-    recordings show by themselves.
+    recordings show by themselves, in the steps that they come in.
 
     A filter that was only proved counts as declared.
     """
     likelihood = fit.target.likelihood
     noise, campaign = likelihood.noise, likelihood.oscillator.campaign
     recordings = []
-    for recording, motion in zip(campaign.recordings, fit.predicted, strict=True):
-        raw = noise.drawn(rng, recording, noise.level)
-        added = smooth(raw, noise.smoothing, recording.interval)
-        recordings.append(replace(recording, samples=motion + added))
+    for r, (recording, motion) in enumerate(zip(campaign.recordings, fit.seen, strict=True)):
+        rounding = likelihood.rounding(r, motion)
+        level = noise.level if rounding is None else rounding.noise / noise.scales[recording.order]
+        raw = noise.drawn(rng, recording, level)
+        read = motion + smooth(raw, noise.smoothing, recording.interval)
+        samples = read if rounding is None else rounding.step * np.round(read / rounding.step)
+        recordings.append(replace(recording, samples=samples))
     return replace(campaign, recordings=tuple(recordings))

@@ -121,15 +121,28 @@ class Fit:
         return float(self.sums.sum() / likelihood.noise.level**2 / freedom)
 
     @cached_property
-    def predicted(self) -> tuple[Array, ...]:
-        """What the probe would have read, per recording (n,), in the recording's SI unit."""
+    def seen(self) -> tuple[Array, ...]:
+        """What the probe would have seen, per recording (n,), in the recording's SI unit."""
         return self.target.oscillator.predict(self.mode)
 
     @cached_property
+    def predicted(self) -> tuple[Array, ...]:
+        """The same as it would have been read on average, where readings come in steps."""
+        average = self.target.likelihood.average
+        return tuple(average(r, seen) for r, seen in enumerate(self.seen))
+
+    @cached_property
+    def slopes(self) -> tuple[Array | float, ...]:
+        """Derivative of the average reading by what is seen, per recording (n,)."""
+        found = (self.target.likelihood.rounding(r, seen) for r, seen in enumerate(self.seen))
+        pairs = zip(found, self.seen, strict=True)
+        return tuple(1.0 if one is None else one.slope(seen) for one, seen in pairs)
+
+    @cached_property
     def readings(self) -> tuple[Array, ...]:
-        """The same counted from the reading at rest."""
+        """What was seen, counted from the reading at rest."""
         offsets = self.target.oscillator.layout.slots(self.mode)[:, _OFFSET]
-        return tuple(p - b for p, b in zip(self.predicted, offsets, strict=True))
+        return tuple(p - b for p, b in zip(self.seen, offsets, strict=True))
 
     @cached_property
     def displacements(self) -> tuple[Array, ...]:

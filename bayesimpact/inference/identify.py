@@ -34,6 +34,7 @@ from bayesimpact.inference.search import Generation, SearchResult, metropolis_di
 from bayesimpact.model.derivatives import grams
 from bayesimpact.model.oscillator import Oscillator, build_oscillator
 from bayesimpact.model.parameters import BASE_SLOTS
+from bayesimpact.model.rounding import scatter
 from bayesimpact.model.simulate import sums_of_squares
 from bayesimpact.model.threads import linear_algebra_alone
 from bayesimpact.response.estimates import Estimates, estimate
@@ -110,7 +111,7 @@ def identify(
     Raises `InputError` when a recording shows no oscillation.
     """
     estimates = rough_estimates(campaign) if campaign.declared else estimate(campaign)
-    given, noise = noise is not None, noise or estimate_noise(campaign)
+    given, noise = noise is not None, noise or about_average(estimate_noise(campaign), campaign)
     oscillator = build_oscillator(campaign, sigma_per_recording=sigma_per_recording)
     if oscillator.acting:
         return _with_declared(
@@ -166,6 +167,14 @@ def _with_declared(
     if refined is not noise:
         fit = climbed(replace(best.target, likelihood=Likelihood(oscillator, refined)), best)
     return Identification(fit, estimates, refined, result, other, best)
+
+
+def about_average(noise: Noise, campaign: Campaign) -> Noise:
+    """Noise about what is read on average, where readings come in coarse steps (`rounding`)."""
+    level = noise.level
+    rows = [(r, level * noise.scales[r.order]) for r in campaign.recordings]
+    left = [scatter(r, own) / own if own > 0 else 1.0 for r, own in rows]
+    return replace(noise, level=level * float(np.sqrt(np.mean(np.square(left)))))
 
 
 def initial_theta(oscillator: Oscillator, estimates: Estimates, noise: Noise) -> Array:

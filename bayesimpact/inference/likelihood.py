@@ -21,6 +21,7 @@ from bayesimpact.model.measurement import smooth
 from bayesimpact.model.nearby import readings_near
 from bayesimpact.model.oscillator import Oscillator
 from bayesimpact.model.parameters import BASE_SLOTS, SLOTS, Layout
+from bayesimpact.model.rounding import Rounding, coarse_step, likeliest_rounding
 from bayesimpact.model.simulate import sums_of_squares
 
 Array = NDArray[np.float64]
@@ -98,11 +99,17 @@ class Likelihood:
         positions = self.oscillator.layout.roles("noise")
         return np.resize(positions, self.oscillator.counts.size)
 
+    @cached_property
+    def steps(self) -> tuple[float, ...]:
+        """Coarse steps that every recording's readings come in, 0 for none; see `rounding`."""
+        pairs = zip(self.oscillator.campaign.recordings, self.scales, strict=True)
+        return tuple(coarse_step(one, self.noise.level * scale) for one, scale in pairs)
+
     def misfit(self, theta: Array) -> Array:
         """Sums of squares of the whitened residuals, (B, R), m2; inf where inadmissible."""
         o = self.oscillator
         theta = np.ascontiguousarray(np.atleast_2d(theta))
-        if o.is_plain and self.noise.is_white and o.is_whole:
+        if o.is_plain and self.noise.is_white and o.is_whole and not any(self.steps):
             base = slice(0, len(BASE_SLOTS))
             columns = np.ascontiguousarray(o.layout.columns[:, base])
             constants = np.ascontiguousarray(o.layout.constants[:, base])
@@ -132,8 +139,30 @@ class Likelihood:
         pairs = zip(
             self.oscillator.campaign.recordings, self.oscillator.predict(theta), strict=True
         )
-        noise = self.noise
-        return tuple(noise.whitened(r, r.samples - p) for r, p in pairs)
+        return tuple(
+            self.noise.whitened(one, one.samples - self.average(r, seen))
+            for r, (one, seen) in enumerate(pairs)
+        )
+
+    def average(self, r: int, seen: Array) -> Array:
+        """What recording `r` reads on average of what the probe sees, (..., n); see `rounding`."""
+        if self.steps[r] == 0.0:
+            return seen
+        read = []
+        for row in seen.reshape(-1, seen.shape[-1]):
+            rounding = self.rounding(r, row)
+            read.append(row if rounding is None else rounding.read(row))
+        return np.array(read).reshape(seen.shape)
+
+    def rounding(self, r: int, seen: Array) -> Rounding | None:
+        """How recording `r` is rounded about what a model says that the probe sees, (n,); None
+        where that is no more than noise, as where the model misses the readings by more.
+        """
+        if self.steps[r] == 0.0:
+            return None
+        recording = self.oscillator.campaign.recordings[r]
+        used = slice(None) if recording.used is None else recording.used
+        return likeliest_rounding(self.steps[r], seen[used], recording.samples[used])
 
     def per_recording(self, theta: Array) -> Array:
         """Log likelihood of every recording, (B, R); -inf where inadmissible."""
@@ -174,8 +203,11 @@ class Likelihood:
         return tuple(self._differences(r, theta, steps, roughly) for r in wanted)
 
     def _whitened(self, r: int, predicted: Array, jacobian: Array, columns: Index) -> Linearisation:
-        """Linearisation from a prediction (n,) and derivatives (k, n)."""
+        """Linearisation from what the probe sees (n,) and derivatives (k, n)."""
         recording = self.oscillator.campaign.recordings[r]
+        if (rounding := self.rounding(r, predicted)) is not None:
+            jacobian = jacobian * rounding.slope(predicted)
+            predicted = rounding.read(predicted)
         stacked = np.vstack([recording.samples - predicted, jacobian])
         white = self.noise.whitened(recording, stacked)
         return Linearisation(white[0], white[1:].T, columns)

@@ -56,7 +56,7 @@ def likeliest_shift(fit: Fit) -> SampleShift | None:
     """
     likelihood, noise = fit.target.likelihood, fit.target.likelihood.noise
     (recording,), (near,) = fit.target.oscillator.campaign.recordings, fit.linearisation
-    motion = np.gradient(fit.predicted[0])
+    motion = np.gradient(fit.seen[0])
     velocity = noise.whitened(recording, motion)
     white = np.vstack([near.residual, velocity, near.jacobian.T])
     count = recording.samples.size

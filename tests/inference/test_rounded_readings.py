@@ -1,0 +1,98 @@
+"""Fits to readings in coarse steps: what these leave is no line, no mode and no law."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import small_rig
+from effect_rigs import BY_ID
+
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.diagnosis.extend import campaign_scales
+from bayesimpact.diagnosis.parametric_bootstrap import simulated
+from bayesimpact.diagnosis.refit import fit_from
+from bayesimpact.diagnosis.scan import scan
+from bayesimpact.inference import likelihood
+from bayesimpact.inference.identify import identify
+from bayesimpact.model.effects import SEARCHED
+from bayesimpact.model.rounding import Rounding
+from bayesimpact.trial.rig import Release
+from bayesimpact.trial.rig_chain import Chain
+
+STEP, DITHER = 2e-4, 0.2
+
+
+def decays(seed: int, effects=None, releases=small_rig.PLAIN_RELEASES) -> Campaign:
+    """Plain decays down to a few steps, read by an encoder."""
+    chain = Chain(noise=DITHER * STEP, offsets=small_rig.OFFSETS, rounding=STEP)
+    return small_rig.record(
+        seed, effects, rig=small_rig.PLAIN, releases=releases, chain=chain,
+        duration=30.0, rate=200.0,
+    )  # fmt: skip
+
+
+def fitted(campaign: Campaign):
+    return identify(campaign, rng=np.random.default_rng(0), search=False).fit
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_what_steps_leave_is_told_by_their_average(seed, monkeypatch):
+    fit = fitted(decays(seed))
+    found = fit.target.likelihood.rounding(0, fit.seen[0])
+    assert found is not None and found.noise == pytest.approx(DITHER * STEP, rel=0.1)
+    assert fit.reduced_chi2 == pytest.approx(1.0, abs=0.06)
+    monkeypatch.setattr(likelihood, "coarse_step", lambda recording, level: 0.0)
+    assert fit.log_likelihood > fitted(decays(seed)).log_likelihood + 50.0
+
+
+def test_the_lines_that_steps_make_of_a_steady_motion_are_no_hum(monkeypatch):
+    """A force that moves the mass by some steps to the end of the recordings."""
+    shaking = {"amplitude": 0.05, "frequency": 10.0}
+    releases = (Release("a", "", -1e-3), Release("b", "", 1.5e-3))
+    campaign = decays(4, {"harmonic_forcing": {**shaking, "phase": 1.0}}, releases)
+    phases = {f"phase[{r.name}]": 1.0 for r in releases}
+    start = {f"harmonic_forcing.{n}": v for n, v in {**shaking, **phases}.items()}
+
+    def left() -> float:
+        base = fitted(campaign)
+        scales = campaign_scales(base)
+        found = fit_from(base, (BY_ID["harmonic_forcing"],), start, scales).fit
+        return scan(found, SEARCHED, scales, rng=np.random.default_rng(0)).p_value
+
+    assert left() > 1e-6
+    monkeypatch.setattr(likelihood, "coarse_step", lambda recording, level: 0.0)
+    assert left() < 1e-12
+
+
+def test_derivatives_go_through_the_steps():
+    """The slope of the sums of squares, two standard deviations from the mode; the noise ahead of
+    the steps, at its best everywhere, adds nothing to it.
+    """
+    fit = fitted(decays(4))
+    own, sign = fit.target.likelihood, np.resize([2.0, -2.0, 2.0], fit.mode.size)
+    theta = fit.mode + sign * fit.sd * (fit.sd < 0.5 * np.abs(fit.mode).clip(1e-9))
+    assert isinstance(own.rounding(0, fit.seen[0]), Rounding)
+
+    def square(at: np.ndarray) -> float:
+        return sum(float(white[0] @ white[0]) for white in own.residuals(at[None]))
+
+    for name in ("k1", "c1", "y0[a]", "v0[b]", "offset[a]"):
+        i = fit.names.index(name)
+        step = np.zeros(fit.mode.size)
+        step[i] = 0.05 * fit.sd[i]
+        slope = (square(theta + step) - square(theta - step)) / (2 * step[i])
+        told = sum(
+            -2.0 * float(part.jacobian[:, part.columns == i].sum(axis=1) @ part.residual)
+            for part in own.linearise(theta)
+        )
+        assert told == pytest.approx(slope, rel=0.05), name
+
+
+def test_a_simulated_campaign_comes_in_the_same_steps():
+    fit = fitted(decays(5))
+    again = simulated(fit, np.random.default_rng(1))
+    for recording, seen in zip(again.recordings, fit.seen, strict=True):
+        steps = recording.samples / STEP
+        np.testing.assert_allclose(steps, np.round(steps), atol=1e-6)
+        error = (recording.samples - seen) / STEP
+        assert np.std(error) == pytest.approx(np.sqrt(1 / 12 + DITHER**2), rel=0.08)
