@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -46,9 +47,13 @@ def draw_job(settings: Settings, seed: int) -> dict[str, Any]:
 
 
 def answer_job(files: Mapping[str, str], search: bool, report: bool) -> dict[str, Any]:
-    """On a worker that sees only files: the diagnosis, or what went wrong."""
+    """On a worker that sees only files: the diagnosis with the seconds of the processor that it
+    took, whatever else ran, or what went wrong.
+    """
+    begun = time.process_time()
     try:
-        return {"answer": answer(files, search=search, report=report)}
+        found = answer(files, search=search, report=report)
+        return {"answer": found, "processor_s": round(time.process_time() - begun, 1)}
     except Exception:
         return {"failed": traceback.format_exc()}
 

@@ -48,6 +48,7 @@ def summarise(results: Sequence[Result]) -> dict[str, Any]:
             if r["score"]["right"] and r["truth"]["planted"]
         ),
         "seconds": _quartiles(r["score"]["seconds"] for r in scored),
+        "processor_seconds": _quartiles(r.get("processor_s") for r in scored),
         "by_rig_kind": _by(scored, lambda r: r["truth"]["rig_kind"]),
         "by_noise": _by(scored, lambda r: r["truth"]["noise_kind"]),
         "by_effect": _by_effect(scored),

@@ -33,6 +33,7 @@ def summary_text(summary: Mapping[str, Any]) -> str:
         *_quartiles("base fit over noise, %", summary["concealed"], 100),
         *_quartiles("held-out gain when right, nats", summary["held_out_gain"], 1),
         *_quartiles("seconds per diagnosis", summary["seconds"], 1),
+        *_quartiles("seconds of the processor", summary["processor_seconds"], 1),
     ]
     lines += added_text(summary, _rate)
     for group, table in summary["coverage"].items():

@@ -46,6 +46,7 @@ def row(result: dict[str, Any]) -> dict[str, Any]:
         "worse": score["quality"]["worse"],
         "inside": [sum(inside), len(inside)],
         "seconds": round(score["seconds"], 1),
+        "processor_s": result.get("processor_s"),
     }
 
 

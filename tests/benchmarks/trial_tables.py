@@ -171,10 +171,21 @@ def strong_table() -> str:
         f"{low:g} to {high:g} times the noise (median {chosen['misfit'][1]:.0f}), "
         f"{len(t['by_rig_kind'])} rigs; {chosen['resting']} begin before the release. "
         f"{chosen['kept']} of {chosen['draws']} draws were kept; thrown away: "
-        f"{thrown or 'none'}. Median {t['seconds']['median']:.0f} s a diagnosis. In brackets: "
+        f"{thrown or 'none'}. {how_long(t)} In brackets: "
         f"95 % interval. Commit {t['commit'][:7]}, {t['date']}."
     )
     return grid(("several effects at once", "trials or intervals"), rows, foot)
+
+
+def how_long(t: dict) -> str:
+    """Of the processor, for a diagnosis; where these were not counted, of the clock."""
+    own = t.get("processor_seconds", {})
+    if not own.get("count"):
+        return f"Median {t['seconds']['median']:.0f} s a diagnosis by the clock."
+    return (
+        f"Median {own['median']:.0f} s of the processor a diagnosis, report included, upper "
+        f"quartile {own['quartiles'][1]:.0f} s, largest {own['largest']:.0f} s."
+    )
 
 
 def next_table() -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import time
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -19,8 +20,10 @@ from bayesimpact.data.strict_json import strict
 from bayesimpact.errors import InputError
 from bayesimpact.trial import run
 from bayesimpact.trial.blind import open_seal, seal, sealed_text
-from bayesimpact.trial.run import run_trials
+from bayesimpact.trial.run import answer_job, run_trials
 from bayesimpact.trial.settings import Settings, settings_from
+from bayesimpact.trial.summary import summarise
+from bayesimpact.trial.table import summary_text
 
 pytestmark = pytest.mark.long
 
@@ -157,6 +160,26 @@ def test_jobs_catch_their_own_errors(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(run, "answer", broken)
     for found in (run.draw_job(CONTROLS, 1), run.answer_job({}, False, True)):
         assert "ZeroDivisionError: on purpose" in found["failed"] and "Traceback" in found["failed"]
+
+
+def test_a_diagnosis_is_timed_by_the_processor(
+    quick: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever else the machine does: sleeping costs nothing, computing does."""
+
+    def busy(files: Mapping[str, str], search: bool, report: bool) -> dict:
+        time.sleep(0.3)
+        end = time.process_time() + 0.2
+        while time.process_time() < end:
+            pass
+        return {}
+
+    monkeypatch.setattr(run, "answer", busy)
+    assert 0.1 < answer_job({}, False, False)["processor_s"] < 0.29
+    results = run_trials(quick, SEEDS, tmp_path)
+    found = [{**r, "processor_s": 3.0 + i} for i, r in enumerate(results)]
+    assert summarise(found)["processor_seconds"]["largest"] == 2.0 + len(found)
+    assert "seconds of the processor" in summary_text(summarise(found))
 
 
 def test_a_changed_truth_is_refused(quick: Settings, tmp_path: Path) -> None:
