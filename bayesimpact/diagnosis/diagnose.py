@@ -35,6 +35,7 @@ from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.faults.compare import base_failed, gain, misfits
 from bayesimpact.diagnosis.faults.outliers import residual_spikes
 from bayesimpact.diagnosis.faults.unfree_start import BETTER, unfree_starts
+from bayesimpact.diagnosis.first_physics import faults_beside_physics
 from bayesimpact.diagnosis.loop import Diagnosis, Progress, diagnose_fit
 from bayesimpact.diagnosis.naming import is_large
 from bayesimpact.diagnosis.promising import NEAR_MARGIN, SCORE_UNDERESTIMATE
@@ -148,6 +149,10 @@ def diagnose(
     cleaned = cleaned_campaign(campaign, rng=rng, search=search)
     say("comparing the recordings")
     certain, doubtful, proved = cleaned, list(comparisons(cleaned, campaign)), False
+    beside_physics = faults_beside_physics(cleaned, campaign, effects)
+    if beside_physics:
+        certain = with_steps(cleaned, beside_physics, rng=rng, search=search)
+        doubtful, proved = [], True
     while doubtful:
         fit = certain.identification.fit
         promised = promised_gains(fit, effects, rng=rng)

@@ -126,7 +126,7 @@ def comparisons(
     if campaign.keep_faults:
         return ()
     effects = shared_effects(beside)
-    model = SharedModel(noise, effects, _values(fit))
+    model = SharedModel(noise, effects, values_of(fit))
     whole = model.fitted(campaign) if effects else base
     if whole is None:
         return ()
@@ -140,12 +140,12 @@ def comparisons(
 def fitted_beside(before: Corrected, effects: Sequence[Effect], fit: Fit) -> Fit | None:
     """The campaign's fit with effects, from where those of `fit` stand; None where it has none."""
     base, noise = before.identification.fit, before.identification.noise
-    model = SharedModel(noise, tuple(effects), _values(fit))
+    model = SharedModel(noise, tuple(effects), values_of(fit))
     return model.fitted(base.target.oscillator.campaign)
 
 
-def _values(fit: Fit | None) -> dict[str, float]:
-    """Parameter -> value; empty without a fit."""
+def values_of(fit: Fit | None) -> dict[str, float]:
+    """Parameter of a fit -> value; empty without one."""
     return {} if fit is None else {n: fit.value(n) for n in fit.target.oscillator.layout.names}
 
 

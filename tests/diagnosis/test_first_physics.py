@@ -1,0 +1,57 @@
+"""Faults of recordings that strong physics hides from a comparison by the base model."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import small_rig
+from effect_rigs import BY_ID
+
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.diagnosis.diagnose import diagnose
+from bayesimpact.diagnosis.first_physics import faults_beside_physics
+from bayesimpact.diagnosis.naming import is_large
+from bayesimpact.diagnosis.recording_faults import cleaned_campaign
+
+CATALOGUE = tuple(
+    BY_ID[i] for i in ("coulomb_friction", "quadratic_drag", "spring_cubic", "harmonic_forcing")
+)
+FRICTION = {"coulomb_friction": {"force": 0.05}}
+BUMP = {"detent": {"stiffness": 40.0, "place": -1.5e-3, "width": 5e-4}}
+
+
+def timed(seed: int, ratio: float, effects) -> Campaign:
+    """Recording b's clock runs slow by a ratio."""
+    campaign = small_rig.record(seed, effects, duration=2.0)
+    first, second, *others = campaign.recordings
+    wrong = replace(second, interval=second.interval / ratio)
+    return replace(campaign, recordings=(first, wrong, *others))
+
+
+def found(campaign: Campaign):
+    before = cleaned_campaign(campaign, rng=np.random.default_rng(0), search=False)
+    assert is_large(before.identification.fit)
+    return faults_beside_physics(before, campaign, CATALOGUE)
+
+
+@pytest.mark.parametrize("seed", [71, 72])
+def test_a_clock_shows_beside_the_law_that_is_asked_for_first(seed):
+    ((fault,),) = found(timed(seed, 1.004, FRICTION))
+    assert fault.fault.id == "recording_clock" and fault.fault.recording == "b"
+    assert "-0.4" in fault.fault.statement or "-0.39" in fault.fault.statement
+
+
+def test_without_a_fault_or_where_more_is_missing_none_is_found():
+    assert found(timed(73, 1.0, FRICTION)) == ()
+    assert found(timed(74, 1.004, FRICTION | BUMP)) == ()
+
+
+def test_what_physics_hid_is_named_beside_it():
+    answer = diagnose(
+        timed(75, 1.004, FRICTION), rng=np.random.default_rng(0), effects=CATALOGUE, search=False
+    )
+    assert answer.verdict == "named" and [e.id for e in answer.effects] == ["coulomb_friction"]
+    assert answer.corrected is not None
+    assert [f.id for f in answer.corrected.faults] == ["recording_clock"]
