@@ -48,10 +48,14 @@ def test_without_a_fault_or_where_more_is_missing_none_is_found():
     assert found(timed(74, 1.004, FRICTION | BUMP)) == ()
 
 
-def test_what_physics_hid_is_named_beside_it():
+def test_what_physics_hid_is_corrected_before_more_is_searched():
+    told: list[str] = []
     answer = diagnose(
-        timed(75, 1.004, FRICTION), rng=np.random.default_rng(0), effects=CATALOGUE, search=False
-    )
+        timed(75, 1.004, FRICTION), rng=np.random.default_rng(0), effects=CATALOGUE, search=False,
+        progress=told.append,
+    )  # fmt: skip
+    first = next(i for i, words in enumerate(told) if words.startswith("scoring"))
+    assert any("recording_clock" in words for words in told[:first])
     assert answer.verdict == "named" and [e.id for e in answer.effects] == ["coulomb_friction"]
     assert answer.corrected is not None
     assert [f.id for f in answer.corrected.faults] == ["recording_clock"]
