@@ -6,8 +6,6 @@ from __future__ import annotations
 
 import math
 
-from scipy.optimize import brentq
-
 ALPHA = 0.004
 """Of the tests of a free force against the noise, which stand beside its odds: what a thousand
 draws of the null resolve well.
@@ -50,8 +48,3 @@ def largest_log_odds(p_value: float) -> float:
         return 0.0
     p = max(p_value, 1e-300)
     return -math.log(-math.e * p * math.log(p))
-
-
-def p_value_of(log_odds: float) -> float:
-    """The p-value that stands for such log odds at most, nats, above 0."""
-    return float(math.exp(brentq(lambda x: largest_log_odds(math.exp(x)) - log_odds, -600.0, -1.0)))

@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
+from scipy.optimize import brentq
 
 from bayesimpact.data.campaign import Measurement
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.scan import scan
-from bayesimpact.diagnosis.thresholds import DECISIVE, p_value_of
+from bayesimpact.diagnosis.thresholds import DECISIVE, largest_log_odds
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.trial.bundle import PAPER_HEIGHTS, PAPER_RIG
 from bayesimpact.trial.designs import DrawnRig
@@ -83,6 +84,11 @@ def bundled_design(recordings: int = 9) -> DrawnRig:
         releases.append(Release(f"case{case}_{i // 3 + 1}", case, height, 1e-3 * (-1) ** i))
     chain = Chain(noise=5e-6, offsets={r.name: 1e-5 * (-1) ** i for i, r in enumerate(releases)})
     return DrawnRig("paper", "white", PAPER_RIG, tuple(releases), 1000.0, 6.0, chain, Measurement())
+
+
+def p_value_of(log_odds: float) -> float:
+    """The p-value that stands for such log odds at most, nats, above 0."""
+    return float(np.exp(brentq(lambda x: largest_log_odds(np.exp(x)) - log_odds, -600.0, -1.0)))
 
 
 def critical_score(sensitivity: Sensitivity, rng: np.random.Generator) -> float:

@@ -16,7 +16,6 @@ from bayesimpact.diagnosis.thresholds import (
     ALPHA,
     DECISIVE,
     largest_log_odds,
-    p_value_of,
 )
 
 
@@ -82,7 +81,6 @@ def test_a_p_value_stands_for_odds_of_a_bound():
     for p, odds in ((0.05, 2.46), (0.01, 7.99), (0.001, 53.3)):
         assert np.exp(largest_log_odds(p)) == pytest.approx(odds, rel=0.005)
     assert largest_log_odds(0.5) == 0.0 and np.isfinite(largest_log_odds(0.0))
-    assert p_value_of(np.log(53.3)) == pytest.approx(0.001, rel=0.01)
 
 
 @pytest.mark.parametrize("ids", [FRICTION, f"{FRICTION} spring_cubic"])

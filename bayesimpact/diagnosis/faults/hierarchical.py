@@ -40,7 +40,7 @@ Freed = tuple[Array, float]
 """Direction (R, p) of what a fault changes, per unit of it, and its largest prior standard
 deviation."""
 
-SWEEPS = 2  # over the parameters' widths; a third changes no log evidence by 0.1
+PASSES = 2  # over the parameters' widths; a third changes no log evidence by 0.1
 SPREAD = 0.02  # standard deviation of the log amplitudes from which on trends can be told
 MEASURED = 10.0  # variance of a logarithm up to which a recording says anything of it
 FLAT = 1e-9  # precision of what is shared
@@ -55,7 +55,7 @@ class Widths:
     scatter: NDArray[np.int_]
 
 
-class Spread:
+class Differences:
     """The recordings' logarithms under one labelling.
 
     Parameters
@@ -120,7 +120,7 @@ class Spread:
         at, total = self.at_none(), 0.0
         if self.trends.size * self.scatters.size == 1:
             return float(self._values(freed, share, _one(at))[0]), at
-        for _ in range(SWEEPS):
+        for _ in range(PASSES):
             total = 0.0
             for p in range(self.size):
                 grid = self._around(at, p)

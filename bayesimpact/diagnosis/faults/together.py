@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.diagnosis.faults.alone import Alone
-from bayesimpact.diagnosis.faults.hierarchical import Freed, Spread
+from bayesimpact.diagnosis.faults.hierarchical import Differences, Freed
 from bayesimpact.diagnosis.thresholds import DECISIVE
 
 Array = NDArray[np.float64]
@@ -125,23 +125,23 @@ class Recordings:
 
     def weighed(self, faults: Sequence[Hypothesis], *, exact: bool) -> Weighed:
         """Evidence of several faults together, and what the last of them frees."""
-        spread, freed = self._spread(faults, exact=exact), self._freed(faults)
-        value, share, at = spread.evidence(freed)
-        agreement = spread.agreement(freed, share, at)
+        found, freed = self._differences(faults, exact=exact), self._freed(faults)
+        value, share, at = found.evidence(freed)
+        agreement = found.agreement(freed, share, at)
         if not faults[-1].direction:
             return Weighed(faults[-1], value, agreement)
-        return Weighed(faults[-1], value, agreement, *spread.estimate(freed, share, at))
+        return Weighed(faults[-1], value, agreement, *found.estimate(freed, share, at))
 
     def roughly(self, fault: Hypothesis) -> float:
         """Its evidence where trends may be of any size and nothing scatters."""
-        return self._spread([fault], exact=False).roughly(self._freed([fault]))
+        return self._differences([fault], exact=False).roughly(self._freed([fault]))
 
-    def _spread(self, faults: Sequence[Hypothesis], *, exact: bool) -> Spread:
+    def _differences(self, faults: Sequence[Hypothesis], *, exact: bool) -> Differences:
         labels = list(self.cases)
         for fault in faults:
             if fault.case is not None:
                 labels[fault.recording] = fault.case
-        return Spread(self.alone, labels, exact=exact)
+        return Differences(self.alone, labels, exact=exact)
 
     def _freed(self, faults: Sequence[Hypothesis]) -> list[Freed]:
         found = []

@@ -15,7 +15,7 @@ from bayesimpact.diagnosis.faults.hierarchical import (
     NOTHING,
     SCATTERS,
     TRENDS,
-    Spread,
+    Differences,
     Widths,
     standardised,
 )
@@ -53,7 +53,7 @@ def test_evidence_against_the_dense_covariance(trend: int, scatter: int) -> None
     """Generalised least squares with priors is a normal density of everything at once."""
     rng = np.random.default_rng(1)
     alone, cases = recordings((2, 2), rng, slope=5.0)
-    spread = Spread(alone, cases, exact=False)
+    spread = Differences(alone, cases, exact=False)
     direction = np.zeros((4, 5))
     direction[2] = (-1.0, -2.0, -1.0, 0.0, -2.0)
     at = Widths(np.full((1, 5), trend), np.full((1, 5), scatter))
