@@ -12,6 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from bayesimpact.data.foreign import file_bytes
+from bayesimpact.data.input import UNITS as INPUT_UNITS
+from bayesimpact.data.input import Kind
 from bayesimpact.data.quantity import RESPONSE_COLUMNS, UNITS, is_angular, order_of
 from bayesimpact.data.readers import text
 from bayesimpact.data.readers.channel import Channel
@@ -139,6 +141,7 @@ def draft(title: str, looks: Sequence[Look], rig: DraftedRig) -> Draft:
             note = "" if rig.case else f"  # {ASSUMED}: recordings of one obstacle share a case"
             lines.append(f"case = {_toml(rig.case or '1')}{note}")
         lines += [] if one.own_kind else _keys(one, rig)
+        lines += _input_lines(one)
         said[one.file] = lines[begin:]
     told = _told(said)
     return Draft(
@@ -250,6 +253,26 @@ def _keys(one: Look, rig: DraftedRig) -> list[str]:
     elif response.unit not in UNITS:
         lines.append(f'# unit = "mm"  # {NEEDED}: the file gives no unit; {", ".join(UNITS)}')
     return lines + _clock_lines(one, inside, response, first_is_time, rig.rate)
+
+
+def _input_lines(one: Look) -> list[str]:
+    """The line of a measured input beside the response: a force, or a base's motion by its name."""
+    known = [c for c in one.channels if c.name in RESPONSE_COLUMNS]
+    response = next(iter(known or guessed_response(one.channels)), None)
+    inside = [c for c in one.channels if response is not None and c.block == response.block]
+    found = [(c, kind) for c in inside if (kind := _input_kind(c)) and c is not response]
+    if not found:
+        return []
+    channel, kind = found[0]
+    others = ", ".join(c.label for c, _ in found[1:SHOWN])
+    note = f"  # {ASSUMED}: it drove the motion{f'; others: {_one_line(others)}' if others else ''}"
+    return [f"input = {{ column = {_chosen(inside, channel)}, kind = {_toml(kind)} }}{note}"]
+
+
+def _input_kind(channel: Channel) -> Kind | None:
+    """As what a channel may have driven the motion; None where neither name nor unit says so."""
+    named = next((kind for kind in INPUT_UNITS if channel.name == kind), None)
+    return named or ("force_N" if channel.unit in INPUT_UNITS["force_N"] else None)
 
 
 def _clock_lines(

@@ -148,3 +148,29 @@ def test_acceleration_is_read_and_said(tmp_path: Path) -> None:
     (recording,) = load_campaign(tmp_path).recordings
     assert recording.quantity == "acceleration"
     np.testing.assert_allclose(recording.samples, made.MM * 9.80665, rtol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("header", "kind", "scale"),
+    [
+        ("Time [s],Pos [mm],Force [kN]", "force_N", 1e3),
+        ("time_s,displacement_mm,force_N", "force_N", 1.0),
+        ("time_s,displacement_mm,base_m_s2", "base_m_s2", 1.0),
+        ("time_s,displacement_mm,temperature", None, 1.0),
+        ("Time [s],Pos [mm],Table [m/s2]", None, 1.0),  # may be the base's, or anything's
+    ],
+)
+def test_a_measured_input_is_read_and_said(tmp_path: Path, header, kind, scale) -> None:
+    drive = 0.01 * np.sin(40.0 * np.array(made.TIMES))
+    rows = [f"{t:.6g},{x:.9g},{f:.9g}" for t, x, f in zip(made.TIMES, made.MM, drive, strict=True)]
+    (tmp_path / "a.csv").write_text(header + "\n" + "\n".join(rows))
+    result = _new(tmp_path, tmp_path / "a.csv")
+    assert result.exit_code == 0
+    assert ("it drove the motion" in result.output) == (kind is not None)
+    (recording,) = load_campaign(tmp_path).recordings
+    np.testing.assert_allclose(recording.samples, made.MM * 1e-3, rtol=1e-6)
+    if kind is None:
+        assert recording.input is None
+    else:
+        assert recording.input is not None and recording.input.kind == kind
+        np.testing.assert_allclose(recording.input.samples, scale * drive, rtol=1e-6, atol=1e-12)
