@@ -256,11 +256,16 @@ def _keys(one: Look, rig: DraftedRig) -> list[str]:
 
 
 def _input_lines(one: Look) -> list[str]:
-    """The line of a measured input beside the response: a force, or a base's motion by its name."""
+    """The line of a measured input of the response's clock: a force, or a base's motion by name."""
     known = [c for c in one.channels if c.name in RESPONSE_COLUMNS]
     response = next(iter(known or guessed_response(one.channels)), None)
-    inside = [c for c in one.channels if response is not None and c.block == response.block]
-    found = [(c, kind) for c in inside if (kind := _input_kind(c)) and c is not response]
+    if response is None:
+        return []
+    inside = [c for c in one.channels if c.block == response.block]
+    timed = [
+        c for c in inside if c.interval == response.interval and np.nanmax(np.abs(c.samples)) > 0.0
+    ]
+    found = [(c, kind) for c in timed if (kind := _input_kind(c)) and c is not response]
     if not found:
         return []
     channel, kind = found[0]

@@ -259,7 +259,8 @@ def _least(
 
 
 def _log_volume(matrix: Array) -> float:
-    """Log determinant of a covariance or a precision."""
-    scale = np.sqrt(np.diag(matrix))
-    scaled = float(np.linalg.slogdet(matrix / np.outer(scale, scale))[1])
-    return float(scaled + 2.0 * np.log(scale).sum())
+    """Log determinant of a covariance or a precision; NaN where it has none."""
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        scale = np.sqrt(np.diag(matrix))
+        scaled = float(np.linalg.slogdet(matrix / np.outer(scale, scale))[1])
+        return float(scaled + 2.0 * np.log(scale).sum())

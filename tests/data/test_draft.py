@@ -18,6 +18,7 @@ def _new(folder: Path, *arguments: object) -> Result:
     return CliRunner().invoke(main, ["new", str(folder), *map(str, arguments)])
 
 
+SILENT = "Time [s],Pos [mm],Load [N]"  # a channel that nothing was connected to
 COMPLETE = [
     *("MATLAB structure", "HDF5", "UFF58", "TDMS", "LVM", "Excel", "NetCDF 3", "NetCDF 4", "Zarr"),
     *("Parquet", "npz", "units in the header", "units in a second row", "NI", "Polytec", "LMS"),
@@ -158,10 +159,11 @@ def test_acceleration_is_read_and_said(tmp_path: Path) -> None:
         ("time_s,displacement_mm,base_m_s2", "base_m_s2", 1.0),
         ("time_s,displacement_mm,temperature", None, 1.0),
         ("Time [s],Pos [mm],Table [m/s2]", None, 1.0),  # may be the base's, or anything's
+        (SILENT, None, 1.0),
     ],
 )
 def test_a_measured_input_is_read_and_said(tmp_path: Path, header, kind, scale) -> None:
-    drive = 0.01 * np.sin(40.0 * np.array(made.TIMES))
+    drive = 0.01 * np.sin(40.0 * np.array(made.TIMES)) * (header != SILENT)
     rows = [f"{t:.6g},{x:.9g},{f:.9g}" for t, x, f in zip(made.TIMES, made.MM, drive, strict=True)]
     (tmp_path / "a.csv").write_text(header + "\n" + "\n".join(rows))
     result = _new(tmp_path, tmp_path / "a.csv")

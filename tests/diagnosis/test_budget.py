@@ -181,7 +181,7 @@ def test_exchanges_beside_a_force_of_time_that_the_budget_cut_short_are_not_fini
     search.examine = lambda candidate: states[candidate.ids]
     search.drop = lambda candidate, effect: base
     search.exchange = exchanged.append
-    left: Any = SimpleNamespace(gain=lambda fit: 90.0 * (fit is other.fit))
+    left: Any = SimpleNamespace(gain=lambda fit, alone: 90.0 * (fit is other.fit))
     before = Naming(states[()], states[()], (base, other), 1.0)
     found = search.beside_a_force(before, left)
     assert found.chosen.candidate is other and found.beside is left

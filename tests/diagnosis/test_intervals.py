@@ -89,16 +89,16 @@ def leaving_something() -> Diagnosis:
 @pytest.mark.long
 def test_the_force_of_time_of_the_chosen_model_is_built_once(monkeypatch) -> None:
     """Its intervals rest on the one that the search compared, which is not kept beyond that."""
-    modules = ("remaining", "intervals", "loop")
-    remaining, ends, loop = (importlib.import_module(f"bayesimpact.diagnosis.{m}") for m in modules)
+    names = ("ranked", "remaining", "intervals", "loop")
+    *modules, loop = (importlib.import_module(f"bayesimpact.diagnosis.{name}") for name in names)
     built = []
 
     def counted(fit: Any) -> Any:
         built.append(fit)
         return discrepancy(fit)
 
-    monkeypatch.setattr(remaining, "discrepancy", counted)
-    monkeypatch.setattr(ends, "discrepancy", counted)
+    for module in modules:
+        monkeypatch.setattr(module, "discrepancy", counted)
     monkeypatch.setattr(loop, "with_formulas", lambda answer, *_, **__: answer)
     found = leaving_something()
     assert found.verdict == "partly" and found.after is found.naming.chosen.candidate.fit

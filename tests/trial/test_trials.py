@@ -41,6 +41,7 @@ def timeless(result: dict) -> dict:
     content = copy.deepcopy(result)
     for part in ("answer", "score"):
         content[part].pop("seconds")
+    content.pop("processor_s")
     return content
 
 
