@@ -32,6 +32,7 @@ from bayesimpact.diagnosis.refit import (
 from bayesimpact.diagnosis.scan import Scan, scan
 from bayesimpact.diagnosis.scores import Score
 from bayesimpact.diagnosis.smoothing import is_refuted
+from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.progress import Refit
 from bayesimpact.model.effects.effect import Effect, Scales
 
@@ -67,6 +68,7 @@ class Models:
         self.look = 0.0  # s, that the last model took to be scored
         self.repeated: tuple[Candidate, float] | None = None
         self.left: Discrepancy | None = None  # beside every model, see `Ranked.weigh_remainder`
+        self.last: tuple[Fit, Discrepancy | None] | None = None  # see `Ranked.remainder`
 
     def keep(self, candidate: Candidate) -> Candidate:
         """The better end of all climbs to the candidate's model, this one among them."""

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bayesimpact.diagnosis.discrepancy import discrepancy
+from bayesimpact.diagnosis.discrepancy import Discrepancy, discrepancy
 from bayesimpact.diagnosis.models import UNCONVERGED_SHORTFALL, Models
 from bayesimpact.diagnosis.naming import State, is_large, leaves_something
 from bayesimpact.diagnosis.promising import refit_candidates
@@ -21,6 +21,7 @@ from bayesimpact.diagnosis.refit import (
 from bayesimpact.diagnosis.scan import Scan
 from bayesimpact.diagnosis.scores import Score
 from bayesimpact.diagnosis.thresholds import DECISIVE
+from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect
 
 MOST_EFFECTS = 3
@@ -74,10 +75,14 @@ class Ranked(Models):
         large and that is a force of time: many samples of it are no evidence by themselves.
         """
         nearest = min(self.tried.values(), key=lambda c: c.fit.reduced_chi2).fit
-        if self.left is not None and self.left.fit is nearest:
-            return
-        left = discrepancy(nearest) if self.is_large and leaves_something(nearest) else None
+        left = self.remainder(nearest) if self.is_large and leaves_something(nearest) else None
         self.left = left if left is not None and left.leaves_noise else None
+
+    def remainder(self, fit: Fit) -> Discrepancy | None:
+        """The force of time that a fit leaves; that of the last one asked for is kept."""
+        if self.last is None or self.last[0] is not fit:
+            self.last = fit, discrepancy(fit)
+        return self.last[1]
 
     def repetition(self) -> float:
         """Samples per independent one in the residual of the best model so far."""

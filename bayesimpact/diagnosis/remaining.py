@@ -29,8 +29,7 @@ class Remaining(Settling):
         time, what it is without each of its effects, and models with a residual force.
         """
         nearest = min(self.tried.values(), key=lambda c: c.fit.reduced_chi2)
-        known = self.left is not None and self.left.fit is nearest.fit
-        left = self.left if known else discrepancy(nearest.fit)
+        left = self.remainder(nearest.fit)
         if left is not None and left.leaves_noise:
             found = self.beside_a_force(found, left)
         chosen = found.chosen.candidate

@@ -87,4 +87,4 @@ def test_models_are_weighed_beside_what_remains(monkeypatch, base, misses, noise
     search.weigh_remainder()
     led = search.log_odds(far) - search.log_odds(near)
     assert led == pytest.approx(search.cost + 20.0 * weighed)
-    assert asked == [near.fit] * (1 if weighed else 2 * (base > 9.0 and misses))
+    assert asked == [near.fit] * (base > 9.0 and misses)
