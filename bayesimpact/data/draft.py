@@ -262,9 +262,7 @@ def _input_lines(one: Look) -> list[str]:
     if response is None:
         return []
     inside = [c for c in one.channels if c.block == response.block]
-    timed = [
-        c for c in inside if c.interval == response.interval and np.nanmax(np.abs(c.samples)) > 0.0
-    ]
+    timed = [c for c in inside if c.interval == response.interval and np.any(c.samples != 0.0)]
     found = [(c, kind) for c in timed if (kind := _input_kind(c)) and c is not response]
     if not found:
         return []

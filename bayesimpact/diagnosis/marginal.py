@@ -252,7 +252,7 @@ def _least(
     if near is not None:
         about = max(bounds[0], near - NEAR), min(bounds[1], near + NEAR)
         best = minimize_scalar(of, bounds=about, method="bounded", options=options)
-        if np.diff(np.clip([best.x - 2 * CLOSE, best.x + 2 * CLOSE], *about))[0] > 3 * CLOSE:
+        if about[0] + 2 * CLOSE < best.x < about[1] - 2 * CLOSE:
             return float(best.x), float(best.fun)
     best = minimize_scalar(of, bounds=bounds, method="bounded", options=options)
     return float(best.x), float(best.fun)
