@@ -149,7 +149,7 @@ def diagnose(
     cleaned = cleaned_campaign(campaign, rng=rng, search=search)
     say("comparing the recordings")
     certain, doubtful, proved = cleaned, list(comparisons(cleaned, campaign)), False
-    beside_physics = faults_beside_physics(cleaned, campaign, effects)
+    beside_physics = faults_beside_physics(cleaned, campaign, effects, doubtful)
     if beside_physics:
         certain = with_steps(cleaned, beside_physics, rng=rng, search=search)
         doubtful, proved = [], True
@@ -237,12 +237,13 @@ def _without_needless_faults(found: Diagnosis, before: Corrected, searches: Sear
     """
     more = found.corrected is not None and len(found.corrected.compared) > len(before.compared)
     beside = [e for e in found.effects if e in found.after.target.oscillator.effects]
-    if not (more and beside and is_settled(found)) or any(map(is_formula, beside)):
+    if not (more and beside and is_settled(found)):
         return found
     fit = fitted_beside(before, beside, found.after)
     if fit is None or misfits(fit):
         return found
-    return searches.again(found, lambda: before, is_simpler, fit)
+    first = None if any(map(is_formula, beside)) else fit  # a search finds formulas by itself
+    return searches.again(found, lambda: before, is_simpler, first)
 
 
 def _without_unfree_start(found: Diagnosis, as_read: Campaign, searches: Searches) -> Diagnosis:

@@ -15,7 +15,7 @@ from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.faults.alone import SharedModel, own_fit
 from bayesimpact.diagnosis.faults.compare import LEAST, base_failed, misfits
 from bayesimpact.diagnosis.likely_sets import LikelySets
-from bayesimpact.diagnosis.naming import is_large, leaves_something
+from bayesimpact.diagnosis.naming import is_large, is_more_than_noise, leaves_something
 from bayesimpact.diagnosis.recording_faults import (
     Corrected,
     Step,
@@ -31,15 +31,17 @@ MOST = 2  # effects beside which recordings are compared
 
 
 def faults_beside_physics(
-    before: Corrected, as_read: Campaign, effects: Sequence[Effect]
+    before: Corrected, as_read: Campaign, effects: Sequence[Effect], by_base: Sequence[Step] = ()
 ) -> tuple[Step, ...]:
     """Faults that leave nothing beside the likeliest law, or pair of laws, along the measured
-    motion; () where there are none, or no misfit that is large.
+    motion; () where there are none, no misfit that is large, or where the faults that comparing
+    `by_base` model shows leave nothing either.
     """
     fit = before.identification.fit
-    campaign = fit.target.oscillator.campaign
+    campaign, noise = fit.target.oscillator.campaign, fit.target.likelihood.noise
     told = len(campaign.recordings) >= LEAST and is_large(fit) and not base_failed(fit)
-    if campaign.keep_faults or not told:
+    enough = bool(by_base) and not is_more_than_noise(by_base[-1][-1].after, noise)
+    if campaign.keep_faults or not told or enough:
         return ()
     scales = campaign_scales(fit)
     for chosen in LikelySets(fit, effects, scales).best(MOST):
@@ -48,7 +50,6 @@ def faults_beside_physics(
         whole = fit_from(fit, chosen.effects, chosen.values, scales).fit
         if not misfits(whole):
             return ()  # physics is enough
-        noise = fit.target.likelihood.noise
         model = SharedModel(noise, chosen.effects, values_of(whole))
         if not all(_leaves_nothing(own_fit(campaign, r, model)) for r in campaign.recordings):
             continue

@@ -29,6 +29,7 @@ from bayesimpact.diagnosis.thresholds import (
     largest_log_odds,
 )
 from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.noise import Noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,8 +208,13 @@ def explains_most(found: Candidate, of: Candidate) -> bool:
 
 def leaves_something(fit: Fit) -> bool:
     """Whether a residual is above the noise by more than the estimate of the noise is uncertain."""
-    error = fit.target.likelihood.noise.level_error
-    return fit.reduced_chi2 > 1.0 + 2 * DOUBT * (error if np.isfinite(error) else 0.0)
+    return is_more_than_noise(fit.reduced_chi2, fit.target.likelihood.noise)
+
+
+def is_more_than_noise(reduced_chi2: float, noise: Noise) -> bool:
+    """Whether a misfit is above the noise by more than the estimate of that is uncertain."""
+    error = noise.level_error
+    return reduced_chi2 > 1.0 + 2 * DOUBT * (error if np.isfinite(error) else 0.0)
 
 
 def _is_elaboration(candidate: Candidate, chosen: Candidate) -> bool:

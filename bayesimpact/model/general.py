@@ -60,6 +60,7 @@ from bayesimpact.model.threads import in_shares
 
 OK, BAD_PARAMETERS, TOO_MANY_EVENTS, NOT_FINITE = 0, 1, 2, 3
 THREADING_PAYS = 4  # trajectories from which on
+FARTHEST = 1e6  # m or rad: a motion that has come as far grows without end, in ever more steps
 EVENTS_AT_LEAST, EVENTS_PER_SAMPLE = 1000, 2  # of sections, most of which end without one
 
 
@@ -204,6 +205,8 @@ def walk(w: Any) -> Any:
             t, j = stick(y, t, j, w)
         else:
             y, v, t, j = section(y, v, t, j, w)
+        if not abs(y) < FARTHEST:
+            return NOT_FINITE
     return OK
 
 

@@ -29,6 +29,7 @@ TERMS = 5  # of the series: the next one is below 1e-8 of the step at the least 
 # Noise ahead of rounding, in steps. With less the average is a staircase, that no climb can follow;
 # with more the sum has below a thousandth of the noise's variance.
 LEAST, MOST = 0.15, 0.45
+FAR = 1e9  # steps: no instrument counts as many, and beyond 1e15 a number knows no part of one
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,8 @@ def likeliest_rounding(step: float, seen: Array, readings: Array) -> Rounding | 
     of it from the first harmonic of their average, by least squares. None where they show none, as
     where the model misses them by more.
     """
+    if not np.all(np.abs(seen) < FAR * step):  # it ran away
+        return None
     wave = np.sin((2.0 * np.pi / step) * seen)
     size = float(wave @ wave)
     shown = -float(wave @ (readings - seen)) * np.pi / (size * step) if size > 0.0 else 0.0

@@ -301,3 +301,21 @@ def test_several_steps_are_corrected_with_one_fit(monkeypatch: pytest.MonkeyPatc
     found = faults.with_steps(before, steps, rng=np.random.default_rng(0), search=True)
     assert fitted == ["three"]
     assert found.own == ("own",) and found.compared == ("known", first, second, third)
+
+
+@pytest.mark.parametrize("formula", [False, True])
+def test_a_formula_is_looked_for_anew_where_a_fault_is_needless(monkeypatch, formula) -> None:
+    """It is no effect of the catalogue, with which a search could begin."""
+    effect: Any = BY_ID["spring_quadratic"]
+    found: Any = SimpleNamespace(
+        verdict="named", effects=(effect,), corrected=SimpleNamespace(compared=(1,)),
+        after=SimpleNamespace(target=SimpleNamespace(oscillator=SimpleNamespace(effects=(effect,)))),
+    )  # fmt: skip
+    beside, begun = object(), []
+    monkeypatch.setattr(module, "is_formula", lambda one: formula)
+    monkeypatch.setattr(module, "fitted_beside", lambda *known: beside)
+    monkeypatch.setattr(module, "misfits", lambda fit: False)
+    searches: Any = SimpleNamespace(again=lambda *known: begun.append(known[3]))
+    before: Any = SimpleNamespace(compared=())
+    module._without_needless_faults(found, before, searches)
+    assert begun == [None if formula else beside]

@@ -215,3 +215,12 @@ def test_addresses_of_compiled_laws_stay_in_their_process() -> None:
     again = pickle.loads(pickle.dumps(oscillator))
     assert "laws" in oscillator.__dict__ and "laws" not in again.__dict__
     np.testing.assert_array_equal(again.laws, laws)
+
+
+def test_a_motion_that_grows_without_end_is_given_up():
+    """A stiffness that drifts below zero: 1e20 m and more by the end, in ever more steps."""
+    oscillator = build_oscillator(campaign(), (BY_ID["stiffness_drift"],))
+    steady, growing = (vector(oscillator, **{"stiffness_drift.rate": r}) for r in (-0.5, -12.0))
+    kept, lost = (oscillator.predict(theta) for theta in (steady, growing))
+    assert all(np.isfinite(row).all() for row in kept)
+    assert np.isnan(lost[1]).all()
