@@ -10,6 +10,7 @@ import small_rig
 from effect_rigs import BY_ID
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.diagnosis import first_physics
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.first_physics import faults_beside_physics
 from bayesimpact.diagnosis.naming import is_large
@@ -46,6 +47,18 @@ def test_a_clock_shows_beside_the_law_that_is_asked_for_first(seed):
 def test_without_a_fault_or_where_more_is_missing_none_is_found():
     assert found(timed(73, 1.0, FRICTION)) == ()
     assert found(timed(74, 1.004, FRICTION | BUMP)) == ()
+
+
+@pytest.mark.parametrize("recordings", [1, 3])
+def test_a_fault_beside_which_something_is_left_does_not_count(monkeypatch, recordings):
+    """Of a recording by itself, or of all together once it is corrected."""
+    assert found(timed(71, 1.004, FRICTION))
+
+    def leaves(fit) -> bool:
+        return len(fit.target.oscillator.campaign.recordings) == recordings
+
+    monkeypatch.setattr(first_physics, "leaves_something", leaves)
+    assert found(timed(71, 1.004, FRICTION)) == ()
 
 
 def test_what_physics_hid_is_corrected_before_more_is_searched():
