@@ -149,8 +149,7 @@ def _direction(
     base = whitened(fit, target.oscillator.predict(theta))
     columns = []
     for name, parameter in sizes:
-        index = layout.index(name)
-        response = _response(fit, target, theta, base, index, parameter, scales)
+        response = _response(fit, target, theta, base, layout.index(name), parameter, scales)
         if response is None:
             return None
         columns.append(response)

@@ -41,7 +41,7 @@ class Remaining(Settling):
         alone = [(e,) for e in ordered(found, chosen.effects)]
         groups = [g if leads_without(found, g) else group_of(found, g[0]) for g in alone]
         leading = [g for g in groups if leads_without(found, g)]
-        own = left if left is not None and left.fit is chosen.fit else discrepancy(chosen.fit)
+        own = self.remainder(chosen.fit)
         if own is not None:
             doubtful = [g[0].id for g in leading if own.leaves_noise and not misses(found, g[0])]
             without = {i: discrepancy(smaller[i].fit) for i in doubtful}
