@@ -12,9 +12,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from bayesimpact.diagnosis.directions import is_periodic
+from bayesimpact.diagnosis.equation_error import is_a_force
 from bayesimpact.diagnosis.extend import transfer
-from bayesimpact.diagnosis.likely_sets import LikelySets
+from bayesimpact.diagnosis.likely_sets import Known, LikelySets
 from bayesimpact.diagnosis.refit import Candidate
+from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
 
@@ -38,8 +41,8 @@ class Asked:
         if key not in self.posed:
             layout = self.base.target.oscillator.layout
             mode = transfer(model.fit, layout, self.base.target.oscillator.effects, self.scales, {})
-            at = replace(self.base, mode=mode)
-            self.posed[key] = LikelySets(at, self.effects, self.scales, flight=flight)
+            at, known = replace(self.base, mode=mode), known_effects(model)
+            self.posed[key] = LikelySets(at, self.effects, self.scales, flight=flight, known=known)
         return self.posed[key]
 
     def first(self, model: Candidate, about: Candidate) -> set[str]:
@@ -54,3 +57,17 @@ class Asked:
             first |= set(sorted(gains, key=lambda i: -gains[i])[:ASKED])
             seen |= set(gains)
         return first
+
+
+def known_effects(model: Candidate) -> list[Known]:
+    """Of a model's effects those whose shapes no grid holds, periodic ones and terms of formulas,
+    with the shapes that its fit has found.
+    """
+    values = dict(zip(model.fit.names, map(float, model.fit.mode), strict=True))
+    found = list[Known]()
+    for effect in model.effects:
+        if is_a_force(effect) and (is_periodic(effect) or is_formula(effect)):
+            own = {f"{effect.id}.{p.name}" for p in effect.parameters if not p.is_size}
+            shapes = {n: v for n, v in values.items() if n.split("[")[0] in own}
+            found.append((effect, shapes))
+    return found

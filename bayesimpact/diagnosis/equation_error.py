@@ -195,22 +195,29 @@ def without_rest(path: Path, x: Array) -> Array:
 def terms_of(
     fit: Fit, effects: Iterable[Effect], scales: Scales, paths: Sequence[Path]
 ) -> list[EffectColumns]:
-    """What every effect adds to the equation of motion, at every point of a finer shape grid."""
+    """What every effect adds to the equation of motion, at every point of a finer shape grid.
+
+    None of a periodic one, whose frequency has no grid.
+    """
     found = []
     for effect in effects:
-        forces = set(effect.binds) <= {"friction"} and not effect.sets
-        if is_periodic(effect) or not forces or not effect.admissible(scales):
+        if is_periodic(effect) or not is_a_force(effect) or not effect.admissible(scales):
             continue
         target = extend(fit, (effect,), scales)
         grid = shape_points(effect, scales)
         for shapes in shape_points(effect, scales, FINER):
-            term = _term(fit, target, effect, scales, shapes, paths)
+            term = term_at(fit, target, effect, scales, shapes, paths)
             if term is not None:
                 found.append(replace(term, on_grid=shapes in grid))
     return found
 
 
-def _term(
+def is_a_force(effect: Effect) -> bool:
+    """Whether what an effect does is a force along a given path, or an addition to the readings."""
+    return set(effect.binds) <= {"friction"} and not effect.sets
+
+
+def term_at(
     fit: Fit,
     target: Target,
     effect: Effect,
@@ -218,6 +225,9 @@ def _term(
     shapes: Mapping[str, float],
     paths: Sequence[Path],
 ) -> EffectColumns | None:
+    """What an effect adds at one point of its shapes, of which `target` has no other; None where
+    that is nothing, or not finite.
+    """
     layout = target.oscillator.layout
     theta = transfer(fit, layout, (effect,), scales, shapes)
     sizes = size_parameters(target, effect)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.short_repr import short_repr
-from bayesimpact.diagnosis.formula_refits import Question, effect_for, kinds_of
+from bayesimpact.diagnosis.formula_refits import Question, effect_for, kind_ids, kinds_of
 from bayesimpact.diagnosis.naming import Naming
 from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.thresholds import DECISIVE
@@ -105,8 +105,8 @@ def listed(
             row = _row(question, head.best, (tuple(own), head.best.sizes), odds, alike)
             rows.append(replace(row, refitted=False))
     rows.sort(key=lambda f: -f.log_odds)
-    holding = [set(c.ids) for c in fitted.values()]
-    others = [c for c in naming.tried if not any(ids <= set(c.ids) for ids in holding)]
+    holding = [kind_ids(c) for c in fitted.values()]
+    others = [c for c in naming.tried if not any(ids <= kind_ids(c) for ids in holding)]
     known = [naming.log_odds(c) for c in others]  # what holds a formula does not speak against it
     total = float(np.logaddexp.reduce([*known, *(f.log_odds for f in rows)]))
     return tuple(replace(f, probability=float(np.exp(f.log_odds - total))) for f in rows[:LISTED])

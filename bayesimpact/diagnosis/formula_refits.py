@@ -12,22 +12,25 @@ from numpy.typing import NDArray
 from bayesimpact.diagnosis.budget import Budget
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.extend import difference_steps, extend, transfer
-from bayesimpact.diagnosis.formula_scores import FormulaScores
+from bayesimpact.diagnosis.formula_scores import FormulaScores, formula_scores, kind_prices
 from bayesimpact.diagnosis.learned import LEARNED
 from bayesimpact.diagnosis.naming import Naming, leaves_something
 from bayesimpact.diagnosis.refit import (
     ITERATIONS,
     TOLERANCE,
     Candidate,
+    Enough,
     best_start,
+    residual_repetition,
     step_sizes,
     without,
 )
 from bayesimpact.diagnosis.sizes import loss_without
 from bayesimpact.diagnosis.thresholds import DECISIVE
-from bayesimpact.formula.evidence import Subset
+from bayesimpact.formula.classes import FormulaClass, formula_classes, term_classes
+from bayesimpact.formula.evidence import Subset, subsets
 from bayesimpact.formula.grammar import Term
-from bayesimpact.formula.law import effect_id, effect_of, starts_of
+from bayesimpact.formula.law import effect_id, effect_of, is_formula, kind_id, starts_of
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.model.effects.effect import Effect, Scales
@@ -58,24 +61,35 @@ class Question:
     ranked: Sequence[Subset]
 
     @cached_property
+    def heads(self) -> Sequence[FormulaClass]:
+        """The formulas, in classes that the recordings do not tell apart."""
+        problem, terms = self.scores.problem, self.scores.terms
+        return formula_classes(self.ranked, terms, term_classes(problem.information, problem.price))
+
+    @cached_property
     def scored(self) -> dict[tuple[int, ...], Subset]:
         """Formulas by their terms."""
         return {s.terms: s for s in self.ranked}
 
     @cached_property
     def kind_prices(self) -> Array:
-        """Price of every term with its shape free: that of all terms of its kind together, (K,)."""
-        kinds = [t.kind for t in self.scores.terms]
-        share = np.exp(-self.scores.problem.price)
-        total: dict[object, float] = {}
-        for kind, part in zip(kinds, share, strict=True):
-            total[kind] = total.get(kind, 0.0) + float(part)
-        return -np.log([total[kind] for kind in kinds])
+        """Price of every term with its shape free, (K,)."""
+        return kind_prices(self.scores.terms, self.scores.problem.price)
 
     @property
     def others(self) -> tuple[Effect, ...]:
-        """Effects of the model beside the learned force."""
-        return tuple(e for e in self.reference.target.oscillator.effects if e.id != LEARNED)
+        """Effects of the model beside the force that formulas stand for: learned, or a formula."""
+        effects = self.reference.target.oscillator.effects
+        return tuple(e for e in effects if not (e.id == LEARNED or is_formula(e)))
+
+
+def asked_about(reference: Fit, cost: float, scales: Scales) -> Question | None:
+    """What a fit says of all formulas; None where it says nothing in favour of any."""
+    scores = formula_scores(reference, scales, repetition=residual_repetition(reference))
+    if not scores.terms:
+        return None
+    question = Question(reference, cost, scores, scales, subsets(scores.problem))
+    return question if any(h.best.log_odds > 0.0 for h in question.heads) else None
 
 
 def refit_candidates(ranked: Sequence[Subset], terms: Sequence[Term]) -> list[Subset]:
@@ -106,9 +120,14 @@ def kinds_of(subset: Subset, terms: Sequence[Term]) -> tuple[str, ...]:
     return tuple(sorted(repr(terms[i].kind) for i in subset.terms))
 
 
+def kind_ids(candidate: Candidate) -> set[str]:
+    """Ids of a model's effects, formulas without the shapes at which they were found."""
+    return set(map(kind_id, candidate.ids))
+
+
 def refitted(question: Question, subset: Subset) -> Candidate | None:
     """A formula fitted in full, from where the scores expect it; None where it cannot stand beside
-    the model's effects. Its price beyond that of effects is taken off its evidence.
+    the model's effects.
     """
     scores, reference = question.scores, question.reference
     terms = [scores.terms[i] for i in subset.terms]
@@ -135,7 +154,7 @@ def refitted(question: Question, subset: Subset) -> Candidate | None:
     step = difference_steps(reference, target, steps)
     start = best_start(target, unshifted, predicted, step)
     fit = find_mode(target, start, steps=step, tolerance=TOLERANCE, max_iterations=ITERATIONS)
-    return Candidate(effects, fit, model_evidence(fit) - length_price(question, subset))
+    return Candidate(effects, fit, model_evidence(fit))
 
 
 def without_idle(
@@ -170,6 +189,7 @@ def _without_one(
     leaves more than noise and the candidate does not.
     """
     own = {effect_id(question.scores.terms[k]): i for i, k in enumerate(subset.terms)}
+    enough = Enough(naming.goal(naming.log_odds(candidate) - DECISIVE))
     smaller = []
     for effect in candidate.effects:
         rest = subset
@@ -179,9 +199,7 @@ def _without_one(
             if len(own) == 1:
                 continue
             rest = _shortened(question, subset, own[effect.id])
-        found = without(candidate, effect, question.scales)
-        price = length_price(question, rest)
-        smaller.append((rest, replace(found, log_evidence=found.log_evidence - price)))
+        smaller.append((rest, without(candidate, effect, question.scales, enough=enough)))
     best = max(smaller, key=lambda one: naming.log_odds(one[1]), default=None)
     if best is None or naming.log_odds(candidate) - naming.log_odds(best[1]) >= DECISIVE:
         return None
@@ -206,12 +224,12 @@ def effect_for(question: Question, i: int, size: float) -> Effect:
     term = scores.terms[i]
     reach = max(float(np.abs(y).max()) for y in scores.fit.displacements)
     signed = term.energy != "dissipates" or size < 0
-    return effect_of(
+    effect = effect_of(
         term, float(scores.size[i]), reach, scales.speed, signed=signed, angle=scales.angle
     )
+    return replace(effect, price=length_price(question, i))
 
 
-def length_price(question: Question, subset: Subset) -> float:
-    """What a formula's length costs beyond the price of as many effects, nats."""
-    cost = question.cost
-    return max(sum(float(question.kind_prices[i]) - cost for i in subset.terms), 0.0)
+def length_price(question: Question, i: int) -> float:
+    """What the length of term i costs beyond the price of an effect, nats."""
+    return max(float(question.kind_prices[i]) - question.cost, 0.0)

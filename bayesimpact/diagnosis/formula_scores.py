@@ -1,9 +1,9 @@
 """What a fit with a learned force says of every term of the grammar.
 
 The fit supplies the motion, so that forces along it are right even where the base model's were not.
-Its learned force is then taken out: what its coefficients explained is given back to the residual,
-and the terms of the grammar, with the other parameters free, may explain it instead. A fit without
-a learned force is scored as it is.
+Its learned force, or the formula that the search has met, is then taken out: what its coefficients
+explained is given back to the residual, and the terms of the grammar, with the other parameters
+free, may explain it instead. A fit without such a force is scored as it is.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from bayesimpact.diagnosis.force import motion_range, whitened_one
 from bayesimpact.diagnosis.learned import LEARNED
 from bayesimpact.formula.evidence import Problem, single_log_odds
 from bayesimpact.formula.grammar import Term
+from bayesimpact.formula.law import is_formula, is_formula_id, term_of
 from bayesimpact.formula.library import library, local_starts, neighbours
 from bayesimpact.formula.responses import motion_of, responses
 from bayesimpact.inference.fit import Fit, inverse
@@ -46,9 +47,9 @@ class FormulaScores:
     fit : where they were scored
     terms : the K of the library
     problem : what the recordings say of their sizes
-    names : parameters of the fit beside the learned force's coefficients
+    names : parameters of the fit beside those of the force that is taken out
     absorbed : (names, K) shift of these per unit of a term when it is ignored
-    shift : (names,) of these when the learned force is taken out
+    shift : (names,) of these when that force is taken out
     size : (K,) plausible sizes
     seen : (learned, K) coefficients of the learned force that would say the same as a term
     motions : of the recordings that were scored
@@ -75,14 +76,15 @@ def formula_scores(fit: Fit, scales: Scales, *, repetition: float = 1.0) -> Form
     mass sticks no term is scored: the motion says nothing of what came before.
     """
     reach = motion_range(fit)
-    whole = library(scales, *reach)
+    met = terms_met(fit)
+    whole = (*library(scales, *reach), *met)
     counts = fit.target.oscillator.counts
     try:
         motions = {r: motion_of(fit, r) for r in range(counts.size) if counts[r] <= LONGEST}
     except np.linalg.LinAlgError:
         motions = {}
     alone: dict[str, Any] = {"scales": scales, "repetition": repetition, "together": False}
-    local = (*(t for t in whole if t.shapes and not t.width), *local_starts(*reach))
+    local = (*(t for t in whole if t.shapes and not t.width), *met, *local_starts(*reach))
     heads = _likeliest(score_terms(fit, motions, local, **alone))
     for step in REFINED:
         around = [n for t in heads for n in neighbours(t, step, max(-reach[0], reach[1]))]
@@ -90,6 +92,12 @@ def formula_scores(fit: Fit, scales: Scales, *, repetition: float = 1.0) -> Form
             heads = _likeliest(score_terms(fit, motions, (*heads, *around), **alone))
     added = tuple(t for t in heads if t not in whole)
     return score_terms(fit, motions, (*whole, *added), scales, repetition)
+
+
+def terms_met(fit: Fit) -> tuple[Term, ...]:
+    """The terms of formulas that a fit has, with their shapes."""
+    values = dict(zip(fit.names, map(float, fit.mode), strict=True))
+    return tuple(term_of(e, values) for e in fit.target.oscillator.effects if is_formula(e))
 
 
 def _likeliest(scores: FormulaScores) -> list[Term]:
@@ -117,12 +125,11 @@ def score_terms(
 
     Without `together` each by itself: `information` is then diagonal.
     """
-    learned = np.array([n.startswith(f"{LEARNED}.") for n in fit.names])
     noise = fit.target.oscillator.layout.roles("noise")
-    others = np.setdiff1d(np.flatnonzero(~learned), noise)
+    others = np.setdiff1d(np.flatnonzero(~_of_a_force(fit)), noise)
     curvature = fit.target.priors.information(fit.mode)[others]
     slope = np.nan_to_num(fit.target.priors.gradient(fit.mode))[others]
-    sums = _Sums(fit, others, learned, len(terms), together)
+    sums = _Sums(fit, others, len(terms), together)
     for r, motion in motions.items():
         sums.add(r, motion, terms)
     solve = inverse(sums.own + np.diag(curvature))
@@ -173,14 +180,24 @@ def _seen(fit: Fit, sums: _Sums, solve: Array) -> Array:
     return np.asarray(inverse(information) @ score)
 
 
+def _learned(fit: Fit) -> NDArray[np.bool_]:
+    """Which parameters are coefficients of a learned force, (d,)."""
+    return np.array([n.startswith(f"{LEARNED}.") for n in fit.names])
+
+
+def _of_a_force(fit: Fit) -> NDArray[np.bool_]:
+    """Which parameters belong to a force that formulas stand for: learned, or a formula, (d,)."""
+    return _learned(fit) | [is_formula_id(n.split(".")[0]) for n in fit.names]
+
+
 class _Sums:
     """Products of whitened responses, noise = 1, summed over recordings."""
 
-    def __init__(
-        self, fit: Fit, others: NDArray[np.int64], learned: Array, count: int, together: bool
-    ) -> None:
+    def __init__(self, fit: Fit, others: NDArray[np.int64], count: int, together: bool) -> None:
         self.fit, self.others, self.together = fit, others, together
-        self.coefficients = np.where(learned, fit.mode, 0.0)
+        of_force, learned = _of_a_force(fit), _learned(fit)
+        sizes = [n.endswith(".size") for n in fit.names]
+        self.coefficients = np.where(of_force & (learned | sizes), fit.mode, 0.0)
         self.sigma = sigma_of(fit)
         self.own = np.zeros((others.size, others.size))
         self.own_score = np.zeros(others.size)
@@ -241,3 +258,11 @@ def prices(terms: Sequence[Term]) -> Array:
     """
     length = np.array([t.length for t in terms])
     return np.asarray(length + np.logaddexp.reduce(-length) + np.log(2.0))
+
+
+def kind_prices(terms: Sequence[Term], price: Array) -> Array:
+    """Price of every term with its shape free: that of all terms of its kind together, (K,)."""
+    total: dict[object, float] = {}
+    for term, part in zip(terms, np.exp(-price), strict=True):
+        total[term.kind] = total.get(term.kind, 0.0) + float(part)
+    return -np.log([total[term.kind] for term in terms])

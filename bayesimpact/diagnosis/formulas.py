@@ -1,8 +1,9 @@
 """From a learned force to a formula.
 
-Where a diagnosis ends with a learned force, every sum of up to three terms of the grammar is scored
-in the linearised problem (`formula_scores`, `bayesimpact.formula.evidence`); the best few are
-refitted in full, as effects like any. One is named when
+Where a diagnosis ends with a learned force, or with a term of the grammar that the search has met,
+every sum of up to three terms is scored in the linearised problem (`formula_scores`,
+`bayesimpact.formula.evidence`); the best few are refitted in full, as effects like any. One is
+named when
 
 - it leaves nothing, by the tests that the catalogue's models pass (`State.is_white`), and
 - it leads every other hypothesis by the decisive odds: the models of the search, the learned force,
@@ -27,6 +28,8 @@ from bayesimpact.diagnosis.force import missing_drift, missing_force
 from bayesimpact.diagnosis.formula_list import Formulas, listed
 from bayesimpact.diagnosis.formula_refits import (
     Question,
+    asked_about,
+    kind_ids,
     kinds_of,
     length_price,
 )
@@ -36,18 +39,18 @@ from bayesimpact.diagnosis.formula_rounds import (
     is_told,
     scored_rivals,
 )
-from bayesimpact.diagnosis.formula_scores import formula_scores
 from bayesimpact.diagnosis.learned import LEARNED
 from bayesimpact.diagnosis.naming import Naming, State, leaves_something
-from bayesimpact.diagnosis.refit import Candidate, residual_repetition
+from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.scan import scan
 from bayesimpact.diagnosis.thresholds import DECISIVE
-from bayesimpact.formula.classes import formula_classes, term_classes
-from bayesimpact.formula.evidence import Subset, subsets
+from bayesimpact.formula.evidence import Subset
 from bayesimpact.formula.grammar import Term
 from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
+
+TURNS = 3  # of scoring formulas on the likeliest one, set by hand: the second is right mostly
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,43 +78,94 @@ def with_formulas(
 
     Where the budget ends before all formulas are fitted that may be the likeliest, none is named.
     """
-    if answer.decision.verdict not in ("unknown", "partly") or not answer.naming.finished:
+    found = _with_formulas(answer, effects, scales, rng=rng, progress=progress, budget=budget)
+    certain = found.formulas is not None and found.formulas.named
+    return found if certain else _uncertain(found)
+
+
+def _with_formulas(
+    answer: Answer,
+    effects: Sequence[Effect],
+    scales: Scales,
+    *,
+    rng: np.random.Generator,
+    progress: Callable[[str], None],
+    budget: Budget,
+) -> Answer:
+    if not (_has_formula(answer.after) or answer.decision.verdict in ("unknown", "partly")):
         return answer
+    if not answer.naming.finished:
+        return answer
+    return _compared(answer, effects, scales, TURNS, rng=rng, progress=progress, budget=budget)
+
+
+def _compared(
+    answer: Answer,
+    effects: Sequence[Effect],
+    scales: Scales,
+    turns: int,
+    *,
+    rng: np.random.Generator,
+    progress: Callable[[str], None],
+    budget: Budget,
+) -> Answer:
+    """The answer with formulas compared along its motion, and along that of the likeliest one if
+    that was wrong, `turns` times at most.
+    """
     if not budget.may_go_on():
         return replace(answer, naming=replace(answer.naming, finished=False))
     progress("scoring formulas")
-    repetition = residual_repetition(answer.after)
-    scores = formula_scores(answer.after, scales, repetition=repetition)
-    if not scores.terms:
+    question = asked_about(answer.after, answer.naming.prior_cost, scales)
+    if question is None:
         return answer
-    ranked = subsets(scores.problem)
-    classes = term_classes(scores.problem.information, scores.problem.price)
-    heads = formula_classes(ranked, scores.terms, classes)
-    if not any(h.best.log_odds > 0.0 for h in heads):
-        return answer
-    question = Question(answer.after, answer.naming.prior_cost, scores, scales, ranked)
     found = fitted_formulas(question, answer.naming, progress, budget)
-    fitted, naming, late = found.fitted, found.naming, found.late
-    answer = replace(answer, naming=replace(answer.naming, finished=not late))
-    if not fitted:
+    answer = replace(answer, naming=replace(answer.naming, finished=not found.late))
+    if not found.fitted:
         return answer
-    heads = [h for h in heads if not is_told(h, found, scores.terms)]
-    first = max(fitted, key=lambda s: naming.log_odds(fitted[s]))
-    rows = listed(question, naming, heads, fitted)
-    named = not late and _may_be_named(question, found, first)
+    first = max(found.fitted, key=lambda s: found.naming.log_odds(found.fitted[s]))
+    if not found.late and turns > 1 and _misled(answer, found, first):
+        answer = replace(answer, naming=found.naming, after=found.fitted[first].fit)
+        return _compared(
+            answer, effects, scales, turns - 1, rng=rng, progress=progress, budget=budget
+        )
+    named = not found.late and _may_be_named(question, found, first)
     state = None
     if named:
         progress("scoring what the formula lacks")
-        state = _examined(fitted[first], effects, scales, rng)
+        state = _examined(found.fitted[first], effects, scales, rng)
         named = state.is_white
+    return _answered(answer, question, found, first, state if named else None)
+
+
+def _answered(
+    answer: Answer, question: Question, found: Refits, first: Subset, state: State | None
+) -> Answer:
+    """The answer with the list of formulas; with the likeliest named where its `state` is given."""
+    scores, naming, candidate = question.scores, found.naming, found.fitted[first]
+    heads = [h for h in question.heads if not is_told(h, found, scores.terms)]
+    rows = listed(question, naming, heads, found.fitted)
     seen = scores.seen[:, list(first.terms)] @ np.array(first.sizes)
-    found_formulas = Formulas(rows, answer.after, named, seen, fitted[first].fit)
-    if not named or state is None:
-        decision = _needed(answer.decision, naming)
-        return replace(answer, decision=decision, formulas=found_formulas)
-    ids = frozenset(fitted[first].ids)
-    naming = replace(naming, chosen=state, states={**naming.states, ids: state})
-    return Answer(naming, _decided(answer, fitted[first]), fitted[first].fit, None, found_formulas)
+    formulas = Formulas(rows, answer.after, state is not None, seen, candidate.fit)
+    if state is None:
+        return replace(answer, decision=_needed(answer.decision, naming), formulas=formulas)
+    states = {**naming.states, frozenset(candidate.ids): state}
+    naming = replace(naming, chosen=state, states=states, finished=answer.naming.finished)
+    return Answer(naming, _decided(answer, candidate), candidate.fit, None, formulas)
+
+
+def _has_formula(fit: Fit) -> bool:
+    return any(map(is_formula, fit.target.oscillator.effects))
+
+
+def _misled(answer: Answer, found: Refits, first: Subset) -> bool:
+    """Whether formulas were scored on one that another beats decisively: along a motion that is
+    wrong the scores of all others are too.
+    """
+    own = [c for c in answer.naming.tried if c.fit is answer.after]
+    if not (own and _has_formula(answer.after)):
+        return False
+    candidate, odds = found.fitted[first], found.naming.log_odds
+    return odds(candidate) > odds(own[0]) + DECISIVE and kind_ids(candidate) != kind_ids(own[0])
 
 
 def _may_be_named(question: Question, found: Refits, first: Subset) -> bool:
@@ -124,24 +178,24 @@ def _may_be_named(question: Question, found: Refits, first: Subset) -> bool:
     candidate, scores = fitted[first], question.scores
     if not candidate.fit.converged or leaves_something(candidate.fit):
         return False
-    own, terms = set(candidate.ids), scores.terms
+    own, terms = kind_ids(candidate), scores.terms
     reference = question.reference
     subset_of = {id(c): s for s, c in fitted.items()}
     kinds = set(kinds_of(first, terms))
     rivals: list[tuple[float, float, float]] = []  # odds, what length costs of them, lead needed
     for c in naming.tried:
-        if not own <= set(c.ids):
-            s = subset_of.get(id(c))
-            extra = length_price(question, s) if s else 0.0
-            rivals.append((naming.log_odds(c), extra, needed_lead(kinds, s, terms)))
+        if not all(holds(c, i) for i in own):
+            lead = needed_lead(kinds, subset_of.get(id(c)), terms)
+            rivals.append((naming.log_odds(c), c.price(0.0), lead))
     if any(e.id == LEARNED for e in reference.target.oscillator.effects):
         evidence = model_evidence(reference)
         learned = Candidate(reference.target.oscillator.effects, reference, evidence)
         rivals.append((naming.log_odds(learned), 0.0, DECISIVE))
-    reached, length = naming.log_odds(candidate), length_price(question, first)
+    reached, length = naming.log_odds(candidate), candidate.price(0.0)
     for s in scored_rivals(question, found, first):
         odds = reached + s.log_odds - first.log_odds
-        rivals.append((odds, length_price(question, s), needed_lead(kinds, s, terms)))
+        extra = sum(length_price(question, i) for i in s.terms)
+        rivals.append((odds, extra, needed_lead(kinds, s, terms)))
     return all(
         reached - odds > least and reached + length - odds - extra > least
         for odds, extra, least in rivals
@@ -160,6 +214,11 @@ def needed_lead(kinds: set[str], rival: Subset | None, terms: Sequence[Term]) ->
     return 0.0 if kinds <= wide | set(kinds_of(rival, terms)) else DECISIVE
 
 
+def holds(candidate: Candidate, kind: str) -> bool:
+    """Whether a model has an effect of a kind, or one that reduces to it."""
+    return kind in kind_ids(candidate) or any(e.prefer == kind for e in candidate.effects)
+
+
 def _examined(
     candidate: Candidate, effects: Sequence[Effect], scales: Scales, rng: np.random.Generator
 ) -> State:
@@ -170,6 +229,24 @@ def _examined(
         missing_force(fit, scales, rng=rng),
         missing_drift(fit, scales, rng=rng),
     )
+
+
+def _uncertain(answer: Answer) -> Answer:
+    """The answer without names of formulas: where its model has one, only those effects are named
+    that every likely model has.
+    """
+    naming, effects = answer.naming, answer.decision.effects
+    if not any(map(is_formula, (*effects, *answer.after.target.oscillator.effects))):
+        return answer
+    least = max(map(naming.log_odds, naming.tried)) - DECISIVE
+    likely = [c for c in naming.tried if naming.log_odds(c) > least]
+    named = tuple(e for e in effects if not is_formula(e) and all(e.id in c.ids for c in likely))
+    decision = replace(answer.decision, verdict="partly" if named else "unknown", effects=named)
+    state = answer.state
+    if state is None:  # what a formula does is what the catalogue leaves
+        rest = frozenset(e.id for e in naming.chosen.candidate.effects if not is_formula(e))
+        state = naming.states.get(rest, naming.base)
+    return replace(answer, decision=decision, state=state)
 
 
 def _needed(decision: Decision, naming: Naming) -> Decision:

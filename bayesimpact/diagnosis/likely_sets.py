@@ -7,7 +7,7 @@ of every unknown (Schwarz 1978), shapes among them, and of every effect.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,14 +18,18 @@ from bayesimpact.diagnosis.equation_error import (
     Path,
     base_columns,
     measured_paths,
+    term_at,
     terms_of,
 )
+from bayesimpact.diagnosis.extend import extend
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
 
 Array = NDArray[np.float64]
 
 Chosen = tuple[int, ...]
+Known = tuple[Effect, Mapping[str, float]]
+"""An effect with its shapes, `<effect>.<parameter>` -> value."""
 
 BEAM = 40  # sets of a size that are extended
 
@@ -66,18 +70,29 @@ class LikelySets:
 
     Holds the normal equations of base model and terms, all columns scaled to norm one. There are no
     terms, and so no sets, where a reading is no displacement, or where effects are declared. In
-    `flight` only what acts there has terms.
+    `flight` only what acts there has terms. Every set holds the effects of `known`, whose shapes
+    are, but not their sizes.
     """
 
     def __init__(
-        self, fit: Fit, effects: Sequence[Effect], scales: Scales, *, flight: bool = False
+        self,
+        fit: Fit,
+        effects: Sequence[Effect],
+        scales: Scales,
+        *,
+        flight: bool = False,
+        known: Sequence[Known] = (),
     ) -> None:
         o = fit.target.oscillator
-        self.fit, self.paths = fit, measured_paths(fit, flight=flight)
+        self.fit, self.scales, self.paths = fit, scales, measured_paths(fit, flight=flight)
         columns, targets, self.names = base_columns(fit, self.paths)
         base, target = np.concatenate(columns), np.concatenate(targets)
         told = base[:, 0].any() and o.reads_displacements and not o.acting
         seen = effects if told else ()
+        self.known = [t for one in known if told and (t := self._known(*one)) is not None]
+        for term in self.known:
+            base = np.column_stack([base, np.concatenate(term.columns)])
+            self.names += term.names
         self.terms = terms_of(fit, seen, scales, self.paths)
         self.cost = float(np.log(2 * len(effects)))
         self.rows = max(sum(int(p.rows.kept.sum()) - 1 for p in self.paths), 1)
@@ -90,6 +105,11 @@ class LikelySets:
         self.matrix, self.right = scaled.T @ scaled, scaled.T @ target
         self.whole = float(target @ target)
         self.base = [i for i in range(base.shape[1]) if size[i] > 0]
+        self.every, self.target = every, target
+
+    def _known(self, effect: Effect, shapes: Mapping[str, float]) -> EffectColumns | None:
+        target = extend(self.fit, (effect,), self.scales)
+        return term_at(self.fit, target, effect, self.scales, shapes, self.paths)
 
     def columns(self, chosen: Sequence[int]) -> list[int]:
         """Of the base model and of the terms `chosen`."""
@@ -118,24 +138,10 @@ class LikelySets:
 
     def best(self, most: int) -> list[EffectSet]:
         """The likeliest sets of one, two, ... effects; each is likelier than all smaller ones."""
-        if not self.terms:
-            return []
-        beam: list[Chosen] = [()]
-        reached = none = self.log_odds(())
-        found = []
-        for _ in range(most):
-            level: dict[frozenset[str], tuple[float, Chosen]] = {}
-            for chosen in beam:
-                for t in self._beside(chosen):
-                    ids = frozenset(self.terms[i].effect.id for i in (*chosen, t))
-                    odds = self.log_odds((*chosen, t))
-                    if odds > level.get(ids, (-np.inf, ()))[0]:
-                        level[ids] = odds, (*chosen, t)
-            ranked = sorted(level.values(), key=lambda one: -one[0])[:BEAM]
-            if not ranked:
-                break
-            beam = [chosen for _, chosen in ranked]
-            best = self._refined(beam[0])
+        found, none = list[EffectSet](), self.log_odds(()) if self.terms else 0.0
+        reached = none
+        for ranked in self.levels(most):
+            best = self.refined(ranked[0])
             odds = self.log_odds(best)
             if odds <= reached:
                 break
@@ -143,11 +149,29 @@ class LikelySets:
             found.append(self._set(best, reached - none))
         return [_completed(one, self.fit, self.paths) for one in found]
 
+    def levels(self, most: int) -> Iterator[list[Chosen]]:
+        """Sets of one, two, ... up to `most` effects, of each number `BEAM` of the likeliest at
+        most, in that order; every one extends one of the last number.
+        """
+        beam: list[Chosen] = [()]
+        for _ in range(most if self.terms else 0):
+            level: dict[frozenset[str], tuple[float, Chosen]] = {}
+            for chosen in beam:
+                for t in self._beside(chosen):
+                    ids = frozenset(self.terms[i].effect.id for i in (*chosen, t))
+                    odds = self.log_odds((*chosen, t))
+                    if odds > level.get(ids, (-np.inf, ()))[0]:
+                        level[ids] = odds, (*chosen, t)
+            beam = [c for _, c in sorted(level.values(), key=lambda one: -one[0])[:BEAM]]
+            if not beam:
+                return
+            yield beam
+
     def gains(self, ids: Collection[str]) -> dict[str, float]:
         """By how much every other effect that has a term would make a set likelier, nats."""
         if not self.terms:
             return {}
-        held = self._shaped([t for t in ids if any(x.effect.id == t for x in self.terms)])
+        held = self.shaped(ids)
         before, found = self.log_odds(held), dict[str, float]()
         for t in self._beside(held):
             own = self.terms[t].effect.id
@@ -155,12 +179,14 @@ class LikelySets:
             found[own] = max(found.get(own, -np.inf), gain)
         return found
 
-    def _shaped(self, ids: Sequence[str]) -> Chosen:
-        """The terms of a set of effects, each at its likeliest shape beside the others."""
+    def shaped(self, ids: Collection[str]) -> Chosen:
+        """The terms of those of some effects that have one, each at its likeliest shape beside the
+        others.
+        """
         every = [term.effect.id for term in self.terms]
-        return self._refined([every.index(i) for i in ids])
+        return self.refined([every.index(i) for i in ids if i in every])
 
-    def _refined(self, chosen: Sequence[int]) -> Chosen:
+    def refined(self, chosen: Sequence[int]) -> Chosen:
         """A set with the shape of each effect where it is likeliest beside the others, also between
         the points from which sets are chosen.
         """
@@ -173,7 +199,7 @@ class LikelySets:
 
     def _beside(self, chosen: Sequence[int]) -> list[int]:
         """Terms that a set may take in."""
-        held = [self.terms[i].effect for i in chosen]
+        held = [term.effect for term in (*self.known, *(self.terms[i] for i in chosen))]
         ids = {e.id for e in held}
         return [
             t
@@ -185,7 +211,21 @@ class LikelySets:
 
     def _set(self, chosen: Sequence[int], odds: float) -> EffectSet:
         x = self.solve(chosen)[0] / self.size[self.columns(chosen)]
-        terms = tuple(self.terms[t] for t in chosen)
-        names = [*(self.names[i] for i in self.base), *(n for t in terms for n in t.names)]
+        return self._filled([self.terms[t] for t in chosen], x, odds)
+
+    def with_term(self, chosen: Chosen, term: EffectColumns, odds: float) -> EffectSet:
+        """A set with one more term of its own, all sizes anew; `odds` as of sets."""
+        columns = np.column_stack(
+            [self.every[:, self.columns(chosen)], np.concatenate(term.columns)]
+        )
+        size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+        x = np.linalg.lstsq(columns / size, self.target, rcond=None)[0] / size
+        own = [*(self.terms[t] for t in chosen), term]
+        return _completed(self._filled(own, x, odds - self.log_odds(())), self.fit, self.paths)
+
+    def _filled(self, own: Sequence[EffectColumns], x: Array, odds: float) -> EffectSet:
+        """Terms with the values of all unknowns, and the `known` ones."""
+        names = [*(self.names[i] for i in self.base), *(n for t in own for n in t.names)]
         values = dict(zip(names, map(float, x), strict=True))
+        terms = (*self.known, *own)
         return EffectSet(terms, values | {n: v for t in terms for n, v in t.shapes.items()}, odds)

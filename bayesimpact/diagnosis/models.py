@@ -16,6 +16,7 @@ from bayesimpact.diagnosis.budget import Budget, begin
 from bayesimpact.diagnosis.discrepancy import Discrepancy
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.force import missing_drift, missing_force
+from bayesimpact.diagnosis.likely_sets import EffectSet
 from bayesimpact.diagnosis.naming import State, is_large, leaves_something
 from bayesimpact.diagnosis.own_band import shakes_in_own_band
 from bayesimpact.diagnosis.profile_likelihood import profiled
@@ -32,6 +33,7 @@ from bayesimpact.diagnosis.refit import (
 from bayesimpact.diagnosis.scan import Scan, scan
 from bayesimpact.diagnosis.scores import Score
 from bayesimpact.diagnosis.smoothing import is_refuted
+from bayesimpact.diagnosis.thresholds import EXCESS, LARGE
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.progress import Refit
 from bayesimpact.model.effects.effect import Effect, Scales
@@ -161,18 +163,24 @@ class Models:
         Larger ones up to the first whose misfit is not large: there scores tell more.
         """
         found, problem = list[Candidate](), self.asked.about(about, flight)
-        for chosen in problem.best(most):
-            key = frozenset(e.id for e in chosen.effects)
-            if not self.is_known(key):
-                if not self.may_go_on():
-                    break
-                self.tell("fitting " + " + ".join(e.id for e in chosen.effects))
-                start, goal = chosen.values, self.contained(key).fit.log_likelihood
-                self.keep(fit_from(problem.fit, chosen.effects, start, self.scales, goal=goal))
-            found.append(self.no_worse(self.tried[key]))
+        for chosen in problem.best(most - len(problem.known)):
+            if not self.may_go_on():
+                break
+            found.append(self.fit_set(problem.fit, chosen))
             if not is_large(found[-1].fit):
                 break
         return found
+
+    def fit_set(self, base: Fit, chosen: EffectSet, goal: float = -np.inf) -> Candidate:
+        """The model of a set that the equation of motion asks for, from where it asks for it; of
+        use where it reaches a log likelihood of `goal` and what the models in it do.
+        """
+        key = frozenset(e.id for e in chosen.effects)
+        if not self.is_known(key):
+            self.tell("fitting " + " + ".join(e.id for e in chosen.effects))
+            goal = max(goal, self.contained(key).fit.log_likelihood)
+            self.keep(fit_from(base, chosen.effects, chosen.values, self.scales, goal=goal))
+        return self.no_worse(self.tried[key])
 
     def no_worse(self, candidate: Candidate) -> Candidate:
         """A model that has reached no less than what it contains: a climb that began elsewhere and
@@ -227,12 +235,14 @@ class Models:
         return key in self.tried and self.tried[key].fit.converged
 
     def drop(self, candidate: Candidate, effect: Effect) -> Candidate:
-        """The model without one effect, fitted from here even where it was fitted before."""
+        """The model without one effect, fitted from here even where it was fitted before; to its
+        mode only where it may leave so little that a verdict or a score has a use for it.
+        """
         step = (frozenset(candidate.ids), candidate.fit.log_posterior, effect.id)
         if step not in self.dropped:
             self.dropped.add(step)
             self.tell("without " + effect.id)
-            enough = replace(self.enough(), goal=-np.inf)
+            enough = replace(self.enough(), goal=likelihood_at(candidate.fit, _far_from(candidate)))
             self.keep(without(candidate, effect, self.scales, enough=enough))
         return self.tried[frozenset(i for i in candidate.ids if i != effect.id)]
 
@@ -254,3 +264,14 @@ class Models:
             fit = profiled(candidate.fit)
             self.keep(Candidate(candidate.effects, fit, model_evidence(fit)))
         return self.tried[key]
+
+
+def likelihood_at(fit: Fit, reduced_chi2: float) -> float:
+    """Log likelihood of a fit to the same recordings that leaves so much, nats."""
+    count = float(fit.target.likelihood.sizes.sum())
+    return fit.log_likelihood - 0.5 * count * float(np.log(reduced_chi2 / fit.reduced_chi2))
+
+
+def _far_from(candidate: Candidate) -> float:
+    """A misfit so large, and so much above a model's own, that no effect stands in doubt by it."""
+    return max(LARGE**2, EXCESS**2 * candidate.fit.reduced_chi2)

@@ -28,8 +28,8 @@ from bayesimpact.diagnosis.refit import (
     Candidate,
     base_candidate,
 )
-from bayesimpact.diagnosis.remaining import Remaining
 from bayesimpact.diagnosis.unknown import learn_force
+from bayesimpact.diagnosis.unlisted import Unlisted
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
 
@@ -74,6 +74,10 @@ def name(
     begun = set[frozenset[str]]()
     while True:
         state = search.grown(beam)
+        with_term = search.with_a_term(state)
+        if with_term is not state:
+            beam = [with_term]
+            continue
         if not search.may_be_named(state):
             break
         search.weigh_remainder()
@@ -91,7 +95,7 @@ def name(
     return search.naming(base, search.at_its_mode(state))
 
 
-class _Search(Remaining):
+class _Search(Unlisted):
     """Which models to fit next, and what they are worth."""
 
     def grown(self, beam: list[State]) -> State:
@@ -137,7 +141,11 @@ class _Search(Remaining):
             if not is_large(begun[-1].fit):
                 break
         best = max(begun, key=self.promise)
-        return [self.examine(c) for c in (best, *(c for c in begun[1:] if c is not best))]
+        state = self.examine(best)
+        with_term = self.with_a_term(state)
+        if with_term is not state:
+            return [with_term]
+        return [state, *(self.examine(c) for c in begun[1:] if c is not best)]
 
     def asked_again(self, about: Candidate, flight: bool) -> Candidate:
         """The likeliest model asked for about one, then about that model, and so on."""

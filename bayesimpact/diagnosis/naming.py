@@ -124,7 +124,7 @@ class Naming:
     def log_odds(self, candidate: Candidate) -> float:
         """Log posterior odds of a model against the base model."""
         own, base = self._evidence(candidate), self._evidence(self.base.candidate)
-        return own - base - self.prior_cost * len(candidate.effects)
+        return own - base - candidate.price(self.prior_cost)
 
     def _evidence(self, candidate: Candidate) -> float:
         if self.beside is None:
@@ -134,9 +134,15 @@ class Naming:
         alone = candidate.log_evidence
         return alone + self.beside.gain(candidate.fit, alone)
 
+    def goal(self, least: float) -> float:
+        """Log likelihood that a model must reach for log odds of `least`: no evidence is above the
+        largest likelihood. Only as long as no force of time stands beside every model.
+        """
+        return self.repetition * (least + self._evidence(self.base.candidate))
+
     def promise(self, candidate: Candidate) -> float:
         """Log posterior odds with every sample counted, up to a constant: how much is explained."""
-        return candidate.log_evidence - self.prior_cost * len(candidate.effects)
+        return candidate.log_evidence - candidate.price(self.prior_cost)
 
     def rivals(self) -> tuple[Candidate, ...]:
         """Models that lack a chosen effect and come within the decisive odds.

@@ -53,7 +53,7 @@ class Ranked(Models):
         """What a model is worth on the way: every sample counts, for what remains may yet be
         explained.
         """
-        return candidate.log_evidence - self.cost * len(candidate.effects)
+        return candidate.log_evidence - candidate.price(self.cost)
 
     def log_odds(self, candidate: Candidate) -> float:
         """Log posterior odds up to a constant: beside the force of time that remains where one does
@@ -63,12 +63,12 @@ class Ranked(Models):
             return self.tempered_odds(candidate)
         alone = candidate.log_evidence
         gained = self.left.gain(candidate.fit, alone)
-        return alone + gained - self.cost * len(candidate.effects)
+        return alone + gained - candidate.price(self.cost)
 
     def tempered_odds(self, candidate: Candidate) -> float:
         """Log posterior odds up to a constant, each independent sample counted once."""
         evidence = tempered_evidence(candidate, self.repetition())
-        return evidence - self.cost * len(candidate.effects)
+        return evidence - candidate.price(self.cost)
 
     def weigh_remainder(self) -> None:
         """From now on models are compared beside what the nearest one leaves, where the misfit was

@@ -59,6 +59,10 @@ class Candidate:
         """Ids of the effects."""
         return tuple(e.id for e in self.effects)
 
+    def price(self, cost: float) -> float:
+        """Nats of log odds that the effects cost: `cost` each, and what a formula's length does."""
+        return sum((cost + e.price for e in self.effects), start=0.0)
+
     @cached_property
     def prior_shares(self) -> Array:
         """Shares (m,), 0 to 1, of the posterior precision that come from the priors.

@@ -11,6 +11,7 @@ from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.scan import Scan
 from bayesimpact.diagnosis.scores import Score
 from bayesimpact.diagnosis.thresholds import DECISIVE
+from bayesimpact.formula.law import is_formula
 from bayesimpact.model.effects.effect import Effect
 
 EXCHANGES = 3  # rounds of leaving out and exchanging effects
@@ -74,6 +75,8 @@ class Settling(Ranked):
         if len(chosen.effects) < 2 and not self.is_large:
             return
         for effect in chosen.effects:
+            if is_formula(effect):  # compared with all others of the grammar
+                continue
             rest = self.drop(chosen, effect)
             if self.is_large:
                 self.simplified(chosen, effect)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -252,6 +253,29 @@ def is_formula(effect: Effect) -> bool:
 def is_formula_id(effect_id: str) -> bool:
     """Whether an id is a formula's, which is made of it and nothing to read."""
     return effect_id.startswith(PREFIX)
+
+
+def kind_id(effect_id: str) -> str:
+    """The id of an effect without the shape at which a formula's term was found."""
+    return re.sub(r"_at_m?[0-9_]+$", "", effect_id) if is_formula_id(effect_id) else effect_id
+
+
+def term_of(effect: Effect, values: Mapping[str, float]) -> Term:
+    """The term that a formula's effect adds, with its shape from `<effect>.<parameter>` values."""
+    if effect.law is None:
+        return Term("everywhere", speed=Power(0.0, True))
+    told = {p.name: float(p.fixed) for p in effect.parameters if p.fixed is not None}
+    shape = {
+        n: told.get(n, values.get(f"{effect.id}.{n}", 0.0)) for n in ("place", "width", "fade")
+    }
+    return Term(
+        REGIONS[int(told["region"])],
+        Power(told["exponent"], bool(told["odd"])),
+        Power(told["speed_exponent"], bool(told["speed_odd"])),
+        side=int(told["side"]),
+        drift=int(told["drift"]),
+        **shape,
+    )
 
 
 def starts_of(term: Term) -> dict[str, float]:

@@ -22,6 +22,9 @@ from bayesimpact.model.superposition import Motion, answers, motion_along
 
 Array = NDArray[np.float64]
 
+Along = tuple[Array, Array, Array, Array]
+"""Displacement m, velocity m/s, indentation m and time s along a motion, each (n,)."""
+
 BLOCK = 64  # terms at once, so that memory stays bounded
 
 
@@ -49,27 +52,35 @@ def responses(motion: Motion, terms: Sequence[Term]) -> tuple[Array, Array, Arra
     largest, power = np.empty(len(terms)), np.empty(len(terms))
     for first in range(0, len(terms), BLOCK):
         block = slice(first, first + BLOCK)
-        forces = _forces(motion, terms[block])
+        forces = forces_along(along(motion), terms[block])
         out[block] = answers(motion, forces)
         largest[block] = np.maximum(forces.max(axis=1), -forces.min(axis=1))
         power[block] = forces @ motion.v / motion.v.size
     return out, largest, power
 
 
-def _forces(motion: Motion, terms: Sequence[Term]) -> Array:
-    """Force of each term along the motion, (K, n); factors that terms share are computed once."""
-    out = np.empty((len(terms), motion.y.size))
+def along(motion: Motion) -> Along:
+    """The path of a motion."""
+    return motion.y, motion.v, motion.d, motion.t
+
+
+def forces_along(path: Along, terms: Sequence[Term]) -> Array:
+    """Force of each term of unit size along a path y, v, d, t (n,), (K, n); factors that terms
+    share are computed once.
+    """
+    y, v, d, t = path
+    out = np.empty((len(terms), y.size))
     known: dict[object, Array] = {}
     for i, term in enumerate(terms):
         where = replace(term, speed=ONE, fade=0.0, drift=0)
         if where not in known:
-            known[where] = where.of_position(motion.y, motion.d)
+            known[where] = where.of_position(y, d)
         speed = (term.speed, term.fade)
         if speed not in known:
-            known[speed] = term.of_speed(motion.v)
+            known[speed] = term.of_speed(v)
         np.multiply(known[where], known[speed], out=out[i])
         if term.drift:
-            out[i] *= motion.t
+            out[i] *= t
     return out
 
 
@@ -78,4 +89,4 @@ def largest_force(
 ) -> float:
     """Peak of the force of some terms together along all motions, N."""
     weights = np.array(sizes)
-    return max(float(np.abs(weights @ _forces(m, terms)).max()) for m in motions)
+    return max(float(np.abs(weights @ forces_along(along(m), terms)).max()) for m in motions)

@@ -16,6 +16,7 @@ S = "contact_second_stage"  # has a depth
 N = "contact_no_tension"  # on or off
 EFFECTS = tuple(BY_ID[i] for i in (A, B, C, D, S))
 ENOUGH = 500.0  # a gain at which nothing is left
+TARGET = SimpleNamespace(likelihood=SimpleNamespace(sizes=np.array([1000])))
 
 
 class Table:
@@ -70,7 +71,7 @@ class Table:
         fit = SimpleNamespace(
             reduced_chi2=self.left.get(frozenset(ids), self.chi2),
             log_likelihood=gain + 10, log_posterior=gain, rms=1.0, ids=tuple(ids), gain=gain,
-            converged=frozenset(ids) not in self.unfinished,
+            converged=frozenset(ids) not in self.unfinished, target=TARGET,
         )  # fmt: skip
         return Candidate(tuple(BY_ID[i] for i in ids), fit, gain)
 
@@ -96,7 +97,7 @@ class Table:
         def about(model, flight):
             again = self.asked_about.get(frozenset(model.ids), self.asked)
             names = self.asked_in_flight if flight else again
-            return SimpleNamespace(fit=base, best=lambda most: best(names))
+            return SimpleNamespace(fit=base, known=(), terms=(), best=lambda most: best(names))
 
         def first(model, about):
             left = [i for i in self.seen if i not in model.ids]

@@ -12,7 +12,7 @@ import pytest
 from effect_rigs import BY_ID
 from small_rig import PLAIN, PLAIN_RELEASES, record
 
-from bayesimpact.diagnosis import formula_rounds, formulas
+from bayesimpact.diagnosis import formula_refits, formula_rounds, formulas
 from bayesimpact.diagnosis.asked import Asked
 from bayesimpact.diagnosis.budget import PATIENCE, begin
 from bayesimpact.diagnosis.decision import Decision
@@ -307,10 +307,14 @@ def test_no_name_rests_on_being_shorter_to_write(
         scores=SimpleNamespace(terms=terms), reference=fit, cost=4.0,
         kind_prices=np.array([5.0, price]), ranked=(),
     )  # fmt: skip
-    own = Effect("formula_one", "formula", "", "", "free", "either", "")
-    other = Effect("formula_two", "formula", "", "", "free", "either", "")
+    length = 1.0, price - 4.0
+    own = Effect("formula_one", "formula", "", "", "free", "either", "", price=length[0])
+    other = Effect("formula_two", "formula", "", "", "free", "either", "", price=length[1])
     first, second = Subset((0,), (1.0,), 100.0), Subset((1,), (1.0,), 93.0)
-    fitted = {first: Candidate((own,), fit, 0.0), second: Candidate((other,), fit, -7.0)}
+    fitted = {
+        first: Candidate((own,), fit, length[0]),
+        second: Candidate((other,), fit, length[1] - 7.0),
+    }
     naming = replace(found.naming, tried=tuple(fitted.values()))
     refits = formula_rounds.Refits(frozenset(fitted), fitted, naming, False)
     said = formulas._may_be_named(question, refits, first)  # type: ignore[arg-type]
@@ -334,14 +338,14 @@ def test_a_fitted_formula_that_only_its_numbers_on_the_grid_made_unlikely_is_lis
 ) -> None:
     """The first one alone is likely on the grid: fitting another ended in a traceback."""
     before, _, scales = detent
-    scored = formulas.subsets
+    scored = formula_refits.subsets
 
     def shifted(problem: Any) -> list[Subset]:
         ranked = scored(problem)
         by = ranked[0].log_odds - 1e-6
         return [replace(s, log_odds=s.log_odds - by) for s in ranked]
 
-    monkeypatch.setattr(formulas, "subsets", shifted)
+    monkeypatch.setattr(formula_refits, "subsets", shifted)
     found = asked(before, scales)
     assert found.formulas is not None
     assert len(found.formulas.ranked) > 1

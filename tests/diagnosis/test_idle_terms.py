@@ -21,15 +21,17 @@ def test_what_surely_is_needed_is_not_left_out_to_see(monkeypatch, repetition, t
     effects = tuple(BY_ID[i] for i in losses)
     left_out = set()
 
-    def without(candidate, effect, scales):
+    def without(candidate, effect, scales, *, enough):
+        assert enough.goal == -DECISIVE  # an end below the decisive odds decides nothing
         left_out.add(effect.id)
         return Candidate(tuple(e for e in effects if e is not effect), None, -100.0)
 
     monkeypatch.setattr(formula_refits, "loss_without", lambda fit, effect: losses[effect.id])
     monkeypatch.setattr(formula_refits, "without", without)
-    monkeypatch.setattr(formula_refits, "length_price", lambda question, subset: 0.0)
     question = SimpleNamespace(scores=SimpleNamespace(terms=()), scales=None)
-    naming = SimpleNamespace(repetition=repetition, log_odds=lambda c: c.log_evidence)
+    naming = SimpleNamespace(
+        repetition=repetition, log_odds=lambda c: c.log_evidence, goal=lambda least: least
+    )
     subset = SimpleNamespace(terms=())
     found = formula_refits._without_one(question, naming, subset, Candidate(effects, None, 0.0))
     assert found is None and left_out == tried

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from effect_rigs import BY_ID
+from made_up_models import TARGET
 
 from bayesimpact.diagnosis import models
 from bayesimpact.diagnosis.budget import COMPARISONS, LOOKS, PATIENCE, begin
@@ -16,8 +17,9 @@ from bayesimpact.diagnosis.refit import Candidate
 
 def candidate(ids: str, reached: float) -> Candidate:
     fit = SimpleNamespace(
-        log_likelihood=reached, log_posterior=reached, converged=True, reduced_chi2=1.0
-    )
+        log_likelihood=reached, log_posterior=reached, converged=True, reduced_chi2=1.0,
+        target=TARGET,
+    )  # fmt: skip
     return Candidate(tuple(BY_ID[i] for i in ids.split()), fit, reached)
 
 
@@ -50,7 +52,10 @@ def test_a_set_reaches_no_less_than_what_it_contains(monkeypatch, reached, again
 def test_an_effect_is_left_out_anew_where_its_model_has_reached_more(monkeypatch):
     """What a worse end of the larger model led to says little of the smaller one."""
 
+    goals = []
+
     def without(larger, effect, scales, *, enough):
+        goals.append(enough.goal)
         left = " ".join(i for i in larger.ids if i != effect.id)
         return candidate(left, larger.fit.log_likelihood - 5.0)
 
@@ -60,6 +65,8 @@ def test_an_effect_is_left_out_anew_where_its_model_has_reached_more(monkeypatch
         reached = search.keep(candidate("spring_cubic quadratic_drag", end))
         assert search.drop(reached, BY_ID["quadratic_drag"]).fit.log_likelihood == expected
     assert search.refits == 2
+    # one that leaves 16 times as much, of 1000 readings, puts no effect in doubt
+    assert goals == [pytest.approx(e - 500.0 * np.log(16.0)) for e in (40.0, 120.0)]
 
 
 def test_an_end_that_no_motion_has_is_not_looked_at(monkeypatch):
@@ -110,7 +117,7 @@ def test_a_set_that_is_asked_for_must_reach_what_it_contains(monkeypatch):
     sets = [
         SimpleNamespace(effects=tuple(BY_ID[i] for i in ids.split()), values={}) for ids in larger
     ]
-    problem = SimpleNamespace(best=lambda most: sets[:1], fit=None)
+    problem = SimpleNamespace(best=lambda most: sets[:1], fit=None, known=())
     search.asked = SimpleNamespace(about=lambda about, flight: problem)
     for one in sets:
         problem.best = lambda most, one=one: [one]

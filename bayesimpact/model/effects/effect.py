@@ -267,6 +267,8 @@ class Effect(Picklable):
     condition : what else a campaign must offer (two obstacles, two impacts, ...); None for nothing
     size : how large it is for given parameters, where the peak of its force along the motion or of
         its change of the readings does not say so
+    price : nats of log odds that it costs beyond what every effect does, for how long it is to
+        write down
     """
 
     id: str
@@ -287,6 +289,7 @@ class Effect(Picklable):
     restates: str | None = None
     condition: Callable[[Scales], bool] | None = None
     size: Callable[[Numbers, Scales], Size] | None = None
+    price: float = 0.0
 
     def __repr__(self) -> str:
         """One line."""

@@ -1,0 +1,170 @@
+"""A force of no effect that the equation of motion along the measured motion asks for.
+
+Where the catalogue leaves most of a large misfit, every term of the grammar is put beside every
+likely set of effects in the same least-squares problem (`likely_sets`), one column each and no
+simulation. Effects that imitate such a force one after the other cost a search minutes, and what
+they leave hides the rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.diagnosis.equation_error import EffectColumns, Path, without_rest
+from bayesimpact.diagnosis.formula_scores import REFINED, kind_prices, plausible_sizes, prices
+from bayesimpact.diagnosis.likely_sets import Chosen, EffectSet, LikelySets
+from bayesimpact.diagnosis.thresholds import EXCESS
+from bayesimpact.formula.grammar import Term
+from bayesimpact.formula.law import effect_of, is_friction, starts_of
+from bayesimpact.formula.library import library, local_starts, neighbours
+from bayesimpact.formula.responses import Along, forces_along
+from bayesimpact.model.effects.effect import Effect
+
+Array = NDArray[np.float64]
+Prices = Mapping[tuple[object, ...], float]
+"""Nats by the kind of a term."""
+
+SEEN = 1e-4  # of a column's square that the others must leave, for its size to mean something
+LIKELY = 5  # sets of every number of effects beside which terms are put
+BLOCK = 64  # terms at once, so that memory stays bounded
+
+
+@dataclass(frozen=True, eq=False)
+class _Beside:
+    """A term beside a set of effects.
+
+    log_odds : of both over no unknown at all, as those of sets
+    left : of the square of all stretches
+    """
+
+    term: Term
+    chosen: Chosen
+    log_odds: float
+    left: float
+
+
+def sets_with_a_term(problem: LikelySets, most: int, own: Collection[str] = ()) -> list[EffectSet]:
+    """For none, one, ... and `most` - 1 effects the likeliest set of these and a term of the
+    grammar, as far as it leaves `EXCESS` times less than every set of up to `most` effects.
+
+    Beside the likeliest sets of every number, effects by the ids `own` are one to begin with.
+    """
+    if not problem.terms:
+        return []
+    sets = [(), problem.shaped(own), *(c for level in problem.levels(most) for c in level[:LIKELY])]
+    least = min(_design(problem, problem.refined(chosen)).left for chosen in sets)
+    reach = _reach(problem)
+    terms = tuple(
+        t for t in (*library(problem.scales, *reach), *local_starts(*reach)) if not is_friction(t)
+    )
+    price = dict(zip((t.kind for t in terms), kind_prices(terms, prices(terms)), strict=True))
+    columns = _columns(problem, terms)
+    found = []
+    for size in range(most):
+        beside = [_best(problem, c, terms, columns, price) for c in sets if len(c) == size]
+        if beside:
+            best = _refined(problem, max(beside, key=lambda one: one.log_odds), price)
+            if EXCESS * max(best.left, problem.rows) < least:
+                found.append(_with_term(problem, best, price))
+    return found
+
+
+def _reach(problem: LikelySets) -> tuple[float, float]:
+    """Smallest and largest displacement of all paths, m."""
+    low = min(float(path.y.min()) for path in problem.paths)
+    return low, max(float(path.y.max()) for path in problem.paths)
+
+
+def _refined(problem: LikelySets, best: _Beside, price: Prices) -> _Beside:
+    """With all shapes where they are likeliest, also between the points of their grids."""
+    low, high = _reach(problem)
+    for step in REFINED:
+        chosen = problem.refined(best.chosen)
+        near = neighbours(best.term, step, max(-low, high)) if best.term.shapes else []
+        around = (best.term, *near)
+        columns = _columns(problem, around)
+        found = [_best(problem, c, around, columns, price) for c in {best.chosen, chosen}]
+        best = max(best, *found, key=lambda one: one.log_odds)
+    return best
+
+
+@dataclass(frozen=True, eq=False)
+class _Design:
+    """The columns of a set, orthonormal, and what they leave of the target and its square."""
+
+    basis: Array
+    rest: Array
+    left: float
+
+
+def _design(problem: LikelySets, chosen: Chosen) -> _Design:
+    columns = problem.every[:, problem.columns(chosen)]
+    basis = np.linalg.qr(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))[0]
+    rest = problem.target - basis @ (basis.T @ problem.target)
+    return _Design(basis, rest, float(rest @ rest))
+
+
+def _best(
+    problem: LikelySets, chosen: Chosen, terms: Sequence[Term], columns: Array, price: Prices
+) -> _Beside:
+    """The likeliest of some terms, with their `columns` (stretches, K), beside a set."""
+    design = _design(problem, chosen)
+    beside = columns - design.basis @ (design.basis.T @ columns)
+    square = np.einsum("nk,nk->k", beside, beside)
+    whole = np.einsum("nk,nk->k", columns, columns)
+    size = beside.T @ design.rest / np.maximum(square, 1e-300)
+    told = (square > SEEN * whole) & (whole > 0.0)
+    told &= (size > 0.0) | [t.energy != "dissipates" for t in terms]
+    left = np.where(told, design.left - size * size * square, design.left)
+    unknowns = np.array([1 + len(t.shapes) for t in terms])
+    cost = 0.5 * unknowns * np.log(problem.rows) + [price[t.kind] for t in terms]
+    gained = np.log(max(design.left / problem.rows, 1.0)) - np.log(
+        np.maximum(left / problem.rows, 1.0)
+    )
+    odds = problem.log_odds(chosen) + 0.5 * problem.rows * gained - cost
+    k = int(np.argmax(odds))
+    return _Beside(terms[k], chosen, float(odds[k]), float(left[k]))
+
+
+def _columns(problem: LikelySets, terms: Sequence[Term]) -> Array:
+    """Whitened integrals of every term's force of unit size, (stretches, K); 0 where not finite."""
+    parts = []
+    for path in problem.paths:
+        blocks = []
+        for first in range(0, len(terms), BLOCK):
+            forces = forces_along(_along(path), terms[first : first + BLOCK])
+            blocks.append(without_rest(path, path.rows.integrals(forces).T))
+        parts.append(np.concatenate(blocks, axis=1))
+    columns = np.concatenate(parts)
+    return np.where(np.isfinite(columns).all(axis=0), columns, 0.0)
+
+
+def _along(path: Path) -> Along:
+    return path.y, path.v, path.d, path.t
+
+
+def _with_term(problem: LikelySets, best: _Beside, price: Prices) -> EffectSet:
+    """The set with the term as an effect of its own, all sizes as the least squares have them."""
+    effect = _effect(problem, best.term, price[best.term.kind])
+    columns = [
+        without_rest(path, path.rows.integrals(forces_along(_along(path), [best.term])).T)
+        for path in problem.paths
+    ]
+    name = f"{effect.id}.size"
+    own = EffectColumns(effect, starts_of(best.term), (name,), tuple(columns), (False,))
+    return problem.with_term(best.chosen, own, best.log_odds)
+
+
+def _effect(problem: LikelySets, term: Term, price: float) -> Effect:
+    """The term as an effect."""
+    forces = [forces_along(_along(path), [term]) for path in problem.paths]
+    largest = max(float(np.abs(f).max()) for f in forces)
+    scale = float(plausible_sizes([term], np.array([largest]), problem.scales)[0])
+    reach = max(float(np.abs(path.y).max()) for path in problem.paths)
+    scales, signed = problem.scales, term.energy != "dissipates"
+    effect = effect_of(term, scale, reach, scales.speed, signed=signed, angle=scales.angle)
+    return replace(effect, price=max(price - problem.cost, 0.0))
