@@ -250,17 +250,29 @@ def _without_unfree_start(found: Diagnosis, as_read: Campaign, searches: Searche
     """Where a large misfit remains: the answer without first instants that keep a model from the
     rest, if that leaves less of it.
     """
-    corrected = found.corrected
-    if as_read.keep_faults or corrected is None or not is_large(found.after):
+    corrected, left = found.corrected, without_uncertain_formulas(found)
+    if as_read.keep_faults or corrected is None or not is_large(left):
         return found
-    starts = unfree_starts(found.after)
+    starts = unfree_starts(left)
     if not starts:
         return found
     return searches.again(
         found,
         lambda: without_faults(corrected, starts, as_read, rng=searches.rng),
-        lambda other, own: BETTER * other.after.reduced_chi2 < own.after.reduced_chi2,
+        lambda other, _: (
+            BETTER * without_uncertain_formulas(other).reduced_chi2 < left.reduced_chi2
+        ),
     )
+
+
+def without_uncertain_formulas(found: Diagnosis) -> Fit:
+    """The fit that is shown, or where it has a formula that is not named, the catalogue's alone."""
+    effects = found.after.target.oscillator.effects
+    known = {e.id for e in effects if not is_formula(e)}
+    if len(known) == len(effects) or (found.formulas is not None and found.formulas.named):
+        return found.after
+    rest = [c.fit for c in found.naming.tried if set(c.ids) == known]
+    return rest[0] if rest else found.before
 
 
 def _without_late_spikes(found: Diagnosis, as_read: Campaign, searches: Searches) -> Diagnosis:

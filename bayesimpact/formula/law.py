@@ -23,6 +23,7 @@ from bayesimpact.model.power import power
 PREFIX = "formula_"
 SMALLEST = 0.01  # of the reach (of the speed): bound of a place, a width, a fading
 FAMILY = "formula"
+KINKED = (Power(1.0, False), Power(2.0, True))  # powers of the speed with a kink at a turning point
 
 
 def force(y, v, d, t, z, touching, p, q):  # type: ignore[no-untyped-def]
@@ -75,6 +76,8 @@ def force(y, v, d, t, z, touching, p, q):  # type: ignore[no-untyped-def]
             inside *= v * v * v
         else:
             inside *= power(v * v + SLOW * SLOW, 0.5 * (m - 1.0)) * v
+    elif m == 1.0:
+        inside *= abs(v)
     elif m == 2.0:
         inside *= v * v
     if p[3] > 0.0:
@@ -210,7 +213,7 @@ def law_of(term: Term) -> Law:
         surface=surface,
         jump_at_surface=surface in (edges, deeper) or term.region == "beyond",
         jump_at_turn=jumps,
-        kink_at_turn=not jumps and (rooted or term.fade > 0 or m == Power(2.0, True)),
+        kink_at_turn=not jumps and (rooted or term.fade > 0 or m in KINKED),
         first_at_turn=first_at_turn if rooted else None,
         rough_at_touch=term.region == "contact" and not term.position.exponent.is_integer(),
         feature_length=feature_length if term.region in ("bump", "box") else None,

@@ -1,6 +1,6 @@
 """The library: every term of the grammar that a campaign of given sizes could show.
 
-Some 350 terms. What the base model has already (k1 y, c1 v, k2 d, c2 v in contact, a constant) is
+Some 370 terms. What the base model has already (k1 y, c1 v, k2 d, c2 v in contact, a constant) is
 left out. Shape parameters stand on grids: places where the mass has been, widths of a sixteenth to
 a quarter of the amplitude; a refit sets them free.
 """
@@ -23,14 +23,16 @@ POSITIONS = (
     Power(3.0, True), Power(4.0, False), Power(5.0, True),
 )  # fmt: skip
 SPEEDS = (
-    ONE, SIGN, Power(0.5, True), V, Power(1.5, True), DRAG, Power(2.0, False), Power(3.0, True),
+    ONE, SIGN, Power(0.5, True), V, Power(1.0, False), Power(1.5, True), DRAG, Power(2.0, False),
+    Power(3.0, True),
 )  # fmt: skip
 DEPTHS = tuple(Power(n, False) for n in (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0))
-CONTACT_SPEEDS = (ONE, SIGN, V, DRAG, Power(2.0, False), Power(3.0, True))
+CONTACT_SPEEDS = (ONE, SIGN, V, Power(1.0, False), DRAG, Power(2.0, False), Power(3.0, True))
 BASE = ((ONE, ONE), (LINEAR, ONE), (ONE, V))
 BASE_CONTACT = ((Power(1.0, False), ONE), (ONE, V))
 
-FADES = (0.05, 0.1, 0.2, 0.4)  # of the largest speed
+FADES = (0.05, 0.1, 0.2, 0.4)  # of the largest speed: of a friction that fades
+MAXIMA = (0.1, 0.2, 0.4, 0.8)  # of a damping that fades, where it is largest
 STAGES = (0.1, 0.25, 0.4, 0.6, 0.8)  # of the deepest indentation
 BEYOND = (0.15, 0.3, 0.45, 0.6, 0.75, 0.9)  # of the reach on that side
 PLACES = 9  # of bumps and boxes, over all displacements outside contact
@@ -60,8 +62,9 @@ def _everywhere(scales: Scales) -> Iterator[Term]:
     for position, speed in itertools.product(POSITIONS, SPEEDS):
         if (position, speed) not in BASE:
             yield Term("everywhere", position, speed)
-    for share in FADES:
-        yield Term("everywhere", ONE, SIGN, fade=share * scales.speed)
+    for speed, shares in ((SIGN, FADES), (V, MAXIMA)):
+        for share in shares:
+            yield Term("everywhere", ONE, speed, fade=share * scales.speed)
 
 
 def _drifts(scales: Scales) -> Iterator[Term]:

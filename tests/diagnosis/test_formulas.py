@@ -28,6 +28,7 @@ from bayesimpact.diagnosis.naming import Naming, State
 from bayesimpact.diagnosis.refit import (
     Candidate,
     base_candidate,
+    fit_from,
     grown,
     residual_repetition,
 )
@@ -37,7 +38,8 @@ from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.diagnosis.unknown import with_force
 from bayesimpact.formula.evidence import Subset
 from bayesimpact.formula.grammar import ONE, Power, Term
-from bayesimpact.formula.law import is_formula
+from bayesimpact.formula.law import effect_of, is_formula, starts_of
+from bayesimpact.formula.library import V
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects.effect import Effect, Scales
 from bayesimpact.model.own_effects import load_effects
@@ -319,6 +321,48 @@ def test_no_name_rests_on_being_shorter_to_write(
     refits = formula_rounds.Refits(frozenset(fitted), fitted, naming, False)
     said = formulas._may_be_named(question, refits, first)  # type: ignore[arg-type]
     assert said is named
+
+
+def met(wrong: Term) -> tuple[Answer, Scales]:
+    """What a search ends with that has met a term on its way, and takes it for what is there."""
+    rng = np.random.default_rng(0)
+    bump = {"coefficient": 4.0, "place": -2.5e-3, "width": 7e-4}
+    campaign = record(
+        3, {"damping_bump": bump}, rig=PLAIN, releases=PLAIN_RELEASES, duration=4.0, rate=500.0
+    )
+    base = base_candidate(identify(campaign, rng=rng, search=False).fit)
+    scales = campaign_scales(base.fit)
+    law = effect_of(wrong, 0.1, 1e-2, scales.speed, signed=False)
+    chosen = fit_from(base.fit, (law,), starts_of(wrong) | {f"{law.id}.size": 4.0}, scales)
+    first, state = (_state(c, scales, rng) for c in (base, chosen))
+    naming = Naming(first, state, (chosen, base), np.log(50.0), residual_repetition(chosen.fit))
+    return Answer(naming, Decision("named", (law,)), chosen.fit, None), scales
+
+
+BOX = Term("box", ONE, V, -1, 2.5e-3, 8e-4)
+
+
+def test_formulas_are_scored_again_along_the_motion_of_the_likeliest() -> None:
+    """Along that of a wrong one others seem as good as the right one is."""
+    before, scales = met(BOX)
+    assert before.after.reduced_chi2 > 1.2
+    said: list[str] = []
+    found = asked(before, scales, said=said)
+    assert said.count("scoring formulas") > 1
+    assert found.decision.verdict == "named" and found.after.reduced_chi2 < 1.1
+    (term,) = found.formulas.ranked[0].terms
+    assert (term.region, term.speed) == ("bump", V)
+
+
+def test_no_term_that_a_search_has_met_is_a_name_by_itself() -> None:
+    """Where time ends before it was compared with others, nor with what is still missing beside."""
+    before, scales = met(BOX)
+    found = asked(before, scales, 0)
+    assert not found.naming.finished and found.after is before.after
+    assert found.state is before.naming.base  # what the formula does is what is left
+    imitation = Decision("named", (BY_ID["spring_cubic"], *before.decision.effects))
+    for answer in (found, asked(replace(before, decision=imitation), scales, 0)):
+        assert (answer.decision.verdict, answer.decision.effects) == ("unknown", ())
 
 
 def test_refitted_are_formulas_of_different_kinds_few_of_which_only_add() -> None:
