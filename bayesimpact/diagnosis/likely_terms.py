@@ -47,9 +47,11 @@ class _Beside:
     left: float
 
 
-def sets_with_a_term(problem: LikelySets, most: int, own: Collection[str] = ()) -> list[EffectSet]:
+def sets_with_a_term(
+    problem: LikelySets, most: int, own: Collection[str] = (), excess: float = EXCESS
+) -> list[EffectSet]:
     """For none, one, ... and `most` - 1 effects the likeliest set of these and a term of the
-    grammar, as far as it leaves `EXCESS` times less than every set of up to `most` effects.
+    grammar, as far as it leaves `excess` times less than every set of up to `most` effects.
 
     Beside the likeliest sets of every number, effects by the ids `own` are one to begin with.
     """
@@ -68,7 +70,7 @@ def sets_with_a_term(problem: LikelySets, most: int, own: Collection[str] = ()) 
         beside = [_best(problem, c, terms, columns, price) for c in sets if len(c) == size]
         if beside:
             best = _refined(problem, max(beside, key=lambda one: one.log_odds), price)
-            if EXCESS * max(best.left, problem.rows) < least:
+            if excess * max(best.left, problem.rows) < least:
                 found.append(_with_term(problem, best, price))
     return found
 

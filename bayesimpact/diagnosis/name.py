@@ -74,7 +74,7 @@ def name(
     begun = set[frozenset[str]]()
     while True:
         state = search.grown(beam)
-        with_term = search.with_a_term(state)
+        with_term = search.with_a_term(state, excess=1.0)
         if with_term is not state:
             beam = [with_term]
             continue

@@ -20,35 +20,41 @@ from bayesimpact.formula.law import is_formula
 class Unlisted(Remaining):
     """A search that may leave the catalogue."""
 
-    def with_a_term(self, state: State) -> State:
-        """A model, or where it leaves a large misfit, one with a term of the grammar that explains
-        more: once about every model, and never a second term, for sums of terms are compared later.
+    def with_a_term(self, state: State, *, excess: float = EXCESS) -> State:
+        """A model, or one with a term of the grammar that explains more, where the equation of
+        motion leaves `excess` times less by it than by the catalogue.
+
+        Of a large misfit only, or of what is left of one; once about every model, and never a
+        second term, for sums of terms are compared later.
         """
         about = state.candidate
-        if not is_large(about.fit) or any(map(is_formula, about.effects)):
+        something = is_large(about.fit) if excess > 1.0 else not state.is_white and self.is_large
+        if not something or any(map(is_formula, about.effects)):
             return state
         for flight in (True, False) if self.asked.has_stop else (False,):
-            key = ("term", about.ids, about.fit.log_posterior, flight)
+            key = ("term", about.ids, about.fit.log_posterior, flight, excess)
             if key in self.begun or not self.may_go_on():
                 continue
             self.begun.add(key)
-            found = [about, *self.fit_sets_with_a_term(about, flight)]
+            found = [about, *self.fit_sets_with_a_term(about, flight, excess)]
             best = max(found, key=self.promise)
             if best is not about:
                 return self.examine(best)
         return state
 
-    def fit_sets_with_a_term(self, about: Candidate, flight: bool) -> list[Candidate]:
+    def fit_sets_with_a_term(
+        self, about: Candidate, flight: bool, excess: float
+    ) -> list[Candidate]:
         """Models with a term of the grammar that the equation of motion asks for about a model;
         larger ones up to the first whose misfit is not large.
         """
         found, problem = list[Candidate](), self.asked.about(about, flight)
         most = self.most - len(problem.known)
-        for chosen in sets_with_a_term(problem, most, about.ids):
+        for chosen in sets_with_a_term(problem, most, about.ids, excess):
             if not self.may_go_on():
                 break
             found.append(self.fit_set(problem.fit, chosen, about.fit.log_likelihood))
-            if not is_large(found[-1].fit):
+            if excess > 1.0 and not is_large(found[-1].fit):
                 break
         return found
 

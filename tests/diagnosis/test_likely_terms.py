@@ -76,15 +76,14 @@ def test_no_term_is_asked_for_where_the_catalogue_explains_as_much(effects: Effe
     assert asked_for(fitted(effects)) == []
 
 
-def test_a_set_with_a_term_leaves_far_less_than_every_set(detent: Any, monkeypatch: Any) -> None:
+def test_a_set_with_a_term_leaves_far_less_than_every_set(detent: Any) -> None:
     fit, found = detent
     problem = LikelySets(fit, SEARCHED, campaign_scales(fit))
     least = min(problem.solve(problem.refined(c))[1] for level in problem.levels(5) for c in level)
     left = [problem.rows * np.exp(-2 * s.log_odds / problem.rows) for s in found]  # with the price
     whole = problem.rows * np.exp(problem.solve(())[1])
     assert all(np.log(whole * one / problem.rows**2) < least for one in left)
-    monkeypatch.setattr("bayesimpact.diagnosis.likely_terms.EXCESS", 1e9)
-    assert asked_for(fit) == []
+    assert sets_with_a_term(problem, 5, excess=1e9) == []
 
 
 def test_what_a_model_has_and_no_grid_holds_is_known_to_the_equation() -> None:
