@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 from bayesimpact.diagnosis.budget import Budget
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.extend import difference_steps, extend, transfer
-from bayesimpact.diagnosis.formula_scores import FormulaScores, formula_scores, kind_prices
+from bayesimpact.diagnosis.formula_scores import (
+    FormulaScores,
+    formula_scores,
+    formulas_met,
+    kind_prices,
+)
 from bayesimpact.diagnosis.learned import LEARNED
 from bayesimpact.diagnosis.naming import Naming, leaves_something
 from bayesimpact.diagnosis.refit import (
@@ -28,7 +33,7 @@ from bayesimpact.diagnosis.refit import (
 from bayesimpact.diagnosis.sizes import loss_without
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.formula.classes import FormulaClass, formula_classes, term_classes
-from bayesimpact.formula.evidence import Subset, subsets
+from bayesimpact.formula.evidence import Subset, single_log_odds, subsets
 from bayesimpact.formula.grammar import Term
 from bayesimpact.formula.law import effect_id, effect_of, is_formula, kind_id, starts_of
 from bayesimpact.inference.fit import Fit
@@ -59,6 +64,19 @@ class Question:
     scores: FormulaScores
     scales: Scales
     ranked: Sequence[Subset]
+
+    @cached_property
+    def met(self) -> Subset | None:
+        """The formula that the reference has; None without one, or where it does nothing that the
+        other parameters do not.
+        """
+        found, terms = formulas_met(self.reference), self.scores.terms
+        if not found or not all(t in terms for t in found):
+            return None
+        sizes = {terms.index(t): size for t, size in found.items()}
+        at = tuple(sorted(sizes))
+        alone = float(np.sum(single_log_odds(self.scores.problem)[list(at)]))
+        return self.scored.get(at, Subset(at, tuple(sizes[i] for i in at), alone))
 
     @cached_property
     def heads(self) -> Sequence[FormulaClass]:

@@ -49,14 +49,17 @@ class Refits:
 def fitted_formulas(
     question: Question, naming: Naming, progress: Callable[[str], None], budget: Budget
 ) -> Refits:
-    """Formulas fitted in full, as far as time allows: those that score best, then those whose
-    scores still speak against the likeliest, `ROUNDS` times at most.
+    """Formulas fitted in full, as far as time allows: what the search has met and those that score
+    best, then those whose scores still speak against the likeliest, `ROUNDS` times at most.
     """
     terms = question.scores.terms
     begun: set[Subset] = set()
     ends: dict[Subset, tuple[Subset, Candidate]] = {}
     found = Refits(frozenset(), {}, naming, False)
     todo = refit_candidates(question.ranked, terms)
+    if question.met is not None:
+        kinds = kinds_of(question.met, terms)
+        todo = [question.met, *(s for s in todo if kinds_of(s, terms) != kinds)]
     for _ in range(ROUNDS):
         fitted, late = _fitted(question, todo, progress, budget)
         begun |= fitted.keys()

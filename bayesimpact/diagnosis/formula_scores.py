@@ -76,7 +76,7 @@ def formula_scores(fit: Fit, scales: Scales, *, repetition: float = 1.0) -> Form
     mass sticks no term is scored: the motion says nothing of what came before.
     """
     reach = motion_range(fit)
-    met = terms_met(fit)
+    met = tuple(formulas_met(fit))
     whole = (*library(scales, *reach), *met)
     counts = fit.target.oscillator.counts
     try:
@@ -94,10 +94,11 @@ def formula_scores(fit: Fit, scales: Scales, *, repetition: float = 1.0) -> Form
     return score_terms(fit, motions, (*whole, *added), scales, repetition)
 
 
-def terms_met(fit: Fit) -> tuple[Term, ...]:
-    """The terms of formulas that a fit has, with their shapes."""
+def formulas_met(fit: Fit) -> dict[Term, float]:
+    """The terms of formulas that a fit has, with their shapes, and their sizes."""
     values = dict(zip(fit.names, map(float, fit.mode), strict=True))
-    return tuple(term_of(e, values) for e in fit.target.oscillator.effects if is_formula(e))
+    effects = [e for e in fit.target.oscillator.effects if is_formula(e)]
+    return {term_of(e, values): values[f"{e.id}.size"] for e in effects}
 
 
 def _likeliest(scores: FormulaScores) -> list[Term]:
@@ -195,9 +196,9 @@ class _Sums:
 
     def __init__(self, fit: Fit, others: NDArray[np.int64], count: int, together: bool) -> None:
         self.fit, self.others, self.together = fit, others, together
-        of_force, learned = _of_a_force(fit), _learned(fit)
-        sizes = [n.endswith(".size") for n in fit.names]
-        self.coefficients = np.where(of_force & (learned | sizes), fit.mode, 0.0)
+        learned = _learned(fit)
+        self.coefficients = np.where(learned, fit.mode, 0.0)
+        self.met = formulas_met(fit)
         self.sigma = sigma_of(fit)
         self.own = np.zeros((others.size, others.size))
         self.own_score = np.zeros(others.size)
@@ -221,6 +222,9 @@ class _Sums:
         j, z = lin.jacobian[:, kept] / sigma, taken / sigma
         out, largest, power = responses(motion, terms)
         d = whitened_one(self.fit, r, out, self.sigma)
+        if self.met:  # as other terms would do it, so that none is better for how it is computed
+            own = responses(motion, tuple(self.met))[0]
+            z = z + np.array([*self.met.values()]) @ whitened_one(self.fit, r, own, self.sigma)
         self.own[np.ix_(where, where)] += j.T @ j
         self.own_score[where] += j.T @ z
         self.cross[where] += j.T @ d.T
