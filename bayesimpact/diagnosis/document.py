@@ -32,6 +32,7 @@ from bayesimpact.diagnosis.words import (
     remaining,
     statement,
 )
+from bayesimpact.formula.law import is_formula_id
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect
 from bayesimpact.model.parameters import bare_name, is_added, unit_for
@@ -267,7 +268,8 @@ def _others(d: Diagnosis) -> tuple[Candidate, ...]:
     if d.verdict == "adequate":
         return ()
     named = {e.id for e in d.effects}
-    rest = [c for c in d.naming.tried if c.ids and set(c.ids) != named]
+    catalogue = (c for c in d.naming.tried if c.ids and not any(map(is_formula_id, c.ids)))
+    rest = [c for c in catalogue if set(c.ids) != named]
     if d.verdict in ("named", "ambiguous"):
         rest = [c for c in rest if not named <= set(c.ids)]
     others = [*d.alternatives, *(c for c in rest if c not in d.alternatives)]

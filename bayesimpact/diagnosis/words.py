@@ -8,6 +8,7 @@ from typing import Any
 
 from bayesimpact.diagnosis.faults.compare import base_failed
 from bayesimpact.diagnosis.remainder import Remainder
+from bayesimpact.formula.law import is_formula_id
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.effects.effect import Effect
@@ -97,7 +98,11 @@ def excludes(content: Mapping[str, Any], value: float) -> bool:
 
 
 def title_of(effect_id: str) -> str:
-    """What an effect of the catalogue is called; an id in words for others."""
+    """What an effect of the catalogue is called; an id in words for others, but a formula's, which
+    is no name.
+    """
+    if is_formula_id(effect_id):
+        return "a formula"
     known = {e.id: e.title for e in EFFECTS}
     return known.get(effect_id, effect_id.replace("_", " "))
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from math import isfinite
 from typing import Any
 
+from bayesimpact.diagnosis.words import titles_of
 from bayesimpact.model.units import (
     chi2,
     decimals,
@@ -19,7 +20,7 @@ from bayesimpact.model.units import (
     typeset,
 )
 from bayesimpact.report.change_view import NUISANCES, change_row, estimate
-from bayesimpact.report.formula_text import effect_title, in_words, titles
+from bayesimpact.report.formula_text import effect_title, in_words
 from bayesimpact.report.limit_view import limit_row, not_found, seen
 from bayesimpact.report.next_words import next_view
 from bayesimpact.report.results import Results
@@ -69,7 +70,7 @@ def diagnosis_view(results: Results) -> dict[str, Any] | None:
         "alternatives": [
             {
                 "id": other["id"],
-                "titles": titles(other["id"]),
+                "titles": titles_of(other["id"]),
                 "name": in_words(other["id"]),  # as the figure of the models has it
                 "probability": probability(other["probability"]),
                 "evidence": _plain(other["delta_log_evidence"], 1),
@@ -169,7 +170,7 @@ def remainder_rows(
     if remainder.get("recordings"):
         rows.append(("recordings", ", ".join(str(x) for x in remainder["recordings"])))
     if remainder.get("guess"):
-        rows.append(("likely", titles(str(remainder["guess"]))))
+        rows.append(("likely", titles_of(str(remainder["guess"]))))
     return rows
 
 

@@ -6,7 +6,6 @@ import re
 
 from markupsafe import Markup, escape
 
-from bayesimpact.diagnosis.words import listed, title_of, titles_of
 from bayesimpact.formula.law import is_formula_id
 
 LETTERS = {"size": "A", "place": "p", "width": "w", "fade": "u"}
@@ -50,14 +49,6 @@ def effect_title(effect_id: str, title: str = "") -> str:
     if not is_formula_id(effect_id):
         return written(title)
     return Markup("force {}").format(typeset_formula(title.removeprefix("force ")))
-
-
-def titles(ids: str) -> str:
-    """What effects are called, of ids joined by " + "; a formula has its name elsewhere."""
-    parts = ids.split(" + ")
-    if not any(map(is_formula_id, parts)):
-        return titles_of(ids)
-    return listed("a formula" if is_formula_id(part) else title_of(part) for part in parts)
 
 
 def as_code(effect_id: str) -> Markup:

@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from bayesimpact.data.text_table import text_table
+from bayesimpact.diagnosis.words import titles_of
 from bayesimpact.model.units import decimals, number, quantity, significant
-from bayesimpact.report.formula_text import titles
 
 Content = Mapping[str, Any]
 
@@ -125,7 +125,7 @@ def next_view(content: Content | None) -> dict[str, Any] | None:
     return {
         "sentence": content["sentence"],
         "rivals": [
-            (titles(" + ".join(r["effects"])) or "the base model", _percent(r["probability"]))
+            (titles_of(" + ".join(r["effects"])) or "the base model", _percent(r["probability"]))
             for r in content["rivals"]
         ]
         if content["open"]

@@ -7,7 +7,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from bayesimpact.diagnosis.words import title_of
+from bayesimpact.diagnosis.words import title_of, titles_of
 from bayesimpact.model.units import percent, significant, span_of
 from bayesimpact.model.units import quantity as amount
 from bayesimpact.report.change_view import NUISANCES, estimate
@@ -19,7 +19,7 @@ from bayesimpact.report.diagnosis_view import (
     size_words,
     verdict_words,
 )
-from bayesimpact.report.formula_text import as_code, effect_title, titles
+from bayesimpact.report.formula_text import as_code, effect_title
 from bayesimpact.report.results import Results
 from bayesimpact.report.tables import symbol
 
@@ -96,7 +96,7 @@ def _physics(diagnosis: Mapping[str, Any]) -> list[str | Markup]:
     others = diagnosis.get("alternatives", ()) if diagnosis["verdict"] == "ambiguous" else ()
     return lines + [
         Markup("or {}, probability {}{}").format(
-            titles(other["id"]), probability(other.get("probability")), as_code(other["id"])
+            titles_of(other["id"]), probability(other.get("probability")), as_code(other["id"])
         )
         for other in others
     ]
