@@ -87,17 +87,17 @@ def value_in(other: Fit, fit: Fit, name: str) -> float | None:
     if name in other.names:
         return other.value(name)
     if not is_added(name):
-        effects = other.target.oscillator.effects
+        effects = other.target.oscillator.acting
         added = [n for n in other.names if is_added(n)]
         parts = [n for n in added if owner(effects, n)[1].replaces == name]
         return float(np.mean([other.value(n) for n in parts])) if parts else None
-    slot = owner(fit.target.oscillator.effects, name)[1].replaces
+    slot = owner(fit.target.oscillator.acting, name)[1].replaces
     return other.value(slot) if slot in other.names else None
 
 
 def _difference(fit: Fit, i: int, value: float) -> float:
     """What a value differs by from that of a fit; of phases modulo a turn."""
     apart, name = value - float(fit.mode[i]), fit.names[i]
-    if is_added(name) and owner(fit.target.oscillator.effects, name)[1].circular:
+    if is_added(name) and owner(fit.target.oscillator.acting, name)[1].circular:
         return float((apart + np.pi) % (2 * np.pi) - np.pi)
     return apart

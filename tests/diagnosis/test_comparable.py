@@ -10,12 +10,14 @@ import pytest
 import small_rig
 from effect_rigs import BY_ID
 
+from bayesimpact.data.campaign import SECOND_STOP
 from bayesimpact.diagnosis import comparable, document
 from bayesimpact.diagnosis.comparable import Comparable, alike_in_misfit, alike_in_odds, value_in
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.intervals import intervals
 from bayesimpact.diagnosis.refit import Candidate, fit_from
 from bayesimpact.diagnosis.thresholds import EXCESS
+from bayesimpact.inference.identify import identify
 
 
 def moved(fit, **changes):
@@ -109,3 +111,13 @@ def test_the_mean_of_parts_is_as_uncertain_as_the_posterior_says(split):
     drawn = document._parameters(split, known, draws)["g"]
     assert drawn["ci90"] == pytest.approx(row["ci90"], abs=0.05 * 1e-4)
     assert drawn["median"] == pytest.approx(row["median"], abs=0.03 * 1e-4)
+
+
+def test_what_a_campaign_declares_is_compared_like_what_is_found(small):
+    """The opposite stop of a two-sided one: a traceback ended such diagnoses."""
+    campaign = replace(small.fit.target.oscillator.campaign, declared=(SECOND_STOP,))
+    fit = identify(campaign, rng=np.random.default_rng(0), search=False).fit
+    other = fit_from(fit, (BY_ID["spring_cubic"],), {}, campaign_scales(fit)).fit
+    at = fit.names.index("opposite_stop.stiffness")
+    found = Comparable((other, moved(fit, **{fit.names[at]: 7.0})), np.full(2, 1 / 3)).between(fit)
+    assert found[at, at] >= 7.0**2 / 3 * (1 - 1e-9)
