@@ -15,7 +15,7 @@ from dataclasses import replace
 from bayesimpact.diagnosis.directions import is_periodic
 from bayesimpact.diagnosis.equation_error import is_a_force
 from bayesimpact.diagnosis.extend import transfer
-from bayesimpact.diagnosis.likely_sets import Known, LikelySets
+from bayesimpact.diagnosis.likely_sets import Known, LikelySets, shapes_of
 from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.fit import Fit
@@ -63,11 +63,8 @@ def known_effects(model: Candidate) -> list[Known]:
     """Of a model's effects those whose shapes no grid holds, periodic ones and terms of formulas,
     with the shapes that its fit has found.
     """
-    values = dict(zip(model.fit.names, map(float, model.fit.mode), strict=True))
-    found = list[Known]()
-    for effect in model.effects:
-        if is_a_force(effect) and (is_periodic(effect) or is_formula(effect)):
-            own = {f"{effect.id}.{p.name}" for p in effect.parameters if not p.is_size}
-            shapes = {n: v for n, v in values.items() if n.split("[")[0] in own}
-            found.append((effect, shapes))
-    return found
+    return [
+        (effect, shapes_of(model.fit, effect))
+        for effect in model.effects
+        if is_a_force(effect) and (is_periodic(effect) or is_formula(effect))
+    ]

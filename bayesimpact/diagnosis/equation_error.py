@@ -27,7 +27,7 @@ from scipy.linalg import cholesky_banded, solve_banded
 from scipy.signal import savgol_filter
 
 from bayesimpact.diagnosis.directions import is_periodic, shape_points, size_parameters
-from bayesimpact.diagnosis.extend import extend, transfer
+from bayesimpact.diagnosis.extend import at_null, extend, transfer
 from bayesimpact.diagnosis.thresholds import DOUBT
 from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.model.effects.effect import Effect, Scales
@@ -225,11 +225,11 @@ def term_at(
     shapes: Mapping[str, float],
     paths: Sequence[Path],
 ) -> EffectColumns | None:
-    """What an effect adds at one point of its shapes, of which `target` has no other; None where
-    that is nothing, or not finite.
+    """What an effect of `target` adds at one point of its shapes, all others at their null; None
+    where that is nothing, or not finite.
     """
     layout = target.oscillator.layout
-    theta = transfer(fit, layout, (effect,), scales, shapes)
+    theta = at_null(target, transfer(fit, layout, (effect,), scales, shapes))
     sizes = size_parameters(target, effect)
     steps = np.array([STEP * parameter.scale(scales) for _, parameter in sizes])
     points = np.repeat(theta[None], 1 + len(sizes), axis=0)

@@ -141,6 +141,18 @@ def _start(
     return parameter.scale(scales) if parameter.null is None else parameter.null
 
 
+def at_null(target: Target, theta: Array) -> Array:
+    """Parameters (d,) with the sizes of all effects at their null."""
+    o = target.oscillator
+    null = theta.copy()
+    for i, name in enumerate(o.layout.names):
+        if is_added(name):
+            parameter = owner(o.acting, name)[1]
+            if parameter.null is not None and not parameter.is_shape:
+                null[i] = parameter.null
+    return null
+
+
 def difference_steps(fit: Fit, target: Target, sizes: Mapping[str, float]) -> Array:
     """Steps (d,) for differences: a twentieth of the known standard deviations or of `sizes`."""
     known = zip(fit.names, fit.sd, np.abs(fit.mode), strict=True)

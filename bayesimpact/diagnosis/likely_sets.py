@@ -17,6 +17,7 @@ from bayesimpact.diagnosis.equation_error import (
     EffectColumns,
     Path,
     base_columns,
+    is_a_force,
     measured_paths,
     term_at,
     terms_of,
@@ -55,6 +56,13 @@ class EffectSet:
         return tuple(term.effect for term in self.terms)
 
 
+def shapes_of(fit: Fit, effect: Effect) -> dict[str, float]:
+    """The values that a fit has found of what is no size of one of its effects."""
+    own = {f"{effect.id}.{p.name}" for p in effect.parameters if not p.is_size}
+    values = zip(fit.names, map(float, fit.mode), strict=True)
+    return {name: value for name, value in values if name.split("[")[0] in own}
+
+
 def _completed(chosen: EffectSet, fit: Fit, paths: Sequence[Path]) -> EffectSet:
     """With the gap, of which only the change is known, and the measured first states."""
     values = dict(chosen.values)
@@ -69,9 +77,9 @@ class LikelySets:
     """Sets of effects for a fit of the base model, by the equation of motion.
 
     Holds the normal equations of base model and terms, all columns scaled to norm one. There are no
-    terms, and so no sets, where a reading is no displacement, or where effects are declared. In
-    `flight` only what acts there has terms. Every set holds the effects of `known`, whose shapes
-    are, but not their sizes.
+    terms, and so no sets, where a reading is no displacement. In `flight` only what acts there has
+    terms. Every set holds what the campaign declares and the effects of `known`: their shapes are
+    known, but not their sizes.
     """
 
     def __init__(
@@ -87,10 +95,11 @@ class LikelySets:
         self.fit, self.scales, self.paths = fit, scales, measured_paths(fit, flight=flight)
         columns, targets, self.names = base_columns(fit, self.paths)
         base, target = np.concatenate(columns), np.concatenate(targets)
-        told = base[:, 0].any() and o.reads_displacements and not o.acting
+        told = base[:, 0].any() and o.reads_displacements and all(map(is_a_force, o.acting))
         seen = effects if told else ()
-        self.known = [t for one in known if told and (t := self._known(*one)) is not None]
-        for term in self.known:
+        declared = self._known([(e, shapes_of(fit, e)) for e in o.acting]) if told else []
+        self.known = self._known(known) if told else []
+        for term in (*declared, *self.known):
             base = np.column_stack([base, np.concatenate(term.columns)])
             self.names += term.names
         self.terms = terms_of(fit, seen, scales, self.paths)
@@ -107,9 +116,17 @@ class LikelySets:
         self.base = [i for i in range(base.shape[1]) if size[i] > 0]
         self.every, self.target = every, target
 
-    def _known(self, effect: Effect, shapes: Mapping[str, float]) -> EffectColumns | None:
-        target = extend(self.fit, (effect,), self.scales)
-        return term_at(self.fit, target, effect, self.scales, shapes, self.paths)
+    def _known(self, effects: Sequence[Known]) -> list[EffectColumns]:
+        """Terms of effects with given shapes; those that the campaign declares have them in any
+        target.
+        """
+        found = []
+        for effect, shapes in effects:
+            added = () if effect in self.fit.target.oscillator.acting else (effect,)
+            target = extend(self.fit, added, self.scales)
+            term = term_at(self.fit, target, effect, self.scales, shapes, self.paths)
+            found += [] if term is None else [term]
+        return found
 
     def columns(self, chosen: Sequence[int]) -> list[int]:
         """Of the base model and of the terms `chosen`."""

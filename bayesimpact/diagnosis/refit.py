@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from bayesimpact.data.short_repr import short_repr
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.extend import (
+    at_null,
     difference_steps,
     extend,
     owner,
@@ -287,18 +288,6 @@ def _refitted(
     if found.reduced_chi2 > LARGE**2:
         found = or_by_stretches(found, start, steps, goal)
     return Candidate(effects, found, model_evidence(found))
-
-
-def at_null(target: Target, theta: Array) -> Array:
-    """Parameters (d,) with the sizes of all effects at their null."""
-    o = target.oscillator
-    null = theta.copy()
-    for i, name in enumerate(o.layout.names):
-        if is_added(name):
-            parameter = owner(o.acting, name)[1]
-            if parameter.null is not None and not parameter.is_shape:
-                null[i] = parameter.null
-    return null
 
 
 def step_sizes(

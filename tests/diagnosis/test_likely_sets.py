@@ -101,16 +101,25 @@ def test_nothing_is_asked_for_where_nothing_is_missing() -> None:
     assert sets_of(fitted(decays(1, {}))) == []
 
 
-def test_only_displacements_of_a_plain_base_model() -> None:
+def test_only_displacements() -> None:
     velocity = small_rig.record(
         1, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES, quantity="velocity"
     )
     assert sets_of(fitted(velocity)) == []
-    fit = fitted(small_rig.record(1))
-    declared = replace(fit.target.oscillator.campaign, declared=(SECOND_STOP,))
-    oscillator = replace(fit.target.oscillator, campaign=declared)
-    likelihood = replace(fit.target.likelihood, oscillator=oscillator)
-    assert sets_of(replace(fit, target=replace(fit.target, likelihood=likelihood))) == []
+
+
+def test_beside_what_a_campaign_declares() -> None:
+    """Of a two-sided stop: its size is an unknown, and it is none of the effects of a set."""
+    second = {"gap": 2.5e-3, "stiffness": 4000.0}
+    campaign = small_rig.record(3, {"opposite_stop": second, "spring_cubic": {"stiffness": 2e7}})
+    fit = fitted(replace(campaign, declared=(SECOND_STOP,)))
+    assert fit.reduced_chi2 > 9
+    problem = LikelySets(fit, SEARCHED, campaign_scales(fit))
+    first = problem.best(1)[0]
+    assert [e.id for e in first.effects] == ["spring_cubic"]
+    assert first.values["opposite_stop.stiffness"] == pytest.approx(4000.0, rel=0.1)
+    found = fit_from(fit, first.effects, first.values, campaign_scales(fit))
+    assert found.fit.reduced_chi2 < 1.2
 
 
 @pytest.mark.parametrize(
