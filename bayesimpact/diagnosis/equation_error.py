@@ -213,8 +213,13 @@ def terms_of(
 
 
 def is_a_force(effect: Effect) -> bool:
-    """Whether what an effect does is a force along a given path, or an addition to the readings."""
-    return set(effect.binds) <= {"friction"} and not effect.sets
+    """Whether what an effect does is a force along a given path, or an addition to the readings.
+
+    Of a law that stands in the place of a term of the base model, whose size it shares, the force
+    beside that term, which stays an unknown.
+    """
+    plain = not effect.sets or (effect.law is not None and not effect.has_size)
+    return set(effect.binds) <= {"friction"} and plain
 
 
 def term_at(
