@@ -29,7 +29,7 @@ Prices = Mapping[tuple[object, ...], float]
 """Nats by the kind of a term."""
 
 SEEN = 1e-4  # of a column's square that the others must leave, for its size to mean something
-LIKELY = 5  # sets of every number of effects beside which terms are put
+LIKELY = 5  # sets of every number of effects beside which terms are put: set by hand
 BLOCK = 64  # terms at once, so that memory stays bounded
 
 
@@ -68,8 +68,9 @@ def sets_with_a_term(
     found = []
     for size in range(most):
         beside = [_best(problem, c, terms, columns, price) for c in sets if len(c) == size]
-        if beside:
-            best = _refined(problem, max(beside, key=lambda one: one.log_odds), price)
+        best = max(beside, key=lambda one: one.log_odds, default=None)
+        if best is not None and np.isfinite(best.log_odds):
+            best = _refined(problem, best, price)
             if excess * max(best.left, problem.rows) < least:
                 found.append(_with_term(problem, best, price))
     return found
@@ -124,10 +125,8 @@ def _best(
     left = np.where(told, design.left - size * size * square, design.left)
     unknowns = np.array([1 + len(t.shapes) for t in terms])
     cost = 0.5 * unknowns * np.log(problem.rows) + [price[t.kind] for t in terms]
-    gained = np.log(max(design.left / problem.rows, 1.0)) - np.log(
-        np.maximum(left / problem.rows, 1.0)
-    )
-    odds = problem.log_odds(chosen) + 0.5 * problem.rows * gained - cost
+    before, after = (np.log(np.maximum(x / problem.rows, 1.0)) for x in (design.left, left))
+    odds = problem.log_odds(chosen) + 0.5 * problem.rows * (before - after) - cost
     k = int(np.argmax(odds))
     return _Beside(terms[k], chosen, float(odds[k]), float(left[k]))
 

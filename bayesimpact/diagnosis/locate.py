@@ -68,8 +68,10 @@ def locate(base: Fit, better: Fit, force: MissingForce, effects: tuple[Effect, .
     """Place of what `better` has and `base` lacks; `force` is what is missing from `base`.
 
     The place of several effects is that of all their forces together, as far as these are forces
-    of displacement and velocity; else that of the missing force.
+    of displacement and velocity; else that of the missing force. What only the measuring chain does
+    has no place where something acts on the mass.
     """
+    effects = tuple(e for e in effects if e.regime != "measurement") or effects
     points = trajectory_points(base)
     times = [r.times for r in base.target.oscillator.campaign.recordings]
     own = [f for f in (own_force(e, better, points, times) for e in effects) if f is not None]

@@ -27,6 +27,7 @@ from bayesimpact.diagnosis.refit import (
     exchanged,
     fit_from,
     grown,
+    in_words,
     refit,
     without,
 )
@@ -95,7 +96,7 @@ class Models:
         held = self.states.get(frozenset(candidate.ids))
         if held is not None and held.candidate is candidate:
             return held
-        self.progress("scoring what " + (" + ".join(candidate.ids) or "the base model") + " lacks")
+        self.progress(f"scoring what {in_words(candidate.effects) or 'the base model'} lacks")
         begun = self.budget.left
         found = scan(candidate.fit, self.effects, self.scales, rng=self.rng)
         force = missing_force(candidate.fit, self.scales, rng=self.rng)
@@ -151,7 +152,7 @@ class Models:
         begun = (candidate.ids, candidate.fit.log_posterior, shapes)
         if begun not in self.begun:
             self.begun.add(begun)
-            self.tell("fitting " + " + ".join((*candidate.ids, *(s.effect.id for s in scores))))
+            self.tell("fitting " + in_words((*candidate.effects, *(s.effect for s in scores))))
             least = candidate.fit.log_likelihood if candidate.effects else -np.inf
             enough = self.enough(rival)
             enough = replace(enough, goal=max(enough.goal, least))
@@ -177,7 +178,7 @@ class Models:
         """
         key = frozenset(e.id for e in chosen.effects)
         if not self.is_known(key):
-            self.tell("fitting " + " + ".join(e.id for e in chosen.effects))
+            self.tell("fitting " + in_words(chosen.effects))
             goal = max(goal, self.contained(key).fit.log_likelihood)
             self.keep(fit_from(base, chosen.effects, chosen.values, self.scales, goal=goal))
         return self.no_worse(self.tried[key])
@@ -189,7 +190,7 @@ class Models:
         best = self.contained(frozenset(candidate.ids))
         if not best.fit.log_likelihood > candidate.fit.log_likelihood + SAME:
             return candidate
-        self.tell("fitting " + " + ".join(candidate.ids) + " once more")
+        self.tell(f"fitting {in_words(candidate.effects)} once more")
         return self.keep(grown(best, candidate.effects, self.scales))
 
     def contained(self, ids: frozenset[str]) -> Candidate:
@@ -241,7 +242,7 @@ class Models:
         step = (frozenset(candidate.ids), candidate.fit.log_posterior, effect.id)
         if step not in self.dropped:
             self.dropped.add(step)
-            self.tell("without " + effect.id)
+            self.tell("without " + in_words([effect]))
             enough = replace(self.enough(), goal=likelihood_at(candidate.fit, _far_from(candidate)))
             self.keep(without(candidate, effect, self.scales, enough=enough))
         return self.tried[frozenset(i for i in candidate.ids if i != effect.id)]
@@ -251,7 +252,7 @@ class Models:
         begun = (candidate.ids, candidate.fit.log_posterior, old.id, new.id)
         if begun not in self.begun:
             self.begun.add(begun)
-            self.tell(f"{new.id} in place of {old.id} in " + " + ".join(candidate.ids))
+            self.tell(f"{new.id} in place of {old.id} in {in_words(candidate.effects)}")
             enough = self.enough(candidate)
             self.keep(exchanged(candidate, old, new, self.scales, enough=enough))
 
@@ -260,7 +261,7 @@ class Models:
         key = frozenset(candidate.ids)
         if key not in self.profiled:
             self.profiled.add(key)
-            self.progress("profile likelihood of " + " + ".join(candidate.ids))
+            self.progress("profile likelihood of " + in_words(candidate.effects))
             fit = profiled(candidate.fit)
             self.keep(Candidate(candidate.effects, fit, model_evidence(fit)))
         return self.tried[key]

@@ -27,6 +27,7 @@ from bayesimpact.diagnosis.promising import (
 from bayesimpact.diagnosis.refit import (
     Candidate,
     base_candidate,
+    in_words,
 )
 from bayesimpact.diagnosis.unknown import learn_force
 from bayesimpact.diagnosis.unlisted import Unlisted
@@ -276,7 +277,7 @@ class _Search(Unlisted):
         tried = tuple(sorted(self.tried.values(), key=self.log_odds, reverse=True))
         many = len(chosen.candidate.effects) >= IMITATING_EFFECTS and not self.is_large
         if contact is not None and many:
-            replaced = " + ".join(chosen.candidate.ids)
+            replaced = in_words(chosen.candidate.effects)
             self.progress(f"fitting a force in contact in place of {replaced}")
             fit = learn_force(base.candidate.fit, contact, self.scales)
             odds = model_evidence(fit) - base.candidate.log_evidence

@@ -28,6 +28,7 @@ from bayesimpact.diagnosis.thresholds import (
     LARGE,
     largest_log_odds,
 )
+from bayesimpact.formula.law import kind_id
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.noise import Noise
 
@@ -196,7 +197,9 @@ class Naming:
         """
         odds = np.array([self.log_odds(c) for c in self.tried])
         weight = np.exp(odds - odds.max())
-        have = np.array([any(effect_id in (e.id, e.prefer) for e in c.effects) for c in self.tried])
+        own = kind_id(effect_id)
+        kinds = [{k for e in c.effects for k in (kind_id(e.id), e.prefer)} for c in self.tried]
+        have = np.array([own in known for known in kinds])
         return float(weight[have].sum() / weight.sum())
 
 

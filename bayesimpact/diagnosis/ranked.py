@@ -15,6 +15,7 @@ from bayesimpact.diagnosis.refit import (
     Candidate,
     Enough,
     grown,
+    in_words,
     residual_repetition,
     tempered_evidence,
 )
@@ -118,7 +119,7 @@ class Ranked(Models):
         candidate = state.candidate
         if candidate.fit.converged or not (candidate.effects and self.is_large):
             return state
-        self.tell("fitting " + " + ".join(candidate.ids) + " to the end")
+        self.tell(f"fitting {in_words(candidate.effects)} to the end")
         return self.examine(grown(candidate, candidate.effects, self.scales))
 
     def goal(self, rival: Candidate | None = None) -> float:

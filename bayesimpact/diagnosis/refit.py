@@ -21,6 +21,7 @@ from bayesimpact.diagnosis.extend import (
 )
 from bayesimpact.diagnosis.scores import Score
 from bayesimpact.diagnosis.thresholds import LARGE
+from bayesimpact.formula.law import is_formula_id
 from bayesimpact.inference.climb import Climb
 from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.horizon import by_stretches, growing_horizon
@@ -76,6 +77,11 @@ class Candidate:
         known = np.sqrt(fit.target.priors.information(fit.mode)[moving])
         shares = fit.covariance[np.ix_(moving, moving)] * np.outer(known, known)
         return np.asarray(np.clip(np.linalg.eigvalsh(shares), 0.0, 1.0))
+
+
+def in_words(effects: Sequence[Effect]) -> str:
+    """What a model adds, as a search tells it: ids, but a formula's, which is no name."""
+    return " + ".join(e.title if is_formula_id(e.id) else e.id for e in effects)
 
 
 @dataclass(frozen=True)

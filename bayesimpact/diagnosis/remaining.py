@@ -16,7 +16,7 @@ from bayesimpact.diagnosis.decision import (
 )
 from bayesimpact.diagnosis.discrepancy import Discrepancy, discrepancy
 from bayesimpact.diagnosis.naming import Naming, State
-from bayesimpact.diagnosis.refit import Candidate
+from bayesimpact.diagnosis.refit import Candidate, in_words
 from bayesimpact.diagnosis.settle import EXCHANGES, Settling
 from bayesimpact.diagnosis.unknown import with_force
 
@@ -102,7 +102,7 @@ class Remaining(Settling):
 
     def with_residual(self, state: State) -> Candidate:
         """A model with the likelier form of a residual force beside its effects."""
-        beside = " + ".join(state.candidate.ids) or "the base model"
+        beside = in_words(state.candidate.effects) or "the base model"
         self.progress(f"fitting a residual force beside {beside}")
         least = self.enough().least_gain
         return with_force(state.candidate, state.unknown, self.scales, least_gain=least)

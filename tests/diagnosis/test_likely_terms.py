@@ -18,6 +18,8 @@ from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.likely_sets import EffectSet, LikelySets
 from bayesimpact.diagnosis.likely_terms import sets_with_a_term
+from bayesimpact.diagnosis.locate import locate
+from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.diagnosis.refit import Candidate, base_candidate, fit_from
 from bayesimpact.diagnosis.thresholds import EXCESS
 from bayesimpact.formula.grammar import ONE, Term
@@ -149,12 +151,16 @@ def test_an_effect_joins_a_formula_only_where_it_leaves_far_less(
     assert search.leads_on(plain, model(cubic, drag, chi2=4.9))  # type: ignore[arg-type]
 
 
-def test_a_large_force_of_no_effect_is_named_with_all_that_acts_beside_it() -> None:
+@pytest.fixture(scope="module")
+def whole() -> tuple[Diagnosis, list[str]]:
     effects = {"detent": DETENT, "spring_cubic": CUBIC, "sensor_hum": HUM}
     said: list[str] = []
-    found = diagnose(
-        decays(effects), rng=np.random.default_rng(0), search=False, progress=said.append
-    )
+    rng = np.random.default_rng(0)
+    return diagnose(decays(effects), rng=rng, search=False, progress=said.append), said
+
+
+def test_a_large_force_of_no_effect_is_named_with_all_that_acts_beside_it(whole: Any) -> None:
+    found, said = whole
     assert found.before.reduced_chi2 > 100 and found.after.reduced_chi2 < 1.1
     assert found.verdict == "named"
     named = {e.id for e in found.effects if not is_formula(e)}
@@ -162,4 +168,17 @@ def test_a_large_force_of_no_effect_is_named_with_all_that_acts_beside_it() -> N
     (law,) = (e for e in found.effects if is_formula(e))
     values = dict(zip(found.after.names, found.after.mode, strict=True))
     assert values[f"{law.id}.place"] == pytest.approx(-DETENT["place"], rel=0.02)
+    assert found.naming.probability(law.id) > 0.99  # at whatever shape it was met
     assert sum("fitting" in one for one in said) < 60
+    assert any("force A exp(" in one for one in said)
+    assert not any("formula_" in one for one in said)  # an id that no one reads
+
+
+def test_what_the_probe_does_is_no_place_where_something_moves_the_mass(whole: Any) -> None:
+    found, _ = whole
+    hum = next(e for e in found.effects if e.id == "sensor_hum")
+    others = tuple(e for e in found.effects if e is not hum)
+    naming = found.naming
+    place = locate(found.before, found.after, naming.unknown, (hum, *others))
+    assert place.regime == "free" and place.displacement[0] < DETENT["place"]
+    assert locate(found.before, found.after, naming.unknown, (hum,)).regime == "measurement"
