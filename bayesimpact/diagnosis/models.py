@@ -167,7 +167,7 @@ class Models:
         for chosen in problem.best(most - len(problem.known)):
             if not self.may_go_on():
                 break
-            found.append(self.fit_set(problem.fit, chosen))
+            found.append(self.no_worse(self.fit_set(problem.fit, chosen)))
             if not is_large(found[-1].fit):
                 break
         return found
@@ -181,7 +181,7 @@ class Models:
             self.tell("fitting " + in_words(chosen.effects))
             goal = max(goal, self.contained(key).fit.log_likelihood)
             self.keep(fit_from(base, chosen.effects, chosen.values, self.scales, goal=goal))
-        return self.no_worse(self.tried[key])
+        return self.tried[key]
 
     def no_worse(self, candidate: Candidate) -> Candidate:
         """A model that has reached no less than what it contains: a climb that began elsewhere and
