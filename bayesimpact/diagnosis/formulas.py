@@ -259,9 +259,15 @@ def _needed(decision: Decision, naming: Naming) -> Decision:
 
 
 def _decided(answer: Answer, candidate: Candidate) -> Decision:
-    """The decision with the formula's effects named; whole where all others of its model are."""
+    """The decision with the formula's effects named; whole where all others of its model are, and
+    ambiguous where these were.
+    """
     before = tuple(e for e in answer.decision.effects if e.id in candidate.ids)
     known = {e.id for e in before}
     own = tuple(e for e in candidate.effects if is_formula(e) and e.id not in known)
     others = {e.id for e in candidate.effects} - {e.id for e in own}
-    return Decision("named" if others <= known else "partly", (*before, *own))
+    if not others <= known:
+        return Decision("partly", (*before, *own))
+    if answer.decision.verdict == "ambiguous":  # beside the formula two effects do the same
+        return replace(answer.decision, effects=(*before, *own))
+    return Decision("named", (*before, *own))

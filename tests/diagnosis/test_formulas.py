@@ -38,7 +38,7 @@ from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.diagnosis.unknown import with_force
 from bayesimpact.formula.evidence import Subset
 from bayesimpact.formula.grammar import ONE, Power, Term
-from bayesimpact.formula.law import effect_of, is_formula, starts_of
+from bayesimpact.formula.law import effect_of, is_formula, kind_id, starts_of
 from bayesimpact.formula.library import V
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects.effect import Effect, Scales
@@ -352,6 +352,18 @@ def test_formulas_are_scored_again_along_the_motion_of_the_likeliest() -> None:
     assert found.decision.verdict == "named" and found.after.reduced_chi2 < 1.1
     (term,) = found.formulas.ranked[0].terms
     assert (term.region, term.speed) == ("bump", V)
+
+
+def test_what_is_ambiguous_beside_a_formula_stays_so() -> None:
+    """Two effects that do the same are not told apart by what else is named."""
+    before, scales = met(replace(BOX, region="bump"))
+    (law,) = before.decision.effects
+    rival = before.naming.tried[1]
+    open_ = replace(before, decision=Decision("ambiguous", (law,), (rival,)))
+    found = asked(open_, scales)
+    assert found.formulas.named
+    assert (found.decision.verdict, found.decision.rivals) == ("ambiguous", (rival,))
+    assert [kind_id(e.id) for e in found.decision.effects] == [kind_id(law.id)]
 
 
 def test_no_term_that_a_search_has_met_is_a_name_by_itself() -> None:
