@@ -13,6 +13,7 @@ from bayesimpact.diagnosis.budget import Budget
 from bayesimpact.diagnosis.formula_list import formula_text
 from bayesimpact.diagnosis.formula_refits import (
     Question,
+    kind_ids,
     kinds_of,
     refit_candidates,
     refitted,
@@ -139,10 +140,13 @@ def _different(
 
 
 def joined(naming: Naming, candidates: Sequence[Candidate]) -> Naming:
-    """The search with further models; samples are counted by the best residual of all, for one of
-    them may leave nothing.
+    """The search with further models, of those of one kind the likeliest; samples are counted by
+    the best residual of all, for one of them may leave nothing.
     """
     tried = (*naming.tried, *candidates)
     best = min(tried, key=lambda c: c.fit.reduced_chi2)
     found = replace(naming, repetition=residual_repetition(best.fit), beside=None)
-    return replace(found, tried=tuple(sorted(tried, key=found.log_odds, reverse=True)))
+    likeliest: dict[frozenset[str], Candidate] = {}
+    for candidate in sorted(tried, key=found.log_odds, reverse=True):
+        likeliest.setdefault(frozenset(kind_ids(candidate)), candidate)
+    return replace(found, tried=tuple(likeliest.values()))

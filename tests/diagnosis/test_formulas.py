@@ -349,6 +349,8 @@ def test_formulas_are_scored_again_along_the_motion_of_the_likeliest() -> None:
     said: list[str] = []
     found = asked(before, scales, said=said)
     assert said.count("scoring formulas") > 1
+    kinds = [frozenset(map(kind_id, c.ids)) for c in found.naming.tried]
+    assert len(set(kinds)) == len(kinds)  # no model is its own rival
     assert found.decision.verdict == "named" and found.after.reduced_chi2 < 1.1
     (term,) = found.formulas.ranked[0].terms
     assert (term.region, term.speed) == ("bump", V)
