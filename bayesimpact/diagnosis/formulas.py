@@ -78,61 +78,47 @@ def with_formulas(
 
     Where the budget ends before all formulas are fitted that may be the likeliest, none is named.
     """
-    found = _with_formulas(answer, effects, scales, rng=rng, progress=progress, budget=budget)
-    certain = found.formulas is not None and found.formulas.named
-    return found if certain else _uncertain(found)
+    something = answer.decision.verdict in ("unknown", "partly") or _has_formula(answer.after)
+    if something and answer.naming.finished:
+        answer = _compared(answer, _Means(effects, scales, rng, progress, budget), TURNS)
+    certain = answer.formulas is not None and answer.formulas.named
+    return answer if certain else _uncertain(answer)
 
 
-def _with_formulas(
-    answer: Answer,
-    effects: Sequence[Effect],
-    scales: Scales,
-    *,
-    rng: np.random.Generator,
-    progress: Callable[[str], None],
-    budget: Budget,
-) -> Answer:
-    if not (_has_formula(answer.after) or answer.decision.verdict in ("unknown", "partly")):
-        return answer
-    if not answer.naming.finished:
-        return answer
-    return _compared(answer, effects, scales, TURNS, rng=rng, progress=progress, budget=budget)
+@dataclass(frozen=True, eq=False)
+class _Means:
+    """What comparing formulas needs beside an answer."""
+
+    effects: Sequence[Effect]
+    scales: Scales
+    rng: np.random.Generator
+    progress: Callable[[str], None]
+    budget: Budget
 
 
-def _compared(
-    answer: Answer,
-    effects: Sequence[Effect],
-    scales: Scales,
-    turns: int,
-    *,
-    rng: np.random.Generator,
-    progress: Callable[[str], None],
-    budget: Budget,
-) -> Answer:
+def _compared(answer: Answer, means: _Means, turns: int) -> Answer:
     """The answer with formulas compared along its motion, and along that of the likeliest one if
     that was wrong, `turns` times at most.
     """
-    if not budget.may_go_on():
+    if not means.budget.may_go_on():
         return replace(answer, naming=replace(answer.naming, finished=False))
-    progress("scoring formulas")
-    question = asked_about(answer.after, answer.naming.prior_cost, scales)
+    means.progress("scoring formulas")
+    question = asked_about(answer.after, answer.naming.prior_cost, means.scales)
     if question is None:
         return answer
-    found = fitted_formulas(question, answer.naming, progress, budget)
+    found = fitted_formulas(question, answer.naming, means.progress, means.budget)
     answer = replace(answer, naming=replace(answer.naming, finished=not found.late))
     if not found.fitted:
         return answer
     first = max(found.fitted, key=lambda s: found.naming.log_odds(found.fitted[s]))
     if not found.late and turns > 1 and _misled(answer, found, first):
         answer = replace(answer, naming=found.naming, after=found.fitted[first].fit)
-        return _compared(
-            answer, effects, scales, turns - 1, rng=rng, progress=progress, budget=budget
-        )
+        return _compared(answer, means, turns - 1)
     named = not found.late and _may_be_named(question, found, first)
     state = None
     if named:
-        progress("scoring what the formula lacks")
-        state = _examined(found.fitted[first], effects, scales, rng)
+        means.progress("scoring what the formula lacks")
+        state = _examined(found.fitted[first], means)
         named = state.is_white
     return _answered(answer, question, found, first, state if named else None)
 
@@ -219,13 +205,11 @@ def holds(candidate: Candidate, kind: str) -> bool:
     return kind in kind_ids(candidate) or any(e.prefer == kind for e in candidate.effects)
 
 
-def _examined(
-    candidate: Candidate, effects: Sequence[Effect], scales: Scales, rng: np.random.Generator
-) -> State:
-    fit = candidate.fit
+def _examined(candidate: Candidate, means: _Means) -> State:
+    fit, scales, rng = candidate.fit, means.scales, means.rng
     return State(
         candidate,
-        scan(fit, effects, scales, rng=rng),
+        scan(fit, means.effects, scales, rng=rng),
         missing_force(fit, scales, rng=rng),
         missing_drift(fit, scales, rng=rng),
     )
