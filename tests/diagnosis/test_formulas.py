@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -10,76 +9,29 @@ from typing import Any
 import numpy as np
 import pytest
 from effect_rigs import BY_ID
-from small_rig import PLAIN, PLAIN_RELEASES, record
+from formula_answers import DETENT, DRAG, asked, unknown
 
 from bayesimpact.diagnosis import formula_refits, formula_rounds, formulas
 from bayesimpact.diagnosis.asked import Asked
-from bayesimpact.diagnosis.budget import PATIENCE, begin
 from bayesimpact.diagnosis.decision import Decision
-from bayesimpact.diagnosis.extend import campaign_scales
-from bayesimpact.diagnosis.force import missing_drift, missing_force
 from bayesimpact.diagnosis.formula_list import formula_text
 from bayesimpact.diagnosis.formula_refits import refit_candidates
 from bayesimpact.diagnosis.formula_rounds import joined
 from bayesimpact.diagnosis.formula_words import formula_entries, found_file
-from bayesimpact.diagnosis.formulas import Answer, with_formulas
+from bayesimpact.diagnosis.formulas import Answer
 from bayesimpact.diagnosis.learned import LEARNED
-from bayesimpact.diagnosis.naming import Naming, State
 from bayesimpact.diagnosis.refit import (
     Candidate,
-    base_candidate,
-    fit_from,
-    grown,
-    residual_repetition,
 )
 from bayesimpact.diagnosis.remainder import likeliest_formula, remainder
-from bayesimpact.diagnosis.scan import scan, score_directions
+from bayesimpact.diagnosis.scan import scan
 from bayesimpact.diagnosis.thresholds import DECISIVE
-from bayesimpact.diagnosis.unknown import with_force
 from bayesimpact.formula.evidence import Subset
 from bayesimpact.formula.grammar import ONE, Power, Term
-from bayesimpact.formula.law import effect_of, is_formula, kind_id, starts_of
-from bayesimpact.formula.library import V
-from bayesimpact.inference.identify import identify
+from bayesimpact.formula.law import is_formula
 from bayesimpact.model.effects.effect import Effect, Scales
 from bayesimpact.model.own_effects import load_effects
 from bayesimpact.report.formula_arrays import formula_arrays
-
-DETENT = {"stiffness": 8.0, "place": -2.5e-3, "width": 7e-4}
-DRAG = {"coefficient": 0.02}  # seven times as much is told from v^3
-
-
-def unknown(effects: dict[str, Any], named: tuple[Effect, ...] = ()) -> tuple[Answer, Scales]:
-    """What a diagnosis that knows no effect, or names one, ends with: a learned force."""
-    rng = np.random.default_rng(0)
-    campaign = record(3, effects, rig=PLAIN, releases=PLAIN_RELEASES, duration=4.0, rate=500.0)
-    base = base_candidate(identify(campaign, rng=rng, search=False).fit)
-    scales = campaign_scales(base.fit)
-    first = state = _state(base, scales, rng)
-    if named:
-        state = _state(grown(base, named, scales), scales, rng)
-    chosen = state.candidate
-    repetition = residual_repetition(chosen.fit)
-    naming = Naming(first, state, (chosen, base)[: 1 + len(named)], np.log(50.0), repetition)
-    learned = with_force(chosen, state.force, scales)
-    decision = Decision("partly" if named else "unknown", named)
-    return Answer(naming, decision, learned.fit, state), scales
-
-
-def _state(candidate: Candidate, scales: Scales, rng: np.random.Generator) -> State:
-    fit = candidate.fit
-    scored = score_directions(fit, (), rng=rng)
-    force, drift = (f(fit, scales, rng=rng) for f in (missing_force, missing_drift))
-    return State(candidate, scored, force, drift)
-
-
-def asked(answer: Answer, scales: Scales, looks: int = 99, said: list[str] | None = None) -> Answer:
-    """With time for so many looks at the clock; what it said goes to `said`."""
-    said = [] if said is None else said
-    rng = np.random.default_rng(1)
-    times = itertools.chain([0.0] * (1 + looks), itertools.repeat(PATIENCE))
-    budget = begin(lambda: next(times))
-    return with_formulas(answer, (), scales, rng=rng, progress=said.append, budget=budget)
 
 
 @pytest.fixture(scope="module")
@@ -321,62 +273,6 @@ def test_no_name_rests_on_being_shorter_to_write(
     refits = formula_rounds.Refits(frozenset(fitted), fitted, naming, False)
     said = formulas._may_be_named(question, refits, first)  # type: ignore[arg-type]
     assert said is named
-
-
-def met(wrong: Term) -> tuple[Answer, Scales]:
-    """What a search ends with that has met a term on its way, and takes it for what is there."""
-    rng = np.random.default_rng(0)
-    bump = {"coefficient": 4.0, "place": -2.5e-3, "width": 7e-4}
-    campaign = record(
-        3, {"damping_bump": bump}, rig=PLAIN, releases=PLAIN_RELEASES, duration=4.0, rate=500.0
-    )
-    base = base_candidate(identify(campaign, rng=rng, search=False).fit)
-    scales = campaign_scales(base.fit)
-    law = effect_of(wrong, 0.1, 1e-2, scales.speed, signed=False)
-    chosen = fit_from(base.fit, (law,), starts_of(wrong) | {f"{law.id}.size": 4.0}, scales)
-    first, state = (_state(c, scales, rng) for c in (base, chosen))
-    naming = Naming(first, state, (chosen, base), np.log(50.0), residual_repetition(chosen.fit))
-    return Answer(naming, Decision("named", (law,)), chosen.fit, None), scales
-
-
-BOX = Term("box", ONE, V, -1, 2.5e-3, 8e-4)
-
-
-def test_formulas_are_scored_again_along_the_motion_of_the_likeliest() -> None:
-    """Along that of a wrong one others seem as good as the right one is."""
-    before, scales = met(BOX)
-    assert before.after.reduced_chi2 > 1.2
-    said: list[str] = []
-    found = asked(before, scales, said=said)
-    assert said.count("scoring formulas") > 1
-    kinds = [frozenset(map(kind_id, c.ids)) for c in found.naming.tried]
-    assert len(set(kinds)) == len(kinds)  # no model is its own rival
-    assert found.decision.verdict == "named" and found.after.reduced_chi2 < 1.1
-    (term,) = found.formulas.ranked[0].terms
-    assert (term.region, term.speed) == ("bump", V)
-
-
-def test_what_is_ambiguous_beside_a_formula_stays_so() -> None:
-    """Two effects that do the same are not told apart by what else is named."""
-    before, scales = met(replace(BOX, region="bump"))
-    (law,) = before.decision.effects
-    rival = before.naming.tried[1]
-    open_ = replace(before, decision=Decision("ambiguous", (law,), (rival,)))
-    found = asked(open_, scales)
-    assert found.formulas.named
-    assert (found.decision.verdict, found.decision.rivals) == ("ambiguous", (rival,))
-    assert [kind_id(e.id) for e in found.decision.effects] == [kind_id(law.id)]
-
-
-def test_no_term_that_a_search_has_met_is_a_name_by_itself() -> None:
-    """Where time ends before it was compared with others, nor with what is still missing beside."""
-    before, scales = met(BOX)
-    found = asked(before, scales, 0)
-    assert not found.naming.finished and found.after is before.after
-    assert found.state is before.naming.base  # what the formula does is what is left
-    imitation = Decision("named", (BY_ID["spring_cubic"], *before.decision.effects))
-    for answer in (found, asked(replace(before, decision=imitation), scales, 0)):
-        assert (answer.decision.verdict, answer.decision.effects) == ("unknown", ())
 
 
 def test_refitted_are_formulas_of_different_kinds_few_of_which_only_add() -> None:

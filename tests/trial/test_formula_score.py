@@ -38,6 +38,7 @@ def test_every_term_of_the_library_has_its_place_and_speed() -> None:
         ("v where |y + 2 mm| < 0.5 mm", "eddy_brake", True),
         ("sign(v) in contact", "contact_friction", True),
         ("d sign(v)", "contact_friction", False),
+        ("v exp(-|v|/(0.1 m/s))", "eddy_brake", False),
         ("t v", "damping_drift", True),
         ("|v| v", "damping_drift", False),
         ("in contact", "contact_preload", True),
