@@ -50,7 +50,7 @@ from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
 
-TURNS = 3  # of scoring formulas on the likeliest one, set by hand: the second is right mostly
+TURNS = 3  # of scoring formulas, each on the likeliest one before: set by hand
 
 
 @dataclass(frozen=True, eq=False)

@@ -164,6 +164,18 @@ def test_a_memory_and_a_clearance_are_asked_for_at_a_shape_nearby(effect_id: str
         assert first.values[f"{effect_id}.{name}"] == pytest.approx(value, rel=0.3)
 
 
+def test_a_law_in_the_place_of_the_spring_and_the_dashpot_is_asked_for() -> None:
+    """It shares the spring's size and has none of its own."""
+    law = {"exponent": 1.5, "damping": 2.0}
+    fit = fitted(small_rig.record(3, {"hunt_crossley": law}, duration=4.0))
+    assert fit.reduced_chi2 > 9
+    first = LikelySets(fit, SEARCHED, campaign_scales(fit)).best(1)[0]
+    assert [e.id for e in first.effects] == ["hunt_crossley"]
+    found = fit_from(fit, first.effects, first.values, campaign_scales(fit)).fit
+    assert found.reduced_chi2 < 1.2
+    assert found.value("hunt_crossley.exponent") == pytest.approx(1.5, rel=0.05)
+
+
 def test_a_shape_has_its_price() -> None:
     """A power of the speed may be two: quadratic drag has one unknown less."""
     fit = fitted(decays(2, {"quadratic_drag": {"coefficient": 3.0}}))
