@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from effect_rigs import BY_ID
 from formula_answers import asked, state_of
 from small_rig import PLAIN, PLAIN_RELEASES, record
 
+from bayesimpact.diagnosis import formula_rounds
 from bayesimpact.diagnosis.decision import Decision
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.formulas import Answer
@@ -52,6 +54,15 @@ def test_formulas_are_scored_again_along_the_motion_of_the_likeliest() -> None:
     assert found.decision.verdict == "named" and found.after.reduced_chi2 < 1.1
     (term,) = found.formulas.ranked[0].terms
     assert (term.region, term.speed) == ("bump", V)
+
+
+def test_what_a_search_has_met_is_fitted_whatever_scores_say(monkeypatch: Any) -> None:
+    """Large forces are scored less exactly than they are fitted."""
+    monkeypatch.setattr(formula_rounds, "refit_candidates", lambda ranked, terms: [])
+    before, scales = met(replace(BOX, region="bump"))
+    found = asked(before, scales)
+    (first,) = (f for f in found.formulas.ranked if f.refitted)
+    assert [t.kind for t in first.terms] == [replace(BOX, region="bump").kind]
 
 
 def test_what_is_ambiguous_beside_a_formula_stays_so() -> None:
