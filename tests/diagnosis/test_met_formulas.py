@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 from effect_rigs import BY_ID
 from formula_answers import asked, state_of
 from small_rig import PLAIN, PLAIN_RELEASES, record
 
 from bayesimpact.diagnosis import formula_rounds
 from bayesimpact.diagnosis.decision import Decision
+from bayesimpact.diagnosis.diagnose import without_uncertain_formulas
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.formulas import Answer
 from bayesimpact.diagnosis.naming import Naming
-from bayesimpact.diagnosis.refit import base_candidate, fit_from, residual_repetition
+from bayesimpact.diagnosis.refit import Candidate, base_candidate, fit_from, residual_repetition
 from bayesimpact.formula.grammar import ONE, Term
 from bayesimpact.formula.law import effect_of, kind_id, starts_of
 from bayesimpact.formula.library import V
 from bayesimpact.inference.identify import identify
-from bayesimpact.model.effects.effect import Scales
+from bayesimpact.model.effects.effect import Effect, Scales
 
 
 def met(wrong: Term) -> tuple[Answer, Scales]:
@@ -86,3 +89,26 @@ def test_no_term_that_a_search_has_met_is_a_name_by_itself() -> None:
     imitation = Decision("named", (BY_ID["spring_cubic"], *before.decision.effects))
     for answer in (found, asked(replace(before, decision=imitation), scales, 0)):
         assert (answer.decision.verdict, answer.decision.effects) == ("unknown", ())
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_what_a_formula_that_is_not_named_hides_is_looked_for_without_it(named: bool) -> None:
+    """Such as first instants in which a recording is not yet free."""
+    law, cubic = effect_of(BOX, 1.0, 1e-2, 1.0, signed=False), BY_ID["spring_cubic"]
+
+    def fit(*effects: Effect) -> Any:
+        return SimpleNamespace(target=SimpleNamespace(oscillator=SimpleNamespace(effects=effects)))
+
+    whole, alone, base = fit(cubic, law), fit(cubic), fit()
+    tried = (Candidate((cubic,), alone, 0.0),)
+
+    def shown(after: Any, tried: tuple[Candidate, ...]) -> Any:
+        found = SimpleNamespace(
+            after=after, before=base, formulas=SimpleNamespace(named=named),
+            naming=SimpleNamespace(tried=tried),
+        )  # fmt: skip
+        return without_uncertain_formulas(found)  # type: ignore[arg-type]
+
+    assert shown(whole, tried) is (whole if named else alone)
+    assert shown(whole, ()) is (whole if named else base)
+    assert shown(alone, tried) is alone
