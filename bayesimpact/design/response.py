@@ -195,8 +195,13 @@ def response(hypothesis: FittedModel, design: PlannedRecording, rivals: Rivalry)
 def noise_at(interval: float, rivals: Rivalry) -> Noise:
     """The noise at another sampling interval: its level stays, its correlation time too."""
     usual = usual_release(rivals.releases).interval
-    correlation = max(rivals.noise.correlation, 0.0)
-    return replace(rivals.noise, correlation=correlation ** (interval / usual))
+    noise = rivals.noise
+
+    def after(correlation: float) -> float:
+        return float(max(correlation, 0.0) ** (interval / usual))
+
+    others = tuple((after(correlation), share) for correlation, share in noise.others)
+    return replace(noise, correlation=after(noise.correlation), others=others)
 
 
 def noise_level(rivals: Rivalry) -> float:

@@ -11,7 +11,7 @@
 4. An answer that explains everything keeps the corrections of 2 and 3 only where, beside its
    effects, the recordings as they were still differ by more than chance.
 5. A start that is no free decay yet, and spikes, may only show against a fit with that physics:
-   then once more without them.
+   then once more without them. Under slow noise, where the likeliest model leaves that alone.
 
 All searches have one budget of computing, which begins with the first. What is left of it after one
 is the next one's; where that is too little, the next one is not begun. An answer that was not
@@ -57,6 +57,7 @@ from bayesimpact.diagnosis.simpler import (
     makes_idle,
     may_be_simpler,
 )
+from bayesimpact.diagnosis.slow_noise import remaining_noise, with_noise, with_slow_noise
 from bayesimpact.diagnosis.smoothing import SAVITZKY_GOLAY, whole_campaign
 from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.fit import Fit
@@ -146,7 +147,7 @@ def diagnose(
     """
     say = progress or (lambda message: None)
     say("fitting the base model")
-    cleaned = cleaned_campaign(campaign, rng=rng, search=search)
+    cleaned = with_slow_noise(cleaned_campaign(campaign, rng=rng, search=search))
     say("comparing the recordings")
     certain, doubtful, proved = cleaned, list(comparisons(cleaned, campaign)), False
     beside_physics = faults_beside_physics(cleaned, campaign, effects, doubtful)
@@ -173,6 +174,7 @@ def diagnose(
     found = _without_needless_faults(found, cleaned, searches)
     found = _without_unfree_start(found, campaign, searches)
     found = _without_late_spikes(found, campaign, searches)
+    found = _beside_slow_noise(found, searches)
     undecided = found.corrected is not None and found.corrected.is_open
     return replace(found, verdict="ambiguous") if undecided and is_settled(found) else found
 
@@ -288,6 +290,21 @@ def _without_late_spikes(found: Diagnosis, as_read: Campaign, searches: Searches
     )
 
 
+def _beside_slow_noise(found: Diagnosis, searches: Searches) -> Diagnosis:
+    """The answer under slow noise, where the likeliest model leaves that and nothing else, if it
+    explains everything then.
+    """
+    chosen, corrected = found.naming.chosen.candidate.fit, found.corrected
+    if is_settled(found) or corrected is None or found.filtered is not None:
+        return found
+    noise = remaining_noise(chosen)
+    if noise is None:
+        return found
+    identification = with_noise(found.identification, noise)
+    again = replace(corrected, identification=identification)
+    return searches.again(found, lambda: again, lambda other, _: is_settled(other))
+
+
 def _of_corrected(
     corrected: Corrected,
     *,
@@ -298,6 +315,7 @@ def _of_corrected(
     first: Fit | None,
 ) -> Diagnosis:
     """The diagnosis of a campaign whose faults are set aside or corrected."""
+    corrected = with_slow_noise(corrected)
     for fault in corrected.faults:
         progress(f"set aside or corrected: {fault.recording}: {fault.statement} ({fault.id})")
     through = corrected.identification

@@ -124,8 +124,9 @@ def document(
         "reading": {"quantity": reading.quantity, "unit": reading.unit},
         "noise": {
             "sigma_m": noise.level,
-            "correlation": "white" if noise.correlation == 0 else "ar1",
+            "correlation": "ar1" if noise.is_coloured else "white",
             "coefficient": noise.correlation,
+            "parts": [{"coefficient": rho, "share": share} for rho, share in noise.parts],
             "source": noise.source,
         },
         "seed": seed,

@@ -100,9 +100,7 @@ def line_blocks(fit: Fit, r: int, grid: Array, decay: float = 0.0) -> Blocks:
 
 
 def _whitening_gain(fit: Fit, grid: Array, interval: float) -> Array:
-    rho = fit.target.likelihood.noise.correlation
-    angle = 2 * np.pi * grid * interval
-    return np.sqrt((1 - 2 * rho * np.cos(angle) + rho**2) / (1 - rho**2))
+    return np.asarray(1.0 / np.sqrt(fit.target.likelihood.noise.spectrum(grid, interval)))
 
 
 def hums(fit: Fit, r: int, lines: Array, decay: float = 0.0) -> Array:

@@ -4,7 +4,7 @@ Whitening is linear, so residuals and derivatives pass through the same operator
 stage (least squares, likelihood, scores) sees white noise. Three kinds:
 
 - white: nothing to do;
-- AR(1): exact in the time domain;
+- AR(1), or a sum of such: exact in the time domain (see `noise_prediction`);
 - band: the recordings were smoothed. What the filter suppressed carries rounding and model error,
   no information, and its covariance has no inverse; so only the Fourier coefficients below the
   filter's half-power frequency are used, each divided by what the filter left of the noise (Whittle
@@ -13,9 +13,9 @@ stage (least squares, likelihood, scores) sees white noise. Three kinds:
 Where recordings are of several quantities, `sigma` is the level of the first one's, and the others'
 levels stand in fixed ratios to it (`scales`), by which whitening divides them.
 
-Samples that are set aside drop out. White and AR(1) noise whiten them to 0, so that shapes stay,
-and AR(1) noise takes its exact correlation over the gap. Behind a filter every stretch between
-gaps, less what the filter carried into it, is transformed on its own.
+Samples that are set aside drop out. In the time domain they whiten to 0, so that shapes stay, and
+the correlation over the gap is exact. Behind a filter every stretch between gaps, less what the
+filter carried into it, is transformed on its own.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from bayesimpact.data.campaign import Smoothing
 from bayesimpact.data.gaps import runs
 from bayesimpact.data.recording import Recording
+from bayesimpact.inference.noise_prediction import Parts, innovations, log_determinant
 from bayesimpact.inference.noise_sd import relative_sd
 from bayesimpact.model.measurement import edge, gain
 
@@ -48,7 +49,7 @@ class Noise:
 
     Attributes
     ----------
-    correlation : between neighbouring raw samples (AR(1)), 0 for white noise
+    correlation : between neighbouring samples of the raw noise (AR(1)), 0 for white noise
     smoothing : filter that the noisy recordings passed, or None
     level : standard deviation of the raw noise as estimated from the recordings alone, m
     level_error : relative standard error of `level`
@@ -70,11 +71,12 @@ class Noise:
     is_bound: bool = field(default=False, compare=False)
     scales: tuple[float, float, float] = (1.0, 1.0, 1.0)
     growth: tuple[float, float] = (0.0, 0.0)
+    others: Parts = ()
 
     @property
     def is_white(self) -> bool:
         """True when whitening does nothing."""
-        return self.correlation == 0.0 and self.smoothing is None and not self.grows
+        return not self.is_coloured and self.smoothing is None and not self.grows
 
     @property
     def grows(self) -> bool:
@@ -84,7 +86,10 @@ class Noise:
     @property
     def kind(self) -> str:
         """In words, for reports."""
-        raw = "white" if self.correlation == 0.0 else f"AR(1), correlation {self.correlation:.2f}"
+        raw = _kind(self.correlation)
+        if self.others:
+            shares = [f"{100 * share:.0f} % {_kind(rho)}" for rho, share in self.parts]
+            raw = "of its variance " + ", ".join(shares)
         size, rate = self.growth
         if size:
             raw += f", growing with the reading ({100 * size * self.level:.2g} % of it)"
@@ -92,6 +97,17 @@ class Noise:
             jitter = f"{1e3 * rate * self.level:.2g} ms"
             raw += f", growing with its rate (as where time stamps jitter by {jitter})"
         return raw if self.smoothing is None else f"{raw}, smoothed ({self.smoothing.kind})"
+
+    @property
+    def parts(self) -> Parts:
+        """Of all processes, correlation and share of the variance; those of no share left out."""
+        rest = 1.0 - sum(share for _, share in self.others)
+        return tuple(p for p in ((self.correlation, rest), *self.others) if p[1] > 0.0)
+
+    @property
+    def is_coloured(self) -> bool:
+        """True when the raw noise is not white."""
+        return self.correlation != 0.0 or bool(self.others)
 
     def whitened(self, recording: Recording, x: Array) -> Array:
         """Whitened signals of a recording: (..., n) samples to (..., m) numbers."""
@@ -118,15 +134,9 @@ class Noise:
                 self._band(x[..., s], interval, False) for s in self._stretches(used, interval)
             ]
             return np.concatenate([x[..., :0], *parts], axis=-1)
-        if used is not None:
-            return self._with_gaps(x, used)
-        if self.correlation == 0.0:
-            return x
-        white = np.empty_like(x)
-        white[..., 0] = x[..., 0]
-        innovation = x[..., 1:] - self.correlation * x[..., :-1]
-        white[..., 1:] = innovation / np.sqrt(1.0 - self.correlation**2)
-        return white
+        if not self.is_coloured:
+            return x if used is None else np.where(used, x, 0.0)
+        return innovations(x, self.parts, used)
 
     def size(self, n: int, interval: float, used: Mask | None = None) -> int:
         """To how many independent numbers `n` samples amount."""
@@ -187,22 +197,25 @@ class Noise:
         if self.smoothing is not None:
             return 0.0
         scaled = self.size(n, interval, used) * float(np.log(self.scales[order]))
-        if used is not None:
-            steps = np.diff(np.flatnonzero(used))
-            return -0.5 * float(np.sum(np.log1p(-(self.correlation ** (2.0 * steps))))) - scaled
-        return -0.5 * (n - 1) * float(np.log1p(-(self.correlation**2))) - scaled
+        if not self.is_coloured:
+            return -scaled
+        return log_determinant(n, self.parts, used) - scaled
 
     def coloured(
         self, rng: np.random.Generator, n: int, interval: float, sigma: float, order: int = 0
     ) -> Array:
         """A draw of n samples of raw noise of level `sigma` (before any smoothing), m."""
-        white = rng.standard_normal(n) * (sigma * self.scales[order])
-        if self.correlation == 0.0:
-            return white
-        from scipy.signal import lfilter
+        sigma = sigma * self.scales[order]
+        drawn = [_process(rng, n, rho, sigma * share**0.5) for rho, share in self.parts]
+        return np.asarray(np.sum(drawn, axis=0))
 
-        white[1:] *= np.sqrt(1.0 - self.correlation**2)
-        return np.asarray(lfilter([1.0], [1.0, -self.correlation], white), dtype=np.float64)
+    def spectrum(self, frequency: Array, interval: float) -> Array:
+        """Power of the raw noise at frequencies, Hz, over that of white noise of its level."""
+        cosine = np.cos(2 * np.pi * frequency * interval)
+        powers = [
+            share * (1.0 - rho**2) / (1.0 - 2 * rho * cosine + rho**2) for rho, share in self.parts
+        ]
+        return np.asarray(np.sum(powers, axis=0))
 
     def drawn(self, rng: np.random.Generator, recording: Recording, sigma: float) -> Array:
         """A draw of a recording's raw noise of level `sigma` (before any smoothing), (n,), m."""
@@ -222,18 +235,6 @@ class Noise:
     def with_smoothing(self, smoothing: Smoothing | None) -> Noise:
         """The same raw noise behind another filter."""
         return replace(self, smoothing=smoothing)
-
-    def _with_gaps(self, x: Array, used: Mask) -> Array:
-        """White or AR(1) noise: each sample less what the one before it, however far, predicts."""
-        white = np.zeros_like(x)
-        good = np.flatnonzero(used)
-        if good.size == 0:
-            return white
-        share = self.correlation ** np.diff(good).astype(np.float64)
-        white[..., good[0]] = x[..., good[0]]
-        innovation = x[..., good[1:]] - share * x[..., good[:-1]]
-        white[..., good[1:]] = innovation / np.sqrt(1.0 - share**2)
-        return white
 
     def _stretches(self, used: Mask, interval: float) -> list[slice]:
         """Between gaps: what no set-aside sample and no end reaches through the filter."""
@@ -263,7 +264,8 @@ class Noise:
 
     def _spectrum(self, n: int, interval: float, ends: bool = True) -> Array:
         inner = self._interior(n, interval) if ends else slice(0, n)
-        return _passed(self.correlation, self.smoothing, inner.stop - inner.start, interval)
+        raw = Noise(self.correlation, self.smoothing, others=self.others)
+        return _passed(raw, inner.stop - inner.start, interval)
 
     def _band_size(self, n: int, interval: float) -> int:
         return int(self._spectrum(n, interval).size)
@@ -281,6 +283,21 @@ class Noise:
         return np.concatenate(
             [head, coefficients[..., 1:].real, coefficients[..., 1:].imag], axis=-1
         )
+
+
+def _kind(correlation: float) -> str:
+    return "white" if correlation == 0.0 else f"AR(1), correlation {correlation:.3g}"
+
+
+def _process(rng: np.random.Generator, n: int, correlation: float, sigma: float) -> Array:
+    """A stationary draw of an AR(1) process, (n,)."""
+    white = rng.standard_normal(n) * sigma
+    if correlation == 0.0:
+        return white
+    from scipy.signal import lfilter
+
+    white[1:] *= np.sqrt(1.0 - correlation**2)
+    return np.asarray(lfilter([1.0], [1.0, -correlation], white), dtype=np.float64)
 
 
 def _shortened(first: int, end: int) -> slice:
@@ -311,18 +328,16 @@ def _largest_prime(number: int) -> int:
 
 
 @lru_cache(maxsize=SPECTRA)
-def _passed(correlation: float, smoothing: Smoothing | None, count: int, interval: float) -> Array:
+def _passed(noise: Noise, count: int, interval: float) -> Array:
     """Power of the noise in the band that the filter lets through, relative to white noise, (m,).
 
     Every residual and derivative of a fit asks for it anew.
     """
     frequency: Array = np.fft.rfftfreq(count, interval).astype(np.float64)
-    filtered = gain(smoothing, interval, frequency) ** 2
+    filtered = gain(noise.smoothing, interval, frequency) ** 2
     beyond = np.flatnonzero(filtered < 0.5)
     frequency = frequency[: beyond[0]] if beyond.size else frequency[:-1]
-    angle = 2 * np.pi * frequency * interval
-    raw = (1 - correlation**2) / (1 - 2 * correlation * np.cos(angle) + correlation**2)
-    found: Array = np.asarray(filtered[: frequency.size] * raw)
+    found: Array = np.asarray(filtered[: frequency.size] * noise.spectrum(frequency, interval))
     found.setflags(write=False)
     return found
 

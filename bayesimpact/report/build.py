@@ -198,10 +198,8 @@ def _noise_rms(noise: Noise, interval: float) -> float:
     if noise.smoothing is None:
         return noise.level
     frequency = np.linspace(0.0, 0.5 / interval, 4001)
-    rho, cosine = noise.correlation, np.cos(2 * np.pi * frequency * interval)
-    raw = (1 - rho**2) / (1 - 2 * rho * cosine + rho**2)
     passed = gain(noise.smoothing, interval, frequency) ** 2
-    return noise.level * float(np.sqrt(np.mean(passed * raw)))
+    return noise.level * float(np.sqrt(np.mean(passed * noise.spectrum(frequency, interval))))
 
 
 def _chi2_z(fit: Fit) -> float:

@@ -20,9 +20,16 @@ def operator(noise: Noise, n: int) -> np.ndarray:
     return noise.whiten(np.eye(n), INTERVAL).T
 
 
+def raw_covariance(noise: Noise, n: int) -> np.ndarray:
+    """Covariance of the sum of processes that the noise says it is."""
+    first = 1.0 - sum(share for _, share in noise.others)
+    parts = ((noise.correlation, first), *noise.others)
+    return sum(share * toeplitz(rho ** np.arange(n)) for rho, share in parts)
+
+
 def passed_covariance(noise: Noise, n: int) -> np.ndarray:
     """Covariance of unit raw noise behind the filter."""
-    raw = toeplitz(noise.correlation ** np.arange(n))
+    raw = raw_covariance(noise, n)
     if noise.smoothing is None:
         return raw
     matrix = smooth(np.eye(n), noise.smoothing, INTERVAL).T
@@ -37,6 +44,30 @@ def test_ar1_whitening_is_exact(rho):
     half = 0.5 * np.linalg.slogdet(covariance)[1]
     assert noise.log_volume(n, INTERVAL) == pytest.approx(-half, abs=1e-10)
     assert noise.size(n, INTERVAL) == n
+
+
+SUMS = (
+    Noise(0.9, others=((0.0, 0.4),)),
+    Noise(-0.3, others=((0.0, 0.5),)),
+    Noise(0.0, others=((0.995, 0.95),)),
+    Noise(0.6, others=((0.99, 0.3),)),
+    Noise(0.8, others=((0.0, 0.3), (0.999, 0.5))),
+)
+
+
+@pytest.mark.parametrize("noise", SUMS)
+@pytest.mark.parametrize("gaps", [(), (0, 1, 2), (20, 21, 22, 23, 40, 59)])
+def test_whitening_of_a_sum_of_processes_is_exact(noise, gaps):
+    n, used = 60, np.ones(60, dtype=bool)
+    used[list(gaps)] = False
+    white = noise.whiten(np.eye(n), INTERVAL, used if gaps else None).T
+    covariance = raw_covariance(noise, n)
+    assert not white[:, ~used].any() and not white[~used].any()
+    kept, left = np.ix_(used, used), int(used.sum())
+    precision = white[kept].T @ white[kept]
+    np.testing.assert_allclose(precision @ covariance[kept], np.eye(left), atol=1e-10)
+    half = 0.5 * np.linalg.slogdet(covariance[kept])[1]
+    assert noise.log_volume(n, INTERVAL, used if gaps else None) == pytest.approx(-half, abs=1e-9)
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.6])
@@ -112,12 +143,12 @@ def test_whitening_is_linear_and_works_on_the_last_axis(noise):
     np.testing.assert_allclose(noise.whiten(x, INTERVAL)[1, 2], one, atol=1e-12)
 
 
-@pytest.mark.parametrize("rho", [0.0, 0.7, -0.5])
-def test_coloured_noise_is_stationary(rho):
+@pytest.mark.parametrize("noise", [Noise(), Noise(0.7), Noise(-0.5), SUMS[0], SUMS[4]])
+def test_coloured_noise_is_stationary(noise):
     """Covariances over draws, from the first sample on; standard errors from normal theory."""
     rng, draws, sigma = np.random.default_rng(3), 20_000, 2.5
-    x = np.array([Noise(rho).coloured(rng, 12, INTERVAL, sigma) for _ in range(draws)])
-    expected = sigma**2 * toeplitz(rho ** np.arange(12))
+    x = np.array([noise.coloured(rng, 12, INTERVAL, sigma) for _ in range(draws)])
+    expected = sigma**2 * raw_covariance(noise, 12)
     found = x.T @ x / draws
     error = np.sqrt((np.outer(np.diag(expected), np.diag(expected)) + expected**2) / draws)
     assert np.abs((found - expected) / error).max() < 4.5
@@ -128,6 +159,16 @@ def test_what_it_says_of_itself():
     assert Noise().kind == "white"
     assert Noise(0.25, SAVGOL).kind == "AR(1), correlation 0.25, smoothed (savgol)"
     assert Noise(0.25).with_smoothing(LAG) == Noise(0.25, LAG)
+    slow = "of its variance 60 % AR(1), correlation 0.9, 40 % white"
+    assert SUMS[0].kind == slow and not SUMS[2].is_white
+
+
+def test_the_spectrum_is_that_of_the_covariances():
+    n, noise = 4096, SUMS[0]
+    lags = np.minimum(np.arange(n), n - np.arange(n))
+    expected = np.fft.fft(0.6 * 0.9**lags + 0.4 * (lags == 0)).real[: n // 2]
+    frequency = np.arange(n // 2) / (n * INTERVAL)
+    np.testing.assert_allclose(noise.spectrum(frequency, INTERVAL), expected, rtol=1e-9)
 
 
 @pytest.mark.parametrize("smoothing", [None, SAVGOL, LAG])

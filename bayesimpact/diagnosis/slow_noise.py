@@ -1,0 +1,56 @@
+"""Is what a model leaves slow noise of the measuring chain, and no force?
+
+A force reaches the reading through the oscillator: its answer is largest about the oscillator's own
+frequencies and small above. Noise that drifts does not pass through it. Both are compared on one
+residual: white and AR(1) noise with a force of time (`discrepancy`), which any missing law of the
+motion resembles more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from bayesimpact.diagnosis.discrepancy import discrepancy
+from bayesimpact.diagnosis.faults.compare import base_failed
+from bayesimpact.diagnosis.recording_faults import Corrected
+from bayesimpact.diagnosis.thresholds import ALPHA, DECISIVE
+from bayesimpact.diagnosis.whiteness import combined, ljung_box, whiteness_p
+from bayesimpact.inference.declared import climbed
+from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.identify import Identification
+from bayesimpact.inference.likelihood import Likelihood
+from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise_refined import COLOURED
+from bayesimpact.inference.noise_slow import slow_noise
+
+
+def remaining_noise(fit: Fit) -> Noise | None:
+    """The slow noise that a fit leaves; None where it leaves none, or anything else as well."""
+    if whiteness_p(fit) >= ALPHA:
+        return None
+    found = slow_noise(fit)
+    if found is None or found.gain < COLOURED:
+        return None
+    if combined([ljung_box(x) for x in found.residuals]) < ALPHA:
+        return None
+    force = discrepancy(fit)
+    if force is None or found.gain < force.gain(fit, fit.log_posterior) + DECISIVE:
+        return None
+    return found.noise
+
+
+def with_noise(before: Identification, noise: Noise) -> Identification:
+    """The base model's mode under another noise."""
+    target = before.fit.target
+    likelihood = Likelihood(target.oscillator, noise)
+    fit = climbed(replace(target, likelihood=likelihood), before.fit)
+    return replace(before, fit=fit, noise=noise)
+
+
+def with_slow_noise(corrected: Corrected) -> Corrected:
+    """The same with the slow noise that the base model leaves, if it leaves nothing else."""
+    fit = corrected.identification.fit
+    noise = None if base_failed(fit) else remaining_noise(fit)
+    if noise is None:
+        return corrected
+    return replace(corrected, identification=with_noise(corrected.identification, noise))

@@ -1,0 +1,135 @@
+"""Noise that is slow as well as white, from all that a fit leaves.
+
+Short windows show the white part and take the slow one for motion; above the motion (see
+`noise_refined`) little of it is left. Here a fit's residual r, linear in a change x of the
+parameters, is taken for noise of both kinds: r - J x ~ N(0, s^2 C), with C the covariance of white
+and AR(1) noise, of one correlation time or, where that says much more, of two, as noise that rises
+over decades of frequency asks for; the parameters are integrated out. What physics a fit may have
+left out is in the residual too: whether this noise explains it better is for the caller to ask.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+from scipy.special import softmax
+
+from bayesimpact.inference.fit import Fit, inverse
+from bayesimpact.inference.likelihood import Likelihood, Linearisation
+from bayesimpact.inference.noise import Noise
+
+Array = NDArray[np.float64]
+
+TIMES = 10.0  # in the longest recording, at least, that the slow part's correlation time fits
+MOST = 1.0 - 1e-9  # of a correlation, whatever the recording
+STEP = 0.05  # of a standard deviation, for differences
+STARTS = ((0.9,), (0.99,), (0.5,), (0.6, 0.98))  # correlations over the largest, beside white noise
+TOLERANCE = 0.01  # nats, of the likelihood at its best
+
+
+@dataclass(frozen=True, eq=False)
+class SlowNoise:
+    """What a fit's residual would be as noise that is white and slow.
+
+    Attributes
+    ----------
+    noise : its shape, and level
+    gain : log evidence over that of the fit with its own noise, nats
+    residuals : per recording, whitened, the parameters at their best, (n,)
+    """
+
+    noise: Noise
+    gain: float
+    residuals: tuple[Array, ...] = field(repr=False)
+
+
+def slow_noise(fit: Fit) -> SlowNoise | None:
+    """The likeliest white and AR(1) noise of all that a fit leaves.
+
+    None behind a filter, for recordings of several quantities, where the noise level is stated, and
+    where the fitted motion runs away.
+    """
+    likelihood = fit.target.likelihood
+    noise, known = likelihood.noise, not likelihood.noise.level_error
+    if noise.smoothing is not None or known or fit.target.oscillator.campaign.mixed:
+        return None
+    plain = Likelihood(fit.target.oscillator, replace(noise, correlation=0.0, others=()))
+    linear = plain.linearise(fit.mode, STEP * fit.sd)
+    if not all(np.isfinite(x).all() for part in linear for x in (part.residual, part.jacobian)):
+        return None
+    recordings = fit.target.oscillator.campaign.recordings
+    longest = max(r.duration / r.interval for r in recordings)
+    most = min(float(np.exp(-TIMES / longest)), MOST)
+
+    def shape(place: Array) -> Noise:
+        """From correlations and, of all AR(1) processes, the log of share over the white one."""
+        count = place.size // 2
+        white, *shares = softmax(np.append(0.0, place[count:]))
+        parts = zip(most * np.tanh(place[:count]), shares, strict=True)
+        (first, _), *others = ((float(rho), float(share)) for rho, share in parts)
+        return replace(noise, correlation=first, others=((0.0, float(white)), *others))
+
+    def likeliest(starts: Sequence[Array]) -> _Whole:
+        def cost(place: Array) -> float:
+            return -float(_Whole(fit, linear, shape(place)).log_evidence)
+
+        rough = min(starts, key=cost)
+        simplex = np.vstack([rough, rough + np.eye(rough.size)])
+        options = {"fatol": TOLERANCE, "xatol": TOLERANCE, "initial_simplex": simplex}
+        best = minimize(cost, rough, method="Nelder-Mead", options=options).x
+        return _Whole(fit, linear, shape(best))
+
+    starts = [np.append(np.arctanh(rho), np.zeros(len(rho))) for rho in STARTS]
+    found, two = (likeliest([s for s in starts if s.size == size]) for size in (2, 4))
+    cost = float(np.log(likelihood.sizes.sum()))  # of two more parameters (Schwarz 1978)
+    if two.log_evidence > found.log_evidence + cost:
+        found = two
+    before = _Whole(fit, linear, noise)
+    level = noise.level * float(np.sqrt(found.variance))
+    error = float(np.sqrt(0.5 / likelihood.sizes.sum()))
+    told = replace(found.noise, level=level, level_error=error, source="residual of the model")
+    return SlowNoise(told, found.log_evidence - before.log_evidence, found.residuals)
+
+
+class _Whole:
+    """All recordings' residuals under one shape of the noise.
+
+    Attributes
+    ----------
+    noise : that shape
+    variance : of the noise over its estimate
+    log_evidence : up to what no shape of the noise changes, nats
+    residuals : per recording, (n,), of unit variance where the shape is right
+    """
+
+    def __init__(self, fit: Fit, linear: tuple[Linearisation, ...], noise: Noise) -> None:
+        self.noise = noise
+        recordings = fit.target.oscillator.campaign.recordings
+        level, size = fit.target.likelihood.noise.level, fit.mode.size
+        free = fit.target.oscillator.layout.roles("physical", "effect", "nuisance")
+        products, volume, total, white = np.zeros((size + 1, size + 1)), 0.0, 0, []
+        for part, recording in zip(linear, recordings, strict=True):
+            rows = np.vstack([part.jacobian.T, part.residual]) / level
+            white.append(noise.whiten(rows, recording.interval, recording.used))
+            at = np.append(part.columns, size)
+            products[np.ix_(at, at)] += white[-1] @ white[-1].T
+            n = recording.samples.size
+            volume += noise.log_volume(n, recording.interval, recording.used)
+            total += noise.size(n, recording.interval, recording.used)
+        information, score = products[np.ix_(free, free)], products[free, size]
+        step = inverse(information) @ score
+        self.variance = max(float(products[size, size] - score @ step) / total, 1e-300)
+        _, spread = np.linalg.slogdet(information / self.variance)
+        self.log_evidence = volume - 0.5 * (total * np.log(self.variance) + float(spread))
+        if not np.isfinite(self.log_evidence):
+            self.log_evidence = -np.inf
+        change = np.zeros(size)
+        change[free] = step
+        self.residuals = tuple(
+            (rows[-1] - change[part.columns] @ rows[:-1]) / np.sqrt(self.variance)
+            for rows, part in zip(white, linear, strict=True)
+        )

@@ -1,0 +1,63 @@
+"""Slow noise is told from a force, alone and beside an effect."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import small_rig
+
+from bayesimpact.diagnosis.diagnose import diagnose
+from bayesimpact.diagnosis.slow_noise import remaining_noise
+from bayesimpact.inference.identify import identify
+from bayesimpact.inference.noise import Noise
+
+RNG = np.random.default_rng
+SLOW = Noise(0.95)
+
+
+def with_slow(campaign, seed, size):
+    """The recordings with AR(1) noise of `size` times their white noise on top."""
+    rng = RNG(seed + 1000)
+    recordings = (
+        replace(
+            r,
+            samples=r.samples
+            + SLOW.coloured(rng, r.samples.size, r.interval, size * small_rig.NOISE),
+        )
+        for r in campaign.recordings
+    )
+    return replace(campaign, recordings=tuple(recordings))
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_control_with_slow_noise_is_adequate_and_says_so(seed):
+    campaign = with_slow(small_rig.record(seed), seed, 1.25)
+    found = diagnose(campaign, rng=RNG(0), search=False)
+    assert found.verdict == "adequate"
+    noise = found.after.target.likelihood.noise
+    (correlation, slow), (_, white) = noise.parts
+    assert correlation == pytest.approx(0.95, abs=0.03)
+    assert white == pytest.approx(1 / (1 + 1.25**2), abs=0.12) and slow == 1 - white
+    assert 0.9 < found.after.reduced_chi2 < 1.1
+
+
+DRAG = {"quadratic_drag": {"coefficient": 3.0}}
+
+
+def test_physics_beside_slow_noise_is_named_and_the_noise_found_beside_it():
+    campaign = with_slow(small_rig.record(2, DRAG), 2, 1.25)
+    found = diagnose(campaign, rng=RNG(0), search=False)
+    assert [e.id for e in found.effects] == ["quadratic_drag"]
+    assert found.verdict in ("named", "ambiguous")
+    assert found.after.target.likelihood.noise.others
+    low, _, high = found.intervals.quantiles("quadratic_drag.coefficient")
+    assert low < 3.0 < high
+
+
+@pytest.mark.parametrize("size", [0.05, 0.5, 3.0])
+def test_physics_alone_is_no_slow_noise(size):
+    effects = {"quadratic_drag": {"coefficient": size}}
+    campaign = small_rig.record(3, effects)
+    assert remaining_noise(identify(campaign, rng=RNG(0), search=False).fit) is None
