@@ -61,3 +61,19 @@ def test_physics_alone_is_no_slow_noise(size):
     effects = {"quadratic_drag": {"coefficient": size}}
     campaign = small_rig.record(3, effects)
     assert remaining_noise(identify(campaign, rng=RNG(0), search=False).fit) is None
+
+
+def test_a_law_in_contact_that_no_force_of_time_follows_is_no_slow_noise():
+    """Its kinks are finer than the force's knots; what slow noise leaves of it is not white."""
+    campaign = small_rig.record(4, {"obstacle_restitution": {"coefficient": 0.8}})
+    assert remaining_noise(identify(campaign, rng=RNG(0), search=False).fit) is None
+
+
+def test_slow_noise_is_found_again_beside_a_fault_of_a_recording():
+    campaign = with_slow(small_rig.record(5), 5, 1.25)
+    first, *others = campaign.recordings
+    turned = replace(first, samples=-first.samples)
+    found = diagnose(replace(campaign, recordings=(turned, *others)), rng=RNG(0), search=False)
+    assert found.verdict == "named" and not found.effects
+    assert [f.id for f in found.corrected.faults] == ["recording_sign"]
+    assert found.after.target.likelihood.noise.others
