@@ -75,5 +75,5 @@ def test_slow_noise_is_found_again_beside_a_fault_of_a_recording():
     turned = replace(first, samples=-first.samples)
     found = diagnose(replace(campaign, recordings=(turned, *others)), rng=RNG(0), search=False)
     assert found.verdict == "named" and not found.effects
-    assert [f.id for f in found.corrected.faults] == ["recording_sign"]
+    assert [f.id for f in found.corrected.faults] == ["recording_reversed"]
     assert found.after.target.likelihood.noise.others
