@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 import small_rig
 
+from bayesimpact.diagnosis import diagnose as whole
+from bayesimpact.diagnosis.budget import begin
 from bayesimpact.diagnosis.diagnose import diagnose
+from bayesimpact.diagnosis.recording_faults import cleaned_campaign
 from bayesimpact.diagnosis.slow_noise import remaining_noise
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.noise import Noise
@@ -67,6 +70,16 @@ def test_a_law_in_contact_that_no_force_of_time_follows_is_no_slow_noise():
     """Its kinks are finer than the force's knots; what slow noise leaves of it is not white."""
     campaign = small_rig.record(4, {"obstacle_restitution": {"coefficient": 0.8}})
     assert remaining_noise(identify(campaign, rng=RNG(0), search=False).fit) is None
+
+
+def test_a_search_begins_with_slow_noise_whatever_was_corrected_before():
+    campaign = with_slow(small_rig.record(6), 6, 1.25)
+    corrected = cleaned_campaign(campaign, rng=RNG(0), search=False)
+    assert not corrected.identification.noise.others
+    found = whole._of_corrected(
+        corrected, rng=RNG(0), effects=(), progress=lambda _: None, budget=begin(), first=None
+    )
+    assert found.verdict == "adequate" and found.after.target.likelihood.noise.others
 
 
 def test_slow_noise_is_found_again_beside_a_fault_of_a_recording():
