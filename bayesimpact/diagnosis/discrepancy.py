@@ -35,6 +35,9 @@ from bayesimpact.model.superposition import Motion, answers, motion_along
 Array = NDArray[np.float64]
 
 KNOTS = 8  # in a free period: a force at its own frequency, or in one contact, is resolved
+# ... in recordings of up to so many knots, whose matrices are quick; in longer ones fewer in a
+# period, down to what still holds more than half of a force at its own frequency: sinc(1 / 2.5)^2
+QUICK, LEAST_KNOTS = 640, 2.5
 ENTRIES = 20_000_000  # of the largest matrix D that is held; longer recordings get fewer knots
 BLOCK = 64  # forces at once, so that memory stays bounded
 # Nats by which derivatives at a mode may underrate a model beside the force: 15 at most among the
@@ -170,15 +173,17 @@ def discrepancy(fit: Fit) -> Discrepancy | None:
     period = 2 * np.pi * float(np.sqrt(fit.target.oscillator.campaign.mass / stiffness))
     try:
         motions = tuple(_motion(fit, r) for r in range(len(fit.linearisation)))
-        parts = tuple(_part(fit, r, motion, period / KNOTS) for r, motion in enumerate(motions))
+        parts = tuple(_part(fit, r, motion, period) for r, motion in enumerate(motions))
         return Discrepancy(fit, motions, parts, *_sized(fit, parts))
     except np.linalg.LinAlgError:
         return None
 
 
-def _part(fit: Fit, r: int, motion: Motion, spacing: float) -> Part:
+def _part(fit: Fit, r: int, motion: Motion, period: float) -> Part:
     duration, n = float(motion.t[-1]), motion.samples
-    count = int(np.clip(np.ceil(duration / spacing), 1, max(ENTRIES // n, 2))) + 1
+    cycles = duration / period
+    wanted = min(KNOTS * cycles, max(QUICK, LEAST_KNOTS * cycles))
+    count = int(np.clip(np.ceil(wanted), 1, max(ENTRIES // n, 2))) + 1
     knots = np.linspace(0.0, duration, count)
     raw = np.empty((count, n))
     for first in range(0, count, BLOCK):

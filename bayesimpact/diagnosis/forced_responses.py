@@ -1,7 +1,7 @@
 """Whitened responses of a recording to a small harmonic force on the mass.
 
-Simulated frequency by frequency, or, for a scan over many, superposed: simulations at some
-frequencies say whether that serves.
+Simulated frequency by frequency, or, for a scan over many, superposed where simulations at some
+frequencies agree with that.
 """
 
 from __future__ import annotations
@@ -20,23 +20,19 @@ from bayesimpact.model.forced import wave_responses
 from bayesimpact.model.free_changes import free_changes, motions_beside
 
 Array = NDArray[np.float64]
+Responses = Callable[[Array], Array]
+"""Of frequencies (F,), Hz: whitened responses to sine and cosine of one newton, (2 F, n)."""
 
 CHECKED = 5  # frequencies at which a simulation is the judge
 AGREE = 0.03  # of a response: a scan's chi-squared then errs by its square, 0.1 %
 SIZE = 1e-3  # of the noise: changes so small are linear, and far above rounding
 
 
-def force_responses(fit: Fit, r: int, grid: Array, scales: Scales) -> Callable[[Array], Array]:
-    """A function of frequencies (F,) out of `grid`, Hz, that gives `simulated_responses`.
-
-    By superposition where that agrees with the simulation at frequencies all over the grid.
+def force_responses(fit: Fit, r: int, grid: Array, scales: Scales) -> Responses | None:
+    """A function of frequencies (F,) out of `grid`, Hz, that gives `simulated_responses` by
+    superposition; None where that does not agree with the simulation at frequencies all over the
+    grid, as behind a law with a state of its own or where the mass sticks.
     """
-
-    def simulated(frequencies: Array) -> Array:
-        return simulated_responses(fit, r, frequencies, scales)
-
-    if grid.size <= CHECKED:
-        return simulated
     oscillator, sigma = fit.target.oscillator, sigma_of(fit)
     slots = oscillator.layout.slots(fit.mode)[r]
     changes = free_changes(oscillator, r, slots, _small(fit, r, scales))
@@ -44,13 +40,13 @@ def force_responses(fit: Fit, r: int, grid: Array, scales: Scales) -> Callable[[
     def superposed(frequencies: Array) -> Array:
         return whitened_one(fit, r, wave_responses(changes, frequencies), sigma)
 
-    some = grid[np.linspace(0, grid.size - 1, CHECKED).astype(int)]
-    expected = simulated(some)
+    some = grid[np.linspace(0, grid.size - 1, min(CHECKED, grid.size)).astype(int)]
+    expected = simulated_responses(fit, r, some, scales)
     try:
         wrong = np.linalg.norm(superposed(some) - expected, axis=1)
     except np.linalg.LinAlgError:  # the mass sticks: what it did before is forgotten
-        return simulated
-    return superposed if np.all(wrong < AGREE * np.linalg.norm(expected, axis=1)) else simulated
+        return None
+    return superposed if np.all(wrong < AGREE * np.linalg.norm(expected, axis=1)) else None
 
 
 def simulated_responses(fit: Fit, r: int, frequencies: Array, scales: Scales) -> Array:

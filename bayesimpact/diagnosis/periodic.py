@@ -16,7 +16,11 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from bayesimpact.diagnosis.directions import decays_of, is_periodic, is_steady
-from bayesimpact.diagnosis.forced_responses import force_responses
+from bayesimpact.diagnosis.forced_responses import (
+    Responses,
+    force_responses,
+    simulated_responses,
+)
 from bayesimpact.diagnosis.harmonics import (
     Blocks,
     absorbed,
@@ -39,6 +43,7 @@ LINE_PERIODS = 5.0  # in the longest recording, at least: slower ones pass for a
 NEAR_RESONANCE = (
     2.0  # times the natural frequency: below, the parameters may absorb nearly all of a hum
 )
+SIMULATED = 8  # lines, with their neighbours, where a force's responses have to be simulated
 ABSORBED = 1e-6  # of a line's power: what is left of so much tells nothing but rounding
 LEAST_GAIN = 0.1  # of a filter: hums that it lets through so far leak into the band below
 
@@ -97,14 +102,17 @@ def _best_frequency(fit: Fit, effect: Effect, scales: Scales) -> Score | None:
         return None
     above = leaking(fit, scales) if effect.observe is not None and is_steady(effect) else grid[:0]
     decays = decays_of(effect, scales)
-    scans = [_scan_of_frequency(fit, effect, grid, above, decay, scales) for decay in decays]
+    trials, shaken = (grid.size + above.size) * decays.size, list[Responses]()
+    if effect.observe is None:
+        grid, shaken = _forces(fit, grid, scales)
+    scans = [_scan_of_frequency(fit, grid, above, decay, scales, shaken) for decay in decays]
     turn = int(np.argmax([statistic.max() for statistic, *_ in scans]))
     statistic, sizes, information, blocks = scans[turn]
     best = int(np.argmax(statistic))
     if best >= grid.size:
         best = grid.size + int(np.argmax(raw_power(fit, above)))
     grid = np.concatenate([grid, above])
-    trials, freedom = grid.size * decays.size, sizes.shape[1]
+    freedom = sizes.shape[1]
     alone = float(stats.chi2.sf(statistic[best], freedom))
     p_value = float(min(1.0, alone * trials))
     amplitude, sd, names = _amplitudes(fit, effect, sizes[best], information[best])
@@ -125,11 +133,34 @@ def _best_frequency(fit: Fit, effect: Effect, scales: Scales) -> Score | None:
     )
 
 
-def _scan_of_frequency(
-    fit: Fit, effect: Effect, grid: Array, above: Array, decay: float, scales: Scales
-) -> tuple[Array, Array, Array, list[Blocks]]:
+def _forces(fit: Fit, grid: Array, scales: Scales) -> tuple[Array, list[Responses]]:
+    """Frequencies out of `grid`, Hz, at which to try a force, and every recording's responses.
+
+    Where they have to be simulated, those of the strongest lines and their neighbours: what a force
+    leaves in a reading, once its beginning has faded, is a line at its frequency.
+    """
     recordings = range(len(fit.linearisation))
-    blocks = [_blocks(fit, r, effect, grid, above, decay, scales) for r in recordings]
+    found = [force_responses(fit, r, grid, scales) for r in recordings]
+    simulated = [partial(simulated_responses, fit, r, scales=scales) for r in recordings]
+    if None not in found or grid.size <= 3 * SIMULATED:
+        return grid, [one or other for one, other in zip(found, simulated, strict=True)]
+    lines, *_ = _statistics(fit, [line_blocks(fit, r, grid) for r in recordings])
+    padded = np.pad(lines, 1, constant_values=-np.inf)
+    peaks = np.flatnonzero((lines >= padded[:-2]) & (lines >= padded[2:]))
+    strongest = peaks[np.argsort(lines[peaks])[-SIMULATED:]]
+    near = np.unique(np.clip(strongest[:, None] + (-1, 0, 1), 0, grid.size - 1))
+    return grid[near], [one or other for one, other in zip(found, simulated, strict=True)]
+
+
+def _scan_of_frequency(
+    fit: Fit, grid: Array, above: Array, decay: float, scales: Scales, shaken: Sequence[Responses]
+) -> tuple[Array, Array, Array, list[Blocks]]:
+    """Of a force with these responses, or, without any, of a hum."""
+    if shaken:
+        blocks = [joined(blocks_in_parts(fit, r, grid, one)) for r, one in enumerate(shaken)]
+    else:
+        recordings = range(len(fit.linearisation))
+        blocks = [_blocks(fit, r, grid, above, decay, scales) for r in recordings]
     return *_statistics(fit, blocks), blocks
 
 
@@ -147,12 +178,7 @@ def _amplitudes(
     return np.array([amplitude]), np.array([1 / np.sqrt(weight.sum())]), (f"{effect.id}.amplitude",)
 
 
-def _blocks(
-    fit: Fit, r: int, effect: Effect, grid: Array, above: Array, decay: float, scales: Scales
-) -> Blocks:
-    if effect.observe is None:
-        shaken = force_responses(fit, r, grid, scales)
-        return joined(blocks_in_parts(fit, r, grid, shaken))
+def _blocks(fit: Fit, r: int, grid: Array, above: Array, decay: float, scales: Scales) -> Blocks:
     waves = partial(hums, fit, r, decay=decay)
     slow = grid < NEAR_RESONANCE * scales.natural_frequency
     sums = [line_blocks(fit, r, grid[~slow], decay)] if np.sum(~slow) > 1 else []

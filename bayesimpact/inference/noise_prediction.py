@@ -27,10 +27,20 @@ def innovations(x: Array, parts: Parts, used: Mask | None) -> Array:
 
     They have the variance of the noise. 0 where `used` (n,) is False.
     """
+    if used is None and len(parts) == 1:
+        return _of_neighbours(x, parts[0][0])
     rows = np.ascontiguousarray(x.reshape(-1, x.shape[-1]))
     sd, gains = _steps(x.shape[-1], parts, used)
     correlations = np.array([correlation for correlation, _ in parts])
     return np.asarray(_innovations(rows, correlations, sd, gains).reshape(x.shape))
+
+
+def _of_neighbours(x: Array, correlation: float) -> Array:
+    """Of one process, every sample of which is predicted by the one before it."""
+    white = np.empty_like(x)
+    white[..., 0] = x[..., 0]
+    white[..., 1:] = (x[..., 1:] - correlation * x[..., :-1]) / np.sqrt(1.0 - correlation**2)
+    return white
 
 
 def log_determinant(n: int, parts: Parts, used: Mask | None) -> float:

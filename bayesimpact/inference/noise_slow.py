@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 
 TIMES = 10.0  # in the longest recording, at least, that the slow part's correlation time fits
 MOST = 1.0 - 1e-9  # of a correlation, whatever the recording
+BAND = 0.05  # of a frequency: width of a band
 STEP = 0.05  # of a standard deviation, for differences
 STARTS = ((0.9,), (0.99,), (0.5,), (0.6, 0.98))  # correlations over the largest, beside white noise
 TOLERANCE = 0.01  # nats, of the likelihood at its best
@@ -65,6 +66,8 @@ def slow_noise(fit: Fit) -> SlowNoise | None:
     longest = max(r.duration / r.interval for r in recordings)
     most = min(float(np.exp(-TIMES / longest)), MOST)
 
+    spectra = _Spectra(fit, linear)
+
     def shape(place: Array) -> Noise:
         """From correlations and, of all AR(1) processes, the log of share over the white one."""
         count = place.size // 2
@@ -75,7 +78,7 @@ def slow_noise(fit: Fit) -> SlowNoise | None:
 
     def likeliest(starts: Sequence[Array]) -> _Whole:
         def cost(place: Array) -> float:
-            return -float(_Whole(fit, linear, shape(place)).log_evidence)
+            return -spectra.log_evidence(shape(place))
 
         rough = min(starts, key=cost)
         simplex = np.vstack([rough, rough + np.eye(rough.size)])
@@ -93,6 +96,46 @@ def slow_noise(fit: Fit) -> SlowNoise | None:
     error = float(np.sqrt(0.5 / likelihood.sizes.sum()))
     told = replace(found.noise, level=level, level_error=error, source="residual of the model")
     return SlowNoise(told, found.log_evidence - before.log_evidence, found.residuals)
+
+
+class _Spectra:
+    """Products of all recordings' derivatives and residuals in narrow bands of frequency, in which
+    the noise's spectrum is all but constant: its likelihood by Whittle's method, at once.
+    """
+
+    def __init__(self, fit: Fit, linear: tuple[Linearisation, ...]) -> None:
+        recordings = fit.target.oscillator.campaign.recordings
+        level, size = fit.target.likelihood.noise.level, fit.mode.size
+        self.free = fit.target.oscillator.layout.roles("physical", "effect", "nuisance")
+        self.bands = []
+        for part, recording in zip(linear, recordings, strict=True):
+            rows = np.vstack([part.jacobian.T, part.residual]) / level
+            waves = np.fft.rfft(rows)[:, 1:] * np.sqrt(2.0 / rows.shape[1])
+            number = np.arange(1, waves.shape[1] + 1)
+            band = np.unique(np.round(np.log(number) / BAND).astype(int), return_index=True)[1]
+            at = np.ix_(np.append(part.columns, size), np.append(part.columns, size))
+            products = np.zeros((band.size, size + 1, size + 1))
+            for i, some in enumerate(np.split(waves, band[1:], axis=1)):
+                products[i][at] = (some @ some.conj().T).real
+            widths = np.diff(np.append(band, number.size))
+            centres = np.exp(np.add.reduceat(np.log(number), band) / widths)
+            frequencies = centres / (rows.shape[1] * recording.interval)
+            self.bands.append((frequencies, recording.interval, widths, products))
+
+    def log_evidence(self, noise: Noise) -> float:
+        """As `_Whole` has it, but for the ends of the recordings."""
+        whole, volume, total = np.zeros(self.bands[0][-1].shape[1:]), 0.0, 0
+        for frequencies, interval, widths, products in self.bands:
+            power = noise.spectrum(frequencies, interval)
+            whole += np.tensordot(1.0 / power, products, 1)
+            volume += float(widths @ np.log(power))
+            total += 2 * int(widths.sum())
+        information, score = whole[np.ix_(self.free, self.free)], whole[self.free, -1]
+        rest = float(whole[-1, -1] - score @ inverse(information) @ score)
+        variance = max(rest / total, 1e-300)
+        _, spread = np.linalg.slogdet(information / variance)
+        value = -volume - 0.5 * (total * np.log(variance) + float(spread))
+        return float(value) if np.isfinite(value) else -np.inf
 
 
 class _Whole:

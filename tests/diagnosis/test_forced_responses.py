@@ -129,7 +129,7 @@ def test_beside_a_measured_input_the_force_comes_on_top(monkeypatch):
 
 
 @pytest.mark.parametrize("wrong", [1.05, np.nan])
-def test_where_superposition_fails_they_are_simulated(wrong, monkeypatch):
+def test_where_superposition_fails_it_does_not_serve(wrong, monkeypatch):
     """As behind a law with a state of its own, or where the mass sticks."""
     fit = identify(small_rig.record(6), rng=np.random.default_rng(0), search=False).fit
     scales = campaign_scales(fit)
@@ -137,5 +137,4 @@ def test_where_superposition_fails_they_are_simulated(wrong, monkeypatch):
     false = [replace(x, readings=wrong * x.readings) for x in changes.stretches]
     monkeypatch.setattr(module, "free_changes", lambda *_: replace(changes, stretches=tuple(false)))
     grid = np.linspace(0.5, 3, 40) * scales.natural_frequency
-    found = force_responses(fit, 0, grid, scales)(grid[[0, 13]])
-    assert error(found, simulated_responses(fit, 0, grid[[0, 13]], scales)) == 0.0
+    assert force_responses(fit, 0, grid, scales) is None

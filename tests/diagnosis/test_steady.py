@@ -174,7 +174,7 @@ def test_a_hum_at_the_motion_s_own_frequency_is_scored_exactly():
     fit = plain_fit()
     scales, recordings = campaign_scales(fit), range(len(fit.linearisation))
     grid = frequencies(fit, BY_ID["sensor_hum"], scales)[:60]
-    found = [_blocks(fit, r, BY_ID["sensor_hum"], grid, grid[:0], 0.0, scales) for r in recordings]
+    found = [_blocks(fit, r, grid, grid[:0], 0.0, scales) for r in recordings]
     exact = [blocks_of(fit, r, hums(fit, r, grid).reshape(grid.size, 2, -1)) for r in recordings]
     slow = grid < 2 * scales.natural_frequency
     assert slow.any() and not slow.all()
