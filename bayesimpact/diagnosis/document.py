@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.diagnosis.faults.compare import base_failed
 from bayesimpact.diagnosis.formula_words import formula_entries
 from bayesimpact.diagnosis.intervals import Intervals, intervals
 from bayesimpact.diagnosis.limits import PRACTICAL, Limit
@@ -74,7 +75,7 @@ def document(
     return {
         "schema": "bayesimpact/diagnosis/2",
         "verdict": d.verdict,
-        "summary": failure(d.identification.fit, explained=d.verdict in ("adequate", "named"))
+        "summary": failure(d.identification.fit, explained=_explained(d))
         + summary(
             Findings(
                 d.verdict,
@@ -134,6 +135,11 @@ def document(
         "versions": dict(versions),
         "data_sha256": d.before.target.oscillator.campaign.sha256,
     }
+
+
+def _explained(d: Diagnosis) -> bool:
+    """Whether what is named takes most of the signal, if the base fit left it."""
+    return d.verdict in ("adequate", "named") or bool(d.effects and not base_failed(d.after))
 
 
 def _evidence(d: Diagnosis) -> dict[str, Any]:

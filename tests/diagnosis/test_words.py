@@ -9,6 +9,7 @@ import pytest
 import small_rig
 from effect_rigs import BY_ID
 
+from bayesimpact.diagnosis.document import _explained
 from bayesimpact.diagnosis.remainder import Remainder
 from bayesimpact.diagnosis.summary import Findings, summary
 from bayesimpact.diagnosis.words import (
@@ -102,6 +103,23 @@ def test_a_failed_base_fit_says_what_may_be_wrong():
     assert 'gain = "free"' in failure(fit_of(0.6, None, known))
     said = failure(fit_of(0.6, free))
     assert "sign, delay or kind of the input" in said and "gain" not in said
+
+
+@pytest.mark.parametrize(
+    ("verdict", "effects", "left", "explained"),
+    [
+        ("named", 1, 0.01, True),
+        ("partly", 1, 0.1, True),
+        ("partly", 1, 0.6, False),
+        ("ambiguous", 1, 0.1, True),
+        ("unknown", 0, 0.1, False),
+    ],
+)
+def test_reasons_of_a_failed_base_fit_are_told_where_no_name_explains_it(
+    verdict, effects, left, explained
+):
+    found = SimpleNamespace(verdict=verdict, effects=(None,) * effects, after=fit_of(left, None))
+    assert _explained(found) == explained
 
 
 def place(regime: str):
