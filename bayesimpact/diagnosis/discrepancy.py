@@ -26,11 +26,10 @@ from bayesimpact.diagnosis.hidden import about, parameter_forces
 from bayesimpact.diagnosis.marginal import Part, gain, products
 from bayesimpact.diagnosis.sizes import sizes_of
 from bayesimpact.diagnosis.thresholds import DOUBT
+from bayesimpact.formula.responses import motion_of
 from bayesimpact.inference.fit import Fit, inverse
 from bayesimpact.model.effects.effect import Effect
-from bayesimpact.model.oscillator import build_oscillator
-from bayesimpact.model.parameters import BASE_SLOTS, SLOTS, WITHOUT
-from bayesimpact.model.superposition import Motion, answers, motion_along
+from bayesimpact.model.superposition import Motion, answers
 
 Array = NDArray[np.float64]
 
@@ -172,7 +171,7 @@ def discrepancy(fit: Fit) -> Discrepancy | None:
         return None
     period = 2 * np.pi * float(np.sqrt(fit.target.oscillator.campaign.mass / stiffness))
     try:
-        motions = tuple(_motion(fit, r) for r in range(len(fit.linearisation)))
+        motions = tuple(motion_of(fit, r) for r in range(len(fit.linearisation)))
         parts = tuple(_part(fit, r, motion, period) for r, motion in enumerate(motions))
         return Discrepancy(fit, motions, parts, *_sized(fit, parts))
     except np.linalg.LinAlgError:
@@ -194,22 +193,6 @@ def _part(fit: Fit, r: int, motion: Motion, period: float) -> Part:
     white = whitened_one(fit, r, raw, level)
     squares, vectors = np.linalg.eigh(white @ white.T)
     return Part(white.T @ vectors, np.maximum(squares, 0.0), vectors)
-
-
-def _motion(fit: Fit, r: int) -> Motion:
-    """One recording's motion; that of the base oscillator where friction holds the mass."""
-    o, reach = fit.target.oscillator, float(np.abs(fit.displacements[r]).max())
-    q = o.layout.slots(fit.mode)[r]
-    try:
-        return motion_along(o, r, q, reach)
-    except np.linalg.LinAlgError:  # what it did before is forgotten
-        base = build_oscillator(o.campaign, (), smoothing=o.smoothing)
-        return motion_along(base, r, np.ascontiguousarray(_without_effects(q)), reach)
-
-
-def _without_effects(q: Array) -> Array:
-    idle = [WITHOUT.get(slot, 0.0) for slot in SLOTS[len(BASE_SLOTS) :]]
-    return np.concatenate([q[: len(BASE_SLOTS)], idle])
 
 
 def _prior_information(fit: Fit) -> Array:

@@ -31,7 +31,7 @@ SIZE = 1e-3  # of the noise: changes so small are linear, and far above rounding
 def force_responses(fit: Fit, r: int, grid: Array, scales: Scales) -> Responses | None:
     """A function of frequencies (F,) out of `grid`, Hz, that gives `simulated_responses` by
     superposition; None where that does not agree with the simulation at frequencies all over the
-    grid, as behind a law with a state of its own or where the mass sticks.
+    grid, as behind a law with a state of its own.
     """
     oscillator, sigma = fit.target.oscillator, sigma_of(fit)
     slots = oscillator.layout.slots(fit.mode)[r]
@@ -42,10 +42,7 @@ def force_responses(fit: Fit, r: int, grid: Array, scales: Scales) -> Responses 
 
     some = grid[np.linspace(0, grid.size - 1, min(CHECKED, grid.size)).astype(int)]
     expected = simulated_responses(fit, r, some, scales)
-    try:
-        wrong = np.linalg.norm(superposed(some) - expected, axis=1)
-    except np.linalg.LinAlgError:  # the mass sticks: what it did before is forgotten
-        return None
+    wrong = np.linalg.norm(superposed(some) - expected, axis=1)
     return superposed if np.all(wrong < AGREE * np.linalg.norm(expected, axis=1)) else None
 
 

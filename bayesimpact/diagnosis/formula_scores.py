@@ -72,17 +72,13 @@ def formula_scores(fit: Fit, scales: Scales, *, repetition: float = 1.0) -> Form
     """Score the library on a fit; `repetition` samples are worth an independent one.
 
     The shapes of the likeliest local terms are refined: grids are coarse against what the
-    recordings can tell. Recordings of more than `LONGEST` samples are left to the refits. Where the
-    mass sticks no term is scored: the motion says nothing of what came before.
+    recordings can tell. Recordings of more than `LONGEST` samples are left to the refits.
     """
     reach = motion_range(fit)
     met = tuple(formulas_met(fit))
     whole = (*library(scales, *reach), *met)
     counts = fit.target.oscillator.counts
-    try:
-        motions = {r: motion_of(fit, r) for r in range(counts.size) if counts[r] <= LONGEST}
-    except np.linalg.LinAlgError:
-        motions = {}
+    motions = {r: motion_of(fit, r) for r in range(counts.size) if counts[r] <= LONGEST}
     alone: dict[str, Any] = {"scales": scales, "repetition": repetition, "together": False}
     local = (*(t for t in whole if t.shapes and not t.width), *met, *local_starts(*reach))
     heads = _likeliest(score_terms(fit, motions, local, **alone))

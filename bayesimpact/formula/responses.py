@@ -29,12 +29,7 @@ BLOCK = 64  # terms at once, so that memory stays bounded
 
 
 def motion_of(fit: Fit, r: int) -> Motion:
-    """The fitted motion of one recording and its free changes.
-
-    Raises
-    ------
-    LinAlgError : the mass sticks, and what it did before is forgotten
-    """
+    """The fitted motion of one recording and its free changes."""
     oscillator = fit.target.oscillator
     reach = float(np.abs(fit.displacements[r]).max())
     return motion_along(oscillator, r, oscillator.layout.slots(fit.mode)[r], reach)

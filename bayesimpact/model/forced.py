@@ -3,8 +3,8 @@
 The change x of displacement and velocity under a small force f(t) obeys a linear equation along the
 motion, whatever laws act on it: x(t) = W(t) Integral W(s)^-1 (0, f(s) / m) ds, where the columns of
 W are two independent solutions without the force (variation of parameters: Coddington and Levinson
-1955, chapter 3). A law with a state of its own needs more than two, and a mass that sticks has
-none: a simulation or two must say whether the answers serve.
+1955, chapter 3). A law with a state of its own needs more than two: a simulation or two must say
+whether the answers serve.
 """
 
 from __future__ import annotations
@@ -25,12 +25,7 @@ QUADRATURE = 14  # nodes for a wave times a polynomial over one interval: exact 
 
 
 def wave_responses(changes: FreeChanges, frequencies: Array) -> Array:
-    """Responses (2 F, n) to a sine and a cosine of one newton at every frequency (F,), Hz.
-
-    Raises
-    ------
-    LinAlgError : the mass sticks
-    """
+    """Responses (2 F, n) to a sine and a cosine of one newton at every frequency (F,), Hz."""
     angles = 2 * np.pi * changes.interval * frequencies
     weights = _wave_weights(angles) * changes.interval
     parts = changes.stretches

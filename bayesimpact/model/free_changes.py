@@ -1,7 +1,8 @@
 """Two independent free changes of a simulated motion, from which small forces can be superposed.
 
 They are differences of simulations, so they carry every law and every contact, jumps at impact
-included. As they decay they drown in rounding: others take over, stretch by stretch.
+included. As they decay they drown in rounding: others take over, stretch by stretch. Where the mass
+sticks there are none, and it does not answer.
 """
 
 from __future__ import annotations
@@ -19,8 +20,10 @@ from bayesimpact.model.parameters import SLOTS
 
 Array = NDArray[np.float64]
 Laws = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 FADED = 1e-2  # of its largest size a change keeps four digits: of the noise, rounding is 1e-9
+ALIGNED = 1e-2  # sine between two changes, displacement and velocity in units of their size
 POINTS = 6  # samples between which a response to impulses is interpolated
 SHORTEST = POINTS + 2  # samples of a stretch
 _Y0, _V0, _GAIN, _K1 = (SLOTS.index(name) for name in ("y0", "v0", "A", "k1"))
@@ -40,6 +43,16 @@ class Stretch:
     begin: int
     states: Array
     readings: Array
+
+    @cached_property
+    def apart(self) -> Mask:
+        """Where both changes still tell displacement from velocity, (n,): not where friction holds
+        the mass, or it creeps under a root of its speed, for there no small force moves it.
+        """
+        size = np.sqrt(np.mean(self.states**2, axis=(0, 2)))
+        scaled = self.states / np.where(size > 0.0, size, 1.0)[:, None]
+        one, other = np.linalg.norm(scaled, axis=1).T
+        return np.asarray(np.abs(np.linalg.det(scaled)) > ALIGNED * one * other)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,25 +86,15 @@ class FreeChanges:
 
     @cached_property
     def impulses(self) -> tuple[Array, ...]:
-        """Both changes (n, 2) that a unit impulse makes at every sample, per stretch.
-
-        Raises
-        ------
-        LinAlgError : the mass sticks, and what it did before is forgotten
-        """
+        """Both changes (n, 2) that a unit impulse makes at every sample, per stretch."""
         unit = np.array([[0.0], [1 / self.mass]])
-        return tuple(np.linalg.solve(part.states, unit)[..., 0] for part in self.stretches)
+        return tuple(_solved(part.states, part.apart, unit)[..., 0] for part in self.stretches)
 
     @cached_property
     def carried(self) -> Array:
-        """What a change of the stretch before becomes at the begin of each, (S, 2, 2).
-
-        Raises
-        ------
-        LinAlgError : as `impulses`
-        """
+        """What a change of the stretch before becomes at the begin of each, (S, 2, 2)."""
         pairs = zip(self.stretches[1:], self.stretches, strict=False)
-        found = [np.linalg.solve(part.states[0], last.states[-1]) for part, last in pairs]
+        found = [_solved(p.states[:1], p.apart[:1], last.states[-1])[0] for p, last in pairs]
         return np.array([np.zeros((2, 2)), *found])
 
 
@@ -131,17 +134,26 @@ def free_changes(
     length = _fading(whole.states * [[1.0], [1 / rate]], 2 * apart + SHORTEST)
     length = -(-length // factor) * factor  # stretches begin on samples
     begins = np.arange(0, max(last - SHORTEST, 1), length)
-    found = [_part(whole, 0, last if begins.size == 1 else length)]
+    held = base[1][0] == 0.0  # an impulse moves nothing, and where the mass stays is not forgotten
+    begins = begins[[b == 0 or not held[b - apart - 1 : b + 1].any() for b in begins]]
+    ends = [*(int(b) for b in begins[1:]), last]
+    found = [_part(whole, 0, ends[0])]
     runs = []
     for first in (1, 2):  # an impulse ends the stretch before in its run: neighbours take turns
         waves[:] = 0.0
         for begin in begins[first::2]:
             waves[[0, 1], [begin - apart - 1, begin - 1]] = small * slots[_K1]
         runs.append(run(np.tile(slots, (2, 1))) if begins.size > first else whole)
-    for number, begin in enumerate(begins[1:]):
-        end = last if begin == begins[-1] else begin + length
-        found.append(_part(runs[number % 2], int(begin), int(end)))
+    for number, (begin, end) in enumerate(zip(begins[1:], ends[1:], strict=True)):
+        found.append(_part(runs[number % 2], int(begin), end))
     return FreeChanges(tuple(found), np.concatenate([base[0], base[1]]), mass, interval, own)
+
+
+def _solved(states: Array, apart: Mask, wanted: Array) -> Array:
+    """Sizes of both changes (n, 2, k) that make states (2, k) of them; 0 where they are alike."""
+    found = np.zeros((*states.shape[:2], wanted.shape[1]))
+    found[apart] = np.linalg.solve(states[apart], wanted)
+    return found
 
 
 def _part(whole: Stretch, begin: int, end: int) -> Stretch:

@@ -3,7 +3,7 @@
 A residual force has tens of coefficients. To first order each adds a small force along the known
 motion, and what that does follows from the motion's free changes (`superposition`), where a
 simulation each would cost the most of a fit. Some are simulated all the same: they say whether
-superposition serves, which it does not where a law has a state of its own or the mass sticks.
+superposition serves, which it does not where a law has a state of its own.
 
 Stiffness, damping and all steady laws are superposed together or not at all: a sum of a residual
 force's coefficients does what k1 or c1 does, and only errors of one kind cancel in the difference.
@@ -97,16 +97,10 @@ def _is_steady(laws: Index) -> Flags:
 
 
 def _changes(oscillator: Oscillator, r: int, q: Array) -> Array:
-    """By how much the motions of slots (1 + K, Q) differ from the first one, (K, n), superposed.
-
-    NaN where the mass sticks.
-    """
-    found = np.full((q.shape[0] - 1, int(oscillator.counts[r])), np.nan)
-    try:
-        y = oscillator.motions_of(np.array([r]), q[:1], np.array([0]))
-        motion = motion_along(oscillator, r, q[0], float(np.abs(y).max()))
-    except np.linalg.LinAlgError:
-        return found
+    """By how much the motions of slots (1 + K, Q) differ from the first one, (K, n), superposed."""
+    found = np.empty((q.shape[0] - 1, int(oscillator.counts[r])))
+    y = oscillator.motions_of(np.array([r]), q[:1], np.array([0]))
+    motion = motion_along(oscillator, r, q[0], float(np.abs(y).max()))
     for first in range(0, found.shape[0], BLOCK):
         rows = np.concatenate([q[:1], q[1 + first : 1 + first + BLOCK]])
         found[first : first + BLOCK] = answers(motion, force_changes(motion, rows, oscillator.laws))

@@ -54,19 +54,13 @@ class Motion:
 
 
 def motion_along(oscillator: Oscillator, r: int, q: Array, reach: float) -> Motion:
-    """Recording r's motion for slots q (Q,), of displacements up to `reach` m; its free changes.
-
-    Raises
-    ------
-    LinAlgError : the mass sticks, and what it did before is forgotten
-    """
+    """Recording r's motion for slots q (Q,), of displacements up to `reach` m; its free changes."""
     rate = np.sqrt(q[_K1] / oscillator.campaign.mass)
     points = POINTS * float(oscillator.intervals[r]) * rate / (2 * np.pi)
     factor = int(np.clip(np.ceil(points), 1, FINEST))
     changes = free_changes(oscillator, r, q, STEP * reach, factor=factor)
     y, v = changes.motion
     d = y - q[_GAP] if oscillator.campaign.stop else np.full(y.size, -np.inf)
-    _ = changes.impulses, changes.carried  # raise here, where the caller expects it
     t, steps = np.arange(y.size) * changes.interval, _steps(v, d, changes.interval)
     return Motion(y, v, d, t, changes, steps, factor)
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import small_rig
+from effect_rigs import BY_ID
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.input import Input
@@ -17,6 +18,8 @@ from bayesimpact.diagnosis.forced_responses import (
     force_responses,
     simulated_responses,
 )
+from bayesimpact.diagnosis.refit import refit
+from bayesimpact.diagnosis.scan import scan
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.experiment import simulate
@@ -126,6 +129,21 @@ def test_beside_a_measured_input_the_force_comes_on_top(monkeypatch):
     alike = simulated_responses(free, 0, lines, scales)
     ratio = np.linalg.norm(found, axis=1) / np.linalg.norm(alike, axis=1)
     assert np.ptp(ratio) < 0.05 * ratio[0]  # the noise level apart
+
+
+@pytest.mark.parametrize("friction", [0.2, 0.6])
+def test_they_are_the_simulated_ones_where_friction_ends_the_motion(friction, monkeypatch):
+    """A mass that sticks does not answer; before, superposition serves as without friction."""
+    effects, plain = {"coulomb_friction": {"force": friction}}, small_rig.PLAIN
+    campaign = small_rig.record(8, effects, rig=plain, releases=small_rig.PLAIN_RELEASES)
+    base = identify(campaign, rng=np.random.default_rng(0), search=False).fit
+    scales, law = campaign_scales(base), BY_ID["coulomb_friction"]
+    score = scan(base, [law], scales, rng=np.random.default_rng(0)).best()[0]
+    fit = refit(base, [score], scales).fit
+    assert not changes_of(fit).motion[1, -100:].any()
+    lines = np.array([0.5, 1.0, 1.5, 3.0]) * scales.natural_frequency
+    found = superposed(fit, lines, monkeypatch)
+    assert error(found, simulated_responses(fit, 0, lines, scales)) < 0.03
 
 
 @pytest.mark.parametrize("wrong", [1.05, np.nan])
