@@ -11,6 +11,7 @@ from scipy import stats
 from scipy.optimize import minimize
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.diagnosis import discrepancy as module
 from bayesimpact.diagnosis import marginal
 from bayesimpact.diagnosis.discrepancy import UNDERRATED, Discrepancy, discrepancy
 from bayesimpact.diagnosis.extend import campaign_scales
@@ -18,7 +19,7 @@ from bayesimpact.diagnosis.force import missing_force
 from bayesimpact.diagnosis.intervals import intervals
 from bayesimpact.diagnosis.marginal import gain
 from bayesimpact.diagnosis.refit import base_candidate, fit_from
-from bayesimpact.diagnosis.thresholds import DECISIVE
+from bayesimpact.diagnosis.thresholds import DECISIVE, EXCESS
 from bayesimpact.diagnosis.unknown import learn_force
 from bayesimpact.inference.climb import Climb
 from bayesimpact.inference.identify import identify
@@ -292,3 +293,25 @@ def test_a_model_far_behind_is_weighed_to_first_order(monkeypatch):
     far = replace(found, _gains={with_it.fit: (alone + whole + 2 * UNDERRATED, 0.0)})
     assert far.gain(fit, alone) == pytest.approx(whole, abs=UNDERRATED)
     assert climbed == [with_it.fit, fit] and np.isfinite(leader)
+
+
+def test_fewer_knots_in_a_period_of_long_decays_follow_what_is_missing_too(monkeypatch):
+    """Models are compared with as many knots each: of powers a factor of `EXCESS` counts."""
+    decay = {"rig": small_rig.PLAIN, "releases": small_rig.PLAIN_RELEASES, "duration": 8.0}
+    campaign = small_rig.record(3, {"quadratic_drag": {"coefficient": 0.5}}, **decay)
+    fit = plain_fit(campaign)
+    whole = left_by(fit)
+    monkeypatch.setattr(module, "QUICK", 1)
+    fewer = left_by(fit)
+    cycles = 8.0 * np.sqrt(fit.value("k1") / campaign.mass) / (2 * np.pi)
+    knots = [one.values[0].size - 1 for one in (whole, fewer)]
+    assert knots == [int(np.ceil(8 * cycles)), int(np.ceil(4 * cycles))]
+    assert whole.leaves_noise and fewer.leaves_noise
+    assert 1 / EXCESS < fewer.power / whole.power < EXCESS
+
+
+def test_at_a_stop_contacts_need_all_knots(monkeypatch):
+    fit = plain_fit(small_rig.record(3, {"contact_power_law": {"exponent": 1.2}}))
+    whole = left_by(fit)
+    monkeypatch.setattr(module, "QUICK", 1)
+    assert left_by(fit).values[0].size == whole.values[0].size > 8 * 2.0 * 6

@@ -61,5 +61,6 @@ def test_only_a_few_lines_are_simulated(beside_friction, not_superposed, monkeyp
     monkeypatch.setattr(periodic, "SIMULATED", 3)
     monkeypatch.setattr(periodic, "simulated_responses", counted)
     periodic.periodic_scores(fit, [FORCING], scales)
-    assert grid.size > 9 and tried
-    assert all(sum(n for at, n in tried if at == r) <= 9 for r in range(2))
+    assert grid.size > 9
+    for r in range(2):  # three lines, or fewer, and their neighbours
+        assert 3 < sum(n for at, n in tried if at == r) <= 9
