@@ -31,7 +31,7 @@ OPTIONS: tuple[Callable[[Callable[..., None]], Callable[..., None]], ...] = (
                  help="Range of sizes in detection limits. [1.5 6]"),
     click.option("--rig", metavar="A,B",
                  help="paper, soft, stiff, fast, slow, one, five, plain, small. [all but small]"),
-    click.option("--noise", metavar="A,B", help="white, ar1, smoothed. [all]"),
+    click.option("--noise", metavar="A,B", help="white, ar1, smoothed, slow. [all but slow]"),
     click.option("--misfit", nargs=2, type=float, metavar="LOW HIGH",
                  help="strong: range of the base misfit over the noise. [3 300]"),
     click.option("--rest", type=click.FloatRange(0, 1), metavar="SHARE",

@@ -23,6 +23,7 @@ from bayesimpact.trial.rig_chain import Chain
 Range = tuple[float, float]
 
 NOISES = ("white", "ar1", "smoothed")
+SLOW: Range = (0.03, 1.0)  # free periods in the correlation time of slow noise
 
 
 @dataclass(frozen=True)
@@ -241,6 +242,11 @@ def _chain(
     offsets = {r.name: float(2 * noise * rng.standard_normal()) for r in releases}
     correlation = float(rng.uniform(0.2, 0.8))
     rounding = noise * log_uniform(rng, (0.02, 0.4))
+    if kind == "slow":
+        period = 2 * pi * sqrt(rig.mass / rig.k1)
+        correlation = exp(-1 / (log_uniform(rng, SLOW) * period * ranges.rate))
+        white = float(rng.uniform(0.2, 0.8))
+        return Chain(noise, correlation, offsets, None, rounding, white), Measurement()
     if kind != "smoothed":
         correlation = correlation if kind == "ar1" else 0.0
         return Chain(noise, correlation, offsets, None, rounding), Measurement()

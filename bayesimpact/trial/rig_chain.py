@@ -30,6 +30,7 @@ class Chain:
     noise : standard deviation of the raw noise, m
     correlation : of neighbouring noise samples, AR(1), in (-1, 1); `noise` stays its standard
         deviation, and it is stationary from the first sample
+    white : share of the noise's variance that is white, where the rest is AR(1); in [0, 1)
     offsets : recording -> rest reading of the probe, m; 0 where not given
     smoothing : applied to the noisy signal. `savgol`: odd window, polynomial fitted at the ends;
         `lag`: x_i = x_(i-1) + (1 - exp(-1 / (rate time_constant))) (signal_i - x_(i-1)),
@@ -42,12 +43,15 @@ class Chain:
     offsets: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     smoothing: Smoothing | None = None
     rounding: float = 0.0
+    white: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0 <= self.noise < np.inf:
             raise InputError("noise", repr(self.noise), "a standard deviation >= 0 in m")
         if not -1 < self.correlation < 1:
             raise InputError("correlation", repr(self.correlation), "a number within (-1, 1)")
+        if not 0 <= self.white < 1:
+            raise InputError("white", repr(self.white), "a share of the variance within [0, 1)")
         if not 0 <= self.rounding < np.inf:
             raise InputError("rounding", repr(self.rounding), "a digit >= 0 in m")
 
@@ -90,7 +94,11 @@ def measure(
 ) -> Series:
     """Pass one recording's true displacement (n,) in m through probe and chain -> (n,) m."""
     signal = probe.reads(displacement, times) + chain.offsets.get(name, 0.0)
-    signal = signal + chain.noise * _unit_noise(times.size, chain.correlation, rng)
+    noise = _unit_noise(times.size, chain.correlation, rng)
+    if chain.white:
+        more = rng.standard_normal(times.size)
+        noise = sqrt(1 - chain.white) * noise + sqrt(chain.white) * more
+    signal = signal + chain.noise * noise
     if chain.smoothing is not None:
         signal = smooth(signal, chain.smoothing, float(times[1] - times[0]))
     if chain.rounding > 0:

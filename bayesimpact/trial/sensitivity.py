@@ -89,6 +89,7 @@ def truth_of_rig(settings: Settings, seed: int, kind: str, design: DrawnRig) -> 
         "duration_s": design.duration,
         "noise_m": design.chain.noise,
         "noise_correlation": design.chain.correlation,
+        "noise_white_share": design.chain.white,
         "rounding_m": design.chain.rounding,
     }
 
@@ -183,7 +184,9 @@ def _fit(design: DrawnRig, readings: Sequence[Array]) -> Fit:
         "control", design.rig.mass, recordings, bool(design.rig.k2), design.measurement
     )
     oscillator = build_oscillator(campaign)
-    noise = Noise(design.chain.correlation, design.chain.smoothing, design.chain.noise)
+    chain = design.chain
+    white = ((0.0, chain.white),) if chain.white else ()
+    noise = Noise(chain.correlation, chain.smoothing, chain.noise, others=white)
     truth = true_parameters(design) | {"sigma": design.chain.noise}
     priors = [_wide(name, truth[name], design) for name in oscillator.layout.names]
     target = Target(Likelihood(oscillator, noise), Priors(tuple(priors)))

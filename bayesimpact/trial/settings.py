@@ -73,7 +73,7 @@ class Settings:
             "effects": tuple(CATALOGUE_STRONG if strong else PLANTED_EFFECTS),
             "outside": tuple(STRONG_OUTSIDE if strong else OUTSIDE_EFFECTS),
             "rig_kinds": tuple(STRONG_RIGS if strong else RIG_DESIGNS),
-            "noises": ("white", "ar1") if strong else NOISES,
+            "noises": ("white", "ar1") if strong else (*NOISES, "slow"),
         }
         for name, accepted in known.items():
             given = getattr(self, name)

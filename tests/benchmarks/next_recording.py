@@ -77,7 +77,8 @@ def recorded(
     y0 = design.y0 * (1 + 0.02 * rng.standard_normal())
     v0 = design.v0 + 4e-3 * speed * rng.standard_normal()
     offsets = {"new": float(2 * noise * rng.standard_normal())}
-    chain = Chain(noise, truth["noise_correlation"], offsets, None, truth["rounding_m"])
+    white = truth.get("noise_white_share", 0.0)
+    chain = Chain(noise, truth["noise_correlation"], offsets, None, truth["rounding_m"], white)
     samples = record(
         rig, Release("new", design.case, y0, v0), effects, chain,
         rate=1 / design.interval, duration=design.samples * design.interval, rng=rng,

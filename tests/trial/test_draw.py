@@ -60,7 +60,7 @@ def test_forms_are_what_the_rig_takes(effect: str) -> None:
 
 
 @pytest.mark.parametrize("rig_kind", RIG_DESIGNS)
-@pytest.mark.parametrize("noise", NOISES)
+@pytest.mark.parametrize("noise", (*NOISES, "slow"))
 def test_kinds_of_rigs(rig_kind: str, noise: str) -> None:
     for seed in range(5):
         design = draw_rig_design(rig_kind, noise, np.random.default_rng(seed))
@@ -71,7 +71,8 @@ def test_kinds_of_rigs(rig_kind: str, noise: str) -> None:
         lowest = min(abs(r.y0) for r in design.releases)
         assert not rig.k2 or 0 < rig.g < 0.7 * lowest  # every recording hits the obstacle
         assert round(design.rate * design.duration) <= 40_000
-        assert (design.chain.correlation != 0) == (noise == "ar1")
+        assert (design.chain.correlation != 0) == (noise in ("ar1", "slow"))
+        assert (design.chain.white > 0) == (noise == "slow")
         assert (design.measurement.smoothing is not None) == (noise == "smoothed")
         assert design.chain.smoothing == design.measurement.smoothing
         assert any(design.chain.offsets.values()) and design.chain.rounding > 0

@@ -103,17 +103,21 @@ def test_concealed_chain_effects_equal_the_open_ones():
         recorded(hidden, open_chain)
 
 
-@pytest.mark.parametrize("correlation", [0.0, 0.7, -0.4])
-def test_noise_is_stationary_with_the_stated_correlation(correlation):
+@pytest.mark.parametrize(
+    ("correlation", "white"), [(0.0, 0.0), (0.7, 0.0), (-0.4, 0.0), (0.8, 0.6)]
+)
+def test_noise_is_stationary_with_the_stated_correlation(correlation, white):
     times = np.arange(500) / 1000
     rng = np.random.default_rng(5)
-    chain = Chain(noise=5e-6, correlation=correlation)
+    chain = Chain(noise=5e-6, correlation=correlation, white=white)
     noise = np.array([measure(0 * times, times, Probe(), chain, "r", rng) for _ in range(400)])
     # 200,000 samples; the effective number is smaller by (1 + phi^2)/(1 - phi^2)
     error = np.sqrt((1 + correlation**2) / (1 - correlation**2) / 2e5)
     assert np.var(noise) == pytest.approx(25e-12, rel=5 * np.sqrt(2) * error)
     lagged = np.mean(noise[:, 1:] * noise[:, :-1]) / np.var(noise)
-    assert lagged == pytest.approx(correlation, abs=5 * error)
+    assert lagged == pytest.approx((1 - white) * correlation, abs=5 * error)
+    farther = np.mean(noise[:, 2:] * noise[:, :-2]) / np.var(noise)
+    assert farther == pytest.approx((1 - white) * correlation**2, abs=5 * error)
     # the first sample is as wide as the others: known to 3.5 % from 400 of them
     assert np.std(noise[:, 0]) == pytest.approx(5e-6, rel=0.15)
 
@@ -133,7 +137,7 @@ def test_impossible_filters_are_refused(smoothing):
 
 
 @pytest.mark.parametrize(
-    "bad", [{"noise": -1e-6}, {"correlation": 1.0}, {"rounding": float("nan")}]
+    "bad", [{"noise": -1e-6}, {"correlation": 1.0}, {"rounding": float("nan")}, {"white": 1.0}]
 )
 def test_impossible_chains_are_refused(bad):
     with pytest.raises(InputError, match=next(iter(bad))):
