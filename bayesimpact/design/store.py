@@ -31,7 +31,7 @@ def rivals_content(rivals: Rivalry) -> tuple[dict[str, Any], dict[str, Array]]:
     """What JSON can say of the rivals, and their arrays by name."""
     noise = asdict(rivals.noise)
     content = {
-        "noise": {k: noise[k] for k in ("correlation", "smoothing", "scales", "source")},
+        "noise": {k: noise[k] for k in ("correlation", "others", "smoothing", "scales", "source")},
         "repetition": rivals.repetition,
         "mass": rivals.mass,
         "stop": rivals.stop,
@@ -68,6 +68,7 @@ def rivals_from(
     if noise["smoothing"] is not None:
         noise["smoothing"] = Smoothing(**noise["smoothing"])
     noise["scales"] = tuple(map(float, noise["scales"]))
+    noise["others"] = tuple((float(rho), float(share)) for rho, share in noise.get("others", ()))
     known = {e.id: e for e in effects}
     return Rivalry(
         verdict,

@@ -142,3 +142,5 @@ def test_noise_keeps_its_correlation_in_time(small: Identification) -> None:
     interval = rivals.releases[0].interval
     assert noise_at(interval / 2, rivals).correlation == pytest.approx(sqrt(0.5))
     assert noise_at(interval, rivals).correlation == pytest.approx(0.5)
+    slow = replace(rivals, noise=Noise(correlation=0.5, others=((0.0, 0.3), (0.81, 0.2))))
+    assert noise_at(interval / 2, slow).parts == ((sqrt(0.5), 0.5), (0.0, 0.3), (0.9, 0.2))

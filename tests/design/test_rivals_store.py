@@ -29,7 +29,8 @@ def test_they_come_back_as_they_were(small: Identification, force: object) -> No
     rivals = base_rivalry(small)
     friction = next(e for e in EFFECTS if e.id == "coulomb_friction")
     model = replace(rivals.hypotheses[0], effects=(friction, force))  # type: ignore[arg-type]
-    noise = Noise(0.3, Smoothing("savgol", 19, 2), scales=(1.0, 2.0, 3.0))
+    others = ((0.0, 0.4), (0.99, 0.1))
+    noise = Noise(0.3, Smoothing("savgol", 19, 2), scales=(1.0, 2.0, 3.0), others=others)
     kept = replace(rivals, hypotheses=(model,), noise=noise, verdict="unknown", repetition=2.5)
     content, arrays = rivals_content(kept)
     back = rivals_from("unknown", json.loads(json.dumps(content)), arrays, EFFECTS)
