@@ -25,7 +25,7 @@ _BASE = {
 }
 _LEAST = {"N": 0.01, "rad": 0.1}  # smaller sizes get a prefix
 _REMARK = re.compile(r" (?:per|at) ")
-_SYMBOL = re.compile(r"([A-Za-z]+|1|-)(-?\d*)")
+_SYMBOL = re.compile(r"([A-Za-z]+|1|-)(-?(?:\d+(?:\.\d+)?)?)")
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _PREFIXES = {-9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 MINUS = "\N{MINUS SIGN}"

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import ctypes
 import pickle
+import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +20,7 @@ from bayesimpact.formula.write import effect_file
 from bayesimpact.model.effects.effect import Effect, address
 from bayesimpact.model.own_effects import USUAL, check_effects, load_effects
 from bayesimpact.model.parameters import angular
+from bayesimpact.model.units import Dimensions, dimensions, per_mass_unit, typeset
 
 LOW, HIGH = -6e-3, 3e-3
 LIBRARY = library(USUAL, LOW, HIGH)
@@ -194,3 +197,18 @@ def test_neighbours_keep_the_kind_and_move_the_shape() -> None:
     assert len(around) == 8 and all(t.kind == bump.kind and t != bump for t in around)
     assert {round(t.place, 6) for t in around} == {1.75e-3, 2e-3, 2.25e-3}
     assert all(t.region in ("bump", "box") for t in local_starts(LOW, HIGH))
+
+
+def test_a_report_can_word_the_unit_of_every_term() -> None:
+    """One of a power like 2.5 once ended a report."""
+    units = {term.unit: term for term in LIBRARY}
+    assert "N s/m2.5" in units
+    for unit, term in units.items():
+        force, speeds = dimensions(unit), term.speed.exponent
+        lengths = term.position.exponent + speeds
+        assert force == Dimensions(1.0, speeds - term.drift - 2.0, 1.0 - lengths)
+        assert dimensions(angular(unit), angle=True) == force
+        assert not re.search(r"[A-Za-z]\d", typeset(unit))
+        turned = per_mass_unit(angular(unit), angle=True)
+        assert turned.replace("rad", "m") == per_mass_unit(unit)
+        assert dimensions(per_mass_unit(unit)) == replace(force, mass=0.0)
