@@ -31,6 +31,7 @@ from bayesimpact.diagnosis.words import (
     nearest,
     parameter_shifts,
     remaining,
+    slow_noise_words,
     statement,
 )
 from bayesimpact.formula.law import is_formula_id
@@ -94,6 +95,7 @@ def document(
                 either=d.either,
             )
         )
+        + slow_noise_words(noise)
         + _nearest(d)
         + _unfinished(d),
         "location": _location(d.location) or (place(faulty) if faulty else None),

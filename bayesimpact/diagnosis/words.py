@@ -10,6 +10,7 @@ from bayesimpact.diagnosis.faults.compare import base_failed
 from bayesimpact.diagnosis.remainder import Remainder
 from bayesimpact.formula.law import is_formula_id
 from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.noise import Noise
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.effects.effect import Effect
 from bayesimpact.model.units import span_of, two_digits
@@ -136,6 +137,16 @@ def remaining(left: Remainder | None, unit: str = "m") -> str:
     guess = f"; likeliest: {titles_of(left.guess)}" if left.guess else ""
     return (
         f" Unexplained remains {size}, {REGIMES[left.regime]}{guess}. The intervals allow for it."
+    )
+
+
+def slow_noise_words(noise: Noise) -> str:
+    """A sentence where what a model leaves was taken for slow noise; else empty."""
+    if noise.is_independent or not noise.others:
+        return ""
+    return (
+        " What the model leaves is taken for noise that is slow as well as white "
+        f"({noise.kind}): no force explains it as well."
     )
 
 

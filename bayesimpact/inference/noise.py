@@ -60,6 +60,9 @@ class Noise:
         over that of the campaign's first quantity
     growth : by which it is larger away from rest, and where the reading changes: 1/m and s/m, over
         `level`, see `noise_growth`
+    others : correlations of further AR(1) processes, 0 for white noise, each with its share of the
+        raw noise's variance; what is left of it is that of `correlation`
+    is_independent : it was estimated without a model of the motion
     """
 
     correlation: float = 0.0
@@ -72,6 +75,7 @@ class Noise:
     scales: tuple[float, float, float] = (1.0, 1.0, 1.0)
     growth: tuple[float, float] = (0.0, 0.0)
     others: Parts = ()
+    is_independent: bool = field(default=True, compare=False)
 
     @property
     def is_white(self) -> bool:

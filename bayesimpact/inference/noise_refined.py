@@ -86,7 +86,8 @@ def refined_noise(fit: Fit) -> Noise:
         error = float(np.sqrt(0.5 / fit.target.likelihood.sizes.sum()))
         # of the noise before a filter; the residual's rms is that behind it
         level = noise.level * float(np.sqrt(fit.reduced_chi2))
-        return replace(noise, level=level, level_error=error, source="residual of the base model")
+        told = replace(noise, level=level, level_error=error, is_independent=False)
+        return replace(told, source="residual of the base model")
     plain = noise.correlation == 0.0 and noise.smoothing is None
     if plain or fit.reduced_chi2 > LARGE_MISFIT or fit.target.oscillator.campaign.mixed:
         return noise

@@ -94,7 +94,13 @@ def slow_noise(fit: Fit) -> SlowNoise | None:
     before = _Whole(fit, linear, noise)
     level = noise.level * float(np.sqrt(found.variance))
     error = float(np.sqrt(0.5 / likelihood.sizes.sum()))
-    told = replace(found.noise, level=level, level_error=error, source="residual of the model")
+    told = replace(
+        found.noise,
+        level=level,
+        level_error=error,
+        source="residual of the model",
+        is_independent=False,
+    )
     return SlowNoise(told, found.log_evidence - before.log_evidence, found.residuals)
 
 

@@ -134,7 +134,12 @@ def _results(
             EffectSummary(e.id, e.title, e.equation, e.statement) for e in oscillator.acting
         ),
         noise=NoiseSummary(
-            noise.kind, noise.level, noise.level_error, noise.correlation, noise.source
+            noise.kind,
+            noise.level,
+            noise.level_error,
+            noise.correlation,
+            noise.source,
+            noise.is_independent,
         ),
         chain=chain,
         verdict="",

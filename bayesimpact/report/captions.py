@@ -145,8 +145,8 @@ def _fit(results: Results, which: str) -> str:
     close = "the deepest impact" if results.stop else "the first cycles after the release"
     return (
         f"{head} (light) and model at the mode (line), residuals below, all on one scale; on the "
-        f"right {close}.{stop} Orange lines: twice the standard deviation of the noise as "
-        "estimated without the model."
+        f"right {close}.{stop} Orange lines: twice the standard deviation of the noise"
+        f"{' as estimated without the model' if results.noise.is_independent else ''}."
     )
 
 

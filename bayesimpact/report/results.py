@@ -206,13 +206,14 @@ class EffectSummary:
 
 @dataclass(frozen=True)
 class NoiseSummary:
-    """The noise as estimated from the recordings alone; level in m (or rad)."""
+    """The noise as estimated; level in m (or rad). Independent: from the recordings alone."""
 
     kind: str
     level: float
     level_error: float
     correlation: float
     source: str
+    is_independent: bool
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ def facts(results: Results) -> list[tuple[str, str]]:
         ("recordings", str(len(results.recordings))),
         ("samples", number(sum(r.samples.size for r in results.recordings), 0)),
         ("unknowns", str(len(results.rows))),
-        ("noise, from the recordings alone", amount(results.noise.level, results.unit)),
+        (f"noise, from {_noise_source(results)}", amount(results.noise.level, results.unit)),
         ("residual rms", amount(results.rms, results.unit)),
         ("reduced χ²", chi2(results.reduced_chi2)),
     ]
@@ -129,10 +129,8 @@ def recordings_words(results: Results) -> str:
     test = "cumulative periodogram" if results.chain.smoothing else f"Ljung-Box, {LAGS} lags"
     words = (
         "Residual: recorded minus predicted at the mode. Reduced χ² is against the noise level "
-        "that was estimated from the recordings alone; whiteness is the p-value of the whitened "
-        "residual "
-        f"({test}), for "
-        "information."
+        f"that was estimated from {_noise_source(results)}; whiteness is the p-value of the "
+        f"whitened residual ({test}), for information."
     )
     if any(r.excluded for r in results.recordings):
         words += " Shaded samples are set aside: they count nowhere, and a stand-in is drawn."
@@ -205,6 +203,10 @@ def sampler_words(results: Results) -> str:
     if s.converged:
         return words + " All demands on convergence are met."
     return words + f" Not converged: {'; '.join(s.reasons)}."
+
+
+def _noise_source(results: Results) -> str:
+    return "the recordings alone" if results.noise.is_independent else "what the model leaves"
 
 
 def noise_words(results: Results) -> str:

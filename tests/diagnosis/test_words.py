@@ -20,8 +20,10 @@ from bayesimpact.diagnosis.words import (
     parameter_shift,
     parameter_shifts,
     remaining,
+    slow_noise_words,
     statement,
 )
+from bayesimpact.inference.noise import Noise
 
 
 def told(*args: object, **more: object) -> str:
@@ -103,6 +105,12 @@ def test_a_failed_base_fit_says_what_may_be_wrong():
     assert 'gain = "free"' in failure(fit_of(0.6, None, known))
     said = failure(fit_of(0.6, free))
     assert "sign, delay or kind of the input" in said and "gain" not in said
+
+
+def test_slow_noise_is_said_where_a_model_s_residual_showed_it():
+    assert slow_noise_words(Noise()) == slow_noise_words(Noise(0.4)) == ""
+    said = slow_noise_words(Noise(0.96, others=((0.0, 0.4),), is_independent=False))
+    assert "60 % AR(1), correlation 0.96, 40 % white" in said
 
 
 @pytest.mark.parametrize(

@@ -132,7 +132,7 @@ def make_results(
     made = Results(
         name="rig <1> & others", mass=MASS, stop=stop, quantity="displacement",
         recordings=recordings, rows=table, effects=(),
-        noise=NoiseSummary("white", NOISE, 0.003, 0.0, "polynomial remainders"),
+        noise=NoiseSummary("white", NOISE, 0.003, 0.0, "polynomial remainders", True),
         chain=ChainSummary("", 0.0, 0.0, 0.0), verdict="", headline="", reduced_chi2=chi2,
         chi2_z=(chi2 - 1) / np.sqrt(2 / (count * n)), log_posterior=1234.5,
         covariance=np.diag([r.sd**2 for r in table]), fit_converged=True, search=search,

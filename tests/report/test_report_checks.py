@@ -13,9 +13,11 @@ from synthetic import make_results
 from bayesimpact.data.campaign import Smoothing
 from bayesimpact.inference.noise import Noise
 from bayesimpact.model.measurement import smooth
+from bayesimpact.report.captions import caption
 from bayesimpact.report.checks import assess, assessed
 from bayesimpact.report.results import EffectSummary
 from bayesimpact.report.whiteness import flat_spectrum, whiteness
+from bayesimpact.report.words import facts, recordings_words
 
 
 @pytest.mark.parametrize(
@@ -43,6 +45,21 @@ def test_adequate_in_words() -> None:
     assert "describes these recordings down to the noise" in results.headline
     assert "5.00\N{NO-BREAK SPACE}µm" in results.headline
     assert results.headline.endswith("The sampler converged.")
+
+
+def test_noise_taken_from_what_a_model_leaves_is_no_test_of_it() -> None:
+    results = make_results()
+    assert "estimated without the model" in results.headline
+    assert results.checks[0].status == "passed"
+    taken = replace(results, noise=replace(results.noise, is_independent=False))
+    after = assessed(taken)
+    assert after.verdict == "adequate" and "without the model" not in after.headline
+    assert after.checks[0].status == "note" and "no test of the misfit" in after.checks[0].meaning
+    names = [name for name, _ in facts(taken)]
+    assert "noise, from what the model leaves" in names
+    assert "what the model leaves" in recordings_words(taken)
+    assert "without the model" in caption("fit", results)
+    assert "without the model" not in caption("fit", taken)
 
 
 def test_a_linear_oscillator_that_does_not_fit_is_said_so_first() -> None:
