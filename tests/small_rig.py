@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 from unittest.mock import patch
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from bayesimpact.data.campaign import Campaign, Measurement
 from bayesimpact.data.quantity import Quantity
+from bayesimpact.inference.noise import Noise
 from bayesimpact.model.parameters import Layout
 from bayesimpact.trial import rig as generator
 from bayesimpact.trial.rig import Effects, Release, Rig, make_campaign, motion
@@ -74,6 +76,17 @@ def record(
             measurement=measurement,
             quantity=quantity,
         )
+
+
+def with_slow(campaign: Campaign, seed: int, size: float, correlation: float = 0.95) -> Campaign:
+    """The recordings with AR(1) noise of `size` times their white noise on top."""
+    rng, slow = np.random.default_rng(seed + 1000), Noise(correlation)
+    more = [
+        slow.coloured(rng, r.samples.size, r.interval, size * NOISE) for r in campaign.recordings
+    ]
+    pairs = zip(campaign.recordings, more, strict=True)
+    recordings = tuple(replace(r, samples=r.samples + noise) for r, noise in pairs)
+    return replace(campaign, recordings=recordings)
 
 
 def motion_of(number: int, rate: float = 1000.0, duration: float = 2.0) -> RigMotion:

@@ -223,6 +223,7 @@ TABLES = {
     "trials": partial(blind_table, "trials"),
     "pairs": partial(blind_table, "pairs"),
     "controls": controls_table,
+    "slow_noise": partial(blind_table, "slow_noise"),
     "trial_coverage": trial_coverage_table,
     "singles": single_table,
     "strong": strong_table,

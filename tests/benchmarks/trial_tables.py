@@ -34,10 +34,13 @@ def blind_table(name: str) -> str:
         ("sizes inside their 90 % interval, where named", share(t["sizes_inside"])),
     ]
     first, last = t["seeds"]
+    sizes = f"{low:g}" if low == high else f"{low:g} to {high:g}"
+    noises = len(t["by_noise"])
     foot = (
-        f"{t['trials']} trials, seeds {first} to {last}; sizes of {low:g} to {high:g} detection "
+        f"{t['trials']} trials, seeds {first} to {last}; sizes of {sizes} detection "
         f"limits (a limit is five standard errors); {len(t['by_rig_kind'])} rigs, "
-        f"{len(t['by_noise'])} kinds of noise; median {t['seconds']['median']:.0f} s a diagnosis. "
+        f"{noises} kind{'s' * (noises > 1)} of noise; "
+        f"median {t['seconds']['median']:.0f} s a diagnosis. "
         f"In brackets: 95 % interval. Commit {t['commit'][:7]}, {t['date']}."
     )
     return grid(("concealed", "answers"), rows, foot)

@@ -14,29 +14,13 @@ from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.recording_faults import cleaned_campaign
 from bayesimpact.diagnosis.slow_noise import remaining_noise
 from bayesimpact.inference.identify import identify
-from bayesimpact.inference.noise import Noise
 
 RNG = np.random.default_rng
-SLOW = Noise(0.95)
-
-
-def with_slow(campaign, seed, size):
-    """The recordings with AR(1) noise of `size` times their white noise on top."""
-    rng = RNG(seed + 1000)
-    recordings = (
-        replace(
-            r,
-            samples=r.samples
-            + SLOW.coloured(rng, r.samples.size, r.interval, size * small_rig.NOISE),
-        )
-        for r in campaign.recordings
-    )
-    return replace(campaign, recordings=tuple(recordings))
 
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_a_control_with_slow_noise_is_adequate_and_says_so(seed):
-    campaign = with_slow(small_rig.record(seed), seed, 1.25)
+    campaign = small_rig.with_slow(small_rig.record(seed), seed, 1.25)
     found = diagnose(campaign, rng=RNG(0), search=False)
     assert found.verdict == "adequate"
     noise = found.after.target.likelihood.noise
@@ -50,7 +34,7 @@ DRAG = {"quadratic_drag": {"coefficient": 3.0}}
 
 
 def test_physics_beside_slow_noise_is_named_and_the_noise_found_beside_it():
-    campaign = with_slow(small_rig.record(2, DRAG), 2, 1.25)
+    campaign = small_rig.with_slow(small_rig.record(2, DRAG), 2, 1.25)
     found = diagnose(campaign, rng=RNG(0), search=False)
     assert [e.id for e in found.effects] == ["quadratic_drag"]
     assert found.verdict in ("named", "ambiguous")
@@ -73,7 +57,7 @@ def test_a_law_in_contact_that_no_force_of_time_follows_is_no_slow_noise():
 
 
 def test_a_search_begins_with_slow_noise_whatever_was_corrected_before():
-    campaign = with_slow(small_rig.record(6), 6, 1.25)
+    campaign = small_rig.with_slow(small_rig.record(6), 6, 1.25)
     corrected = cleaned_campaign(campaign, rng=RNG(0), search=False)
     assert not corrected.identification.noise.others
     found = whole._of_corrected(
@@ -83,7 +67,7 @@ def test_a_search_begins_with_slow_noise_whatever_was_corrected_before():
 
 
 def test_slow_noise_is_found_again_beside_a_fault_of_a_recording():
-    campaign = with_slow(small_rig.record(5), 5, 1.25)
+    campaign = small_rig.with_slow(small_rig.record(5), 5, 1.25)
     first, *others = campaign.recordings
     turned = replace(first, samples=-first.samples)
     found = diagnose(replace(campaign, recordings=(turned, *others)), rng=RNG(0), search=False)

@@ -20,18 +20,8 @@ CORRELATION, SIZE, SEEDS = 0.95, 1.25, 12  # of the slow part, over the white on
 SHARE = 1 / (1 + SIZE**2)
 
 
-def with_slow(campaign: Campaign, seed: int, correlation: float = CORRELATION) -> Campaign:
-    """The recordings with an AR(1) part beside their white noise."""
-    rng, slow = RNG(seed + 1000), Noise(correlation)
-    recordings = (
-        replace(
-            r,
-            samples=r.samples
-            + slow.coloured(rng, r.samples.size, r.interval, SIZE * small_rig.NOISE),
-        )
-        for r in campaign.recordings
-    )
-    return replace(campaign, recordings=tuple(recordings))
+def recorded(seed: int) -> Campaign:
+    return small_rig.with_slow(small_rig.record(seed), seed, SIZE, CORRELATION)
 
 
 def fitted(campaign: Campaign, **options):
@@ -41,7 +31,10 @@ def fitted(campaign: Campaign, **options):
 @pytest.fixture(scope="module")
 def found():
     """What is found in recordings with planted slow noise."""
-    campaigns = (with_slow(small_rig.record(seed), seed) for seed in range(SEEDS))
+    campaigns = (
+        small_rig.with_slow(small_rig.record(seed), seed, SIZE, CORRELATION)
+        for seed in range(SEEDS)
+    )
     return [slow_noise(fitted(campaign)) for campaign in campaigns]
 
 
@@ -69,7 +62,7 @@ def test_what_it_leaves_is_white_and_of_unit_variance(found):
 
 def test_its_gain_is_the_log_likelihood_ratio_beside_few_parameters(found):
     """Against dense covariances of one recording, its parameters as good as known."""
-    campaign = with_slow(small_rig.record(0), 0)
+    campaign = recorded(0)
     fit, noise = fitted(campaign), found[0].noise
     rows = []
     for part in fit.linearisation:
