@@ -57,7 +57,7 @@ from bayesimpact.diagnosis.simpler import (
     makes_idle,
     may_be_simpler,
 )
-from bayesimpact.diagnosis.slow_noise import remaining_noise, with_noise, with_slow_noise
+from bayesimpact.diagnosis.slow_noise import remaining_noise, with_noise
 from bayesimpact.diagnosis.smoothing import SAVITZKY_GOLAY, whole_campaign
 from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.fit import Fit
@@ -147,7 +147,7 @@ def diagnose(
     """
     say = progress or (lambda message: None)
     say("fitting the base model")
-    cleaned = with_slow_noise(cleaned_campaign(campaign, rng=rng, search=search))
+    cleaned = cleaned_campaign(campaign, rng=rng, search=search)
     say("comparing the recordings")
     certain, doubtful, proved = cleaned, list(comparisons(cleaned, campaign)), False
     beside_physics = faults_beside_physics(cleaned, campaign, effects, doubtful)
@@ -315,7 +315,6 @@ def _of_corrected(
     first: Fit | None,
 ) -> Diagnosis:
     """The diagnosis of a campaign whose faults are set aside or corrected."""
-    corrected = with_slow_noise(corrected)
     for fault in corrected.faults:
         progress(f"set aside or corrected: {fault.recording}: {fault.statement} ({fault.id})")
     through = corrected.identification

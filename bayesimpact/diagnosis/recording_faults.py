@@ -21,6 +21,7 @@ from bayesimpact.diagnosis.faults.compare import (
     misfits,
 )
 from bayesimpact.diagnosis.faults.outliers import faults_set_aside, residual_spikes
+from bayesimpact.diagnosis.slow_noise import with_slow_noise
 from bayesimpact.diagnosis.smoothing import proved_smoothing
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.formula.law import is_formula
@@ -79,7 +80,7 @@ def cleaned_campaign(campaign: Campaign, *, rng: np.random.Generator, search: bo
     """
     cleaned, own = set_aside(campaign)
     cleaned, filtered = _through_filter(cleaned, None)
-    found = Corrected(identify(cleaned, rng=rng, search=search), own, filtered=filtered)
+    found = Corrected(_identified(cleaned, rng=rng, search=search), own, filtered=filtered)
     fit = found.identification.fit
     spikes = () if campaign.keep_faults or base_failed(fit) else residual_spikes(fit)
     if not spikes:
@@ -96,7 +97,7 @@ def without_faults(
     before = found.identification
     whole = before.fit.target.oscillator.campaign
     campaign = faults_set_aside(whole, faults)
-    again = replace(identify(campaign, rng=rng, search=False), search=before.search)
+    again = replace(_identified(campaign, rng=rng, search=False), search=before.search)
     change = before.fit.reduced_chi2, again.fit.reduced_chi2
     told = (_as_read(fault, whole, as_read) for fault in faults)
     return replace(
@@ -163,9 +164,14 @@ def with_steps(
 ) -> Corrected:
     """The same with the next steps of `comparisons` corrected, each after all before it."""
     campaign, filtered = _through_filter(steps[-1][-1].campaign, before.filtered)
-    identification = identify(campaign, rng=rng, search=search)
+    identification = _identified(campaign, rng=rng, search=search)
     compared = (*before.compared, *chain.from_iterable(steps))
     return Corrected(identification, before.own, compared, filtered)
+
+
+def _identified(campaign: Campaign, *, rng: np.random.Generator, search: bool) -> Identification:
+    """The base model's mode, under slow noise where it leaves that and nothing else."""
+    return with_slow_noise(identify(campaign, rng=rng, search=search))
 
 
 def _through_filter(

@@ -12,7 +12,6 @@ from dataclasses import replace
 
 from bayesimpact.diagnosis.discrepancy import discrepancy
 from bayesimpact.diagnosis.faults.compare import base_failed
-from bayesimpact.diagnosis.recording_faults import Corrected
 from bayesimpact.diagnosis.thresholds import ALPHA, DECISIVE
 from bayesimpact.diagnosis.whiteness import combined, ljung_box, whiteness_p
 from bayesimpact.inference.declared import climbed
@@ -47,10 +46,7 @@ def with_noise(before: Identification, noise: Noise) -> Identification:
     return replace(before, fit=fit, noise=noise)
 
 
-def with_slow_noise(corrected: Corrected) -> Corrected:
-    """The same with the slow noise that the base model leaves, if it leaves nothing else."""
-    fit = corrected.identification.fit
-    noise = None if base_failed(fit) else remaining_noise(fit)
-    if noise is None:
-        return corrected
-    return replace(corrected, identification=with_noise(corrected.identification, noise))
+def with_slow_noise(before: Identification) -> Identification:
+    """The same under the slow noise that the base model leaves, if it leaves nothing else."""
+    noise = None if base_failed(before.fit) else remaining_noise(before.fit)
+    return before if noise is None else with_noise(before, noise)

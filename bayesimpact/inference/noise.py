@@ -62,7 +62,7 @@ class Noise:
         `level`, see `noise_growth`
     others : correlations of further AR(1) processes, 0 for white noise, each with its share of the
         raw noise's variance; what is left of it is that of `correlation`
-    is_independent : it was estimated without a model of the motion
+    is_independent : its level is not that of what a model leaves of the motion
     """
 
     correlation: float = 0.0

@@ -23,6 +23,7 @@ from bayesimpact.inference.likelihood import Likelihood, Linearisation
 from bayesimpact.inference.noise import Noise
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 
 TIMES = 10.0  # in the longest recording, at least, that the slow part's correlation time fits
 MOST = 1.0 - 1e-9  # of a correlation, whatever the recording
@@ -104,6 +105,22 @@ def slow_noise(fit: Fit) -> SlowNoise | None:
     return SlowNoise(told, found.log_evidence - before.log_evidence, found.residuals)
 
 
+def _integrated(
+    products: Array, free: Index, volume: float, total: int
+) -> tuple[float, float, Array]:
+    """Log evidence up to a constant, the noise's variance and the `free` parameters' step (k,).
+
+    products : of whitened derivatives and, last, residual, (d + 1, d + 1)
+    volume, total : log determinant of the whitening, and to how many numbers it leads
+    """
+    information, score = products[np.ix_(free, free)], products[free, -1]
+    step = inverse(information) @ score
+    variance = max(float(products[-1, -1] - score @ step) / total, 1e-300)
+    _, spread = np.linalg.slogdet(information / variance)
+    value = volume - 0.5 * (total * np.log(variance) + float(spread))
+    return float(value) if np.isfinite(value) else -np.inf, variance, step
+
+
 class _Spectra:
     """Products of all recordings' derivatives and residuals in narrow bands of frequency, in which
     the noise's spectrum is all but constant: its likelihood by Whittle's method, at once.
@@ -136,12 +153,7 @@ class _Spectra:
             whole += np.tensordot(1.0 / power, products, 1)
             volume += float(widths @ np.log(power))
             total += 2 * int(widths.sum())
-        information, score = whole[np.ix_(self.free, self.free)], whole[self.free, -1]
-        rest = float(whole[-1, -1] - score @ inverse(information) @ score)
-        variance = max(rest / total, 1e-300)
-        _, spread = np.linalg.slogdet(information / variance)
-        value = -volume - 0.5 * (total * np.log(variance) + float(spread))
-        return float(value) if np.isfinite(value) else -np.inf
+        return _integrated(whole, self.free, -volume, total)[0]
 
 
 class _Whole:
@@ -169,13 +181,8 @@ class _Whole:
             n = recording.samples.size
             volume += noise.log_volume(n, recording.interval, recording.used)
             total += noise.size(n, recording.interval, recording.used)
-        information, score = products[np.ix_(free, free)], products[free, size]
-        step = inverse(information) @ score
-        self.variance = max(float(products[size, size] - score @ step) / total, 1e-300)
-        _, spread = np.linalg.slogdet(information / self.variance)
-        self.log_evidence = volume - 0.5 * (total * np.log(self.variance) + float(spread))
-        if not np.isfinite(self.log_evidence):
-            self.log_evidence = -np.inf
+        found = _integrated(products, free, volume, total)
+        self.log_evidence, self.variance, step = found
         change = np.zeros(size)
         change[free] = step
         self.residuals = tuple(

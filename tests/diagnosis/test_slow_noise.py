@@ -24,6 +24,7 @@ def test_a_control_with_slow_noise_is_adequate_and_says_so(seed):
     found = diagnose(campaign, rng=RNG(0), search=False)
     assert found.verdict == "adequate"
     noise = found.after.target.likelihood.noise
+    assert not noise.is_independent
     (correlation, slow), (_, white) = noise.parts
     assert correlation == pytest.approx(0.95, abs=0.03)
     assert white == pytest.approx(1 / (1 + 1.25**2), abs=0.12) and slow == 1 - white
@@ -59,11 +60,12 @@ def test_a_law_in_contact_that_no_force_of_time_follows_is_no_slow_noise():
 def test_a_search_begins_with_slow_noise_whatever_was_corrected_before():
     campaign = small_rig.with_slow(small_rig.record(6), 6, 1.25)
     corrected = cleaned_campaign(campaign, rng=RNG(0), search=False)
-    assert not corrected.identification.noise.others
+    noise = corrected.identification.noise
+    assert noise.others and corrected.identification.fit.target.likelihood.noise is noise
     found = whole._of_corrected(
         corrected, rng=RNG(0), effects=(), progress=lambda _: None, budget=begin(), first=None
     )
-    assert found.verdict == "adequate" and found.after.target.likelihood.noise.others
+    assert found.verdict == "adequate" and found.after.target.likelihood.noise is noise
 
 
 def test_slow_noise_is_found_again_beside_a_fault_of_a_recording():
