@@ -120,16 +120,15 @@ def half_cycles(samples: Floats, level: float, period: float, noise: float) -> H
     if flips.size < 2:
         return _none()
     before, after = strong[flips], strong[flips + 1]
-    centre = np.array(
-        [_middle_change(signal, a, b) for a, b in zip(before, after, strict=True)], dtype=np.intp
-    )
+    centre = middle_changes(signal, before, after)
     side = state[flips[:-1] + 1]
     first, last = centre[:-1] + 1, centre[1:]
-    peaks, values = local.extremes(signal, first, last, side, noise)
+    spline = local.cubic(signal)
+    peaks, values = local.extremes(signal, first, last, side, noise, spline)
     amplitudes = side * values
     lengths = (last - first + 1).astype(np.float64)
     shorter = np.minimum(np.append(lengths, lengths[-1]), np.append(lengths[0], lengths))
-    positions = local.crossings(signal, centre, 0.25 * shorter, noise)
+    positions = local.crossings(signal, centre, 0.25 * shorter, noise, spline)
     lost = amplitudes < max(6 * noise, 1.5 * threshold)
     lost |= _merged(signal, turning_points(signal, period, noise), first, last, side, amplitudes)
     count = int(np.argmax(lost)) if lost.any() else lost.size
@@ -140,12 +139,11 @@ def _none() -> HalfCycles:
     return HalfCycles(np.empty(0), np.empty(0, dtype=int), np.empty(0), np.empty(0))
 
 
-def _middle_change(signal: Floats, before: int, after: int) -> int:
-    """The middle one of the changes of sign between two samples on either side."""
-    changes = np.flatnonzero(
-        np.signbit(signal[before:after]) != np.signbit(signal[before + 1 : after + 1])
-    )
-    return int(before + changes[changes.size // 2])
+def middle_changes(signal: Floats, before: Ints, after: Ints) -> Ints:
+    """The middle ones of the changes of sign between samples (k,) on either side."""
+    changes = np.flatnonzero(np.diff(np.signbit(signal)))
+    first, past = np.searchsorted(changes, before), np.searchsorted(changes, after)
+    return changes[first + (past - first) // 2]
 
 
 def _merged(

@@ -8,9 +8,9 @@ noise limits it. Where no window passes, the cubic spline through the samples de
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
-from numpy.polynomial import polynomial
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
@@ -63,17 +63,29 @@ def fit(samples: Floats, centres: Ints, half: int, degree: int) -> tuple[Floats,
     (k, degree + 1) coefficients of x = (index - centre) / half, lowest order first, with the centre
     clipped to [half, n - 1 - half], and the (k,) residual standard deviations.
     """
-    x = np.linspace(-1.0, 1.0, 2 * half + 1)
-    basis = np.vander(x, degree + 1, increasing=True)
+    basis, inverse = _window(half, degree)
     middle = np.clip(centres, half, samples.size - 1 - half)
     window = samples[middle[:, None] + np.arange(-half, half + 1)]
-    coefficients = window @ np.linalg.pinv(basis).T
+    coefficients = window @ inverse.T
     left = window - coefficients @ basis.T
     rms = np.sqrt((left**2).sum(axis=1) / (2 * half - degree))
     return coefficients, rms
 
 
-def crossings(samples: Floats, centres: Ints, caps: Floats, noise: float) -> Floats:
+@lru_cache(maxsize=256)
+def _window(half: int, degree: int) -> tuple[Floats, Floats]:
+    """Powers at the samples of a window, and their pseudoinverse: met again in every signal."""
+    basis = np.vander(np.linspace(-1.0, 1.0, 2 * half + 1), degree + 1, increasing=True)
+    return basis, np.asarray(np.linalg.pinv(basis), dtype=np.float64)
+
+
+def crossings(
+    samples: Floats,
+    centres: Ints,
+    caps: Floats,
+    noise: float,
+    spline: CubicSpline | None = None,
+) -> Floats:
     """Where the signal passes zero near the given samples.
 
     Parameters
@@ -82,12 +94,13 @@ def crossings(samples: Floats, centres: Ints, caps: Floats, noise: float) -> Flo
     centres : (k,) sample before each change of sign
     caps : (k,) largest half width of a window, samples
     noise : standard deviation of the noise
+    spline : `cubic` of the samples, where it is known already
 
     Returns
     -------
     (k,) crossing positions in samples (not integers).
     """
-    position = _spline_roots(samples, centres)
+    position = _spline_roots(cubic(samples) if spline is None else spline, samples, centres)
     open_ = np.ones(centres.size, dtype=bool)
     nearest = np.rint(position).astype(np.intp)
     for half in LADDER:
@@ -95,19 +108,30 @@ def crossings(samples: Floats, centres: Ints, caps: Floats, noise: float) -> Flo
         if use.size == 0 or samples.size <= 2 * half:
             continue
         coefficients, rms = fit(samples, nearest[use], half, 3)
+        passed = rms <= noise * _slack(2 * half - 3)
+        use, powers = use[passed], coefficients[passed].T
+        if use.size == 0:
+            continue
+        slopes = _derivative(powers)
         middle = np.clip(nearest[use], half, samples.size - 1 - half)
         x = (position[use] - middle) / half
         for _ in range(6):
-            value, slope = _value_and_slope(coefficients, x)
-            x = np.clip(x - value / np.where(slope == 0, np.inf, slope), -1.0, 1.0)
-        good = (rms <= noise * _slack(2 * half - 3)) & (np.abs(x) < 0.9)
+            slope = _polynomial(slopes, x)
+            step = _polynomial(powers, x) / np.where(slope == 0, np.inf, slope)
+            x = np.clip(x - step, -1.0, 1.0)
+        good = np.abs(x) < 0.9
         position[use[good]] = middle[good] + half * x[good]
         open_[use[good]] = False
     return position
 
 
 def extremes(
-    samples: Floats, first: Ints, last: Ints, sign: NDArray[np.int_], noise: float
+    samples: Floats,
+    first: Ints,
+    last: Ints,
+    sign: NDArray[np.int_],
+    noise: float,
+    spline: CubicSpline | None = None,
 ) -> tuple[Floats, Floats]:
     """The largest excursion inside each half cycle.
 
@@ -117,6 +141,7 @@ def extremes(
     first, last : (k,) first and last sample of each half cycle, inclusive
     sign : (k,) +1 to look for a maximum, -1 for a minimum
     noise : standard deviation of the noise
+    spline : `cubic` of the samples, where it is known already
 
     Returns
     -------
@@ -129,7 +154,8 @@ def extremes(
         ],
         dtype=np.intp,
     )
-    position, value = _three_point(samples, peak)
+    spline = cubic(samples) if spline is None else spline
+    position, value = _three_point(spline, samples, peak)
     caps = 0.3 * (last - first)
     # The raw maximum of a flat, noisy top may sit anywhere on it: centre the window instead.
     centre = np.where(caps > 12, np.clip(peak, first + caps, last - caps), peak).astype(np.intp)
@@ -139,13 +165,16 @@ def extremes(
         if use.size == 0 or samples.size <= 2 * half:
             continue
         coefficients, rms = fit(samples, centre[use], half, 4)
-        middle = np.clip(centre[use], half, samples.size - 1 - half)
-        x, top = _tops(coefficients * sign[use, None])
-        good = (rms <= noise * _slack(2 * half - 4)) & (np.abs(x) < 0.95)
-        chosen = use[good]
-        position[chosen] = middle[good] + half * x[good]
-        value[chosen] = sign[chosen] * top[good]
-        open_[chosen] = False
+        passed = rms <= noise * _slack(2 * half - 4)
+        use, powers = use[passed], (coefficients[passed] * sign[use[passed], None]).T
+        if use.size:
+            middle = np.clip(centre[use], half, samples.size - 1 - half)
+            x, top = _tops(powers)
+            good = np.abs(x) < 0.95
+            chosen = use[good]
+            position[chosen] = middle[good] + half * x[good]
+            value[chosen] = sign[chosen] * top[good]
+            open_[chosen] = False
         centre = np.where(open_, peak, centre)
     return position, value
 
@@ -155,33 +184,40 @@ def _slack(freedom: int) -> float:
     return 1.1 + 1.8 / math.sqrt(max(freedom, 1))
 
 
-def _value_and_slope(coefficients: Floats, x: Floats) -> tuple[Floats, Floats]:
-    value = polynomial.polyval(x, coefficients.T, tensor=False)
-    slope = polynomial.polyval(x, polynomial.polyder(coefficients.T), tensor=False)
-    return np.asarray(value, dtype=np.float64), np.asarray(slope, dtype=np.float64)
-
-
-def _tops(coefficients: Floats) -> tuple[Floats, Floats]:
-    """Position in [-1, 1] and value of the maximum of each polynomial."""
+def _tops(powers: Floats) -> tuple[Floats, Floats]:
+    """Position in [-1, 1] and value of the maximum of each polynomial, (degree + 1, k)."""
     grid = np.linspace(-1.0, 1.0, 41)
-    x = grid[np.argmax(polynomial.polyval(grid, coefficients.T), axis=1)]
-    slope = polynomial.polyder(coefficients.T)
-    bend = polynomial.polyder(slope)
+    x = grid[np.argmax(_polynomial(powers[:, :, None], grid), axis=1)]
+    slope = _derivative(powers)
+    bend = _derivative(slope)
     for _ in range(4):
-        curvature = np.minimum(polynomial.polyval(x, bend, tensor=False), -1e-300)
-        step = polynomial.polyval(x, slope, tensor=False) / curvature
-        x = np.clip(x - np.clip(step, -0.05, 0.05), -1.0, 1.0)
-    return x, polynomial.polyval(x, coefficients.T, tensor=False)
+        curvature = np.minimum(_polynomial(bend, x), -1e-300)
+        x = x - np.clip(_polynomial(slope, x) / curvature, -0.05, 0.05)
+        x = np.clip(x, -1.0, 1.0)
+    return x, _polynomial(powers, x)
 
 
-def _three_point(samples: Floats, peak: Ints) -> tuple[Floats, Floats]:
+def _polynomial(powers: Floats, x: Floats) -> Floats:
+    """Polynomials at x by Horner; `powers` (degree + 1, ...), lowest order first. NumPy's own takes
+    ten times as long on arrays so small.
+    """
+    value = np.asarray(powers[-1])
+    for power in powers[-2::-1]:
+        value = power + value * x
+    return value
+
+
+def _derivative(powers: Floats) -> Floats:
+    return np.asarray(powers[1:] * np.arange(1.0, len(powers))[:, None])
+
+
+def _three_point(spline: CubicSpline, samples: Floats, peak: Ints) -> tuple[Floats, Floats]:
     """Extreme of the cubic spline through the samples around `peak` (by parabola, then spline)."""
     inner = np.clip(peak, 1, samples.size - 2)
     left, mid, right = samples[inner - 1], samples[inner], samples[inner + 1]
     bend = left - 2 * mid + right
     shift = np.where(bend == 0, 0.0, 0.5 * (left - right) / np.where(bend == 0, 1.0, bend))
     position = inner + np.clip(shift, -1.0, 1.0)
-    spline = _spline(samples)
     for _ in range(3):
         curvature = spline(position, 2)
         step = np.where(
@@ -191,17 +227,18 @@ def _three_point(samples: Floats, peak: Ints) -> tuple[Floats, Floats]:
     return position, np.asarray(spline(position), dtype=np.float64)
 
 
-def _spline_roots(samples: Floats, centres: Ints) -> Floats:
+def _spline_roots(spline: CubicSpline, samples: Floats, centres: Ints) -> Floats:
     """Roots of the cubic spline between the samples `centres` and `centres + 1`, by bisection."""
-    spline = _spline(samples)
-    low, high = centres.astype(np.float64), centres + 1.0
+    powers = spline.c[::-1, centres]
+    low, high = np.zeros(centres.size), np.ones(centres.size)
     rising = samples[centres] < samples[centres + 1]
     for _ in range(45):
         middle = 0.5 * (low + high)
-        above = (np.asarray(spline(middle)) > 0) == rising
+        above = (_polynomial(powers, middle) > 0) == rising
         low, high = np.where(above, low, middle), np.where(above, middle, high)
-    return 0.5 * (low + high)
+    return np.asarray(centres + 0.5 * (low + high))
 
 
-def _spline(samples: Floats) -> CubicSpline:
+def cubic(samples: Floats) -> CubicSpline:
+    """The cubic spline through samples."""
     return CubicSpline(np.arange(samples.size), samples)

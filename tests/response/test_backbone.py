@@ -10,7 +10,7 @@ from rigs import PAPER, paper_motion
 
 from bayesimpact.errors import InputError
 from bayesimpact.response.backbone import Backbone, backbone
-from bayesimpact.response.half_cycles import half_cycles, spectral_period
+from bayesimpact.response.half_cycles import half_cycles, middle_changes, spectral_period
 from bayesimpact.response.rest import rest_position
 
 RATIO = PAPER["c1"] / (2 * np.sqrt(PAPER["k1"] * PAPER["mass"]))
@@ -209,3 +209,18 @@ def test_no_swing_no_backbone() -> None:
 def test_bad_input_is_refused(samples: NDArray, arguments: dict, word: str) -> None:
     with pytest.raises(InputError, match=word):
         backbone(samples, **{"interval": 1e-3, **arguments})
+
+
+def test_the_middle_of_several_changes_of_sign_is_the_crossing() -> None:
+    """As one looks for it, crossing by crossing."""
+    rng = np.random.default_rng(7)
+    signal = np.sin(np.arange(2000) / 60.0) + 0.05 * rng.standard_normal(2000)
+    strong = np.flatnonzero(np.abs(signal) > 0.2)
+    flips = np.flatnonzero(np.diff(np.sign(signal[strong])))
+    before, after = strong[flips], strong[flips + 1]
+    changes = [
+        [i for i in range(a, b) if (signal[i] < 0) != (signal[i + 1] < 0)]
+        for a, b in zip(before, after, strict=True)
+    ]
+    assert max(len(found) for found in changes) > 2
+    assert middle_changes(signal, before, after).tolist() == [c[len(c) // 2] for c in changes]

@@ -92,3 +92,33 @@ def test_extremes_of_a_clean_and_of_a_noisy_sine() -> None:
     # Quartic over about 45 of 78 samples: 3.5 / 45 of the variance of one sample.
     assert np.std(value * sign) < 0.03 * 0.45
     assert abs(np.mean(value * sign) - 3.0) < 0.03 * 0.3
+
+
+def test_windows_that_hold_more_than_noise_are_skipped_alone() -> None:
+    """Crossings and extremes are each what they would be alone, whatever the others' windows."""
+    rng = np.random.default_rng(5)
+    samples = sine(4000, 157.0) + 0.01 * rng.standard_normal(4000)
+    samples[2000:] += 0.2 * np.sign(sine(2000, 9.0))  # nothing smooth passes there
+    centres = np.flatnonzero(np.diff(np.signbit(samples)))
+    caps = np.full(centres.size, 35.0)
+    together = local.crossings(samples, centres, caps, 0.01)
+    alone = [local.crossings(samples, c, caps[:1], 0.01)[0] for c in centres[:, None]]
+    assert together == pytest.approx(np.array(alone), abs=1e-9)
+    first, last = centres[:-1] + 1, centres[1:]
+    sign = np.where(samples[first] > 0, 1, -1)
+    position, value = local.extremes(samples, first, last, sign, 0.01)
+    for k in range(first.size):
+        one = slice(k, k + 1)
+        own = local.extremes(samples, first[one], last[one], sign[one], 0.01)
+        assert (position[k], value[k]) == pytest.approx((own[0][0], own[1][0]), abs=1e-9)
+
+
+def test_a_spline_that_is_known_changes_nothing() -> None:
+    samples = sine(700, 31.7)
+    centres = np.flatnonzero(np.diff(np.signbit(samples)))
+    caps, sign = np.full(centres.size, 8.0), np.where(samples[centres[:-1] + 1] > 0, 1, -1)
+    spline = local.cubic(samples)
+    known = local.crossings(samples, centres, caps, 0.0, spline)
+    assert np.array_equal(known, local.crossings(samples, centres, caps, 0.0))
+    turns = samples, centres[:-1] + 1, centres[1:], sign, 0.0
+    assert np.array_equal(local.extremes(*turns, spline), local.extremes(*turns))
