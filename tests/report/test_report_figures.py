@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -238,6 +239,22 @@ def test_files(tmp_path: Path) -> None:
     assert file_name('fit_case_1/2 "ß"').startswith("fit_case_1_2__ß_-")
     assert file_name("fit_case_a b") != file_name("fit_case_a_b") == "fit_case_a_b"
     assert len(f".{file_name('ß' * 300)}.png.12345678.png".encode()) < 255
+
+
+def test_every_file_is_drawn_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[str] = []
+    draw = Figure.draw
+
+    def counted(figure: Figure, renderer: Any) -> None:
+        drawn.append(type(renderer).__name__)
+        draw(figure, renderer)
+
+    figures = all_figures(make_results(1, 1, n=200))
+    monkeypatch.setattr(Figure, "draw", counted)
+    for name in ("fit_case_1", "backbone"):  # placed by hand, and by a layout engine
+        drawn.clear()
+        save_figures({name: figures[name]}, tmp_path)
+        assert drawn == ["RendererAgg", "MixedModeRenderer"]
 
 
 def test_style_stays_inside(tmp_path: Path) -> None:

@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -145,7 +147,6 @@ def _saved(name: str, figure: Figure, folder: Path) -> bytes:
         # a name in letters that the font lacks shows boxes there; that is all
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         picture = png(figure)
-        figure.set_layout_engine("none")  # laid out once is enough
         with atomic(folder / f"{safe}.png") as temporary:
             temporary.write_bytes(picture)
         with atomic(folder / f"{safe}.pdf") as temporary:
@@ -154,13 +155,23 @@ def _saved(name: str, figure: Figure, folder: Path) -> bytes:
 
 
 def png(figure: Figure) -> bytes:
-    """A figure as a PNG file."""
-    stream, small = io.BytesIO(), io.BytesIO()
-    figure.savefig(stream, format="png", dpi=DPI)
-    with Image.open(stream) as picture:
-        colours = picture.convert("RGB").quantize(_COLOURS, method=Image.Quantize.FASTOCTREE)
-    colours.save(small, format="png", optimize=True)
-    return min(stream.getvalue(), small.getvalue(), key=len)
+    """A figure, laid out for good, as a PNG file."""
+    lay_out(figure)
+    figure.set_dpi(DPI)
+    canvas: Any = FigureCanvasAgg(figure)  # carries no types
+    canvas.draw()
+    picture = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+    stream = io.BytesIO()
+    picture.quantize(_COLOURS, method=Image.Quantize.FASTOCTREE).save(stream, format="png")
+    return stream.getvalue()
+
+
+def lay_out(figure: Figure) -> None:
+    """Place what is on a figure, once: with a layout engine, every file of it is drawn twice."""
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
+        figure.set_layout_engine(None)  # "none" would leave a placeholder, which is an engine
 
 
 def file_name(name: str) -> str:
