@@ -18,6 +18,7 @@ from PIL import Image
 
 from bayesimpact.data.files import atomic
 from bayesimpact.report.figures.backbone import backbone_figures
+from bayesimpact.report.figures.collector import held_back
 from bayesimpact.report.figures.corner import corner_figure
 from bayesimpact.report.figures.diagnosis import DRAWERS as DIAGNOSIS
 from bayesimpact.report.figures.diagnosis import Drawer
@@ -110,6 +111,7 @@ def save_figures(figures: Mapping[str, Figure], folder: Path) -> dict[str, bytes
     return {name: _saved(name, figure, folder) for name, figure in figures.items()}
 
 
+@held_back()
 def save_drawn(draw: Drawer, results: Results, folder: Path) -> SavedFigures:
     """Draw and save what one function draws; a figure that fails leaves its reason, not a gap.
 
