@@ -1,4 +1,4 @@
-"""Reports for tests that do not look at their figures: one pixel, no PDF, no second process.
+"""Reports for tests that do not look at their figures: one pixel, no PDF.
 
 Half of such a test's time was the layout of text, whatever the number of pixels.
 """
@@ -15,7 +15,7 @@ import pytest
 from matplotlib.figure import Figure
 from PIL import Image
 
-from bayesimpact.report.figures import save, shares
+from bayesimpact.report.figures import save
 from bayesimpact.report.figures.style import STYLE
 
 PIXEL = base64.b64decode(
@@ -57,4 +57,3 @@ def written(name: str, content: bytes, folder: Path) -> bytes:
 def draw_coarsely(patch: pytest.MonkeyPatch, *, pixels: bool = False) -> None:
     """All reports are made like that until the patch ends; `pixels`: their figures are drawn."""
     patch.setattr(save, "_saved", saved if pixels else undrawn)
-    patch.setattr(shares, "started", lambda folder: None)

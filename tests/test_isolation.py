@@ -58,7 +58,7 @@ def test_modules_beside_the_recordings_are_never_imported(tmp_path: Path, diagno
     for folder in (here, results, campaign):
         trap(folder, marker)
     few = replace(diagnosed(1, 1, sampled=False), diagnosis_arrays={}, before_backbone=None)
-    save_results(few, results)  # and some of its figures are the second process's
+    save_results(few, results)
     command = str(Path(sys.executable).with_name("bayesimpact"))
     environment = {k: v for k, v in os.environ.items() if not k.startswith("PYTHON")}
     for arguments, place in (

@@ -13,8 +13,7 @@ from bayesimpact.inference.posterior import Posterior
 from bayesimpact.report import archive_arviz
 from bayesimpact.report.archive import load_results, save_results
 from bayesimpact.report.build import NO_CONTEXT, ReportContext, results_from_posterior
-from bayesimpact.report.figures.save import reason
-from bayesimpact.report.figures.shares import save_all
+from bayesimpact.report.figures.save import reason, save_all
 from bayesimpact.report.html import render, unfinished
 from bayesimpact.report.latex import latex_tables
 from bayesimpact.report.pdf import print_page

@@ -118,7 +118,7 @@ def crossings(
         for _ in range(6):
             slope = _polynomial(slopes, x)
             step = _polynomial(powers, x) / np.where(slope == 0, np.inf, slope)
-            x = np.clip(x - step, -1.0, 1.0)
+            x = _within(x - step, 1.0)
         good = np.abs(x) < 0.9
         position[use[good]] = middle[good] + half * x[good]
         open_[use[good]] = False
@@ -192,8 +192,7 @@ def _tops(powers: Floats) -> tuple[Floats, Floats]:
     bend = _derivative(slope)
     for _ in range(4):
         curvature = np.minimum(_polynomial(bend, x), -1e-300)
-        x = x - np.clip(_polynomial(slope, x) / curvature, -0.05, 0.05)
-        x = np.clip(x, -1.0, 1.0)
+        x = _within(x - _within(_polynomial(slope, x) / curvature, 0.05), 1.0)
     return x, _polynomial(powers, x)
 
 
@@ -209,6 +208,11 @@ def _polynomial(powers: Floats, x: Floats) -> Floats:
 
 def _derivative(powers: Floats) -> Floats:
     return np.asarray(powers[1:] * np.arange(1.0, len(powers))[:, None])
+
+
+def _within(x: Floats, most: float) -> Floats:
+    """`np.clip` between -most and most, in a third of its time on arrays so small."""
+    return np.asarray(np.minimum(np.maximum(x, -most), most))
 
 
 def _three_point(spline: CubicSpline, samples: Floats, peak: Ints) -> tuple[Floats, Floats]:

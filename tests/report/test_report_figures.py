@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,14 @@ from bayesimpact.report.figures.recordings import (
     recording_figures,
     shown_recordings,
 )
-from bayesimpact.report.figures.save import all_figures, file_name, png, save_drawn, save_figures
+from bayesimpact.report.figures.save import (
+    all_figures,
+    file_name,
+    png,
+    save_all,
+    save_drawn,
+    save_figures,
+)
 from bayesimpact.report.figures.style import polyline, scaled, symbol
 from bayesimpact.report.html import png_size
 from bayesimpact.report.results import Draws, Results
@@ -241,6 +249,14 @@ def test_files(tmp_path: Path) -> None:
     assert len(f".{file_name('ß' * 300)}.png.12345678.png".encode()) < 255
 
 
+def test_all_are_saved_in_the_order_of_the_page(tmp_path: Path) -> None:
+    told = replace(diagnosed(1, 1), sampler=None, backbone=None)
+    pictures = save_all(told, tmp_path).pictures
+    assert list(pictures) == list(all_figures(told))
+    files = {f.name for f in (tmp_path / "figures").iterdir()}
+    assert files == {f"{name}.{kind}" for name in pictures for kind in ("png", "pdf")}
+
+
 def test_every_file_is_drawn_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     drawn: list[str] = []
     draw = Figure.draw
@@ -255,6 +271,23 @@ def test_every_file_is_drawn_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         drawn.clear()
         save_figures({name: figures[name]}, tmp_path)
         assert drawn == ["RendererAgg", "MixedModeRenderer"]
+
+
+@pytest.mark.parametrize("enabled", [True, False])
+def test_the_collector_is_held_back_while_a_figure_is_drawn(enabled: bool, tmp_path: Path) -> None:
+    seen: list[bool] = []
+
+    def looks_and_fails(results: Results) -> dict[str, Figure]:
+        seen.append(gc.isenabled())
+        raise OSError("full")
+
+    (gc.enable if enabled else gc.disable)()
+    try:
+        with pytest.raises(OSError, match="full"):
+            save_drawn(looks_and_fails, make_results(1, 1, n=200, sampled=False), tmp_path)
+        assert (seen, gc.isenabled()) == ([False], enabled)
+    finally:
+        gc.enable()
 
 
 def test_style_stays_inside(tmp_path: Path) -> None:

@@ -70,7 +70,7 @@ def corner_figure(
     limits = [_limits(clouds, k, marks.get(k)) for k in range(len(names))]
     figure, panels = _grid(len(names))
     for i in range(len(names)):
-        for j in range(len(names)):
+        for j in range(i + 1):
             _panel(panels[i, j], i, j, clouds, limits, marks)
         _title(panels[i, i], names[i], draws.units[i], known[names[i]])
         _outer_labels(panels, axes, i)
@@ -83,10 +83,20 @@ def _grid(count: int) -> tuple[Figure, np.ndarray]:
     """No wider than other figures, so that its letters are as large as theirs in print."""
     size = min(WIDTH, _PANEL * count + _LEFT + _RIGHT)
     figure = Figure(figsize=(size, size), dpi=150)
-    figure.subplots_adjust(
-        _LEFT / size, _BELOW / size, 1 - _RIGHT / size, 1 - _ABOVE / size, 0.07, 0.07
+    places = figure.add_gridspec(
+        count,
+        count,
+        left=_LEFT / size,
+        bottom=_BELOW / size,
+        right=1 - _RIGHT / size,
+        top=1 - _ABOVE / size,
+        wspace=0.07,
+        hspace=0.07,
     )
-    return figure, figure.subplots(count, count, squeeze=False)
+    panels = np.full((count, count), None, dtype=object)  # nothing above the diagonal
+    for i, j in zip(*np.tril_indices(count), strict=True):
+        panels[i, j] = figure.add_subplot(places[i, j])
+    return figure, panels
 
 
 def _estimate(law: Law, k: int) -> Estimate:
@@ -140,10 +150,7 @@ def _panel(
     limits: list[tuple[float, float]],
     marks: Mapping[int, float],
 ) -> None:
-    """Row i, column j: a marginal, a pair, or nothing above the diagonal."""
-    if j > i:
-        axis.remove()
-        return
+    """Row i, column j: a marginal, or a pair below the diagonal."""
     for cloud in clouds:
         if i == j and cloud.has(i):
             cloud.marginal(axis, i)

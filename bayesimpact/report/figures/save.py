@@ -29,6 +29,7 @@ from bayesimpact.report.figures.traces import trace_figure
 from bayesimpact.report.published import PUBLISHED
 from bayesimpact.report.results import Results
 
+FIGURES = "figures"
 DPI = 150
 _COLOURS = 256  # in a picture: a third of the bytes, no difference to be seen
 LONGEST_NAME = 40
@@ -109,6 +110,20 @@ def save_figures(figures: Mapping[str, Figure], folder: Path) -> dict[str, bytes
     The PNG files' content by name, for the page.
     """
     return {name: _saved(name, figure, folder) for name, figure in figures.items()}
+
+
+def save_all(results: Results, folder: Path) -> SavedFigures:
+    """Draw all figures that the results allow and save them into `folder`'s folder of figures.
+
+    Raises
+    ------
+    OSError : the folder cannot be written
+    """
+    found = [save_drawn(draw, results, folder / FIGURES) for draw in drawers(results)]
+    return SavedFigures(
+        {name: data for drawn in found for name, data in drawn.pictures.items()},
+        {name: reason for drawn in found for name, reason in drawn.failed.items()},
+    )
 
 
 @held_back()
