@@ -94,8 +94,9 @@ def _grid(count: int) -> tuple[Figure, np.ndarray]:
         hspace=0.07,
     )
     panels = np.full((count, count), None, dtype=object)  # nothing above the diagonal
-    for i, j in zip(*np.tril_indices(count), strict=True):
-        panels[i, j] = figure.add_subplot(places[i, j])
+    for i in range(count):
+        for j in range(i + 1):
+            panels[i, j] = figure.add_subplot(places[i, j])
     return figure, panels
 
 
