@@ -24,16 +24,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cholesky_banded, solve_banded
-from scipy.signal import savgol_filter
 
 from bayesimpact.diagnosis.directions import is_periodic, shape_points, size_parameters
 from bayesimpact.diagnosis.extend import at_null, extend, transfer
+from bayesimpact.diagnosis.term_sets import EffectColumns
 from bayesimpact.diagnosis.thresholds import DOUBT
 from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.model.effects.effect import Effect, Scales
 from bayesimpact.model.oscillator import Oscillator
 from bayesimpact.model.parameters import INPUT_GAIN, SLOTS, instance_name
 from bayesimpact.model.path_forces import add_forces
+from bayesimpact.response.measured_motion import smoothed
 from bayesimpact.response.weak_form import Rows, products, rows_of
 
 Array = NDArray[np.float64]
@@ -43,8 +44,6 @@ _C1, _K1, _GAP, _K2, _OFFSET, _FRICTION = (
 
 WIDTH = 0.5  # half width of a stretch, natural periods
 FLIGHT_WIDTH = 1 / 8  # of one in flight: every flight lasts half a period, two stretches and more
-STEADY = 3e-3  # of the largest speed: noise that is left in a measured velocity
-WIDEST = 1 / 24  # of a natural period: half width of the polynomials that smooth the motion
 STEP = 1e-3  # of an effect's plausible size
 # points of a shape grid for one of the scores', to which a force along a path costs little: what a
 # shape beside the true one leaves of a large effect asks for other effects
@@ -73,27 +72,6 @@ class Path:
         return np.asarray(solve_banded((self.factor.shape[0] - 1, 0), self.factor, x))
 
 
-@dataclass(frozen=True, eq=False)
-class EffectColumns:
-    """One effect at one point of its shape grid.
-
-    Attributes
-    ----------
-    names : of its size parameters; its id for what it adds where they are at their null
-    columns : per recording (stretches, k), whitened, per unit of them
-    one_sided : which of them cannot be negative, (k,)
-    on_grid : whether the shape is one of the scores' grid; sets are chosen from those, for on a
-        finer one a law with a free power comes nearer to the errors of another law than that itself
-    """
-
-    effect: Effect
-    shapes: Mapping[str, float]
-    names: tuple[str, ...]
-    columns: tuple[Array, ...]
-    one_sided: tuple[bool, ...]
-    on_grid: bool = True
-
-
 def measured_paths(fit: Fit, *, flight: bool = False) -> list[Path]:
     """Every recording's displacement and velocity from its own readings, about the fit's rest and
     gap; of those in `flight` the stretches do not reach the stop.
@@ -102,7 +80,7 @@ def measured_paths(fit: Fit, *, flight: bool = False) -> list[Path]:
     found = []
     for r, q in zip(o.campaign.recordings, o.layout.slots(fit.mode), strict=True):
         period = 2 * np.pi * float(np.sqrt(o.campaign.mass / q[_K1]))
-        y, v = _smoothed(r.samples - q[_OFFSET], r.interval, period, noise.level)
+        y, v = smoothed(r.samples - q[_OFFSET], r.interval, period, noise.level)
         d = y - q[_GAP] if o.campaign.stop else np.full(y.size, -np.inf)
         rows = rows_of(r, o.campaign.mass, (FLIGHT_WIDTH if flight else WIDTH) * period)
         rows = _without_rests(rows, r.samples, noise.level)
@@ -132,16 +110,6 @@ def _without_rests(rows: Rows, samples: Array, noise: float) -> Rows:
 
 def _only(rows: Rows, kept: NDArray[np.bool_]) -> Rows:
     return replace(rows, base=rows.base * kept[:, None], target=rows.target * kept)
-
-
-def _smoothed(samples: Array, interval: float, period: float, noise: float) -> tuple[Array, Array]:
-    """Displacement and velocity (n,) by local quartics, no wider than the noise asks for."""
-    speed = np.pi * float(np.ptp(samples)) / period
-    asked = (3.0 * noise / (STEADY * speed * interval)) ** (2 / 3)
-    most = min(WIDEST * period / interval, (samples.size - 1) / 2)  # a fitted period may be long
-    half = int(np.clip(np.ceil(asked), 3, max(most, 3)))
-    y, v = (savgol_filter(samples, 2 * half + 1, 4, deriv=k, delta=interval) for k in (0, 1))
-    return np.asarray(y), np.asarray(v)
 
 
 def _factor(rows: Rows, weights: Array) -> Array:

@@ -14,9 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.diagnosis.equation_error import EffectColumns, Path, without_rest
+from bayesimpact.diagnosis.equation_error import Path, without_rest
 from bayesimpact.diagnosis.formula_scores import REFINED, kind_prices, plausible_sizes, prices
-from bayesimpact.diagnosis.likely_sets import Chosen, EffectSet, LikelySets
+from bayesimpact.diagnosis.likely_sets import LikelySets
+from bayesimpact.diagnosis.term_sets import Chosen, EffectColumns, EffectSet
 from bayesimpact.diagnosis.thresholds import EXCESS
 from bayesimpact.formula.grammar import Term
 from bayesimpact.formula.law import effect_of, is_friction, starts_of

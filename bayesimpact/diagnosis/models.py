@@ -5,7 +5,7 @@ Of two ends of climbs to one model the better one is kept.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -16,7 +16,6 @@ from bayesimpact.diagnosis.budget import Budget, begin
 from bayesimpact.diagnosis.discrepancy import Discrepancy
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.force import missing_drift, missing_force
-from bayesimpact.diagnosis.likely_sets import EffectSet
 from bayesimpact.diagnosis.naming import State, is_large, leaves_something
 from bayesimpact.diagnosis.own_band import shakes_in_own_band
 from bayesimpact.diagnosis.profile_likelihood import profiled
@@ -34,6 +33,7 @@ from bayesimpact.diagnosis.refit import (
 from bayesimpact.diagnosis.scan import Scan, scan
 from bayesimpact.diagnosis.scores import Score
 from bayesimpact.diagnosis.smoothing import is_refuted
+from bayesimpact.diagnosis.term_sets import EffectSet
 from bayesimpact.diagnosis.thresholds import EXCESS, LARGE
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.progress import Refit
@@ -158,16 +158,16 @@ class Models:
             enough = replace(enough, goal=max(enough.goal, least))
             self.keep(refit(candidate.fit, scores, self.scales, enough=enough))
 
-    def fit_sets(self, about: Candidate, most: int, flight: bool) -> list[Candidate]:
-        """Models that the equation of motion asks for about a model, in flight or altogether.
+    def fit_sets(self, fit: Fit, sets: Sequence[EffectSet]) -> list[Candidate]:
+        """Models that a problem posed about a fit asks for.
 
         Larger ones up to the first whose misfit is not large: there scores tell more.
         """
-        found, problem = list[Candidate](), self.asked.about(about, flight)
-        for chosen in problem.best(most - len(problem.known)):
+        found = list[Candidate]()
+        for chosen in sets:
             if not self.may_go_on():
                 break
-            found.append(self.no_worse(self.fit_set(problem.fit, chosen)))
+            found.append(self.no_worse(self.fit_set(fit, chosen)))
             if not is_large(found[-1].fit):
                 break
         return found
@@ -204,16 +204,15 @@ class Models:
         return Asked(self.states[frozenset()].candidate.fit, self.effects, self.scales)
 
     def asked_beside(
-        self, candidate: Candidate, about: Candidate, found: Scan, promising: Sequence[Score]
+        self, candidate: Candidate, first: Collection[str], found: Scan, promising: Sequence[Score]
     ) -> list[Score]:
         """Scores that are tried beside a model, the `promising` ones; with a large misfit those
-        that the equation of motion, posed `about` a model, asks for first, and of the promising
-        ones what it does not see.
+        that are asked for `first`, and of the promising ones what cannot be.
         """
         if not is_large(candidate.fit):
             return list(promising)
-        first, seen = self.asked.first(candidate, about), self.asked.seen
-        kept = first | {s.effect.id for s in promising if s.effect.id not in seen}
+        seen = self.asked.seen
+        kept = {*first, *(s.effect.id for s in promising if s.effect.id not in seen)}
         return [s for s in found.best() if s.effect.id in kept]
 
     def enough(self, rival: Candidate | None = None) -> Enough:

@@ -8,7 +8,7 @@ physics and decide between near-opposites that scores cannot tell apart.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -39,6 +39,9 @@ from bayesimpact.model.effects.effect import Effect, Scales
 IMITATING_EFFECTS = 3
 BEAM = 3  # models that are extended while the best one is not white
 PAIRS = 4  # refitted at the first step
+
+Problem = Callable[[Candidate], list[Candidate]]
+"""Models that a problem posed about one asks for."""
 
 
 def name(
@@ -131,28 +134,52 @@ class _Search(Unlisted):
         return len(state.candidate.effects) < self.most and not self.is_dominated(state)
 
     def asked_for(self, base: State) -> list[State]:
-        """The likeliest models that the equation of motion asks for along the measured motion.
+        """The likeliest models that are asked for: without a stop by the equation of motion along
+        the measured motion; with one by periods ahead, by these about what the equation asks for in
+        free flight, and by the equation over all stretches, as long as the misfit stays large.
 
-        First in free flight: what the stop does may be still to come, and so where that is not all,
-        this model stays in the beam beside the likeliest that all stretches ask for.
+        What the stop does may be still to come after flight, and so where that is not all, this
+        model stays in the beam beside the likeliest.
         """
+        ways: list[list[Problem]] = [[self.of_all]]
+        if self.asked.has_stop:
+            ways = [[self.of_periods], [self.of_flight, self.of_periods], *ways]
         begun = [base.candidate]
-        for flight in (True, False) if self.asked.has_stop else (False,):
-            begun.append(self.asked_again(max(begun, key=self.promise), flight))
-            if not is_large(begun[-1].fit):
+        for way in ways:
+            about = base.candidate
+            for problem in way:
+                about = self.asked_again(about, problem)
+                begun.append(about)
+            if not is_large(about.fit):
                 break
         best = max(begun, key=self.promise)
         state = self.examine(best)
         with_term = self.with_a_term(state)
         if with_term is not state:
             return [with_term]
-        return [state, *(self.examine(c) for c in begun[1:] if c is not best)]
+        beside = begun[2:3] if self.asked.has_stop else []
+        return [state, *(self.examine(c) for c in beside if c is not best)]
 
-    def asked_again(self, about: Candidate, flight: bool) -> Candidate:
-        """The likeliest model asked for about one, then about that model, and so on."""
+    def of_flight(self, about: Candidate) -> list[Candidate]:
+        """Models that the equation of motion asks for about one, in free flight."""
+        problem = self.asked.about(about, flight=True)
+        return self.fit_sets(problem.fit, problem.best(self.most - len(problem.known)))
+
+    def of_all(self, about: Candidate) -> list[Candidate]:
+        """Models that the equation of motion asks for about one."""
+        problem = self.asked.about(about, flight=False)
+        return self.fit_sets(problem.fit, problem.best(self.most - len(problem.known)))
+
+    def of_periods(self, about: Candidate) -> list[Candidate]:
+        """Models that periods ahead ask for about one."""
+        problem = self.asked.ahead(about, about)
+        return self.fit_sets(problem.fit, problem.best(self.most - len(about.effects)))
+
+    def asked_again(self, about: Candidate, problem: Problem) -> Candidate:
+        """The likeliest model that a problem asks for about one, then about that, and so on."""
         best = about
         while True:
-            found = self.fit_sets(best, self.most, flight)
+            found = problem(best)
             better = max([best, *found], key=self.promise)
             if better is best:
                 return best
@@ -180,7 +207,8 @@ class _Search(Unlisted):
         """
         chosen, found = state.candidate, list[Candidate]()
         scores = self.refit_candidates(state.scan, self.least_gain(chosen))
-        for score in self.asked_beside(chosen, chosen, state.scan, scores):
+        first = self.asked.first(chosen, chosen) if is_large(chosen.fit) else ()
+        for score in self.asked_beside(chosen, first, state.scan, scores):
             if not self.may_go_on():
                 return found
             if is_redundant(chosen, score.effect):

@@ -86,9 +86,10 @@ class Settling(Ranked):
                 for joint in others:
                     if len(joint) > 1 and joint[0].effect.family == effect.family:
                         self.fit_more(rest, joint)
-            scores = self.asked_beside(rest, chosen, found, self.refit_candidates(found))
             large = is_large(rest.fit)
-            asked = self.asked.first(rest, chosen) if self.is_large else set[str]()
+            instead = effect.id if self.leaves_nothing(chosen) else ""
+            asked = self.asked.first(rest, chosen, instead) if self.is_large else set[str]()
+            scores = self.asked_beside(rest, asked, found, self.refit_candidates(found))
             promising = in_place_of(effect, scores, large, asked if large else ())
             for score in promising:
                 if self.may_go_on() and not is_redundant(rest, score.effect):
@@ -101,6 +102,11 @@ class Settling(Ranked):
             for new in _unseen(found, asked - {effect.id}, promising):
                 if self.may_go_on() and not is_redundant(rest, new):
                     self.exchange_in_place(chosen, effect, new)
+
+    def leaves_nothing(self, candidate: Candidate) -> bool:
+        """Whether a model has been examined, and nothing was missing from it."""
+        state = self.states.get(frozenset(candidate.ids))
+        return state is not None and state.candidate is candidate and state.is_white
 
     def simplified(self, chosen: Candidate, effect: Effect) -> list[Candidate]:
         """What an effect refines in its place, whatever scores on a model without both say."""

@@ -140,7 +140,7 @@ class Likelihood:
             self.oscillator.campaign.recordings, self.oscillator.predict(theta), strict=True
         )
         return tuple(
-            self.noise.whitened(one, one.samples - self.average(r, seen))
+            self.whitened(r, one.samples - self.average(r, seen))
             for r, (one, seen) in enumerate(pairs)
         )
 
@@ -209,8 +209,18 @@ class Likelihood:
             jacobian = jacobian * rounding.slope(predicted)
             predicted = rounding.read(predicted)
         stacked = np.vstack([recording.samples - predicted, jacobian])
-        white = self.noise.whitened(recording, stacked)
+        white = self.whitened(r, stacked)
         return Linearisation(white[0], white[1:].T, columns)
+
+    def whitened(self, r: int, signals: Array) -> Array:
+        """Signals (..., n) of recording `r`, whitened."""
+        return self.noise.whitened(self.oscillator.campaign.recordings[r], signals)
+
+    def readings(self, r: int, points: Array, error: float) -> Array:
+        """Readings (B, n) of recording `r` for parameters (B, d) near the first ones, as right as
+        `readings_near` has them.
+        """
+        return readings_near(self.oscillator, r, points, error)
 
     def _exact(self, theta: Array) -> tuple[Linearisation, ...]:
         o = self.oscillator
@@ -249,7 +259,7 @@ class Likelihood:
                 points.append(point)
             weights.append(formula.weights)
         error = SLIGHT * float(theta[self.sigma_columns[r]] * self.scales[r])
-        values = readings_near(o, r, np.array(points), error)
+        values = self.readings(r, np.array(points), error)
         w = np.array(weights) / steps[columns, None]
         others = w.shape[1] - 1
         jacobian = w[:, :1] * values[0]

@@ -10,6 +10,7 @@ parts: `added.context` (arrays, laws), `added.flows` (between events), `added.st
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -21,9 +22,11 @@ from bayesimpact.model.added.contact_state import (
     NONE,
     SIDES,
     SLIDING,
+    STEPS,
     begin,
     heading,
     resolve,
+    set_contact,
     set_directions,
     update_contact,
 )
@@ -62,6 +65,9 @@ OK, BAD_PARAMETERS, TOO_MANY_EVENTS, NOT_FINITE = 0, 1, 2, 3
 THREADING_PAYS = 4  # trajectories from which on
 FARTHEST = 1e6  # m or rad: a motion that has come as far grows without end, in ever more steps
 EVENTS_AT_LEAST, EVENTS_PER_SAMPLE = 1000, 2  # of sections, most of which end without one
+# of steps on average. The catalogue at its plausible sizes takes up to 36 where a period has three
+# samples, up to 4 at 1 kHz; a climb may ask for motions that take thousands, and minutes.
+STEPS_AT_LEAST, STEPS_PER_SAMPLE = 20_000, 100
 
 
 @inner()
@@ -98,6 +104,7 @@ def cruise(y: Any, v: Any, n0: Any, j: Any, stride: Any, end: Any, flow: Any, w:
         event = suspicious(y, v, n0, y1, v1, n1, t + h, h, flow, w)
         if event:
             break
+        w.s[STEPS] += 1.0
         fill_in(j, j + stride - 1, t, True, at, flow, w, y, v, n0, h, y1, v1, n1)
         last = j + stride - 1
         w.out[last] = reading(y1, v1, n1, flow, w) + input_reading(last, flow.inverse, w)
@@ -122,6 +129,7 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
     y1, v1, n1 = y, v, n0
     stride = stride_of(longest, w)
     at = quarters(longest, flow.b, flow.K, flow.inverse)
+    most = STEPS_AT_LEAST + STEPS_PER_SAMPLE * w.n
     end = min(w.n, j + max(1, int(min(RENEWED * longest / w.interval, 1.0 * w.n))))
     while j < end:
         aligned, expected = t == (j - 1) * w.interval, False
@@ -144,7 +152,8 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
             if h != at.h:
                 at = quarters(h, flow.b, flow.K, flow.inverse)
             y1, v1, n1 = step(y, v, t, n0, at, flow, w)
-            if not np.isfinite(y1 + v1):  # no step would be short enough any more
+            w.s[STEPS] += 1.0
+            if not (np.isfinite(y1 + v1) and w.s[STEPS] < most):  # no step would be short enough
                 w.out[j] = np.nan
                 return y1, v1, t, w.n
         length = h
@@ -176,35 +185,53 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
 
 
 @inner()
-def first_reading(y: Any, v: Any, w: Any) -> Any:
-    """What the probe reads at t = 0."""
-    at_once = input_reading(0, 0.0, w)
+def reading_at(j: Any, y: Any, v: Any, t: Any, w: Any) -> Any:
+    """What the probe reads at sample `j`, where a motion begins."""
+    at_once = input_reading(j, 0.0, w)
     if w.order < 2:
         return at_once + (y if w.order == 0 else v)
     if v == 0.0 and w.q[FRICTION] > 0.0 and w.s[SLIDING] == 0.0:
-        return at_once + added_reading(y, v, 0.0, w)
-    set_directions(y, v, 0.0, w)
-    flow, _ = flow_from(y, v, 0.0, w)
-    force = 0.0 if flow.plain else added_force(y, v, 0.0, NOW, flow, w)
-    at_once = input_reading(0, flow.inverse, w)
-    return reading(y, v, force, flow, w) + added_reading(y, v, 0.0, w) + at_once
+        return at_once + added_reading(y, v, t, w)
+    set_directions(y, v, t, w)
+    flow, _ = flow_from(y, v, t, w)
+    force = 0.0 if flow.plain else added_force(y, v, t, NOW, flow, w)
+    at_once = input_reading(j, flow.inverse, w)
+    return reading(y, v, force, flow, w) + added_reading(y, v, t, w) + at_once
+
+
+@inner()
+def up_to(n: Any, w: Any) -> Any:
+    """What stays the same, up to a sample."""
+    return Context(
+        w.mass, w.interval, n, w.order, w.out, w.tables, w.keys, w.size, w.q, w.base, w.laws,
+        w.acting, w.work, w.s, w.wave, w.shown, w.carried, w.driven, w.peak,
+    )  # fmt: skip
 
 
 @inner(inline="always")
-def walk(w: Any) -> Any:
+def walk(restarts: Any, w: Any) -> Any:
     """Readings at the samples, without the sensor's offset; returns a failure code."""
     y, v = begin(w)
-    w.out[0] = first_reading(y, v, w)
-    t, j = 0.0, typed(1)
+    w.out[0] = reading_at(0, y, v, 0.0, w)
+    t, j, r = 0.0, typed(1), 0
+    limit = w.n if restarts.shape[0] == 0 else int(restarts[0, 0]) + 1
+    part = up_to(limit, w)
     events = EVENTS_AT_LEAST + EVENTS_PER_SAMPLE * w.n
     while j < w.n:
+        if j == part.n:
+            t = (j - 1) * w.interval
+            y, v = set_contact(restarts[r, 1], restarts[r, 2], t, w)
+            w.out[j - 1] = reading_at(j - 1, y, v, t, w)
+            r += 1
+            part = up_to(w.n if r == restarts.shape[0] else int(restarts[r, 0]) + 1, w)
+            continue
         events -= 1
         if events < 0:
             return TOO_MANY_EVENTS
         if v == 0.0 and w.q[FRICTION] > 0.0 and w.s[SLIDING] == 0.0:
-            t, j = stick(y, t, j, w)
+            t, j = stick(y, t, j, part)
         else:
-            y, v, t, j = section(y, v, t, j, w)
+            y, v, t, j = section(y, v, t, j, part)
         if not abs(y) < FARTHEST:
             return NOT_FINITE
     return OK
@@ -212,11 +239,20 @@ def walk(w: Any) -> Any:
 
 @inner(inline="always")
 def integrate(
-    q: Any, mass: Any, interval: Any, laws: Any, order: Any, out: Any, waves: Any, room: Any
+    q: Any,
+    mass: Any,
+    interval: Any,
+    laws: Any,
+    order: Any,
+    out: Any,
+    waves: Any,
+    restarts: Any,
+    room: Any,
 ) -> Any:
     """One trajectory, see `integrate_many`. The caller keeps `room`: w has only its addresses.
 
     waves : (3, n) measured input, see `driven.Wave`, or (3, 0)
+    restarts : (m, 3) samples from which on, and states in which, the motion begins anew
     """
     if not admissible(q, mass):
         return BAD_PARAMETERS
@@ -230,7 +266,7 @@ def integrate(
         floats_at(work.ctypes.data), floats_at(s.ctypes.data), floats_at(wave.ctypes.data),
         floats_at(shown.ctypes.data), floats_at(carried.ctypes.data), wave.size > 1, largest(wave),
     )  # fmt: skip
-    code = walk(w)
+    code = walk(restarts, w)
     if code == OK and not np.all(np.isfinite(out)):
         return NOT_FINITE
     return code
@@ -260,14 +296,14 @@ def room_for(size: Any) -> Any:
 @compiled(nogil=True)
 def _in_turn(
     q: Any, mass: Any, intervals: Any, counts: Any, laws: Any, orders: Any, waves: Any,
-    starts: Any, out: Any, codes: Any,
+    starts: Any, restarts: Any, firsts: Any, out: Any, codes: Any,
 ) -> Any:  # fmt: skip
     room = room_for(laws.shape[0])
     for k in range(q.shape[0]):
         first, size = (0, 0) if starts[k] < 0 else (starts[k], counts[k])
         codes[k] = integrate(
             q[k], mass, intervals[k], laws, orders[k], out[k, : counts[k]],
-            waves[:, first : first + size], room,
+            waves[:, first : first + size], restarts[firsts[k] : firsts[k + 1]], room,
         )  # fmt: skip
 
 
@@ -282,6 +318,7 @@ def integrate_many(
     *,
     orders: NDArray[np.int64] | None = None,
     threads: bool | None = None,
+    restarts: Sequence[NDArray[np.float64]] = (),
 ) -> NDArray[np.int64]:
     """Trajectories of many slot vectors, each a recording of its own.
 
@@ -294,11 +331,15 @@ def integrate_many(
     out : (K, n) receives displacements, m, or what `orders` says, without the sensor's offset
     orders : (K,) which time derivative of the displacement; None: 0 throughout
     inputs : measured forces, where recordings have any; the slot A is then their gain
+    restarts : per trajectory (m, 3) or none: samples, ascending, none the first, at which the
+        motion begins anew, and the displacements, m, and velocities, m/s, there; time, states of
+        laws and bodies go on
     threads : share the work among threads; the numbers do not depend on it. None: where it pays
 
     Returns
     -------
-    (K,) codes: OK, BAD_PARAMETERS, TOO_MANY_EVENTS or NOT_FINITE; `out` is then not to be used.
+    (K,) codes: OK, BAD_PARAMETERS, TOO_MANY_EVENTS or NOT_FINITE (too many steps too); `out` is
+    then not to be used.
     """
     table = np.ascontiguousarray(laws)
     codes = np.zeros(q.shape[0], dtype=np.int64)
@@ -307,11 +348,16 @@ def integrate_many(
     given = inputs or Inputs(np.empty((3, 0)), np.full(q.shape[0], -1, dtype=np.int64))
     waves, starts = np.ascontiguousarray(given.values), np.ascontiguousarray(given.starts)
 
+    anew = np.concatenate([np.empty((0, 3)), *restarts])
+    firsts = np.concatenate([[0], np.cumsum([len(one) for one in restarts])]).astype(np.int64)
+    if not restarts:
+        firsts = np.zeros(q.shape[0] + 1, dtype=np.int64)
+
     def run(first: int, end: int) -> None:
         some = slice(first, end)
         _in_turn(
             q[some], mass, intervals[some], counts[some], table, orders[some], waves, starts[some],
-            out[some], codes[some],
+            anew, firsts[first : end + 1], out[some], codes[some],
         )  # fmt: skip
 
     if threads or (threads is None and q.shape[0] >= THREADING_PAYS):

@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -61,10 +63,16 @@ def general_motions(
     laws: NDArray[np.int64],
     orders: Counts,
     inputs: Inputs | None = None,
+    restarts: Sequence[Array] = (),
 ) -> Array:
-    """The same for oscillators with added effects: slots (K, Q), table of laws (L, 7)."""
+    """The same for oscillators with added effects: slots (K, Q), table of laws (L, 7).
+
+    Every row may begin anew, see `integrate_many`.
+    """
     out = np.empty((q.shape[0], int(counts.max())))
-    codes = integrate_many(q, mass, intervals, counts, laws, out, inputs, orders=orders)
+    codes = integrate_many(
+        q, mass, intervals, counts, laws, out, inputs, orders=orders, restarts=restarts
+    )
     out[np.arange(out.shape[1]) >= counts[:, None]] = np.nan
     out[codes != 0] = np.nan
     return out

@@ -200,6 +200,19 @@ class Oscillator:
         motions = self.motions_of(np.full(simulated.size, r), q[simulated])
         return self.read(r, motions[np.where(other, np.cumsum(other), 0)], theta)
 
+    def predict_restarted(self, r: int, theta: Array, restarts: Array) -> Array:
+        """Readings of recording `r`, (B, n), for parameter vectors (B, d), of a motion that begins
+        anew where `restarts` (m, 3) say, see `integrate_many`.
+        """
+        q = np.ascontiguousarray(self.layout.slots(theta)[:, r])
+        rows = np.full(q.shape[0], r)
+        motions = general_motions(
+            q, self.campaign.mass, self.counts[rows], self.intervals[rows], self.laws,
+            self.orders[rows], None if self.inputs is None else self.inputs.of(rows),
+            [restarts] * rows.size,
+        )  # fmt: skip
+        return self.read(r, motions, theta)
+
     def read(self, r: int, motion: Array, theta: Array) -> Array:
         """Gain, sensor, rest offset and filter on true displacements (or their time derivatives,
         as the probe reads them), (B, n), of recording `r`.

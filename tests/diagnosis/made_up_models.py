@@ -27,8 +27,8 @@ class Table:
     `once` where a model's first fit ends. `force` is the evidence of a free force in place of all
     effects, to which `beside` adds where there are effects that it may stand beside. `chi2` is
     that of every fit but those of `left`. `asked` are the sets that the equation of motion asks
-    for, of all stretches and `asked_in_flight`, or about a model, `asked_about`; `seen` what it
-    gains by an effect, of which `first` are tried.
+    for, of all stretches and `asked_in_flight`, or about a model, `asked_about`, and `asked_ahead`
+    those that periods ahead do; `seen` what is gained by an effect, of which `first` are tried.
     """
 
     def __init__(
@@ -46,10 +46,12 @@ class Table:
         asked_in_flight: tuple[str, ...] = (),
         asked_about: dict[str, tuple[str, ...]] | None = None,
         first: int = 4,
+        asked_ahead: tuple[str, ...] = (),
         left: dict[str, float] | None = None,
     ) -> None:
         self.left = {frozenset(k.split()): v for k, v in (left or {}).items()}
         self.asked_in_flight, self.first = asked_in_flight, first
+        self.asked_ahead = asked_ahead
         self.asked_about = {frozenset(k.split()): v for k, v in (asked_about or {}).items()}
         self.beside, self.chi2, self.asked, self.seen = beside, chi2, asked, seen or {}
         self.once = {frozenset(k.split()): v for k, v in (once or {}).items()}
@@ -99,13 +101,17 @@ class Table:
             names = self.asked_in_flight if flight else again
             return SimpleNamespace(fit=base, known=(), terms=(), best=lambda most: best(names))
 
-        def first(model, about):
+        def ahead(model, about):
+            return SimpleNamespace(fit=model.fit, best=lambda most: best(self.asked_ahead))
+
+        def first(model, about, instead=""):
             left = [i for i in self.seen if i not in model.ids]
             return set(sorted(left, key=lambda i: -self.seen[i])[: self.first])
 
         return SimpleNamespace(
-            has_stop=bool(self.asked_in_flight), seen=set(self.seen), about=about, first=first
-        )
+            has_stop=bool(self.asked_in_flight), seen=set(self.seen), about=about, first=first,
+            ahead=ahead,
+        )  # fmt: skip
 
     def without(self, candidate, effect, scales, *, enough) -> Candidate:
         ids = [i for i in candidate.ids if i != effect.id]

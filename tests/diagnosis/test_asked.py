@@ -7,11 +7,11 @@ import small_rig
 from effect_rigs import BY_ID
 
 from bayesimpact.diagnosis.asked import ASKED, Asked
-from bayesimpact.diagnosis.equation_error import _smoothed
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.refit import base_candidate, fit_from
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects import SEARCHED
+from bayesimpact.response.measured_motion import smoothed
 
 
 def test_about_a_better_model_a_quadratic_spring_hides_nothing_else() -> None:
@@ -46,16 +46,36 @@ def test_what_acts_in_flight_is_judged_there() -> None:
     asked = Asked(fit, SEARCHED, campaign_scales(fit))
     base = base_candidate(fit)
     flight = asked.about(base, flight=True).gains(())
-    whole = asked.about(base, flight=False).gains(())
-    stops = {i: g for i, g in whole.items() if i not in flight}
-    assert set(flight) | set(stops) == asked.seen and stops
+    ahead = asked.ahead(base, base).gains()
+    stops = {i: g for i, g in ahead.items() if i not in flight}
+    assert set(flight) | set(stops) <= asked.seen and stops
     expected = [sorted(g, key=lambda i: -g[i])[:ASKED] for g in (flight, stops)]
     assert asked.first(base, base) == {*expected[0], *expected[1]}
-    assert all(BY_ID[i].regime != "free" for i in stops)
+    assert "contact_no_tension" in expected[1]
+    assert asked.ahead(base, base) is asked.ahead(base, base)
+
+
+def test_in_the_place_of_an_effect_only_what_comes_near_is_asked_for() -> None:
+    planted = {"obstacle_mass": {"mass": 0.05}, "quadratic_drag": {"coefficient": 1.5}}
+    fit = identify(
+        small_rig.record(1, planted, duration=4.0), rng=np.random.default_rng(0), search=False
+    ).fit
+    scales = campaign_scales(fit)
+    asked = Asked(fit, SEARCHED, scales)
+    whole = fit_from(fit, [BY_ID[i] for i in planted], {}, scales)
+    assert whole.fit.reduced_chi2 < 1.2
+    drag, mass = (
+        fit_from(fit, [BY_ID[i]], {}, scales) for i in ("quadratic_drag", "obstacle_mass")
+    )
+    every, near = (asked.first(drag, whole, own) for own in ("", "obstacle_mass"))
+    assert {"obstacle_mass", "contact_no_tension"} <= every
+    assert near == {"obstacle_mass"}  # judged by periods ahead alone: nothing of it in flight
+    near = asked.first(mass, whole, "quadratic_drag")
+    assert {"quadratic_drag", "power_damping"} <= near and "second_mode" not in near
 
 
 def test_a_period_longer_than_the_recording_is_smoothed_over_what_there_is() -> None:
     """A fit that failed may have any period, and noise that asks for long polynomials."""
     samples = 1e-3 * np.random.default_rng(0).standard_normal(40)
-    y, v = _smoothed(samples, 1e-3, 10.0, 1.0)
+    y, v = smoothed(samples, 1e-3, 10.0, 1.0)
     assert y.shape == v.shape == (40,) and np.isfinite(v).all()

@@ -125,6 +125,20 @@ def test_what_free_flight_asks_for_is_extended_beside_what_gains_more(run):
     assert chosen(run(table, (*EFFECTS, BY_ID[N]))) == {A, N}
 
 
+def test_with_a_stop_periods_ahead_are_asked_first(run):
+    """What they ask for is fitted before what free flight does, and where nothing large is left of
+    it flight is not asked.
+    """
+    gains = {A: 5.0, f"{S} {N}": ENOUGH}
+    effects = (*EFFECTS, BY_ID[N])
+    table = Table(
+        gains, chi2=100.0, left={f"{S} {N}": 1.0}, asked=(S,), asked_in_flight=(A,),
+        asked_ahead=(f"{S} {N}",),
+    )  # fmt: skip
+    assert chosen(run(table, effects)) == {S, N}
+    assert table.fitted[0] == {S, N} and {A} not in table.fitted[:3]
+
+
 @pytest.mark.parametrize(
     ("before", "left", "ends"), [(35.0, 8.5, True), (33.0, 8.5, False), (100.0, 9.5, False)]
 )

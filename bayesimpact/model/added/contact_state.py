@@ -59,10 +59,12 @@ from bayesimpact.model.compiled import inner
 
 # what holds between events: gap, kind of motion, direction of sliding (0: held), direction of
 # motion, whether the obstacle has pushed in this contact; displacement and velocity of a second
-# mode, and what it keeps for a sampling interval; then the side of every law's surface
+# mode, and what it keeps for a sampling interval; then the number of steps so far and the side of
+# every law's surface
 GAP, MODE, SLIDING, HEADING, PUSHED, SECOND_Q, SECOND_P, HOP = range(8)
 JOINT = HOP + 8  # matrices of `joint`, in flight and in contact
-SIDES = JOINT + 2 * (3 + 36)
+STEPS = JOINT + 2 * (3 + 36)
+SIDES = STEPS + 1
 FREE, TOUCHING, SEPARATED = 0.0, 1.0, 2.0
 NEVER, SOON, ONCE = 0.0, 0.5, 1.0  # the obstacle has pushed in this contact; SOON: in this step
 NONE, TOUCH, LEAVE, TURN, SURFACE = range(-1, 4)  # SURFACE + i: surface of law i
@@ -152,18 +154,26 @@ def begin(w: Any) -> Any:
         initial = w.laws[LAW_COLUMNS * law + LAW_INITIAL]
         tell(law, q[initial] if initial >= 0 else 0.0, w)
     s[GAP] = q[G]
+    return set_contact(y, v, 0.0, w)
+
+
+@inner()
+def set_contact(y: Any, v: Any, t: Any, w: Any) -> Any:
+    """What holds where a motion begins, whatever it was before: (y, v)."""
+    q, s = w.q, w.s
     s[SLIDING] = np.sign(v)
+    s[MODE] = FREE
     if y > s[GAP]:
         s[MODE] = TOUCHING
-        added_force = reaction(y, v, 0.0, NOW, w)
+        added_force = reaction(y, v, t, NOW, w)
         s[PUSHED] = ONCE if added_force > 0.0 else NEVER
         if one_sided(q) and added_force <= -q[ADHESION]:
             s[MODE] = SEPARATED
-    set_sides(y, v, 0.0, w)
+    set_sides(y, v, t, w)
     if v == 0.0:
-        set_sliding(y, 0.0, w)
-    if y == s[GAP] and (v > 0.0 or (v == 0.0 and static_force(y, 0.0, NOW, w) > 0.0)):
-        y, v = resolve(TOUCH, y, v, 0.0, w)
+        set_sliding(y, t, w)
+    if y == s[GAP] and (v > 0.0 or (v == 0.0 and static_force(y, t, NOW, w) > 0.0)):
+        y, v = resolve(TOUCH, y, v, t, w)
     return y, v
 
 

@@ -1,0 +1,199 @@
+"""Sets of terms that a linear least-squares problem asks for.
+
+All sets come from its normal equations: a beam of the best ones is extended by one term at a time.
+A set counts by what its least squares leave, with the price of every unknown (Schwarz 1978), shapes
+among them, and of every effect.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.model.effects.effect import Effect
+
+Array = NDArray[np.float64]
+
+Chosen = tuple[int, ...]
+
+BEAM = 40  # sets of a size that are extended
+
+
+@dataclass(frozen=True, eq=False)
+class EffectSet:
+    """Effects with the parameters that a problem asks for.
+
+    Attributes
+    ----------
+    effects : all of them
+    values : parameter -> value: sizes and shapes of the effects, the base model's, y0 and v0
+    log_odds : over the model that the problem is posed about, as far as this problem tells
+    """
+
+    effects: tuple[Effect, ...]
+    values: Mapping[str, float]
+    log_odds: float
+
+
+@dataclass(frozen=True, eq=False)
+class EffectColumns:
+    """One effect at one point of its shape grid.
+
+    Attributes
+    ----------
+    names : of its size parameters; its id for what it adds where they are at their null
+    columns : per recording (stretches, k), whitened, per unit of them
+    one_sided : which of them cannot be negative, (k,)
+    on_grid : whether the shape is one of the scores' grid; sets are chosen from those, for on a
+        finer one a law with a free power comes nearer to the errors of another law than that itself
+    """
+
+    effect: Effect
+    shapes: Mapping[str, float]
+    names: tuple[str, ...]
+    columns: tuple[Array, ...]
+    one_sided: tuple[bool, ...]
+    on_grid: bool = True
+
+
+class TermSets:
+    """Sets of terms by their least squares: the normal equations of what every set has and of the
+    terms, all columns scaled to norm one.
+
+    terms : what a set may hold
+    names, columns : of the unknowns of every set (N, b)
+    target : (N,) what is to be explained
+    rows : independent numbers of it
+    cost : nats of an effect, for multiplicity
+    """
+
+    known: Sequence[EffectColumns] = ()
+
+    def __init__(
+        self,
+        terms: Sequence[EffectColumns],
+        names: Sequence[str],
+        columns: Array,
+        target: Array,
+        rows: int,
+        cost: float,
+    ) -> None:
+        self.terms, self.names, self.target, self.rows, self.cost = terms, names, target, rows, cost
+        blocks = [np.concatenate(term.columns) for term in terms]
+        self.first = np.cumsum([columns.shape[1], *(b.shape[1] for b in blocks)])
+        self.every = np.column_stack([columns, *blocks])
+        size = np.linalg.norm(self.every, axis=0)
+        self.size = np.where(size > 0, size, 1.0)
+        scaled = self.every / self.size
+        self.matrix, self.right = scaled.T @ scaled, scaled.T @ target
+        self.whole = float(target @ target)
+        self.base = [i for i in range(columns.shape[1]) if size[i] > 0]
+
+    def columns(self, chosen: Sequence[int]) -> list[int]:
+        """Of the base model and of the terms `chosen`."""
+        own = [i for t in chosen for i in range(self.first[t], self.first[t + 1])]
+        return [*self.base, *own]
+
+    def solve(self, chosen: Sequence[int]) -> tuple[Array, float]:
+        """Scaled unknowns of a set, and the log of what it leaves per stretch, at least 0."""
+        at = self.columns(chosen)
+        part = self.matrix[np.ix_(at, at)] + 1e-12 * np.eye(len(at))
+        x = np.linalg.solve(part, self.right[at])
+        left = self.whole - float(x @ self.right[at])
+        return np.asarray(x), float(np.log(max(left / self.rows, 1.0)))
+
+    def is_possible(self, x: Array) -> bool:
+        """Whether a set may have such scaled unknowns, those of one-sided terms apart."""
+        return True
+
+    def log_odds(self, chosen: Sequence[int]) -> float:
+        """Of a set over no unknown at all; minus infinity for what cannot be, such as a size below
+        zero.
+        """
+        x, left = self.solve(chosen)
+        unknowns = x.size - len(self.base) + sum(len(self.terms[t].shapes) for t in chosen)
+        signs = [s for t in chosen for s in self.terms[t].one_sided]
+        if not self.is_possible(x) or np.any(x[len(self.base) :][signs] <= 0.0):
+            return -np.inf
+        price = 0.5 * unknowns * float(np.log(self.rows)) + self.cost * len(chosen)
+        return -0.5 * self.rows * left - price
+
+    def best(self, most: int) -> list[EffectSet]:
+        """The likeliest sets of one, two, ... effects; each is likelier than all smaller ones."""
+        found, none = list[EffectSet](), self.log_odds(()) if self.terms else 0.0
+        reached = none
+        for ranked in self.levels(most):
+            best = self.refined(ranked[0])
+            odds = self.log_odds(best)
+            if odds <= reached:
+                break
+            reached = odds
+            found.append(self.set_of(best, reached - none))
+        return found
+
+    def set_of(self, chosen: Sequence[int], odds: float) -> EffectSet:
+        """The effects of some terms with the values of all unknowns."""
+        raise NotImplementedError
+
+    def levels(self, most: int) -> Iterator[list[Chosen]]:
+        """Sets of one, two, ... up to `most` effects, of each number `BEAM` of the likeliest at
+        most, in that order; every one extends one of the last number.
+        """
+        beam: list[Chosen] = [()]
+        for _ in range(most if self.terms else 0):
+            level: dict[frozenset[str], tuple[float, Chosen]] = {}
+            for chosen in beam:
+                for t in self._beside(chosen):
+                    ids = frozenset(self.terms[i].effect.id for i in (*chosen, t))
+                    odds = self.log_odds((*chosen, t))
+                    if odds > level.get(ids, (-np.inf, ()))[0]:
+                        level[ids] = odds, (*chosen, t)
+            beam = [c for _, c in sorted(level.values(), key=lambda one: -one[0])[:BEAM]]
+            if not beam:
+                return
+            yield beam
+
+    def gains(self, ids: Collection[str] = ()) -> dict[str, float]:
+        """By how much every other effect that has a term would make a set likelier, nats."""
+        if not self.terms:
+            return {}
+        held = self.shaped(ids)
+        before, found = self.log_odds(held), dict[str, float]()
+        for t in self._beside(held):
+            own = self.terms[t].effect.id
+            gain = self.log_odds((*held, t)) - before
+            found[own] = max(found.get(own, -np.inf), gain)
+        return found
+
+    def shaped(self, ids: Collection[str]) -> Chosen:
+        """The terms of those of some effects that have one, each at its likeliest shape beside the
+        others.
+        """
+        every = [term.effect.id for term in self.terms]
+        return self.refined([every.index(i) for i in ids if i in every])
+
+    def refined(self, chosen: Sequence[int]) -> Chosen:
+        """A set with the shape of each effect where it is likeliest beside the others, also between
+        the points from which sets are chosen.
+        """
+        found = list(chosen)
+        for k in (*range(len(found)), *range(len(found))):
+            effect, rest = self.terms[found[k]].effect, (*found[:k], *found[k + 1 :])
+            own = [t for t, term in enumerate(self.terms) if term.effect is effect]
+            found[k] = max(own, key=lambda t: self.log_odds((*rest, t)))
+        return tuple(found)
+
+    def _beside(self, chosen: Sequence[int]) -> list[int]:
+        """Terms that a set may take in."""
+        held = [term.effect for term in (*self.known, *(self.terms[i] for i in chosen))]
+        ids = {e.id for e in held}
+        return [
+            t
+            for t, term in enumerate(self.terms)
+            if term.on_grid
+            and term.effect.id not in ids
+            and all(term.effect.stands_beside(e) for e in held)
+        ]

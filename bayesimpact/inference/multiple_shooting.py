@@ -1,0 +1,150 @@
+"""A likelihood whose simulated motion begins anew in every period, where the recording says.
+
+Over many cycles small errors of a force add up: a simulation comes out of step with its recording,
+the misfit has a side minimum for every cycle, and what is linearised about it means little. Here
+the motion starts at every lowest point from the state that is read there, and the misfit is that
+of one period ahead. What a wrong start does to its period, to first order, is taken out of
+residuals and derivatives alike: the starts are free (multiple shooting: Bock 1981; for chaotic and
+oscillating systems Pisarenko and Sornette 2004, Phys. Rev. E 69:036122). Time, the states of laws
+and bodies, and the number of impacts go on.
+
+Starts cost information, so this likelihood decides nothing; it leads to modes of the ordinary one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.inference.likelihood import Likelihood, Linearisation
+from bayesimpact.inference.noise import Noise
+from bayesimpact.model.oscillator import Oscillator
+from bayesimpact.model.parameters import SLOTS
+from bayesimpact.response.measured_motion import lowest_points, smoothed
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+_K1, _OFFSET = SLOTS.index("k1"), SLOTS.index("offset")
+
+SMALL = 1e-5  # of the largest displacement and speed: changes of a start, for differences
+
+
+@dataclass(frozen=True, eq=False)
+class Starts:
+    """Where the motion of one recording begins anew.
+
+    Attributes
+    ----------
+    restarts : (m, 3) samples, displacements, m, and velocities, m/s
+    blocks : per period after the first one (s, 2): orthonormal responses to its start, whitened
+    """
+
+    restarts: Array
+    blocks: tuple[Array, ...]
+
+    def apart(self, white: Array) -> Array:
+        """Whitened signals (..., n) less what other starts would do, period by period."""
+        found, first = white.copy(), self.restarts[:, 0].astype(np.int64)
+        for begin, block in zip(first, self.blocks, strict=True):
+            part = found[..., begin : begin + block.shape[0]]
+            part -= (part @ block) @ block.T
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class MultipleShooting(Likelihood):
+    """Likelihood of every period ahead. Of displacements only; filtered noise counts as white."""
+
+    starts: tuple[Starts, ...] = ()
+
+    @cached_property
+    def sizes(self) -> Array:
+        """Independent numbers per recording, (R,): two of every start tell nothing."""
+        whole = super().sizes
+        return np.array(
+            [max(n - 2 * len(s.blocks), 1.0) for n, s in zip(whole, self.starts, strict=True)]
+        )
+
+    def misfit(self, theta: Array) -> Array:
+        """Sums of squares of the residuals, (B, R), m2; inf where inadmissible."""
+        left = self.residuals(np.atleast_2d(theta))
+        sums = np.stack([np.einsum("bn,bn->b", white, white) for white in left], axis=1)
+        return np.where(np.isfinite(sums), sums, np.inf)
+
+    def residuals(self, theta: Array) -> tuple[Array, ...]:
+        """Residuals of every recording, (B, n), m, for parameter vectors (B, d)."""
+        found = []
+        for r, (recording, starts) in enumerate(
+            zip(self.oscillator.campaign.recordings, self.starts, strict=True)
+        ):
+            seen = self.oscillator.predict_restarted(r, theta, starts.restarts)
+            white = self.noise.whitened(recording, recording.samples - seen)
+            found.append(starts.apart(white))
+        return tuple(found)
+
+    def linearise(
+        self,
+        theta: Array,
+        steps: Array | None = None,
+        recordings: Sequence[int] | None = None,
+        *,
+        roughly: bool = False,
+    ) -> tuple[Linearisation, ...]:
+        """As of the ordinary likelihood, always by differences."""
+        if steps is None:
+            raise ValueError("multiple shooting needs difference steps")
+        wanted = range(self.oscillator.counts.size) if recordings is None else recordings
+        return tuple(self._differences(r, theta, steps, roughly) for r in wanted)
+
+    def readings(self, r: int, points: Array, error: float) -> Array:
+        """Readings (B, n) of recording `r` for parameters (B, d)."""
+        return self.oscillator.predict_restarted(r, points, self.starts[r].restarts)
+
+    def whitened(self, r: int, signals: Array) -> Array:
+        """Signals (..., n) of recording `r`, whitened, less what other starts would do."""
+        return self.starts[r].apart(
+            self.noise.whitened(self.oscillator.campaign.recordings[r], signals)
+        )
+
+
+def multiple_shooting(likelihood: Likelihood, theta: Array) -> MultipleShooting | None:
+    """The likelihood of periods ahead, with responses to its starts as `theta` (d,) has them.
+
+    None where recordings are no displacements, or no period is told from noise.
+    """
+    o = likelihood.oscillator
+    if not o.reads_displacements:
+        return None
+    noise = replace(likelihood.noise, smoothing=None)
+    starts = tuple(_starts(o, noise, r, theta) for r in range(o.counts.size))
+    return MultipleShooting(o, noise, starts) if any(s.blocks for s in starts) else None
+
+
+def _starts(o: Oscillator, noise: Noise, r: int, theta: Array) -> Starts:
+    recording, q = o.campaign.recordings[r], o.layout.slots(theta)[r]
+    period = 2 * np.pi * float(np.sqrt(o.campaign.mass / q[_K1]))
+    gain = theta[o.gains[r]] if o.gains[r] >= 0 else 1.0
+    y = (recording.samples - q[_OFFSET]) / gain
+    y, v = smoothed(y, recording.interval, period, noise.level)
+    at = lowest_points(y, recording.interval, period, noise.level)
+    restarts = np.column_stack([at, y[at], v[at]])
+    if at.size == 0:
+        return Starts(restarts, ())
+    moved = [restarts]
+    for column, size in ((1, np.ptp(y)), (2, np.ptp(v))):
+        moved.append(restarts.copy())
+        moved[-1][:, column] += SMALL * size
+    seen = np.concatenate([o.predict_restarted(r, theta[None], one) for one in moved])
+    white = noise.whitened(recording, (seen[1:] - seen[0]) / SMALL).T
+    ends = [*at[1:], recording.samples.size]
+    parts = [white[a:b] for a, b in zip(at, ends, strict=True)]
+    return Starts(restarts, tuple(np.linalg.qr(_scaled(part))[0] for part in parts))
+
+
+def _scaled(columns: Array) -> Array:
+    size = np.linalg.norm(columns, axis=0)
+    return np.asarray(columns / np.where(size > 0.0, size, 1.0))

@@ -1,0 +1,33 @@
+"""Displacement and velocity from the readings of a displacement alone, by local polynomials."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import find_peaks, savgol_filter
+
+Array = NDArray[np.float64]
+
+STEADY = 3e-3  # of the largest speed: noise that is left in a measured velocity
+WIDEST = 1 / 24  # of a natural period: half width of the polynomials that smooth the motion
+APART = 0.6  # natural periods from one lowest point to the next, at least
+STANDING_OUT = 6.0  # noise levels by which one lies below the motion beside it
+
+
+def smoothed(samples: Array, interval: float, period: float, noise: float) -> tuple[Array, Array]:
+    """Displacement and velocity (n,) by local quartics, no wider than the noise asks for."""
+    speed = np.pi * float(np.ptp(samples)) / period
+    asked = (3.0 * noise / (STEADY * speed * interval)) ** (2 / 3)
+    most = min(WIDEST * period / interval, (samples.size - 1) / 2)  # a fitted period may be long
+    half = int(np.clip(np.ceil(asked), 3, max(most, 3)))
+    y, v = (savgol_filter(samples, 2 * half + 1, 4, deriv=k, delta=interval) for k in (0, 1))
+    return np.asarray(y), np.asarray(v)
+
+
+def lowest_points(y: Array, interval: float, period: float, noise: float) -> NDArray[np.int64]:
+    """Samples (m,) at which a motion turns farthest from the stop, one per period, as far as the
+    `noise` lets them be told.
+    """
+    apart = max(APART * period / interval, 1.0)
+    found, _ = find_peaks(-y, distance=apart, prominence=STANDING_OUT * noise)
+    return np.asarray(found, dtype=np.int64)

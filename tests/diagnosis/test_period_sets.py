@@ -1,0 +1,100 @@
+"""Sets of effects that periods ahead ask for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import small_rig
+from effect_rigs import BY_ID
+
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.diagnosis.directions import shape_points
+from bayesimpact.diagnosis.extend import campaign_scales
+from bayesimpact.diagnosis.name import name
+from bayesimpact.diagnosis.period_sets import PeriodSets
+from bayesimpact.diagnosis.refit import fit_from
+from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.identify import identify
+from bayesimpact.model.effects import SEARCHED
+
+MASS = {"obstacle_mass": {"mass": 0.01}, "quadratic_drag": {"coefficient": 1.5}}
+
+
+def fitted(campaign: Campaign) -> Fit:
+    return identify(campaign, rng=np.random.default_rng(0), search=False).fit
+
+
+@pytest.fixture(scope="module")
+def heavy() -> Fit:
+    """A base fit to recordings of an obstacle with a mass, and drag."""
+    return fitted(small_rig.record(1, MASS, duration=4.0))
+
+
+def test_effects_with_states_of_their_own_are_asked_for(heavy: Fit) -> None:
+    assert heavy.reduced_chi2 > 50
+    scales = campaign_scales(heavy)
+    found = PeriodSets(heavy, SEARCHED, scales).best(3)
+    assert {e.id for e in found[1].effects} == set(MASS)
+    odds = [s.log_odds for s in found]
+    assert odds == sorted(odds) and odds[0] > 100
+    reached = fit_from(heavy, found[1].effects, found[1].values, scales)
+    assert reached.fit.reduced_chi2 < 1.2
+    for effect, numbers in MASS.items():
+        for key, value in numbers.items():
+            assert reached.fit.value(f"{effect}.{key}") == pytest.approx(value, rel=0.05)
+
+
+def test_sizes_are_what_the_least_squares_have_and_shapes_those_of_the_grid(heavy: Fit) -> None:
+    """Against the least squares of the same columns by numpy."""
+    scales = campaign_scales(heavy)
+    effects = [BY_ID["quadratic_drag"], BY_ID["contact_relaxation"]]
+    problem = PeriodSets(heavy, effects, scales)
+    chosen = (0, 1)
+    assert problem.terms[1].shapes in shape_points(effects[1], scales)
+    found = problem.set_of(chosen, 0.0)
+    columns = problem.every[:, problem.columns(chosen)]
+    size = np.linalg.norm(columns, axis=0)
+    x = np.linalg.lstsq(columns / size, problem.target, rcond=1e-10)[0] / size
+    assert found.values["k1"] - heavy.value("k1") == pytest.approx(x[problem.names.index("k1")])
+    assert found.values["quadratic_drag.coefficient"] == pytest.approx(x[-2])
+    assert found.values["contact_relaxation.stiffness"] == pytest.approx(x[-1])
+    shape = problem.terms[1].shapes["contact_relaxation.time"]
+    assert found.values["contact_relaxation.time"] == shape
+
+
+def test_what_replaces_a_base_parameter_moves_with_it(heavy: Fit) -> None:
+    """Only the differences of the gaps are told apart from the change of the common one."""
+    problem = PeriodSets(heavy, [BY_ID["gap_per_recording"]], campaign_scales(heavy))
+    values = problem.set_of((0,), 0.0).values
+    gaps = [values[f"gap_per_recording.g[{r}]"] for r in "abc"]
+    assert "g" not in values
+    alone = problem.set_of((), 0.0).values["g"]
+    assert np.mean(gaps) == pytest.approx(alone, abs=0.3 * abs(alone - heavy.value("g")) + 2e-5)
+
+
+def test_about_a_model_its_own_effects_stay(heavy: Fit) -> None:
+    scales = campaign_scales(heavy)
+    drag = fit_from(heavy, [BY_ID["quadratic_drag"]], {}, scales)
+    problem = PeriodSets(drag.fit, SEARCHED, scales)
+    assert "quadratic_drag" not in {t.effect.id for t in problem.terms}
+    assert "quadratic_drag.coefficient" in problem.names
+    (one, *_) = problem.best(2)
+    assert {e.id for e in one.effects} == set(MASS)
+    assert max(problem.gains(), key=lambda i: problem.gains()[i]) == "obstacle_mass"
+
+
+def test_there_are_no_sets_of_velocities() -> None:
+    fit = fitted(small_rig.record(1, MASS, duration=2.0, quantity="velocity"))
+    problem = PeriodSets(fit, SEARCHED, campaign_scales(fit))
+    assert problem.best(3) == [] and problem.gains() == {}
+
+
+def test_a_search_begins_with_them(heavy: Fit) -> None:
+    """The obstacle's mass, which no force along the measured motion shows, is in the second fit."""
+    said = list[str]()
+    found = name(
+        heavy, SEARCHED, campaign_scales(heavy), rng=np.random.default_rng(0), progress=said.append
+    )
+    assert set(found.chosen.candidate.ids) == set(MASS)
+    fits = [str(line) for line in said if str(line).startswith("fitting")]
+    assert any("obstacle_mass" in line for line in fits[:2])
