@@ -22,9 +22,9 @@ from bayesimpact.model.added.contact_state import (
     NONE,
     SIDES,
     SLIDING,
-    STEPS,
     begin,
     heading,
+    may_step,
     resolve,
     set_contact,
     set_directions,
@@ -65,9 +65,6 @@ OK, BAD_PARAMETERS, TOO_MANY_EVENTS, NOT_FINITE = 0, 1, 2, 3
 THREADING_PAYS = 4  # trajectories from which on
 FARTHEST = 1e6  # m or rad: a motion that has come as far grows without end, in ever more steps
 EVENTS_AT_LEAST, EVENTS_PER_SAMPLE = 1000, 2  # of sections, most of which end without one
-# of steps on average. The catalogue at its plausible sizes takes up to 36 where a period has three
-# samples, up to 4 at 1 kHz; a climb may ask for motions that take thousands, and minutes.
-STEPS_AT_LEAST, STEPS_PER_SAMPLE = 20_000, 100
 
 
 @inner()
@@ -104,7 +101,6 @@ def cruise(y: Any, v: Any, n0: Any, j: Any, stride: Any, end: Any, flow: Any, w:
         event = suspicious(y, v, n0, y1, v1, n1, t + h, h, flow, w)
         if event:
             break
-        w.s[STEPS] += 1.0
         fill_in(j, j + stride - 1, t, True, at, flow, w, y, v, n0, h, y1, v1, n1)
         last = j + stride - 1
         w.out[last] = reading(y1, v1, n1, flow, w) + input_reading(last, flow.inverse, w)
@@ -129,7 +125,6 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
     y1, v1, n1 = y, v, n0
     stride = stride_of(longest, w)
     at = quarters(longest, flow.b, flow.K, flow.inverse)
-    most = STEPS_AT_LEAST + STEPS_PER_SAMPLE * w.n
     end = min(w.n, j + max(1, int(min(RENEWED * longest / w.interval, 1.0 * w.n))))
     while j < end:
         aligned, expected = t == (j - 1) * w.interval, False
@@ -152,8 +147,7 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
             if h != at.h:
                 at = quarters(h, flow.b, flow.K, flow.inverse)
             y1, v1, n1 = step(y, v, t, n0, at, flow, w)
-            w.s[STEPS] += 1.0
-            if not (np.isfinite(y1 + v1) and w.s[STEPS] < most):  # no step would be short enough
+            if not (np.isfinite(y1 + v1) and may_step(w)):  # no step would be short enough
                 w.out[j] = np.nan
                 return y1, v1, t, w.n
         length = h

@@ -65,9 +65,19 @@ GAP, MODE, SLIDING, HEADING, PUSHED, SECOND_Q, SECOND_P, HOP = range(8)
 JOINT = HOP + 8  # matrices of `joint`, in flight and in contact
 STEPS = JOINT + 2 * (3 + 36)
 SIDES = STEPS + 1
+# of steps, on average. The catalogue at its plausible sizes takes up to 36 where a period has three
+# samples, up to 4 at 1 kHz; a climb may ask for motions that take thousands, and minutes.
+STEPS_AT_LEAST, STEPS_PER_SAMPLE = 20_000, 100
 FREE, TOUCHING, SEPARATED = 0.0, 1.0, 2.0
 NEVER, SOON, ONCE = 0.0, 0.5, 1.0  # the obstacle has pushed in this contact; SOON: in this step
 NONE, TOUCH, LEAVE, TURN, SURFACE = range(-1, 4)  # SURFACE + i: surface of law i
+
+
+@inner(forceinline=True)
+def may_step(w: Any) -> Any:
+    """Count a step, and say whether a motion that takes so many is worth its time."""
+    w.s[STEPS] += 1.0
+    return w.s[STEPS] < STEPS_AT_LEAST + STEPS_PER_SAMPLE * w.n
 
 
 @inner(forceinline=True)

@@ -18,6 +18,7 @@ from bayesimpact.model.compiled import compiled, inner
 TERMS = 16  # over at most half a radian: the rest is below 1e-17
 SIZE = 6
 KEPT = 3 + SIZE * SIZE  # h, b, K and the matrix
+FASTEST = 1e4  # rad in a step: the series is summed twice as often per step
 SAME = 1e-11  # relative difference up to which a step has the usual length
 
 
@@ -33,10 +34,13 @@ def series(
         x'' = -Wo x - do x' + held (Wo y + do y')       z'' = -Wf z - df z' + Wf y + df y'
 
     with held = 1 while the obstacle's body follows the mass, else 0; ao, af its mass over that
-    which moves, 0 where there is none or it does not act.
+    which moves, 0 where there is none or it does not act. NaN for a body that is far too fast to be
+    followed.
     """
     y, v, x, r, z, s = state
     rate = math.sqrt(K) + 2.0 * b + math.sqrt(Wo) + do + math.sqrt(Wf) + df
+    if not rate * h < FASTEST:
+        return math.nan, math.nan, math.nan, math.nan, math.nan, math.nan
     pieces = max(1, math.ceil(2.0 * rate * h))
     h /= pieces
     for _ in range(pieces):

@@ -6,7 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from bayesimpact.model.added.contact_state import SLIDING, holding_force, static_force
+from bayesimpact.model.added.contact_state import (
+    SLIDING,
+    holding_force,
+    may_step,
+    static_force,
+)
 from bayesimpact.model.added.context import AHEAD, FORCE, NOW
 from bayesimpact.model.added.dense import input_reading
 from bayesimpact.model.added.flows import flow_from
@@ -33,6 +38,9 @@ def stick(y: Any, t: Any, j: Any, w: Any) -> Any:
         h = j * w.interval - t
         cuts = max(int(np.ceil(h / longest)), 1)
         h /= cuts
+        if not may_step(w):
+            w.out[j] = np.nan
+            return t, w.n
         force = pull_at(y, t, h, flow, w)
         if abs(force) > most:
             low, high = 0.0, h

@@ -213,3 +213,13 @@ def test_surfaces_at_one_place():
         values |= typical(effect, rig)
     assert values["opposite_stop.gap"] == values["spring_piecewise.gap"]
     assert np.abs(moved(effects, values, rig) - by_rig(effects, values, rig)).max() < 1e-9
+
+
+def test_a_motion_that_takes_far_too_many_steps_is_given_up() -> None:
+    """A climb may ask for any size: a body so fast would take minutes for two seconds."""
+    rig, effect = TestRig(duration=2.0), BY_ID["obstacle_mode"]
+    values = {name: 1e4 * value for name, value in typical(effect, rig).items()}
+    assert np.isnan(moved([effect], values, rig)).all()
+    near = typical(effect, rig)
+    near["obstacle_mode.frequency"] *= 100.0
+    assert np.isfinite(moved([effect], near, rig)).all()
