@@ -11,9 +11,10 @@ best sets, with all their parameters, are where refits begin.
 Impacts that few samples show, and a law of the stop that is not the base model's, bias the sizes of
 all forces. The same problem over stretches of free flight alone knows nothing of the stop.
 
-A state that the motion drives (a memory) follows from the measured motion. Effects that no force
-along a given path stands for (a further mode, another gap) are not seen here, nor are readings of
-velocity or acceleration.
+A state that the motion drives (a memory) follows from the measured motion. A velocity or an
+acceleration obeys the equation differentiated; what forces act along is its integral, where no
+input and no stop is beside it (`response.displacement`). Effects that no force along a given path
+stands for (a further mode, another gap) are not seen here.
 """
 
 from __future__ import annotations
@@ -23,8 +24,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 from scipy.linalg import cholesky_banded, solve_banded
 
+from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.directions import is_periodic, shape_points, size_parameters
 from bayesimpact.diagnosis.extend import at_null, extend, transfer
 from bayesimpact.diagnosis.term_sets import EffectColumns
@@ -34,6 +37,7 @@ from bayesimpact.model.effects.effect import Effect, Scales
 from bayesimpact.model.oscillator import Oscillator
 from bayesimpact.model.parameters import INPUT_GAIN, SLOTS, instance_name
 from bayesimpact.model.path_forces import add_forces
+from bayesimpact.response.displacement import displacement
 from bayesimpact.response.measured_motion import smoothed
 from bayesimpact.response.weak_form import Rows, products, rows_of
 
@@ -55,6 +59,7 @@ RIDGE = 1e-9  # stretches that overlap much are nearly dependent
 class Path:
     """A recording's measured motion, y, v, d, t (n,) in SI units, and its stretches.
 
+    reading : (n,) what is read, less its offset
     operator : (w,) by which a stretch weighs the readings' errors
     factor : (lags, stretches) banded Cholesky factor of the covariance of the stretches' errors
     """
@@ -63,6 +68,7 @@ class Path:
     v: Array
     d: Array
     t: Array
+    reading: Array
     rows: Rows
     operator: Array
     factor: Array
@@ -80,15 +86,37 @@ def measured_paths(fit: Fit, *, flight: bool = False) -> list[Path]:
     found = []
     for r, q in zip(o.campaign.recordings, o.layout.slots(fit.mode), strict=True):
         period = 2 * np.pi * float(np.sqrt(o.campaign.mass / q[_K1]))
-        y, v = smoothed(r.samples - q[_OFFSET], r.interval, period, noise.level)
+        level = noise.level * noise.scales[r.order]
+        y, v, reading = _motion(r, q[_OFFSET], period, level)
         d = y - q[_GAP] if o.campaign.stop else np.full(y.size, -np.inf)
         rows = rows_of(r, o.campaign.mass, (FLIGHT_WIDTH if flight else WIDTH) * period)
-        rows = _without_rests(rows, r.samples, noise.level)
+        rows = _without_rests(rows, r.samples, level)
         if flight:
             rows = _without(rows, d > -DOUBT * noise.level)
         operator = o.campaign.mass * rows.bend + q[_C1] * rows.slope + q[_K1] * rows.phi
-        found.append(Path(y, v, d, r.times, rows, operator, _factor(rows, operator * noise.level)))
+        factor = _factor(rows, operator * level)
+        found.append(Path(y, v, d, r.times, reading, rows, operator, factor))
     return found
+
+
+def _motion(r: Recording, offset: float, period: float, level: float) -> tuple[Array, Array, Array]:
+    """Displacement, velocity and what is read less its offset, smoothed, (n,) each."""
+    reading, rate = smoothed(r.samples - offset, r.interval, period, level)
+    if r.order == 0:
+        return reading, rate, reading
+    y = as_displacement(r)
+    v = reading if r.order == 1 else np.gradient(y, r.interval)
+    return y, v, reading
+
+
+def as_displacement(recording: Recording) -> Array:
+    """The displacement (n,) of a velocity or an acceleration, what is set aside bridged by a
+    spline.
+    """
+    samples, times = recording.samples, recording.times
+    if recording.used is not None:
+        samples = CubicSpline(times[recording.used], samples[recording.used])(times)
+    return displacement(samples, recording.interval, recording.order).samples
 
 
 def _without(rows: Rows, touched: NDArray[np.bool_]) -> Rows:
@@ -236,8 +264,8 @@ def _added(target: Target, effect: Effect, r: int, path: Path, points: Array) ->
     found = path.rows.integrals(force)
     if effect.observe is not None:
         numbers = np.stack([points[:, i] for i in _own_columns(o, effect, r)], axis=1)
-        read = effect.observe(np.repeat(path.y[None], q.shape[0], axis=0), path.t, numbers)
-        moved = [products(one - path.y, path.rows.hop, path.operator)[:, 0] for one in read]
+        read = effect.observe(np.repeat(path.reading[None], q.shape[0], axis=0), path.t, numbers)
+        moved = [products(one - path.reading, path.rows.hop, path.operator)[:, 0] for one in read]
         found = found - np.where(path.rows.kept, np.stack(moved), 0.0)
     return np.asarray(found)
 

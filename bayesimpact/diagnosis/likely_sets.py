@@ -21,6 +21,7 @@ from bayesimpact.diagnosis.extend import extend
 from bayesimpact.diagnosis.term_sets import Chosen, EffectColumns, EffectSet, TermSets
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
+from bayesimpact.model.oscillator import Oscillator
 
 Array = NDArray[np.float64]
 
@@ -35,12 +36,18 @@ def shapes_of(fit: Fit, effect: Effect) -> dict[str, float]:
     return {name: value for name, value in values if name.split("[")[0] in own}
 
 
+def _tells(oscillator: Oscillator) -> bool:
+    """Whether every recording is a displacement, or can be integrated to one."""
+    free = not oscillator.campaign.stop and oscillator.inputs is None
+    return oscillator.reads_displacements or free
+
+
 class LikelySets(TermSets):
     """Sets of effects for a fit of the base model, by the equation of motion.
 
-    There are no terms, and so no sets, where a reading is no displacement. In `flight` only what
-    acts there has terms. Every set holds what the campaign declares and the effects of `known`:
-    their shapes are known, but not their sizes.
+    There are no terms, and so no sets, where readings can be made no displacement. In `flight` only
+    what acts there has terms. Every set holds what the campaign declares and the effects of
+    `known`: their shapes are known, but not their sizes.
     """
 
     def __init__(
@@ -56,7 +63,7 @@ class LikelySets(TermSets):
         self.fit, self.scales, self.paths = fit, scales, measured_paths(fit, flight=flight)
         columns, targets, names = base_columns(fit, self.paths)
         base, target = np.concatenate(columns), np.concatenate(targets)
-        told = base[:, 0].any() and o.reads_displacements and all(map(is_a_force, o.acting))
+        told = base[:, 0].any() and _tells(o) and all(map(is_a_force, o.acting))
         seen = effects if told else ()
         declared = self._known([(e, shapes_of(fit, e)) for e in o.acting]) if told else []
         self.known = self._known(known) if told else []

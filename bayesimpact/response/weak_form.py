@@ -62,8 +62,11 @@ class Rows:
         return np.asarray(products(x, self.hop, *weights) * self.kept[:, None])
 
     def integrals(self, x: Floats) -> Floats:
-        """Int phi x of forces (..., samples) along the motion, (..., n); 0 in what is set aside."""
-        found = np.stack([products(one, self.hop, self.phi)[:, 0] for one in np.atleast_2d(x)])
+        """Int phi x of forces (..., samples) along the motion, differentiated with the readings,
+        (..., n); 0 in what is set aside.
+        """
+        weights = (self.phi, self.slope, self.bend)[self.order]
+        found = np.stack([products(one, self.hop, weights)[:, 0] for one in np.atleast_2d(x)])
         return np.asarray(np.where(self.kept, found, 0.0).reshape(*x.shape[:-1], -1))
 
 

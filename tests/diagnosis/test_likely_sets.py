@@ -12,10 +12,17 @@ from effect_rigs import BY_ID
 
 from bayesimpact.data.campaign import SECOND_STOP, Campaign
 from bayesimpact.data.input import Input
+from bayesimpact.data.quantity import Quantity
 from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.asked import Asked
 from bayesimpact.diagnosis.directions import shape_points
-from bayesimpact.diagnosis.equation_error import Path, measured_paths, terms_of, without_rest
+from bayesimpact.diagnosis.equation_error import (
+    Path,
+    as_displacement,
+    measured_paths,
+    terms_of,
+    without_rest,
+)
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.likely_sets import EffectSet, LikelySets
 from bayesimpact.diagnosis.refit import fit_from
@@ -25,6 +32,7 @@ from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects import EFFECTS, SEARCHED
 from bayesimpact.model.parameters import SLOTS
 from bayesimpact.trial.rig import Effects
+from bayesimpact.trial.rig_chain import Chain
 
 FREE = {
     "spring_cubic": {"stiffness": 4e6},
@@ -67,6 +75,38 @@ def test_three_strong_effects_are_asked_for(seed: int) -> None:
     assert candidate.fit.converged and candidate.fit.reduced_chi2 < 1.1
 
 
+# bias of their sizes: noise that is integrated and inertia's own
+@pytest.mark.parametrize(("quantity", "rel"), [("velocity", 0.1), ("acceleration", 0.3)])
+def test_velocities_and_accelerations_are_integrated(quantity: Quantity, rel: float) -> None:
+    chain = Chain(noise={"velocity": 1e-3, "acceleration": 0.03}[quantity])
+    campaign = small_rig.record(
+        1, FREE, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES, duration=6.0,
+        quantity=quantity, chain=chain,
+    )  # fmt: skip
+    fit = fitted(campaign)
+    assert fit.reduced_chi2 > 100
+    three = sets_of(fit)[2]
+    assert {e.id for e in three.effects} == set(FREE)
+    for effect, numbers in FREE.items():
+        for name, value in numbers.items():
+            assert three.values[f"{effect}.{name}"] == pytest.approx(value, rel=rel)
+    candidate = fit_from(fit, three.effects, three.values, campaign_scales(fit))
+    assert candidate.fit.converged and candidate.fit.reduced_chi2 < 1.1
+    # no stop: whose side of the rest the mass is on, a derivative does not say
+    stopped = fitted(small_rig.record(1, quantity=quantity, chain=chain))
+    assert sets_of(stopped) == []
+
+
+def test_what_is_set_aside_is_bridged_before_a_velocity_is_integrated() -> None:
+    t = 1e-3 * np.arange(4000)
+    y = 1e-3 * np.exp(-0.3 * t) * np.cos(30.0 * t)
+    v, used = np.gradient(y, t), np.ones(t.size, dtype=bool)
+    used[500:520] = used[1700:1703] = False
+    v[~used] = 5.0
+    recording = Recording("a", "", v, 1e-3, used=used, quantity="velocity")
+    assert np.abs(as_displacement(recording) - y).max() < 0.05 * np.abs(y).max()
+
+
 def test_with_a_stop() -> None:
     fit = fitted(small_rig.record(1, STOPPED, duration=4.0))
     assert fit.reduced_chi2 > 9
@@ -101,10 +141,11 @@ def test_nothing_is_asked_for_where_nothing_is_missing() -> None:
     assert sets_of(fitted(decays(1, {}))) == []
 
 
-def test_only_displacements() -> None:
+def test_velocities_ask_for_nothing_where_nothing_is_missing() -> None:
     velocity = small_rig.record(
-        1, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES, quantity="velocity"
-    )
+        1, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES, quantity="velocity",
+        chain=Chain(noise=1e-3),
+    )  # fmt: skip
     assert sets_of(fitted(velocity)) == []
 
 
