@@ -9,10 +9,10 @@ from dataclasses import dataclass
 # s of computing from the first search of physics on, set by hand: no fit begins later; an answer
 # that says so is worth more than none. Not of the clock: what else a machine does must not change
 # an answer.
-PATIENCE = 300.0
+PATIENCE = 150.0
 # s of a search's time that are kept for what its answer is compared with (each needed effect left
 # out, with a residual force), set by hand: a search that used up all of it could name nothing.
-COMPARISONS = 60.0
+COMPARISONS = 45.0
 # Times as long as it takes to score what a model lacks, that are kept for them too: a forced run of
 # 10,000 samples, scored in 7 s, took 150 s and was not done. No more than this share of the budget.
 LOOKS, MOST_KEPT = 25.0, 0.6

@@ -69,7 +69,7 @@ def test_a_budget_is_used_up_by_its_clock_alone() -> None:
 
 def test_a_search_keeps_time_for_its_comparisons() -> None:
     """The longer a model takes to be scored, the more of it; at most a share of all."""
-    for look, kept in ((0.0, COMPARISONS), (5.0, LOOKS * 5.0), (50.0, MOST_KEPT * PATIENCE)):
+    for look, kept in ((0.0, COMPARISONS), (3.0, LOOKS * 3.0), (50.0, MOST_KEPT * PATIENCE)):
         clock = Clock()
         budget = begin(clock)
         clock.now = PATIENCE - kept - 1.0
