@@ -62,9 +62,10 @@ def name(
     most per effect is then the next model. While it extends, the search takes any gain that the
     noise level allows, for what remains may yet be explained; effects that the odds do not demand
     are left out afterwards, and each that stays is exchanged for every other that might do what it
-    does. Where the misfit was large, the search begins with what the equation of motion asks for,
-    and goes on from a model that has settled and still leaves something. It begins with the model
-    of `first` instead, a fit to the same campaign, where that is given.
+    does. Where the misfit was large, the search begins with what the equation of motion asks for
+    and, with a stop, simulations of one period ahead; it goes on from a model that has settled and
+    still leaves something. It begins with the model of `first` instead, a fit to the same campaign,
+    where that is given.
 
     A search that has used up the `budget` begins no more refits, and names nothing that it has not
     compared with all that might do the same.
