@@ -88,15 +88,34 @@ def line_blocks(fit: Fit, r: int, grid: Array, decay: float = 0.0) -> Blocks:
     stacked, start = noise.in_time(white, count, interval, used)
     n = stacked.shape[-1]
     envelope = np.exp(-decay * (start + interval * np.arange(n)))
-    stacked = stacked * envelope
-    step = 2 * np.pi * interval * (grid[1] - grid[0])
-    first = 2 * np.pi * interval * grid[0]
-    sums = czt(stacked, grid.size, np.exp(-1j * step), np.exp(1j * first), axis=-1)
     lift = _whitening_gain(fit, grid, interval) / (sigma * fit.target.likelihood.scales[r])
-    sums = sums * np.exp(-2j * np.pi * grid * start)
+    sums = _fourier_sums(stacked * envelope, grid, interval) * np.exp(-2j * np.pi * grid * start)
     pairs = np.stack([-sums.imag, sums.real], axis=-1) * lift[:, None]  # (1 + k, F, 2)
     own = (0.5 * np.sum(envelope**2) * lift**2)[:, None, None] * np.eye(2)
     return Blocks(own, pairs[1:].transpose(1, 0, 2), pairs[0], part.columns)
+
+
+def white_line_blocks(fit: Fit, r: int, grid: Array, decay: float = 0.0) -> Blocks:
+    """The same at any frequencies, exact, where the noise of recording `r` is white."""
+    part, sigma = fit.linearisation[r], float(sigma_of(fit)[r] * fit.target.likelihood.scales[r])
+    recording = fit.target.oscillator.campaign.recordings[r]
+    seen = np.exp(-decay * recording.times) * fit.slopes[r] / sigma
+    if recording.used is not None:
+        seen = np.where(recording.used, seen, 0.0)
+    white = np.vstack([part.residual, part.jacobian.T]) / sigma_of(fit)[r]
+    sums = _fourier_sums(white * seen, grid, recording.interval)
+    pairs = np.stack([-sums.imag, sums.real], axis=-1)  # (1 + k, F, 2)
+    twice = _fourier_sums((seen**2)[None], 2 * grid, recording.interval)[0]
+    mean, even, odd = 0.5 * np.sum(seen**2), 0.5 * twice.real, -0.5 * twice.imag
+    own = np.array([[mean - even, odd], [odd, mean + even]]).transpose(2, 0, 1)
+    return Blocks(own, pairs[1:].transpose(1, 0, 2), pairs[0], part.columns)
+
+
+def _fourier_sums(signals: Array, grid: Array, interval: float) -> NDArray[np.complex128]:
+    """Sums of signals (K, n) times exp(-2 pi i f t) at equally spaced frequencies (F,), Hz."""
+    step = 2 * np.pi * interval * (grid[1] - grid[0])
+    first = 2 * np.pi * interval * grid[0]
+    return np.asarray(czt(signals, grid.size, np.exp(-1j * step), np.exp(1j * first), axis=-1))
 
 
 def _whitening_gain(fit: Fit, grid: Array, interval: float) -> Array:

@@ -29,6 +29,7 @@ from bayesimpact.diagnosis.harmonics import (
     joined,
     line_blocks,
     projected,
+    white_line_blocks,
 )
 from bayesimpact.diagnosis.scores import LIMIT_SD, Score
 from bayesimpact.inference.fit import Fit
@@ -179,6 +180,8 @@ def _amplitudes(
 
 
 def _blocks(fit: Fit, r: int, grid: Array, above: Array, decay: float, scales: Scales) -> Blocks:
+    if fit.target.likelihood.noise.is_white and fit.target.oscillator.smoothing is None:
+        return white_line_blocks(fit, r, grid, decay)
     waves = partial(hums, fit, r, decay=decay)
     slow = grid < NEAR_RESONANCE * scales.natural_frequency
     sums = [line_blocks(fit, r, grid[~slow], decay)] if np.sum(~slow) > 1 else []

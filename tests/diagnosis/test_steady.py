@@ -19,6 +19,7 @@ from bayesimpact.diagnosis.harmonics import (
     line_blocks,
     projected,
     rotations,
+    white_line_blocks,
 )
 from bayesimpact.diagnosis.models import Models
 from bayesimpact.diagnosis.own_band import shakes_in_own_band
@@ -127,6 +128,28 @@ def test_a_hum_behind_a_declared_filter_is_found():
     direct, sums = blocks_of(fit, 0, waves), line_blocks(fit, 0, lines)
     np.testing.assert_allclose(sums.score, direct.score, rtol=0.05, atol=0.01 * sums.score.max())
     np.testing.assert_allclose(sums.own[:, 0, 0], direct.own[:, 0, 0], rtol=0.05)
+
+
+@pytest.mark.parametrize("decay", [0.0, 3.0])
+def test_in_white_noise_fourier_sums_are_exact(decay: float) -> None:
+    """At all frequencies, below the natural one too, where samples are set aside, of a velocity."""
+    campaign = small_rig.record(
+        1, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES, quantity="velocity",
+        chain=Chain(noise=1e-3),
+    )  # fmt: skip
+    used = np.ones(campaign.recordings[0].samples.size, dtype=bool)
+    used[300:350] = used[-7:] = False
+    first = replace(campaign.recordings[0], used=used)
+    campaign = replace(campaign, recordings=(first, *campaign.recordings[1:]))
+    fit = identify(campaign, rng=np.random.default_rng(0), search=False).fit
+    assert fit.target.likelihood.noise.is_white
+    lines = np.arange(0.7, 12.0, 0.37)
+    waves = hums(fit, 0, lines, decay).reshape(lines.size, 2, -1)
+    direct, sums = blocks_of(fit, 0, waves), white_line_blocks(fit, 0, lines, decay)
+    for name in ("own", "absorbed", "score"):
+        expected = getattr(direct, name)
+        scale = np.abs(expected).max(axis=0)
+        np.testing.assert_allclose(getattr(sums, name) / scale, expected / scale, atol=1e-9)
 
 
 def test_a_hum_above_the_band_of_a_filter_is_found_by_what_leaks_into_it():
