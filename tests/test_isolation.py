@@ -23,6 +23,7 @@ PLANTED = (
         "subprocess",
         "pathlib",
         "h5netcdf",
+        "h5py",
         "numba",
         "csv",
         "hashlib",

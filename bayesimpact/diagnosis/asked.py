@@ -3,9 +3,9 @@
 Forces are evaluated along the measured motion, but counted from the rest reading and the gap of a
 fit. Those of a base model make up for what it lacks: about a rest that is a little wrong, a
 quadratic spring reads as a stiffness that changes. So the problem is posed anew about each better
-model (as Gauss and Newton linearise anew at each step). Where there is a stop it is posed twice:
-over stretches of free flight, which no law of the stop disturbs, and over all of them; and what the
-stop does is asked of simulations of one period ahead (`period_sets`).
+model (as Gauss and Newton linearise anew at each step). Where there is a stop it is posed over
+stretches of free flight, which no law of the stop disturbs, and what the stop does is asked of
+simulations of one period ahead (`period_sets`).
 """
 
 from __future__ import annotations
@@ -26,32 +26,29 @@ from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
 
-ASKED = 4  # effects that are tried beside a model, of the flight and of the contact
+ASKED = 4  # effects that are tried beside a model, by every problem
 
 
 class Asked:
-    """Problems of the equation of motion, by the model that they are posed about."""
+    """Problems of the equation of motion and of periods ahead, by what they are posed about."""
 
     def __init__(self, base: Fit, effects: Sequence[Effect], scales: Scales) -> None:
         self.base, self.effects, self.scales = base, effects, scales
-        self.posed: dict[tuple[object, ...], LikelySets] = {}
+        self.of_motion: dict[tuple[object, ...], LikelySets] = {}
         self.of_periods: dict[tuple[object, ...], PeriodSets] = {}
-        o = base.target.oscillator
-        self.has_stop = o.campaign.stop
-        model = Candidate(o.effects, base, 0.0)
-        terms = [*self.about(model, flight=False).terms]
-        terms += self.ahead(model, model).terms if self.has_stop else []
-        self.seen = {term.effect.id for term in terms}
+        self.has_stop = base.target.oscillator.campaign.stop
 
     def about(self, model: Candidate, flight: bool) -> LikelySets:
         """The problem about a model's rest and gap, of stretches in `flight` or of all."""
         key = model.ids, model.fit.log_posterior, flight
-        if key not in self.posed:
+        if key not in self.of_motion:
             layout = self.base.target.oscillator.layout
             mode = transfer(model.fit, layout, self.base.target.oscillator.effects, self.scales, {})
             at, known = replace(self.base, mode=mode), known_effects(model)
-            self.posed[key] = LikelySets(at, self.effects, self.scales, flight=flight, known=known)
-        return self.posed[key]
+            self.of_motion[key] = LikelySets(
+                at, self.effects, self.scales, flight=flight, known=known
+            )
+        return self.of_motion[key]
 
     def ahead(self, model: Candidate, about: Candidate) -> PeriodSets:
         """The problem of periods ahead of a model, with what it shares with `about` as that has
@@ -65,22 +62,28 @@ class Asked:
             self.of_periods[key] = PeriodSets(at, self.effects, self.scales)
         return self.of_periods[key]
 
-    def first(self, model: Candidate, about: Candidate, instead: str = "") -> set[str]:
-        """Effects that are asked for first beside a model: by the equation of motion, posed `about`
-        the best one known; with a stop what acts in flight is judged there, the others by periods
-        ahead of the model itself. In the place of an effect `instead`, where `about` leaves
-        nothing, only those that come near its gain.
+    def first(
+        self, model: Candidate, about: Candidate, instead: str = ""
+    ) -> tuple[set[str], set[str]]:
+        """Effects that are asked for first beside a model, and all that were asked about.
+
+        The equation of motion is posed `about` the best model known. With a stop it is asked for
+        what acts in flight, and periods ahead of the model for the rest; where no period is told,
+        the equation over all stretches. In the place of an effect `instead`, where `about` leaves
+        nothing, only what comes near its gain by a problem that sees it is asked for.
         """
         gains = [self.about(about, self.has_stop).gains(model.ids)]
         if self.has_stop:
-            gains.append(self.ahead(model, about).gains())
+            ahead = self.ahead(model, about).gains()
+            gains.append(ahead or self.about(about, flight=False).gains(model.ids))
+        judges = [g for g in gains if instead in g] or gains
         first, seen = set[str](), set[str]()
-        for found in [g for g in gains if instead in ("", *g)]:
+        for found in judges:
             least = NEAR_BEST * found.get(instead, -np.inf) - NEAR_MARGIN
             kept = {i: g for i, g in found.items() if i not in seen and g >= least}
             first |= set(sorted(kept, key=lambda i: -kept[i])[:ASKED])
             seen |= set(found)
-        return first
+        return first, seen.union(*gains)
 
 
 def known_effects(model: Candidate) -> list[Known]:

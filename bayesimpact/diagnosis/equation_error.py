@@ -24,7 +24,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 from scipy.linalg import cholesky_banded, solve_banded
 
 from bayesimpact.data.recording import Recording
@@ -104,19 +103,9 @@ def _motion(r: Recording, offset: float, period: float, level: float) -> tuple[A
     reading, rate = smoothed(r.samples - offset, r.interval, period, level)
     if r.order == 0:
         return reading, rate, reading
-    y = as_displacement(r)
+    y = displacement(r.samples, r.interval, r.order).samples
     v = reading if r.order == 1 else np.gradient(y, r.interval)
     return y, v, reading
-
-
-def as_displacement(recording: Recording) -> Array:
-    """The displacement (n,) of a velocity or an acceleration, what is set aside bridged by a
-    spline.
-    """
-    samples, times = recording.samples, recording.times
-    if recording.used is not None:
-        samples = CubicSpline(times[recording.used], samples[recording.used])(times)
-    return displacement(samples, recording.interval, recording.order).samples
 
 
 def _without(rows: Rows, touched: NDArray[np.bool_]) -> Rows:

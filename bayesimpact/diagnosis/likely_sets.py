@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.diagnosis.equation_error import (
+    Path,
     base_columns,
     is_a_force,
     measured_paths,
@@ -59,20 +60,26 @@ class LikelySets(TermSets):
         flight: bool = False,
         known: Sequence[Known] = (),
     ) -> None:
-        o = fit.target.oscillator
-        self.fit, self.scales, self.paths = fit, scales, measured_paths(fit, flight=flight)
+        o, cost = fit.target.oscillator, float(np.log(2 * len(effects)))
+        self.fit, self.scales, self.paths = fit, scales, list[Path]()
+        self.every, self.target = np.zeros((1, 0)), np.zeros(1)
+        if not (_tells(o) and all(map(is_a_force, o.acting))):
+            super().__init__((), (), self.every, self.target, 1, cost)
+            return
+        self.paths = measured_paths(fit, flight=flight)
         columns, targets, names = base_columns(fit, self.paths)
         base, target = np.concatenate(columns), np.concatenate(targets)
-        told = base[:, 0].any() and _tells(o) and all(map(is_a_force, o.acting))
-        seen = effects if told else ()
+        told = bool(base[:, 0].any())
         declared = self._known([(e, shapes_of(fit, e)) for e in o.acting]) if told else []
         self.known = self._known(known) if told else []
         for term in (*declared, *self.known):
             base = np.column_stack([base, np.concatenate(term.columns)])
             names += term.names
         rows = max(sum(int(p.rows.kept.sum()) - 1 for p in self.paths), 1)
-        terms = terms_of(fit, seen, scales, self.paths)
-        super().__init__(terms, names, base, target, rows, float(np.log(2 * len(effects))))
+        terms = terms_of(fit, effects if told else (), scales, self.paths)
+        super().__init__(terms, names, base, target, rows, cost)
+        blocks = [np.concatenate(term.columns) for term in terms]
+        self.every, self.target = np.column_stack([base, *blocks]), target
 
     def _known(self, effects: Sequence[Known]) -> list[EffectColumns]:
         """Terms of effects with given shapes; those that the campaign declares have them in any

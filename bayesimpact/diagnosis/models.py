@@ -46,6 +46,9 @@ UNCONVERGED_SHORTFALL = 60.0
 MORE = 2.0  # nats by which a score must promise more than a model has reached to fit it again
 SAME = 0.05  # nats; two climbs to one mode differ by less
 
+NOTHING: tuple[set[str], set[str]] = (set(), set())
+"""Effects that are asked for first, and all that were asked about: none."""
+
 Progress = Callable[[str], None]
 
 
@@ -200,18 +203,22 @@ class Models:
 
     @cached_property
     def asked(self) -> Asked:
-        """What the equation of motion asks for."""
+        """What the equation of motion and periods ahead ask for."""
         return Asked(self.states[frozenset()].candidate.fit, self.effects, self.scales)
 
     def asked_beside(
-        self, candidate: Candidate, first: Collection[str], found: Scan, promising: Sequence[Score]
+        self,
+        candidate: Candidate,
+        asked: tuple[Collection[str], Collection[str]],
+        found: Scan,
+        promising: Sequence[Score],
     ) -> list[Score]:
-        """Scores that are tried beside a model, the `promising` ones; with a large misfit those
-        that are asked for `first`, and of the promising ones what cannot be.
+        """Scores that are tried beside a model, the `promising` ones; with a large misfit, of what
+        is `asked` (those first, and all), those first, and of the promising ones all others.
         """
         if not is_large(candidate.fit):
             return list(promising)
-        seen = self.asked.seen
+        first, seen = asked
         kept = {*first, *(s.effect.id for s in promising if s.effect.id not in seen)}
         return [s for s in found.best() if s.effect.id in kept]
 

@@ -15,7 +15,7 @@ import numpy as np
 from bayesimpact.diagnosis.budget import Budget
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.force import missing_contact
-from bayesimpact.diagnosis.models import STARTS, UNCONVERGED_SHORTFALL, Progress
+from bayesimpact.diagnosis.models import NOTHING, STARTS, UNCONVERGED_SHORTFALL, Progress
 from bayesimpact.diagnosis.naming import Naming, State, explains_most, is_large
 from bayesimpact.diagnosis.pairs import promising_pairs
 from bayesimpact.diagnosis.promising import (
@@ -145,12 +145,13 @@ class _Search(Unlisted):
         ways: list[list[Problem]] = [[self.of_all]]
         if self.asked.has_stop:
             ways = [[self.of_periods], [self.of_flight, self.of_periods], *ways]
-        begun = [base.candidate]
+        begun, in_flight = [base.candidate], base.candidate
         for way in ways:
             about = base.candidate
             for problem in way:
                 about = self.asked_again(about, problem)
                 begun.append(about)
+                in_flight = about if problem == self.of_flight else in_flight
             if not is_large(about.fit):
                 break
         best = max(begun, key=self.promise)
@@ -158,8 +159,8 @@ class _Search(Unlisted):
         with_term = self.with_a_term(state)
         if with_term is not state:
             return [with_term]
-        beside = begun[2:3] if self.asked.has_stop else []
-        return [state, *(self.examine(c) for c in beside if c is not best)]
+        stays = in_flight.effects and in_flight is not best
+        return [state, self.examine(in_flight)] if stays else [state]
 
     def of_flight(self, about: Candidate) -> list[Candidate]:
         """Models that the equation of motion asks for about one, in free flight."""
@@ -208,8 +209,8 @@ class _Search(Unlisted):
         """
         chosen, found = state.candidate, list[Candidate]()
         scores = self.refit_candidates(state.scan, self.least_gain(chosen))
-        first = self.asked.first(chosen, chosen) if is_large(chosen.fit) else ()
-        for score in self.asked_beside(chosen, first, state.scan, scores):
+        asked = self.asked.first(chosen, chosen) if is_large(chosen.fit) else NOTHING
+        for score in self.asked_beside(chosen, asked, state.scan, scores):
             if not self.may_go_on():
                 return found
             if is_redundant(chosen, score.effect):
@@ -222,7 +223,7 @@ class _Search(Unlisted):
             for pair in promising_pairs(state.scan, count=PAIRS):
                 if chosen.log_evidence + pair.gain > best_single + self.cost:
                     found.append(self.fit_more(chosen, pair.scores))
-        if is_large(chosen.fit) and not self.asked.seen:
+        if is_large(chosen.fit) and not asked[1]:
             found += [self.fit_more(chosen, j) for j in families(state.scan)]
         return found
 

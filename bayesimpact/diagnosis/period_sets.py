@@ -24,15 +24,15 @@ from bayesimpact.diagnosis.extend import (
 )
 from bayesimpact.diagnosis.refit import step_sizes
 from bayesimpact.diagnosis.term_sets import EffectColumns, EffectSet, TermSets
-from bayesimpact.inference.fit import Fit, Target
+from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.multiple_shooting import MultipleShooting, multiple_shooting
-from bayesimpact.model.effects.effect import Effect, Scales
+from bayesimpact.model.effects.effect import Effect, EffectParameter, Scales
 from bayesimpact.model.parameters import is_added
 
 Array = NDArray[np.float64]
 
 STEP = 1e-3  # of an effect's plausible size
-INVISIBLE = 1e-6  # of the noise: rounding of the simulation, not physics
+INVISIBLE = 1e-6  # of the noise, at that step: rounding of the simulation, not physics
 
 
 class PeriodSets(TermSets):
@@ -63,6 +63,7 @@ class PeriodSets(TermSets):
             int(ahead.sizes.sum()),
             cost,
         )
+        self.terms = [replace(term, columns=()) for term in self.terms]  # the samples are many
 
     def is_possible(self, x: Array) -> bool:
         """Whether the stiffness k1 stays positive."""
@@ -109,45 +110,35 @@ def _terms(
         target = extend(fit, own, scales)
         for shapes in shape_points(effect, scales):
             theta = transfer(fit, target.oscillator.layout, own, scales, shapes)
-            names, points, steps = _steps(target, effect, theta, scales)
+            sizes = size_parameters(target, effect)
+            steps = np.array([STEP * parameter.scale(scales) for _, parameter in sizes])
+            points = np.repeat(theta[None], 1 + len(sizes), axis=0)
+            for i, (name, _) in enumerate(sizes):
+                points[1 + i, target.oscillator.layout.index(name)] += steps[i]
             left = replace(ahead, oscillator=target.oscillator).residuals(points)
-            columns = tuple(
-                np.column_stack([before[0] - own[0], (own[0] - own[1:]).T / steps])
-                / ahead.noise.level
-                for before, own in zip(missed, left, strict=True)
-            )
-            found += _seen(effect, shapes, names, columns)
+            changes = [
+                np.column_stack([before[0] - rest[0], (rest[0] - rest[1:]).T]) / ahead.noise.level
+                for before, rest in zip(missed, left, strict=True)
+            ]
+            found += _seen(effect, shapes, sizes, changes, np.array([1.0, *steps]))
     return found
 
 
-def _steps(
-    target: Target, effect: Effect, theta: Array, scales: Scales
-) -> tuple[list[str], Array, Array]:
-    """Names of an effect's sizes (k,), points (1 + k, d), of which each but the first, theta, has
-    one of them larger, and by how much.
-    """
-    sizes = size_parameters(target, effect)
-    steps = np.array([STEP * parameter.scale(scales) for _, parameter in sizes])
-    points = np.repeat(theta[None], 1 + len(sizes), axis=0)
-    for i, (name, _) in enumerate(sizes):
-        points[1 + i, target.oscillator.layout.index(name)] += steps[i]
-    return [name for name, _ in sizes], points, steps
-
-
 def _seen(
-    effect: Effect, shapes: Mapping[str, float], names: Sequence[str], columns: Sequence[Array]
+    effect: Effect,
+    shapes: Mapping[str, float],
+    sizes: Sequence[tuple[str, EffectParameter]],
+    changes: Sequence[Array],
+    steps: Array,
 ) -> list[EffectColumns]:
-    """The term of an effect, of those columns that are anything; none where one is not finite."""
-    every = (effect.id, *names)
-    signs = [
-        p.lower == p.null and replaced_slot(effect, p) is None
-        for p in effect.parameters
-        if p.is_size
-    ]
-    one_sided = (True, *(signs[0] for _ in names))
-    kept = [i for i in range(len(every)) if any(np.abs(c[:, i]).max() > INVISIBLE for c in columns)]
-    if not kept or not all(np.isfinite(c).all() for c in columns):
+    """The term of an effect from what it changes at its null and by `steps` of its sizes (1 + k,),
+    per recording (n, 1 + k); none where nothing is seen of it, or it is not finite.
+    """
+    names = [effect.id, *(name for name, _ in sizes)]
+    one_sided = [True, *(p.lower == p.null and not replaced_slot(effect, p) for _, p in sizes)]
+    kept = [i for i in range(len(names)) if any(np.abs(c[:, i]).max() > INVISIBLE for c in changes)]
+    if not kept or not all(np.isfinite(c).all() for c in changes):
         return []
-    shown = tuple(c[:, kept] for c in columns)
-    seen = tuple(every[i] for i in kept)
-    return [EffectColumns(effect, shapes, seen, shown, tuple(one_sided[i] for i in kept))]
+    columns = tuple(c[:, kept] / steps[kept] for c in changes)
+    seen, signs = tuple(names[i] for i in kept), tuple(one_sided[i] for i in kept)
+    return [EffectColumns(effect, shapes, seen, columns, signs)]

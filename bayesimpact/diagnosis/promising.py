@@ -76,7 +76,7 @@ def in_place_of(
     effect: Effect, scores: Sequence[Score], large: bool, asked: Collection[str] = ()
 ) -> list[Score]:
     """Effects that might do what one does, by their `scores` on a model without it; `large` is its
-    misfit, `asked` what the equation of motion asks for there.
+    misfit, `asked` what is asked for there.
 
     What explains less than half of its signal to first order cannot come near it. Effects that do
     not begin at the base model have no first order; they stand for one of their own family, or of

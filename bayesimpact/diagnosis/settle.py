@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
+from bayesimpact.diagnosis.models import NOTHING
 from bayesimpact.diagnosis.naming import State, is_large
 from bayesimpact.diagnosis.promising import NEAR_BEST, families, in_place_of, is_redundant
 from bayesimpact.diagnosis.ranked import Ranked
@@ -81,15 +82,15 @@ class Settling(Ranked):
             if self.is_large:
                 self.simplified(chosen, effect)
             found = self.scanned(rest, self.effects)
-            if self.is_large and not self.asked.seen:
+            large = is_large(rest.fit)
+            instead = effect.id if self.leaves_nothing(chosen) else ""
+            asked, seen = self.asked.first(rest, chosen, instead) if self.is_large else NOTHING
+            if self.is_large and not seen:
                 others = [[s for s in j if s.effect.id != effect.id] for j in families(found)]
                 for joint in others:
                     if len(joint) > 1 and joint[0].effect.family == effect.family:
                         self.fit_more(rest, joint)
-            large = is_large(rest.fit)
-            instead = effect.id if self.leaves_nothing(chosen) else ""
-            asked = self.asked.first(rest, chosen, instead) if self.is_large else set[str]()
-            scores = self.asked_beside(rest, asked, found, self.refit_candidates(found))
+            scores = self.asked_beside(rest, (asked, seen), found, self.refit_candidates(found))
             promising = in_place_of(effect, scores, large, asked if large else ())
             for score in promising:
                 if self.may_go_on() and not is_redundant(rest, score.effect):

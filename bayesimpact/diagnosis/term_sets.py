@@ -29,7 +29,7 @@ class EffectSet:
     Attributes
     ----------
     effects : all of them
-    values : parameter -> value: sizes and shapes of the effects, the base model's, y0 and v0
+    values : parameter -> value: sizes and shapes of the effects, the base model's, first states
     log_odds : over the model that the problem is posed about, as far as this problem tells
     """
 
@@ -45,7 +45,7 @@ class EffectColumns:
     Attributes
     ----------
     names : of its size parameters; its id for what it adds where they are at their null
-    columns : per recording (stretches, k), whitened, per unit of them
+    columns : per recording (stretches or samples, k), whitened, per unit of them
     one_sided : which of them cannot be negative, (k,)
     on_grid : whether the shape is one of the scores' grid; sets are chosen from those, for on a
         finer one a law with a free power comes nearer to the errors of another law than that itself
@@ -64,7 +64,7 @@ class TermSets:
     terms, all columns scaled to norm one.
 
     terms : what a set may hold
-    names, columns : of the unknowns of every set (N, b)
+    names, columns : of the unknowns of every set (N, b), at stretches or samples
     target : (N,) what is to be explained
     rows : independent numbers of it
     cost : nats of an effect, for multiplicity
@@ -81,15 +81,14 @@ class TermSets:
         rows: int,
         cost: float,
     ) -> None:
-        self.terms, self.names, self.target, self.rows, self.cost = terms, names, target, rows, cost
+        self.terms, self.names, self.rows, self.cost = terms, names, rows, cost
         blocks = [np.concatenate(term.columns) for term in terms]
         self.first = np.cumsum([columns.shape[1], *(b.shape[1] for b in blocks)])
-        self.every = np.column_stack([columns, *blocks])
-        size = np.linalg.norm(self.every, axis=0)
+        every = np.column_stack([columns, *blocks])
+        size = np.linalg.norm(every, axis=0)
         self.size = np.where(size > 0, size, 1.0)
-        scaled = self.every / self.size
-        self.matrix, self.right = scaled.T @ scaled, scaled.T @ target
-        self.whole = float(target @ target)
+        self.matrix = every.T @ every / np.outer(self.size, self.size)
+        self.right, self.whole = every.T @ target / self.size, float(target @ target)
         self.base = [i for i in range(columns.shape[1]) if size[i] > 0]
 
     def columns(self, chosen: Sequence[int]) -> list[int]:
@@ -98,7 +97,7 @@ class TermSets:
         return [*self.base, *own]
 
     def solve(self, chosen: Sequence[int]) -> tuple[Array, float]:
-        """Scaled unknowns of a set, and the log of what it leaves per stretch, at least 0."""
+        """Scaled unknowns of a set, and the log of what it leaves per row, at least 0."""
         at = self.columns(chosen)
         part = self.matrix[np.ix_(at, at)] + 1e-12 * np.eye(len(at))
         x = np.linalg.solve(part, self.right[at])

@@ -8,7 +8,7 @@ residuals and derivatives alike: the starts are free (multiple shooting: Bock 19
 oscillating systems Pisarenko and Sornette 2004, Phys. Rev. E 69:036122). Time, the states of laws
 and bodies, and the number of impacts go on.
 
-Starts cost information, so this likelihood decides nothing; it leads to modes of the ordinary one.
+Starts cost information, so this likelihood decides nothing: it says what to try (`diagnosis`).
 """
 
 from __future__ import annotations
@@ -40,7 +40,8 @@ class Starts:
     Attributes
     ----------
     restarts : (m, 3) samples, displacements, m, and velocities, m/s
-    blocks : per period after the first one (s, 2): orthonormal responses to its start, whitened
+    blocks : per period after the first one (s, 2): orthonormal responses to its start, whitened;
+        all starts are moved at once, so that what a state carries on of the last one is in it
     """
 
     restarts: Array
@@ -60,6 +61,11 @@ class MultipleShooting(Likelihood):
     """Likelihood of every period ahead. Of displacements only; filtered noise counts as white."""
 
     starts: tuple[Starts, ...] = ()
+
+    @cached_property
+    def steps(self) -> tuple[float, ...]:
+        """Of readings in coarse steps: none, their rounding is noise here."""
+        return (0.0,) * len(self.starts)
 
     @cached_property
     def sizes(self) -> Array:
@@ -129,8 +135,10 @@ def _starts(o: Oscillator, noise: Noise, r: int, theta: Array) -> Starts:
     period = 2 * np.pi * float(np.sqrt(o.campaign.mass / q[_K1]))
     gain = theta[o.gains[r]] if o.gains[r] >= 0 else 1.0
     y = (recording.samples - q[_OFFSET]) / gain
-    y, v = smoothed(y, recording.interval, period, noise.level)
-    at = lowest_points(y, recording.interval, period, noise.level)
+    y, v = smoothed(y, recording.interval, period, noise.level / abs(gain))
+    at = lowest_points(y, recording.interval, period, noise.level / abs(gain))
+    if recording.used is not None:
+        at = at[recording.used[at]]
     restarts = np.column_stack([at, y[at], v[at]])
     if at.size == 0:
         return Starts(restarts, ())

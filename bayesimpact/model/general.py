@@ -23,7 +23,9 @@ from bayesimpact.model.added.contact_state import (
     SIDES,
     SLIDING,
     begin,
+    carry_on,
     heading,
+    may_go_on,
     may_step,
     resolve,
     set_contact,
@@ -214,6 +216,7 @@ def walk(restarts: Any, w: Any) -> Any:
     while j < w.n:
         if j == part.n:
             t = (j - 1) * w.interval
+            carry_on(restarts[r, 1] - w.out[j - 1], restarts[r, 2] - v, w)
             y, v = set_contact(restarts[r, 1], restarts[r, 2], t, w)
             w.out[j - 1] = reading_at(j - 1, y, v, t, w)
             r += 1
@@ -226,7 +229,7 @@ def walk(restarts: Any, w: Any) -> Any:
             t, j = stick(y, t, j, part)
         else:
             y, v, t, j = section(y, v, t, j, part)
-        if not abs(y) < FARTHEST:
+        if not (abs(y) < FARTHEST and np.isfinite(v) and may_go_on(w)):
             return NOT_FINITE
     return OK
 

@@ -76,7 +76,10 @@ def fit(samples: Floats, centres: Ints, half: int, degree: int) -> tuple[Floats,
 def _window(half: int, degree: int) -> tuple[Floats, Floats]:
     """Powers at the samples of a window, and their pseudoinverse: met again in every signal."""
     basis = np.vander(np.linspace(-1.0, 1.0, 2 * half + 1), degree + 1, increasing=True)
-    return basis, np.asarray(np.linalg.pinv(basis), dtype=np.float64)
+    inverse = np.asarray(np.linalg.pinv(basis), dtype=np.float64)
+    basis.setflags(write=False)
+    inverse.setflags(write=False)
+    return basis, inverse
 
 
 def crossings(

@@ -106,10 +106,10 @@ class Table:
 
         def first(model, about, instead=""):
             left = [i for i in self.seen if i not in model.ids]
-            return set(sorted(left, key=lambda i: -self.seen[i])[: self.first])
+            return set(sorted(left, key=lambda i: -self.seen[i])[: self.first]), set(self.seen)
 
         return SimpleNamespace(
-            has_stop=bool(self.asked_in_flight), seen=set(self.seen), about=about, first=first,
+            has_stop=bool(self.asked_in_flight), about=about, first=first,
             ahead=ahead,
         )  # fmt: skip
 

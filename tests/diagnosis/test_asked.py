@@ -32,10 +32,8 @@ def test_about_a_better_model_a_quadratic_spring_hides_nothing_else() -> None:
     assert {e.id for e in two.effects} == set(planted)
     wrong = asked.about(base, flight=False)
     assert two.log_odds > max(s.log_odds for s in wrong.best(5))
-    assert (
-        "quadratic_drag" in asked.first(better, better)
-        and len(asked.first(better, better)) == ASKED
-    )
+    first, seen = asked.first(better, better)
+    assert "quadratic_drag" in first and len(first) == ASKED and first < seen
 
 
 def test_what_acts_in_flight_is_judged_there() -> None:
@@ -48,9 +46,8 @@ def test_what_acts_in_flight_is_judged_there() -> None:
     flight = asked.about(base, flight=True).gains(())
     ahead = asked.ahead(base, base).gains()
     stops = {i: g for i, g in ahead.items() if i not in flight}
-    assert set(flight) | set(stops) <= asked.seen and stops
     expected = [sorted(g, key=lambda i: -g[i])[:ASKED] for g in (flight, stops)]
-    assert asked.first(base, base) == {*expected[0], *expected[1]}
+    assert asked.first(base, base) == ({*expected[0], *expected[1]}, {*flight, *ahead})
     assert "contact_no_tension" in expected[1]
     assert asked.ahead(base, base) is asked.ahead(base, base)
 
@@ -67,11 +64,30 @@ def test_in_the_place_of_an_effect_only_what_comes_near_is_asked_for() -> None:
     drag, mass = (
         fit_from(fit, [BY_ID[i]], {}, scales) for i in ("quadratic_drag", "obstacle_mass")
     )
-    every, near = (asked.first(drag, whole, own) for own in ("", "obstacle_mass"))
+    every, near = (asked.first(drag, whole, own)[0] for own in ("", "obstacle_mass"))
     assert {"obstacle_mass", "contact_no_tension"} <= every
     assert near == {"obstacle_mass"}  # judged by periods ahead alone: nothing of it in flight
-    near = asked.first(mass, whole, "quadratic_drag")
+    near, seen = asked.first(mass, whole, "quadratic_drag")
+    assert {"second_mode", "contact_hardening", "spring_cubic"} <= seen
     assert {"quadratic_drag", "power_damping"} <= near and "second_mode" not in near
+
+
+def test_in_the_place_of_what_no_problem_sees_all_are_asked_for() -> None:
+    planted = {"quadratic_drag": {"coefficient": 1.5}}
+    fit = identify(
+        small_rig.record(1, planted, duration=4.0), rng=np.random.default_rng(0), search=False
+    ).fit
+    asked, base = Asked(fit, SEARCHED, campaign_scales(fit)), base_candidate(fit)
+    assert asked.first(base, base, "harmonic_forcing") == asked.first(base, base)
+
+
+def test_where_no_period_is_told_all_stretches_say_what_the_stop_does() -> None:
+    short = small_rig.record(1, {"contact_no_tension": {}}).truncated(0.1)
+    fit = identify(short, rng=np.random.default_rng(0), search=False).fit
+    asked, base = Asked(fit, SEARCHED, campaign_scales(fit)), base_candidate(fit)
+    assert not asked.ahead(base, base).terms
+    _, seen = asked.first(base, base)
+    assert {"contact_hardening", "contact_damping_speed", "hunt_crossley"} <= seen
 
 
 def test_a_period_longer_than_the_recording_is_smoothed_over_what_there_is() -> None:

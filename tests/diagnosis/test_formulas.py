@@ -20,9 +20,7 @@ from bayesimpact.diagnosis.formula_rounds import joined
 from bayesimpact.diagnosis.formula_words import formula_entries, found_file
 from bayesimpact.diagnosis.formulas import Answer
 from bayesimpact.diagnosis.learned import LEARNED
-from bayesimpact.diagnosis.refit import (
-    Candidate,
-)
+from bayesimpact.diagnosis.refit import Candidate, base_candidate
 from bayesimpact.diagnosis.remainder import likeliest_formula, remainder
 from bayesimpact.diagnosis.scan import scan
 from bayesimpact.diagnosis.thresholds import DECISIVE
@@ -108,8 +106,8 @@ def test_a_formula_is_scored_and_asked_for_like_any_effect(detent: Any) -> None:
     base, (law,) = before.naming.base.candidate.fit, found.decision.effects
     (score,) = scan(base, (law,), scales, rng=np.random.default_rng(0)).best()
     assert score.names == (f"{law.id}.size",) and score.gain > 10.0
-    asked_for = Asked(base, (law,), scales)
-    assert asked_for.seen == {law.id}
+    model = base_candidate(base)
+    assert Asked(base, (law,), scales).first(model, model) == ({law.id}, {law.id})
 
 
 def test_formulas_that_still_speak_against_the_likeliest_are_fitted_next(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import small_rig
@@ -9,12 +11,13 @@ from effect_rigs import BY_ID
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.diagnosis.directions import shape_points
-from bayesimpact.diagnosis.extend import campaign_scales
+from bayesimpact.diagnosis.extend import campaign_scales, extend
 from bayesimpact.diagnosis.name import name
 from bayesimpact.diagnosis.period_sets import PeriodSets
 from bayesimpact.diagnosis.refit import fit_from
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
+from bayesimpact.inference.multiple_shooting import multiple_shooting
 from bayesimpact.model.effects import SEARCHED
 
 MASS = {"obstacle_mass": {"mass": 0.01}, "quadratic_drag": {"coefficient": 1.5}}
@@ -44,22 +47,33 @@ def test_effects_with_states_of_their_own_are_asked_for(heavy: Fit) -> None:
             assert reached.fit.value(f"{effect}.{key}") == pytest.approx(value, rel=0.05)
 
 
-def test_sizes_are_what_the_least_squares_have_and_shapes_those_of_the_grid(heavy: Fit) -> None:
-    """Against the least squares of the same columns by numpy."""
+def test_a_set_leaves_what_its_least_squares_say(heavy: Fit) -> None:
+    """Against simulations of periods ahead at the sizes and shapes of the set."""
     scales = campaign_scales(heavy)
-    effects = [BY_ID["quadratic_drag"], BY_ID["contact_relaxation"]]
-    problem = PeriodSets(heavy, effects, scales)
-    chosen = (0, 1)
-    assert problem.terms[1].shapes in shape_points(effects[1], scales)
-    found = problem.set_of(chosen, 0.0)
-    columns = problem.every[:, problem.columns(chosen)]
-    size = np.linalg.norm(columns, axis=0)
-    x = np.linalg.lstsq(columns / size, problem.target, rcond=1e-10)[0] / size
-    assert found.values["k1"] - heavy.value("k1") == pytest.approx(x[problem.names.index("k1")])
-    assert found.values["quadratic_drag.coefficient"] == pytest.approx(x[-2])
-    assert found.values["contact_relaxation.stiffness"] == pytest.approx(x[-1])
-    shape = problem.terms[1].shapes["contact_relaxation.time"]
-    assert found.values["contact_relaxation.time"] == shape
+    problem = PeriodSets(heavy, [BY_ID["contact_relaxation"]], scales)
+    term = problem.terms[0]
+    assert term.shapes in shape_points(term.effect, scales)
+    found = problem.set_of((0,), 0.0)
+    assert found.values["contact_relaxation.time"] == term.shapes["contact_relaxation.time"]
+    ahead = multiple_shooting(heavy.target.likelihood, heavy.mode)
+    assert ahead is not None
+    o = extend(heavy, found.effects, scales).oscillator
+    theta = np.array([found.values[name] for name in o.layout.names])
+    left = replace(ahead, oscillator=o).misfit(theta).sum() / ahead.noise.level**2
+    said = problem.rows * np.exp(problem.solve((0,))[1])
+    none = problem.rows * np.exp(problem.solve(())[1])
+    assert said < 0.95 * none and left == pytest.approx(said, rel=0.1)
+
+
+@pytest.mark.parametrize("angle", [False, True])
+def test_every_force_at_the_stop_has_a_term_whatever_its_unit(heavy: Fit, angle: bool) -> None:
+    """A size of 1 N/m3 changes nothing that could be seen; a plausible one does."""
+    scales = replace(campaign_scales(heavy), angle=angle)
+    seen = {t.effect.id for t in PeriodSets(heavy, SEARCHED, scales).terms}
+    every = [e for e in SEARCHED if e.needs_stop and e.admissible(scales)]
+    assert len(every) > 10
+    missing = {e.id for e in every} - seen
+    assert missing <= {"opposite_stop"}  # no recording comes as far on the other side
 
 
 def test_what_replaces_a_base_parameter_moves_with_it(heavy: Fit) -> None:

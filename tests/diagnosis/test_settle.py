@@ -31,7 +31,7 @@ def test_laws_that_are_asked_for_take_the_place_where_scores_see_nothing(base, s
     """
     search: Any = Settling((), None, np.random.default_rng(0), lambda words: None)
     search.states = {frozenset(): SimpleNamespace(candidate=model("", base))}
-    search.asked = SimpleNamespace(seen={DRAG}, first=lambda *about: {DRAG, HYSTERESIS})
+    search.asked = SimpleNamespace(first=lambda *about: ({DRAG, HYSTERESIS}, {DRAG}))
     gains = {HYSTERESIS: seen, SPRING: 0.9 * seen, DRAG: 0.0}
     scores = tuple(Table.score(BY_ID[i], gain) for i, gain in gains.items())
     search.drop = lambda chosen, effect: model(FRICTION, 3.9)

@@ -59,6 +59,22 @@ def test_in_the_state_that_it_had_the_motion_goes_on(effect: Effect) -> None:
     np.testing.assert_allclose(o.predict_restarted(0, theta, restarts)[0], whole, atol=2e-7)
 
 
+@pytest.mark.parametrize("effect_id", ["base_motion", "presliding_friction"])
+def test_states_beside_the_mass_jump_with_it(effect_id: str) -> None:
+    """Where the mass is put elsewhere, a frame or bristles that follow it are not pulled."""
+    effect = BY_ID[effect_id]
+    o = build_oscillator(PLAIN.campaign(), [effect])
+    theta = PLAIN.theta(o, typical(effect, PLAIN))[None]
+    rows, q = np.zeros(1, dtype=np.int64), o.layout.slots(theta)[:, 0]
+    y, v = (o.motions_of(rows, q, np.array([order]))[0] for order in (0, 1))
+    jump = np.array([[1000.0, y[1000] + 1e-3, v[1000]]])
+    moved = o.predict_restarted(0, theta, jump)[0]
+    same = o.predict_restarted(0, theta, jump - np.array([0.0, 1e-3, 0.0]))[0]
+    # at first only the mass's own spring feels the jump
+    pull = 1e-3 * (1.0 - 0.5 * PLAIN.k1 / PLAIN.mass * (1e-3 * np.arange(8)) ** 2)
+    np.testing.assert_allclose((moved - same)[1000:1008], pull, atol=2e-6)
+
+
 def test_without_restarts_nothing_changes() -> None:
     o = build_oscillator(RIG.campaign(), [BY_ID["quadratic_drag"]])
     theta = RIG.theta(o, {"quadratic_drag.coefficient": 0.4})[None]

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from bayesimpact.data.faults.bursts import Spike, find_bursts
+from bayesimpact.data.faults.dropouts import find_dropouts
 from bayesimpact.data.faults.fault import (
     Array,
     Fault,
@@ -31,14 +32,17 @@ MOST = 0.01  # of the samples: more deviations than this are the signal
 
 
 def find_spikes(recording: Recording) -> list[Fault]:
-    """Up to five samples in a row far off the motion; impacts are none.
+    """Samples far off the motion, drop-outs of any length or up to five in a row; impacts are none.
 
-    Those close to each other come first, as in `bursts`, and then those alone, as in
-    `lone_spikes`, without them: beside a spike a good reading may look like one.
+    Spikes close to each other come first, as in `bursts`, then drop-outs, and then spikes alone, as
+    in `lone_spikes`, each without what is found already: beside a spike a good reading may look
+    like one.
     """
     close = find_bursts(recording)
     rest = without(recording, [one.span for one in close]) if close else recording
-    return _fault(recording, [*close, *_unpredicted(rest)])
+    lost = find_dropouts(rest, crossing_period(recording.samples, 1.0))
+    rest = without(rest, [one.span for one in lost]) if lost else rest
+    return _fault(recording, [*close, *lost, *_unpredicted(rest)])
 
 
 def lone_spikes(recording: Recording) -> list[Fault]:
@@ -82,7 +86,9 @@ def _fault(recording: Recording, spikes: list[Spike]) -> list[Fault]:
     places = tuple(runs(bad))
     largest = max(abs(one.size) for one in spikes)
     clearest = max(spikes, key=lambda one: one.strength / one.threshold)
-    noun = "spike" if len(places) == 1 else f"{len(places)} spikes"
+    what = "spike" if max(b - a for a, b in places) <= LONGEST else "drop-out of the signal"
+    what = what if len(places) == 1 else "spikes" if what == "spike" else "spikes and drop-outs"
+    noun = what if len(places) == 1 else f"{len(places)} {what}"
     return [
         Fault(
             id="recording_spikes",

@@ -52,6 +52,7 @@ from bayesimpact.model.added.resonator import (
     OBSTACLE,
     begin_bodies,
     body_force,
+    row,
     share_of_frame,
 )
 from bayesimpact.model.callback import call_law
@@ -77,6 +78,12 @@ NONE, TOUCH, LEAVE, TURN, SURFACE = range(-1, 4)  # SURFACE + i: surface of law 
 def may_step(w: Any) -> Any:
     """Count a step, and say whether a motion that takes so many is worth its time."""
     w.s[STEPS] += 1.0
+    return may_go_on(w)
+
+
+@inner(forceinline=True)
+def may_go_on(w: Any) -> Any:
+    """Whether a motion has taken no more steps than are worth their time."""
     return w.s[STEPS] < STEPS_AT_LEAST + STEPS_PER_SAMPLE * w.n
 
 
@@ -165,6 +172,16 @@ def begin(w: Any) -> Any:
         tell(law, q[initial] if initial >= 0 else 0.0, w)
     s[GAP] = q[G]
     return set_contact(y, v, 0.0, w)
+
+
+@inner()
+def carry_on(jump: Any, faster: Any, w: Any) -> Any:
+    """States that are counted from the mass's place stay as they are beside it where it jumps."""
+    for law in range(w.size):
+        w.work[WORK_COLUMNS * law + TURNED] += jump
+    at = row(FRAME, w)
+    w.work[at + NOW] += jump
+    w.work[at + WORK_COLUMNS + NOW] += faster
 
 
 @inner()
