@@ -81,13 +81,14 @@ class PeriodSets(TermSets):
         changes = dict(zip(names, map(float, x), strict=True))
         effects = (*self.fit.target.oscillator.effects, *(t.effect for t in terms))
         shapes = {name: value for t in terms for name, value in t.shapes.items()}
-        layout = extend(self.fit, effects, self.scales).oscillator.layout
+        oscillator = extend(self.fit, effects, self.scales).oscillator
+        layout = oscillator.layout
         start = transfer(self.fit, layout, effects, self.scales, shapes)
         values = {}
         for name, value in zip(layout.names, map(float, start), strict=True):
             values[name] = value + changes.get(name, 0.0)
             if is_added(name):  # what all of them share is known as the base parameter's
-                slot = replaced_slot(*owner(effects, name))
+                slot = replaced_slot(*owner(oscillator.acting, name))
                 values[name] += 0.0 if slot is None else changes.get(slot, 0.0)
         return EffectSet(effects, values, odds)
 

@@ -9,6 +9,7 @@ import pytest
 import small_rig
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.gaps import without
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.multiple_shooting import MultipleShooting, multiple_shooting
 from bayesimpact.inference.noise import Noise
@@ -123,3 +124,15 @@ def test_there_is_none_without_displacements_or_periods() -> None:
     short = small_rig.record(1).truncated(0.1)
     whole = likelihood_of(short)
     assert multiple_shooting(whole, small_rig.vector(whole.oscillator.layout, TRUE)) is None
+
+
+def test_no_period_begins_where_samples_are_set_aside() -> None:
+    campaign = small_rig.record(1)
+    first = without(campaign.recordings[0], [(700, 1100)])
+    whole = likelihood_of(replace(campaign, recordings=(first, *campaign.recordings[1:])))
+    theta = small_rig.vector(whole.oscillator.layout, TRUE)
+    ahead, full = ahead_of(whole, theta), ahead_of(likelihood_of(campaign), theta)
+    at = ahead.starts[0].restarts[:, 0]
+    assert 0 < at.size < full.starts[0].restarts.shape[0]
+    assert not np.any((at >= 700) & (at < 1100))
+    assert ahead.sizes[0] == whole.sizes[0] - 2 * at.size
