@@ -45,6 +45,23 @@ def test_laws_that_are_asked_for_take_the_place_where_scores_see_nothing(base, s
     assert ((HYSTERESIS, DRAG) in in_place) == (base > 9.0 and seen < 725.0)
 
 
+@pytest.mark.parametrize("white", [True, False])
+def test_beside_a_model_that_leaves_nothing_rivals_must_come_near_what_they_replace(white) -> None:
+    search: Any = Settling((), None, np.random.default_rng(0), lambda words: None)
+    chosen = model(f"{FRICTION} {SPRING}", 1.0)
+    search.states = {
+        frozenset(): SimpleNamespace(candidate=model("", 400.0)),
+        frozenset(chosen.ids): SimpleNamespace(candidate=chosen, is_white=white),
+    }
+    replaced = []
+    search.asked = SimpleNamespace(first=lambda *about: replaced.append(about[-1]) or (set(), {1}))
+    search.drop = lambda chosen, effect: model(FRICTION, 100.0)
+    search.simplified = lambda chosen, effect: []
+    search.scanned = lambda rest, effects: Scan((), 1e-6, None, (), ())
+    search.exchange(chosen)
+    assert replaced == ([FRICTION, SPRING] if white else ["", ""])
+
+
 def test_a_better_end_of_the_same_set_settles_once_more(monkeypatch):
     """What its effects contribute was told at the worse end."""
     first, better = (Table({}).candidate((A, B), gain) for gain in (40.0, 90.0))
