@@ -77,10 +77,8 @@ def _grown(x: Array, used: Mask, first: int, period: float, least: float) -> Spi
             continue
         inside, beyond = off[GUARD:-GUARD], np.abs(off / leverage)[GUARD:-GUARD]
         strength = float(np.median(beyond)) / noise if noise > 0.0 else np.inf
-        joined = rms < JOINED * noise and not _is_step(
-            x, np.concatenate([far, near]), noise, period
-        )
-        if strength > SURE * least and joined:
+        joined = rms < JOINED * noise and strength > SURE * least and _is_rough(inside)
+        if joined and not _is_step(x, np.concatenate([far, near]), noise, period):
             size = float(inside[np.argmax(np.abs(inside))])
             return Spike((first, end), size, strength, SURE * least)
         end += GUARD  # what looks good beside it may be bad as well

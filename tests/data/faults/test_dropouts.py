@@ -59,6 +59,15 @@ def test_what_does_not_come_back_is_none(seed: int) -> None:
     assert found_in(lost) == found_in(moved) == found_in(knock) == []
 
 
+@pytest.mark.parametrize("length", [12, 16, 20, 26])
+def test_what_sets_in_and_ends_smoothly_is_none(length: int) -> None:
+    """As a soft stop's push does."""
+    x, k = decay(2), np.arange(length) + 0.5
+    for a in (700, 1500, 2600):
+        x[a : a + length] += 2.0 * k / length * (1.0 - k / length)
+    assert found_in(x) == []
+
+
 def test_beside_a_stop_none_is_looked_for() -> None:
     x = decay(0)
     x[400:418] = 0.5
