@@ -61,7 +61,7 @@ def test_what_does_not_come_back_is_none(seed: int) -> None:
 
 @pytest.mark.parametrize("length", [16, 20, 26])
 def test_what_sets_in_and_ends_smoothly_is_none(length: int) -> None:
-    """As a soft stop does; what rises by a third of its height in a sample is no softer than noise."""
+    """As a soft stop does. What rises by a third of its height in a sample is as steep as noise."""
     x, k = decay(2), np.arange(length) + 0.5
     for a in (700, 1500, 2600):
         x[a : a + length] += 2.0 * k / length * (1.0 - k / length)
