@@ -8,6 +8,7 @@ import small_rig
 from effect_rigs import BY_ID
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.diagnosis import periodic
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.parametric_bootstrap import simulated
 from bayesimpact.diagnosis.refit import fit_from
@@ -96,3 +97,17 @@ def test_a_simulated_campaign_comes_in_the_same_steps():
         np.testing.assert_allclose(steps, np.round(steps), atol=1e-6)
         error = (recording.samples - seen) / STEP
         assert np.std(error) == pytest.approx(np.sqrt(1 / 12 + DITHER**2), rel=0.08)
+
+
+def test_sums_that_weigh_by_what_readings_tell_are_not_taken_for_steps(monkeypatch):
+    """Where they tell most they scatter most: of an encoder, every sample counts alike."""
+    fit = fitted(decays(1))
+    scales = campaign_scales(fit)
+    assert np.ndim(fit.slopes[0]) == 1
+
+    def refused(*_):
+        raise AssertionError("weighted sums")
+
+    monkeypatch.setattr(periodic, "white_line_blocks", refused)
+    (score,) = periodic.periodic_scores(fit, [BY_ID["sensor_hum"]], scales)
+    assert score.p_value > 1e-3
