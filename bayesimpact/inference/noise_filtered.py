@@ -58,11 +58,13 @@ def filtered_noise(recordings: Sequence[Recording], smoothing: Smoothing) -> Noi
     return Noise(0.0, smoothing, level, error, 0.0, source, is_bound=True)
 
 
-def lower(cycles: Noise, bound: Noise) -> Noise:
+def lower(cycles: Noise | None, bound: Noise) -> Noise:
     """What half cycles of free decays say, or the bound where that is lower by far.
 
-    A bound no longer: polynomials follow a free motion.
+    A bound no longer: polynomials follow a free motion. It stays one where half cycles say nothing.
     """
+    if cycles is None:
+        return bound
     if cycles.level <= FAR * bound.level:
         return cycles
     return replace(bound, source="polynomial remainders behind the filter", is_bound=False)

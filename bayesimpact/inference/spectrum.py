@@ -124,8 +124,9 @@ def nulls(smoothing: Smoothing, interval: float, count: int = 3) -> tuple[float,
     return tuple(float(f) for f in frequency[1:-1][inner][:count])
 
 
-def smoothed_noise(recordings: Sequence[Recording], smoothing: Smoothing) -> Noise:
-    """Raw noise level behind a known filter, from half cycles on the free side.
+def smoothed_noise(recordings: Sequence[Recording], smoothing: Smoothing) -> Noise | None:
+    """Raw noise level behind a known filter, from half cycles on the free side; None where the
+    filter leaves too little of these to tell it.
 
     Frequency and decay of the half cycles are those that leave the least.
     """
@@ -133,7 +134,7 @@ def smoothed_noise(recordings: Sequence[Recording], smoothing: Smoothing) -> Noi
     halves = [_passband(s, smoothing, r.interval) for r, s in found]
     halves = [one for one in halves if one.numbers.shape[1] > MOTION]
     if not halves:
-        raise ValueError("too few half cycles for a noise estimate")
+        return None
 
     def energy(x: Array) -> float:
         return sum(_left(one, x)[0] for one in halves)

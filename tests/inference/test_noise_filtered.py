@@ -10,8 +10,10 @@ import small_rig
 from driven_rigs import driven_rig
 
 from bayesimpact.data.campaign import Campaign, Measurement, Smoothing
+from bayesimpact.data.recording import Recording
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.noise_estimate import estimate_noise
+from bayesimpact.inference.spectrum import smoothed_noise
 from bayesimpact.model.measurement import smooth
 from bayesimpact.trial.rig_chain import Chain
 
@@ -75,3 +77,17 @@ def test_the_level_in_decays(stop, quantity, force):
     noise = estimate_noise(smoothed(whole, Smoothing("savgol", 21, 2)))
     assert noise.level == pytest.approx(level, rel=max(0.05, 3 * noise.level_error))
     assert noise.level_error < 0.15
+
+
+def test_half_cycles_of_few_samples_leave_the_bound() -> None:
+    """Of a motion of 36 samples a period a wide filter leaves nothing that is not motion."""
+    t, rng = 1e-3 * np.arange(3000), np.random.default_rng(0)
+    raw = 2e-3 * np.exp(-0.3 * t) * np.cos(2 * np.pi * 27.5 * t) + 8e-6 * rng.standard_normal(3000)
+    smoothing = Smoothing("savgol", 15, 2, declared_window=15)
+    recording = Recording("a", "", smooth(raw[None], smoothing, 1e-3)[0], 1e-3)
+    assert smoothed_noise([recording], smoothing) is None
+    campaign = Campaign(
+        "ribbon", 0.09, (recording,), stop=False, measurement=Measurement(smoothing=smoothing)
+    )
+    noise = estimate_noise(campaign)
+    assert noise.is_bound and 4e-6 < noise.level < 4e-5
