@@ -16,8 +16,8 @@ COMPARISONS = 45.0
 # Times as long as it takes to score what a model lacks, that are kept for them too: a forced run of
 # 10,000 samples, scored in 7 s, took 150 s and was not done. No more than this share of the budget.
 LOOKS, MOST_KEPT = 25.0, 0.6
-# s that must be left for another search, set by hand: half of 50 strong campaigns need less than 30
-# altogether. One that begins with less would mostly end by its limit, and then tell no more.
+# s that must be left for another search, set by hand: about what half of the strong campaigns take
+# in all (tests/benchmarks/strong.json). One that begins with less would mostly end by its limit.
 ANOTHER = COMPARISONS + 30.0
 
 

@@ -38,7 +38,7 @@ INVISIBLE = 1e-6  # of the noise, at that step: rounding of the simulation, not 
 class PeriodSets(TermSets):
     """Sets of effects beside those of a fit, each by what periods ahead leave.
 
-    There are no terms, and so no sets, where recordings are no displacements.
+    There are no terms, and so no sets, where recordings are no displacements or tell no period.
     """
 
     def __init__(self, fit: Fit, effects: Sequence[Effect], scales: Scales) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,6 +72,9 @@ class Likelihood:
     oscillator: Oscillator
     noise: Noise
 
+    in_closed_form: ClassVar[bool] = True
+    """The base oscillator's motions and derivatives are those of the closed form."""
+
     __repr__ = short_repr
 
     @cached_property
@@ -109,7 +113,8 @@ class Likelihood:
         """Sums of squares of the whitened residuals, (B, R), m2; inf where inadmissible."""
         o = self.oscillator
         theta = np.ascontiguousarray(np.atleast_2d(theta))
-        if o.is_plain and self.noise.is_white and o.is_whole and not any(self.steps):
+        plain = self.in_closed_form and o.is_plain and o.is_whole
+        if plain and self.noise.is_white and not any(self.steps):
             base = slice(0, len(BASE_SLOTS))
             columns = np.ascontiguousarray(o.layout.columns[:, base])
             constants = np.ascontiguousarray(o.layout.constants[:, base])
@@ -136,9 +141,7 @@ class Likelihood:
 
     def residuals(self, theta: Array) -> tuple[Array, ...]:
         """Whitened residual of every recording, (B, m), m, for parameter vectors (B, d)."""
-        pairs = zip(
-            self.oscillator.campaign.recordings, self.oscillator.predict(theta), strict=True
-        )
+        pairs = zip(self.oscillator.campaign.recordings, self.seen(theta), strict=True)
         return tuple(
             self.whitened(r, one.samples - self.average(r, seen))
             for r, (one, seen) in enumerate(pairs)
@@ -195,7 +198,7 @@ class Likelihood:
         be a small fraction of the posterior's standard deviations.
         """
         wanted = range(self.oscillator.counts.size) if recordings is None else recordings
-        if self.oscillator.is_base and not self.oscillator.sensors:
+        if self.in_closed_form and self.oscillator.is_base and not self.oscillator.sensors:
             parts = self._exact(theta)
             return tuple(parts[r] for r in wanted)
         if steps is None:
@@ -211,6 +214,10 @@ class Likelihood:
         stacked = np.vstack([recording.samples - predicted, jacobian])
         white = self.whitened(r, stacked)
         return Linearisation(white[0], white[1:].T, columns)
+
+    def seen(self, theta: Array) -> tuple[Array, ...]:
+        """What the probe would see of every recording, (B, n), for parameter vectors (B, d)."""
+        return self.oscillator.predict(theta)
 
     def whitened(self, r: int, signals: Array) -> Array:
         """Signals (..., n) of recording `r`, whitened."""

@@ -13,21 +13,20 @@ Starts cost information, so this likelihood decides nothing: it says what to try
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.inference.likelihood import Likelihood, Linearisation
+from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.noise import Noise
 from bayesimpact.model.oscillator import Oscillator
 from bayesimpact.model.parameters import SLOTS
 from bayesimpact.response.measured_motion import lowest_points, smoothed
 
 Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 _K1, _OFFSET = SLOTS.index("k1"), SLOTS.index("offset")
 
 SMALL = 1e-5  # of the largest displacement and speed: changes of a start, for differences
@@ -62,6 +61,8 @@ class MultipleShooting(Likelihood):
 
     starts: tuple[Starts, ...] = ()
 
+    in_closed_form: ClassVar[bool] = False
+
     @cached_property
     def steps(self) -> tuple[float, ...]:
         """Of readings in coarse steps: none, their rounding is noise here."""
@@ -75,36 +76,9 @@ class MultipleShooting(Likelihood):
             [max(n - 2 * len(s.blocks), 1.0) for n, s in zip(whole, self.starts, strict=True)]
         )
 
-    def misfit(self, theta: Array) -> Array:
-        """Sums of squares of the residuals, (B, R), m2; inf where inadmissible."""
-        left = self.residuals(np.atleast_2d(theta))
-        sums = np.stack([np.einsum("bn,bn->b", white, white) for white in left], axis=1)
-        return np.where(np.isfinite(sums), sums, np.inf)
-
-    def residuals(self, theta: Array) -> tuple[Array, ...]:
-        """Residuals of every recording, (B, n), m, for parameter vectors (B, d)."""
-        found = []
-        for r, (recording, starts) in enumerate(
-            zip(self.oscillator.campaign.recordings, self.starts, strict=True)
-        ):
-            seen = self.oscillator.predict_restarted(r, theta, starts.restarts)
-            white = self.noise.whitened(recording, recording.samples - seen)
-            found.append(starts.apart(white))
-        return tuple(found)
-
-    def linearise(
-        self,
-        theta: Array,
-        steps: Array | None = None,
-        recordings: Sequence[int] | None = None,
-        *,
-        roughly: bool = False,
-    ) -> tuple[Linearisation, ...]:
-        """As of the ordinary likelihood, always by differences."""
-        if steps is None:
-            raise ValueError("multiple shooting needs difference steps")
-        wanted = range(self.oscillator.counts.size) if recordings is None else recordings
-        return tuple(self._differences(r, theta, steps, roughly) for r in wanted)
+    def seen(self, theta: Array) -> tuple[Array, ...]:
+        """What the probe would see of every recording, (B, n), for parameter vectors (B, d)."""
+        return tuple(self.readings(r, theta, 0.0) for r in range(len(self.starts)))
 
     def readings(self, r: int, points: Array, error: float) -> Array:
         """Readings (B, n) of recording `r` for parameters (B, d)."""
@@ -112,9 +86,7 @@ class MultipleShooting(Likelihood):
 
     def whitened(self, r: int, signals: Array) -> Array:
         """Signals (..., n) of recording `r`, whitened, less what other starts would do."""
-        return self.starts[r].apart(
-            self.noise.whitened(self.oscillator.campaign.recordings[r], signals)
-        )
+        return self.starts[r].apart(super().whitened(r, signals))
 
 
 def multiple_shooting(likelihood: Likelihood, theta: Array) -> MultipleShooting | None:
