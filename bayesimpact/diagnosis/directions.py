@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 
 CHANGE = 3.0  # norm of the response to a difference step, in units of the noise
 FIRST_STEP = 1e-5  # of a parameter's physical scale, to find the right step
+SIZE_STEP = 1e-3  # of an effect's plausible size
 DECAY = "decay"  # parameter of a periodic effect that rings down, 1/s
 INVISIBLE = 1e-6  # a response below this at the first step is rounding, not physics
 
@@ -132,6 +133,18 @@ def size_parameters(target: Target, effect: Effect) -> list[tuple[str, EffectPar
     }
     sizes = [p for p in effect.parameters if p.is_size]
     return [(instance_name(effect, p, key), p) for p in sizes for key in keys[p.scope]]
+
+
+def size_steps(target: Target, effect: Effect, theta: Array, scales: Scales) -> tuple[Array, Array]:
+    """Points (1 + k, d): theta, and with each of an effect's k sizes larger by a small part of what
+    is plausible; these steps (k,).
+    """
+    sizes = size_parameters(target, effect)
+    steps = np.array([SIZE_STEP * parameter.scale(scales) for _, parameter in sizes])
+    points = np.repeat(theta[None], 1 + len(sizes), axis=0)
+    for i, (name, _) in enumerate(sizes):
+        points[1 + i, target.oscillator.layout.index(name)] += steps[i]
+    return points, steps
 
 
 def _direction(

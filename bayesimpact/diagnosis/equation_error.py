@@ -27,7 +27,12 @@ from numpy.typing import NDArray
 from scipy.linalg import cholesky_banded, solve_banded
 
 from bayesimpact.data.recording import Recording
-from bayesimpact.diagnosis.directions import is_periodic, shape_points, size_parameters
+from bayesimpact.diagnosis.directions import (
+    is_periodic,
+    shape_points,
+    size_parameters,
+    size_steps,
+)
 from bayesimpact.diagnosis.extend import at_null, extend, transfer
 from bayesimpact.diagnosis.term_sets import EffectColumns
 from bayesimpact.diagnosis.thresholds import DOUBT
@@ -47,7 +52,6 @@ _C1, _K1, _GAP, _K2, _OFFSET, _FRICTION = (
 
 WIDTH = 0.5  # half width of a stretch, natural periods
 FLIGHT_WIDTH = 1 / 8  # of one in flight: every flight lasts half a period, two stretches and more
-STEP = 1e-3  # of an effect's plausible size
 # points of a shape grid for one of the scores', to which a force along a path costs little: what a
 # shape beside the true one leaves of a large effect asks for other effects
 FINER = 4
@@ -221,10 +225,7 @@ def term_at(
     layout = target.oscillator.layout
     theta = at_null(target, transfer(fit, layout, (effect,), scales, shapes))
     sizes = size_parameters(target, effect)
-    steps = np.array([STEP * parameter.scale(scales) for _, parameter in sizes])
-    points = np.repeat(theta[None], 1 + len(sizes), axis=0)
-    for i, (name, _) in enumerate(sizes):
-        points[1 + i, layout.index(name)] += steps[i]
+    points, steps = size_steps(target, effect, theta, scales)
     columns = []
     for r, path in enumerate(paths):
         added = _added(target, effect, r, path, points)

@@ -14,7 +14,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.diagnosis.directions import is_periodic, shape_points, size_parameters
+from bayesimpact.diagnosis.directions import (
+    is_periodic,
+    shape_points,
+    size_parameters,
+    size_steps,
+)
 from bayesimpact.diagnosis.extend import (
     difference_steps,
     extend,
@@ -31,7 +36,6 @@ from bayesimpact.model.parameters import is_added
 
 Array = NDArray[np.float64]
 
-STEP = 1e-3  # of an effect's plausible size
 INVISIBLE = 1e-6  # of the noise, at that step: rounding of the simulation, not physics
 
 
@@ -111,16 +115,13 @@ def _terms(
         target = extend(fit, own, scales)
         for shapes in shape_points(effect, scales):
             theta = transfer(fit, target.oscillator.layout, own, scales, shapes)
-            sizes = size_parameters(target, effect)
-            steps = np.array([STEP * parameter.scale(scales) for _, parameter in sizes])
-            points = np.repeat(theta[None], 1 + len(sizes), axis=0)
-            for i, (name, _) in enumerate(sizes):
-                points[1 + i, target.oscillator.layout.index(name)] += steps[i]
+            points, steps = size_steps(target, effect, theta, scales)
             left = replace(ahead, oscillator=target.oscillator).residuals(points)
             changes = [
                 np.column_stack([before[0] - rest[0], (rest[0] - rest[1:]).T]) / ahead.noise.level
                 for before, rest in zip(missed, left, strict=True)
             ]
+            sizes = size_parameters(target, effect)
             found += _seen(effect, shapes, sizes, changes, np.array([1.0, *steps]))
     return found
 
