@@ -13,7 +13,9 @@ Let S be the likeliest set of effects that the search reached.
    the effects only imitate it. Else an effect of S is needed when
    - every set of effects without it trails S by the decisive odds, or trails at all a set with the
      effect that has fewer effects or parameters; if it has more than S itself, one that has no
-     more: more to fit with makes imitation easy, and the rest of the truth may be among it,
+     more: more to fit with makes imitation easy, and the rest of the truth may be among it. Where
+     the effect is a line, sets whose own line may be the motion's (`own_band`) are among these:
+     they are refused as names, and still are another explanation,
    - `EXCESS` times as much is left without it, other effects refitted: of the misfit above the
      noise, or, where a force of time is all that S leaves, of that force about the motion's own
      frequencies. An effect that imitates what the catalogue lacks may put the phase right, but
@@ -37,11 +39,12 @@ A name never rests on one p-value.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
+from bayesimpact.diagnosis.directions import is_periodic
 from bayesimpact.diagnosis.learned import may_restate
 from bayesimpact.diagnosis.naming import Naming, State
 from bayesimpact.diagnosis.refit import Candidate
@@ -212,9 +215,16 @@ def leads_without(naming: Naming, group: Group) -> bool:
         simpler = [odds for size, odds in sizes if size < most or (larger and size == most)]
         return max([own - DECISIVE, *simpler])
 
-    return not any(
-        naming.log_odds(c) > least(c) for c in naming.tried if not holds(c.effects, group)
-    )
+    others = [c for c in naming.tried if not holds(c.effects, group)]
+    if is_periodic(group[0]):
+        others = [with_its_evidence(c) for c in others]
+    return not any(naming.log_odds(c) > least(c) for c in others)
+
+
+def with_its_evidence(candidate: Candidate) -> Candidate:
+    """A model, with the evidence that it would have if it were not refused."""
+    refused = candidate.refused
+    return candidate if refused is None else replace(candidate, log_evidence=refused)
 
 
 def misses(naming: Naming, effect: Effect) -> bool:

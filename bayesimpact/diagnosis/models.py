@@ -81,8 +81,11 @@ class Models:
         key = frozenset(candidate.ids)
         fit = candidate.fit
         lost = not np.isfinite(fit.log_posterior)  # its mode need not be finite either
-        if lost or shakes_in_own_band(fit, leaves_something(fit)) or is_refuted(fit):
+        if lost or is_refuted(fit):
             candidate = replace(candidate, log_evidence=-np.inf)
+        elif shakes_in_own_band(fit, leaves_something(fit)):
+            refused = candidate.log_evidence
+            candidate = replace(candidate, log_evidence=-np.inf, refused=refused)
         held = self.tried.get(key)
         sooner = candidate.fit.converged and not (held and held.fit.converged)
         least = SAME * (-1 if sooner else 1)

@@ -48,11 +48,14 @@ class Candidate:
     effects : ids, in the order in which they were added
     fit : its mode
     log_evidence : by Laplace's method, with the truncation of bounded parameters
+    refused : what that would be of a model that is refused since it has a line that may be the
+        motion's own (`own_band`); None of every other
     """
 
     effects: tuple[Effect, ...]
     fit: Fit
     log_evidence: float
+    refused: float | None = None
 
     __repr__ = short_repr
 

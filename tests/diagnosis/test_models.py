@@ -83,6 +83,13 @@ def test_an_end_that_no_motion_has_is_not_looked_at(monkeypatch):
     assert search.keep(candidate("sensor_hum", 20.0)).log_evidence == 20.0
 
 
+def test_a_model_whose_line_may_be_the_motions_own_keeps_its_evidence_apart(monkeypatch):
+    search = made_up(monkeypatch)
+    monkeypatch.setattr(models, "shakes_in_own_band", lambda fit, remains: True)
+    kept = search.keep(candidate("sensor_hum", 20.0))
+    assert (kept.log_evidence, kept.refused) == (-np.inf, 20.0)
+
+
 def test_a_search_keeps_time_for_comparisons_by_how_long_a_look_takes(monkeypatch):
     now, took = [0.0], 6.0
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from effect_rigs import BY_ID
 from made_up_evidence import (
@@ -45,6 +46,18 @@ def test_an_effect_that_another_could_stand_for_is_not_needed():
     near, far = (candidate(DRAG, 100.0 - DECISIVE + x) for x in (0.1, -0.1))
     assert judge(remaining(something_left(), 100.0, 10.0, near)) == "unknown"
     assert judge(remaining(something_left(), 100.0, 10.0, far)) == "partly"
+
+
+@pytest.mark.parametrize("effect", ["released_mode", FRICTION])
+def test_a_line_that_a_refused_line_could_stand_for_is_not_needed(effect: str) -> None:
+    """Whose line may be the motion's own is no name, but as good an explanation of a line."""
+    chosen = state(candidate(effect, 100.0), p_force=ALPHA / 2, force_evidence=2 * DECISIVE)
+    forced = candidate("harmonic_forcing", 130.0)
+    refused = replace(forced, log_evidence=-np.inf, refused=forced.log_evidence)
+    is_line = effect == "released_mode"
+    assert judge(remaining(chosen, 100.0, 10.0, refused)) == ("unknown" if is_line else "partly")
+    behind = replace(refused, refused=forced.log_evidence - 30.0 - DECISIVE - 0.1)
+    assert judge(remaining(chosen, 100.0, 10.0, behind)) == "partly"
 
 
 def test_an_effect_that_a_residual_force_replaces_is_not_needed():
