@@ -20,6 +20,7 @@ from bayesimpact.diagnosis.equation_error import is_a_force
 from bayesimpact.diagnosis.extend import transfer
 from bayesimpact.diagnosis.likely_sets import Known, LikelySets, shapes_of
 from bayesimpact.diagnosis.period_sets import PeriodSets
+from bayesimpact.diagnosis.period_terms import periods_with_terms
 from bayesimpact.diagnosis.promising import NEAR_BEST, NEAR_MARGIN
 from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.formula.law import is_formula
@@ -61,6 +62,10 @@ class Asked:
             at = replace(model.fit, mode=mode)
             self.of_periods[key] = PeriodSets(at, self.effects, self.scales)
         return self.of_periods[key]
+
+    def ahead_with_terms(self, model: Candidate) -> PeriodSets:
+        """The problem of periods ahead of a model, with the terms of the grammar."""
+        return periods_with_terms(model.fit, self.effects, self.scales)
 
     def first(
         self, model: Candidate, about: Candidate, instead: str = ""

@@ -57,7 +57,6 @@ from bayesimpact.diagnosis.simpler import (
     makes_idle,
     may_be_simpler,
 )
-from bayesimpact.diagnosis.slow_noise import remaining_noise, with_noise
 from bayesimpact.diagnosis.smoothing import SAVITZKY_GOLAY, whole_campaign
 from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.fit import Fit
@@ -174,7 +173,6 @@ def diagnose(
     found = _without_needless_faults(found, cleaned, searches)
     found = _without_unfree_start(found, campaign, searches)
     found = _without_late_spikes(found, campaign, searches)
-    found = _beside_slow_noise(found, searches)
     undecided = found.corrected is not None and found.corrected.is_open
     return replace(found, verdict="ambiguous") if undecided and is_settled(found) else found
 
@@ -288,21 +286,6 @@ def _without_late_spikes(found: Diagnosis, as_read: Campaign, searches: Searches
         lambda: without_faults(corrected, spikes, as_read, rng=searches.rng),
         lambda other, own: is_settled(other) and len(other.effects) <= len(own.effects),
     )
-
-
-def _beside_slow_noise(found: Diagnosis, searches: Searches) -> Diagnosis:
-    """The answer under slow noise, where the likeliest model leaves that and nothing else, if it
-    explains everything then.
-    """
-    chosen, corrected = found.naming.chosen.candidate.fit, found.corrected
-    if is_settled(found) or corrected is None or found.filtered is not None:
-        return found
-    noise = remaining_noise(chosen)
-    if noise is None:
-        return found
-    identification = with_noise(found.identification, noise)
-    again = replace(corrected, identification=identification)
-    return searches.again(found, lambda: again, lambda other, _: is_settled(other))
 
 
 def _of_corrected(

@@ -23,7 +23,7 @@ from bayesimpact.formula.grammar import Term
 from bayesimpact.formula.law import effect_of, is_friction, starts_of
 from bayesimpact.formula.library import library, local_starts, neighbours
 from bayesimpact.formula.responses import Along, forces_along
-from bayesimpact.model.effects.effect import Effect
+from bayesimpact.model.effects.effect import Effect, Scales
 
 Array = NDArray[np.float64]
 Prices = Mapping[tuple[object, ...], float]
@@ -60,11 +60,9 @@ def sets_with_a_term(
         return []
     sets = [(), problem.shaped(own), *(c for level in problem.levels(most) for c in level[:LIKELY])]
     least = min(_design(problem, problem.refined(chosen)).left for chosen in sets)
-    reach = _reach(problem)
-    terms = tuple(
-        t for t in (*library(problem.scales, *reach), *local_starts(*reach)) if not is_friction(t)
-    )
-    price = dict(zip((t.kind for t in terms), kind_prices(terms, prices(terms)), strict=True))
+    reach = reach_of(problem.paths)
+    terms = unlisted((*library(problem.scales, *reach), *local_starts(*reach)))
+    price = prices_by_kind(terms)
     columns = _columns(problem, terms)
     found = []
     for size in range(most):
@@ -77,15 +75,25 @@ def sets_with_a_term(
     return found
 
 
-def _reach(problem: LikelySets) -> tuple[float, float]:
+def reach_of(paths: Sequence[Path]) -> tuple[float, float]:
     """Smallest and largest displacement of all paths, m."""
-    low = min(float(path.y.min()) for path in problem.paths)
-    return low, max(float(path.y.max()) for path in problem.paths)
+    low = min(float(path.y.min()) for path in paths)
+    return low, max(float(path.y.max()) for path in paths)
+
+
+def unlisted(terms: Sequence[Term]) -> tuple[Term, ...]:
+    """Terms that the catalogue has no law with events of its own for."""
+    return tuple(t for t in terms if not is_friction(t))
+
+
+def prices_by_kind(terms: Sequence[Term]) -> Prices:
+    """What a term of every kind costs, its shape free, nats."""
+    return dict(zip((t.kind for t in terms), kind_prices(terms, prices(terms)), strict=True))
 
 
 def _refined(problem: LikelySets, best: _Beside, price: Prices) -> _Beside:
     """With all shapes where they are likeliest, also between the points of their grids."""
-    low, high = _reach(problem)
+    low, high = reach_of(problem.paths)
     for step in REFINED:
         chosen = problem.refined(best.chosen)
         near = neighbours(best.term, step, max(-low, high)) if best.term.shapes else []
@@ -151,7 +159,8 @@ def _along(path: Path) -> Along:
 
 def _with_term(problem: LikelySets, best: _Beside, price: Prices) -> EffectSet:
     """The set with the term as an effect of its own, all sizes as the least squares have them."""
-    effect = _effect(problem, best.term, price[best.term.kind])
+    beyond = max(price[best.term.kind] - problem.cost, 0.0)
+    (effect,) = as_effects(problem.paths, problem.scales, [best.term], [beyond])
     columns = [
         without_rest(path, path.rows.integrals(forces_along(_along(path), [best.term])).T)
         for path in problem.paths
@@ -161,12 +170,21 @@ def _with_term(problem: LikelySets, best: _Beside, price: Prices) -> EffectSet:
     return problem.with_term(best.chosen, own, best.log_odds)
 
 
-def _effect(problem: LikelySets, term: Term, price: float) -> Effect:
-    """The term as an effect."""
-    forces = [forces_along(_along(path), [term]) for path in problem.paths]
-    largest = max(float(np.abs(f).max()) for f in forces)
-    scale = float(plausible_sizes([term], np.array([largest]), problem.scales)[0])
-    reach = max(float(np.abs(path.y).max()) for path in problem.paths)
-    scales, signed = problem.scales, term.energy != "dissipates"
-    effect = effect_of(term, scale, reach, scales.speed, signed=signed, angle=scales.angle)
-    return replace(effect, price=max(price - problem.cost, 0.0))
+def as_effects(
+    paths: Sequence[Path], scales: Scales, terms: Sequence[Term], prices: Sequence[float]
+) -> list[Effect]:
+    """Terms as effects, with what each costs beyond any effect, nats."""
+    largest = np.zeros(len(terms))
+    for path in paths:
+        for first in range(0, len(terms), BLOCK):
+            block = slice(first, first + BLOCK)
+            forces = np.abs(forces_along(_along(path), terms[block]))
+            largest[block] = np.maximum(largest[block], forces.max(axis=1))
+    reach = max(float(np.abs(path.y).max()) for path in paths)
+    found = []
+    sizes = plausible_sizes(terms, largest, scales)
+    for term, size, price in zip(terms, map(float, sizes), prices, strict=True):
+        signed = term.energy != "dissipates"
+        effect = effect_of(term, size, reach, scales.speed, signed=signed, angle=scales.angle)
+        found.append(replace(effect, price=price))
+    return found

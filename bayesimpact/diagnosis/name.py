@@ -8,7 +8,7 @@ physics and decide between near-opposites that scores cannot tell apart.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -29,9 +29,11 @@ from bayesimpact.diagnosis.refit import (
     base_candidate,
     in_words,
 )
+from bayesimpact.diagnosis.slow_noise import remaining_noise, under_noise
 from bayesimpact.diagnosis.unknown import learn_force
-from bayesimpact.diagnosis.unlisted import Unlisted
+from bayesimpact.diagnosis.unlisted import Problem, Unlisted
 from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.noise import Noise
 from bayesimpact.model.effects.effect import Effect, Scales
 
 # Effects from which on a single force in contact is fitted in their place: three sizes can follow
@@ -39,9 +41,6 @@ from bayesimpact.model.effects.effect import Effect, Scales
 IMITATING_EFFECTS = 3
 BEAM = 3  # models that are extended while the best one is not white
 PAIRS = 4  # refitted at the first step
-
-Problem = Callable[[Candidate], list[Candidate]]
-"""Models that a problem posed about one asks for."""
 
 
 def name(
@@ -97,7 +96,24 @@ def name(
             break
         begun.add(key)
         beam = [state]
-    return search.naming(base, search.at_its_mode(state))
+    state = search.at_its_mode(state)
+    noise = _remaining_noise(state)
+    if noise is None:
+        return search.naming(base, state)
+    search.progress("what remains is slow noise: once more under that")
+    found = state.candidate.fit
+    return name(
+        under_noise(fit, noise), effects, scales,
+        rng=rng, progress=progress, budget=search.budget,
+        first=under_noise(found, noise) if found is not fit else None,
+    )  # fmt: skip
+
+
+def _remaining_noise(state: State) -> Noise | None:
+    """The slow noise that a model leaves, if it leaves no more than a little, and nothing else."""
+    if state.is_white or is_large(state.candidate.fit):
+        return None
+    return remaining_noise(state.candidate.fit)
 
 
 class _Search(Unlisted):
@@ -156,7 +172,7 @@ class _Search(Unlisted):
                 break
         best = max(begun, key=self.promise)
         state = self.examine(best)
-        with_term = self.with_a_term(state)
+        with_term = self.with_a_term_ahead(base, self.with_a_term(state))
         if with_term is not state:
             return [with_term]
         stays = in_flight.effects and in_flight is not best
@@ -176,16 +192,6 @@ class _Search(Unlisted):
         """Models that periods ahead ask for about one."""
         problem = self.asked.ahead(about, about)
         return self.fit_sets(problem.fit, problem.best(self.most - len(about.effects)))
-
-    def asked_again(self, about: Candidate, problem: Problem) -> Candidate:
-        """The likeliest model that a problem asks for about one, then about that, and so on."""
-        best = about
-        while True:
-            found = problem(best)
-            better = max([best, *found], key=self.promise)
-            if better is best:
-                return best
-            best = better
 
     def best_first(self, state: State, found: Sequence[Candidate]) -> list[Candidate]:
         """Extensions of a model, the next one to examine first."""

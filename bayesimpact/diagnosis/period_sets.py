@@ -43,9 +43,12 @@ class PeriodSets(TermSets):
     """Sets of effects beside those of a fit, each by what periods ahead leave.
 
     There are no terms, and so no sets, where recordings are no displacements or tell no period.
+    Terms of the `grammar` may stand beside sets, see `best_with_a_term`.
     """
 
-    def __init__(self, fit: Fit, effects: Sequence[Effect], scales: Scales) -> None:
+    def __init__(
+        self, fit: Fit, effects: Sequence[Effect], scales: Scales, grammar: Sequence[Effect] = ()
+    ) -> None:
         self.fit, self.scales, cost = fit, scales, float(np.log(2 * len(effects)))
         o = fit.target.oscillator
         ahead = multiple_shooting(fit.target.likelihood, fit.mode)
@@ -60,7 +63,10 @@ class PeriodSets(TermSets):
             whole[:, part.columns] = part.jacobian
         level = ahead.noise.level
         super().__init__(
-            _terms(fit, ahead, effects, scales),
+            [
+                *_terms(fit, ahead, effects, scales),
+                *(replace(t, on_grid=False) for t in _terms(fit, ahead, grammar, scales)),
+            ],
             [o.layout.names[i] for i in moving],
             np.concatenate(columns)[:, moving] / level,
             np.concatenate([p.residual for p in parts]) / level,

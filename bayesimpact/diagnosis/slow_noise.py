@@ -38,15 +38,15 @@ def remaining_noise(fit: Fit) -> Noise | None:
     return found.noise
 
 
-def with_noise(before: Identification, noise: Noise) -> Identification:
-    """The base model's mode under another noise."""
-    target = before.fit.target
-    likelihood = Likelihood(target.oscillator, noise)
-    fit = climbed(replace(target, likelihood=likelihood), before.fit)
-    return replace(before, fit=fit, noise=noise)
+def under_noise(fit: Fit, noise: Noise) -> Fit:
+    """A model's mode under another noise."""
+    likelihood = Likelihood(fit.target.oscillator, noise)
+    return climbed(replace(fit.target, likelihood=likelihood), fit)
 
 
 def with_slow_noise(before: Identification) -> Identification:
     """The same under the slow noise that the base model leaves, if it leaves nothing else."""
     noise = None if base_failed(before.fit) else remaining_noise(before.fit)
-    return before if noise is None else with_noise(before, noise)
+    if noise is None:
+        return before
+    return replace(before, fit=under_noise(before.fit, noise), noise=noise)

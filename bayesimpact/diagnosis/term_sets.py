@@ -48,7 +48,8 @@ class EffectColumns:
     columns : per recording (stretches or samples, k), whitened, per unit of them
     one_sided : which of them cannot be negative, (k,)
     on_grid : whether the shape is one of the scores' grid; sets are chosen from those, for on a
-        finer one a law with a free power comes nearer to the errors of another law than that itself
+        finer one a law with a free power comes nearer to the errors of another law than that
+        itself. No term of the grammar is: those stand beside sets
     """
 
     effect: Effect
@@ -117,7 +118,8 @@ class TermSets:
         signs = [s for t in chosen for s in self.terms[t].one_sided]
         if not self.is_possible(x) or np.any(x[len(self.base) :][signs] <= 0.0):
             return -np.inf
-        price = 0.5 * unknowns * float(np.log(self.rows)) + self.cost * len(chosen)
+        price = 0.5 * unknowns * float(np.log(self.rows))
+        price += sum(self.cost + self.terms[t].effect.price for t in chosen)
         return -0.5 * self.rows * left - price
 
     def best(self, most: int) -> list[EffectSet]:

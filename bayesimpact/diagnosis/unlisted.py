@@ -9,12 +9,18 @@ may be what tells it from the force that it stands for; so an effect joins it on
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from bayesimpact.diagnosis.likely_terms import sets_with_a_term
 from bayesimpact.diagnosis.naming import State, is_large
+from bayesimpact.diagnosis.period_terms import sets_with_a_term_ahead
 from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.remaining import Remaining
 from bayesimpact.diagnosis.thresholds import EXCESS
 from bayesimpact.formula.law import is_formula
+
+Problem = Callable[[Candidate], list[Candidate]]
+"""Models that a problem posed about one asks for."""
 
 
 class Unlisted(Remaining):
@@ -56,6 +62,40 @@ class Unlisted(Remaining):
             found.append(self.fit_set(problem.fit, chosen, about.fit.log_likelihood))
             if excess > 1.0 and not is_large(found[-1].fit):
                 break
+        return found
+
+    def with_a_term_ahead(self, base: State, state: State) -> State:
+        """A model, or where its misfit is large the one that periods ahead of the base model lead
+        to with a term of the grammar, if that leaves `EXCESS` times less.
+        """
+        if not (self.asked.has_stop and is_large(state.candidate.fit)):
+            return state
+        found = self.asked_again(base.candidate, self.of_periods_with_a_term)
+        far_less = EXCESS * found.fit.reduced_chi2 < state.candidate.fit.reduced_chi2
+        return self.examine(found) if far_less else state
+
+    def asked_again(self, about: Candidate, problem: Problem) -> Candidate:
+        """The likeliest model that a problem asks for about one, then about that, and so on."""
+        best = about
+        while True:
+            found = problem(best)
+            better = max([best, *found], key=self.promise)
+            if better is best:
+                return best
+            best = better
+
+    def of_periods_with_a_term(self, about: Candidate) -> list[Candidate]:
+        """Models with a term of the grammar that periods ahead ask for about one; of one that has
+        a term those with more effects.
+        """
+        most = self.most - len(about.effects)
+        if any(map(is_formula, about.effects)):
+            problem = self.asked.ahead(about, about)
+            return self.fit_sets(problem.fit, problem.best(most))
+        problem = self.asked.ahead_with_terms(about)
+        found = list[Candidate]()
+        for sets in sets_with_a_term_ahead(problem, most):
+            found += self.fit_sets(problem.fit, sets)
         return found
 
     def leads_on(self, state: State, larger: Candidate) -> bool:
