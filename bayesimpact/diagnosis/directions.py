@@ -102,8 +102,8 @@ def sigma_of(fit: Fit) -> Array:
 def whitened(fit: Fit, values: Sequence[Array]) -> tuple[Array, ...]:
     """Changes (..., n_r) of what is seen per recording, whitened and in units of the noise."""
     recordings, noise = fit.target.oscillator.campaign.recordings, fit.target.likelihood.noise
-    rows = zip(values, fit.slopes, recordings, sigma_of(fit), strict=True)
-    return tuple(noise.whitened(r, v * slope) / s for v, slope, r, s in rows)
+    rows = zip(values, recordings, sigma_of(fit), strict=True)
+    return tuple(noise.whitened(r, v) / s for v, r, s in rows)
 
 
 def shape_points(effect: Effect, scales: Scales, finer: int = 1) -> list[dict[str, float]]:

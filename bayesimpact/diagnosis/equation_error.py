@@ -26,7 +26,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cholesky_banded, solve_banded
 
-from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.directions import (
     is_periodic,
     shape_points,
@@ -41,8 +40,7 @@ from bayesimpact.model.effects.effect import Effect, Scales
 from bayesimpact.model.oscillator import Oscillator
 from bayesimpact.model.parameters import INPUT_GAIN, SLOTS, instance_name
 from bayesimpact.model.path_forces import add_forces
-from bayesimpact.response.displacement import displacement
-from bayesimpact.response.measured_motion import smoothed
+from bayesimpact.response.measured_motion import from_rest, measured_motion
 from bayesimpact.response.weak_form import Rows, products, rows_of
 
 Array = NDArray[np.float64]
@@ -90,7 +88,7 @@ def measured_paths(fit: Fit, *, flight: bool = False) -> list[Path]:
     for r, q in zip(o.campaign.recordings, o.layout.slots(fit.mode), strict=True):
         period = 2 * np.pi * float(np.sqrt(o.campaign.mass / q[_K1]))
         level = noise.level * noise.scales[r.order]
-        y, v, reading = _motion(r, q[_OFFSET], period, level)
+        y, v, reading = measured_motion(from_rest(r, q[_OFFSET]), period, level)
         d = y - q[_GAP] if o.campaign.stop else np.full(y.size, -np.inf)
         rows = rows_of(r, o.campaign.mass, (FLIGHT_WIDTH if flight else WIDTH) * period)
         rows = _without_rests(rows, r.samples, level)
@@ -100,16 +98,6 @@ def measured_paths(fit: Fit, *, flight: bool = False) -> list[Path]:
         factor = _factor(rows, operator * level)
         found.append(Path(y, v, d, r.times, reading, rows, operator, factor))
     return found
-
-
-def _motion(r: Recording, offset: float, period: float, level: float) -> tuple[Array, Array, Array]:
-    """Displacement, velocity and what is read less its offset, smoothed, (n,) each."""
-    reading, rate = smoothed(r.samples - offset, r.interval, period, level)
-    if r.order == 0:
-        return reading, rate, reading
-    y = displacement(r.samples, r.interval, r.order).samples
-    v = reading if r.order == 1 else np.gradient(y, r.interval)
-    return y, v, reading
 
 
 def _without(rows: Rows, touched: NDArray[np.bool_]) -> Rows:

@@ -276,7 +276,7 @@ def whitened_one(fit: Fit, r: int, values: Array, sigma: Array) -> Array:
     """Filtered, whitened signals (k, n) of one recording in units of the noise."""
     oscillator, noise = fit.target.oscillator, fit.target.likelihood.noise
     recording = oscillator.campaign.recordings[r]
-    filtered = smooth(values, oscillator.smoothing, recording.interval) * fit.slopes[r]
+    filtered = smooth(values, oscillator.smoothing, recording.interval)
     white = noise.whitened(recording, filtered)
     return np.asarray(white / sigma[r])
 

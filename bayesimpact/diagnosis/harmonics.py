@@ -99,7 +99,7 @@ def white_line_blocks(fit: Fit, r: int, grid: Array, decay: float = 0.0) -> Bloc
     """The same at any frequencies, exact, where the noise of recording `r` is white."""
     part, sigma = fit.linearisation[r], float(sigma_of(fit)[r] * fit.target.likelihood.scales[r])
     recording = fit.target.oscillator.campaign.recordings[r]
-    seen = np.exp(-decay * recording.times) * fit.slopes[r] / sigma
+    seen = np.exp(-decay * recording.times) / sigma
     if recording.used is not None:
         seen = np.where(recording.used, seen, 0.0)
     white = np.vstack([part.residual, part.jacobian.T]) / sigma_of(fit)[r]

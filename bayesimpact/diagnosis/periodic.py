@@ -180,9 +180,7 @@ def _amplitudes(
 
 
 def _blocks(fit: Fit, r: int, grid: Array, above: Array, decay: float, scales: Scales) -> Blocks:
-    plain = fit.target.likelihood.noise.is_white and fit.target.oscillator.smoothing is None
-    # readings in coarse steps scatter most where they tell most: weighted sums would be too sure
-    if plain and np.ndim(fit.slopes[r]) == 0:
+    if fit.target.likelihood.noise.is_white and fit.target.oscillator.smoothing is None:
         return white_line_blocks(fit, r, grid, decay)
     waves = partial(hums, fit, r, decay=decay)
     slow = grid < NEAR_RESONANCE * scales.natural_frequency

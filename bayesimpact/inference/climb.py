@@ -86,9 +86,9 @@ class Climb:
         if self.steps is None and not self.frozen:
             sums = likelihood.misfit(theta)[0]
         else:
-            left = tuple(white[0] for white in likelihood.residuals(theta[None]))
             with np.errstate(over="ignore", invalid="ignore"):  # a motion that ran away: no point
-                sums = np.array([white @ white for white in left])
+                residuals, (sums,) = likelihood.residuals_and_sums(theta[None])
+            left = tuple(white[0] for white in residuals)
         if not np.isfinite(sums).all():
             return Point(theta, np.inf, sums, left)
         theta[self.noise] = best_sigma(self.target, sums)
@@ -201,6 +201,8 @@ class Climb:
         The geodesic acceleration of Transtrum and Sethna 2012, from one more simulation.
         """
         likelihood, part_way = self.target.likelihood, theta + BENT_AT * step
+        if any(likelihood.steps):  # what readings scatter by about a staircase is no curvature
+            return np.zeros(theta.size)
         ahead = []
         for part, white in zip(slope.parts, likelihood.residuals(part_way[None]), strict=True):
             straight = part.residual - BENT_AT * part.jacobian @ step[part.columns]

@@ -132,13 +132,6 @@ class Fit:
         return tuple(average(r, seen) for r, seen in enumerate(self.seen))
 
     @cached_property
-    def slopes(self) -> tuple[Array | float, ...]:
-        """Derivative of the average reading by what is seen, per recording (n,)."""
-        found = (self.target.likelihood.rounding(r, seen) for r, seen in enumerate(self.seen))
-        pairs = zip(found, self.seen, strict=True)
-        return tuple(1.0 if one is None else one.slope(seen) for one, seen in pairs)
-
-    @cached_property
     def readings(self) -> tuple[Array, ...]:
         """What was seen, counted from the reading at rest."""
         offsets = self.target.oscillator.layout.slots(self.mode)[:, _OFFSET]

@@ -87,14 +87,18 @@ def _blocks(likelihood: Likelihood, r: int, displacement: Array) -> Blocks:
 
 def _chunk(likelihood: Likelihood, theta: Array, blocks: tuple[Blocks, ...]) -> Array:
     found = []
-    residuals = likelihood.residuals(theta)
+    seen = likelihood.seen(theta)
     recordings = likelihood.oscillator.campaign.recordings
-    for r, (recording, white, b) in enumerate(zip(recordings, residuals, blocks, strict=True)):
+    for r, (recording, b) in enumerate(zip(recordings, blocks, strict=True)):
+        white = likelihood.residual(r, seen[r])
         signal, _ = likelihood.noise.in_time(
             white, recording.samples.size, recording.interval, recording.used
         )
         places = np.clip(b.first - b.shift, 0, signal.shape[1] - 1)
-        sums = np.add.reduceat(signal**2, places, axis=1)
+        squares = signal**2
+        if likelihood.steps[r] > 0.0 and likelihood.noise.smoothing is None:
+            squares = squares + likelihood.coarse_squares(r, seen[r])
+        sums = np.add.reduceat(squares, places, axis=1)
         sigma = theta[:, likelihood.sigma_columns[r], None]
         with np.errstate(divide="ignore", invalid="ignore"):
             value = b.log_volumes - b.sizes * (np.log(sigma) + 0.5 * np.log(2 * np.pi))

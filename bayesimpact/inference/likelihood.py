@@ -2,7 +2,8 @@
 
     log L = sum_r [ -n_r log sigma_r - S_r / (2 sigma_r^2) - (n_r / 2) log 2 pi + log volume_r ]
 
-with S_r the sum of squares of the whitened residual of recording r and n_r its size (see `noise`).
+with S_r the sum of squares of the whitened residual of recording r and n_r its size (see `noise`);
+of readings in coarse steps the quasi-likelihood of what they are on average (`model.rounding`).
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from bayesimpact.model.measurement import smooth
 from bayesimpact.model.nearby import readings_near
 from bayesimpact.model.oscillator import Oscillator
 from bayesimpact.model.parameters import BASE_SLOTS, SLOTS, Layout
-from bayesimpact.model.rounding import Rounding, coarse_step, likeliest_rounding
+from bayesimpact.model.rounding import Rounding, average_square, coarse_step, likeliest_rounding
 from bayesimpact.model.simulate import sums_of_squares
 
 Array = NDArray[np.float64]
@@ -135,17 +136,46 @@ class Likelihood:
         size = max(1, _CHUNK_SAMPLES // (o.counts.size * int(o.counts.max())))
         for first in range(0, theta.shape[0], size):
             part = slice(first, first + size)
-            for r, white in enumerate(self.residuals(theta[part])):
-                sums[part, r] = np.einsum("bn,bn->b", white, white)
+            sums[part] = self.residuals_and_sums(theta[part])[1]
         return np.where(np.isfinite(sums), sums, np.inf)
 
     def residuals(self, theta: Array) -> tuple[Array, ...]:
         """Whitened residual of every recording, (B, m), m, for parameter vectors (B, d)."""
-        pairs = zip(self.oscillator.campaign.recordings, self.seen(theta), strict=True)
-        return tuple(
-            self.whitened(r, one.samples - self.average(r, seen))
-            for r, (one, seen) in enumerate(pairs)
-        )
+        return tuple(self.residual(r, seen) for r, seen in enumerate(self.seen(theta)))
+
+    def residuals_and_sums(self, theta: Array) -> tuple[tuple[Array, ...], Array]:
+        """The same, and their sums of squares (B, R), of readings in coarse steps as their
+        quasi-likelihood has them; finite or not.
+        """
+        residuals = list[Array]()
+        sums = np.empty((theta.shape[0], self.oscillator.counts.size))
+        for r, seen in enumerate(self.seen(theta)):
+            white = self.residual(r, seen)
+            residuals.append(white)
+            sums[:, r] = np.einsum("bn,bn->b", white, white)
+            if self.steps[r] > 0.0:
+                sums[:, r] += self.coarse_squares(r, seen).sum(axis=1)
+        return tuple(residuals), sums
+
+    def residual(self, r: int, seen: Array) -> Array:
+        """Whitened residual (B, m) of recording `r` from what the probe would see (B, n)."""
+        samples = self.oscillator.campaign.recordings[r].samples
+        return self.whitened(r, samples - self.average(r, seen))
+
+    def coarse_squares(self, r: int, seen: Array) -> Array:
+        """By what squares of recording `r`, in coarse steps, about a model (B, n) exceed those of
+        its residuals, as the quasi-likelihood counts them (`rounding`), with a mean of 0 for the
+        noise level; 0 for samples set aside.
+        """
+        recording = self.oscillator.campaign.recordings[r]
+        level = self.noise.level * self.scales[r]
+        found = np.full(seen.shape, -average_square(self.steps[r], level))
+        for row, own in zip(seen, found, strict=True):
+            rounding = self.rounding(r, row)
+            if rounding is not None:
+                own += rounding.squares(row, recording.samples)
+                own -= (recording.samples - rounding.read(row)) ** 2
+        return found if recording.used is None else np.where(recording.used, found, 0.0)
 
     def average(self, r: int, seen: Array) -> Array:
         """What recording `r` reads on average of what the probe sees, (..., n); see `rounding`."""
@@ -208,10 +238,7 @@ class Likelihood:
     def _whitened(self, r: int, predicted: Array, jacobian: Array, columns: Index) -> Linearisation:
         """Linearisation from what the probe sees (n,) and derivatives (k, n)."""
         recording = self.oscillator.campaign.recordings[r]
-        if (rounding := self.rounding(r, predicted)) is not None:
-            jacobian = jacobian * rounding.slope(predicted)
-            predicted = rounding.read(predicted)
-        stacked = np.vstack([recording.samples - predicted, jacobian])
+        stacked = np.vstack([recording.samples - self.average(r, predicted), jacobian])
         white = self.whitened(r, stacked)
         return Linearisation(white[0], white[1:].T, columns)
 

@@ -24,7 +24,7 @@ from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.noise import Noise
 from bayesimpact.model.oscillator import Oscillator
 from bayesimpact.model.parameters import SLOTS
-from bayesimpact.response.measured_motion import lowest_points, smoothed
+from bayesimpact.response.measured_motion import from_rest, lowest_points, measured_motion
 
 Array = NDArray[np.float64]
 _K1, _OFFSET = SLOTS.index("k1"), SLOTS.index("offset")
@@ -57,7 +57,7 @@ class Starts:
 
 @dataclass(frozen=True, eq=False)
 class MultipleShooting(Likelihood):
-    """Likelihood of every period ahead. Of displacements only; filtered noise counts as white."""
+    """Likelihood of every period ahead; filtered noise counts as white."""
 
     starts: tuple[Starts, ...] = ()
 
@@ -92,11 +92,9 @@ class MultipleShooting(Likelihood):
 def multiple_shooting(likelihood: Likelihood, theta: Array) -> MultipleShooting | None:
     """The likelihood of periods ahead, with responses to its starts as `theta` (d,) has them.
 
-    None where recordings are no displacements, or no period is told from noise.
+    None where no period is told from noise.
     """
     o = likelihood.oscillator
-    if not o.reads_displacements:
-        return None
     noise = replace(likelihood.noise, smoothing=None)
     starts = tuple(_starts(o, noise, r, theta) for r in range(o.counts.size))
     return MultipleShooting(o, noise, starts) if any(s.blocks for s in starts) else None
@@ -106,9 +104,10 @@ def _starts(o: Oscillator, noise: Noise, r: int, theta: Array) -> Starts:
     recording, q = o.campaign.recordings[r], o.layout.slots(theta)[r]
     period = 2 * np.pi * float(np.sqrt(o.campaign.mass / q[_K1]))
     gain = theta[o.gains[r]] if o.gains[r] >= 0 else 1.0
-    y = (recording.samples - q[_OFFSET]) / gain
-    y, v = smoothed(y, recording.interval, period, noise.level / abs(gain))
-    at = lowest_points(y, recording.interval, period, noise.level / abs(gain))
+    level = noise.level * noise.scales[recording.order] / abs(gain)
+    y, v, _ = measured_motion(from_rest(recording, q[_OFFSET], gain), period, level)
+    as_displacement = level * (period / (2 * np.pi)) ** recording.order
+    at = lowest_points(y, recording.interval, period, as_displacement)
     if recording.used is not None:
         at = at[recording.used[at]]
     restarts = np.column_stack([at, y[at], v[at]])

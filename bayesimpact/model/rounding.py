@@ -9,6 +9,15 @@ harmonic damped by the noise),
 Where a motion passes many steps within a few samples the sum is as good as noise, of variance
 q^2 / 12 with the scatter about it. Where it does not, in the tail of a decay, it repeats from cycle
 to cycle: lines at multiples of the motion's frequency, which passed for a hum.
+
+Readings scatter most, and change most with x, beside the edges of the steps. Least squares about
+the average take what those tell for twice of what it is. The quasi-likelihood of readings R with
+that average,
+
+    sum (R - average(x)) dx,
+
+weighs all samples alike (Wedderburn 1974, Biometrika 61:439, Eq. 3): its estimates scatter as
+least squares about the smooth motion do, with the residuals' own variance.
 """
 
 from __future__ import annotations
@@ -18,6 +27,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from bayesimpact.data.faults.flat import reading_step
 from bayesimpact.data.recording import Recording
@@ -43,9 +53,11 @@ class Rounding:
         """What is read on average of values of any shape."""
         return np.asarray(self._of(values)[0])
 
-    def slope(self, values: Array) -> Array:
-        """Its derivative by the values."""
-        return np.asarray(self._of(values)[1])
+    def squares(self, values: Array, readings: Array) -> Array:
+        """Minus twice the quasi-likelihood of readings (n,), up to what they alone decide: on
+        average their squared distance from the values.
+        """
+        return np.asarray((readings - values) ** 2 + self._of(values)[1])
 
     def _of(self, values: Array) -> Array:
         found = _average(np.ravel(values), self.step, self.noise)
@@ -87,6 +99,22 @@ def scatter(recording: Recording, level: float) -> float:
     return min(step * math.sqrt(_variance(noise) - _average_variance(noise)), level)
 
 
+def average_square(step: float, level: float) -> float:
+    """Mean square of what the average adds to a motion over many steps, where readings scatter by
+    `level` about it.
+    """
+
+    def excess(noise: float) -> float:
+        return _variance(noise) - _average_variance(noise) - (level / step) ** 2
+
+    ends = (LEAST, MOST)
+    if excess(ends[0]) >= 0.0 or excess(ends[1]) <= 0.0:
+        noise = ends[0] if excess(ends[0]) >= 0.0 else ends[1]
+    else:
+        noise = float(brentq(excess, *ends))
+    return step**2 * _average_variance(noise)
+
+
 def _variance(noise: float) -> float:
     """Of readings about the motion, for noise ahead of rounding in steps, in squared steps."""
     return noise**2 + 1.0 / 12.0
@@ -111,17 +139,17 @@ def _step(recording: Recording) -> float:
 
 @compiled()
 def _average(x, step, noise):  # type: ignore[no-untyped-def]
-    """Values (n,) as they are read on average, and the derivative, (2, n)."""
+    """Values (n,) as they are read on average, and the integral of twice what that adds, (2, n)."""
     found = np.empty((2, x.size))
     damped = np.empty(TERMS)
     for k in range(1, TERMS + 1):
         damped[k - 1] = (-1.0) ** k * math.exp(-2.0 * (math.pi * k * noise / step) ** 2)
     for i in range(x.size):
         angle = 2.0 * math.pi * (x[i] / step - math.floor(x[i] / step))
-        read, slope = 0.0, 0.0
+        added, integral = 0.0, 0.0
         for k in range(1, TERMS + 1):
-            read += damped[k - 1] * math.sin(k * angle) / (math.pi * k)
-            slope += 2.0 * damped[k - 1] * math.cos(k * angle)
-        found[0, i] = x[i] + step * read
-        found[1, i] = 1.0 + slope
+            added += damped[k - 1] * math.sin(k * angle) / (math.pi * k)
+            integral -= damped[k - 1] * math.cos(k * angle) / (math.pi * k) ** 2
+        found[0, i] = x[i] + step * added
+        found[1, i] = step * step * integral
     return found

@@ -1,10 +1,15 @@
-"""Displacement and velocity from the readings of a displacement alone, by local polynomials."""
+"""Displacement and velocity as a recording shows them, by local polynomials and integrals."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import find_peaks, savgol_filter
+
+from bayesimpact.data.recording import Recording
+from bayesimpact.response.displacement import displacement_of
 
 Array = NDArray[np.float64]
 
@@ -12,6 +17,25 @@ STEADY = 3e-3  # of the largest speed: noise that is left in a measured velocity
 WIDEST = 1 / 24  # of a natural period: half width of the polynomials that smooth the motion
 APART = 0.6  # natural periods from one lowest point to the next, at least
 STANDING_OUT = 6.0  # noise levels by which one lies below the motion beside it
+
+
+def measured_motion(
+    recording: Recording, period: float, noise: float
+) -> tuple[Array, Array, Array]:
+    """Displacement, velocity and what is read, smoothed, (n,) each, of readings from rest; `noise`
+    is theirs.
+    """
+    reading, rate = smoothed(recording.samples, recording.interval, period, noise)
+    if recording.order == 0:
+        return reading, rate, reading
+    y = displacement_of(recording).samples
+    v = reading if recording.order == 1 else np.gradient(y, recording.interval)
+    return y, v, reading
+
+
+def from_rest(recording: Recording, offset: float, gain: float = 1.0) -> Recording:
+    """A recording whose readings are counted from rest, and not enlarged by a gain."""
+    return replace(recording, samples=(recording.samples - offset) / gain)
 
 
 def smoothed(samples: Array, interval: float, period: float, noise: float) -> tuple[Array, Array]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import small_rig
 from effect_rigs import BY_ID
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.diagnosis import period_sets
 from bayesimpact.diagnosis.directions import shape_points
 from bayesimpact.diagnosis.extend import campaign_scales, extend
 from bayesimpact.diagnosis.name import name
@@ -19,6 +21,7 @@ from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.multiple_shooting import multiple_shooting
 from bayesimpact.model.effects import SEARCHED
+from bayesimpact.trial.rig_chain import Chain
 
 MASS = {"obstacle_mass": {"mass": 0.01}, "quadratic_drag": {"coefficient": 1.5}}
 
@@ -97,9 +100,21 @@ def test_about_a_model_its_own_effects_stay(heavy: Fit) -> None:
     assert max(problem.gains(), key=lambda i: problem.gains()[i]) == "obstacle_mass"
 
 
-def test_there_are_no_sets_of_velocities() -> None:
-    fit = fitted(small_rig.record(1, MASS, duration=2.0, quantity="velocity"))
-    problem = PeriodSets(fit, SEARCHED, campaign_scales(fit))
+@pytest.mark.parametrize("quantity, noise", [("velocity", 3e-4), ("acceleration", 2e-2)])
+def test_other_quantities_ask_for_the_same(quantity: Any, noise: float) -> None:
+    chain = Chain(noise=noise, offsets={})
+    fit = fitted(small_rig.record(1, MASS, duration=4.0, chain=chain, quantity=quantity))
+    assert fit.reduced_chi2 > 10
+    scales = campaign_scales(fit)
+    found = PeriodSets(fit, SEARCHED, scales).best(3)
+    assert {e.id for e in found[1].effects} == set(MASS)
+    reached = fit_from(fit, found[1].effects, found[1].values, scales)
+    assert reached.fit.reduced_chi2 < 1.2
+
+
+def test_there_are_no_sets_without_periods(heavy: Fit, monkeypatch: Any) -> None:
+    monkeypatch.setattr(period_sets, "multiple_shooting", lambda likelihood, theta: None)
+    problem = PeriodSets(heavy, SEARCHED, campaign_scales(heavy))
     assert problem.best(3) == [] and problem.gains() == {}
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.multiple_shooting import MultipleShooting, multiple_shooting
 from bayesimpact.inference.noise import Noise
 from bayesimpact.model.oscillator import build_oscillator
+from bayesimpact.trial.rig_chain import Chain
 
 TRUE = small_rig.true_values()
 
@@ -115,12 +117,33 @@ def test_it_stays_in_step_where_the_whole_motion_does_not() -> None:
     assert abs(found[1] - change) > 0.5 * abs(change)
 
 
-def test_there_is_none_without_displacements_or_periods() -> None:
-    campaign = small_rig.record(1, quantity="velocity")
-    whole = likelihood_of(campaign)
-    values = {**TRUE}
-    theta = np.array([values.get(n, 0.0) for n in whole.oscillator.layout.names])
-    assert multiple_shooting(whole, theta) is None
+@pytest.mark.parametrize(
+    "quantity, noise, most", [("velocity", 3e-4, 1.0), ("acceleration", 2e-2, 2.0)]
+)
+def test_another_quantity_begins_anew_where_its_integral_says(
+    quantity: Any, noise: float, most: float
+) -> None:
+    """About the truth noise is left, about a wrong stiffness much more. An acceleration jumps at
+    the impact, by more than noise in the sample that a start's small error moves across it.
+    """
+    sums, sizes = np.zeros(2), 0.0
+    for seed in range(4):
+        chain = Chain(noise=noise, offsets={})
+        campaign = small_rig.record(seed, chain=chain, quantity=quantity)
+        whole = Likelihood(build_oscillator(campaign), Noise(level=noise))
+        names = whole.oscillator.layout.names
+        theta = np.array([{**TRUE, "sigma": noise}.get(n, 0.0) for n in names])
+        theta[[i for i, n in enumerate(names) if n.startswith("offset")]] = 0.0
+        wrong = theta.copy()
+        wrong[names.index("k2[1]")] *= 1.1
+        sums += [ahead_of(whole, at).misfit(at).sum() / noise**2 for at in (theta, wrong)]
+        sizes += ahead_of(whole, theta).sizes.sum()
+    error = 6 * np.sqrt(2 * sizes)
+    assert sizes - error < sums[0] < most * sizes + error
+    assert sums[1] > 2 * sums[0]
+
+
+def test_there_is_none_without_periods() -> None:
     short = small_rig.record(1).truncated(0.1)
     whole = likelihood_of(short)
     assert multiple_shooting(whole, small_rig.vector(whole.oscillator.layout, TRUE)) is None

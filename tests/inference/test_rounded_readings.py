@@ -8,8 +8,8 @@ import small_rig
 from effect_rigs import BY_ID
 
 from bayesimpact.data.campaign import Campaign
-from bayesimpact.diagnosis import periodic
 from bayesimpact.diagnosis.extend import campaign_scales
+from bayesimpact.diagnosis.force import missing_force
 from bayesimpact.diagnosis.parametric_bootstrap import simulated
 from bayesimpact.diagnosis.refit import fit_from
 from bayesimpact.diagnosis.scan import scan
@@ -66,16 +66,14 @@ def test_the_lines_that_steps_make_of_a_steady_motion_are_no_hum(monkeypatch):
 
 
 def test_derivatives_go_through_the_steps():
-    """The slope of the sums of squares, two standard deviations from the mode; the noise ahead of
-    the steps, at its best everywhere, adds nothing to it.
-    """
+    """The slope of what a climb lowers, two standard deviations from the mode."""
     fit = fitted(decays(4))
     own, sign = fit.target.likelihood, np.resize([2.0, -2.0, 2.0], fit.mode.size)
     theta = fit.mode + sign * fit.sd * (fit.sd < 0.5 * np.abs(fit.mode).clip(1e-9))
     assert isinstance(own.rounding(0, fit.seen[0]), Rounding)
 
     def square(at: np.ndarray) -> float:
-        return sum(float(white[0] @ white[0]) for white in own.residuals(at[None]))
+        return float(own.misfit(at).sum())
 
     for name in ("k1", "c1", "y0[a]", "v0[b]", "offset[a]"):
         i = fit.names.index(name)
@@ -99,15 +97,28 @@ def test_a_simulated_campaign_comes_in_the_same_steps():
         assert np.std(error) == pytest.approx(np.sqrt(1 / 12 + DITHER**2), rel=0.08)
 
 
-def test_sums_that_weigh_by_what_readings_tell_are_not_taken_for_steps(monkeypatch):
-    """Where they tell most they scatter most: of an encoder, every sample counts alike."""
-    fit = fitted(decays(1))
-    scales = campaign_scales(fit)
-    assert np.ndim(fit.slopes[0]) == 1
+def encoder(seed: int) -> Campaign:
+    """Impacts that pass many steps within a few samples, with a tenth of a step of noise."""
+    chain = Chain(noise=1.2e-6, offsets=small_rig.OFFSETS, rounding=1e-5)
+    return small_rig.record(seed, chain=chain)
 
-    def refused(*_):
-        raise AssertionError("weighted sums")
 
-    monkeypatch.setattr(periodic, "white_line_blocks", refused)
-    (score,) = periodic.periodic_scores(fit, [BY_ID["sensor_hum"]], scales)
-    assert score.p_value > 1e-3
+@pytest.mark.slow
+def test_intervals_of_coarse_readings_hold_the_truth_as_often_as_they_say():
+    """Least squares about the average took the readings for twice as telling as they are: squares
+    of errors in standard deviations, 1 on average, were 2, and every second control was doubted.
+    """
+    names, seeds = ("k1", "g", "k2[1]", "k2[2]", "c2", "y0[a]", "y0[b]"), range(30)
+    squares, doubted = [], 0
+    for seed in seeds:
+        fit = fitted(encoder(seed))
+        truth = small_rig.true_values()
+        squares.append(
+            [((fit.value(n) - truth[n]) / fit.sd[fit.names.index(n)]) ** 2 for n in names]
+        )
+        scales = campaign_scales(fit)
+        force = missing_force(fit, scales, rng=np.random.default_rng(seed))
+        doubted += force.p_value < 0.02
+    mean, error = np.mean(squares), np.std(np.mean(squares, axis=1)) / np.sqrt(len(seeds))
+    assert mean == pytest.approx(1.0, abs=3.5 * error + 0.05)
+    assert doubted <= 4  # of 30 at 0.02: five and more have a chance of 0.0003
