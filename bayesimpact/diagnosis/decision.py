@@ -160,12 +160,14 @@ def is_compared(naming: Naming, group: Group) -> bool:
     """Whether a search that ended by its limit has still fitted what an effect must beat.
 
     With a residual force: the chosen model, the base model, the one without the effect, and the
-    likeliest with another, not of its group, in its place.
+    likeliest with another, not of its group, in its place; where none was tried, it was not.
     """
     chosen = frozenset(naming.chosen.candidate.ids)
     other = in_its_place(naming, group)
-    rivals = {chosen, frozenset[str](), chosen - {group[0].id}}
-    return rivals | ({frozenset(other.ids)} if other else set()) <= naming.residual.keys()
+    if other is None:
+        return False
+    rivals = {chosen, frozenset[str](), chosen - {group[0].id}, frozenset(other.ids)}
+    return rivals <= naming.residual.keys()
 
 
 def lead(naming: Naming, ids: frozenset[str], effect: Effect) -> float:

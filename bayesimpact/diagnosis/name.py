@@ -97,7 +97,7 @@ def name(
         begun.add(key)
         beam = [state]
     state = search.at_its_mode(state)
-    noise = _remaining_noise(state)
+    noise = _remaining_noise(state) if search.may_go_on() else None
     if noise is None:
         return search.naming(base, state)
     search.progress("what remains is slow noise: once more under that")

@@ -89,19 +89,19 @@ def test_a_residual_force_that_cannot_be_the_effect_is_another_explanation(
 
 
 def test_a_search_that_ended_by_its_limit_needs_only_what_it_has_compared():
-    """The effect with a residual force beside, and such a force in its place."""
+    """The effect and another one in its place, both with a residual force beside, and such a force
+    in its place; where nothing else was tried in its place, it was compared with nothing.
+    """
     found = remaining(something_left(), 100.0, 10.0, beside=110.0, instead=100.0)
-    ended = replace(found, finished=False)
-    assert judge(found) == judge(ended) == "partly"
-    for missing in found.residual:
-        some = {key: model for key, model in found.residual.items() if key != missing}
-        assert judge(replace(ended, residual=some)) == "unknown"
+    assert judge(found) == "partly" and judge(replace(found, finished=False)) == "unknown"
     other = candidate(DRAG, 50.0)
     ended = remaining(something_left(), 100.0, 10.0, other, beside=110.0, instead=100.0)
-    ended = replace(ended, finished=False)
-    assert judge(ended) == "unknown"
     fitted = {frozenset([DRAG]): beside_force(other, 50.0)}
-    assert judge(replace(ended, residual={**ended.residual, **fitted})) == "partly"
+    ended = replace(ended, finished=False, residual={**ended.residual, **fitted})
+    assert judge(ended) == "partly"
+    for missing in ended.residual:
+        some = {key: model for key, model in ended.residual.items() if key != missing}
+        assert judge(replace(ended, residual=some)) == "unknown"
 
 
 def test_an_effect_whose_place_another_can_take_beside_a_residual_force_is_not_needed():
