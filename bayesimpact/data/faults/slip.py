@@ -27,6 +27,7 @@ BENDS = 3.0  # samples: how far a corner of the motion within a few samples may 
 MOST = 3  # slips: more jumps than this are the signal
 WIDEST = 5  # samples of a spike
 CHANCE = 3.0  # standard deviations
+TURNING = 0.3  # rad of a cycle about the largest accelerations, where the mass turns: set by hand
 REPEATED = 3  # samples of a block written twice, at least
 LONGEST = 200  # samples of such a block
 COARSE = 0.02  # of neighbours equal: from here on equal blocks are the step's
@@ -40,12 +41,14 @@ def find_slips(recording: Recording) -> list[Fault]:
     slope times a few samples; besides, three times the 99th percentile over the recording has to be
     passed, which is what corners of the motion reach, and what rounding may do to both. A slip is
     of whole samples: its sides are apart by half a sample's way of the motion or more, while an
-    impact, or a stop that chatters, bends the motion by less. Where both sides do meet once a few
-    samples beside the place are left out, those were a spike. The remedy
-    keeps the longest part without a slip: how many samples are missing need then not be known.
+    impact, or a stop that chatters, bends the motion by less. An acceleration jumps by itself where
+    the mass turns, and friction with it. Where both sides do meet once a few samples beside the
+    place are left out, those were a spike. The remedy keeps the longest part without a slip: how
+    many samples are missing need then not be known.
     """
     x = recording.samples
-    form = best_form(x, crossing_period(x, 1.0))
+    period = crossing_period(x, 1.0)
+    form = best_form(x, period)
     sides = predict_sides(x, form, 0, -0.5)
     jump = np.abs(sides.after - sides.before)
     jump = np.where(np.isfinite(jump), jump, 0.0)
@@ -62,6 +65,9 @@ def find_slips(recording: Recording) -> list[Fault]:
     least_jump = max(least * level, BEYOND * usual, rounded)
     way = 0.5 * np.abs(sides.slope_after + sides.slope_before)
     strong = jump > np.maximum(least_jump, np.nan_to_num(np.maximum(BENDS * bend, WHOLE * way)))
+    if recording.order == 2 and period is not None:  # friction turns round with the mass
+        size = np.abs(x - np.mean(x)) * 2.0 * np.pi / period
+        strong &= ~(way < TURNING * size)
     places = [
         p
         for p in _peaks(jump, strong, form[1])

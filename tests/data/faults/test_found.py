@@ -377,3 +377,16 @@ def test_a_swing_to_the_other_side_is_no_hand() -> None:
     fault = recording_faults(Recording("p", "", samples, 0.01, quantity="angle"))[0]
     assert fault.id == "recording_start" and "at rest" in fault.statement
     assert fault.end_s == pytest.approx(1.0, abs=0.12)
+
+
+@pytest.mark.parametrize("turns, found", [(0.0, False), (0.25, True)])
+def test_an_acceleration_that_friction_makes_jump_has_lost_no_samples(turns, found) -> None:
+    """It jumps where the mass turns; where that moves fast, samples are lost."""
+    t = np.arange(4000) * 1e-3 - 0.5 + turns / 7.0
+    jumps = np.where(t < turns / 7.0, 1.08, 1.0) * np.cos(2 * np.pi * 7.0 * t)
+    jumps += np.where(t < turns / 7.0, 0.1, 0.0)
+    noise = 2e-3 * np.random.default_rng(1).standard_normal(t.size)
+    recording = Recording("a", "", jumps + noise, 1e-3)
+    assert [f.id for f in find_slips(recording)] == ["recording_slip"]
+    acceleration = replace(recording, quantity="acceleration")
+    assert bool(find_slips(acceleration)) is found
