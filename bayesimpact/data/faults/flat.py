@@ -9,6 +9,7 @@ import numpy as np
 from bayesimpact.data.faults.fault import Array
 from bayesimpact.data.gaps import runs
 
+SINGLE = 5.0  # percentile of the distances of readings that is one step: set by hand
 NEIGHBOURS = 4  # samples on either side of a run from which its slope there is taken
 
 
@@ -91,13 +92,16 @@ def _jump_at_end(samples: Array) -> float:
 def reading_step(samples: Array) -> float:
     """The step that the readings are multiples of: the usual smallest distance of two readings.
 
-    The median of the distances between neighbours among the values that occur, less what rounding
-    in the file adds; 0 for readings that are all different.
+    The median of the distances of one step between neighbours among the values that occur, less
+    what rounding in the file adds: of a large motion most are several steps apart. 0 for readings
+    that are all different.
     """
     values = np.unique(samples)
     if values.size < 3 or values.size > 0.5 * samples.size:
         return 0.0
-    return float(np.median(np.diff(values)))
+    apart = np.diff(values)
+    apart = apart[apart > 1e-9 * float(values[-1] - values[0])]
+    return float(np.median(apart[apart < 1.5 * np.percentile(apart, SINGLE)]))
 
 
 def last_digit(samples: Array) -> float:
