@@ -41,8 +41,8 @@ def test_friction_that_holds_an_encoder_is_no_fault() -> None:
 def test_the_step_is_found_where_most_readings_are_several_apart() -> None:
     """A large motion passes 1,800 steps in few samples; half of it was taken for two steps."""
     t = np.arange(4658) * 1e-2
-    swing = 0.9 * np.exp(-0.12 * t) * np.cos(2 * np.pi * 1.1 * t)
+    swing = 0.9 * np.exp(-0.03 * t) * np.cos(2 * np.pi * 1.1 * t)
     counts = np.round(swing / 5.33e-4 + 0.2 * np.random.default_rng(0).standard_normal(t.size))
     apart = np.diff(np.unique(counts))
-    assert np.median(apart) == 2.0
+    assert np.median(apart) >= 2.0
     assert reading_step(np.round(counts * 5.33e-4, 7)) == pytest.approx(5.33e-4)
