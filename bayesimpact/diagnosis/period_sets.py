@@ -42,8 +42,8 @@ INVISIBLE = 1e-6  # of the noise, at that step: rounding of the simulation, not 
 class PeriodSets(TermSets):
     """Sets of effects beside those of a fit, each by what periods ahead leave.
 
-    There are no terms, and so no sets, where recordings tell no period.
-    Terms of the `grammar` may stand beside sets, see `best_with_a_term`.
+    There are no terms, and so no sets, where recordings tell no period. Terms of the `grammar` are
+    in none of them, but may stand beside one (`period_terms`).
     """
 
     def __init__(
@@ -61,15 +61,15 @@ class PeriodSets(TermSets):
         columns = [np.zeros((p.residual.size, fit.mode.size)) for p in parts]
         for whole, part in zip(columns, parts, strict=True):
             whole[:, part.columns] = part.jacobian
-        levels = ahead.noise.level * ahead.scales
+        level = ahead.noise.level
         super().__init__(
             [
                 *_terms(fit, ahead, effects, scales),
                 *(replace(t, on_grid=False) for t in _terms(fit, ahead, grammar, scales)),
             ],
             [o.layout.names[i] for i in moving],
-            np.concatenate([c[:, moving] / x for c, x in zip(columns, levels, strict=True)]),
-            np.concatenate([p.residual / x for p, x in zip(parts, levels, strict=True)]),
+            np.concatenate(columns)[:, moving] / level,
+            np.concatenate([p.residual for p in parts]) / level,
             int(ahead.sizes.sum()),
             cost,
         )
@@ -110,7 +110,7 @@ def _terms(
     none of a periodic one, whose frequency has no grid.
     """
     acting = fit.target.oscillator.acting
-    missed, levels = ahead.residuals(fit.mode[None]), ahead.noise.level * ahead.scales
+    missed = ahead.residuals(fit.mode[None])
     found = []
     for effect in effects:
         lacking = effect.id not in {e.id for e in acting}
@@ -124,8 +124,8 @@ def _terms(
             points, steps = size_steps(target, effect, theta, scales)
             left = replace(ahead, oscillator=target.oscillator).residuals(points)
             changes = [
-                np.column_stack([before[0] - rest[0], (rest[0] - rest[1:]).T]) / level
-                for before, rest, level in zip(missed, left, levels, strict=True)
+                np.column_stack([before[0] - rest[0], (rest[0] - rest[1:]).T]) / ahead.noise.level
+                for before, rest in zip(missed, left, strict=True)
             ]
             sizes = size_parameters(target, effect)
             found += _seen(effect, shapes, sizes, changes, np.array([1.0, *steps]))

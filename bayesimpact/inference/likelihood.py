@@ -164,8 +164,8 @@ class Likelihood:
 
     def coarse_squares(self, r: int, seen: Array) -> Array:
         """By what squares of recording `r`, in coarse steps, about a model (B, n) exceed those of
-        its residuals, as the quasi-likelihood counts them (`rounding`), with a mean of 0 for the
-        noise level; 0 for samples set aside.
+        its whitened residuals, as the quasi-likelihood counts them (`rounding`), with a mean of 0
+        for the noise level; 0 for samples set aside.
         """
         recording = self.oscillator.campaign.recordings[r]
         level = self.noise.level * self.scales[r]
@@ -175,6 +175,10 @@ class Likelihood:
             if rounding is not None:
                 own += rounding.squares(row, recording.samples)
                 own -= (recording.samples - rounding.read(row)) ** 2
+        weight = self.scales[r]
+        if self.noise.grows:
+            weight = weight * self.noise.relative_sd(recording)
+        found /= weight**2
         return found if recording.used is None else np.where(recording.used, found, 0.0)
 
     def average(self, r: int, seen: Array) -> Array:

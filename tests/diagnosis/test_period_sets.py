@@ -112,6 +112,23 @@ def test_other_quantities_ask_for_the_same(quantity: Any, noise: float) -> None:
     assert reached.fit.reduced_chi2 < 1.2
 
 
+def test_recordings_of_two_quantities_weigh_by_their_own_noise() -> None:
+    chains = {
+        "displacement": Chain(noise=5e-6, offsets={}),
+        "velocity": Chain(noise=6e-4, offsets={}),
+    }
+    kinds: Any = list(chains)
+    a, b = (small_rig.record(1, MASS, chain=chains[q], quantity=q) for q in kinds)
+    fit = fitted(replace(a, recordings=(*a.recordings[:2], b.recordings[2])))
+    likelihood = fit.target.likelihood
+    assert likelihood.scales[2] == pytest.approx(120.0, rel=0.3)
+    ahead = multiple_shooting(likelihood, fit.mode)
+    assert ahead is not None
+    problem = PeriodSets(fit, [BY_ID["quadratic_drag"]], campaign_scales(fit))
+    whole = ahead.misfit(fit.mode).sum() / likelihood.noise.level**2
+    assert problem.whole == pytest.approx(whole, rel=1e-9)
+
+
 def test_there_are_no_sets_without_periods(heavy: Fit, monkeypatch: Any) -> None:
     monkeypatch.setattr(period_sets, "multiple_shooting", lambda likelihood, theta: None)
     problem = PeriodSets(heavy, SEARCHED, campaign_scales(heavy))
