@@ -21,6 +21,7 @@ from bayesimpact.inference.arviz_groups import arviz_groups, as_arviz, laplace_d
 from bayesimpact.inference.declared import climbed, is_same_mode, search_declared
 from bayesimpact.inference.defaults import default_priors
 from bayesimpact.inference.fit import Fit, Target
+from bayesimpact.inference.from_periods import or_by_periods
 from bayesimpact.inference.horizon import best_climb
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
@@ -55,7 +56,7 @@ class Identification:
 
     Attributes
     ----------
-    fit : the better of the two ends
+    fit : the better of the two ends, or where both miss by far the one that periods ahead lead to
     estimates : initial estimates from the recordings, the guess
     noise : estimated from the recordings alone
     search : the global search, or None when it was left out
@@ -137,6 +138,7 @@ def identify(
         ends = [find_mode(target, fit.mode) for fit in ends]
         from_guess, from_search = ends[0], ends[1] if search else None
         best = max(ends, key=lambda fit: fit.log_posterior)
+    best = or_by_periods(best)
     refined = noise if given else refined_noise(best)
     if refined is not noise:
         noise = refined
@@ -162,8 +164,8 @@ def _with_declared(
         oscillator = replace(oscillator, campaign=smooth)
         target = replace(best.target, likelihood=Likelihood(oscillator, noise))
         best, other = climbed(target, best), climbed(target, other)
+    fit = best = or_by_periods(best)
     refined = noise if given else refined_noise(best)
-    fit = best
     if refined is not noise:
         fit = climbed(replace(best.target, likelihood=Likelihood(oscillator, refined)), best)
     return Identification(fit, estimates, refined, result, other, best)
