@@ -84,7 +84,8 @@ def slow_noise(fit: Fit) -> SlowNoise | None:
         rough = min(starts, key=cost)
         simplex = np.vstack([rough, rough + np.eye(rough.size)])
         options = {"fatol": TOLERANCE, "xatol": TOLERANCE, "initial_simplex": simplex}
-        best = minimize(cost, rough, method="Nelder-Mead", options=options).x
+        with np.errstate(invalid="ignore"):  # shapes of no noise cost infinity
+            best = minimize(cost, rough, method="Nelder-Mead", options=options).x
         return _Whole(fit, linear, shape(best))
 
     starts = [np.append(np.arctanh(rho), np.zeros(len(rho))) for rho in STARTS]

@@ -27,6 +27,7 @@ class Branch:
     sizes = np.array([40.0])
     log_volume = np.array([0.0])
     sigma_columns = np.array([3])
+    steps = (0.0,)
 
     def __init__(self) -> None:
         roles = ("physical", "effect", "effect", "noise")
@@ -49,6 +50,9 @@ class Branch:
         slow = k * t**3 - STIFFNESS * TIME**3
         rest = np.tile(1e-3 * np.sin(np.arange(37.0)), (c.size, 1))
         return (np.column_stack([3e2 * dashpot, 1e1 * inertia, 3e2 * slow, rest]),)
+
+    def residuals_and_sums(self, theta: np.ndarray) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
+        return self.residuals(theta), self.misfit(theta)
 
     def misfit(self, theta: np.ndarray) -> np.ndarray:
         return np.sum(self.residuals(np.atleast_2d(theta))[0] ** 2, axis=1)[:, None]
