@@ -43,10 +43,12 @@ def sets_with_a_term_ahead(problem: PeriodSets, most: int) -> list[list[EffectSe
     of different kinds; the first is likelier than all smaller ones.
     """
     terms = [t for t, term in enumerate(problem.terms) if is_formula(term.effect)]
-    none = problem.log_odds(()) if terms else 0.0
+    if not terms or most < 1:
+        return []
+    none = problem.log_odds(())
     found, reached = list[list[EffectSet]](), none
-    levels: list[list[Chosen]] = [[()], *problem.levels(most - 1)] if most > 0 else []
-    for level in levels if terms else ():
+    levels: list[list[Chosen]] = [[()], *problem.levels(most - 1)]
+    for level in levels:
         likely = [problem.refined(chosen) for chosen in level[:LIKELY]]
         odds = {(*s, t): problem.log_odds((*s, t)) for s in likely for t in terms}
         kinds: dict[str, Chosen] = {}

@@ -110,7 +110,7 @@ class Table:
 
         return SimpleNamespace(
             has_stop=bool(self.asked_in_flight), about=about, first=first,
-            ahead=ahead,
+            ahead=ahead, ahead_with_terms=lambda model: SimpleNamespace(fit=base, terms=()),
         )  # fmt: skip
 
     def without(self, candidate, effect, scales, *, enough) -> Candidate:

@@ -44,6 +44,7 @@ class Linear:
     x: np.ndarray
     y: np.ndarray
     log_volume = np.array([0.0])
+    steps = (0.0,)
 
     def __post_init__(self) -> None:
         self.sizes = np.array([float(self.y.size)])
@@ -61,6 +62,9 @@ class Linear:
 
     def residuals(self, theta: np.ndarray) -> tuple[np.ndarray, ...]:
         return (self.y - theta[:, :-1] @ self.x.T,)
+
+    def residuals_and_sums(self, theta: np.ndarray) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
+        return self.residuals(theta), self.misfit(theta)
 
     def misfit(self, theta: np.ndarray) -> np.ndarray:
         return np.sum(self.residuals(np.atleast_2d(theta))[0] ** 2, axis=1)[:, None]

@@ -46,6 +46,7 @@ def run(monkeypatch):
         monkeypatch.setattr(remaining, "may_be_needed", lambda naming, effect: True)
         monkeypatch.setattr(remaining, "is_imitated", lambda naming: False)
         monkeypatch.setattr(search, "promising_pairs", lambda scan, count: ())
+        monkeypatch.setattr(search, "remaining_noise", lambda fit: None)
         for force in ("missing_force", "missing_drift"):
             monkeypatch.setattr(models, force, table.missing)
         monkeypatch.setattr(
