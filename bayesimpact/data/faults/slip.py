@@ -85,11 +85,20 @@ def _written_twice(x: Array) -> list[int]:
     if share > COARSE:
         return []
     chance = np.log(FALSE_ALARM / (x.size * LONGEST))
-    least = max(REPEATED, int(np.ceil(chance / np.log(share + 1 / x.size))))
+
+    def least(equal: float) -> float:
+        """Samples that repeat by no chance where so many neighbours are equal."""
+        return float(chance / np.log(min(equal + 1 / x.size, 1.0 - 1e-9)))
+
     places = []
     for lag in range(2, min(LONGEST, x.size // 4)):
         for first, end in runs(x[lag:] == x[:-lag]):
-            if end - first >= max(least, lag) and np.unique(x[first:end]).size > 1:
+            if end - first < max(least(share), REPEATED, lag) or np.unique(x[first:end]).size < 2:
+                continue
+            here = float(
+                np.mean(np.diff(x[first : end + lag]) == 0.0)
+            )  # a mass at rest repeats too
+            if end - first >= least(max(share, here)):
                 places.append(first + lag)
     return places
 

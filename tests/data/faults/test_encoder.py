@@ -7,6 +7,7 @@ import pytest
 
 from bayesimpact.data.faults.find import recording_faults
 from bayesimpact.data.faults.flat import reading_step
+from bayesimpact.data.faults.slip import find_slips
 from bayesimpact.data.recording import Recording
 
 
@@ -25,6 +26,20 @@ def test_a_mass_that_friction_stops_before_an_encoder_has_no_fault(seed: int) ->
     x[1500:1640] = 0.0
     x[1640:1644] = -1.0, 0.0, 0.0, -1.0
     assert recording_faults(Recording("a", "", x * step, 1e-2)) == []
+
+
+def test_a_rest_between_two_steps_is_not_written_twice() -> None:
+    """An encoder that flickers repeats itself by chance; one that swings does not."""
+    rng, step = np.random.default_rng(3), 3e-4
+    t = np.arange(2800) * 1e-2
+    swing = 0.5 * np.maximum(1.0 - t / 20.0, 0.0) * np.cos(2 * np.pi * 0.9 * t)
+    x = np.round(swing / step + 0.2 * rng.standard_normal(t.size))
+    x[2000:] = -4.0
+    x[[2703, 2707]] = -3.0
+    assert [f.id for f in find_slips(Recording("a", "", x * step, 1e-2))] == []
+    twice = np.concatenate([x[:500], x[490:]])
+    (found,) = find_slips(Recording("a", "", twice * step, 1e-2))
+    assert found.spans[0][0] == 500 or found.spans[0][1] == 500
 
 
 def test_friction_that_holds_an_encoder_is_no_fault() -> None:
