@@ -35,6 +35,7 @@ from bayesimpact.diagnosis.scores import Score
 from bayesimpact.diagnosis.smoothing import is_refuted
 from bayesimpact.diagnosis.term_sets import EffectSet
 from bayesimpact.diagnosis.thresholds import EXCESS, LARGE
+from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.progress import Refit
 from bayesimpact.model.effects.effect import Effect, Scales
@@ -232,7 +233,11 @@ class Models:
         return TO_THE_MODE
 
     def may_go_on(self) -> bool:
-        """Whether the budget allows for more refits."""
+        """Whether the budget allows for more refits: with time for comparisons, as long as no model
+        of the catalogue leaves nothing, which is compared with no force.
+        """
+        if any(map(_is_settled, self.states.values())):
+            return self.budget.may_go_on()
         return self.budget.may_search_on(self.look)
 
     def tell(self, words: str) -> None:
@@ -274,6 +279,12 @@ class Models:
             fit = profiled(candidate.fit)
             self.keep(Candidate(candidate.effects, fit, model_evidence(fit)))
         return self.tried[key]
+
+
+def _is_settled(state: State) -> bool:
+    """Whether nothing is missing from effects of the catalogue."""
+    effects = state.candidate.effects
+    return bool(effects) and state.is_white and not any(map(is_formula, effects))
 
 
 def likelihood_at(fit: Fit, reduced_chi2: float) -> float:

@@ -13,6 +13,7 @@ from bayesimpact.diagnosis import models
 from bayesimpact.diagnosis.budget import COMPARISONS, LOOKS, PATIENCE, begin
 from bayesimpact.diagnosis.models import Models
 from bayesimpact.diagnosis.refit import Candidate
+from bayesimpact.formula.law import FAMILY, PREFIX
 
 
 def candidate(ids: str, reached: float) -> Candidate:
@@ -106,6 +107,27 @@ def test_a_search_keeps_time_for_comparisons_by_how_long_a_look_takes(monkeypatc
     assert search.budget.may_search_on() and not search.may_go_on()
     now[0] = PATIENCE - LOOKS * took - 1.0
     assert search.may_go_on()
+
+
+@pytest.mark.parametrize(
+    "ids, white, goes_on",
+    [
+        ("", True, False),
+        ("spring_cubic", False, False),
+        ("spring_cubic formula", True, False),  # formulas are compared with it
+        ("spring_cubic", True, True),
+    ],
+)
+def test_what_leaves_nothing_is_compared_with_no_force(monkeypatch, ids, white, goes_on):
+    """And needs no time for that."""
+    search, now = made_up(monkeypatch), [0.0]
+    search.budget = begin(lambda: now[0])
+    now[0] = PATIENCE - 1.0
+    formula = SimpleNamespace(id=PREFIX, family=FAMILY)
+    effects = tuple(BY_ID.get(i, formula) for i in ids.split())
+    state = SimpleNamespace(candidate=SimpleNamespace(effects=effects), is_white=white)
+    search.states = {frozenset(ids.split()): state}
+    assert search.may_go_on() is goes_on
 
 
 def test_a_set_that_is_asked_for_must_reach_what_it_contains(monkeypatch):
