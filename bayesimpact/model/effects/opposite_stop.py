@@ -4,7 +4,7 @@ Equation: ks (y + gs) where y < -gs; ks in N/m, gs in m (for angles N m/rad, rad
 At its null: ks = 0 is the base model; gs then means nothing.
 Energy: conserves; potential ks (y + gs)^2 / 2.
 Valid: a frame, cable or end of a guide that is reached at large amplitude; elastic, without loss
-of its own; also of a rig without an obstacle on the other side.
+of its own; where campaign.toml says that there is no stop at all, none is looked for.
 Its absence shows in the first cycles only, as half-periods on that side which are too long.
 Source: Shaw and Holmes 1983, J. Sound Vib. 90:129 (piecewise linear oscillators).
 Status: period checked against the closed form, energy conserved to rounding; compiled law against
@@ -57,4 +57,5 @@ EFFECT = Effect(
         ),
     ),
     law=Law(force, surface=surface, polynomial=True, ignores_speed=True),
+    condition=lambda s: s.cases > 0,  # a rig that is said to have no stop has no second one
 )

@@ -6,8 +6,8 @@ At its null: kp = 0 with cp = 0 is the base model; gp then means nothing. cp = 0
 which is simpler and preferred.
 Energy: dissipates cp v^2 beyond the clearance; the spring's potential is kp (y + gp)^2 / 2.
 Valid: a bumper, a cable or a guide that is met at large amplitude and takes energy; a linear pair
-of spring and damper, which may pull for a moment when it is left; also of a rig without an obstacle
-on the other side.
+of spring and damper, which may pull for a moment when it is left; where campaign.toml says that
+there is no stop at all, none is looked for.
 Its absence shows in the first cycles only, as half-periods on that side which are too long and a
 loss that ends with them.
 Source: Shaw and Holmes 1983, J. Sound Vib. 90:129 (piecewise linear oscillators).
@@ -67,5 +67,6 @@ EFFECT = Effect(
         ),
     ),
     law=Law(force, surface=surface, jump_at_surface=True, polynomial=True),
+    condition=lambda s: s.cases > 0,  # a rig that is said to have no stop has no second one
     prefer="opposite_stop",
 )
