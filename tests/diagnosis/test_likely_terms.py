@@ -46,9 +46,7 @@ def fitted(effects: Effects) -> Fit:
 
 
 def asked_for(fit: Fit) -> list[EffectSet]:
-    """Without second springs, of which two and a cubic one leave less than four times as much."""
-    effects = [e for e in SEARCHED if e.id not in ("opposite_stop", "spring_piecewise")]
-    return sets_with_a_term(LikelySets(fit, effects, campaign_scales(fit)), 5)
+    return sets_with_a_term(LikelySets(fit, SEARCHED, campaign_scales(fit)), 5)
 
 
 @pytest.fixture(scope="module")

@@ -57,5 +57,6 @@ EFFECT = Effect(
         ),
     ),
     law=Law(force, surface=surface, polynomial=True, ignores_speed=True),
-    condition=lambda s: s.cases > 0,  # a rig that is said to have no stop has no second one
+    # a rig that is said to have no stop has no second one: there two of these imitate a detent
+    condition=lambda s: s.cases > 0,
 )

@@ -67,6 +67,7 @@ EFFECT = Effect(
         ),
     ),
     law=Law(force, surface=surface, jump_at_surface=True, polynomial=True),
-    condition=lambda s: s.cases > 0,  # a rig that is said to have no stop has no second one
+    # a rig that is said to have no stop has no second one: there two of these imitate a detent
+    condition=lambda s: s.cases > 0,
     prefer="opposite_stop",
 )
