@@ -20,6 +20,7 @@ CLASSES: Mapping[str, tuple[str, str]] = {
     "damping_drift": ("t", "v"),
     "contact_friction": ("contact", "sign(v)"),
     "contact_preload": ("contact", ""),
+    "contact_bump": ("local", ""),  # of the indentation: beyond a gap, of the displacement
 }
 """Place and dependence on the speed of every planted force that the grammar holds."""
 

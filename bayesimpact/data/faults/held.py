@@ -17,13 +17,16 @@ from bayesimpact.data.recording import Recording
 
 LEAST = 5  # equal readings in a row
 MISSED = 4.0  # reading steps that a motion would have made within the run, or at once after
+BESIDE = 3  # samples on either side of a run, across which the motion's way is compared
+FEW = 20  # places that tell how often readings repeat where the motion is slow
 COARSE = 0.02  # of neighbours equal: from here on a decayed motion ends in equal readings
 
 
 def find_held(recording: Recording) -> list[Fault]:
     """Runs of equal readings that neither noise nor rounding explains.
 
-    Two equal neighbours have a probability p, taken from the recording; a run of r has n p^(r - 1).
+    Two equal neighbours have a probability p, taken from the recording, where the motion is as slow
+    as about the run: at its turning points readings repeat more often. A run of r has n p^(r - 1).
     A run must also hide a motion of four steps of the readings, or end in such a jump, or
     reach to the end. Where readings come in steps, one that is entered by less than a step a sample
     and reaches to the end is rest: the motion died away, or friction holds the mass.
@@ -34,8 +37,8 @@ def find_held(recording: Recording) -> list[Fault]:
     level, rounded = float(np.ptp(x)), reading_step(x)
     chosen: list[Flat] = []
     for run in flats(x, LEAST):
-        chance = x.size * max(share, 1.0 / x.size) ** (run.size - 1)
-        if chance > FALSE_ALARM:
+        slow = max(share, _share_as_slow(x, run), 1.0 / x.size)
+        if x.size * slow ** (run.size - 1) > FALSE_ALARM:
             continue
         dead = run.end == x.size
         if dead and run.slope < rounded:
@@ -77,6 +80,22 @@ def find_held(recording: Recording) -> list[Fault]:
             action="cut" if alone else "exclude",
         )
     ]
+
+
+def _share_as_slow(x: np.ndarray, run: Flat) -> float:
+    """How often neighbours are equal where the motion gets no farther than across a run and a few
+    samples beside it, or at the `FEW` slowest places; the run itself left out.
+    """
+    first, last = max(run.first - BESIDE, 0), min(run.end - 1 + BESIDE, x.size - 1)
+    span = last - first
+    far = np.abs(x[span:] - x[:-span])
+    middle = np.arange(far.size) + span // 2
+    other = (middle + 1 < run.first - span) | (middle > run.end + span)
+    middle, far = middle[other], far[other]
+    if far.size <= FEW:
+        return 0.0
+    slow = middle[far <= max(abs(x[last] - x[first]), np.partition(far, FEW)[FEW])]
+    return float(np.mean(x[slow] == x[slow + 1]))
 
 
 def _at_extreme(x: np.ndarray, run: Flat, level: float) -> bool:
