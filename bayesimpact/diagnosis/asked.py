@@ -5,7 +5,8 @@ fit. Those of a base model make up for what it lacks: about a rest that is a lit
 quadratic spring reads as a stiffness that changes. So the problem is posed anew about each better
 model (as Gauss and Newton linearise anew at each step). Where there is a stop it is posed over
 stretches of free flight, which no law of the stop disturbs, and what the stop does is asked of
-simulations of one period ahead (`period_sets`).
+simulations of one period ahead (`period_sets`). A hum that the spectra of the recordings show is
+taken out of them before: it would be read as speed.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from bayesimpact.data.hum import find_hum
+from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.directions import is_periodic
 from bayesimpact.diagnosis.equation_error import is_a_force
 from bayesimpact.diagnosis.extend import transfer
@@ -27,6 +30,7 @@ from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
 
+HUM = "sensor_hum"
 ASKED = 4  # effects that are tried beside a model, by every problem
 
 
@@ -38,6 +42,9 @@ class Asked:
         self.of_motion: dict[tuple[object, ...], LikelySets] = {}
         self.of_periods: dict[tuple[object, ...], PeriodSets] = {}
         self.has_stop = base.target.oscillator.campaign.stop
+        recordings = base.target.oscillator.campaign.recordings
+        self.quiet = tuple(map(without_hum, recordings))
+        self.hums = any(a is not b for a, b in zip(self.quiet, recordings, strict=True))
 
     def about(self, model: Candidate, flight: bool) -> LikelySets:
         """The problem about a model's rest and gap, of stretches in `flight` or of all."""
@@ -46,9 +53,12 @@ class Asked:
             layout = self.base.target.oscillator.layout
             mode = transfer(model.fit, layout, self.base.target.oscillator.effects, self.scales, {})
             at, known = replace(self.base, mode=mode), known_effects(model)
-            self.of_motion[key] = LikelySets(
-                at, self.effects, self.scales, flight=flight, known=known
-            )
+            found = LikelySets(
+                self.of_the_motion(at, model), self.effects, self.scales,
+                flight=flight, known=known,
+            )  # fmt: skip
+            found.fit = at
+            self.of_motion[key] = found
         return self.of_motion[key]
 
     def ahead(self, model: Candidate, about: Candidate) -> PeriodSets:
@@ -60,12 +70,28 @@ class Asked:
             layout = model.fit.target.oscillator.layout
             mode = transfer(about.fit, layout, model.effects, self.scales, {})
             at = replace(model.fit, mode=mode)
-            self.of_periods[key] = PeriodSets(at, self.effects, self.scales)
+            found = PeriodSets(self.of_the_motion(at, model), self.effects, self.scales)
+            found.fit = at
+            self.of_periods[key] = found
         return self.of_periods[key]
 
     def ahead_with_terms(self, model: Candidate) -> PeriodSets:
         """The problem of periods ahead of a model, with the terms of the grammar."""
-        return periods_with_terms(model.fit, self.effects, self.scales)
+        at = self.of_the_motion(model.fit, model)
+        found = periods_with_terms(at, self.effects, self.scales)
+        found.fit = model.fit
+        return found
+
+    def of_the_motion(self, fit: Fit, model: Candidate) -> Fit:
+        """A fit, for a problem, to its recordings less their hums, which no motion makes, unless
+        the model has one.
+        """
+        if not self.hums or HUM in model.ids:
+            return fit
+        o = fit.target.oscillator
+        o = replace(o, campaign=replace(o.campaign, recordings=self.quiet))
+        likelihood = replace(fit.target.likelihood, oscillator=o)
+        return replace(fit, target=replace(fit.target, likelihood=likelihood))
 
     def first(
         self, model: Candidate, about: Candidate, instead: str = ""
@@ -89,6 +115,14 @@ class Asked:
             first |= set(sorted(kept, key=lambda i: -kept[i])[:ASKED])
             seen |= set(found)
         return first, seen.union(*gains)
+
+
+def without_hum(recording: Recording) -> Recording:
+    """A recording less the steady hum that its spectrum shows, if any."""
+    hum = find_hum(recording.samples, recording.interval)
+    if hum is None:
+        return recording
+    return replace(recording, samples=recording.samples - hum.readings(recording.times))
 
 
 def known_effects(model: Candidate) -> list[Known]:

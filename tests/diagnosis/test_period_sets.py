@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,12 @@ from effect_rigs import BY_ID
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.diagnosis import period_sets
+from bayesimpact.diagnosis.asked import Asked
 from bayesimpact.diagnosis.directions import shape_points
 from bayesimpact.diagnosis.extend import campaign_scales, extend
 from bayesimpact.diagnosis.name import name
 from bayesimpact.diagnosis.period_sets import PeriodSets
-from bayesimpact.diagnosis.refit import fit_from
+from bayesimpact.diagnosis.refit import base_candidate, fit_from
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.multiple_shooting import multiple_shooting
@@ -144,3 +146,19 @@ def test_a_search_begins_with_them(heavy: Fit) -> None:
     assert set(found.chosen.candidate.ids) == set(MASS)
     fits = [str(line) for line in said if str(line).startswith("fitting")]
     assert any("obstacle_mass" in line for line in fits[:2])
+
+
+def test_a_hum_of_the_readings_is_no_speed() -> None:
+    """Problems are asked of the motion; what they ask for is fitted to the recordings."""
+    hum = {"amplitude": 1e-4, "frequency": 151.0, "phase": 0.7}
+    fit = fitted(small_rig.record(1, {**MASS, "sensor_hum": hum}, duration=4.0))
+    base = base_candidate(fit)
+    asked = Asked(fit, SEARCHED, campaign_scales(fit))
+    problem = asked.ahead(base, base)
+    sets = problem.best(3)
+    assert {e.id for e in sets[1].effects} == set(MASS)
+    assert problem.fit.target.oscillator.campaign is fit.target.oscillator.campaign
+    plain = PeriodSets(fit, SEARCHED, campaign_scales(fit)).best(3)
+    assert not plain or {e.id for e in plain[min(1, len(plain) - 1)].effects} != set(MASS)
+    with_hum = SimpleNamespace(ids=("sensor_hum",))
+    assert asked.of_the_motion(fit, with_hum) is fit  # type: ignore[arg-type]
