@@ -30,7 +30,6 @@ from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
 
-HUM = "sensor_hum"
 ASKED = 4  # effects that are tried beside a model, by every problem
 
 
@@ -84,9 +83,10 @@ class Asked:
 
     def of_the_motion(self, fit: Fit, model: Candidate) -> Fit:
         """A fit, for a problem, to its recordings less their hums, which no motion makes, unless
-        the model has one.
+        the model has a line.
         """
-        if not self.hums or HUM in model.ids:
+        acting = (*fit.target.oscillator.acting, *model.effects)
+        if not self.hums or any(map(is_periodic, acting)):
             return fit
         o = fit.target.oscillator
         o = replace(o, campaign=replace(o.campaign, recordings=self.quiet))
@@ -118,8 +118,9 @@ class Asked:
 
 
 def without_hum(recording: Recording) -> Recording:
-    """A recording less the steady hum that its spectrum shows, if any."""
-    hum = find_hum(recording.samples, recording.interval)
+    """A recording less the steady hum that its spectrum shows, if any; a driven one may move so."""
+    driven = recording.input is not None
+    hum = None if driven else find_hum(recording.samples, recording.interval)
     if hum is None:
         return recording
     return replace(recording, samples=recording.samples - hum.readings(recording.times))

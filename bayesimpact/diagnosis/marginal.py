@@ -142,13 +142,22 @@ def gain(fit: Fit, parts: Sequence[Part], least: float = -np.inf) -> float:
     start = _point(fit, fit.mode, products(fit, parts, fit.linearisation))
     level, total = likelihood.noise.level, start.found.total
     unit = float(np.sum(likelihood.log_volume)) - total * np.log(level * np.sqrt(2 * np.pi))
-    alone = fit.log_likelihood + 0.5 * _log_volume(fit.covariance[np.ix_(free, free)])
+    alone = _log_likelihood(fit) + 0.5 * _log_volume(fit.covariance[np.ix_(free, free)])
     alone += float(np.ravel(priors.log_density(fit.mode[None]))[0])
     known = float(unit - alone)
     straight = _stepped(fit, start, _by_derivatives(fit))
     if known + straight.value < least:
         return known + straight.value
     return known + _climbed(fit, start).value
+
+
+def _log_likelihood(fit: Fit) -> float:
+    """Of a fit's residuals by their squares, as those beside a force count: readings in coarse
+    steps have another one (`rounding`).
+    """
+    sigma = fit.mode[fit.target.likelihood.sigma_columns]
+    squares = np.array([part.residual @ part.residual for part in fit.linearisation])
+    return fit.log_likelihood + 0.5 * float(np.sum((fit.sums - squares) / sigma**2))
 
 
 def _climbed(fit: Fit, start: _Point) -> _Point:

@@ -90,7 +90,7 @@ class Models:
         held = self.tried.get(key)
         sooner = candidate.fit.converged and not (held and held.fit.converged)
         least = SAME * (-1 if sooner else 1)
-        if held is None or candidate.log_evidence > held.log_evidence + least:
+        if held is None or _is_above(candidate, held, least):
             self.tried[key] = candidate
         return self.tried[key]
 
@@ -279,6 +279,13 @@ class Models:
             fit = profiled(candidate.fit)
             self.keep(Candidate(candidate.effects, fit, model_evidence(fit)))
         return self.tried[key]
+
+
+def _is_above(candidate: Candidate, held: Candidate, least: float) -> bool:
+    """Whether an end of a climb lies above another one of the same model by more than `least`."""
+    if candidate.refused is not None and held.refused is not None:
+        return candidate.refused > held.refused + least
+    return candidate.log_evidence > held.log_evidence + least
 
 
 def _is_settled(state: State) -> bool:

@@ -66,47 +66,26 @@ def name(
     still leaves something. It begins with the model of `first` instead, a fit to the same campaign,
     where that is given.
 
+    Where what remains is slow noise of the measuring chain, and time allows, the search begins once
+    more under that noise from the model that left it; it counts if it leaves nothing then.
+
     A search that has used up the `budget` begins no more refits, and names nothing that it has not
     compared with all that might do the same.
     """
-    search = _Search(effects, scales, rng, progress or (lambda message: None), budget)
-    base = search.examine(base_candidate(fit))
-    if first is not None:
-        beam = [search.examine(base_candidate(first))]
-    else:
-        beam = search.asked_for(base) if search.is_large else [base]
-    begun = set[frozenset[str]]()
-    while True:
-        state = search.grown(beam)
-        with_term = search.with_a_term(state, excess=1.0)
-        if with_term is not state:
-            beam = [with_term]
-            continue
-        if not search.may_be_named(state):
-            break
-        search.weigh_remainder()
-        smaller = search.eliminated(state)
-        made_room = smaller is not state and frozenset(smaller.candidate.ids) not in begun
-        if not search.is_large or smaller.is_white or not made_room:
-            state = search.settled(smaller)
-        else:
-            state = smaller
-        key = frozenset(state.candidate.ids)
-        if state.is_white or not search.is_large or key in begun or not search.may_go_on():
-            break
-        begun.add(key)
-        beam = [state]
-    state = search.at_its_mode(state)
-    noise = _remaining_noise(state) if search.may_go_on() else None
-    if noise is None:
-        return search.naming(base, state)
-    search.progress("what remains is slow noise: once more under that")
-    found = state.candidate.fit
-    return name(
-        under_noise(fit, noise), effects, scales,
-        rng=rng, progress=progress, budget=search.budget,
-        first=under_noise(found, noise) if found is not fit else None,
-    )  # fmt: skip
+    say = progress or (lambda message: None)
+    search = _Search(effects, scales, rng, say, budget)
+    base, state = search.found(fit, first)
+    noise = _remaining_noise(state) if search.budget.may_search_again() else None
+    if noise is not None:
+        say("what remains is slow noise: once more under that")
+        found = state.candidate.fit
+        again = _Search(effects, scales, rng, say, search.budget)
+        quiet = again.found(
+            under_noise(fit, noise), under_noise(found, noise) if found is not fit else None
+        )
+        if quiet[1].is_white:
+            return again.naming(*quiet)
+    return search.naming(base, state)
 
 
 def _remaining_noise(state: State) -> Noise | None:
@@ -118,6 +97,36 @@ def _remaining_noise(state: State) -> Noise | None:
 
 class _Search(Unlisted):
     """Which models to fit next, and what they are worth."""
+
+    def found(self, fit: Fit, first: Fit | None) -> tuple[State, State]:
+        """The base model of `fit`, and where a search from it, or from `first`, ends."""
+        base = self.examine(base_candidate(fit))
+        if first is not None:
+            beam = [self.examine(base_candidate(first))]
+        else:
+            beam = self.asked_for(base) if self.is_large else [base]
+        begun = set[frozenset[str]]()
+        while True:
+            state = self.grown(beam)
+            with_term = self.with_a_term(state, excess=1.0)
+            if with_term is not state:
+                beam = [with_term]
+                continue
+            if not self.may_be_named(state):
+                break
+            self.weigh_remainder()
+            smaller = self.eliminated(state)
+            made_room = smaller is not state and frozenset(smaller.candidate.ids) not in begun
+            if not self.is_large or smaller.is_white or not made_room:
+                state = self.settled(smaller)
+            else:
+                state = smaller
+            key = frozenset(state.candidate.ids)
+            if state.is_white or not self.is_large or key in begun or not self.may_go_on():
+                break
+            begun.add(key)
+            beam = [state]
+        return base, self.at_its_mode(state)
 
     def grown(self, beam: list[State]) -> State:
         """The model that ever more effects lead to from the first of a beam, or beside it."""

@@ -26,11 +26,16 @@ from bayesimpact.formula.library import library
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
 
+MOST_SAMPLES = 400_000  # of all recordings: their columns then take 2 x 1.7 GB
 KINDS = 3  # of terms that are fitted beside as many effects: set by hand
 
 
 def periods_with_terms(fit: Fit, effects: Sequence[Effect], scales: Scales) -> PeriodSets:
-    """The problem of periods ahead about a fit, with all terms of the grammar."""
+    """The problem of periods ahead about a fit, with all terms of the grammar; without any where
+    the recordings are so long that their columns would fill the memory.
+    """
+    if fit.target.oscillator.counts.sum() > MOST_SAMPLES:
+        return PeriodSets(fit, effects, scales)
     paths = measured_paths(fit)
     terms = unlisted(library(scales, *reach_of(paths)))
     price, cost = prices_by_kind(terms), float(np.log(2 * len(effects)))

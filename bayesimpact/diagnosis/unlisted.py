@@ -68,7 +68,8 @@ class Unlisted(Remaining):
         """A model, or where its misfit is large the one that periods ahead of the base model lead
         to with a term of the grammar, if that leaves `EXCESS` times less.
         """
-        if not (self.asked.has_stop and is_large(state.candidate.fit)):
+        wanted = self.asked.has_stop and is_large(state.candidate.fit)
+        if not (wanted and self.may_go_on()):
             return state
         found = self.asked_again(base.candidate, self.of_periods_with_a_term)
         far_less = EXCESS * found.fit.reduced_chi2 < state.candidate.fit.reduced_chi2

@@ -15,8 +15,11 @@ import numpy as np
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.inference.multiple_shooting import Array, multiple_shooting
+from bayesimpact.model.parameters import SLOTS
 from bayesimpact.response.displacement import displacement_of
+from bayesimpact.response.measured_motion import from_rest
 
+_G, _OFFSET = SLOTS.index("g"), SLOTS.index("offset")
 FAR = 0.2  # of the signal: a base fit that leaves more is tried again; set by hand
 SHARE = 0.5  # of the largest displacement towards the stop: another gap to begin with
 STIFFER = 4.0  # than the suspension: an obstacle to begin with
@@ -44,12 +47,23 @@ def or_by_periods(found: Fit) -> Fit:
 def _starts(found: Fit) -> list[Array]:
     """The mode, and one with a gap that is reached and obstacles that are felt."""
     o, theta = found.target.oscillator, found.mode.copy()
-    reach = max(float(displacement_of(r).samples.max()) for r in o.campaign.recordings)
-    theta[o.layout.index("g")] = SHARE * reach
+    gaps = np.unique(o.layout.columns[:, _G])
+    theta[gaps[gaps >= 0]] = SHARE * max(_reach(found, r) for r in range(o.counts.size))
     for case in o.campaign.cases:
         i = o.layout.index(f"k2[{case}]")
         theta[i] = max(theta[i], STIFFER * found.value("k1"))
     return [found.mode, theta]
+
+
+def _reach(found: Fit, r: int) -> float:
+    """Largest displacement of a recording from rest towards the stop, m."""
+    o = found.target.oscillator
+    recording, gain = o.campaign.recordings[r], o.gains[r]
+    offset = float(o.layout.slots(found.mode)[r, _OFFSET])
+    own = float(found.mode[gain]) if gain >= 0 else 1.0
+    moved = displacement_of(from_rest(recording, offset, own or 1.0)).samples
+    used = slice(None) if recording.used is None else recording.used
+    return float(np.max(moved[used]))
 
 
 def _ahead(found: Fit, theta: Array) -> Array | None:

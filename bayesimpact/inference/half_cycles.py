@@ -96,7 +96,7 @@ def _chunk(likelihood: Likelihood, theta: Array, blocks: tuple[Blocks, ...]) -> 
         )
         places = np.clip(b.first - b.shift, 0, signal.shape[1] - 1)
         squares = signal**2
-        if likelihood.steps[r] > 0.0 and likelihood.noise.smoothing is None:
+        if likelihood.steps[r] > 0.0:
             squares = squares + likelihood.coarse_squares(r, seen[r])
         sums = np.add.reduceat(squares, places, axis=1)
         sigma = theta[:, likelihood.sigma_columns[r], None]

@@ -173,6 +173,8 @@ def _with_declared(
 
 def about_average(noise: Noise, campaign: Campaign) -> Noise:
     """Noise about what is read on average, where readings come in coarse steps (`rounding`)."""
+    if noise.smoothing is not None:  # behind a filter steps are noise
+        return noise
     level = noise.level
     rows = [(r, level * noise.scales[r.order]) for r in campaign.recordings]
     left = [scatter(r, own) / own if own > 0 else 1.0 for r, own in rows]

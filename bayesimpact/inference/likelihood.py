@@ -106,7 +106,11 @@ class Likelihood:
 
     @cached_property
     def steps(self) -> tuple[float, ...]:
-        """Coarse steps that every recording's readings come in, 0 for none; see `rounding`."""
+        """Coarse steps that every recording's readings come in, 0 for none, as behind a filter; see
+        `rounding`.
+        """
+        if self.noise.smoothing is not None:
+            return (0.0,) * self.oscillator.counts.size
         pairs = zip(self.oscillator.campaign.recordings, self.scales, strict=True)
         return tuple(coarse_step(one, self.noise.level * scale) for one, scale in pairs)
 

@@ -92,9 +92,14 @@ class MultipleShooting(Likelihood):
 def multiple_shooting(likelihood: Likelihood, theta: Array) -> MultipleShooting | None:
     """The likelihood of periods ahead, with responses to its starts as `theta` (d,) has them.
 
-    None where no period is told from noise.
+    None where no period is told from noise, or there is none (k1 = 0), and for velocities and
+    accelerations under an input: their integrals are anchored where a free mass turns.
     """
     o = likelihood.oscillator
+    moving = bool(np.all(o.layout.slots(theta)[:, _K1] > 0.0))
+    moving &= all(theta[i] != 0.0 for i in o.gains if i >= 0)
+    if not moving or not (o.inputs is None or o.reads_displacements):
+        return None
     noise = replace(likelihood.noise, smoothing=None)
     starts = tuple(_starts(o, noise, r, theta) for r in range(o.counts.size))
     return MultipleShooting(o, noise, starts) if any(s.blocks for s in starts) else None

@@ -160,5 +160,6 @@ def test_a_hum_of_the_readings_is_no_speed() -> None:
     assert problem.fit.target.oscillator.campaign is fit.target.oscillator.campaign
     plain = PeriodSets(fit, SEARCHED, campaign_scales(fit)).best(3)
     assert not plain or {e.id for e in plain[min(1, len(plain) - 1)].effects} != set(MASS)
-    with_hum = SimpleNamespace(ids=("sensor_hum",))
-    assert asked.of_the_motion(fit, with_hum) is fit  # type: ignore[arg-type]
+    for effects, kept in ((("sensor_hum",), True), (("quadratic_drag",), False)):
+        model: Any = SimpleNamespace(effects=tuple(BY_ID[i] for i in effects))
+        assert (asked.of_the_motion(fit, model) is fit) is kept

@@ -68,6 +68,7 @@ def test_a_model_with_a_term_must_leave_far_less(monkeypatch, times: float, take
     """An effect more explains a little of anything; the search goes on with the catalogue then."""
     search = object.__new__(unlisted.Unlisted)
     search.asked = SimpleNamespace(has_stop=True)
+    monkeypatch.setattr(search, "may_go_on", lambda: True)
     left = 100.0 * LARGE**2
     made = lambda chi2: SimpleNamespace(fit=SimpleNamespace(reduced_chi2=chi2))  # noqa: E731
     with_term = made(left / (times * EXCESS))
@@ -77,6 +78,9 @@ def test_a_model_with_a_term_must_leave_far_less(monkeypatch, times: float, take
     found = search.with_a_term_ahead(base, state)
     assert (found.candidate is with_term) is taken
     search.asked.has_stop = False
+    assert search.with_a_term_ahead(base, state) is state
+    search.asked.has_stop = True
+    monkeypatch.setattr(search, "may_go_on", lambda: False)
     assert search.with_a_term_ahead(base, state) is state
 
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 import small_rig
+from effect_rigs import with_effect
 
 from bayesimpact.inference import from_periods
 from bayesimpact.inference.fit import Fit
@@ -56,3 +59,32 @@ def test_an_end_is_never_less_likely(quantity: Any, monkeypatch: Any) -> None:
     before = fitted(SHAKEN, quantity=quantity)
     assert before.rms > FAR * before.signal
     assert after.log_posterior >= before.log_posterior - 0.1
+
+
+def test_a_gap_is_reached_from_rest_and_has_any_name() -> None:
+    """Readings count from rest; `gap_per_recording` has gaps in the place of g."""
+    fit = fitted()
+    far = {n: 0.05 for n in fit.names if n.startswith("offset[")}
+    recordings = tuple(
+        replace(r, samples=r.samples + 0.05) for r in fit.target.oscillator.campaign.recordings
+    )
+    oscillator = fit.target.oscillator
+    oscillator = replace(oscillator, campaign=replace(oscillator.campaign, recordings=recordings))
+    mode = fit.mode + np.array([far.get(n, 0.0) for n in fit.names])
+    likelihood = replace(fit.target.likelihood, oscillator=oscillator)
+    moved = replace(fit, target=replace(fit.target, likelihood=likelihood), mode=mode)
+    for one in (fit, moved):
+        (_, start) = from_periods._starts(one)
+        assert 1e-3 < start[one.names.index("g")] < 4e-3
+    found: Any = SimpleNamespace(fit=fit)
+    own = with_effect(found, "gap_per_recording")
+    (_, start) = from_periods._starts(own)
+    gaps = [start[own.names.index(f"gap_per_recording.g[{r}]")] for r in "abc"]
+    assert len(set(gaps)) == 1 and 1e-3 < gaps[0] < 4e-3
+
+
+def test_no_period_is_told_without_a_spring() -> None:
+    fit = fitted()
+    theta = fit.mode.copy()
+    theta[fit.names.index("k1")] = 0.0
+    assert from_periods._ahead(fit, theta) is None

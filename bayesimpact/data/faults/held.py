@@ -37,15 +37,14 @@ def find_held(recording: Recording) -> list[Fault]:
     level, rounded = float(np.ptp(x)), reading_step(x)
     chosen: list[Flat] = []
     for run in flats(x, LEAST):
-        slow = max(share, _share_as_slow(x, run), 1.0 / x.size)
-        if x.size * slow ** (run.size - 1) > FALSE_ALARM:
+        if not _is_rare(x, run, max(share, 1.0 / x.size)):
             continue
         dead = run.end == x.size
         if dead and run.slope < rounded:
             continue
         if max(run.missed(rounded), run.jump) < MISSED * step and not (dead and share < COARSE):
             continue
-        if _at_extreme(x, run, level):
+        if _at_extreme(x, run, level) or not _is_rare(x, run, _share_as_slow(x, run)):
             continue
         chosen.append(run)
     if not chosen:
@@ -80,6 +79,11 @@ def find_held(recording: Recording) -> list[Fault]:
             action="cut" if alone else "exclude",
         )
     ]
+
+
+def _is_rare(x: np.ndarray, run: Flat, share: float) -> bool:
+    """Whether a run is no chance where so many neighbours are equal."""
+    return x.size * share ** (run.size - 1) <= FALSE_ALARM
 
 
 def _share_as_slow(x: np.ndarray, run: Flat) -> float:
