@@ -114,8 +114,16 @@ class Likelihood:
         pairs = zip(self.oscillator.campaign.recordings, self.scales, strict=True)
         return tuple(coarse_step(one, self.noise.level * scale) for one, scale in pairs)
 
+    @cached_property
+    def _average_squares(self) -> tuple[float, ...]:
+        """Mean squares (R,) of what coarse steps add to an average reading; 0 for none."""
+        pairs = zip(self.steps, self.noise.level * self.scales, strict=True)
+        return tuple(average_square(q, float(s)) if q > 0.0 else 0.0 for q, s in pairs)
+
     def misfit(self, theta: Array) -> Array:
-        """Sums of squares of the whitened residuals, (B, R), m2; inf where inadmissible."""
+        """Sums of squares of the whitened residuals, (B, R), m2, of readings in coarse steps as
+        their quasi-likelihood has them; inf where inadmissible.
+        """
         o = self.oscillator
         theta = np.ascontiguousarray(np.atleast_2d(theta))
         plain = self.in_closed_form and o.is_plain and o.is_whole
@@ -172,8 +180,7 @@ class Likelihood:
         for the noise level; 0 for samples set aside.
         """
         recording = self.oscillator.campaign.recordings[r]
-        level = self.noise.level * self.scales[r]
-        found = np.full(seen.shape, -average_square(self.steps[r], level))
+        found = np.full(seen.shape, -self._average_squares[r])
         for row, own in zip(seen, found, strict=True):
             rounding = self.rounding(r, row)
             if rounding is not None:
