@@ -29,6 +29,7 @@ class Banana:
     sizes = np.array([4.0])
     log_volume = np.array([0.0])
     sigma_columns = np.array([2])
+    steps = (0.0,)
 
     @property
     def oscillator(self):
@@ -48,6 +49,9 @@ class Banana:
         x, y = theta[:, 0], theta[:, 1]
         rest = np.full_like(x, 1e-2)
         return (np.stack([self.steep * (y - x**2), 1 - x, rest, rest], axis=1),)
+
+    def residuals_and_sums(self, theta: np.ndarray) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
+        return self.residuals(theta), self.misfit(theta)
 
     def misfit(self, theta: np.ndarray) -> np.ndarray:
         return np.sum(self.residuals(np.atleast_2d(theta))[0] ** 2, axis=1)[:, None]
