@@ -52,7 +52,8 @@ def find_held(recording: Recording) -> list[Fault]:
     spans = tuple((run.first, run.end) for run in chosen)
     longest = max(chosen, key=lambda run: run.size)
     count = sum(run.size for run in chosen)
-    log_chance = np.log10(x.size) + (longest.size - 1) * np.log10(max(share, 1.0 / x.size))
+    equal = max(share, _share_as_slow(x, longest), 1.0 / x.size)
+    log_chance = np.log10(x.size) + (longest.size - 1) * np.log10(equal)
     what = (
         "zeros"
         if longest.value == 0.0
