@@ -89,6 +89,8 @@ def test_a_model_whose_line_may_be_the_motions_own_keeps_its_evidence_apart(monk
     monkeypatch.setattr(models, "shakes_in_own_band", lambda fit, remains: True)
     kept = search.keep(candidate("sensor_hum", 20.0))
     assert (kept.log_evidence, kept.refused) == (-np.inf, 20.0)
+    for end, reached in ((50.0, 50.0), (30.0, 50.0)):  # of two refused ends the better one stays
+        assert search.keep(candidate("sensor_hum", end)).refused == reached
 
 
 def test_a_search_keeps_time_for_comparisons_by_how_long_a_look_takes(monkeypatch):
