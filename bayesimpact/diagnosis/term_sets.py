@@ -178,14 +178,14 @@ class TermSets:
 
     def refined(self, chosen: Sequence[int]) -> Chosen:
         """A set with the shape of each effect where it is likeliest beside the others, also between
-        the points from which sets are chosen.
+        the points from which sets are chosen, in the order of `terms`.
         """
         found = list(chosen)
         for k in (*range(len(found)), *range(len(found))):
             effect, rest = self.terms[found[k]].effect, (*found[:k], *found[k + 1 :])
             own = [t for t, term in enumerate(self.terms) if term.effect is effect]
             found[k] = max(own, key=lambda t: self.log_odds((*rest, t)))
-        return tuple(found)
+        return tuple(sorted(found))  # in one order, whichever way the search came by
 
     def _beside(self, chosen: Sequence[int]) -> list[int]:
         """Terms that a set may take in."""

@@ -52,6 +52,13 @@ def test_effects_with_states_of_their_own_are_asked_for(heavy: Fit) -> None:
             assert reached.fit.value(f"{effect}.{key}") == pytest.approx(value, rel=0.05)
 
 
+def test_a_set_is_one_whichever_way_the_search_came_by(heavy: Fit) -> None:
+    problem = PeriodSets(heavy, [BY_ID[i] for i in MASS], campaign_scales(heavy))
+    chosen = problem.shaped(list(MASS))
+    assert len(chosen) == 2 and problem.shaped(list(MASS)[::-1]) == chosen
+    assert problem.refined(chosen[::-1]) == chosen
+
+
 def test_a_set_leaves_what_its_least_squares_say(heavy: Fit) -> None:
     """Against simulations of periods ahead at the sizes and shapes of the set."""
     scales = campaign_scales(heavy)
