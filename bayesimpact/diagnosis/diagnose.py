@@ -46,6 +46,7 @@ from bayesimpact.diagnosis.recording_faults import (
     comparisons,
     fitted_beside,
     shared_effects,
+    values_of,
     with_steps,
     without_faults,
 )
@@ -165,7 +166,7 @@ def diagnose(
     beside = [e for e in found.effects if e in found.after.target.oscillator.effects]
     if shared_effects(beside) and is_doubtful(found):
         say("comparing the recordings beside what is missing")
-        doubtful = list(comparisons(certain, campaign, beside, found.after)) or doubtful
+        doubtful = list(comparisons(certain, campaign, beside, values_of(found.after))) or doubtful
     if doubtful and is_doubtful(found) and may_be_simpler(doubtful, certain, found):
         found = _beside_faults(found, certain, doubtful, searches, search)
     elif certain is not cleaned and not proved and found.verdict not in OPEN:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, groupby
 from typing import Any
@@ -115,19 +115,22 @@ def _as_read(fault: Fault, campaign: Campaign, as_read: Campaign) -> Fault:
 
 
 def comparisons(
-    before: Corrected, as_read: Campaign, beside: Sequence[Effect] = (), fit: Fit | None = None
+    before: Corrected,
+    as_read: Campaign,
+    beside: Sequence[Effect] = (),
+    values: Mapping[str, float] | None = None,
 ) -> tuple[Step, ...]:
     """Faults that comparing the recordings shows, what is corrected together in a step.
 
     They are compared by the base model and those effects `beside` it that hold for all recordings
-    alike; `fit` knows where their parameters begin.
+    alike, whose fits begin at `values` of parameters.
     """
     base, noise = before.identification.fit, before.identification.noise
     campaign = base.target.oscillator.campaign
     if campaign.keep_faults:
         return ()
     effects = shared_effects(beside)
-    model = SharedModel(noise, effects, values_of(fit))
+    model = SharedModel(noise, effects, values or {})
     whole = model.fitted(campaign) if effects else base
     if whole is None:
         return ()
@@ -145,9 +148,9 @@ def fitted_beside(before: Corrected, effects: Sequence[Effect], fit: Fit) -> Fit
     return model.fitted(base.target.oscillator.campaign)
 
 
-def values_of(fit: Fit | None) -> dict[str, float]:
-    """Parameter of a fit -> value; empty without one."""
-    return {} if fit is None else {n: fit.value(n) for n in fit.target.oscillator.layout.names}
+def values_of(fit: Fit) -> dict[str, float]:
+    """Parameter of a fit -> value."""
+    return dict(zip(fit.names, map(float, fit.mode), strict=True))
 
 
 def shared_effects(effects: Sequence[Effect]) -> tuple[Effect, ...]:

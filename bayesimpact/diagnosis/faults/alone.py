@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.recording import Recording
-from bayesimpact.diagnosis.extend import campaign_scales
+from bayesimpact.diagnosis.extend import campaign_scales, replaced_slot
 from bayesimpact.diagnosis.refit import fit_from
 from bayesimpact.errors import BayesimpactError
 from bayesimpact.inference.fit import Fit
@@ -63,16 +63,22 @@ class SharedModel:
     def fitted(self, campaign: Campaign) -> Fit | None:
         """The mode for a campaign; None where it allows no fit."""
         rng = np.random.default_rng(0)
+        effects = [e for e in self.effects if len(campaign.cases) > 1 or not _is_by_case(e)]
         try:
             fit = identify(campaign, rng=rng, noise=self.noise, search=False).fit
             scales = campaign_scales(fit)
-            if not all(effect.admissible(scales) for effect in self.effects):
+            if not all(effect.admissible(scales) for effect in effects):
                 return None  # a recording that misses the obstacle shows nothing of contacts
-            if self.effects:
-                fit = fit_from(fit, self.effects, self.values, scales).fit
+            if effects:
+                fit = fit_from(fit, effects, self.values, scales).fit
         except (BayesimpactError, ValueError, np.linalg.LinAlgError):
             return None
         return fit if np.isfinite(fit.reduced_chi2) else None
+
+
+def _is_by_case(effect: Effect) -> bool:
+    """Whether an effect only gives every stop a base parameter of its own."""
+    return all(p.scope == "case" and replaced_slot(effect, p) for p in effect.parameters)
 
 
 def inverted(recording: Recording) -> Recording:
@@ -97,7 +103,8 @@ def fit_alone(campaign: Campaign, recording: Recording, model: SharedModel) -> A
     chi2 = fit.reduced_chi2
     names = NAMES if campaign.stop else NAMES[:2]
     own = [_name(n, recording.case) for n in names]
-    there = np.flatnonzero([n in fit.names for n in own])
+    replaced = {replaced_slot(e, p) for e in model.effects for p in e.parameters}
+    there = np.flatnonzero([n in fit.names and n not in replaced for n in own])
     at = [fit.names.index(own[i]) for i in there]
     values, known = np.zeros(len(names)), np.eye(len(names))
     values[there] = fit.mode[at]
