@@ -3,9 +3,10 @@
 Short windows show the white part and take the slow one for motion; above the motion (see
 `noise_refined`) little of it is left. Here a fit's residual r, linear in a change x of the
 parameters, is taken for noise of both kinds: r - J x ~ N(0, s^2 C), with C the covariance of white
-and AR(1) noise, of one correlation time or, where that says much more, of two, as noise that rises
-over decades of frequency asks for; the parameters are integrated out. What physics a fit may have
-left out is in the residual too: whether this noise explains it better is for the caller to ask.
+and AR(1) noise, of one correlation time or, where that says much more, of two or three, as noise
+that rises over decades of frequency (1/f) asks for; the parameters are integrated out. What physics
+a fit may have left out is in the residual too: whether this noise explains it better is for the
+caller to ask.
 """
 
 from __future__ import annotations
@@ -29,7 +30,12 @@ TIMES = 10.0  # in the longest recording, at least, that the slow part's correla
 MOST = 1.0 - 1e-9  # of a correlation, whatever the recording
 BAND = 0.05  # of a frequency: width of a band
 STEP = 0.05  # of a standard deviation, for differences
-STARTS = ((0.9,), (0.99,), (0.5,), (0.6, 0.98))  # correlations over the largest, beside white noise
+STARTS: tuple[tuple[tuple[float, ...], ...], ...] = (
+    ((0.9,), (0.99,), (0.5,)),
+    ((0.6, 0.98),),
+    ((0.5, 0.9, 0.99), (0.6, 0.98, 0.998)),
+)
+"""Correlations over the largest, beside white noise: of one process, of two, of three."""
 TOLERANCE = 0.01  # nats, of the likelihood at its best
 
 
@@ -88,11 +94,16 @@ def slow_noise(fit: Fit) -> SlowNoise | None:
             best = minimize(cost, rough, method="Nelder-Mead", options=options).x
         return _Whole(fit, linear, shape(best))
 
-    starts = [np.append(np.arctanh(rho), np.zeros(len(rho))) for rho in STARTS]
-    found, two = (likeliest([s for s in starts if s.size == size]) for size in (2, 4))
+    first, *larger = (
+        [np.append(np.arctanh(rho), np.zeros(len(rho))) for rho in starts] for starts in STARTS
+    )
+    found = likeliest(first)
     cost = float(np.log(likelihood.sizes.sum()))  # of two more parameters (Schwarz 1978)
-    if two.log_evidence > found.log_evidence + cost:
-        found = two
+    for starts in larger:
+        more = likeliest(starts)
+        if more.log_evidence <= found.log_evidence + cost:
+            break
+        found = more
     before = _Whole(fit, linear, noise)
     level = noise.level * float(np.sqrt(found.variance))
     error = float(np.sqrt(0.5 / likelihood.sizes.sum()))

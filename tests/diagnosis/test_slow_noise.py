@@ -31,6 +31,18 @@ def test_a_control_with_slow_noise_is_adequate_and_says_so(seed):
     assert 0.9 < found.after.reduced_chi2 < 1.1
 
 
+def test_noise_of_many_correlation_times_is_noise():
+    """As flicker noise is: two of them leave it coloured, and then lines and modes are named."""
+    campaign = small_rig.record(
+        6, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES, duration=10.0
+    )
+    for number, correlation in enumerate((0.7, 0.95, 0.99, 0.999)):
+        campaign = small_rig.with_slow(campaign, number, 1.0, correlation)
+    found = diagnose(campaign, rng=RNG(0), search=False)
+    assert found.verdict == "adequate"
+    assert len(found.after.target.likelihood.noise.parts) > 3
+
+
 DRAG = {"quadratic_drag": {"coefficient": 3.0}}
 
 
