@@ -32,9 +32,9 @@ def test_a_control_with_slow_noise_is_adequate_and_says_so(seed):
 
 
 def test_noise_of_many_correlation_times_is_noise():
-    """As flicker noise is: two of them leave it coloured, and then lines and modes are named."""
+    """As flicker noise is, which two of them do not follow."""
     campaign = small_rig.record(
-        6, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES, duration=10.0
+        6, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES, rate=500.0, duration=20.0
     )
     for number, correlation in enumerate((0.7, 0.95, 0.99, 0.999)):
         campaign = small_rig.with_slow(campaign, number, 1.0, correlation)
