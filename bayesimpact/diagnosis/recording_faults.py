@@ -80,6 +80,8 @@ def cleaned_campaign(campaign: Campaign, *, rng: np.random.Generator, search: bo
     """
     cleaned, own = set_aside(campaign)
     cleaned, filtered = _through_filter(cleaned, None)
+    if filtered is not None:  # what was cut before it reaches further
+        cleaned, own = set_aside(replace(campaign, measurement=cleaned.measurement))
     found = Corrected(_identified(cleaned, rng=rng, search=search), own, filtered=filtered)
     fit = found.identification.fit
     spikes = () if campaign.keep_faults or base_failed(fit) else residual_spikes(fit)

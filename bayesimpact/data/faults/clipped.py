@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from bayesimpact.data.campaign import Smoothing
 from bayesimpact.data.faults.fault import Fault, amount, file_time, times_of
 from bayesimpact.data.faults.flat import Flat, flats, reading_step
 from bayesimpact.data.gaps import excluded
@@ -48,6 +51,19 @@ def find_clipped(recording: Recording) -> list[Fault]:
                 found.append(_fault(recording, side, cut, alone))
                 break
     return found
+
+
+def behind_filter(fault: Fault, recording: Recording, smoothing: Smoothing | None) -> Fault:
+    """A fault of a recording, with what a filter's window made of clipped readings.
+
+    Only where all of the window was cut are the readings alike: as many on either side as half of
+    it hold cut ones too, besides those that any gap behind a filter loses.
+    """
+    if fault.id != "recording_clipped" or smoothing is None or smoothing.kind != "savgol":
+        return fault
+    reach, size = smoothing.window // 2, recording.samples.size
+    spans = tuple((max(a - reach, 0), min(b + reach, size)) for a, b in fault.spans)
+    return replace(fault, spans=spans, remedy=excluded(recording, spans))
 
 
 def _fault(recording: Recording, side: str, cut: list[Flat], places: list[Flat]) -> Fault:

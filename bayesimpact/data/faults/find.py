@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from bayesimpact.data.campaign import Campaign
-from bayesimpact.data.faults.clipped import find_clipped
+from bayesimpact.data.faults.clipped import behind_filter, find_clipped
 from bayesimpact.data.faults.duplicate import find_duplicates
 from bayesimpact.data.faults.fault import Fault, Span
 from bayesimpact.data.faults.held import find_held
@@ -40,7 +40,12 @@ DRIVEN = tuple(detector for detector in DETECTORS if detector not in FREE)
 
 def find_faults(campaign: Campaign) -> tuple[Fault, ...]:
     """Everything found in the recordings themselves, in their order; sample numbers as read."""
-    found = [fault for r in campaign.recordings for fault in recording_faults(r)]
+    smoothing = campaign.measurement.smoothing
+    found = [
+        behind_filter(fault, r, smoothing)
+        for r in campaign.recordings
+        for fault in recording_faults(r)
+    ]
     found += find_duplicates(campaign.recordings)
     found += loud_recordings([r for r in campaign.recordings if r.input is None])
     order = [r.name for r in campaign.recordings]

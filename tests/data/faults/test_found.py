@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import lfilter, savgol_filter
 
 from bayesimpact.data.bundled import bundled_campaign
-from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.campaign import Campaign, Smoothing
 from bayesimpact.data.faults.clipped import find_clipped
 from bayesimpact.data.faults.fault import Fault
 from bayesimpact.data.faults.find import find_faults, recording_faults, set_aside
@@ -168,6 +168,28 @@ def test_clipping(paper: Campaign, low: bool) -> None:
     fault = only(spoiled(paper, cut))
     assert fault.id == "recording_clipped" and fault.size == limit
     assert covered(fault) == set(np.flatnonzero((x <= limit) if low else (x >= limit)))
+
+
+def test_what_a_filter_made_of_clipped_readings_is_set_aside_with_them(paper: Campaign) -> None:
+    """Every kept reading that the likelihood weighs is the filter's of readings that were whole."""
+    x, window = paper.recordings[1].samples, 9
+    limit = 0.8 * float(x.min())
+    average = lambda x: savgol_filter(x, window, 0, mode="interp").round(9)  # noqa: E731
+    campaign = spoiled(paper, lambda x: average(np.maximum(x, limit)))
+    declared = replace(campaign.measurement, smoothing=Smoothing("savgol", window, 0))
+    cleaned, faults = set_aside(replace(campaign, measurement=declared))
+    assert [f.id for f in faults] == ["recording_clipped"]
+    used, reach = cleaned.recordings[1].used, window // 2
+    assert used is not None
+    weighed = np.convolve(~used, np.ones(2 * reach + 1), mode="same") < 0.5  # see `Noise`
+    spoilt = np.abs(average(np.maximum(x, limit)) - average(x)) > 0.0
+    near = np.zeros(x.size, bool)  # cuts shorter than the window leave no two readings alike
+    for first, end in faults[0].spans:
+        near[max(first - window, 0) : end + window] = True
+    assert (spoilt & near).sum() > 2 * window and not np.any(weighed & spoilt & near)
+    assert weighed.mean() > 0.9
+    plain = set_aside(campaign)[0].recordings[1].used
+    assert plain is not None and plain.sum() > used.sum()
 
 
 def scattered(x: np.ndarray, limit: float, scatter: float) -> np.ndarray:
