@@ -11,16 +11,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.diagnosis.extend import campaign_scales, extend
 from bayesimpact.diagnosis.faults.alone import SharedModel, own_fit
-from bayesimpact.diagnosis.faults.compare import LEAST, base_failed, misfits
+from bayesimpact.diagnosis.faults.compare import LEAST, Compared, base_failed, gain, misfits
+from bayesimpact.diagnosis.faults.correct import as_fault, corrected
 from bayesimpact.diagnosis.faults.own_stops import (
-    labels_are_doubted,
     share_stops,
     shared_values,
+    shown_label,
     with_own_stops,
 )
+from bayesimpact.diagnosis.faults.together import CERTAIN, Hypothesis, Weighed
 from bayesimpact.diagnosis.likely_sets import LikelySets
 from bayesimpact.diagnosis.naming import is_large, is_more_than_noise, leaves_something
 from bayesimpact.diagnosis.period_sets import PeriodSets
@@ -32,12 +36,16 @@ from bayesimpact.diagnosis.recording_faults import (
     values_of,
 )
 from bayesimpact.diagnosis.refit import fit_from
+from bayesimpact.diagnosis.term_sets import EffectSet
 from bayesimpact.diagnosis.thresholds import EXCESS
 from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.noise import Noise
 from bayesimpact.model.effects.effect import Effect
+from bayesimpact.model.oscillator import build_oscillator
+from bayesimpact.model.parameters import Layout
 
 MOST = 2  # effects beside which recordings are compared
-MOST_AT_STOPS = 3  # of those that periods ahead ask for
+MOST_AT_STOPS = 3  # of those that periods ahead ask for, beside which labels are doubted
 
 
 def faults_beside_physics(
@@ -67,31 +75,44 @@ def faults_beside_physics(
         steps = comparisons(before, as_read, chosen.effects, values)
         if steps and _leaves_nothing(model.fitted(steps[-1][-1].campaign)):
             return steps
-    return _labels_beside_physics(before, as_read, effects)
+    return _label_beside_physics(before, effects)
 
 
-def _labels_beside_physics(
-    before: Corrected, as_read: Campaign, effects: Sequence[Effect]
-) -> tuple[Step, ...]:
-    """Faults without which the likeliest laws leave `EXCESS` times less, where the stiffnesses that
-    recordings with stops of their own show beside these doubt a label, and leave as much less.
+def _label_beside_physics(before: Corrected, effects: Sequence[Effect]) -> tuple[Step, ...]:
+    """A wrong label that the contact stiffnesses of recordings with stops of their own show beside
+    the likeliest laws, where with the right one these leave `EXCESS` times less.
     """
     fit = before.identification.fit
-    if not share_stops(fit.target.oscillator.campaign):
+    campaign, noise = fit.target.oscillator.campaign, fit.target.likelihood.noise
+    if not share_stops(campaign):
         return ()
     scales, own = campaign_scales(fit), with_own_stops(fit)
-    sets = PeriodSets(own, effects, scales).best(MOST_AT_STOPS)
-    if not sets or not labels_are_doubted(fit.target.oscillator.campaign, sets[-1].values):
-        return ()
-    apart = fit_from(own, sets[-1].effects, sets[-1].values, scales).fit
-    layout = extend(fit, sets[-1].effects, scales).oscillator.layout
-    values = shared_values(apart, layout)
-    together = fit_from(fit, sets[-1].effects, values, scales).fit
-    most = together.reduced_chi2 / EXCESS
-    if apart.reduced_chi2 > most:
-        return ()
-    steps = comparisons(before, as_read, sets[-1].effects, values)
-    return steps if steps and steps[-1][-1].after <= most else ()
+    for chosen in PeriodSets(own, shared_effects(effects), scales).best(MOST_AT_STOPS)[::-1]:
+        shown = shown_label(campaign, chosen.values)
+        if shown is None:
+            continue
+        place, case = shown
+        label = Weighed(Hypothesis("recording_case", place, case=case), 0.0)
+        right = corrected(campaign, place, label)
+        layout = extend(own, chosen.effects, scales).oscillator.layout
+        given, put_right = (
+            _left_by(chosen, layout, labelled, noise) for labelled in (campaign, right)
+        )
+        if given > EXCESS * put_right:
+            recording, gained = campaign.recordings[place], gain(given, put_right, right)
+            fault = as_fault(recording, label, gained, CERTAIN)
+            return ((Compared(fault, right, given, put_right),),)
+    return ()
+
+
+def _left_by(chosen: EffectSet, own: Layout, campaign: Campaign, noise: Noise) -> float:
+    """Reduced chi-squared of laws with the values of recordings with own stops, those of a
+    campaign's labels put together; infinite where it allows no fit.
+    """
+    shared = build_oscillator(campaign, chosen.effects).layout
+    values = shared_values(chosen.values, own, shared)
+    found = SharedModel(noise, chosen.effects, values).fitted(campaign)
+    return np.inf if found is None else found.reduced_chi2
 
 
 def _leaves_nothing(fit: Fit | None) -> bool:

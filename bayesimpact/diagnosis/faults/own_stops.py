@@ -25,12 +25,12 @@ from bayesimpact.model.parameters import Layout
 Array = NDArray[np.float64]
 
 STEP = 1e-6  # of a parameter, for differences
-CHANCE = 0.01  # of stiffnesses that speak against a label: it only decides what is compared
+CHANCE = 0.01  # of stiffnesses that doubt a label: it only decides what is fitted; set by hand
 
 
 def share_stops(campaign: Campaign) -> bool:
-    """Whether some recordings are said to share a stop."""
-    return campaign.stop and len(campaign.cases) < len(campaign.recordings)
+    """Whether there are several stops, and some recordings are said to share one."""
+    return campaign.stop and 1 < len(campaign.cases) < len(campaign.recordings)
 
 
 def with_own_stops(fit: Fit) -> Fit:
@@ -51,11 +51,14 @@ def with_own_stops(fit: Fit) -> Fit:
     return find_mode(Target(likelihood, priors, fit.target.replaced), start, steps=steps)
 
 
-def shared_values(own: Fit, layout: Layout) -> dict[str, float]:
-    """Parameter of the same model with shared stops -> value; the mean of those that share it."""
-    places = shared_places(own.target.oscillator.layout, layout)
-    total = np.bincount(places, own.mode, layout.size) / np.bincount(places, minlength=layout.size)
-    return dict(zip(layout.names, map(float, total), strict=True))
+def shared_values(values: Mapping[str, float], own: Layout, shared: Layout) -> dict[str, float]:
+    """Parameter of a layout with shared stops -> value: the mean of `values` of those that share
+    it in a layout with `own` ones.
+    """
+    places = shared_places(own, shared)
+    found = np.array([values[name] for name in own.names])
+    total = np.bincount(places, found, shared.size) / np.bincount(places, minlength=shared.size)
+    return dict(zip(shared.names, map(float, total), strict=True))
 
 
 def shared_places(own: Layout, shared: Layout) -> NDArray[np.int64]:
@@ -70,24 +73,25 @@ def _place(layout: Layout, name: str) -> int:
     return layout.index(name) if name in layout.names else -1
 
 
-def labels_are_doubted(campaign: Campaign, values: Mapping[str, float]) -> bool:
-    """Whether stiffnesses `k2[<recording>]` agree far better once one recording has another label.
+def shown_label(campaign: Campaign, values: Mapping[str, float]) -> tuple[int, str] | None:
+    """The recording, by its place, and the label with which stiffnesses `k2[<recording>]` agree far
+    better; None where no label is doubted, or a stiffness is not positive, which measures none.
 
-    By an F test of their logarithms against the scatter that is left then; not where a stiffness is
-    not positive, which none of these measures.
+    By F tests of their logarithms against the scatter that is left then.
     """
     stiffness = np.array([values[f"k2[{r.name}]"] for r in campaign.recordings])
     if not np.all(stiffness > 0.0):
-        return False
+        return None
     logs, labels = np.log(stiffness), [r.case for r in campaign.recordings]
-    before, least = _scatter(logs, labels)[0], 1.0
+    before, found = _scatter(logs, labels)[0], list[tuple[float, tuple[int, str]]]()
     for r, own in enumerate(labels):
-        for other in {*labels, ""} - {own}:  # "": a stop that no other recording shows
+        for other in sorted({*labels} - {own}):
             left, freedom = _scatter(logs, [*labels[:r], other, *labels[r + 1 :]])
             if freedom > 0:
                 ratio = (before - left) / max(left / freedom, 1e-300)
-                least = min(least, float(f_distribution.sf(ratio, 1, freedom)))
-    return least < CHANCE
+                found.append((float(f_distribution.sf(ratio, 1, freedom)), (r, other)))
+    chance, best = min(found, default=(1.0, (0, "")))
+    return best if chance < CHANCE else None
 
 
 def _scatter(logs: Array, labels: Sequence[str]) -> tuple[float, int]:

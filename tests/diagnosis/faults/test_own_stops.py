@@ -13,10 +13,10 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.diagnosis.extend import campaign_scales, extend
 from bayesimpact.diagnosis.faults.alone import NAMES, SharedModel, fit_alone
 from bayesimpact.diagnosis.faults.own_stops import (
-    labels_are_doubted,
     share_stops,
     shared_places,
     shared_values,
+    shown_label,
     with_own_stops,
 )
 from bayesimpact.diagnosis.first_physics import faults_beside_physics
@@ -60,19 +60,26 @@ def test_a_wrong_label_is_found_beside_strong_laws_and_no_right_one(recorded: Ca
     assert found(recorded) == []
 
 
-def test_stiffnesses_doubt_a_label() -> None:
+def test_stiffnesses_show_a_label() -> None:
     campaign = small_rig.record(1, releases=RELEASES, chain=small_rig.Chain(noise=1e-6))
-    names = [f"k2[{release.name}]" for release in RELEASES]
-    right, wrong = (
-        [5000.0, 5060.0, 3000.0, 2980.0, 3010.0],
-        [5000.0, 5060.0, 3000.0, 2980.0, 5020.0],
-    )
-    doubted = lambda values: labels_are_doubted(campaign, dict(zip(names, values, strict=True)))  # noqa: E731
-    assert not doubted(right) and doubted(wrong)
-    assert not doubted([5000.0, 4000.0, 3000.0, 2500.0, 3400.0])  # scatter is no label
-    assert not doubted([*wrong[:4], -5020.0])
+    right = [5000.0, 5060.0, 3000.0, 2980.0, 3010.0]
+
+    def shown(stiffness: list[float]) -> tuple[int, str] | None:
+        names = (f"k2[{release.name}]" for release in RELEASES)
+        return shown_label(campaign, dict(zip(names, stiffness, strict=True)))
+
+    assert shown(right) is None
+    assert shown([*right[:4], 5020.0]) == (4, "1")
+    assert shown([5000.0, 4000.0, 3000.0, 2500.0, 3400.0]) is None  # scatter is no label
+    assert shown([*right[:4], 4200.0]) is None  # nor is a stop that no other recording shows
+    assert shown([*right[:4], -5020.0]) is None
+
+
+def test_some_recordings_share_one_of_several_stops() -> None:
+    campaign = small_rig.record(1)
     assert share_stops(campaign)
-    assert not share_stops(replace(campaign, recordings=campaign.recordings[1:3]))
+    assert not share_stops(replace(campaign, recordings=campaign.recordings[1:]))
+    assert not share_stops(replace(campaign, recordings=campaign.recordings[:2]))
 
 
 def test_parameters_find_their_places() -> None:
@@ -86,7 +93,8 @@ def test_parameters_find_their_places() -> None:
     named = dict(zip(own.names, (layout.names[i] for i in places), strict=True))
     assert named.pop("k2[a]") == named.pop("k2[b]") == "k2[1]" and named.pop("k2[c]") == "k2[2]"
     assert all(one == other for one, other in named.items())
-    values = shared_values(own, layout)
+    known = dict(zip(own.names, map(float, own.mode), strict=True))
+    values = shared_values(known, own.target.oscillator.layout, layout)
     assert set(values) == set(fit.names)
     assert values["k2[1]"] == pytest.approx((own.value("k2[a]") + own.value("k2[b]")) / 2)
     laws = [BY_ID["contact_damping_per_case"]]
