@@ -10,8 +10,8 @@
    needs all of its effects beside these: the simpler of two such answers stays.
 4. An answer that explains everything keeps the corrections of 2 and 3 only where, beside its
    effects, the recordings as they were still differ by more than chance.
-5. A start that is no free decay yet, and spikes, may only show against a fit with that physics:
-   then once more without them. Under slow noise, where the likeliest model leaves that alone.
+5. A start that is no free decay yet may only show against a fit with that physics: then once more
+   without it. Spikes that only show there, and slow noise, are found by the search itself.
 
 All searches have one budget of computing, which begins with the first. What is left of it after one
 is the next one's; where that is too little, the next one is not begun. An answer that was not
@@ -33,7 +33,6 @@ from bayesimpact.diagnosis.budget import Budget, begin
 from bayesimpact.diagnosis.decision import Verdict
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.faults.compare import base_failed, gain, misfits
-from bayesimpact.diagnosis.faults.outliers import residual_spikes
 from bayesimpact.diagnosis.faults.unfree_start import BETTER, unfree_starts
 from bayesimpact.diagnosis.first_physics import faults_beside_physics
 from bayesimpact.diagnosis.loop import Diagnosis, Progress, diagnose_fit
@@ -47,6 +46,7 @@ from bayesimpact.diagnosis.recording_faults import (
     fitted_beside,
     shared_effects,
     values_of,
+    with_spikes,
     with_steps,
     without_faults,
 )
@@ -89,6 +89,7 @@ class Searches:
     effects: Sequence[Effect]
     progress: Progress
     budget: Budget
+    as_read: Campaign
 
     def search(self, corrected: Corrected, first: Fit | None = None) -> Diagnosis:
         """With what is left of the budget, from the model of `first` on where that is given."""
@@ -99,6 +100,7 @@ class Searches:
             progress=self.progress,
             budget=self.budget,
             first=first,
+            as_read=self.as_read,
         )
 
     def again(
@@ -161,7 +163,7 @@ def diagnose(
             break
         proved = proved or exceeds(doubtful[0], fit, float(promised.sum()))
         certain = with_steps(certain, [doubtful.pop(0)], rng=rng, search=search)
-    searches = Searches(rng, effects, say, begin(clock))
+    searches = Searches(rng, effects, say, begin(clock), campaign)
     found = searches.search(certain)
     beside = [e for e in found.effects if e in found.after.target.oscillator.effects]
     if shared_effects(beside) and is_doubtful(found):
@@ -173,7 +175,6 @@ def diagnose(
         found = searches.again(found, lambda: cleaned, lambda other, _: is_settled(other))
     found = _without_needless_faults(found, cleaned, searches)
     found = _without_unfree_start(found, campaign, searches)
-    found = _without_late_spikes(found, campaign, searches)
     undecided = found.corrected is not None and found.corrected.is_open
     return replace(found, verdict="ambiguous") if undecided and is_settled(found) else found
 
@@ -276,19 +277,6 @@ def without_uncertain_formulas(found: Diagnosis) -> Fit:
     return rest[0] if rest else found.before
 
 
-def _without_late_spikes(found: Diagnosis, as_read: Campaign, searches: Searches) -> Diagnosis:
-    """The answer without spikes that only the extended fit shows, if it leaves nothing then."""
-    spikes = () if as_read.keep_faults or base_failed(found.after) else residual_spikes(found.after)
-    corrected = found.corrected
-    if not spikes or corrected is None:
-        return found
-    return searches.again(
-        found,
-        lambda: without_faults(corrected, spikes, as_read, rng=searches.rng),
-        lambda other, own: is_settled(other) and len(other.effects) <= len(own.effects),
-    )
-
-
 def _of_corrected(
     corrected: Corrected,
     *,
@@ -297,6 +285,7 @@ def _of_corrected(
     progress: Progress,
     budget: Budget,
     first: Fit | None,
+    as_read: Campaign,
 ) -> Diagnosis:
     """The diagnosis of a campaign whose faults are set aside or corrected."""
     for fault in corrected.faults:
@@ -307,6 +296,9 @@ def _of_corrected(
     found = diagnose_fit(
         through, rng=rng, effects=effects, progress=progress, budget=budget, first=first
     )
+    if found.naming.spikes:
+        corrected = with_spikes(corrected, found.identification, found.naming.spikes, as_read)
+        through = found.identification
     if corrected.filtered is not None:
         campaign = through.fit.target.oscillator.campaign
         measurement = replace(campaign.measurement, smoothing=None)

@@ -9,11 +9,14 @@ physics and decide between near-opposites that scores cannot tell apart.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bayesimpact.diagnosis.budget import Budget
 from bayesimpact.diagnosis.evidence import model_evidence
+from bayesimpact.diagnosis.faults.compare import Compared
+from bayesimpact.diagnosis.faults.outliers import all_that_remains, still_off, without
 from bayesimpact.diagnosis.force import missing_contact
 from bayesimpact.diagnosis.models import NOTHING, STARTS, UNCONVERGED_SHORTFALL, Progress
 from bayesimpact.diagnosis.naming import Naming, State, explains_most, is_large
@@ -33,7 +36,6 @@ from bayesimpact.diagnosis.slow_noise import remaining_noise, under_noise
 from bayesimpact.diagnosis.unknown import learn_force
 from bayesimpact.diagnosis.unlisted import Problem, Unlisted
 from bayesimpact.inference.fit import Fit
-from bayesimpact.inference.noise import Noise
 from bayesimpact.model.effects.effect import Effect, Scales
 
 # Effects from which on a single force in contact is fitted in their place: three sizes can follow
@@ -66,8 +68,9 @@ def name(
     still leaves something. It begins with the model of `first` instead, a fit to the same campaign,
     where that is given.
 
-    Where what remains is slow noise of the measuring chain, and time allows, the search begins once
-    more under that noise from the model that left it; it counts if it leaves nothing then.
+    Where what remains is slow noise of the measuring chain or spikes of the readings, and time
+    allows, the search begins once more under that noise, or without these, from the model that left
+    them; it counts if it leaves nothing then.
 
     A search that has used up the `budget` begins no more refits, and names nothing that it has not
     compared with all that might do the same.
@@ -75,24 +78,54 @@ def name(
     say = progress or (lambda message: None)
     search = _Search(effects, scales, rng, say, budget)
     base, state = search.found(fit, first)
-    noise = _remaining_noise(state) if search.budget.may_search_again() else None
-    if noise is not None:
-        say("what remains is slow noise: once more under that")
-        found = state.candidate.fit
+    anew = _posed_anew(fit, state, say) if search.budget.may_search_again() else None
+    if anew is not None:
         again = _Search(effects, scales, rng, say, search.budget)
-        quiet = again.found(
-            under_noise(fit, noise), under_noise(found, noise) if found is not fit else None
-        )
+        quiet = again.found(anew.base, anew.first)
         if quiet[1].is_white:
-            return again.naming(*quiet)
+            return replace(again.naming(*quiet), spikes=anew.spikes)
     return search.naming(base, state)
 
 
-def _remaining_noise(state: State) -> Noise | None:
-    """The slow noise that a model leaves, if it leaves no more than a little, and nothing else."""
-    if state.is_white or is_large(state.candidate.fit):
+@dataclass(frozen=True, eq=False)
+class _Posed:
+    """A search posed anew: from which base model, from which other one if any, without what."""
+
+    base: Fit
+    first: Fit | None
+    spikes: tuple[Compared, ...] = ()
+
+
+def _posed_anew(base: Fit, state: State, say: Progress) -> _Posed | None:
+    """The search without the spikes, or under the slow noise, that are all that a model leaves."""
+    found = state.candidate.fit
+    posed = _without_spikes(base, found)
+    if posed is not None:
+        say("what remains is spikes: once more without them")
+        return posed
+    noise = None if state.is_white or is_large(found) else remaining_noise(found)
+    if noise is None:
         return None
-    return remaining_noise(state.candidate.fit)
+    say("what remains is slow noise: once more under that")
+    first = under_noise(found, noise) if found is not base else None
+    return _Posed(under_noise(base, noise), first)
+
+
+def _without_spikes(base: Fit, found: Fit) -> _Posed | None:
+    spikes = all_that_remains(found)
+    if not spikes:
+        return None
+    clean = without(found, spikes)
+    lasting = still_off(found, clean, spikes)
+    if not lasting:
+        return None
+    if len(lasting) < len(spikes):  # others had shifted a contact
+        clean = without(found, lasting)
+    change = found.reduced_chi2, clean.reduced_chi2
+    told = tuple(Compared(f, clean.target.oscillator.campaign, *change) for f in lasting)
+    return (
+        _Posed(clean, None, told) if found is base else _Posed(without(base, lasting), clean, told)
+    )
 
 
 class _Search(Unlisted):
@@ -108,6 +141,8 @@ class _Search(Unlisted):
         begun = set[frozenset[str]]()
         while True:
             state = self.grown(beam)
+            if self.leaves_spikes(state):
+                break
             with_term = self.with_a_term(state, excess=1.0)
             if with_term is not state:
                 beam = [with_term]
@@ -131,7 +166,7 @@ class _Search(Unlisted):
     def grown(self, beam: list[State]) -> State:
         """The model that ever more effects lead to from the first of a beam, or beside it."""
         state, self.left = beam[0], None
-        while not state.is_white and self.may_go_on():
+        while not (state.is_white or self.leaves_spikes(state)) and self.may_go_on():
             found, waiting = self.extensions([s for s in beam if self.may_grow(s)])
             better = self.best_first(state, found)
             if not better or not self.leads_on(state, better[0]):
@@ -143,6 +178,11 @@ class _Search(Unlisted):
                 beside = [self.examine(c) for c in self.beside(state, better)]
                 beam = [state, *waiting, *beside]
         return state
+
+    def leaves_spikes(self, state: State) -> bool:
+        """Whether spikes of the readings are all that a model leaves, and time is left to ask."""
+        may_ask = not state.is_white and self.budget.may_search_again()
+        return may_ask and bool(all_that_remains(state.candidate.fit))
 
     def extensions(self, beam: Sequence[State]) -> tuple[list[Candidate], list[State]]:
         """Models with one more effect than those of a beam, and what of the beam has to wait: where

@@ -17,6 +17,7 @@ import numpy as np
 
 from bayesimpact.data.short_repr import short_repr
 from bayesimpact.diagnosis.discrepancy import Discrepancy
+from bayesimpact.diagnosis.faults.compare import Compared
 from bayesimpact.diagnosis.force import MissingForce
 from bayesimpact.diagnosis.refit import Candidate, tempered_evidence
 from bayesimpact.diagnosis.scan import Scan
@@ -97,6 +98,7 @@ class Naming:
         remainder may have done to it in them (`discrepancy`); empty where nothing remains
     power : of the force of time that models leave about the motion's own frequencies, N2, by their
         ids: the chosen one and those without an effect that may be needed
+    spikes : readings that a model which left nothing else showed to be far off, set aside
     """
 
     base: State
@@ -113,6 +115,7 @@ class Naming:
     own: Discrepancy | None = None
     apart: Mapping[str, float] = field(default_factory=dict)
     power: Mapping[frozenset[str], float] = field(default_factory=dict)
+    spikes: tuple[Compared, ...] = ()
 
     __repr__ = short_repr
 

@@ -109,6 +109,15 @@ def without_faults(
     )
 
 
+def with_spikes(
+    before: Corrected, identification: Identification, spikes: Step, as_read: Campaign
+) -> Corrected:
+    """The same with spikes set aside that a model showed; `identification` is without them."""
+    whole = before.identification.fit.target.oscillator.campaign
+    told = tuple(replace(one, fault=_as_read(one.fault, whole, as_read)) for one in spikes)
+    return replace(before, identification=identification, compared=(*before.compared, *told))
+
+
 def _as_read(fault: Fault, campaign: Campaign, as_read: Campaign) -> Fault:
     """A fault found in a campaign, its samples counted from the recording's first as read."""
     now, before = ({r.name: r for r in c.recordings}[fault.recording] for c in (campaign, as_read))

@@ -95,7 +95,8 @@ def searches(
 
     monkeypatch.setattr(whole, "_of_corrected", searched)
     rng = np.random.default_rng(0)
-    return whole.Searches(rng, (), lambda message: None, begin(clock)), given
+    campaign: Any = None
+    return whole.Searches(rng, (), lambda message: None, begin(clock), campaign), given
 
 
 def better(answer: bool) -> Callable[[Any, Any], bool]:

@@ -127,6 +127,30 @@ def test_spikes_that_show_only_beside_the_physics_are_set_aside_too() -> None:
     assert [f.id for f in found.corrected.faults] == ["recording_spikes"]
 
 
+def test_spikes_away_from_the_stop_that_physics_hides_are_found_by_the_search() -> None:
+    """In accelerations they look like contacts; a contact would have moved all that comes after."""
+    cubic = {"spring_cubic": {"stiffness": 2e6}}
+    chain = small_rig.Chain(noise=0.05, offsets=dict.fromkeys("abc", 0.0))
+    campaign = small_rig.record(63, cubic, chain=chain, quantity="acceleration")
+    first, *others = campaign.recordings
+    samples, places = first.samples.copy(), (403, 1106, 1750)
+    for place in places:
+        samples[place] -= 1.2
+    campaign = replace(campaign, recordings=(replace(first, samples=samples), *others))
+    told: list[str] = []
+    found = diagnose(
+        campaign, rng=np.random.default_rng(0), effects=(BY_ID["spring_cubic"], *CATALOGUE[:1]),
+        search=False, progress=told.append,
+    )  # fmt: skip
+    assert found.verdict == "named" and [e.id for e in found.effects] == ["spring_cubic"]
+    assert found.corrected is not None
+    (fault,) = found.corrected.faults
+    assert (fault.id, fault.recording) == ("recording_spikes", "a")
+    assert fault.spans == tuple((place, place + 1) for place in places)
+    assert 0.9 < found.after.reduced_chi2 < 1.1
+    assert "what remains is spikes: once more without them" in told
+
+
 def test_doubtful_faults_come_after_certain_ones_and_physics(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

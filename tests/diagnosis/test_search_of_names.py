@@ -47,6 +47,7 @@ def run(monkeypatch):
         monkeypatch.setattr(remaining, "is_imitated", lambda naming: False)
         monkeypatch.setattr(search, "promising_pairs", lambda scan, count: ())
         monkeypatch.setattr(search, "remaining_noise", lambda fit: None)
+        monkeypatch.setattr(search, "all_that_remains", lambda fit: ())
         for force in ("missing_force", "missing_drift"):
             monkeypatch.setattr(models, force, table.missing)
         monkeypatch.setattr(

@@ -75,7 +75,13 @@ def test_a_search_begins_with_slow_noise_whatever_was_corrected_before():
     noise = corrected.identification.noise
     assert noise.others and corrected.identification.fit.target.likelihood.noise is noise
     found = whole._of_corrected(
-        corrected, rng=RNG(0), effects=(), progress=lambda _: None, budget=begin(), first=None
+        corrected,
+        rng=RNG(0),
+        effects=(),
+        progress=lambda _: None,
+        budget=begin(),
+        first=None,
+        as_read=campaign,
     )
     assert found.verdict == "adequate" and found.after.target.likelihood.noise is noise
 

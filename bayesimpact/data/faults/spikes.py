@@ -45,28 +45,30 @@ def find_spikes(recording: Recording) -> list[Fault]:
     return _fault(recording, [*close, *lost, *_unpredicted(rest)])
 
 
-def lone_spikes(recording: Recording) -> list[Fault]:
+def lone_spikes(recording: Recording, *, contacts: bool = True) -> list[Fault]:
     """Up to five samples in a row far off what both sides predict alike; impacts are none.
 
-    A brief contact is a spike of the acceleration away from the stop: such a one does not count.
+    A brief contact is a spike of the acceleration away from the stop: such a one does not count, as
+    long as there may be `contacts` in the readings.
 
     The statistic is the smaller of the deviations from either side over the bulk of such
     deviations. It has to pass the Gaussian threshold and four times the 97th percentile over the
     recording, which is what the corners of the motion itself reach.
     """
-    return _fault(recording, _unpredicted(recording))
+    return _fault(recording, _unpredicted(recording, contacts))
 
 
-def _unpredicted(recording: Recording) -> list[Spike]:
+def _unpredicted(recording: Recording, contacts: bool = True) -> list[Spike]:
     """What `lone_spikes` finds, none touching another."""
     x = recording.samples
+    brief = contacts and recording.order == 2 and bool(recording.case)
     period = crossing_period(x, 1.0)
     form = best_form(x, period)
     least = gaussian_threshold(x.size * LONGEST)
     found: list[tuple[float, float, Span]] = []
     for width in range(1, LONGEST + 1):
         for strength, size, span in _of_width(x, form, width, least):
-            if not (size < 0.0 and recording.order == 2 and recording.case):
+            if size >= 0.0 or not brief:
                 found.append((strength, size, span))
     chosen: list[Spike] = []
     for strength, size, (first, end) in sorted(found, reverse=True):

@@ -12,22 +12,82 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
-from bayesimpact.data.faults.fault import Fault
+from bayesimpact.data.faults.fault import Fault, gaussian_threshold
 from bayesimpact.data.faults.find import applied
+from bayesimpact.data.faults.local import robust_sd
 from bayesimpact.data.faults.spikes import lone_spikes
+from bayesimpact.diagnosis.naming import is_more_than_noise
+from bayesimpact.diagnosis.thresholds import LARGE
+from bayesimpact.inference.declared import climbed
 from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.likelihood import Likelihood
+from bayesimpact.model.oscillator import Oscillator
+
+Array = NDArray[np.float64]
+
+HALF_WITHIN = 0.6745  # standard deviations of Gaussian noise
 
 
-def residual_spikes(fit: Fit) -> tuple[Fault, ...]:
-    """Spikes in the residuals of a fit; samples that are set aside count as fitted."""
+def residual_spikes(fit: Fit, *, contacts: bool = True) -> tuple[Fault, ...]:
+    """Spikes in the residuals of a fit; samples that are set aside count as fitted.
+
+    contacts : whether the fit may have missed brief ones
+    """
     found: list[Fault] = []
     recordings = fit.target.oscillator.campaign.recordings
     for recording, residual in zip(recordings, fit.residuals, strict=True):
         kept = residual if recording.used is None else np.where(recording.used, residual, 0.0)
-        found += lone_spikes(replace(recording, samples=kept))
+        found += lone_spikes(replace(recording, samples=kept), contacts=contacts)
     return tuple(found)
+
+
+def all_that_remains(fit: Fit) -> tuple[Fault, ...]:
+    """Spikes of a fit that leaves no more than noise beside them; () of every other.
+
+    A contact that it missed would have moved all that comes after it.
+    """
+    kept = fit.target.oscillator.campaign.keep_faults
+    if kept or np.median(np.abs(_misses(fit, ()))) > LARGE * HALF_WITHIN:
+        return ()
+    spikes = residual_spikes(fit, contacts=False)
+    rest = float(np.mean(_misses(fit, spikes) ** 2))
+    return () if is_more_than_noise(rest, fit.target.likelihood.noise) else spikes
+
+
+def _misses(fit: Fit, faults: Sequence[Fault]) -> Array:
+    """Residuals over the noise, those of faults left out, (n,)."""
+    noise, found = fit.target.likelihood.noise, list[Array]()
+    recordings = fit.target.oscillator.campaign.recordings
+    for recording, residual in zip(recordings, fit.residuals, strict=True):
+        kept = np.ones(residual.size, bool) if recording.used is None else recording.used.copy()
+        for first, end in (s for f in faults if f.recording == recording.name for s in f.spans):
+            kept[first:end] = False
+        found.append(residual[kept] / (noise.level * noise.scales[recording.order]))
+    return np.concatenate(found)
+
+
+def without(fit: Fit, faults: Sequence[Fault]) -> Fit:
+    """A model's mode where samples of its campaign are set aside."""
+    old = fit.target.oscillator
+    campaign = faults_set_aside(old.campaign, faults)
+    oscillator = Oscillator(campaign, old.effects, old.layout, old.smoothing)
+    likelihood = Likelihood(oscillator, fit.target.likelihood.noise)
+    return climbed(replace(fit.target, likelihood=likelihood), fit)
+
+
+def still_off(fit: Fit, clean: Fit, faults: Sequence[Fault]) -> tuple[Fault, ...]:
+    """Those faults of a fit with a reading that the fit without all of them misses as well."""
+    kept = list[Fault]()
+    recordings, bridged = (f.target.oscillator.campaign.recordings for f in (fit, clean))
+    for recording, other, residual in zip(recordings, bridged, clean.residuals, strict=True):
+        missed = np.abs(recording.samples - (other.samples - residual))
+        least = gaussian_threshold(missed.size) * robust_sd(residual)
+        own = (fault for fault in faults if fault.recording == recording.name)
+        kept += [f for f in own if max(missed[a:b].max() for a, b in f.spans) > least]
+    return tuple(kept)
 
 
 def faults_set_aside(campaign: Campaign, faults: Sequence[Fault]) -> Campaign:
