@@ -88,10 +88,7 @@ class Asked:
         acting = (*fit.target.oscillator.acting, *model.effects)
         if not self.hums or any(map(is_periodic, acting)):
             return fit
-        o = fit.target.oscillator
-        o = replace(o, campaign=replace(o.campaign, recordings=self.quiet))
-        likelihood = replace(fit.target.likelihood, oscillator=o)
-        return replace(fit, target=replace(fit.target, likelihood=likelihood))
+        return fit.with_recordings(self.quiet)
 
     def first(
         self, model: Candidate, about: Candidate, instead: str = ""

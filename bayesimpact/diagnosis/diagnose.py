@@ -1,7 +1,7 @@
 """The whole way: faults of the recordings and missing physics, told from one another.
 
 1. What recordings show of themselves is set aside, and the base model fitted, through the filter
-   that the noise proves if it does.
+   that the noise proves if it does. So are starts that the equation of motion shows to be pushed.
 2. What comparing them shows is corrected, step by step, as long as a step gains more than any
    effect promises. Where physics then leaves something, once more without these corrections, unless
    one gained more than all effects together promise.
@@ -33,6 +33,7 @@ from bayesimpact.diagnosis.budget import Budget, begin
 from bayesimpact.diagnosis.decision import Verdict
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.faults.compare import base_failed, gain, misfits
+from bayesimpact.diagnosis.faults.pushed_start import pushed_starts
 from bayesimpact.diagnosis.faults.unfree_start import BETTER, unfree_starts
 from bayesimpact.diagnosis.first_physics import faults_beside_physics
 from bayesimpact.diagnosis.loop import Diagnosis, Progress, diagnose_fit
@@ -150,6 +151,10 @@ def diagnose(
     say = progress or (lambda message: None)
     say("fitting the base model")
     cleaned = cleaned_campaign(campaign, rng=rng, search=search)
+    first = cleaned.identification.fit
+    pushed = pushed_starts(first, effects, campaign_scales(first)) if is_large(first) else ()
+    if pushed:
+        cleaned = without_faults(cleaned, pushed, campaign, rng=rng)
     say("comparing the recordings")
     certain, doubtful, proved = cleaned, list(comparisons(cleaned, campaign)), False
     beside_physics = faults_beside_physics(cleaned, campaign, effects, doubtful)

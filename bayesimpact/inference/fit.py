@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from bayesimpact.data.html import html_table, resolved
+from bayesimpact.data.recording import Recording
 from bayesimpact.data.short_repr import short_repr
 from bayesimpact.inference.likelihood import Likelihood, Linearisation
 from bayesimpact.inference.prior import Prior
@@ -107,6 +108,15 @@ class Fit:
     def value(self, name: str) -> float:
         """The mode of one parameter."""
         return float(self.mode[self.target.oscillator.layout.index(name)])
+
+    def with_recordings(self, recordings: Sequence[Recording]) -> Fit:
+        """The same point of a posterior of other recordings, of the same names: no mode of it, but
+        what problems about the fit are posed on.
+        """
+        o = self.target.oscillator
+        o = replace(o, campaign=replace(o.campaign, recordings=tuple(recordings)))
+        likelihood = replace(self.target.likelihood, oscillator=o)
+        return replace(self, target=replace(self.target, likelihood=likelihood))
 
     @property
     def log_likelihood(self) -> float:

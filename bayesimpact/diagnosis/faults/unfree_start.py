@@ -41,7 +41,7 @@ def unfree_starts(fit: Fit) -> tuple[Fault, ...]:
         ratios = [_ratio(whole, _alone(fit, r, first), first) for first in firsts]
         if max(ratios) > BETTER:
             at = next(i for i, x in enumerate(ratios) if x >= max(BETTER, NEARLY * max(ratios)))
-            found.append(_fault(fit, r, firsts[at], ratios[at]))
+            found.append(start_fault(fit, r, firsts[at], ratios[at], BETTER))
     return tuple(found)
 
 
@@ -76,7 +76,8 @@ def _ratio(whole: Fit, later: Fit, first: int) -> float:
     return float(before @ before) / max(float(after @ after), after.size * level**2)
 
 
-def _fault(fit: Fit, r: int, first: int, ratio: float) -> Fault:
+def start_fault(fit: Fit, r: int, first: int, ratio: float, threshold: float) -> Fault:
+    """A start that is not free before a sample, without which so many times less is left."""
     recording = fit.target.oscillator.campaign.recordings[r]
     seconds = first * recording.interval
     return Fault(
@@ -90,6 +91,6 @@ def _fault(fit: Fit, r: int, first: int, ratio: float) -> Fault:
         statement=f"the motion is not yet free for the first {seconds:.3g} s ({first} samples)",
         remedy=f"start_s = {file_time(recording, first - 0.4):.9g}",
         strength=ratio,
-        threshold=BETTER,
+        threshold=threshold,
         action="cut",
     )
