@@ -26,11 +26,14 @@ from bayesimpact.diagnosis.period_sets import PeriodSets
 from bayesimpact.diagnosis.period_terms import periods_with_terms
 from bayesimpact.diagnosis.promising import NEAR_BEST, NEAR_MARGIN
 from bayesimpact.diagnosis.refit import Candidate
+from bayesimpact.diagnosis.term_sets import TermSets
+from bayesimpact.diagnosis.thresholds import EXCESS
 from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
 
 ASKED = 4  # effects that are tried beside a model, by every problem
+ALIKE = 1.0 - 1.0 / EXCESS  # of what an effect explains: what explains more of it may imitate it
 
 
 class Asked:
@@ -98,12 +101,16 @@ class Asked:
         The equation of motion is posed `about` the best model known. With a stop it is asked for
         what acts in flight, and periods ahead of the model for the rest; where no period is told,
         the equation over all stretches. In the place of an effect `instead`, where `about` leaves
-        nothing, only what comes near its gain by a problem that sees it is asked for.
+        nothing, only what comes near its gain by a problem that sees it is asked for, and all that
+        is as good as alike there.
         """
-        gains = [self.about(about, self.has_stop).gains(model.ids)]
+        problems: list[tuple[TermSets, tuple[str, ...]]] = []
+        problems.append((self.about(about, self.has_stop), model.ids))
         if self.has_stop:
-            ahead = self.ahead(model, about).gains()
-            gains.append(ahead or self.about(about, flight=False).gains(model.ids))
+            ahead = self.ahead(model, about)
+            every = (self.about(about, flight=False), model.ids)
+            problems.append((ahead, ()) if ahead.terms else every)
+        gains = [problem.gains(ids) for problem, ids in problems]
         judges = [g for g in gains if instead in g] or gains
         first, seen = set[str](), set[str]()
         for found in judges:
@@ -111,6 +118,9 @@ class Asked:
             kept = {i: g for i, g in found.items() if i not in seen and g >= least}
             first |= set(sorted(kept, key=lambda i: -kept[i])[:ASKED])
             seen |= set(found)
+        if instead:
+            shares = (problem.likeness(ids, instead) for problem, ids in problems)
+            first |= {i for alike in shares for i, share in alike.items() if share > ALIKE}
         return first, seen.union(*gains)
 
 

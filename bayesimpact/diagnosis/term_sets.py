@@ -94,8 +94,7 @@ class TermSets:
 
     def columns(self, chosen: Sequence[int]) -> list[int]:
         """Of the base model and of the terms `chosen`."""
-        own = [i for t in chosen for i in range(self.first[t], self.first[t + 1])]
-        return [*self.base, *own]
+        return [*self.base, *(i for t in chosen for i in self._places(t))]
 
     def solve(self, chosen: Sequence[int]) -> tuple[Array, float]:
         """Scaled unknowns of a set, and the log of what it leaves per row, at least 0."""
@@ -168,6 +167,41 @@ class TermSets:
             gain = self.log_odds((*held, t)) - before
             found[own] = max(found.get(own, -np.inf), gain)
         return found
+
+    def likeness(self, ids: Collection[str], effect: str) -> dict[str, float]:
+        """Of what an effect explains beside a set, the share that every other one explains as well
+        with its own sizes, at its best shape; {} where no term stands for the effect.
+        """
+        chosen = self.shaped([*ids, effect])
+        own = [t for t in chosen if self.terms[t].effect.id == effect]
+        if not own:
+            return {}
+        held = [t for t in chosen if t not in own]
+        sizes = self.solve((*held, *own))[0][len(self.columns(held)) :]
+        place = self._places(own[0])
+        found = dict[str, float]()
+        for t in self._beside(held):
+            other, key = self._places(t), self.terms[t].effect.id
+            if key == effect:
+                continue
+            at = [*place, *other]
+            left = self._beside_columns(self.columns(held), at)
+            asked, cross = left[: len(place), : len(place)], left[len(place) :, : len(place)]
+            right, whole = cross @ sizes, float(sizes @ asked @ sizes)
+            own_part = left[len(place) :, len(place) :] + 1e-12 * np.eye(len(other))
+            share = float(right @ np.linalg.solve(own_part, right)) / max(whole, 1e-300)
+            found[key] = max(found.get(key, 0.0), share)
+        return found
+
+    def _places(self, t: int) -> list[int]:
+        """Columns of a term."""
+        return list(range(self.first[t], self.first[t + 1]))
+
+    def _beside_columns(self, held: Sequence[int], at: Sequence[int]) -> Array:
+        """Products of columns, less what those `held` explain of them."""
+        part = self.matrix[np.ix_(held, held)] + 1e-12 * np.eye(len(held))
+        known = self.matrix[np.ix_(held, at)]
+        return np.asarray(self.matrix[np.ix_(at, at)] - known.T @ np.linalg.solve(part, known))
 
     def shaped(self, ids: Collection[str]) -> Chosen:
         """The terms of those of some effects that have one, each at its likeliest shape beside the
