@@ -33,7 +33,7 @@ from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
 
 ASKED = 4  # effects that are tried beside a model, by every problem
-ALIKE = 1.0 - 1.0 / EXCESS  # of what an effect explains: what explains more of it may imitate it
+ALIKE = 1.0 - 1.0 / EXCESS**2  # of what an effect explains: what explains more may imitate it
 
 
 class Asked:

@@ -21,6 +21,10 @@ EXCHANGES = 3  # rounds of leaving out and exchanging effects
 class Settling(Ranked):
     """How a model settles: effects left out and exchanged."""
 
+    def extended(self, state: State) -> list[Candidate]:
+        """Models with one more effect."""
+        raise NotImplementedError
+
     def settled(self, state: State) -> State:
         """The model that neither leaving out nor exchanging an effect improves."""
         for _ in range(EXCHANGES):
@@ -30,6 +34,7 @@ class Settling(Ranked):
                 if self.may_go_on():
                     self.exchange(candidate)
             best = self.best(len(state.candidate.effects))
+            best = max([best, *self.beside_rival(state)], key=self.log_odds)
             if best is state.candidate:  # the same set with a better end settles once more
                 return state
             state = self.examine(best)
@@ -66,6 +71,23 @@ class Settling(Ranked):
             for c in self.ranked(list(self.tried.values()))
             if self.log_odds(c) >= least and len(c.effects) <= len(state.candidate.effects)
         ]
+
+    def beside_rival(self, state: State) -> list[Candidate]:
+        """Extensions by one effect of the likeliest model that lacks an effect of one that leaves
+        nothing, and comes near it: a law of free shape may have taken the place of two.
+        """
+        chosen = state.candidate
+        least = self.log_odds(chosen) - 2 * DECISIVE
+        rivals = [
+            c
+            for c in self.ranked(list(self.tried.values()))
+            if self.log_odds(c) >= least
+            and len(c.effects) <= len(chosen.effects)
+            and not set(chosen.ids) <= set(c.ids)
+        ]
+        if not (state.is_white and rivals and self.may_go_on()):
+            return []
+        return self.extended(self.examine(rivals[0]))
 
     def exchange(self, chosen: Candidate) -> None:
         """Put every other effect in the place of each chosen one.

@@ -170,7 +170,7 @@ class TermSets:
 
     def likeness(self, ids: Collection[str], effect: str) -> dict[str, float]:
         """Of what an effect explains beside a set, the share that every other one explains as well
-        with its own sizes, at its best shape; {} where no term stands for the effect.
+        with sizes that it may have, at its best shape; {} where no term stands for the effect.
         """
         chosen = self.shaped([*ids, effect])
         own = [t for t in chosen if self.terms[t].effect.id == effect]
@@ -188,8 +188,11 @@ class TermSets:
             left = self._beside_columns(self.columns(held), at)
             asked, cross = left[: len(place), : len(place)], left[len(place) :, : len(place)]
             right, whole = cross @ sizes, float(sizes @ asked @ sizes)
-            own_part = left[len(place) :, len(place) :] + 1e-12 * np.eye(len(other))
-            share = float(right @ np.linalg.solve(own_part, right)) / max(whole, 1e-300)
+            square = left[len(place) :, len(place) :] + 1e-12 * np.eye(len(other))
+            needed = np.linalg.solve(square, right)
+            if np.any(needed[list(self.terms[t].one_sided)] <= 0.0):
+                continue
+            share = float(right @ needed) / max(whole, 1e-300)
             found[key] = max(found.get(key, 0.0), share)
         return found
 

@@ -237,7 +237,7 @@ def test_what_the_last_exchange_leads_to_is_rid_of_what_it_does_not_need(run, mo
 def test_an_exchange_begins_at_rivals_too(run):
     """No exchange leads from {A, B} to {D, S}, one from its equal {C, D} does."""
     singles = {A: 400.0, B: 390.0, C: 380.0, D: 100.0, S: 50.0}
-    equal, far = {f"{A} {B}": 520.0, f"{C} {D}": 518.0}, {f"{A} {B}": 520.0, f"{C} {D}": 510.0}
+    equal, far = {f"{A} {B}": 520.0, f"{C} {D}": 518.0}, {f"{A} {B}": 520.0, f"{C} {D}": 505.0}
     assert chosen(run(Table(singles | equal | {f"{D} {S}": 560.0}))) == {D, S}
     assert chosen(run(Table(singles | far | {f"{D} {S}": 560.0}))) == {A, B}
 

@@ -72,6 +72,8 @@ def test_a_better_end_of_the_same_set_settles_once_more(monkeypatch):
         "near": lambda state: [state.candidate],
         "may_go_on": lambda: True,
         "exchange": lambda candidate: None,
+        "beside_rival": lambda state: [],
+        "log_odds": lambda candidate: candidate.fit.gain,
         "best": lambda size: better,
         "examine": lambda candidate: SimpleNamespace(candidate=candidate),
     }
@@ -105,3 +107,24 @@ def test_models_are_weighed_beside_what_remains(monkeypatch, base, misses, noise
     led = search.log_odds(far) - search.log_odds(near)
     assert led == pytest.approx(search.cost + 20.0 * weighed)
     assert asked == [near.fit] * (base > 9.0 and misses)
+
+
+@pytest.mark.parametrize(
+    ("odds", "white", "extended"),
+    [(492.0, True, True), (492.0, False, False), (488.0, True, False)],
+)
+def test_a_law_may_have_taken_the_place_of_two(odds: float, white: bool, extended: bool) -> None:
+    """The likeliest rival of a model that leaves nothing is extended where it comes near."""
+    chosen, rival = model(f"{FRICTION} {HYSTERESIS}", 1.0), model(f"{FRICTION} {DRAG}", 1.1)
+    more, part = model(f"{FRICTION} {DRAG} {SPRING}", 1.0), model(FRICTION, 1.2)
+    known = {chosen.ids: 500.0, rival.ids: odds, part.ids: odds - 1.0, more.ids: 600.0}
+    search: Any = Settling((), None, np.random.default_rng(0), lambda words: None)
+    search.log_odds = lambda candidate: known[candidate.ids]
+    search.ranked = lambda models: sorted(models, key=search.log_odds, reverse=True)
+    search.tried = {frozenset(c.ids): c for c in (chosen, rival, part, more)}
+    search.may_go_on = lambda: True
+    search.examine = lambda candidate: SimpleNamespace(candidate=candidate)
+    asked: list[Candidate] = []
+    search.extended = lambda state: asked.append(state.candidate) or [more]
+    found = search.beside_rival(SimpleNamespace(candidate=chosen, is_white=white))
+    assert (found, asked) == (([more], [rival]) if extended else ([], []))
