@@ -61,6 +61,7 @@ def test_a_fault_beside_which_something_is_left_does_not_count(monkeypatch, reco
     assert found(timed(71, 1.004, FRICTION)) == ()
 
 
+@pytest.mark.long
 def test_what_physics_hid_is_corrected_before_more_is_searched():
     told: list[str] = []
     answer = diagnose(

@@ -72,6 +72,7 @@ def test_a_force_of_no_catalogue_is_named_with_its_numbers(detent: Any) -> None:
     assert LEARNED not in {e.id for e in found.after.target.oscillator.effects}
 
 
+@pytest.mark.long
 def test_an_effect_that_imitated_the_force_goes_once_the_formula_is_in(detent: Any) -> None:
     cubic = BY_ID["spring_cubic"]
     before, scales = unknown({"detent": DETENT}, named=(cubic,))
@@ -141,6 +142,7 @@ def test_of_two_fits_of_one_kind_the_likelier_keeps_its_own_terms(detent: Any) -
     assert best == {replace(near, log_odds=9.0): good, cube: other}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("others", [(), ("quadratic_drag",)])
 def test_no_effect_is_named_that_the_likeliest_formula_makes_idle(
     monkeypatch: Any, others: tuple[str, ...]

@@ -159,6 +159,7 @@ def whole() -> tuple[Diagnosis, list[str]]:
     return diagnose(decays(effects), rng=rng, search=False, progress=said.append), said
 
 
+@pytest.mark.long
 def test_a_large_force_of_no_effect_is_named_with_all_that_acts_beside_it(whole: Any) -> None:
     found, said = whole
     assert found.before.reduced_chi2 > 100 and found.after.reduced_chi2 < 1.1

@@ -144,6 +144,7 @@ def test_there_are_no_sets_without_periods(heavy: Fit, monkeypatch: Any) -> None
     assert problem.best(3) == [] and problem.gains() == {}
 
 
+@pytest.mark.long
 def test_a_search_begins_with_them(heavy: Fit) -> None:
     """The obstacle's mass, which no force along the measured motion shows, is in the second fit."""
     said = list[str]()

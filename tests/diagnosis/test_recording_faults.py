@@ -127,6 +127,7 @@ def test_spikes_that_show_only_beside_the_physics_are_set_aside_too() -> None:
     assert [f.id for f in found.corrected.faults] == ["recording_spikes"]
 
 
+@pytest.mark.long
 def test_spikes_away_from_the_stop_that_physics_hides_are_found_by_the_search() -> None:
     """In accelerations they look like contacts; a contact would have moved all that comes after."""
     cubic = {"spring_cubic": {"stiffness": 2e6}}
@@ -151,6 +152,7 @@ def test_spikes_away_from_the_stop_that_physics_hides_are_found_by_the_search() 
     assert "what remains is spikes: once more without them" in told
 
 
+@pytest.mark.long
 def test_doubtful_faults_come_after_certain_ones_and_physics(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -222,6 +224,7 @@ def test_faults_that_do_nothing_that_the_effects_do_are_not_searched_beside(
     assert module._beside_faults(found, found.corrected, (), asked, False) is again
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("needed", [False, True])
 def test_faults_that_the_physics_makes_needless_are_taken_back(
     monkeypatch: pytest.MonkeyPatch, needed: bool

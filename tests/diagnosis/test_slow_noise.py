@@ -31,6 +31,7 @@ def test_a_control_with_slow_noise_is_adequate_and_says_so(seed):
     assert 0.9 < found.after.reduced_chi2 < 1.1
 
 
+@pytest.mark.long
 def test_noise_of_many_correlation_times_is_noise():
     """As flicker noise is, which two of them do not follow."""
     campaign = small_rig.record(
@@ -46,6 +47,7 @@ def test_noise_of_many_correlation_times_is_noise():
 DRAG = {"quadratic_drag": {"coefficient": 3.0}}
 
 
+@pytest.mark.long
 def test_physics_beside_slow_noise_is_named_and_the_noise_found_beside_it():
     campaign = small_rig.with_slow(small_rig.record(2, DRAG), 2, 1.25)
     found = diagnose(campaign, rng=RNG(0), search=False)
@@ -86,6 +88,7 @@ def test_a_search_begins_with_slow_noise_whatever_was_corrected_before():
     assert found.verdict == "adequate" and found.after.target.likelihood.noise is noise
 
 
+@pytest.mark.long
 def test_slow_noise_is_found_again_beside_a_fault_of_a_recording():
     campaign = small_rig.with_slow(small_rig.record(5), 5, 1.25)
     first, *others = campaign.recordings

@@ -58,6 +58,7 @@ def test_a_push_is_found_where_it_acts_and_no_law() -> None:
     assert found(recorded(bumper=3.6e-3)) == []  # met in the first swings of two recordings
 
 
+@pytest.mark.long
 def test_physics_is_named_beside_it() -> None:
     laws = tuple(BY_ID[i] for i in ("spring_cubic", "released_mode", "stiffness_drift"))
     answer = diagnose(recorded(push=4.0), rng=RNG(0), effects=laws, search=False)

@@ -88,6 +88,7 @@ def test_a_channel_of_free_gain_is_fitted_with_its_own_gain_and_prior() -> None:
     assert alone.reduced_chi2 == pytest.approx(1.0, abs=0.15)
 
 
+@pytest.mark.long
 def test_physics_is_named_without_the_push():
     """A drift of the probe adds to any motion, so that what is put together here is one."""
     campaign = pushed(plain({"sensor_drift": {"rate": 2e-5}}, duration=1.5), 0.4 * PERIOD)
