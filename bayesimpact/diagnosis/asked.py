@@ -54,13 +54,10 @@ class Asked:
         if key not in self.of_motion:
             layout = self.base.target.oscillator.layout
             mode = transfer(model.fit, layout, self.base.target.oscillator.effects, self.scales, {})
-            at, known = replace(self.base, mode=mode), known_effects(model)
-            found = LikelySets(
-                self.of_the_motion(at, model), self.effects, self.scales,
-                flight=flight, known=known,
+            self.of_motion[key] = LikelySets(
+                replace(self.base, mode=mode), self.effects, self.scales,
+                flight=flight, known=known_effects(model), recordings=self.of_the_motion(model),
             )  # fmt: skip
-            found.fit = at
-            self.of_motion[key] = found
         return self.of_motion[key]
 
     def ahead(self, model: Candidate, about: Candidate) -> PeriodSets:
@@ -72,26 +69,22 @@ class Asked:
             layout = model.fit.target.oscillator.layout
             mode = transfer(about.fit, layout, model.effects, self.scales, {})
             at = replace(model.fit, mode=mode)
-            found = PeriodSets(self.of_the_motion(at, model), self.effects, self.scales)
-            found.fit = at
-            self.of_periods[key] = found
+            self.of_periods[key] = PeriodSets(
+                at, self.effects, self.scales, recordings=self.of_the_motion(model)
+            )
         return self.of_periods[key]
 
     def ahead_with_terms(self, model: Candidate) -> PeriodSets:
         """The problem of periods ahead of a model, with the terms of the grammar."""
-        at = self.of_the_motion(model.fit, model)
-        found = periods_with_terms(at, self.effects, self.scales)
-        found.fit = model.fit
-        return found
+        recordings = self.of_the_motion(model)
+        return periods_with_terms(model.fit, self.effects, self.scales, recordings)
 
-    def of_the_motion(self, fit: Fit, model: Candidate) -> Fit:
-        """A fit, for a problem, to its recordings less their hums, which no motion makes, unless
-        the model has a line.
+    def of_the_motion(self, model: Candidate) -> Sequence[Recording] | None:
+        """The recordings less their hums, which no motion makes; None where the model has a line,
+        or there are none.
         """
-        acting = (*fit.target.oscillator.acting, *model.effects)
-        if not self.hums or any(map(is_periodic, acting)):
-            return fit
-        return fit.with_recordings(self.quiet)
+        acting = (*model.fit.target.oscillator.acting, *model.effects)
+        return None if not self.hums or any(map(is_periodic, acting)) else self.quiet
 
     def first(
         self, model: Candidate, about: Candidate, instead: str = ""

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.equation_error import (
     Path,
     base_columns,
@@ -48,7 +49,8 @@ class LikelySets(TermSets):
 
     There are no terms, and so no sets, where readings can be made no displacement. In `flight` only
     what acts there has terms. Every set holds what the campaign declares and the effects of
-    `known`: their shapes are known, but not their sizes.
+    `known`: their shapes are known, but not their sizes. Other `recordings` of the same motions may
+    stand in for the fit's.
     """
 
     def __init__(
@@ -59,6 +61,7 @@ class LikelySets(TermSets):
         *,
         flight: bool = False,
         known: Sequence[Known] = (),
+        recordings: Sequence[Recording] | None = None,
     ) -> None:
         o, cost = fit.target.oscillator, float(np.log(2 * len(effects)))
         self.fit, self.scales, self.paths = fit, scales, list[Path]()
@@ -66,8 +69,9 @@ class LikelySets(TermSets):
         if not (_tells(o) and all(map(is_a_force, o.acting))):
             super().__init__((), (), self.every, self.target, 1, cost)
             return
-        self.paths = measured_paths(fit, flight=flight)
-        columns, targets, names = base_columns(fit, self.paths)
+        along = fit if recordings is None else fit.with_recordings(recordings)
+        self.paths = measured_paths(along, flight=flight)
+        columns, targets, names = base_columns(along, self.paths)
         base, target = np.concatenate(columns), np.concatenate(targets)
         told = bool(base[:, 0].any())
         declared = self._known([(e, shapes_of(fit, e)) for e in o.acting]) if told else []

@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.directions import (
     is_periodic,
     shape_points,
@@ -43,13 +44,20 @@ class PeriodSets(TermSets):
     """Sets of effects beside those of a fit, each by what periods ahead leave.
 
     There are no terms, and so no sets, where recordings tell no period. Terms of the `grammar` are
-    in none of them, but may stand beside one (`period_terms`).
+    in none of them, but may stand beside one (`period_terms`). Other `recordings` of the same
+    motions may stand in for the fit's.
     """
 
     def __init__(
-        self, fit: Fit, effects: Sequence[Effect], scales: Scales, grammar: Sequence[Effect] = ()
+        self,
+        fit: Fit,
+        effects: Sequence[Effect],
+        scales: Scales,
+        grammar: Sequence[Effect] = (),
+        recordings: Sequence[Recording] | None = None,
     ) -> None:
         self.fit, self.scales, cost = fit, scales, float(np.log(2 * len(effects)))
+        fit = fit if recordings is None else fit.with_recordings(recordings)
         o = fit.target.oscillator
         ahead = multiple_shooting(fit.target.likelihood, fit.mode)
         if ahead is None:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.equation_error import measured_paths
 from bayesimpact.diagnosis.likely_terms import (
     LIKELY,
@@ -30,17 +31,23 @@ MOST_SAMPLES = 400_000  # of all recordings: their columns then take 2 x 1.7 GB
 KINDS = 3  # of terms that are fitted beside as many effects: set by hand
 
 
-def periods_with_terms(fit: Fit, effects: Sequence[Effect], scales: Scales) -> PeriodSets:
+def periods_with_terms(
+    fit: Fit,
+    effects: Sequence[Effect],
+    scales: Scales,
+    recordings: Sequence[Recording] | None = None,
+) -> PeriodSets:
     """The problem of periods ahead about a fit, with all terms of the grammar; without any where
     the recordings are so long that their columns would fill the memory.
     """
     if fit.target.oscillator.counts.sum() > MOST_SAMPLES:
-        return PeriodSets(fit, effects, scales)
-    paths = measured_paths(fit)
+        return PeriodSets(fit, effects, scales, recordings=recordings)
+    paths = measured_paths(fit if recordings is None else fit.with_recordings(recordings))
     terms = unlisted(library(scales, *reach_of(paths)))
     price, cost = prices_by_kind(terms), float(np.log(2 * len(effects)))
     beyond = [max(price[t.kind] - cost, 0.0) for t in terms]
-    return PeriodSets(fit, effects, scales, as_effects(paths, scales, terms, beyond))
+    grammar = as_effects(paths, scales, terms, beyond)
+    return PeriodSets(fit, effects, scales, grammar, recordings)
 
 
 def sets_with_a_term_ahead(problem: PeriodSets, most: int) -> list[list[EffectSet]]:

@@ -169,5 +169,5 @@ def test_a_hum_of_the_readings_is_no_speed() -> None:
     plain = PeriodSets(fit, SEARCHED, campaign_scales(fit)).best(3)
     assert not plain or {e.id for e in plain[min(1, len(plain) - 1)].effects} != set(MASS)
     for effects, kept in ((("sensor_hum",), True), (("quadratic_drag",), False)):
-        model: Any = SimpleNamespace(effects=tuple(BY_ID[i] for i in effects))
-        assert (asked.of_the_motion(fit, model) is fit) is kept
+        model: Any = SimpleNamespace(fit=fit, effects=tuple(BY_ID[i] for i in effects))
+        assert (asked.of_the_motion(model) is None) is kept
