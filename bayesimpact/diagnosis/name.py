@@ -221,6 +221,8 @@ class _Search(Unlisted):
                 break
         best = max(begun, key=self.promise)
         state = self.examine(best)
+        if self.leaves_spikes(state):
+            return [state]
         with_term = self.with_a_term_ahead(base, self.with_a_term(state))
         if with_term is not state:
             return [with_term]
