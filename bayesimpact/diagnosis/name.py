@@ -9,18 +9,17 @@ physics and decide between near-opposites that scores cannot tell apart.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from bayesimpact.diagnosis.budget import Budget
 from bayesimpact.diagnosis.evidence import model_evidence
-from bayesimpact.diagnosis.faults.compare import Compared
-from bayesimpact.diagnosis.faults.outliers import all_that_remains, still_off, without
 from bayesimpact.diagnosis.force import missing_contact
 from bayesimpact.diagnosis.models import NOTHING, STARTS, UNCONVERGED_SHORTFALL, Progress
 from bayesimpact.diagnosis.naming import Naming, State, explains_most, is_large
 from bayesimpact.diagnosis.pairs import promising_pairs
+from bayesimpact.diagnosis.posed_anew import posed_anew, spoilt
 from bayesimpact.diagnosis.promising import (
     NEAR_MARGIN,
     SCORE_UNDERESTIMATE,
@@ -32,7 +31,6 @@ from bayesimpact.diagnosis.refit import (
     base_candidate,
     in_words,
 )
-from bayesimpact.diagnosis.slow_noise import remaining_noise, under_noise
 from bayesimpact.diagnosis.unknown import learn_force
 from bayesimpact.diagnosis.unlisted import Problem, Unlisted
 from bayesimpact.inference.fit import Fit
@@ -68,9 +66,9 @@ def name(
     still leaves something. It begins with the model of `first` instead, a fit to the same campaign,
     where that is given.
 
-    Where what remains is slow noise of the measuring chain or spikes of the readings, and time
-    allows, the search begins once more under that noise, or without these, from the model that left
-    them; it counts if it leaves nothing then.
+    Where what remains is slow noise of the measuring chain or spikes of the readings, or readings
+    jump within the posterior of a model, and time allows, the search begins once more under that
+    noise, or without these, from that model; it counts if it leaves nothing then.
 
     A search that has used up the `budget` begins no more refits, and names nothing that it has not
     compared with all that might do the same.
@@ -78,58 +76,20 @@ def name(
     say = progress or (lambda message: None)
     search = _Search(effects, scales, rng, say, budget)
     base, state = search.found(fit, first)
-    anew = _posed_anew(fit, state, say) if search.budget.may_search_again() else None
+    anew = posed_anew(fit, state, rng, say) if search.budget.may_search_again() else None
     if anew is not None:
         again = _Search(effects, scales, rng, say, search.budget)
+        again.is_last = True
         quiet = again.found(anew.base, anew.first)
         if quiet[1].is_white:
             return replace(again.naming(*quiet), spikes=anew.spikes)
     return search.naming(base, state)
 
 
-@dataclass(frozen=True, eq=False)
-class _Posed:
-    """A search posed anew: from which base model, from which other one if any, without what."""
-
-    base: Fit
-    first: Fit | None
-    spikes: tuple[Compared, ...] = ()
-
-
-def _posed_anew(base: Fit, state: State, say: Progress) -> _Posed | None:
-    """The search without the spikes, or under the slow noise, that are all that a model leaves."""
-    found = state.candidate.fit
-    posed = _without_spikes(base, found)
-    if posed is not None:
-        say("what remains is spikes: once more without them")
-        return posed
-    noise = None if state.is_white or is_large(found) else remaining_noise(found)
-    if noise is None:
-        return None
-    say("what remains is slow noise: once more under that")
-    first = under_noise(found, noise) if found is not base else None
-    return _Posed(under_noise(base, noise), first)
-
-
-def _without_spikes(base: Fit, found: Fit) -> _Posed | None:
-    spikes = all_that_remains(found)
-    if not spikes:
-        return None
-    clean = without(found, spikes)
-    lasting = still_off(found, clean, spikes)
-    if not lasting:
-        return None
-    if len(lasting) < len(spikes):  # others had shifted a contact
-        clean = without(found, lasting)
-    change = found.reduced_chi2, clean.reduced_chi2
-    told = tuple(Compared(f, clean.target.oscillator.campaign, *change) for f in lasting)
-    return (
-        _Posed(clean, None, told) if found is base else _Posed(without(base, lasting), clean, told)
-    )
-
-
 class _Search(Unlisted):
-    """Which models to fit next, and what they are worth."""
+    """Which models to fit next, and what they are worth; `is_last` where none is posed anew."""
+
+    is_last = False
 
     def found(self, fit: Fit, first: Fit | None) -> tuple[State, State]:
         """The base model of `fit`, and where a search from it, or from `first`, ends."""
@@ -141,7 +101,7 @@ class _Search(Unlisted):
         begun = set[frozenset[str]]()
         while True:
             state = self.grown(beam)
-            if self.leaves_spikes(state):
+            if self.is_spoilt(state):
                 break
             with_term = self.with_a_term(state, excess=1.0)
             if with_term is not state:
@@ -166,7 +126,7 @@ class _Search(Unlisted):
     def grown(self, beam: list[State]) -> State:
         """The model that ever more effects lead to from the first of a beam, or beside it."""
         state, self.left = beam[0], None
-        while not (state.is_white or self.leaves_spikes(state)) and self.may_go_on():
+        while not (state.is_white or self.is_spoilt(state)) and self.may_go_on():
             found, waiting = self.extensions([s for s in beam if self.may_grow(s)])
             better = self.best_first(state, found)
             if not better or not self.leads_on(state, better[0]):
@@ -179,10 +139,13 @@ class _Search(Unlisted):
                 beam = [state, *waiting, *beside]
         return state
 
-    def leaves_spikes(self, state: State) -> bool:
-        """Whether spikes of the readings are all that a model leaves, and time is left to ask."""
-        may_ask = not state.is_white and self.budget.may_search_again()
-        return may_ask and bool(all_that_remains(state.candidate.fit))
+    def is_spoilt(self, state: State) -> bool:
+        """Whether readings are off, or jump, that only a model as good as this one shows: what is
+        fitted to these decides nothing, as long as time is left to pose the search without them.
+        """
+        if self.is_last or state.is_white or not self.budget.may_search_again():
+            return False
+        return spoilt(state.candidate.fit, self.rng)
 
     def extensions(self, beam: Sequence[State]) -> tuple[list[Candidate], list[State]]:
         """Models with one more effect than those of a beam, and what of the beam has to wait: where
@@ -221,7 +184,7 @@ class _Search(Unlisted):
                 break
         best = max(begun, key=self.promise)
         state = self.examine(best)
-        if self.leaves_spikes(state):
+        if self.is_spoilt(state):
             return [state]
         with_term = self.with_a_term_ahead(base, self.with_a_term(state))
         if with_term is not state:

@@ -132,7 +132,7 @@ def laplace_draws(fit: Fit, *, seed: int = 0, chains: int = 4, draws: int = 250)
     """Independent draws of the Laplace approximation, kept inside the parameters' bounds."""
     parameters = fit.target.oscillator.layout.parameters
     rng = np.random.default_rng(seed)
-    drawn = rng.multivariate_normal(fit.mode, fit.covariance, (chains, draws), method="eigh")
+    drawn = fit.draws(rng, chains * draws).reshape(chains, draws, -1)
     bounds = np.array([(p.lower, p.upper) for p in parameters]).T
     attrs = {"seed": seed, "approximation": "Laplace, at the mode"}
     return ArvizDraws(np.clip(drawn, *bounds), attrs=attrs)

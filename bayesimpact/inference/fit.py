@@ -105,6 +105,17 @@ class Fit:
         """Standard deviations in the Laplace approximation, (d,)."""
         return np.sqrt(np.diag(self.covariance))
 
+    def draws(self, rng: np.random.Generator, count: int, wider: float = 1.0) -> Array:
+        """Draws of the Laplace approximation, `wider` times its standard deviations, (count, d).
+
+        In units of these: of parameters whose scales are ten decades apart the covariance itself
+        has no root that is accurate for all.
+        """
+        sd = self.sd
+        values, axes = np.linalg.eigh(self.covariance / np.outer(sd, sd))
+        root = axes * np.sqrt(np.maximum(values, 0.0))
+        return np.asarray(self.mode + wider * sd * (rng.standard_normal((count, sd.size)) @ root.T))
+
     def value(self, name: str) -> float:
         """The mode of one parameter."""
         return float(self.mode[self.target.oscillator.layout.index(name)])

@@ -149,7 +149,7 @@ def test_spikes_away_from_the_stop_that_physics_hides_are_found_by_the_search() 
     assert (fault.id, fault.recording) == ("recording_spikes", "a")
     assert fault.spans == tuple((place, place + 1) for place in places)
     assert 0.9 < found.after.reduced_chi2 < 1.1
-    assert "what remains is spikes: once more without them" in told
+    assert any("once more without them" in words for words in told)
 
 
 @pytest.mark.long

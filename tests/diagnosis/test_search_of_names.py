@@ -46,8 +46,8 @@ def run(monkeypatch):
         monkeypatch.setattr(remaining, "may_be_needed", lambda naming, effect: True)
         monkeypatch.setattr(remaining, "is_imitated", lambda naming: False)
         monkeypatch.setattr(search, "promising_pairs", lambda scan, count: ())
-        monkeypatch.setattr(search, "remaining_noise", lambda fit: None)
-        monkeypatch.setattr(search, "all_that_remains", lambda fit: ())
+        monkeypatch.setattr(search, "posed_anew", lambda *about: None)
+        monkeypatch.setattr(search, "spoilt", lambda *about: False)
         for force in ("missing_force", "missing_drift"):
             monkeypatch.setattr(models, force, table.missing)
         monkeypatch.setattr(

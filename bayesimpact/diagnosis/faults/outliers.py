@@ -69,13 +69,12 @@ def _misses(fit: Fit, faults: Sequence[Fault]) -> Array:
     return np.concatenate(found)
 
 
-def without(fit: Fit, faults: Sequence[Fault]) -> Fit:
-    """A model's mode where samples of its campaign are set aside."""
+def refitted(fit: Fit, campaign: Campaign, start: Fit | None = None) -> Fit:
+    """A model's mode for its campaign with other samples set aside, from the fit's or `start`'s."""
     old = fit.target.oscillator
-    campaign = faults_set_aside(old.campaign, faults)
     oscillator = Oscillator(campaign, old.effects, old.layout, old.smoothing)
     likelihood = Likelihood(oscillator, fit.target.likelihood.noise)
-    return climbed(replace(fit.target, likelihood=likelihood), fit)
+    return climbed(replace(fit.target, likelihood=likelihood), start or fit)
 
 
 def still_off(fit: Fit, clean: Fit, faults: Sequence[Fault]) -> tuple[Fault, ...]:
