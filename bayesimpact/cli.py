@@ -73,7 +73,7 @@ def check(campaign: Path, out: Path | None, seed: int, quiet: bool) -> None:
         click.echo(campaign_text(loaded, noise))
     for line in fault_lines(loaded, faults):
         click.echo(line, err=quiet)
-    for warning in campaign_warnings(loaded, noise):
+    for warning in campaign_warnings(cleaned, noise):
         click.echo(f"warning: {warning}", err=True)
     if out is not None:
         from bayesimpact.report.check_figure import campaign_figure

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bayesimpact.data.campaign import SECOND_STOP, Campaign
+from bayesimpact.data.faults.start import GROWTH
 from bayesimpact.data.period import crossing_period
 from bayesimpact.data.recording import Recording
 from bayesimpact.data.text_table import text_table
@@ -52,7 +53,7 @@ def campaign_text(campaign: Campaign, noise: Noise | None) -> str:
 
 
 def campaign_warnings(campaign: Campaign, noise: Noise | None) -> list[str]:
-    """What a user should know before trusting a fit of these recordings."""
+    """What a user should know before trusting a fit of these recordings, their faults set aside."""
     warnings = []
     stated = campaign.measurement.noise
     if stated is not None and noise is not None and not 1 / 1.5 < noise.level / stated < 1.5:
@@ -89,9 +90,11 @@ def _recording_warnings(recording: Recording, *, stop: bool) -> list[str]:
     if recording.duration < 5 * period:
         warnings.append(f"only {recording.duration / period:.1f} periods: damping is seen poorly")
     rest = np.median(recording.samples[recording.samples.size // 2 :])
-    largest = int(np.argmax(np.abs(recording.samples - rest)))
+    way = np.abs(recording.samples - rest)
+    largest = int(np.argmax(way))
     late = largest * recording.interval
-    if late > period and recording.input is None:
+    grown = way[largest] > GROWTH * way[: int(per_period) + 1].max()  # by no beat of two modes
+    if late > period and grown and recording.input is None:
         warnings.append(
             f"the largest excursion comes {late:.3g} s after the first sample: if the recording "
             f"begins before the release, set start_s = {recording.start + late:.6g}"
