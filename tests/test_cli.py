@@ -129,7 +129,7 @@ def test_stated_noise_is_compared_with_the_recordings(
 
 
 def test_recording_that_starts_before_the_release(run: Run, tmp_path: Path) -> None:
-    held = 0.8 * np.concatenate([np.full(300, -6e-3 * 0.9), decay()])
+    held = 0.8 * np.concatenate([np.full(300, -6e-3 * 0.7), decay()])
     code, out, err = run("check", write(tmp_path, b=csv(held, start=1.0)))
     assert (code, err) == (0, "")  # it is set aside, and so nothing is left to be warned of
     assert "b: recording_held: " in out and "exclude_s = [[0.9992, 1.5988]]" in out
