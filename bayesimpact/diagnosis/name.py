@@ -19,7 +19,7 @@ from bayesimpact.diagnosis.force import missing_contact
 from bayesimpact.diagnosis.models import NOTHING, STARTS, UNCONVERGED_SHORTFALL, Progress
 from bayesimpact.diagnosis.naming import Naming, State, explains_most, is_large
 from bayesimpact.diagnosis.pairs import promising_pairs
-from bayesimpact.diagnosis.posed_anew import posed_anew, spoilt
+from bayesimpact.diagnosis.posed_anew import is_spoilt, posed_anew
 from bayesimpact.diagnosis.promising import (
     NEAR_MARGIN,
     SCORE_UNDERESTIMATE,
@@ -66,9 +66,10 @@ def name(
     still leaves something. It begins with the model of `first` instead, a fit to the same campaign,
     where that is given.
 
-    Where what remains is slow noise of the measuring chain or spikes of the readings, or readings
-    jump within the posterior of a model, and time allows, the search begins once more under that
-    noise, or without these, from that model; it counts if it leaves nothing then.
+    Where what remains is slow noise of the measuring chain or spikes of the readings, or where
+    accelerations lie at onsets of contacts that only a good model shows, and time allows, the
+    search begins once more under that noise, or without these, from that model; it counts if it
+    leaves nothing then.
 
     A search that has used up the `budget` begins no more refits, and names nothing that it has not
     compared with all that might do the same.
@@ -76,7 +77,7 @@ def name(
     say = progress or (lambda message: None)
     search = _Search(effects, scales, rng, say, budget)
     base, state = search.found(fit, first)
-    anew = posed_anew(fit, state, rng, say) if search.budget.may_search_again() else None
+    anew = posed_anew(fit, state, say) if search.budget.may_search_again() else None
     if anew is not None:
         again = _Search(effects, scales, rng, say, search.budget)
         again.is_last = True
@@ -145,7 +146,7 @@ class _Search(Unlisted):
         """
         if self.is_last or state.is_white or not self.budget.may_search_again():
             return False
-        return spoilt(state.candidate.fit, self.rng)
+        return is_spoilt(state.candidate.fit)
 
     def extensions(self, beam: Sequence[State]) -> tuple[list[Candidate], list[State]]:
         """Models with one more effect than those of a beam, and what of the beam has to wait: where

@@ -1,17 +1,15 @@
 """A search posed anew, on what a model that is nearly good enough has shown of the readings.
 
-Spikes beside a contact, readings that jump within the posterior, and noise that is slow show only
-against a model that leaves nothing else. Before they are known, whatever follows them is fitted.
+Spikes beside a contact, the instants at which contacts begin and end, where an acceleration jumps,
+and noise that is slow show only against a model that leaves little else. Before they are known,
+whatever follows them is fitted.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from bayesimpact.diagnosis.faults.compare import Compared
-from bayesimpact.diagnosis.faults.jumps import jumping_readings, without_readings
 from bayesimpact.diagnosis.faults.outliers import (
     all_that_remains,
     faults_set_aside,
@@ -22,6 +20,7 @@ from bayesimpact.diagnosis.models import Progress
 from bayesimpact.diagnosis.naming import State, is_large
 from bayesimpact.diagnosis.slow_noise import remaining_noise, under_noise
 from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.onsets import without_onsets
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,13 +32,13 @@ class Posed:
     spikes: tuple[Compared, ...] = ()
 
 
-def posed_anew(base: Fit, state: State, rng: np.random.Generator, say: Progress) -> Posed | None:
+def posed_anew(base: Fit, state: State, say: Progress) -> Posed | None:
     """The search without the readings that spoil it, or under the slow noise that is all that a
     model leaves.
     """
     found = state.candidate.fit
     if not (state.is_white and found is base):
-        posed = _without_readings(base, found, rng, say)
+        posed = _without_readings(base, found, say)
         if posed is not None:
             return posed
     noise = None if state.is_white or is_large(found) else remaining_noise(found)
@@ -50,11 +49,10 @@ def posed_anew(base: Fit, state: State, rng: np.random.Generator, say: Progress)
     return Posed(under_noise(base, noise), first)
 
 
-def _without_readings(
-    base: Fit, found: Fit, rng: np.random.Generator, say: Progress
-) -> Posed | None:
-    """Without spikes that are all that a model leaves, and without what jumps within its posterior;
-    a jump may look like a spike as long as it is on the wrong side.
+def _without_readings(base: Fit, found: Fit, say: Progress) -> Posed | None:
+    """Without spikes that are all that a model leaves, and without accelerations at the onsets that
+    it shows, which a base fit with a large misfit has elsewhere. As long as such a reading lies on
+    the wrong side of its jump, it may look like a spike.
     """
     campaign, clean = found.target.oscillator.campaign, found
     spikes = all_that_remains(found)
@@ -63,22 +61,23 @@ def _without_readings(
         spikes = still_off(found, clean, spikes)
         campaign = faults_set_aside(campaign, spikes)
         clean = refitted(found, campaign, clean)
-    jumps = () if is_large(clean) else jumping_readings(clean, rng)
-    if jumps:
-        campaign = without_readings(campaign, jumps)
+    if not is_large(clean) and without_onsets(clean) is not campaign:
+        campaign = without_onsets(clean)
         clean = refitted(found, campaign, clean)
     if clean is found:
         return None
     say("readings that only a good model shows to be off: once more without them")
     change = found.reduced_chi2, clean.reduced_chi2
     told = tuple(Compared(fault, campaign, *change) for fault in spikes)
-    return (
-        Posed(clean, None, told) if found is base else Posed(refitted(base, campaign), clean, told)
-    )
+    if found is base:
+        return Posed(clean, None, told)
+    return Posed(refitted(base, campaign), clean, told)
 
 
-def spoilt(fit: Fit, rng: np.random.Generator) -> bool:
+def is_spoilt(fit: Fit) -> bool:
     """Whether readings are off, or jump, that only a model as good as this one shows: what is
     fitted to these decides nothing.
     """
-    return bool(all_that_remains(fit)) or (not is_large(fit) and bool(jumping_readings(fit, rng)))
+    if all_that_remains(fit):
+        return True
+    return not (is_large(fit) or without_onsets(fit) is fit.target.oscillator.campaign)

@@ -1,0 +1,78 @@
+"""What a nearly good model shows of the readings."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import small_rig
+from effect_rigs import BY_ID
+
+from bayesimpact.diagnosis.extend import campaign_scales
+from bayesimpact.diagnosis.faults.outliers import refitted
+from bayesimpact.diagnosis.posed_anew import is_spoilt, posed_anew
+from bayesimpact.diagnosis.refit import fit_from
+from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.identify import identify
+from bayesimpact.inference.onsets import without_onsets
+
+RNG = np.random.default_rng
+DAMPED = replace(small_rig.RIG, c2=8.0)
+CUBIC = {"spring_cubic": {"stiffness": 6e6}}
+
+
+@pytest.fixture(scope="module")
+def base() -> Fit:
+    """A base fit that misses accelerations by far, its contacts by a sample and more."""
+    chain = small_rig.Chain(noise=0.05, offsets=dict.fromkeys("abc", 0.0))
+    campaign = small_rig.record(
+        5, CUBIC, rig=DAMPED, chain=chain, quantity="acceleration", rate=2000.0, duration=3.0
+    )
+    return identify(campaign, rng=RNG(0), search=False).fit
+
+
+@pytest.fixture(scope="module")
+def good(base: Fit) -> Fit:
+    return fit_from(base, [BY_ID["spring_cubic"]], {}, campaign_scales(base)).fit
+
+
+def test_onsets_are_those_of_the_good_model(base: Fit, good: Fit) -> None:
+    """Without them one mode is found from any side: no step lies between."""
+    assert base.reduced_chi2 > 30 and good.reduced_chi2 < 2.0
+    assert is_spoilt(good) and not is_spoilt(base)
+    state: Any = SimpleNamespace(candidate=SimpleNamespace(fit=good), is_white=True)
+    told: list[str] = []
+    anew = posed_anew(base, state, told.append)
+    assert anew is not None and anew.first is not None and not anew.spikes and told
+    assert not is_spoilt(anew.first)
+    campaign = anew.first.target.oscillator.campaign
+    assert without_onsets(anew.first) is campaign is anew.base.target.oscillator.campaign
+    ends = [
+        refitted(good, campaign, replace(good, mode=start)).log_posterior
+        for start in good.draws(RNG(2), 6)
+    ]
+    assert np.ptp(ends) < 0.01
+
+
+def test_of_displacements_there_is_nothing_to_pose_anew() -> None:
+    fit = identify(small_rig.record(5, CUBIC), rng=RNG(0), search=False).fit
+    found = fit_from(fit, [BY_ID["spring_cubic"]], {}, campaign_scales(fit)).fit
+    state: Any = SimpleNamespace(candidate=SimpleNamespace(fit=found), is_white=True)
+    assert not is_spoilt(found)
+    assert posed_anew(fit, state, pytest.fail) is None
+
+
+def test_draws_have_the_spread_of_the_approximation_whatever_the_units(good: Fit) -> None:
+    """Of scales ten decades apart; standard errors of 2,000 draws."""
+    units = np.where(np.arange(good.mode.size) % 2 == 0, 1e6, 1e-6)
+    scaled = replace(
+        good, mode=units * good.mode, covariance=good.covariance * np.outer(units, units)
+    )
+    count = 2000
+    z = (scaled.draws(RNG(3), count, 2.0) - scaled.mode) / scaled.sd
+    expected = 4.0 * scaled.covariance / np.outer(scaled.sd, scaled.sd)
+    error = np.sqrt((expected**2 + 16.0) / count)
+    assert np.abs((z.T @ z / count - expected) / error).max() < 4.5
