@@ -126,7 +126,7 @@ def diagnose_fit(
         effects = [e for e in effects if e.id != SAVITZKY_GOLAY.id]
     scales = campaign_scales(base)
     naming = name(base, effects, scales, rng=rng, progress=say, budget=budget, first=first)
-    if naming.base.candidate.fit is not base:  # under slow noise, which a search has found
+    if naming.base.candidate.fit is not base:  # posed anew, see `posed_anew`
         base = naming.base.candidate.fit
         noise = base.target.likelihood.noise
         identification = replace(identification, fit=base, noise=noise)

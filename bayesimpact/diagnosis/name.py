@@ -68,8 +68,8 @@ def name(
 
     Where what remains is slow noise of the measuring chain or spikes of the readings, or where
     accelerations lie at onsets of contacts that only a good model shows, and time allows, the
-    search begins once more under that noise, or without these, from that model; it counts if it
-    leaves nothing then.
+    search begins once more under that noise, or without these, from that model. It counts if it
+    leaves nothing then, or if the first one was cut short for it.
 
     A search that has used up the `budget` begins no more refits, and names nothing that it has not
     compared with all that might do the same.
@@ -77,20 +77,29 @@ def name(
     say = progress or (lambda message: None)
     search = _Search(effects, scales, rng, say, budget)
     base, state = search.found(fit, first)
-    anew = posed_anew(fit, state, say) if search.budget.may_search_again() else None
+    asks = search.was_cut or search.budget.may_search_again()
+    anew = posed_anew(fit, state, say) if asks else None
     if anew is not None:
         again = _Search(effects, scales, rng, say, search.budget)
         again.is_last = True
         quiet = again.found(anew.base, anew.first)
-        if quiet[1].is_white:
+        if search.was_cut or quiet[1].is_white:
             return replace(again.naming(*quiet), spikes=anew.spikes)
+    elif search.was_cut:
+        search.is_last = True
+        reached = state.candidate.fit
+        base, state = search.found(fit, first if reached is fit else reached)
     return search.naming(base, state)
 
 
 class _Search(Unlisted):
-    """Which models to fit next, and what they are worth; `is_last` where none is posed anew."""
+    """Which models to fit next, and what they are worth.
 
-    is_last = False
+    is_last : it goes to its end, whatever a model shows of the readings
+    was_cut : it ended at a model that readings spoil
+    """
+
+    is_last = was_cut = False
 
     def found(self, fit: Fit, first: Fit | None) -> tuple[State, State]:
         """The base model of `fit`, and where a search from it, or from `first`, ends."""
@@ -141,12 +150,11 @@ class _Search(Unlisted):
         return state
 
     def is_spoilt(self, state: State) -> bool:
-        """Whether readings are off, or jump, that only a model as good as this one shows: what is
-        fitted to these decides nothing, as long as time is left to pose the search without them.
-        """
+        """Whether readings spoil what follows a model, and time is left to go on without them."""
         if self.is_last or state.is_white or not self.budget.may_search_again():
             return False
-        return is_spoilt(state.candidate.fit)
+        self.was_cut = is_spoilt(state.candidate.fit)
+        return self.was_cut
 
     def extensions(self, beam: Sequence[State]) -> tuple[list[Candidate], list[State]]:
         """Models with one more effect than those of a beam, and what of the beam has to wait: where

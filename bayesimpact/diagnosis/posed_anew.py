@@ -9,16 +9,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from bayesimpact.data.faults.fault import gaussian_threshold
 from bayesimpact.diagnosis.faults.compare import Compared
-from bayesimpact.diagnosis.faults.outliers import (
-    all_that_remains,
-    faults_set_aside,
-    refitted,
-    still_off,
-)
+from bayesimpact.diagnosis.faults.outliers import beside_spikes, refitted
 from bayesimpact.diagnosis.models import Progress
 from bayesimpact.diagnosis.naming import State, is_large
 from bayesimpact.diagnosis.slow_noise import remaining_noise, under_noise
+from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.onsets import without_onsets
 
@@ -54,30 +53,39 @@ def _without_readings(base: Fit, found: Fit, say: Progress) -> Posed | None:
     it shows, which a base fit with a large misfit has elsewhere. As long as such a reading lies on
     the wrong side of its jump, it may look like a spike.
     """
-    campaign, clean = found.target.oscillator.campaign, found
-    spikes = all_that_remains(found)
-    if spikes:
-        clean = refitted(found, faults_set_aside(campaign, spikes))
-        spikes = still_off(found, clean, spikes)
-        campaign = faults_set_aside(campaign, spikes)
-        clean = refitted(found, campaign, clean)
-    if not is_large(clean) and without_onsets(clean) is not campaign:
-        campaign = without_onsets(clean)
-        clean = refitted(found, campaign, clean)
-    if clean is found:
+    spikes, clean = beside_spikes(found) or ((), found)
+    change = found.reduced_chi2, clean.reduced_chi2
+    told = tuple(Compared(f, clean.target.oscillator.campaign, *change) for f in spikes)
+    gained = not spikes and clean.log_posterior > found.log_posterior + DECISIVE
+    if misses_onsets(clean):
+        clean = refitted(found, without_onsets(clean), clean)
+    campaign = clean.target.oscillator.campaign
+    is_same = campaign is found.target.oscillator.campaign
+    if is_same and not gained:
         return None
     say("readings that only a good model shows to be off: once more without them")
-    change = found.reduced_chi2, clean.reduced_chi2
-    told = tuple(Compared(fault, campaign, *change) for fault in spikes)
     if found is base:
         return Posed(clean, None, told)
-    return Posed(refitted(base, campaign), clean, told)
+    return Posed(base if is_same else refitted(base, campaign), clean, told)
 
 
 def is_spoilt(fit: Fit) -> bool:
-    """Whether readings are off, or jump, that only a model as good as this one shows: what is
-    fitted to these decides nothing.
+    """Whether readings are off that only a model as good as this one shows: what is fitted to these
+    decides nothing.
     """
-    if all_that_remains(fit):
-        return True
-    return not (is_large(fit) or without_onsets(fit) is fit.target.oscillator.campaign)
+    return beside_spikes(fit) is not None or misses_onsets(fit)
+
+
+def misses_onsets(fit: Fit) -> bool:
+    """Whether a fit that leaves no large misfit misses accelerations at onsets that it shows."""
+    campaign = fit.target.oscillator.campaign
+    cleaned = campaign if is_large(fit) else without_onsets(fit)
+    noise = fit.target.likelihood.noise
+    rows = zip(campaign.recordings, cleaned.recordings, fit.residuals, strict=True)
+    for before, after, residual in rows:
+        if after.used is not None and after is not before:
+            at = ~after.used if before.used is None else before.used & ~after.used
+            least = gaussian_threshold(residual.size) * noise.level * noise.scales[before.order]
+            if np.any(np.abs(residual[at]) > least):
+                return True
+    return False

@@ -82,7 +82,7 @@ class Settling(Ranked):
             c
             for c in self.ranked(list(self.tried.values()))
             if self.log_odds(c) >= least
-            and len(c.effects) <= len(chosen.effects)
+            and len(c.effects) <= min(len(chosen.effects), self.most - 1)
             and not set(chosen.ids) <= set(c.ids)
         ]
         if not (state.is_white and rivals and self.may_go_on()):

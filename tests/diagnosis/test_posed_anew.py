@@ -12,8 +12,9 @@ import small_rig
 from effect_rigs import BY_ID
 
 from bayesimpact.diagnosis.extend import campaign_scales
-from bayesimpact.diagnosis.faults.outliers import refitted
-from bayesimpact.diagnosis.posed_anew import is_spoilt, posed_anew
+from bayesimpact.diagnosis.faults import outliers
+from bayesimpact.diagnosis.faults.outliers import beside_spikes, refitted
+from bayesimpact.diagnosis.posed_anew import is_spoilt, misses_onsets, posed_anew
 from bayesimpact.diagnosis.refit import fit_from
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
@@ -39,22 +40,59 @@ def good(base: Fit) -> Fit:
     return fit_from(base, [BY_ID["spring_cubic"]], {}, campaign_scales(base)).fit
 
 
-def test_onsets_are_those_of_the_good_model(base: Fit, good: Fit) -> None:
+@pytest.fixture(scope="module")
+def across(good: Fit) -> Fit:
+    """The good model, of readings one of which lies across the jump of an onset."""
+    recordings = list(good.target.oscillator.campaign.recordings)
+    used, before = without_onsets(good).recordings[0].used, recordings[0].used
+    assert used is not None
+    place = int(np.flatnonzero(~used if before is None else before & ~used)[0])
+    samples = recordings[0].samples.copy()
+    samples[place] += 1.0
+    recordings[0] = replace(recordings[0], samples=samples)
+    return good.with_recordings(recordings)
+
+
+def test_onsets_are_those_of_the_good_model(base: Fit, good: Fit, across: Fit) -> None:
     """Without them one mode is found from any side: no step lies between."""
     assert base.reduced_chi2 > 30 and good.reduced_chi2 < 2.0
-    assert is_spoilt(good) and not is_spoilt(base)
-    state: Any = SimpleNamespace(candidate=SimpleNamespace(fit=good), is_white=True)
+    assert misses_onsets(across) and not misses_onsets(good) and not is_spoilt(base)
+    state: Any = SimpleNamespace(candidate=SimpleNamespace(fit=across), is_white=True)
     told: list[str] = []
     anew = posed_anew(base, state, told.append)
-    assert anew is not None and anew.first is not None and not anew.spikes and told
-    assert not is_spoilt(anew.first)
+    assert anew is not None and anew.first is not None and told
     campaign = anew.first.target.oscillator.campaign
-    assert without_onsets(anew.first) is campaign is anew.base.target.oscillator.campaign
+    assert campaign is anew.base.target.oscillator.campaign
+    assert not is_spoilt(anew.first) and 0.9 < anew.first.reduced_chi2 < 1.1
     ends = [
-        refitted(good, campaign, replace(good, mode=start)).log_posterior
+        refitted(good, without_onsets(good), replace(good, mode=start)).log_posterior
         for start in good.draws(RNG(2), 6)
     ]
     assert np.ptp(ends) < 0.01
+
+
+def test_a_spike_is_one_that_the_fit_without_it_misses(good: Fit) -> None:
+    """And one that it explains is counted again."""
+    recordings = list(good.target.oscillator.campaign.recordings)
+    samples = recordings[1].samples.copy()
+    samples[901] -= 1.5
+    recordings[1] = replace(recordings[1], samples=samples)
+    spiked = good.with_recordings(recordings)
+    found = beside_spikes(spiked)
+    assert found is not None
+    ((fault,), clean) = found
+    assert (fault.recording, fault.spans) == ("b", ((901, 902),))
+    campaign = spiked.target.oscillator.campaign
+    assert outliers._still_off(campaign, clean, [fault]) == (fault,)
+    right = good.target.oscillator.campaign  # the reading as it was
+    assert outliers._still_off(right, clean, [fault]) == ()
+    assert beside_spikes(good) is None
+    kept = replace(campaign, keep_faults=True)
+    oscillator = replace(spiked.target.oscillator, campaign=kept)
+    likelihood = replace(spiked.target.likelihood, oscillator=oscillator)
+    assert (
+        beside_spikes(replace(spiked, target=replace(spiked.target, likelihood=likelihood))) is None
+    )
 
 
 def test_of_displacements_there_is_nothing_to_pose_anew() -> None:

@@ -119,6 +119,7 @@ def test_a_law_may_have_taken_the_place_of_two(odds: float, white: bool, extende
     more, part = model(f"{FRICTION} {DRAG} {SPRING}", 1.0), model(FRICTION, 1.2)
     known = {chosen.ids: 500.0, rival.ids: odds, part.ids: odds - 1.0, more.ids: 600.0}
     search: Any = Settling((), None, np.random.default_rng(0), lambda words: None)
+    search.states = {frozenset(): SimpleNamespace(candidate=model("", 400.0))}
     search.log_odds = lambda candidate: known[candidate.ids]
     search.ranked = lambda models: sorted(models, key=search.log_odds, reverse=True)
     search.tried = {frozenset(c.ids): c for c in (chosen, rival, part, more)}

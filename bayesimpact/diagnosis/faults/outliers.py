@@ -19,7 +19,7 @@ from bayesimpact.data.faults.fault import Fault, gaussian_threshold
 from bayesimpact.data.faults.find import applied
 from bayesimpact.data.faults.local import robust_sd
 from bayesimpact.data.faults.spikes import lone_spikes
-from bayesimpact.diagnosis.naming import is_more_than_noise
+from bayesimpact.diagnosis.naming import leaves_something
 from bayesimpact.diagnosis.thresholds import LARGE
 from bayesimpact.inference.declared import climbed
 from bayesimpact.inference.fit import Fit
@@ -44,29 +44,36 @@ def residual_spikes(fit: Fit, *, contacts: bool = True) -> tuple[Fault, ...]:
     return tuple(found)
 
 
-def all_that_remains(fit: Fit) -> tuple[Fault, ...]:
-    """Spikes of a fit that leaves no more than noise beside them; () of every other.
+def beside_spikes(fit: Fit) -> tuple[tuple[Fault, ...], Fit] | None:
+    """Spikes of a fit, and the model's mode without them, where that leaves no more than noise: a
+    contact that the model missed would have moved all that comes after it.
 
-    A contact that it missed would have moved all that comes after it.
+    What the mode without them explains is none: it is counted again, from that mode.
     """
-    kept = fit.target.oscillator.campaign.keep_faults
-    if kept or np.median(np.abs(_misses(fit, ()))) > LARGE * HALF_WITHIN:
-        return ()
+    campaign = fit.target.oscillator.campaign
+    if campaign.keep_faults or _misses_most(fit):
+        return None
     spikes = residual_spikes(fit, contacts=False)
-    rest = float(np.mean(_misses(fit, spikes) ** 2))
-    return () if is_more_than_noise(rest, fit.target.likelihood.noise) else spikes
+    clean = refitted(fit, faults_set_aside(campaign, spikes)) if spikes else fit
+    if not spikes or leaves_something(clean):
+        return None
+    lasting = _still_off(campaign, clean, spikes)
+    if len(lasting) < len(spikes):
+        counted = faults_set_aside(campaign, lasting) if lasting else campaign
+        clean = refitted(fit, counted, clean)
+    return lasting, clean
 
 
-def _misses(fit: Fit, faults: Sequence[Fault]) -> Array:
-    """Residuals over the noise, those of faults left out, (n,)."""
+def _misses_most(fit: Fit) -> bool:
+    """Whether half of the readings are missed by more than a large misfit would: no fit is needed
+    to see that spikes are not all.
+    """
     noise, found = fit.target.likelihood.noise, list[Array]()
     recordings = fit.target.oscillator.campaign.recordings
     for recording, residual in zip(recordings, fit.residuals, strict=True):
-        kept = np.ones(residual.size, bool) if recording.used is None else recording.used.copy()
-        for first, end in (s for f in faults if f.recording == recording.name for s in f.spans):
-            kept[first:end] = False
-        found.append(residual[kept] / (noise.level * noise.scales[recording.order]))
-    return np.concatenate(found)
+        kept = residual if recording.used is None else residual[recording.used]
+        found.append(np.abs(kept) / (noise.level * noise.scales[recording.order]))
+    return bool(np.median(np.concatenate(found)) > LARGE * HALF_WITHIN)
 
 
 def refitted(fit: Fit, campaign: Campaign, start: Fit | None = None) -> Fit:
@@ -77,12 +84,12 @@ def refitted(fit: Fit, campaign: Campaign, start: Fit | None = None) -> Fit:
     return climbed(replace(fit.target, likelihood=likelihood), start or fit)
 
 
-def still_off(fit: Fit, clean: Fit, faults: Sequence[Fault]) -> tuple[Fault, ...]:
-    """Those faults of a fit with a reading that the fit without all of them misses as well."""
+def _still_off(campaign: Campaign, clean: Fit, faults: Sequence[Fault]) -> tuple[Fault, ...]:
+    """Those faults of a campaign with a reading that the fit without all of them misses as well."""
     kept = list[Fault]()
-    recordings, bridged = (f.target.oscillator.campaign.recordings for f in (fit, clean))
-    for recording, other, residual in zip(recordings, bridged, clean.residuals, strict=True):
-        missed = np.abs(recording.samples - (other.samples - residual))
+    rows = zip(campaign.recordings, clean.predicted, clean.residuals, strict=True)
+    for recording, predicted, residual in rows:
+        missed = np.abs(recording.samples - predicted)
         least = gaussian_threshold(missed.size) * robust_sd(residual)
         own = (fault for fault in faults if fault.recording == recording.name)
         kept += [f for f in own if max(missed[a:b].max() for a, b in f.spans) > least]

@@ -29,8 +29,11 @@ CHANCE = 0.01  # of stiffnesses that doubt a label: it only decides what is fitt
 
 
 def share_stops(campaign: Campaign) -> bool:
-    """Whether there are several stops, and some recordings are said to share one."""
-    return campaign.stop and 1 < len(campaign.cases) < len(campaign.recordings)
+    """Whether there are several stops, and some recordings are said to share one; not of several
+    channels of a motion, which share their stop whatever its label.
+    """
+    single = all(not r.motion_name for r in campaign.recordings)
+    return campaign.stop and single and 1 < len(campaign.cases) < len(campaign.recordings)
 
 
 def with_own_stops(fit: Fit) -> Fit:

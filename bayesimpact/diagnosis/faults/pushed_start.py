@@ -28,12 +28,15 @@ NEARLY = 0.5  # of the best such ratio: the earliest instant that reaches so muc
 
 
 def pushed_starts(fit: Fit, effects: Sequence[Effect], scales: Scales) -> tuple[Fault, ...]:
-    """First instants of free recordings without a stop that no law explains beside the rest.
+    """First instants of free recordings without a stop that no law explains beside the rest; of
+    motions with one channel each.
 
     What still falls at the last instant is no push: a misfit that decays with the motion.
     """
     campaign = fit.target.oscillator.campaign
-    if campaign.stop or campaign.keep_faults or fit.target.oscillator.inputs is not None:
+    channels = any(r.motion_name for r in campaign.recordings)
+    driven = fit.target.oscillator.inputs is not None
+    if campaign.stop or campaign.keep_faults or driven or channels:
         return ()
     period = 2 * np.pi * float(np.sqrt(campaign.mass / fit.value("k1")))
     whole, found = _left(fit, effects, scales), []
