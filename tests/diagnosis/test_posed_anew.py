@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,6 +11,7 @@ import pytest
 import small_rig
 from effect_rigs import BY_ID
 
+from bayesimpact.diagnosis import name as search
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.faults import outliers
 from bayesimpact.diagnosis.faults.outliers import beside_spikes, refitted
@@ -114,3 +115,52 @@ def test_draws_have_the_spread_of_the_approximation_whatever_the_units(good: Fit
     expected = 4.0 * scaled.covariance / np.outer(scaled.sd, scaled.sd)
     error = np.sqrt((expected**2 + 16.0) / count)
     assert np.abs((z.T @ z / count - expected) / error).max() < 4.5
+
+
+@dataclass(frozen=True)
+class MadeUpNaming:
+    """Which search it is of: the first, the one posed anew, or the first gone on."""
+
+    of: str
+    spikes: tuple[Any, ...] = ()
+
+
+@pytest.mark.parametrize(
+    ("cut", "posed", "white", "of"),
+    [
+        (True, True, False, "anew"),
+        (False, True, False, "first"),
+        (False, True, True, "anew"),
+        (True, False, False, "first to its end"),
+        (False, False, False, "first"),
+    ],
+)
+def test_which_search_answers(
+    monkeypatch: pytest.MonkeyPatch, cut: bool, posed: bool, white: bool, of: str
+) -> None:
+    """One that was cut short is no answer, whatever the one posed anew leaves."""
+    made: list[Any] = []
+
+    class Search:
+        is_last = was_cut = False
+
+        def __init__(self, *about: Any) -> None:
+            self.budget = SimpleNamespace(may_search_again=lambda: True)
+            made.append(self)
+
+        def found(self, base: Any, first: Any) -> tuple[Any, Any]:
+            self.was_cut = cut and not self.is_last
+            state = SimpleNamespace(candidate=SimpleNamespace(fit="reached"), is_white=white)
+            return base, state
+
+        def naming(self, base: Any, state: Any) -> MadeUpNaming:
+            first = "first to its end" if self.is_last else "first"
+            return MadeUpNaming(first if self is made[0] else "anew")
+
+    anew = SimpleNamespace(base="clean", first=None, spikes=("spike",)) if posed else None
+    monkeypatch.setattr(search, "_Search", Search)
+    monkeypatch.setattr(search, "posed_anew", lambda *about: anew)
+    fit: Any = "base"
+    scales: Any = None
+    found: Any = search.name(fit, (), scales, rng=RNG(0))
+    assert found == MadeUpNaming(of, ("spike",) if of == "anew" else ())
