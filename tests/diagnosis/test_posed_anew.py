@@ -14,7 +14,7 @@ from effect_rigs import BY_ID
 from bayesimpact.diagnosis import name as search
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.faults import outliers
-from bayesimpact.diagnosis.faults.outliers import beside_spikes, refitted
+from bayesimpact.diagnosis.faults.outliers import beside_spikes, refitted, residual_spikes
 from bayesimpact.diagnosis.posed_anew import is_spoilt, misses_onsets, posed_anew
 from bayesimpact.diagnosis.refit import fit_from
 from bayesimpact.inference.fit import Fit
@@ -164,3 +164,9 @@ def test_which_search_answers(
     scales: Any = None
     found: Any = search.name(fit, (), scales, rng=RNG(0))
     assert found == MadeUpNaming(of, ("spike",) if of == "anew" else ())
+
+
+def test_a_reading_across_the_jump_of_an_onset_is_no_spike(across: Fit) -> None:
+    assert misses_onsets(across)
+    assert residual_spikes(across, contacts=False) == ()
+    assert beside_spikes(across) is None

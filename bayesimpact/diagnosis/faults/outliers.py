@@ -24,6 +24,7 @@ from bayesimpact.diagnosis.thresholds import LARGE
 from bayesimpact.inference.declared import climbed
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.likelihood import Likelihood
+from bayesimpact.inference.onsets import without_onsets
 from bayesimpact.model.oscillator import Oscillator
 
 Array = NDArray[np.float64]
@@ -34,12 +35,15 @@ HALF_WITHIN = 0.6745  # standard deviations of Gaussian noise
 def residual_spikes(fit: Fit, *, contacts: bool = True) -> tuple[Fault, ...]:
     """Spikes in the residuals of a fit; samples that are set aside count as fitted.
 
-    contacts : whether the fit may have missed brief ones
+    contacts : whether the fit may have missed brief ones; where it has not, accelerations at the
+        onsets that it shows count as fitted too: they lie on one side of a jump or the other
     """
     found: list[Fault] = []
-    recordings = fit.target.oscillator.campaign.recordings
-    for recording, residual in zip(recordings, fit.residuals, strict=True):
-        kept = residual if recording.used is None else np.where(recording.used, residual, 0.0)
+    campaign = fit.target.oscillator.campaign
+    counted = campaign if contacts else without_onsets(fit)
+    rows = zip(campaign.recordings, counted.recordings, fit.residuals, strict=True)
+    for recording, other, residual in rows:
+        kept = residual if other.used is None else np.where(other.used, residual, 0.0)
         found += lone_spikes(replace(recording, samples=kept), contacts=contacts)
     return tuple(found)
 
