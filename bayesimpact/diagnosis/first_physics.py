@@ -32,6 +32,7 @@ from bayesimpact.diagnosis.recording_faults import (
     Corrected,
     Step,
     comparisons,
+    fault_as_read,
     shared_effects,
     values_of,
 )
@@ -75,10 +76,12 @@ def faults_beside_physics(
         steps = comparisons(before, as_read, chosen.effects, values)
         if steps and _leaves_nothing(model.fitted(steps[-1][-1].campaign)):
             return steps
-    return _label_beside_physics(before, effects)
+    return _label_beside_physics(before, as_read, effects)
 
 
-def _label_beside_physics(before: Corrected, effects: Sequence[Effect]) -> tuple[Step, ...]:
+def _label_beside_physics(
+    before: Corrected, as_read: Campaign, effects: Sequence[Effect]
+) -> tuple[Step, ...]:
     """A wrong label that the contact stiffnesses of recordings with stops of their own show beside
     the likeliest laws, where with the right one these leave `EXCESS` times less.
     """
@@ -101,7 +104,8 @@ def _label_beside_physics(before: Corrected, effects: Sequence[Effect]) -> tuple
         if given > EXCESS * put_right:
             recording, gained = campaign.recordings[place], gain(given, put_right, right)
             fault = as_fault(recording, label, gained, CERTAIN)
-            return ((Compared(fault, right, given, put_right),),)
+            told = fault_as_read(fault, campaign, as_read)
+            return ((Compared(told, right, given, put_right),),)
     return ()
 
 

@@ -101,7 +101,7 @@ def without_faults(
     campaign = faults_set_aside(whole, faults)
     again = replace(_identified(campaign, rng=rng, search=False), search=before.search)
     change = before.fit.reduced_chi2, again.fit.reduced_chi2
-    told = (_as_read(fault, whole, as_read) for fault in faults)
+    told = (fault_as_read(fault, whole, as_read) for fault in faults)
     return replace(
         found,
         identification=again,
@@ -114,11 +114,11 @@ def with_spikes(
 ) -> Corrected:
     """The same with spikes set aside that a model showed; `identification` is without them."""
     whole = before.identification.fit.target.oscillator.campaign
-    told = tuple(replace(one, fault=_as_read(one.fault, whole, as_read)) for one in spikes)
+    told = tuple(replace(one, fault=fault_as_read(one.fault, whole, as_read)) for one in spikes)
     return replace(before, identification=identification, compared=(*before.compared, *told))
 
 
-def _as_read(fault: Fault, campaign: Campaign, as_read: Campaign) -> Fault:
+def fault_as_read(fault: Fault, campaign: Campaign, as_read: Campaign) -> Fault:
     """A fault found in a campaign, its samples counted from the recording's first as read."""
     now, before = ({r.name: r for r in c.recordings}[fault.recording] for c in (campaign, as_read))
     cut = round((now.start - before.start) / now.interval)
@@ -146,7 +146,7 @@ def comparisons(
     if whole is None:
         return ()
     found = [
-        replace(one, fault=_as_read(one.fault, campaign, as_read))
+        replace(one, fault=fault_as_read(one.fault, campaign, as_read))
         for one in compare_recordings(whole, model)
     ]
     return tuple(tuple(step) for _, step in groupby(found, key=lambda one: one.after))

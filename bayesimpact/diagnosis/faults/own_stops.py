@@ -56,16 +56,19 @@ def with_own_stops(fit: Fit) -> Fit:
 
 def shared_values(values: Mapping[str, float], own: Layout, shared: Layout) -> dict[str, float]:
     """Parameter of a layout with shared stops -> value: the mean of `values` of those that share
-    it in a layout with `own` ones.
+    it in a layout with `own` ones; none of a parameter that only one of the layouts has.
     """
-    places = shared_places(own, shared)
-    found = np.array([values[name] for name in own.names])
-    total = np.bincount(places, found, shared.size) / np.bincount(places, minlength=shared.size)
-    return dict(zip(shared.names, map(float, total), strict=True))
+    found = dict[str, list[float]]()
+    for name, place in zip(own.names, shared_places(own, shared), strict=True):
+        if place >= 0:
+            found.setdefault(shared.names[place], []).append(values[name])
+    return {name: float(np.mean(those)) for name, those in found.items()}
 
 
 def shared_places(own: Layout, shared: Layout) -> NDArray[np.int64]:
-    """Where the parameters of a layout with own stops stand in that with shared ones, (d,)."""
+    """Where the parameters of a layout with own stops stand in that with shared ones, (d,); -1
+    where that has none.
+    """
     found = np.array([_place(shared, name) for name in own.names])
     fed = own.columns >= 0
     found[own.columns[fed]] = shared.columns[fed]

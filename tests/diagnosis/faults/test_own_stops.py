@@ -60,6 +60,22 @@ def test_a_wrong_label_is_found_beside_strong_laws_and_no_right_one(recorded: Ca
     assert found(recorded) == []
 
 
+def test_it_is_told_of_the_recording_as_read(recorded: Campaign) -> None:
+    """Readings cut at its start count, as in what other faults say."""
+    wrong = mislabelled(recorded)
+    rest = np.full(150, wrong.recordings[-1].samples[0])
+    noise = small_rig.NOISE * np.random.default_rng(3).standard_normal(rest.size)
+    late = replace(
+        wrong.recordings[-1], samples=np.concatenate([rest + noise, wrong.recordings[-1].samples])
+    )
+    campaign = replace(wrong, recordings=(*wrong.recordings[:-1], late))
+    before = cleaned_campaign(campaign, rng=np.random.default_rng(0), search=False)
+    cut = late.samples.size - before.identification.fit.residuals[-1].size
+    assert cut > 100
+    (((one,),),) = (faults_beside_physics(before, campaign, tuple(BY_ID[i] for i in LAWS)),)
+    assert one.fault.id == "recording_case" and one.fault.spans == ((cut, late.samples.size),)
+
+
 def test_stiffnesses_show_a_label() -> None:
     campaign = small_rig.record(1, releases=RELEASES, chain=small_rig.Chain(noise=1e-6))
     right = [5000.0, 5060.0, 3000.0, 2980.0, 3010.0]
