@@ -22,6 +22,8 @@ Let S be the likeliest set of effects that the search reached.
      leaves most of the force,
    - its size is apart from none at all by `APART` of its own standard deviations, with what the
      remainder may have done to it in them (`discrepancy`),
+   - where it refines a simpler law (`Effect.prefer`), `EXCESS` times as much is left with that law
+     in its place: what remains may be all that tells the two apart,
    - no set without it, with a residual force of whichever form is likeliest, is likelier than S
      with its own residual force: by these odds (as in 1), where that force depends on what the
      effect's depends on and may be no more than the effect itself, and
@@ -30,8 +32,8 @@ Let S be the likeliest set of effects that the search reached.
    A search that ended by its limit must have fitted all of these.
    With needed effects the verdict is `partly`, without any it is `unknown`. Other effects of S stay
    in the fitted model, but are not named. Where every likely set that lacks one of them has another
-   of its family, and all of the above holds of these together, it is told that one of them is
-   needed.
+   of its family, or where a law and the one that it refines are not told apart, and all of the
+   above holds of these together, it is told that one of them is needed.
 
 A name never rests on one p-value.
 """
@@ -96,7 +98,7 @@ def decide(naming: Naming) -> Decision:
         return Decision("named" if settled else "ambiguous", effects, rivals)
     if is_imitated(naming):
         return Decision("unknown", ())
-    needed = tuple(e for e in effects if is_needed(naming, (e,)))
+    needed = tuple(e for e in effects if not simpler(naming, e) and is_needed(naming, (e,)))
     groups = (group_of(naming, e) for e in effects if e not in needed)
     either = tuple(g for g in groups if len(g) > 1 and is_needed(naming, g))
     if not needed:
@@ -121,22 +123,45 @@ def is_needed(naming: Naming, group: Group) -> bool:
     )
 
 
+def simpler(naming: Naming, effect: Effect) -> Group:
+    """The law that an effect of the chosen model refines, unless far more is left with it."""
+    found = in_place_of_refined(naming, effect)
+    if found is None or exceeds(naming, found.fit):
+        return ()
+    return tuple(e for e in found.effects if e.id == effect.prefer)
+
+
+def in_place_of_refined(naming: Naming, effect: Effect) -> Candidate | None:
+    """The chosen model with the law that an effect refines in its place, if it was fitted."""
+    ids = frozenset(naming.chosen.candidate.ids)
+    if not refines_another(naming, effect):
+        return None
+    wanted = ids - {effect.id} | {effect.prefer}
+    return next((c for c in naming.tried if frozenset(c.ids) == wanted), None)
+
+
+def refines_another(naming: Naming, effect: Effect) -> bool:
+    """Whether an effect refines a law that the chosen model does not have beside it."""
+    return effect.prefer is not None and effect.prefer not in naming.chosen.candidate.ids
+
+
 def group_of(naming: Naming, effect: Effect) -> Group:
-    """An effect of the chosen model, and those of its family that likely sets without it have in
-    its place; alone where one of them has none, or there are too many.
+    """An effect of the chosen model, the law that it refines where they are not told apart, and
+    those of its family that likely sets without it have in its place; without these where one of
+    the sets has none, or there are too many.
     """
-    chosen = naming.chosen.candidate
+    chosen, alone = naming.chosen.candidate, (effect, *simpler(naming, effect))
     least = naming.log_odds(chosen) - DECISIVE
-    others = dict[str, Effect]()
+    others = {e.id: e for e in alone[1:]}
     for candidate in naming.tried:
         if naming.log_odds(candidate) <= least or holds(candidate.effects, (effect,)):
             continue
         same = [e for e in candidate.effects if e.family == effect.family]
         found = [e for e in same if e.id not in chosen.ids]
         if len(found) != 1:
-            return (effect,)
+            return alone
         others[found[0].id] = found[0]
-    return (effect, *others.values()) if len(others) < LARGEST_GROUP else (effect,)
+    return (effect, *others.values()) if len(others) < LARGEST_GROUP else alone
 
 
 def is_imitated(naming: Naming) -> bool:
@@ -160,11 +185,13 @@ def is_compared(naming: Naming, group: Group) -> bool:
     """Whether a search that ended by its limit has still fitted what an effect must beat.
 
     With a residual force: the chosen model, the base model, the one without the effect, and the
-    likeliest with another, not of its group, in its place; where none was tried, it was not.
+    likeliest with another, not of its group, in its place; where none was tried, it was not. And
+    the law that it refines in its place.
     """
     chosen = frozenset(naming.chosen.candidate.ids)
     other = in_its_place(naming, group)
-    if other is None:
+    refined = not refines_another(naming, group[0]) or in_place_of_refined(naming, group[0])
+    if other is None or not refined:
         return False
     rivals = {chosen, frozenset[str](), chosen - {group[0].id}, frozenset(other.ids)}
     return rivals <= naming.residual.keys()
@@ -231,12 +258,14 @@ def with_its_evidence(candidate: Candidate) -> Candidate:
 
 def misses(naming: Naming, effect: Effect) -> bool:
     """Whether `EXCESS` times as much misfit is left without an effect."""
-    ids = frozenset(naming.chosen.candidate.ids)
-    with_it, without_it = (
-        misfit_above_noise(naming, naming.states[key].candidate.fit)
-        for key in (ids, ids - {effect.id})
-    )
-    return without_it > EXCESS * with_it
+    smaller = frozenset(naming.chosen.candidate.ids) - {effect.id}
+    return exceeds(naming, naming.states[smaller].candidate.fit)
+
+
+def exceeds(naming: Naming, fit: Fit) -> bool:
+    """Whether a fit leaves `EXCESS` times as much misfit as the chosen model."""
+    with_it = misfit_above_noise(naming, naming.chosen.candidate.fit)
+    return misfit_above_noise(naming, fit) > EXCESS * with_it
 
 
 def stands_out(naming: Naming, effect: Effect) -> bool:

@@ -13,6 +13,7 @@ from bayesimpact.diagnosis.decision import (
     may_be_needed,
     misses,
     ordered,
+    simpler,
 )
 from bayesimpact.diagnosis.discrepancy import Discrepancy, discrepancy
 from bayesimpact.diagnosis.naming import Naming, State
@@ -36,10 +37,15 @@ class Remaining(Settling):
         if found.chosen.is_white:
             return replace(found, beside=None)
         smaller = {e.id: self.examine(self.drop(chosen, e)).candidate for e in chosen.effects}
+        for effect in chosen.effects:
+            self.simplified(chosen, effect)
         tried = tuple(sorted(self.tried.values(), key=found.log_odds, reverse=True))
         found = replace(found, tried=tried, states=dict(self.states))
         alone = [(e,) for e in ordered(found, chosen.effects)]
-        groups = [g if leads_without(found, g) else group_of(found, g[0]) for g in alone]
+        groups = [
+            g if leads_without(found, g) and not simpler(found, g[0]) else group_of(found, g[0])
+            for g in alone
+        ]
         leading = [g for g in groups if leads_without(found, g)]
         own = self.remainder(chosen.fit)
         if own is not None:

@@ -117,7 +117,11 @@ def force_along(law: Law, y: Array, v: Array, t: Array, p: Numbers, q: Array) ->
 def branch(
     law: Law, y: float, v: float, d: float, t: float, touching: float, p: Numbers, q: Array
 ) -> float:
-    """The state of a law whose force jumps: direction of the motion, or side of its surface."""
+    """The state of a law whose force jumps: direction of the motion, side of its surface, or of a
+    law that has both the direction where the surface is above zero.
+    """
+    direction = float(np.sign(v)) if law.jump_at_turn else 0.0
     if law.jump_at_surface and law.surface is not None:
-        return float(np.sign(law.surface(y, v, d, t, 0.0, touching, p, q)))
-    return float(np.sign(v)) if law.jump_at_turn else 0.0
+        side = float(np.sign(law.surface(y, v, d, t, 0.0, touching, p, q)))
+        return (direction if side > 0.0 else 0.0) if law.jump_at_turn else side
+    return direction

@@ -1,6 +1,6 @@
 """The library: every term of the grammar that a campaign of given sizes could show.
 
-Some 370 terms. What the base model has already (k1 y, c1 v, k2 d, c2 v in contact, a constant) is
+Some 390 terms. What the base model has already (k1 y, c1 v, k2 d, c2 v in contact, a constant) is
 left out. Shape parameters stand on grids: places where the mass has been, widths of a sixteenth to
 a quarter of the amplitude; a refit sets them free.
 """
@@ -42,7 +42,9 @@ LOCAL: tuple[tuple[Region, Power, Power], ...] = tuple(
     ("bump", position, speed)
     for position, speed in ((ONE, ONE), (LINEAR, ONE), (ONE, V), (ONE, SIGN), (ONE, DRAG))
 )
-LOCAL_BOXES: tuple[tuple[Region, Power, Power], ...] = (("box", ONE, V), ("box", ONE, DRAG))
+LOCAL_BOXES: tuple[tuple[Region, Power, Power], ...] = tuple(
+    ("box", ONE, speed) for speed in (V, SIGN, DRAG)
+)
 
 
 def library(scales: Scales, low: float, high: float) -> tuple[Term, ...]:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from bayesimpact.formula.grammar import Power, Term
 from bayesimpact.formula.law import is_friction, law_of
-from bayesimpact.model.effects.effect import Effect
+from bayesimpact.model.effects.effect import Effect, Law
 from bayesimpact.model.effects.power_damping import SLOW
 
 HEAD = '''"""{title}
@@ -111,7 +111,7 @@ def _law(number: str, term: Term, effect: Effect) -> tuple[list[str], list[str]]
             '    binds={"friction": "size"},  # sticks where the other forces cannot move it'
         ]
     law, name = law_of(term), f"force{number}"
-    functions = [_function(name, "N.", [f"return {_force(term, law.jump_at_surface)}"])]
+    functions = [_function(name, "N.", [f"return {_force(term, law)}"])]
     words = [name]
     if law.where == "contact":
         words.append('where="contact"')
@@ -190,7 +190,7 @@ def _surface(term: Term, places: dict[str, str]) -> str:
     return x
 
 
-def _force(term: Term, sided: bool) -> str:
+def _force(term: Term, law: Law) -> str:
     """The force as an expression of Python."""
     places = _places(term)
     x = _coordinate(term, places)
@@ -201,7 +201,7 @@ def _force(term: Term, sided: bool) -> str:
     if term.fade > 0:
         factors.append(f"math.exp(-abs(v) / {places['fade']})")
     product = " * ".join(factors)
-    if sided:
+    if law.jump_at_surface and not law.jump_at_turn:
         return f"{product} if z > 0.0 else 0.0"
     return product
 

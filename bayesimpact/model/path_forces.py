@@ -47,5 +47,6 @@ def _force(law: Any, y: Any, v: Any, d: Any, t: Any, z: Any, p: Any, q: Any) -> 
     if law[LAW_FLAGS] & JUMP_AT_TURN:  # z tells the branch
         z = np.sign(v)
     if law[LAW_FLAGS] & JUMP_AT_SURFACE:
-        z = np.sign(call_law(law[LAW_SURFACE], y, v, d, t, 0.0, touching, p, q))
+        side = np.sign(call_law(law[LAW_SURFACE], y, v, d, t, 0.0, touching, p, q))
+        z = (z if side > 0.0 else 0.0) if law[LAW_FLAGS] & JUMP_AT_TURN else side
     return call_law(law[LAW_FORCE], y, v, d, t, z, touching, p, q)

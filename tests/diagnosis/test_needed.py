@@ -230,3 +230,28 @@ def test_an_effect_that_its_own_interval_does_not_hold_apart_is_not_needed(apart
     """Intervals beside a remainder may contain no effect at all; no name then stands beside one."""
     found = remaining(something_left(), 100.0, 10.0)
     assert judge(replace(found, apart={FRICTION: apart})) == verdict
+
+
+@pytest.mark.parametrize(("more", "names"), [(0.1, ["power_damping"]), (-0.1, [])])
+def test_a_law_is_told_from_the_one_that_it_refines_where_that_leaves_far_more(more, names):
+    """Its odds alone do not tell: what remains may be all that speaks for its further parameter."""
+    chosen = state(
+        candidate("power_damping", 100.0), p_force=ALPHA / 2, force_evidence=2 * DECISIVE
+    )
+    refined = with_misfit(candidate(DRAG, 50.0), 1.0 + 9.0 * EXCESS + more)
+    decision = decide(remaining(chosen, 100.0, 10.0, refined))
+    assert [e.id for e in decision.effects] == names
+    either = [] if names else [("power_damping", DRAG)]
+    assert [tuple(e.id for e in g) for g in decision.either] == either
+
+
+def test_a_search_that_ended_by_its_limit_needs_the_law_that_an_effect_refines_fitted() -> None:
+    chosen = state(
+        candidate("power_damping", 100.0), p_force=ALPHA / 2, force_evidence=2 * DECISIVE
+    )
+    other, refined = candidate("structural_damping", 50.0), with_misfit(candidate(DRAG, 40.0), 90.0)
+    for known, verdict in (((refined,), "partly"), ((), "unknown")):
+        found = remaining(chosen, 100.0, 10.0, other, *known, beside=110.0, instead=100.0)
+        fitted = {frozenset(other.ids): beside_force(other, 50.0)}
+        ended = replace(found, finished=False, residual={**found.residual, **fitted})
+        assert judge(ended) == verdict

@@ -54,7 +54,8 @@ def called(law: Any, function: Any, p: Any, state: np.ndarray) -> float:
     y, v, d, t = map(float, state)
     z = float(np.sign(v))
     if law.jump_at_surface:
-        z = float(np.sign(law.surface(y, v, d, t, 0.0, float(d > 0), p, None)))
+        side = float(np.sign(law.surface(y, v, d, t, 0.0, float(d > 0), p, None)))
+        z = (z if side > 0.0 else 0.0) if law.jump_at_turn else side
     return float(function(y, v, d, t, z, float(d > 0), p, None))
 
 

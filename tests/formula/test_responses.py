@@ -30,6 +30,7 @@ FREE = (
     Term("bump", Power(1.0, True), ONE, -1, 2e-3, 7e-4),
     Term("bump", ONE, V, -1, 2e-3, 7e-4),
     Term("box", ONE, V, -1, 2e-3, 7e-4),
+    Term("box", ONE, SIGN, -1, 2e-3, 7e-4),
 )
 CONTACT = (
     Term("contact", ONE),

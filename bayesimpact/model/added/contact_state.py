@@ -218,10 +218,14 @@ def static_force(y: Any, t: Any, column: Any, w: Any) -> Any:
 
 @inner()
 def point_laws(direction: Any, w: Any) -> Any:
-    """Tell the laws whose force jumps at a turning point which way the motion goes."""
+    """Tell the laws whose force jumps at a turning point which way the motion goes; where the
+    force jumps at a surface too and the motion is beyond it, nothing acts.
+    """
     for law in range(w.size):
-        if w.laws[LAW_COLUMNS * law + LAW_FLAGS] & JUMP_AT_TURN != 0:
-            tell(law, direction, w)
+        flags = w.laws[LAW_COLUMNS * law + LAW_FLAGS]
+        if flags & JUMP_AT_TURN != 0:
+            acts = flags & JUMP_AT_SURFACE == 0 or w.s[SIDES + law] > 0.0
+            tell(law, direction if acts else 0.0, w)
 
 
 @inner()

@@ -203,7 +203,8 @@ class Law:
         is continuous but not smooth at v = 0 (a root of the speed); steps end there
     jump_at_turn : the force jumps at v = 0; steps end on turning points, and z, of which the
         law then has no use of its own, is the direction of the motion: -1, 1, or 0 at rest
-    jump_at_surface : the force jumps at its surface; z is the side: the sign of `surface`
+    jump_at_surface : the force jumps at its surface; z is the side: the sign of `surface`. Of a
+        law that jumps at v = 0 too, z is the direction where `surface` is above 0, else 0
     polynomial : between its kinks the force is a polynomial of low degree of y and v, and of sines
         of time no faster than `time_rate`: it has no features that a look at four points of a cycle
         misses, so steps may be longer where it is weak

@@ -10,6 +10,9 @@ import pytest
 from effect_rigs import BY_ID, TestRig, by_rig, moved
 from scipy.special import gamma
 
+from bayesimpact.formula.grammar import Power, Term
+from bayesimpact.formula.law import effect_of, starts_of
+
 FREE = TestRig(mass=0.5, c1=0.0, k1=0.5 * (10 * np.pi) ** 2, k2=(), y0=(-6e-3,), v0=(0.0,))
 POWER, STRUCTURAL = BY_ID["power_damping"], BY_ID["structural_damping"]
 
@@ -102,3 +105,18 @@ def test_structural_damping_adds_to_the_hold_of_dry_friction():
         y = moved(effects, values, rig)
         assert np.all(y == place) == held
         assert np.abs(y - by_rig(effects, values, rig)).max() < 1e-12
+
+
+@pytest.mark.parametrize(("place", "side"), [(2.5e-3, -1), (1.5e-3, 1)])
+def test_dry_friction_of_a_box(place, side):
+    """Every pass of a pad of width 2 w takes the energy 2 w F: a_n^2 = a_0^2 - 4 n w F / k."""
+    w, a = 0.6e-3, abs(FREE.y0[0])
+    force = 0.02 * FREE.k1 * a
+    term = Term("box", speed=Power(0.0, True), side=side, place=place, width=w)
+    pad = effect_of(term, force, a, 10 * np.pi * a, signed=False)
+    values = {f"{pad.id}.size": force} | starts_of(term)
+    half_swings = np.abs(moved([pad], values, FREE, 0)[::100])  # k1 is 10 pi: 0.1 s each
+    expected = np.sqrt(a * a - 4 * np.arange(half_swings.size) * w * force / FREE.k1)
+    through = expected > place + w
+    assert 8 < np.count_nonzero(through)
+    np.testing.assert_allclose(half_swings[through], expected[through], rtol=1e-5)
