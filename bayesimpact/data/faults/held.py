@@ -54,11 +54,10 @@ def find_held(recording: Recording) -> list[Fault]:
     count = sum(run.size for run in chosen)
     equal = max(share, _share_as_slow(x, longest), 1.0 / x.size)
     log_chance = np.log10(x.size) + (longest.size - 1) * np.log10(equal)
-    what = (
-        "zeros"
-        if longest.value == 0.0
-        else f"readings held at {amount(longest.value, recording.unit)}"
-    )
+    values = {run.value for run in chosen}
+    what = "zeros" if values == {0.0} else "readings held"
+    if len(values) == 1 and longest.value != 0.0:
+        what += f" at {amount(longest.value, recording.unit)}"
     tail = chosen[-1]
     alone = tail.end == x.size and len(chosen) == 1
     place = "until the end" if alone else f"in {len(chosen)} place(s)"
