@@ -98,7 +98,7 @@ def decide(naming: Naming) -> Decision:
         return Decision("named" if settled else "ambiguous", effects, rivals)
     if is_imitated(naming):
         return Decision("unknown", ())
-    needed = tuple(e for e in effects if not simpler(naming, e) and is_needed(naming, (e,)))
+    needed = tuple(e for e in effects if is_told(naming, e) and is_needed(naming, (e,)))
     groups = (group_of(naming, e) for e in effects if e not in needed)
     either = tuple(g for g in groups if len(g) > 1 and is_needed(naming, g))
     if not needed:
@@ -123,15 +123,13 @@ def is_needed(naming: Naming, group: Group) -> bool:
     )
 
 
-def simpler(naming: Naming, effect: Effect) -> Group:
-    """The law that an effect of the chosen model refines, unless far more is left with it."""
-    found = in_place_of_refined(naming, effect)
-    if found is None or exceeds(naming, found.fit):
-        return ()
-    return tuple(e for e in found.effects if e.id == effect.prefer)
+def is_told(naming: Naming, effect: Effect) -> bool:
+    """Whether far more is left with the law that an effect refines in its place, if it does."""
+    found = with_refined_law(naming, effect)
+    return found is None or exceeds(naming, found.fit)
 
 
-def in_place_of_refined(naming: Naming, effect: Effect) -> Candidate | None:
+def with_refined_law(naming: Naming, effect: Effect) -> Candidate | None:
     """The chosen model with the law that an effect refines in its place, if it was fitted."""
     ids = frozenset(naming.chosen.candidate.ids)
     if not refines_another(naming, effect):
@@ -146,11 +144,14 @@ def refines_another(naming: Naming, effect: Effect) -> bool:
 
 
 def group_of(naming: Naming, effect: Effect) -> Group:
-    """An effect of the chosen model, the law that it refines where they are not told apart, and
-    those of its family that likely sets without it have in its place; without these where one of
-    the sets has none, or there are too many.
+    """An effect of the chosen model, the law that it refines, and those of its family that likely
+    sets without it have in its place; without these where one of the sets has none, or there are
+    too many.
     """
-    chosen, alone = naming.chosen.candidate, (effect, *simpler(naming, effect))
+    chosen, simpler = naming.chosen.candidate, with_refined_law(naming, effect)
+    alone = (
+        (effect, *(e for e in simpler.effects if e.id == effect.prefer)) if simpler else (effect,)
+    )
     least = naming.log_odds(chosen) - DECISIVE
     others = {e.id: e for e in alone[1:]}
     for candidate in naming.tried:
@@ -190,7 +191,7 @@ def is_compared(naming: Naming, group: Group) -> bool:
     """
     chosen = frozenset(naming.chosen.candidate.ids)
     other = in_its_place(naming, group)
-    refined = not refines_another(naming, group[0]) or in_place_of_refined(naming, group[0])
+    refined = not refines_another(naming, group[0]) or with_refined_law(naming, group[0])
     if other is None or not refined:
         return False
     rivals = {chosen, frozenset[str](), chosen - {group[0].id}, frozenset(other.ids)}

@@ -6,14 +6,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from bayesimpact.diagnosis.decision import (
+    Group,
     group_of,
     in_its_place,
     is_imitated,
+    is_needed,
+    is_told,
     leads_without,
     may_be_needed,
     misses,
     ordered,
-    simpler,
 )
 from bayesimpact.diagnosis.discrepancy import Discrepancy, discrepancy
 from bayesimpact.diagnosis.naming import Naming, State
@@ -43,7 +45,7 @@ class Remaining(Settling):
         found = replace(found, tried=tried, states=dict(self.states))
         alone = [(e,) for e in ordered(found, chosen.effects)]
         groups = [
-            g if leads_without(found, g) and not simpler(found, g[0]) else group_of(found, g[0])
+            g if leads_without(found, g) and is_told(found, g[0]) else group_of(found, g[0])
             for g in alone
         ]
         leading = [g for g in groups if leads_without(found, g)]
@@ -65,8 +67,10 @@ class Remaining(Settling):
             found = self.with_forces(found, [found.base.candidate])
         found = self.with_forces(found, [chosen])
         for group in needed if not is_imitated(found) else ():
-            other = in_its_place(found, group)
-            found = self.with_forces(found, [smaller[group[0].id], *([other] if other else [])])
+            found = self.with_forces(found, [smaller[group[0].id], *others(found, group)])
+            wider = group_of(found, group[0])
+            if len(wider) > len(group) and not is_needed(found, group):
+                found = self.with_forces(found, others(found, wider))
         return found
 
     def with_forces(self, found: Naming, candidates: Sequence[Candidate]) -> Naming:
@@ -112,3 +116,9 @@ class Remaining(Settling):
         self.progress(f"fitting a residual force beside {beside}")
         least = self.enough().least_gain
         return with_force(state.candidate, state.unknown, self.scales, least_gain=least)
+
+
+def others(found: Naming, group: Group) -> list[Candidate]:
+    """The likeliest model with another effect, not of a group, in the place of its first."""
+    other = in_its_place(found, group)
+    return [] if other is None else [other]

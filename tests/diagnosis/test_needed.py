@@ -255,3 +255,18 @@ def test_a_search_that_ended_by_its_limit_needs_the_law_that_an_effect_refines_f
         fitted = {frozenset(other.ids): beside_force(other, 50.0)}
         ended = replace(found, finished=False, residual={**found.residual, **fitted})
         assert judge(ended) == verdict
+
+
+@pytest.mark.parametrize(("instead", "told"), [(0.1, True), (-0.1, False)])
+def test_a_law_that_a_residual_force_makes_of_the_one_it_refines_is_told_with_that(instead, told):
+    """Far more is left with the simpler law alone, but none of that beside a residual force."""
+    chosen = state(
+        candidate("power_damping", 100.0), p_force=ALPHA / 2, force_evidence=2 * DECISIVE
+    )
+    refined = with_misfit(candidate(DRAG, 50.0), 90.0)
+    found = remaining(chosen, 100.0, 10.0, refined, beside=110.0, instead=50.0)
+    beside = beside_force(refined, 110.0 - DECISIVE + instead)
+    decision = decide(replace(found, residual={**found.residual, frozenset([DRAG]): beside}))
+    assert [e.id for e in decision.effects] == ([] if told else ["power_damping"])
+    either = [("power_damping", DRAG)] if told else []
+    assert [tuple(e.id for e in g) for g in decision.either] == either
