@@ -34,11 +34,14 @@ def shakes_in_own_band(fit: Fit, remains: bool) -> bool:
     are too short to tell both frequencies apart. At a multiple of the motion's frequency such a
     mode is what any law that is not linear makes of the motion, and so is a steady line where no
     recording decays enough to tell. A line too slow for any recording to show it come and go passes
-    for a drift.
+    for a drift; and two that no recording tells apart, for one whose amplitude every recording sets
+    anew, as what a motion makes does.
     """
     recordings = fit.target.oscillator.campaign.recordings
     longest = max(r.duration for r in recordings)
     if any(frequency * longest < SLOWEST for _, frequency in _lines(fit)):
+        return True
+    if _is_one_line([f for e, f in _lines(fit) if is_steady(e)], longest):
         return True
     for effect, frequency in _lines(fit):
         steady = is_steady(effect)
@@ -57,6 +60,13 @@ def shakes_in_own_band(fit: Fit, remains: bool) -> bool:
         if steady and all(_passes_for_harmonic(r, frequency) for r in recordings):
             return True
     return False
+
+
+def _is_one_line(frequencies: list[float], longest: float) -> bool:
+    """Whether two of some steady frequencies, Hz, differ by less than recordings of up to `longest`
+    seconds resolve.
+    """
+    return bool(np.any(np.diff(np.sort(frequencies)) * longest < 1.0))
 
 
 def _without(recording: Recording, effect: Effect, fit: Fit) -> Recording:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+from effect_rigs import BY_ID
 
 from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.own_band import (
@@ -12,6 +15,7 @@ from bayesimpact.diagnosis.own_band import (
     _passes_for_harmonic,
     _unforced,
     multiple_of,
+    shakes_in_own_band,
 )
 
 INTERVAL, SAMPLES = 1.0 / 550.0, 242
@@ -85,3 +89,18 @@ def test_what_is_lost_at_once_does_not_say_how_long_a_motion_lasts():
     motion = Recording("a", "", envelope * np.cos(2 * np.pi * 5.16 * t), 1e-3)
     assert not _overlaps(motion, 3.46, 0.0, steady=True)
     assert _overlaps(motion, 5.3, 0.0, steady=True)
+
+
+@pytest.mark.parametrize(("apart", "refused"), [(0.0, True), (0.9, True), (1.1, False)])
+def test_two_steady_lines_that_no_recording_tells_apart_are_none(apart, refused):
+    """A hum and a force that nearly cancel have another amplitude in every recording: a stiffness
+    that pulsates made both of 12 % of the motion, at one frequency.
+    """
+    lines = {"sensor_hum": 75.0, "harmonic_forcing": 75.0 + apart * LINE}
+    oscillator = SimpleNamespace(
+        campaign=SimpleNamespace(recordings=(decay(30.0, 30.0),)),
+        acting=tuple(BY_ID[i] for i in lines),
+    )
+    values = {f"{i}.frequency": f for i, f in lines.items()}
+    fit = SimpleNamespace(target=SimpleNamespace(oscillator=oscillator), value=values.get)
+    assert shakes_in_own_band(fit, remains=False) is refused
