@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from bayesimpact.data.period import crossing_period
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
-FROM = 4.0  # times the motion's frequency: below are its own low harmonics
-NEIGHBOURS = 101  # lines of the spectrum about one, whose median is the level there
+FROM = 1.25  # times the motion's lowest frequency: below are slow drifts of its own
+MULTIPLES = 3  # of the motion's frequency, about which a line is its own
+BESIDE = 0.03  # of a frequency, and `APART` lines of the spectrum: what its band is widened by
+APART = 3
+MOVES = 0.2  # of the largest excursion: a part with less does not tell the motion's frequency
+SKIPPED = 2  # lines on either side of one that its taper reaches
+NEIGHBOURS = 20  # lines beyond those, half on either side, whose middle one is the level there
 FALSE_ALARM = 1e-6  # chance per recording for Gaussian noise: a periodogram is exponential
+CANDIDATES = 8  # lines that stand out most: a motion's own may be among them
 PARTS = 4  # of a recording, in which the hum has to be the same
 STEADY = 3  # of them: impacts may drown it in one
 COMB = 0.25  # of its amplitude: neighbours one motion's frequency away make it one of a comb
@@ -51,40 +61,85 @@ class Hum:
 
 
 def find_hum(samples: Array, interval: float) -> Hum | None:
-    """The strongest steady line above `FROM` times the motion's frequency, if there is one.
+    """The steady line that stands out most beside the motion's own, if there is one.
 
     Second differences of the readings are tapered (Hann) and transformed. A line has to stand out
-    of the level about it, to stand alone (harmonics of sharp impacts come as a comb), and to keep
-    its amplitude and phase through the recording (harmonics of a decaying motion do not for long).
+    of the level beside it, away from the frequencies that the motion goes through and their first
+    multiples; to stand alone (harmonics of sharp impacts come as a comb), and to keep its amplitude
+    and phase through the recording (harmonics of a decaying motion do not for long).
     """
     period = crossing_period(samples, interval)
     if period is None or samples.size < PARTS * LEAST_PART:
         return None
-    line = _line(samples, interval, 1.0 / period)
-    return None if line is None else _steady(samples, interval, *line)
+    found = (_steady(samples, interval, *line) for line in _lines(samples, interval, 1.0 / period))
+    return next((hum for hum in found if hum is not None), None)
 
 
-def _line(samples: Array, interval: float, motion: float) -> tuple[float, float, float] | None:
-    """Frequency (Hz), strength and threshold of the line that stands out most."""
-    from scipy.ndimage import median_filter
-
+def _lines(
+    samples: Array, interval: float, motion: float
+) -> Iterator[tuple[float, float, float]]:  # fmt: skip
+    """Frequency (Hz), strength and threshold of lines that stand out, the strongest first."""
     curvature = np.diff(samples, 2)
     power = np.abs(np.fft.rfft(curvature * np.hanning(curvature.size))) ** 2
-    level = median_filter(power, NEIGHBOURS, mode="nearest")
+    if power.size < 2 * (NEIGHBOURS + SKIPPED):
+        return
     resolution = 1.0 / (curvature.size * interval)
-    half = NEIGHBOURS // 2  # on both sides
-    first, last = max(int(np.ceil(FROM * motion / resolution)), half), power.size - half
-    if last <= first:
-        return None
-    ratio = power[first:last] / np.maximum(level[first:last], np.finfo(float).tiny)
-    k = first + int(np.argmax(ratio))
-    threshold = float(np.log(ratio.size / FALSE_ALARM) / np.log(2.0))  # median = ln 2 of the mean
-    if ratio[k - first] < threshold or _of_a_comb(power, k, motion / resolution):
-        return None
-    low, middle, high = np.log(np.maximum(power[k - 1 : k + 2], np.finfo(float).tiny))
-    bend = low - 2 * middle + high
-    shift = 0.5 * (low - high) / bend if bend < 0 else 0.0
-    return (k + float(shift)) * resolution, float(ratio[k - first]), threshold
+    ratio = power / np.maximum(_level(power), np.finfo(float).tiny)
+    peak = np.zeros(power.size, dtype=bool)
+    peak[1:-1] = (power[1:-1] >= power[:-2]) & (power[1:-1] >= power[2:])
+    threshold = _threshold(power.size)
+    peak &= (ratio > threshold) & _beside_motion(samples, interval, power.size, motion)
+    places = np.flatnonzero(peak)
+    for k in places[np.argsort(-ratio[places])][:CANDIDATES]:
+        if _of_a_comb(power, k, motion / resolution):
+            continue
+        low, middle, high = np.log(np.maximum(power[k - 1 : k + 2], np.finfo(float).tiny))
+        bend = low - 2 * middle + high
+        shift = 0.5 * (low - high) / bend if bend < 0 else 0.0
+        yield float((k + shift) * resolution), float(ratio[k]), threshold
+
+
+def _level(power: Array) -> Array:
+    """The middle one of the neighbours of every line, the lower of two."""
+    half = NEIGHBOURS // 2
+    padded = np.pad(power, half + SKIPPED, mode="reflect")
+    beside = np.lib.stride_tricks.sliding_window_view(padded, NEIGHBOURS + 2 * SKIPPED + 1)
+    neighbours = np.concatenate([beside[:, :half], beside[:, -half:]], axis=1)
+    return np.asarray(np.partition(neighbours, half - 1, axis=1)[:, half - 1])
+
+
+@cache
+def _threshold(count: int) -> float:
+    """The ratio that one of `count` lines exceeds by chance `FALSE_ALARM` times.
+
+    Of n independent exponentials the k-th smallest is a sum of k exponentials of means 1 / (n - k +
+    1) to 1 / n (Renyi 1953); another one exceeds it t times with the product of i / (i + t) over
+    these i.
+    """
+    orders = np.arange(NEIGHBOURS - NEIGHBOURS // 2 + 1, NEIGHBOURS + 1)
+    wanted = np.log(FALSE_ALARM / count)
+    return float(brentq(lambda t: -np.log1p(t / orders).sum() - wanted, 0.0, 1e6))
+
+
+def _beside_motion(samples: Array, interval: float, count: int, motion: float) -> Flags:
+    """Which lines, (count,), are none of the motion.
+
+    Its frequencies are those of parts where it moves; the mean, `motion`, may count a hum's too.
+    """
+    resolution = 1.0 / ((samples.size - 2) * interval)
+    frequencies = resolution * np.arange(count)
+    size = samples.size // PARTS
+    parts = samples[: PARTS * size].reshape(PARTS, size)
+    moving = parts[np.ptp(parts, axis=1) > MOVES * np.ptp(samples)]
+    periods = [crossing_period(part, interval) for part in moving]
+    own = [1.0 / p for p in periods if p is not None] or [motion]
+    free = frequencies > FROM * min(own)
+    for n in range(1, MULTIPLES + 1):
+        low = n * min(own) * (1.0 - BESIDE) - APART * resolution
+        high = n * max(own) * (1.0 + BESIDE) + APART * resolution
+        free &= (frequencies < low) | (frequencies > high)
+    free[-NEIGHBOURS // 2 :] = False
+    return np.asarray(free)
 
 
 def _of_a_comb(power: Array, k: int, spacing: float) -> bool:

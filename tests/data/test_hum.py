@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bayesimpact.data import hum as hum_module
 from bayesimpact.data.bundled import bundled_campaign
 from bayesimpact.data.hum import find_hum
 from bayesimpact.data.read import load_campaign
@@ -53,6 +54,44 @@ def test_no_hum_in_noise_or_in_harmonics_of_a_decay(third: float) -> None:
         rng = np.random.default_rng(seed)
         noise = 1e-6 * rng.standard_normal(SIZE)
         assert find_hum(decay(rng, third) + noise, INTERVAL) is None
+
+
+@pytest.mark.parametrize("times", [1.45, 1.79, 2.6])
+def test_a_hum_between_the_multiples_of_a_motion_that_slows_down(times: float) -> None:
+    """Mains at 1.8 times the frequency of a blade that falls by 15 % as impacts cease."""
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        slower = 28.0 * (1.0 + 0.15 * np.exp(-3.0 * TIMES))
+        phase = 2 * np.pi * np.cumsum(slower) * INTERVAL
+        motion = 3e-3 * np.exp(-1.5 * TIMES) * (np.cos(phase) + 0.02 * np.cos(2 * phase))
+        line = 14e-6 * np.cos(2 * np.pi * times * 28.0 * TIMES + rng.uniform(0, 2 * np.pi))
+        noise = 3e-6 * rng.standard_normal(SIZE)
+        assert find_hum(motion + noise, INTERVAL) is None
+        hum = find_hum(motion + line + noise, INTERVAL)
+        assert hum is not None and hum.frequency == pytest.approx(times * 28.0, abs=0.02)
+        assert hum.amplitude == pytest.approx(14e-6, rel=0.1)
+
+
+@pytest.mark.parametrize("rate", [0.02, 0.4])
+def test_no_hum_in_the_double_frequency_of_a_motion_that_hardly_decays(rate: float) -> None:
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        phase = 2 * np.pi * 6.0 * TIMES + rng.uniform(0, 2 * np.pi)
+        height = np.exp(-rate * TIMES)
+        motion = 5e-3 * (height * np.cos(phase) + 0.02 * height**2 * np.cos(2 * phase))
+        assert find_hum(motion + 1e-6 * rng.standard_normal(SIZE), INTERVAL) is None
+
+
+def test_the_chance_of_a_line_in_noise_is_the_stated_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of lines of white noise 1 in 50 by chance; neighbours behind a taper are not independent."""
+    monkeypatch.setattr(hum_module, "FALSE_ALARM", 0.02)
+    rng, count, trials = np.random.default_rng(0), 0, 400
+    threshold = hum_module._threshold.__wrapped__(1)
+    for _ in range(trials):
+        power = np.abs(np.fft.rfft(rng.standard_normal(600))) ** 2
+        count += int((power / hum_module._level(power) > threshold)[20:-20].sum())
+    lines = trials * (301 - 40)
+    assert abs(count / lines - 0.02) < 4 * np.sqrt(0.02 / lines)
 
 
 def test_no_hum_in_the_bundled_recordings() -> None:
