@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -60,24 +60,28 @@ class Hum:
         return np.asarray(self.cosine * np.cos(angle) + self.sine * np.sin(angle))
 
 
-def find_hum(samples: Array, interval: float) -> Hum | None:
-    """The steady line that stands out most beside the motion's own, if there is one.
+def find_hum(samples: Array, interval: float, motion: Array | None = None) -> Hum | None:
+    """The steady line that stands out most beside the motion's own, if there is one; the motion is
+    that of the `samples` (n,), or of others at the same times, where these are what a model leaves.
 
     Second differences of the readings are tapered (Hann) and transformed. A line has to stand out
     of the level beside it, away from the frequencies that the motion goes through and their first
     multiples; to stand alone (harmonics of sharp impacts come as a comb), and to keep its amplitude
     and phase through the recording (harmonics of a decaying motion do not for long).
     """
-    period = crossing_period(samples, interval)
+    motion = samples if motion is None else motion
+    period = crossing_period(motion, interval)
     if period is None or samples.size < PARTS * LEAST_PART:
         return None
-    found = (_steady(samples, interval, *line) for line in _lines(samples, interval, 1.0 / period))
+    own = _own_frequencies(motion, interval) or [1.0 / period]
+    lines = _lines(samples, interval, 1.0 / period, own)
+    found = (_steady(samples, interval, *line) for line in lines)
     return next((hum for hum in found if hum is not None), None)
 
 
 def _lines(
-    samples: Array, interval: float, motion: float
-) -> Iterator[tuple[float, float, float]]:  # fmt: skip
+    samples: Array, interval: float, spacing: float, own: Sequence[float]
+) -> Iterator[tuple[float, float, float]]:
     """Frequency (Hz), strength and threshold of lines that stand out, the strongest first."""
     curvature = np.diff(samples, 2)
     power = np.abs(np.fft.rfft(curvature * np.hanning(curvature.size))) ** 2
@@ -88,10 +92,10 @@ def _lines(
     peak = np.zeros(power.size, dtype=bool)
     peak[1:-1] = (power[1:-1] >= power[:-2]) & (power[1:-1] >= power[2:])
     threshold = _threshold(power.size)
-    peak &= (ratio > threshold) & _beside_motion(samples, interval, power.size, motion)
+    peak &= (ratio > threshold) & _beside(own, resolution, power.size)
     places = np.flatnonzero(peak)
     for k in places[np.argsort(-ratio[places])][:CANDIDATES]:
-        if _of_a_comb(power, k, motion / resolution):
+        if _of_a_comb(power, k, spacing / resolution):
             continue
         low, middle, high = np.log(np.maximum(power[k - 1 : k + 2], np.finfo(float).tiny))
         bend = low - 2 * middle + high
@@ -121,18 +125,18 @@ def _threshold(count: int) -> float:
     return float(brentq(lambda t: -np.log1p(t / orders).sum() - wanted, 0.0, 1e6))
 
 
-def _beside_motion(samples: Array, interval: float, count: int, motion: float) -> Flags:
-    """Which lines, (count,), are none of the motion.
-
-    Its frequencies are those of parts where it moves; the mean, `motion`, may count a hum's too.
-    """
-    resolution = 1.0 / ((samples.size - 2) * interval)
-    frequencies = resolution * np.arange(count)
+def _own_frequencies(samples: Array, interval: float) -> list[float]:
+    """Of a motion, Hz, in parts of it that move: the mean of all counts a hum's too."""
     size = samples.size // PARTS
     parts = samples[: PARTS * size].reshape(PARTS, size)
     moving = parts[np.ptp(parts, axis=1) > MOVES * np.ptp(samples)]
     periods = [crossing_period(part, interval) for part in moving]
-    own = [1.0 / p for p in periods if p is not None] or [motion]
+    return [1.0 / period for period in periods if period is not None]
+
+
+def _beside(own: Sequence[float], resolution: float, count: int) -> Flags:
+    """Which of `count` lines are none of a motion that goes through its own frequencies, Hz."""
+    frequencies = resolution * np.arange(count)
     free = frequencies > FROM * min(own)
     for n in range(1, MULTIPLES + 1):
         low = n * min(own) * (1.0 - BESIDE) - APART * resolution

@@ -26,10 +26,10 @@ from bayesimpact.diagnosis.refit import (
     Candidate,
     Enough,
     best_start,
-    residual_repetition,
     step_sizes,
     without,
 )
+from bayesimpact.diagnosis.repetition import residual_repetition
 from bayesimpact.diagnosis.sizes import loss_without
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.formula.classes import FormulaClass, formula_classes, term_classes

@@ -20,7 +20,8 @@ from bayesimpact.diagnosis.formula_refits import (
     without_idle,
 )
 from bayesimpact.diagnosis.naming import Naming
-from bayesimpact.diagnosis.refit import Candidate, residual_repetition
+from bayesimpact.diagnosis.refit import Candidate
+from bayesimpact.diagnosis.repetition import residual_repetition
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.formula.classes import FormulaClass
 from bayesimpact.formula.evidence import Subset

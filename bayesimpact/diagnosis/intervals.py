@@ -19,7 +19,7 @@ from scipy import stats
 from bayesimpact.data.short_repr import short_repr
 from bayesimpact.diagnosis.comparable import Comparable
 from bayesimpact.diagnosis.discrepancy import Discrepancy, discrepancy
-from bayesimpact.diagnosis.refit import residual_repetition
+from bayesimpact.diagnosis.repetition import residual_repetition
 from bayesimpact.inference.fit import Fit
 
 Array = NDArray[np.float64]

@@ -16,9 +16,9 @@ from bayesimpact.diagnosis.refit import (
     Enough,
     grown,
     in_words,
-    residual_repetition,
     tempered_evidence,
 )
+from bayesimpact.diagnosis.repetition import residual_repetition
 from bayesimpact.diagnosis.scan import Scan
 from bayesimpact.diagnosis.scores import Score
 from bayesimpact.diagnosis.thresholds import DECISIVE

@@ -36,7 +36,6 @@ ITERATIONS = 40
 SHARES = (0.5, 0.25, 0.125, 0.0625)  # of the predicted shift, where the whole of it goes too far
 GAINED = 1.0  # nats: what gains less than this over a model that it contains begins again
 LITTLE = 0.1  # nats of odds: a climb that gains less by a step decides nothing
-WHITE_SD = 4.0  # one lag of 16,000 of white noise lies beyond: none in a recording
 
 
 @dataclass(frozen=True, eq=False)
@@ -343,24 +342,3 @@ def tempered_evidence(candidate: Candidate, repetition: float) -> float:
     gained = -0.5 * np.sum(np.log((1.0 - known) / repetition + known))
     gained += 0.5 * fit.target.oscillator.layout.roles("noise").size * np.log(repetition)
     return candidate.log_evidence - lost + float(gained)
-
-
-def residual_repetition(fit: Fit) -> float:
-    """Samples per independent one in a residual, as far as its variance is concerned; at least 1.
-
-    n / n_eff = 1 + 2 sum (1 - k/n) rho_k^2 for a stationary Gaussian series (Bayley and Hammersley
-    1946, for the variance): what a comparison of residual variances rests on. Correlations that
-    white noise would show, up to `WHITE_SD` standard errors 1 / sqrt(n), count nothing.
-    """
-    total = effective = 0.0
-    for part in fit.linearisation:
-        x = part.residual - part.residual.mean()
-        n = x.size
-        power = np.abs(np.fft.rfft(x, 2 * n)) ** 2
-        rho = np.fft.irfft(power)[:n]
-        rho = rho / max(rho[0], 1e-300)
-        seen = np.where(np.abs(rho) > WHITE_SD / np.sqrt(n), rho, 0.0)[1:]
-        weights = 1.0 - np.arange(1, n) / n
-        total += n
-        effective += n / (1.0 + 2.0 * float(np.sum(weights * seen**2)))
-    return max(1.0, total / effective)

@@ -16,8 +16,8 @@ from bayesimpact.diagnosis.refit import (
     TOLERANCE,
     Candidate,
     best_start,
-    residual_repetition,
 )
+from bayesimpact.diagnosis.repetition import residual_repetition
 from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.model.effects.effect import Effect, Scales

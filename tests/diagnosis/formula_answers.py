@@ -14,7 +14,8 @@ from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.force import missing_drift, missing_force
 from bayesimpact.diagnosis.formulas import Answer, with_formulas
 from bayesimpact.diagnosis.naming import Naming, State
-from bayesimpact.diagnosis.refit import Candidate, base_candidate, grown, residual_repetition
+from bayesimpact.diagnosis.refit import Candidate, base_candidate, grown
+from bayesimpact.diagnosis.repetition import residual_repetition
 from bayesimpact.diagnosis.scan import score_directions
 from bayesimpact.diagnosis.unknown import with_force
 from bayesimpact.inference.identify import identify

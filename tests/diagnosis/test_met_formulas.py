@@ -18,7 +18,8 @@ from bayesimpact.diagnosis.diagnose import without_uncertain_formulas
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.formulas import Answer
 from bayesimpact.diagnosis.naming import Naming
-from bayesimpact.diagnosis.refit import Candidate, base_candidate, fit_from, residual_repetition
+from bayesimpact.diagnosis.refit import Candidate, base_candidate, fit_from
+from bayesimpact.diagnosis.repetition import residual_repetition
 from bayesimpact.formula.grammar import ONE, Term
 from bayesimpact.formula.law import effect_of, kind_id, starts_of
 from bayesimpact.formula.library import V
