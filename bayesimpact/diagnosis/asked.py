@@ -16,11 +16,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from bayesimpact.data.hum import find_hum
 from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.directions import is_periodic
 from bayesimpact.diagnosis.equation_error import is_a_force
 from bayesimpact.diagnosis.extend import transfer
+from bayesimpact.diagnosis.hums import without_hum
 from bayesimpact.diagnosis.likely_sets import Known, LikelySets, shapes_of
 from bayesimpact.diagnosis.period_sets import PeriodSets
 from bayesimpact.diagnosis.period_terms import periods_with_terms
@@ -115,15 +115,6 @@ class Asked:
             shares = (problem.likeness(ids, instead) for problem, ids in problems)
             first |= {i for alike in shares for i, share in alike.items() if share > ALIKE}
         return first, seen.union(*gains)
-
-
-def without_hum(recording: Recording) -> Recording:
-    """A recording less the steady hum that its spectrum shows, if any; a driven one may move so."""
-    driven = recording.input is not None
-    hum = None if driven else find_hum(recording.samples, recording.interval)
-    if hum is None:
-        return recording
-    return replace(recording, samples=recording.samples - hum.readings(recording.times))
 
 
 def known_effects(model: Candidate) -> list[Known]:

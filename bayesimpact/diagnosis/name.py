@@ -15,7 +15,9 @@ import numpy as np
 
 from bayesimpact.diagnosis.budget import Budget
 from bayesimpact.diagnosis.evidence import model_evidence
+from bayesimpact.diagnosis.faults.outliers import refitted
 from bayesimpact.diagnosis.force import missing_contact
+from bayesimpact.diagnosis.hums import without_hums
 from bayesimpact.diagnosis.models import NOTHING, STARTS, UNCONVERGED_SHORTFALL, Progress
 from bayesimpact.diagnosis.naming import Naming, State, explains_most, is_large
 from bayesimpact.diagnosis.pairs import promising_pairs
@@ -66,6 +68,9 @@ def name(
     still leaves something. It begins with the model of `first` instead, a fit to the same campaign,
     where that is given.
 
+    Where the misfit is large and the spectra of the recordings show a hum, the search begins with
+    what the recordings less that lead to.
+
     Where what remains is slow noise of the measuring chain or spikes of the readings, or where
     accelerations lie at onsets of contacts that only a good model shows, and time allows, the
     search begins once more under that noise, or without these, from that model. It counts if it
@@ -76,6 +81,8 @@ def name(
     """
     say = progress or (lambda message: None)
     search = _Search(effects, scales, rng, say, budget)
+    if first is None and is_large(fit):
+        first = _beside_hums(fit, _Search(effects, scales, rng, say, search.budget))
     base, state = search.found(fit, first)
     asks = search.was_cut or search.budget.may_search_again()
     anew = posed_anew(fit, state, say) if asks else None
@@ -90,6 +97,21 @@ def name(
         reached = state.candidate.fit
         base, state = search.found(fit, first if reached is fit else reached)
     return search.naming(base, state)
+
+
+def _beside_hums(fit: Fit, search: _Search) -> Fit | None:
+    """The model that the recordings less their hums lead to, fitted to them as they are; None where
+    they have none, or it leaves a large misfit.
+    """
+    quiet = without_hums(fit)
+    if quiet is None:
+        return None
+    search.progress("a hum is taken out of the recordings first")
+    search.is_last = True
+    state = search.grown(search.asked_for(search.examine(base_candidate(quiet))))
+    if is_large(state.candidate.fit):
+        return None
+    return refitted(state.candidate.fit, fit.target.oscillator.campaign)
 
 
 class _Search(Unlisted):
