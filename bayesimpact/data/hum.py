@@ -79,6 +79,13 @@ def find_hum(samples: Array, interval: float, motion: Array | None = None) -> Hu
     return next((hum for hum in found if hum is not None), None)
 
 
+def hum_at(samples: Array, interval: float, frequency: float) -> Hum | None:
+    """The steady line at a known frequency, Hz, as that of another recording, if there is one."""
+    if samples.size < PARTS * LEAST_PART:
+        return None
+    return _steady(samples, interval, frequency, np.nan, np.nan)
+
+
 def _lines(
     samples: Array, interval: float, spacing: float, own: Sequence[float]
 ) -> Iterator[tuple[float, float, float]]:

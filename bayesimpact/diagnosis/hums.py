@@ -6,20 +6,34 @@ leaves a large misfit: a search that knows nothing of it goes astray.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
-from bayesimpact.data.hum import find_hum
+import numpy as np
+
+from bayesimpact.data.hum import Hum, find_hum, hum_at
 from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.faults.outliers import refitted
 from bayesimpact.inference.fit import Fit
 
 
-def without_hum(recording: Recording) -> Recording:
-    """A recording less the steady hum that its spectrum shows, if any; a driven one may move so."""
-    driven = recording.input is not None
-    hum = None if driven else find_hum(recording.samples, recording.interval)
-    if hum is None:
-        return recording
+def quiet(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
+    """Recordings less the steady hums that their spectra show, if any.
+
+    One that shows none may have it at the frequency of the others. Driven motions may be steady
+    lines themselves, and stay as they are.
+    """
+    hums = [None if r.input else find_hum(r.samples, r.interval) for r in recordings]
+    told = [hum.frequency for hum in hums if hum is not None]
+    found = list[Recording]()
+    for recording, hum in zip(recordings, hums, strict=True):
+        if hum is None and told and recording.input is None:
+            hum = hum_at(recording.samples, recording.interval, float(np.median(told)))
+        found.append(recording if hum is None else _less(recording, hum))
+    return tuple(found)
+
+
+def _less(recording: Recording, hum: Hum) -> Recording:
     return replace(recording, samples=recording.samples - hum.readings(recording.times))
 
 
@@ -28,8 +42,8 @@ def without_hums(fit: Fit) -> Fit | None:
     is left without them, as where a force moves a mass that meets a stop.
     """
     campaign = fit.target.oscillator.campaign
-    quiet = tuple(map(without_hum, campaign.recordings))
-    if all(a is b for a, b in zip(quiet, campaign.recordings, strict=True)):
+    recordings = quiet(campaign.recordings)
+    if all(a is b for a, b in zip(recordings, campaign.recordings, strict=True)):
         return None
-    found = refitted(fit, replace(campaign, recordings=quiet))
+    found = refitted(fit, replace(campaign, recordings=recordings))
     return found if found.reduced_chi2 < fit.reduced_chi2 else None

@@ -69,7 +69,7 @@ def name(
     where that is given.
 
     Where the misfit is large and the spectra of the recordings show a hum, the search begins with
-    what the recordings less that lead to.
+    what the recordings less that ask for.
 
     Where what remains is slow noise of the measuring chain or spikes of the readings, or where
     accelerations lie at onsets of contacts that only a good model shows, and time allows, the
@@ -100,7 +100,7 @@ def name(
 
 
 def _beside_hums(fit: Fit, search: _Search) -> Fit | None:
-    """The model that the recordings less their hums lead to, fitted to them as they are; None where
+    """The model that the recordings less their hums ask for, fitted to them as they are; None where
     they have none, or it leaves a large misfit.
     """
     quiet = without_hums(fit)
@@ -108,7 +108,8 @@ def _beside_hums(fit: Fit, search: _Search) -> Fit | None:
         return None
     search.progress("a hum is taken out of the recordings first")
     search.is_last = True
-    state = search.grown(search.asked_for(search.examine(base_candidate(quiet))))
+    base = search.examine(base_candidate(quiet))
+    state = search.asked_for(base)[0] if search.is_large else base
     if is_large(state.candidate.fit):
         return None
     return refitted(state.candidate.fit, fit.target.oscillator.campaign)
