@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.clock import check_rate
+from bayesimpact.data.fields import fields, unquoted
 from bayesimpact.data.gaps import on_clock
 from bayesimpact.data.quantity import RESPONSE_COLUMNS, UNITS, Quantity
 from bayesimpact.data.window import unbroken, window
@@ -116,7 +117,8 @@ def squeezed(name: str) -> str:
 
 
 def _is_content(line: str) -> bool:
-    return bool(line.strip()) and not line.lstrip().startswith("#")
+    bare = line.replace('"', "").strip()
+    return bool(bare) and not bare.startswith("#")
 
 
 def _lines(path: Path, content: bytes) -> list[str]:
@@ -132,16 +134,17 @@ def _lines(path: Path, content: bytes) -> list[str]:
         ) from None
     if "\0" in text:
         raise InputError(str(path), "binary content", "a text file in UTF-8, columns of numbers")
-    return text.replace("\r\n", "\n").replace("\r", "\n").replace('"', "").split("\n")
+    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 
 def _separator(line: str) -> str | None:
-    return next((mark for mark in (";", "\t", ",") if mark in line), None)
+    bare = unquoted(line)
+    return next((mark for mark in (";", "\t", ",") if mark in bare), None)
 
 
 def _layout(path: Path, line: int, header: str, column: str | None, unit: str | None) -> _Layout:
     separator = _separator(header)
-    names = tuple(name.strip() for name in header.strip().split(separator))
+    names = tuple(name.strip() for name in fields(header.strip(), separator))
     where = f"{path}, line {line}"
     if all(_is_number(name) for name in names):
         accepted = f"a header row with a time column ({', '.join(TIME_COLUMNS)}) and a response"
@@ -253,19 +256,19 @@ def _decimal_points(path: Path, body: list[str], first: int) -> list[str]:
 
 
 def _row(path: Path, line: int, text: str, layout: _Layout) -> list[float]:
-    fields = text.strip("\n").split(layout.separator)
-    if len(fields) != len(layout.names):
+    row = fields(text, layout.separator)
+    if len(row) != len(layout.names):
         accepted = f"{len(layout.names)} fields as in the header ({', '.join(layout.names)})"
         if layout.separator == ",":
             accepted += "; decimal commas need semicolons between the columns"
-        found = f'{len(fields)} fields ("{text.strip()}")'
+        found = f'{len(row)} fields ("{text.strip()}")'
         raise InputError(f"{path}, line {line}", found, accepted)
-    response = _number(fields[layout.response])
+    response = _number(row[layout.response])
     if layout.time is None:
         return [response]
-    time = _number(fields[layout.time])
+    time = _number(row[layout.time])
     if math.isnan(time):
-        raise _no_number(path, line, layout, layout.time, fields)
+        raise _no_number(path, line, layout, layout.time, row)
     return [time, response]
 
 
@@ -288,14 +291,14 @@ def _check_finite(
     wrong = np.flatnonzero(np.isnan(samples))
     if wrong.size:
         line = int(rows[wrong[0]])
-        fields = lines[line - 1].strip("\n").split(layout.separator)
-        raise _no_number(path, line, layout, layout.response, fields)
+        row = fields(lines[line - 1], layout.separator)
+        raise _no_number(path, line, layout, layout.response, row)
 
 
 def _no_number(
-    path: Path, line: int, layout: _Layout, column: int, fields: Sequence[str]
+    path: Path, line: int, layout: _Layout, column: int, row: Sequence[str]
 ) -> InputError:
-    field = fields[column].strip()
+    field = row[column].strip()
     found = f'"{field}"' if field else "an empty field"
     where = f"{path}, line {line}, column {layout.names[column]}"
     return InputError(where, found, "a finite number")

@@ -41,6 +41,7 @@ _TIMES = frozenset(
     ("time", "t", "zeit", "temps", "tiempo", "tempo", "timestamp", "x_value", "x-value")
 )
 _LABEL = re.compile(r"^(.*?)\s*(?:\[([^\[\]]*)\]|\(([^()]*)\)|/\s*([^/\s]+(?:/[^/\s]+)?))$")
+_BRACKETS = re.compile(r"\s*(?:\[([^\[\]]*)\]|\(([^()]*)\))(?=\s)")
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,13 +94,20 @@ def spelt(unit: str) -> str:
 
 
 def name_and_unit(label: str) -> tuple[str, str]:
-    """Name and unit of `Time [s]`, `Weg (mm)`, `x/mm` or `displacement_mm`; "" for no unit."""
+    """Name and unit of `Time [s]`, `Weg (mm)`, `x/mm` or `displacement_mm`; "" for no unit.
+
+    Words that follow the unit belong to the name, as the run in `Angle (rad) Run #3`.
+    """
     label = label.strip()
     match = _LABEL.match(label)
     if match:
         unit = spelt(next(group for group in match.groups()[1:] if group is not None))
         if unit in LABEL_UNITS:
             return match.group(1).strip() or label, unit
+    for match in _BRACKETS.finditer(label):
+        unit = spelt(match.group(1) or match.group(2) or "")
+        if unit in LABEL_UNITS:
+            return (label[: match.start()] + label[match.end() :]).strip(), unit
     if label in RESPONSE_COLUMNS:
         return label, RESPONSE_COLUMNS[label]
     head, _, tail = label.rpartition("_")

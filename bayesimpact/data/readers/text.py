@@ -6,6 +6,7 @@ import codecs
 from collections.abc import Sequence
 from pathlib import Path
 
+from bayesimpact.data.fields import fields, unquoted
 from bayesimpact.data.readers.channel import Channel
 from bayesimpact.data.readers.grid import Cell, channels_of, has_units, number
 from bayesimpact.errors import InputError
@@ -69,21 +70,27 @@ def _cells(lines: Sequence[str], skip: int) -> tuple[list[list[Cell]], list[int]
     while kept and not kept[-1][1].strip():
         kept.pop()
     middle = [line for _, line in kept[len(kept) // 2 :][:LOOKED_AT] if line.strip()]
-    separator, decimal = _format(middle)
+    separator, decimal = _format([unquoted(line) for line in middle])
+    decimal = decimal or any("," in part for line in middle for part in line.split('"')[1::2])
     rows: list[list[Cell]] = []
     numbers: list[int] = []
     for i, line in kept:
-        plain = line.replace('"', "").strip("\n")
-        commented = plain.lstrip().startswith("#")
+        commented = line.lstrip(' \t"').startswith("#")
         if commented and rows and any(number(cell) == number(cell) for cell in rows[-1]):
             continue  # a comment among the numbers
-        fields = plain.lstrip("#% ").split(separator) if commented else plain.split(separator)
-        cells: list[Cell] = [field.strip() for field in fields]
-        if decimal and separator != ",":
+        plain = _comment(line) if commented else line
+        cells: list[Cell] = [field.strip() for field in fields(plain, separator)]
+        if decimal:
             cells = [_point(cell) for cell in cells]
         rows.append(cells)
         numbers.append(i)
     return rows, numbers
+
+
+def _comment(line: str) -> str:
+    """A comment without its marks; a quote before them is that of its first field."""
+    bare = line.lstrip(' \t"')
+    return line[: len(line) - len(bare)].lstrip() + bare.lstrip("#% ")
 
 
 def _point(cell: Cell) -> Cell:
@@ -102,9 +109,9 @@ def _format(lines: Sequence[str]) -> tuple[str | None, bool]:
             return separator, "," in text
     if "," not in text:
         return None, False
-    fields = [field for line in lines for field in line.split()]
+    words = [word for line in lines for word in line.split()]
     blanks = all(len(line.split()) > 1 for line in lines)
-    if all(field.count(",") <= 1 and not field.endswith(",") for field in fields) and (
+    if all(word.count(",") <= 1 and not word.endswith(",") for word in words) and (
         blanks or ("." not in text and all(line.count(",") == 1 for line in lines))
     ):
         # "0,001 1,5": decimal commas between blanks; "0,001" alone stays two columns
