@@ -77,3 +77,33 @@ def test_decimal_commas_in_quotes(tmp_path: Path) -> None:
     ]
     (tmp_path / "a.csv").write_text("\n".join(['"t [s]","x, tip [mm]"', *rows]) + "\n")
     np.testing.assert_allclose(read(tmp_path), decay(), rtol=1e-10)
+
+
+@pytest.mark.parametrize("mark", ["#", "# ", "% ", ""])
+@pytest.mark.parametrize(
+    ("units", "found"),
+    [
+        ("[s]\t[au]\t[s]\t[au]", ["Time A [s]", "Pos A [au]", "Time B [s]", "Pos B [au]"]),
+        ("s\tau\ts\tau", ["Time A [s]", "Pos A [au]", "Time B [s]", "Pos B [au]"]),
+        ("(ms)\t(mm)\t(s)\t(-)", ["Time A [ms]", "Pos A [mm]", "Time B [s]", "Pos B"]),
+    ],
+)
+def test_names_and_units_in_rows_of_their_own(
+    tmp_path: Path, mark: str, units: str, found: list[str]
+) -> None:
+    rows = [
+        f"{t:.3f}\t{x:.4f}\t{t + 0.025:.3f}\t450" for t, x in zip(made.TIMES, made.MM, strict=True)
+    ]
+    head = [
+        "Creator: eventBuffer",
+        "Creation time: Mon Mar  7 10:03:51 2022",
+        "Time A\tPos A\tTime B\tPos B",
+    ]
+    lines = [mark + line for line in [*head, units]]
+    (tmp_path / "a.csv").write_text("\n".join([*lines, *rows]) + "\n")
+    assert channels(tmp_path) == found
+
+
+def test_names_of_two_rows_without_units_are_those_of_the_last(tmp_path: Path) -> None:
+    made.text("# first,release", "# t,laser")(tmp_path / "a.csv")
+    assert channels(tmp_path) == ["t", "laser"]

@@ -40,6 +40,7 @@ LABEL_UNITS = frozenset((*_QUANTITY_UNITS, *TIME_UNITS))
 _TIMES = frozenset(
     ("time", "t", "zeit", "temps", "tiempo", "tempo", "timestamp", "x_value", "x-value")
 )
+_WORD = re.compile(r"[^\W\d_]+")
 _LABEL = re.compile(r"^(.*?)\s*(?:\[([^\[\]]*)\]|\(([^()]*)\)|/\s*([^/\s]+(?:/[^/\s]+)?))$")
 _BRACKETS = re.compile(r"\s*(?:\[([^\[\]]*)\]|\(([^()]*)\))(?=\s)")
 
@@ -85,6 +86,12 @@ class Channel:
     def label(self) -> str:
         """Name and unit as a message shows them."""
         return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+
+def says_time(name: str) -> bool:
+    """True for names such as `Time`, `t`, `Time A`, `Time Stamp`, `tiempo_s`."""
+    words = _WORD.findall(name.lower())
+    return name.lower() in _TIMES or any(word in _TIMES for word in words if len(word) > 1)
 
 
 def spelt(unit: str) -> str:

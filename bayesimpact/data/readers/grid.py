@@ -7,10 +7,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bayesimpact.data.readers.channel import LABEL_UNITS, Channel, name_and_unit, spelt
+from bayesimpact.data.readers.channel import (
+    LABEL_UNITS,
+    TIME_UNITS,
+    Channel,
+    name_and_unit,
+    says_time,
+    spelt,
+)
 from bayesimpact.errors import InputError
 
 Cell = str | float | None
+_NO_UNIT = "[]()- "
 LOOKED_AT = 25
 """Rows in the middle of a grid that show which of its columns are numbers."""
 
@@ -120,15 +128,29 @@ def _labels(above: Sequence[Sequence[Cell]], width: int) -> tuple[list[str], lis
         [str(c or "").strip() for c in row] for row in above if any(not _empty(c) for c in row)
     ]
     heads = [row + [""] * (width - len(row)) for row in heads if width - 1 <= len(row) <= width]
+    for row in heads:
+        row[0] = row[0].lstrip("#% ")  # the mark of a comment
     below: list[str] = [""] * width
-    if heads and _is_units(heads[-1]) and len(heads) > 1:
-        below = [spelt(cell) for cell in heads.pop()]
+    if len(heads) > 1 and _is_units(heads[-1], heads[-2]):
+        below = [spelt(cell) if cell.strip(_NO_UNIT) else "" for cell in heads.pop()]
     if not heads or not any(heads[-1]):
         return [""] * width, below
     names, units = zip(*(name_and_unit(cell.lstrip("#% ")) for cell in heads[-1]), strict=True)
     return list(names), [unit or other for unit, other in zip(units, below, strict=True)]
 
 
-def _is_units(cells: Sequence[str]) -> bool:
-    given = [spelt(cell) for cell in cells if cell and cell.strip("[]()- ")]
-    return bool(given) and all(unit in LABEL_UNITS for unit in given)
+def _is_units(cells: Sequence[str], above: Sequence[str]) -> bool:
+    """True for a row of units below a row of names; not all of them need be known here.
+
+    Each is a known unit, or in brackets, or one of them is that of the time above it.
+    """
+    pairs = [(c, name) for c, name in zip(cells, above, strict=True) if c.strip(_NO_UNIT)]
+    given = [spelt(cell) for cell, _ in pairs]
+    if not given:
+        return False
+    bracketed = all(cell[0] + cell[-1] in ("[]", "()") for cell, _ in pairs)
+    timed = any(
+        unit in TIME_UNITS and says_time(name_and_unit(name)[0])
+        for unit, (_, name) in zip(given, pairs, strict=True)
+    )
+    return bracketed or timed or all(unit in LABEL_UNITS for unit in given)
