@@ -17,8 +17,8 @@ from bayesimpact.data.input import Kind
 from bayesimpact.data.quantity import RESPONSE_COLUMNS, UNITS, is_angular, order_of
 from bayesimpact.data.readers import text
 from bayesimpact.data.readers.channel import Channel
-from bayesimpact.data.readers.choose import clock_of, guessed_response
 from bayesimpact.data.readers.formats import is_instrument_file, read_channels
+from bayesimpact.data.readers.guess import guessed_response, nearest_clock
 from bayesimpact.data.table import TIME_COLUMNS
 from bayesimpact.errors import InputError
 
@@ -287,7 +287,7 @@ def _clock_lines(
 ) -> list[str]:
     if response.times is not None:
         return []
-    stated = clock_of(inside, response)
+    stated = nearest_clock(inside, response)
     guessed = False
     if stated is None and response.interval is not None:
         return []

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bayesimpact.data.readers.channel import Channel
-from bayesimpact.data.readers.choose import clock_of
+from bayesimpact.data.readers.guess import nearest_clock
 
 MOST = 60
 """Panels in one figure; what is beyond is named in the title."""
@@ -18,7 +18,9 @@ POINTS = 20_000
 
 def channel_figure(files: Sequence[tuple[str, Sequence[Channel]]]) -> Figure:
     """One panel per channel that is no clock; time in s where the file has one, else samples."""
-    panels = [(file, c, clock_of(all_, c)) for file, all_ in files for c in all_ if not c.is_time]
+    panels = [
+        (file, c, nearest_clock(all_, c)) for file, all_ in files for c in all_ if not c.is_time
+    ]
     shown = panels[:MOST]
     columns = min(3, max(1, len(shown)))
     rows = max(1, -(-len(shown) // columns))

@@ -72,10 +72,18 @@ class Channel:
 
     @property
     def is_time(self) -> bool:
-        """True for a column of time stamps."""
-        return self.name.lower().removesuffix("_s").removesuffix("_ms") in _TIMES and (
-            self.unit in ("", *TIME_UNITS)
-        )
+        """True for a column of time stamps: named so, or never falling and named or in units so."""
+        if self.unit not in ("", *TIME_UNITS):
+            return False
+        if self.name.lower().removesuffix("_s").removesuffix("_ms") in _TIMES:
+            return True
+        return (self.unit != "" or says_time(self.name)) and self.never_falls
+
+    @property
+    def never_falls(self) -> bool:
+        """True where no number is below the one before it: a clock or a count, and no motion."""
+        steps = np.diff(self.samples[np.isfinite(self.samples)])
+        return bool(steps.size and steps.min() >= 0.0 and steps.max() > 0.0)
 
     @property
     def seconds(self) -> Floats:

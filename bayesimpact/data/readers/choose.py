@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from bayesimpact.data.clock import check_rate
 from bayesimpact.data.gaps import on_clock
 from bayesimpact.data.input import Kind, unit_factor
-from bayesimpact.data.quantity import UNITS, Quantity, order_of, units_of
+from bayesimpact.data.quantity import UNITS, Quantity, units_of
 from bayesimpact.data.readers.channel import TIME_UNITS, Channel, name_and_unit
+from bayesimpact.data.readers.guess import clocks_of, guessed_response
 from bayesimpact.data.table import Table, squeezed
 from bayesimpact.data.window import unbroken, window
 from bayesimpact.errors import InputError
@@ -84,27 +85,6 @@ def listed(channels: Sequence[Channel]) -> str:
     names = [f"{c.label} (block {c.block})" if several else c.label for c in channels]
     rest = f", and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
     return ", ".join(names[:SHOWN]) + rest
-
-
-def guessed_response(
-    channels: Sequence[Channel], quantity: Quantity | None = None
-) -> list[Channel]:
-    """The channels that may be the response: those of the quantity that is wanted.
-
-    Without one those with a unit of displacement or angle, else of a velocity, else acceleration.
-    """
-    known = [c for c in channels if not c.is_time and c.unit in UNITS]
-    if quantity is not None:
-        return [c for c in known if UNITS[c.unit][0] == quantity]
-    orders = [order_of(UNITS[c.unit][0]) for c in known]
-    return [c for c, order in zip(known, orders, strict=True) if order == min(orders)]
-
-
-def clock_of(channels: Sequence[Channel], channel: Channel) -> Channel | None:
-    """The column of time stamps beside a channel; None when there is none, or several."""
-    beside = [c for c in channels if c.is_time and c.block == channel.block]
-    beside = [c for c in beside if c.samples.size == channel.samples.size and c is not channel]
-    return beside[0] if len(beside) == 1 else None
 
 
 def _of_block(
@@ -200,14 +180,17 @@ def _times(
         return stamps.seconds
     if channel.times is not None:
         return channel.times
-    stated = clock_of(channels, channel)
-    if stated is not None:
-        return stated.seconds
+    stated = clocks_of(channels, channel)
+    if len(stated) == 1:
+        return stated[0].seconds
     if channel.interval is not None:
         check_rate(path, channel.interval, wanted.sample_rate)
         return channel.interval, channel.start
     if wanted.sample_rate is not None:
         return 1.0 / wanted.sample_rate, channel.start
+    if stated:
+        found = f"{len(stated)} columns that may be the clock of channel {channel.name}"
+        raise InputError(str(path), found, f'time_column = "...", one of {listed(stated)}')
     found = f"no clock for channel {channel.name} among {listed(channels)}"
     raise InputError(str(path), found, "time_column, or sample_rate_hz in campaign.toml")
 
