@@ -14,7 +14,8 @@ from types import MappingProxyType
 from typing import Any
 
 from bayesimpact.data import bounds
-from bayesimpact.data.campaign import SECOND_STOP, Beam, Campaign, Measurement, Smoothing
+from bayesimpact.data.campaign import SECOND_STOP, Beam, Campaign
+from bayesimpact.data.chain import measurement_of
 from bayesimpact.data.channels import check_channels
 from bayesimpact.data.entries import filled_in
 from bayesimpact.data.foreign import file_bytes, is_foreign, read_foreign
@@ -22,15 +23,12 @@ from bayesimpact.data.gaps import excluded_spans
 from bayesimpact.data.input_column import input_of, with_input
 from bayesimpact.data.period import crossing_period
 from bayesimpact.data.prior_bounds import check_prior, parameter_ranges, prior_names
-from bayesimpact.data.quantity import Quantity, check_quantity, unit_of, with_article
+from bayesimpact.data.quantity import check_quantity, unit_of, with_article
 from bayesimpact.data.recording import Recording
 from bayesimpact.data.schema import (
     CampaignTable,
-    LagTable,
     LogUniformTable,
-    MeasurementTable,
     RecordingTable,
-    UnfilteredTable,
     UniformTable,
     parse_campaign,
 )
@@ -109,7 +107,7 @@ def build_campaign(
         mass=table.mass_kg,
         recordings=tuple(recordings),
         stop=bool(table.stop),
-        measurement=_measurement(file, table, recordings),
+        measurement=measurement_of(file, table, recordings),
         priors=MappingProxyType(_priors(file, table, recordings)),
         beams=MappingProxyType(_beams(file, table)),
         keep_faults=table.faults == "keep",
@@ -288,66 +286,6 @@ def _check_together(where: str, table: CampaignTable, recordings: list[Recording
         found = f"{table.mass_uncertainty_kg:g} kg"
         accepted = f"less than the mass, {table.mass_kg:g} kg"
         raise InputError(f"{where}, key mass_uncertainty_kg", found, accepted)
-
-
-def _measurement(where: str, table: CampaignTable, recordings: list[Recording]) -> Measurement:
-    given = table.measurement
-    return Measurement(
-        noise=_noise(f"{where}, [measurement]", given, recordings),
-        smoothing=_smoothing(f"{where}, [measurement], smoothing", given, recordings),
-        mass_sd=table.mass_uncertainty_kg / table.mass_kg,
-        clock_sd=given.clock_uncertainty_ppm * 1e-6,
-        gain_sd=given.gain_uncertainty_percent * 1e-2,
-        unfiltered=isinstance(given.smoothing, UnfilteredTable),
-    )
-
-
-def _noise(where: str, given: MeasurementTable, recordings: list[Recording]) -> float | None:
-    scales: dict[Quantity, dict[str, float]] = {
-        "displacement": {"noise_um": 1e-6},
-        "angle": {"noise_mrad": 1e-3, "noise_deg": math.pi / 180.0},
-    }
-    levels = {key: getattr(given, key) for keys in scales.values() for key in keys}
-    other = next((r.quantity for r in recordings if r.quantity not in scales), None)
-    quantity = other or recordings[0].quantity
-    levels = {key: level for key, level in levels.items() if level is not None}
-    accepted = " or ".join(scales.get(quantity, ())) or "no noise level: it is estimated"
-    if len(levels) > 1:
-        raise InputError(f"{where}, key {list(levels)[1]}", " and ".join(levels), accepted)
-    for key, level in levels.items():
-        if key not in scales.get(quantity, ()):
-            raise InputError(
-                f"{where}, key {key}", f"a noise level for recordings of {quantity}", accepted
-            )
-        return float(level * scales[quantity][key])
-    return None
-
-
-def _smoothing(
-    where: str, given: MeasurementTable, recordings: list[Recording]
-) -> Smoothing | None:
-    table = given.smoothing
-    if table is None or isinstance(table, UnfilteredTable):
-        return None
-    if isinstance(table, LagTable):
-        return Smoothing(kind="lag", time_constant=table.time_constant_s)
-    window = table.window - 1 + table.window % 2
-    shortest = min(recording.samples.size for recording in recordings)
-    if window > shortest:
-        raise InputError(
-            f"{where}, key window",
-            f"{table.window} samples",
-            f"at most {shortest}, the shortest recording",
-        )
-    if table.polyorder >= window:
-        raise InputError(
-            f"{where}, key polyorder",
-            f"{table.polyorder}",
-            f"a whole number below {window}, the window",
-        )
-    return Smoothing(
-        kind="savgol", window=window, polyorder=table.polyorder, declared_window=table.window
-    )
 
 
 def _beams(where: str, table: CampaignTable) -> dict[str, Beam]:
