@@ -92,6 +92,8 @@ class Campaign(Picklable):
     skipped : recording -> why it is left out
     notes : what was set aside in the recordings and why, in words, for reports
     declared : ids of effects that are known to act and belong to the base model
+    scaled : units of the files that a `scale` of campaign.toml multiplies, in words
+    doubts : how files were read where something speaks against it, in words
     """
 
     name: str
@@ -107,6 +109,8 @@ class Campaign(Picklable):
     skipped: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     notes: tuple[str, ...] = ()
     declared: tuple[str, ...] = ()
+    scaled: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         """One line."""

@@ -17,7 +17,7 @@ from bayesimpact.data.schema import RecordingTable
 from bayesimpact.data.table import Table
 from bayesimpact.errors import InputError
 
-_KEYS = ("channel", "time_column", "block", "skip_rows", "encoding")
+_KEYS = ("channel", "time_column", "time_unit", "block", "skip_rows", "encoding")
 
 
 def is_foreign(source: Path, entry: RecordingTable, data: bytes) -> bool:
@@ -67,6 +67,7 @@ def _wanted(entry: RecordingTable, column: str | int | None) -> Wanted:
     return Wanted(
         column=column,
         time_column=entry.time_column,
+        time_unit=entry.time_unit,
         block=entry.block,
         sample_rate=entry.sample_rate_hz,
         start=entry.start_s,

@@ -33,7 +33,8 @@ def with_input(source: Path, entry: RecordingTable, data: bytes, table: Table) -
     if end - first < table.samples.size:
         found = f"{other.samples.size} samples for {table.samples.size} of the response"
         raise InputError(f"{source}, key input", found, "an input for every sample of the response")
-    return replace(table, input=other.samples[first - shift : end - shift])
+    samples = other.samples[first - shift : end - shift]
+    return replace(table, input=samples, input_unit=other.unit)
 
 
 def input_of(

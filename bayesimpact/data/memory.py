@@ -33,7 +33,7 @@ taken for metres exceed twice that above 2.5 Hz and 6.5 mm.
 _NUMBERS = "finite numbers, (n,), two or more"
 _OWN = ("samples", "times_s", "used")
 _OF_FILES = frozenset(
-    ("file", "column", "channel", "block", "skip_rows", "encoding", "time_column")
+    ("file", "column", "channel", "block", "skip_rows", "encoding", "time_column", "time_unit")
 )
 
 

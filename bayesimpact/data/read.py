@@ -17,6 +17,7 @@ from bayesimpact.data import bounds
 from bayesimpact.data.campaign import SECOND_STOP, Beam, Campaign
 from bayesimpact.data.chain import measurement_of
 from bayesimpact.data.channels import check_channels
+from bayesimpact.data.doubts import doubts_of, scaled_units
 from bayesimpact.data.entries import filled_in
 from bayesimpact.data.foreign import file_bytes, is_foreign, read_foreign
 from bayesimpact.data.gaps import excluded_spans
@@ -90,13 +91,18 @@ def build_campaign(
         as `load_campaign`.
     """
     recordings: list[Recording] = []
+    scaled: list[str] = []
+    doubts: list[str] = []
     for number, entry in enumerate(table.recording, 1):
         where = f"{file}, recording {number} ({entry.file})"
         if entry.skip is not None:
             continue
         _check_entry(where, entry, bool(table.stop), recordings)
         source, samples = read(entry, where)
-        recordings.append(_recording(source, where, entry, bool(table.stop), samples))
+        recording = _recording(source, where, entry, bool(table.stop), samples)
+        recordings.append(recording)
+        scaled += [f"{recording.name}, {words}" for words in scaled_units(entry, samples)]
+        doubts += doubts_of(entry, samples, recording)
     skipped = {e.name or Path(e.file).stem: e.skip for e in table.recording if e.skip}
     table = table.model_copy(update={"recording": [e for e in table.recording if e.skip is None]})
     if not recordings:
@@ -114,6 +120,8 @@ def build_campaign(
         skipped=MappingProxyType(skipped),
         notes=tuple(f"{name} is skipped ({reason})" for name, reason in skipped.items()),
         declared=(SECOND_STOP,) if table.stop == "two-sided" else (),
+        scaled=tuple(scaled),
+        doubts=tuple(doubts),
     )
 
 

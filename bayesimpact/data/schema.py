@@ -12,6 +12,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 
 from bayesimpact.data import bounds
 from bayesimpact.data.quantity import QUANTITIES, UNITS, Quantity
+from bayesimpact.data.readers.channel import TIME_UNITS
 from bayesimpact.errors import InputError
 
 _SEEN = rf"^[^{bounds.UNSEEN}]*[^{bounds.UNSEEN}\s][^{bounds.UNSEEN}]*$"
@@ -72,6 +73,9 @@ class RecordingTable(_Table):
     column: Text | Count | None = Field(None, description=COLUMN)
     channel: Text | Count | None = Field(None, description=COLUMN)
     time_column: Text | Count | None = Field(None, description=COLUMN)
+    time_unit: Literal[tuple(TIME_UNITS)] | None = Field(  # type: ignore[valid-type]
+        None, description=f"{', '.join(TIME_UNITS)}, in quotes"
+    )
     block: Text | Count | None = Field(
         None, description="the name of a group, sheet or data set in quotes, or its number"
     )
@@ -99,7 +103,9 @@ class RecordingTable(_Table):
         None, description="a number other than 0, times the readings (-1e+12 to 1e+12)"
     )
     clock_ratio: Annotated[float, Field(gt=0, ge=1e-3, le=1e3)] | None = Field(
-        None, description=f"{POSITIVE}, true time over the file's time (0.001 to 1000)"
+        None,
+        description=f"{POSITIVE}, true time over the file's time (0.001 to 1000); "
+        "another unit is time_unit",
     )
     resample: bool = Field(False, description="true or false, without quotes")
     input: InputTable | None = Field(

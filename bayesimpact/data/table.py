@@ -33,6 +33,9 @@ class Table:
     quantity : what the samples are
     used : (n,) False where an uneven clock left a gap; None where every sample counts
     input : (n,) a measured input in SI units, see `bayesimpact.data.input`; None without one
+    unit, input_unit : that the readings and the input were taken for, in the file; "" where nothing
+        said one
+    assumed_seconds : nothing said the unit of the time stamps, and they were taken for s
     """
 
     samples: NDArray[np.float64]
@@ -41,6 +44,9 @@ class Table:
     quantity: Quantity
     used: NDArray[np.bool_] | None = None
     input: NDArray[np.float64] | None = None
+    unit: str = ""
+    input_unit: str = ""
+    assumed_seconds: bool = False
 
 
 @dataclass(frozen=True)
@@ -99,7 +105,7 @@ def read_table(
         interval = 1.0 / sample_rate
         first, last = window((interval, 0.0), samples.size, *span)
         _check_finite(path, lines, layout, samples[first:last], rows[first:last])
-        return Table(samples[first:last], interval, first * interval, quantity)
+        return Table(samples[first:last], interval, first * interval, quantity, unit=layout.unit)
     times = numbers[:, 0] * TIME_COLUMNS[layout.names[layout.time]]
     first, last = window(times, samples.size, *span)
     if resample:
@@ -108,7 +114,8 @@ def read_table(
     _check_finite(path, lines, layout, samples, rows)
     even = on_clock(path, times, samples, rows, resample=resample)
     check_rate(path, even.interval, sample_rate)
-    return Table(even.samples, even.interval, float(times[0]), quantity, even.used)
+    start = float(times[0])
+    return Table(even.samples, even.interval, start, quantity, even.used, unit=layout.unit)
 
 
 def squeezed(name: str) -> str:

@@ -32,7 +32,7 @@ def channel_figure(files: Sequence[tuple[str, Sequence[Channel]]]) -> Figure:
         step = max(1, channel.samples.size // POINTS)
         times, label = np.arange(channel.samples.size, dtype=np.float64), "sample"
         if clock is not None:
-            times, label = clock.seconds, "time, s"
+            times, label = clock.seconds(), "time, s"
         elif channel.times is not None:
             times, label = channel.times, "time, s"
         elif channel.interval is not None:

@@ -54,7 +54,7 @@ def campaign_text(campaign: Campaign, noise: Noise | None) -> str:
 
 def campaign_warnings(campaign: Campaign, noise: Noise | None) -> list[str]:
     """What a user should know before trusting a fit of these recordings, their faults set aside."""
-    warnings = []
+    warnings = list(campaign.doubts)
     stated = campaign.measurement.noise
     if stated is not None and noise is not None and not 1 / 1.5 < noise.level / stated < 1.5:
         warnings.append(
@@ -115,7 +115,8 @@ def _recordings_block(campaign: Campaign) -> str:
         row = [r.name, r.case or "-", str(r.samples.size), *(f"{x:.4g}" for x in numbers)]
         rows.append([*row, envelope_bars(r)])
     remark = "(first and largest are counted from rest, the median of the readings)"
-    return "\n".join([*text_table(rows, left=(0, -1)), remark, *_inputs(campaign)])
+    scaled = [f"unit of {words}" for words in campaign.scaled]
+    return "\n".join([*text_table(rows, left=(0, -1)), remark, *_inputs(campaign), *scaled])
 
 
 def _rest(recording: Recording) -> float:

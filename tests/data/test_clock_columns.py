@@ -69,3 +69,70 @@ def test_of_two_clocks_reading_asks_and_new_takes_the_one_before(tmp_path: Path)
     CliRunner().invoke(main, ["new", str(tmp_path), str(tmp_path / "a.csv")])
     assert 'time_column = "Time A"' in (tmp_path / "campaign.toml").read_text()
     assert load_campaign(tmp_path).recordings[0].start == 0.0
+
+
+TICKS = np.round(made.TIMES * 1e6)
+
+
+@pytest.mark.parametrize(("unit", "size"), [("us", 1e-6), ("ms", 1e-3), ("s", 1.0), ("min", 60.0)])
+def test_the_unit_of_a_clock_can_be_stated(tmp_path: Path, unit: str, size: float) -> None:
+    columns(tmp_path, "Time,x [mm]", made.TIMES / size, made.MM)
+    recording = load(tmp_path, f'time_unit = "{unit}"\nstart_s = 0.2\n')
+    assert recording.interval == pytest.approx(2e-3, rel=1e-6)
+    assert recording.start == pytest.approx(0.2)
+    np.testing.assert_allclose(recording.samples, decay()[100:], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("header", "keys", "words"),
+    [
+        ("Time [ms],x [mm]", 'time_unit = "us"\n', 'accepted: time_unit = "ms", or no time_unit'),
+        ("time_s,displacement_mm", 'time_unit = "us"\n', 'accepted: time_unit = "s", or no'),
+        ("Time,x [mm]", 'time_unit = "h"\n', "accepted: s, ms, us, ns, min, in quotes"),
+        ("y [V],x [mm]", 'sample_rate_hz = 500\ntime_unit = "us"\n', "found no column of times"),
+    ],
+)
+def test_units_of_a_clock_that_are_refused(
+    tmp_path: Path, header: str, keys: str, words: str
+) -> None:
+    columns(tmp_path, header, made.TIMES, made.MM)
+    with pytest.raises(InputError) as caught:
+        load(tmp_path, keys)
+    assert "time_unit" in str(caught.value) and words in str(caught.value)
+
+
+def warned(tmp_path: Path, keys: str = "") -> str:
+    write(tmp_path, ONE + keys, a=None, b=None)
+    result = CliRunner().invoke(main, ["check", str(tmp_path), "--quiet"])
+    assert result.exit_code == 0, result.output
+    return result.stderr
+
+
+def test_check_warns_of_a_clock_that_makes_the_motion_slower_than_any_rig(tmp_path: Path) -> None:
+    columns(tmp_path, "Time Stamp,x [mm]", TICKS, made.MM)  # a counter of microseconds
+    said = warned(tmp_path)
+    assert 'state the unit in campaign.toml, time_unit = "us" (a period of 0.156' in said
+    assert "a pendulum 6.07e+09 m long" in said
+    assert "its clock" not in warned(tmp_path, 'time_unit = "us"\n')
+    assert "its clock" not in warned(tmp_path, 'time_unit = "s"\n')  # it is said, and believed
+    columns(tmp_path, "Time,x [mm]", TICKS / 1e3, made.MM)
+    assert 'time_unit = "ms" (a period of 0.156' in warned(tmp_path)
+    assert "its clock" not in warned(tmp_path, "clock_ratio = 0.001\n")
+    columns(tmp_path, "Time [s],x [mm]", TICKS / 1e3, made.MM)
+    assert "its clock" not in warned(tmp_path)  # the file itself says s
+
+
+@pytest.mark.parametrize(("period", "doubted"), [(19.0, False), (21.0, True)])
+def test_a_pendulum_of_a_hundred_metres_is_the_slowest(
+    tmp_path: Path, period: float, doubted: bool
+) -> None:
+    columns(tmp_path, "Time,x [mm]", made.TIMES * 6.4 * period, made.MM)
+    assert ("its clock" in warned(tmp_path)) == doubted
+
+
+def test_a_rate_that_is_stated_comes_before_a_clock_that_is_guessed(tmp_path: Path) -> None:
+    columns(tmp_path, "Time Stamp,x [mm]", TICKS, made.MM)
+    assert load(tmp_path, "sample_rate_hz = 500\n").interval == pytest.approx(2e-3)
+    columns(tmp_path, "Time,x [mm]", made.TIMES, made.MM)
+    with pytest.raises(InputError, match="sample_rate_hz = 400, and a clock at 500 Hz"):
+        load(tmp_path, "sample_rate_hz = 400\n")

@@ -82,6 +82,7 @@ KEYS: dict[str, dict[str, tuple[str, str]]] = {
         "column": (f"{TOP}{ENTRY}time_column = 1\n{NEAR}", "two columns"),
         "channel": (f'{TOP}{ENTRY}time_column = 1\nchannel = "far"\nunit = "mm"\n', "two columns"),
         "time_column": (f"{TOP}{ENTRY}time_column = 1\n{NEAR}", "two columns"),
+        "time_unit": (f'{TOP}{ENTRY}time_column = 1\ntime_unit = "ms"\n{NEAR}', "two columns"),
         "block": (TOP + ENTRY.replace("csv", "npz") + "block = 1\n", ""),
         "skip_rows": (f"{TOP}{ENTRY}skip_rows = 1\ntime_column = 1\n{NEAR}", "preamble"),
         "encoding": (
@@ -153,7 +154,12 @@ def assert_same(mine: Any, other: Any, place: str = "") -> None:
     if dataclasses.is_dataclass(mine):
         assert type(mine) is type(other), place
         for field in dataclasses.fields(mine):
-            if field.name not in ("sha256", "folder"):  # of the files, not of the campaign
+            if field.name not in (
+                "sha256",
+                "folder",
+                "scaled",
+                "doubts",
+            ):  # of the files, not of the campaign
                 pair = getattr(mine, field.name), getattr(other, field.name)
                 assert_same(*pair, f"{place}.{field.name}")
     elif isinstance(mine, Mapping):

@@ -73,11 +73,16 @@ class Channel:
     @property
     def is_time(self) -> bool:
         """True for a column of time stamps: named so, or never falling and named or in units so."""
-        if self.unit not in ("", *TIME_UNITS):
-            return False
-        if self.name.lower().removesuffix("_s").removesuffix("_ms") in _TIMES:
-            return True
-        return (self.unit != "" or says_time(self.name)) and self.never_falls
+        named = self.unit != "" or says_time(self.name)
+        fits = self.unit in ("", *TIME_UNITS)
+        return self.is_called_time or (fits and named and self.never_falls)
+
+    @property
+    def is_called_time(self) -> bool:
+        """True for a name that nothing but time stamps has, whatever the numbers."""
+        return self.name.lower().removesuffix("_s").removesuffix("_ms") in _TIMES and (
+            self.unit in ("", *TIME_UNITS)
+        )
 
     @property
     def never_falls(self) -> bool:
@@ -85,10 +90,9 @@ class Channel:
         steps = np.diff(self.samples[np.isfinite(self.samples)])
         return bool(steps.size and steps.min() >= 0.0 and steps.max() > 0.0)
 
-    @property
-    def seconds(self) -> Floats:
-        """The samples of a column of time stamps, s; without a unit they are taken as s."""
-        return self.samples * TIME_UNITS.get(self.unit, 1.0)
+    def seconds(self, unit: str | None = None) -> Floats:
+        """The samples of a column of time stamps, s; `unit`, or else s, where it has none."""
+        return self.samples * TIME_UNITS.get(self.unit or unit or "s", 1.0)
 
     @property
     def label(self) -> str:

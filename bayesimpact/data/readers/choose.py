@@ -34,6 +34,7 @@ class Wanted:
 
     column: str | int | None = None
     time_column: str | int | None = None
+    time_unit: str | None = None
     block: str | int | None = None
     unit: str | None = None
     quantity: Quantity | None = None
@@ -55,8 +56,8 @@ def choose(path: Path, channels: Sequence[Channel], wanted: Wanted) -> Table:
     """
     inside = _of_block(path, channels, wanted.block)
     channel = _response(path, inside, wanted)
-    quantity, factor = _quantity(path, channel, wanted)
-    times = _times(path, channels, channel, wanted)
+    unit, quantity, factor = _quantity(path, channel, wanted)
+    times, assumed = _times(path, channels, channel, wanted)
     first, last = window(times, channel.samples.size, wanted.start, wanted.end)
     if wanted.resample and not isinstance(times, tuple):
         first, last = unbroken(times, channel.samples, first, last)
@@ -64,7 +65,7 @@ def choose(path: Path, channels: Sequence[Channel], wanted: Wanted) -> Table:
     _check_finite(path, channel, samples, first)
     if isinstance(times, tuple):
         interval, start = times
-        return Table(samples * factor, interval, start + first * interval, quantity)
+        return Table(samples * factor, interval, start + first * interval, quantity, unit=unit)
     stamps = times[first:last]
     rows = np.arange(first + 1, last + 1) if channel.rows is None else channel.rows[first:last]
     place = "sample" if channel.rows is None else "line"
@@ -76,7 +77,10 @@ def choose(path: Path, channels: Sequence[Channel], wanted: Wanted) -> Table:
         path, stamps, samples * factor, rows.astype(np.int64), place, resample=wanted.resample
     )
     check_rate(path, even.interval, wanted.sample_rate)
-    return Table(even.samples, even.interval, float(stamps[0]), quantity, even.used)
+    return Table(
+        even.samples, even.interval, float(stamps[0]), quantity, even.used,
+        unit=unit, assumed_seconds=assumed,
+    )  # fmt: skip
 
 
 def listed(channels: Sequence[Channel]) -> str:
@@ -138,15 +142,16 @@ def _response(path: Path, channels: Sequence[Channel], wanted: Wanted) -> Channe
     if len(fitting) == 1:
         return fitting[0]
     found = f"{'several' if fitting else 'no'} channels that may be the response"
-    raise InputError(str(path), found, f'column = "...", one of {listed(channels)}')
+    raise InputError(str(path), found, f'column = "...", one of {listed(fitting or channels)}')
 
 
-def _quantity(path: Path, channel: Channel, wanted: Wanted) -> tuple[Quantity, float]:
-    """What was measured, and the factor to SI units; an input's own quantity does not matter."""
+def _quantity(path: Path, channel: Channel, wanted: Wanted) -> tuple[str, Quantity, float]:
+    """Unit, what was measured, factor to SI units; an input's own quantity does not matter."""
     if wanted.kind is not None:
         where = f"{path}, channel {channel.name}"
-        return "displacement", unit_factor(where, wanted.kind, channel.unit)
-    return UNITS[_unit(path, channel, wanted)]
+        return channel.unit, "displacement", unit_factor(where, wanted.kind, channel.unit)
+    unit = _unit(path, channel, wanted)
+    return unit, *UNITS[unit]
 
 
 def _unit(path: Path, channel: Channel, wanted: Wanted) -> str:
@@ -163,10 +168,10 @@ def _unit(path: Path, channel: Channel, wanted: Wanted) -> str:
     return asked
 
 
-def _times(
+def _clock(
     path: Path, channels: Sequence[Channel], channel: Channel, wanted: Wanted
-) -> tuple[float, float] | Floats:
-    """An even clock (interval, start), or the written time stamps, s."""
+) -> tuple[float, float] | Channel | Floats:
+    """An even clock (interval, start), the column of the time stamps, or these themselves, s."""
     if wanted.time_column is not None:
         beside = [c for c in channels if c.block == channel.block]
         stamps = _named(path, beside, "time_column", wanted.time_column)
@@ -177,12 +182,14 @@ def _times(
         if stamps.unit not in ("", *TIME_UNITS):
             accepted = f"a time ({', '.join(TIME_UNITS)})"
             raise InputError(f"{path}, key time_column", f"the unit {stamps.unit}", accepted)
-        return stamps.seconds
+        return stamps
     if channel.times is not None:
         return channel.times
     stated = clocks_of(channels, channel)
+    if wanted.sample_rate is not None:  # what is stated comes before what is guessed
+        stated = [c for c in stated if c.is_called_time]
     if len(stated) == 1:
-        return stated[0].seconds
+        return stated[0]
     if channel.interval is not None:
         check_rate(path, channel.interval, wanted.sample_rate)
         return channel.interval, channel.start
@@ -193,6 +200,23 @@ def _times(
         raise InputError(str(path), found, f'time_column = "...", one of {listed(stated)}')
     found = f"no clock for channel {channel.name} among {listed(channels)}"
     raise InputError(str(path), found, "time_column, or sample_rate_hz in campaign.toml")
+
+
+def _times(
+    path: Path, channels: Sequence[Channel], channel: Channel, wanted: Wanted
+) -> tuple[tuple[float, float] | Floats, bool]:
+    """An even clock (interval, start), or the time stamps, s; and whether s is assumed of them."""
+    clock, unit = _clock(path, channels, channel, wanted), wanted.time_unit
+    if not isinstance(clock, Channel):
+        if unit is not None:
+            found = "no column of times that it is the unit of"
+            raise InputError(f"{path}, key time_unit", found, "time_column, or no time_unit")
+        return clock, False
+    if unit is not None and clock.unit not in ("", unit):
+        where = f"{path}, time column {clock.name}"
+        found = f'time_unit = "{unit}" in campaign.toml'
+        raise InputError(where, found, f'time_unit = "{clock.unit}", or no time_unit')
+    return clock.seconds(unit), not clock.unit and unit is None
 
 
 def _check_finite(path: Path, channel: Channel, samples: Floats, first: int) -> None:

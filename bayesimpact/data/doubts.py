@@ -1,0 +1,91 @@
+"""What reading took a file for, where campaign.toml or the motion speaks against it; for `check`.
+
+Nothing of it is wrong for certain, so nothing is refused.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from bayesimpact.data.input import UNITS as INPUT_UNITS
+from bayesimpact.data.period import crossing_period
+from bayesimpact.data.quantity import STANDARD_GRAVITY, UNITS
+from bayesimpact.data.readers.channel import TIME_UNITS
+from bayesimpact.data.recording import Recording
+from bayesimpact.data.schema import RecordingTable
+from bayesimpact.data.table import Table
+
+TALLEST = 100.0
+"""Longest pendulum, and largest sag of a spring under its mass, m, that a building has room for.
+
+Foucault's in the Panthéon is 67 m long.
+"""
+SLOWEST = 2.0 * math.pi * math.sqrt(TALLEST / STANDARD_GRAVITY)
+"""Period of such an oscillator, s: for a spring that sags by h under its mass as for a pendulum of
+length h it is 2 pi sqrt(h / g). Only a balance of torsion, or a pendulum that swings in a nearly
+horizontal plane, is slower."""
+NEAR = 2e-3
+"""Relative distance up to which a factor is that of a change of units, as 9.81 and 0.0175 are."""
+
+
+def doubts_of(entry: RecordingTable, table: Table, recording: Recording) -> list[str]:
+    """What a user should look at in how an entry of campaign.toml was read, in words."""
+    found = [_clock(recording)] if table.assumed_seconds else []
+    found.append(_scale("its readings are", entry.scale, table.unit, _alike(table.unit)))
+    given = entry.input
+    if given is not None:
+        what = f"its input, column {given.column}, is"
+        found.append(_scale(what, given.scale, table.input_unit, INPUT_UNITS[given.kind]))
+    return [f"{recording.name}: {text}" for text in found if text]
+
+
+def scaled_units(entry: RecordingTable, table: Table) -> list[str]:
+    """The units that factors of campaign.toml multiply, in words; [] without a factor."""
+    words = []
+    if entry.scale is not None and table.unit:
+        words.append(f"readings: {table.unit}, times scale = {entry.scale:g}")
+    given = entry.input
+    if given is not None and given.scale != 1.0:
+        unit = table.input_unit or f"no unit, so SI ({given.kind})"
+        words.append(f"input {given.column}: {unit}, times scale = {given.scale:g}")
+    return words
+
+
+def likely_unit(period: float) -> str:
+    """Unit of a clock that makes of `period`, read in s, one of an oscillator in a building."""
+    finer = (unit for unit, size in TIME_UNITS.items() if size < 1.0 and period * size <= SLOWEST)
+    return next(finer, "s")
+
+
+def _clock(recording: Recording) -> str:
+    """Doubt of a clock without a unit, taken in s; "" where nothing speaks against it."""
+    period = crossing_period(recording.samples, recording.interval)
+    if period is None or period <= SLOWEST:
+        return ""
+    length = STANDARD_GRAVITY * (period / (2.0 * math.pi)) ** 2
+    unit = likely_unit(period)
+    return (
+        f"its clock has no unit and is taken in s: a period of {period:.4g} s, that of a pendulum "
+        f"{length:.3g} m long; state the unit in campaign.toml, time_unit = "
+        f'"{unit}" (a period of {period * TIME_UNITS[unit]:.4g} s), or "s" where that is right'
+    )
+
+
+def _alike(unit: str) -> Mapping[str, float]:
+    """Factor to SI of all units of a unit's quantity."""
+    own = UNITS.get(unit, (None, 1.0))[0]
+    return {other: factor for other, (quantity, factor) in UNITS.items() if quantity == own}
+
+
+def _scale(what: str, scale: float | None, unit: str, units: Mapping[str, float]) -> str:
+    """Doubt of a factor that converts what reading has converted already; "" for any other."""
+    if scale is None or unit not in units:
+        return ""
+    for other, factor in units.items():
+        if other != unit and abs(abs(scale) * factor / units[unit] - 1.0) < NEAR:
+            return (
+                f"{what} read in {unit}, and scale = {scale:g} multiplies that again: leave it out "
+                f"where it was to turn {unit} into {other}"
+            )
+    return ""
