@@ -92,7 +92,7 @@ class Campaign(Picklable):
     skipped : recording -> why it is left out
     notes : what was set aside in the recordings and why, in words, for reports
     declared : ids of effects that are known to act and belong to the base model
-    scaled : units of the files that a `scale` of campaign.toml multiplies, in words
+    scaled : units of the files that a `scale` or a free gain multiplies, in words
     doubts : how files were read where something speaks against it, in words
     """
 

@@ -8,9 +8,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from bayesimpact.data.input import UNITLESS
 from bayesimpact.data.input import UNITS as INPUT_UNITS
 from bayesimpact.data.period import crossing_period
-from bayesimpact.data.quantity import STANDARD_GRAVITY, UNITS
+from bayesimpact.data.quantity import STANDARD_GRAVITY, units_like
 from bayesimpact.data.readers.channel import TIME_UNITS
 from bayesimpact.data.recording import Recording
 from bayesimpact.data.schema import RecordingTable
@@ -32,16 +33,17 @@ NEAR = 2e-3
 def doubts_of(entry: RecordingTable, table: Table, recording: Recording) -> list[str]:
     """What a user should look at in how an entry of campaign.toml was read, in words."""
     found = [_clock(recording)] if table.assumed_seconds else []
-    found.append(_scale("its readings are", entry.scale, table.unit, _alike(table.unit)))
+    found.append(_scale("its readings are", entry.scale, table.unit, units_like(table.unit)))
     given = entry.input
     if given is not None:
         what = f"its input, column {given.column}, is"
-        found.append(_scale(what, given.scale, table.input_unit, INPUT_UNITS[given.kind]))
+        alike = units_like(table.input_unit) or INPUT_UNITS[given.kind]
+        found.append(_scale(what, given.scale, table.input_unit, alike))
     return [f"{recording.name}: {text}" for text in found if text]
 
 
 def scaled_units(entry: RecordingTable, table: Table) -> list[str]:
-    """The units that factors of campaign.toml multiply, in words; [] without a factor."""
+    """The units that factors and free gains of campaign.toml multiply, in words; [] without any."""
     words = []
     if entry.scale is not None and table.unit:
         words.append(f"readings: {table.unit}, times scale = {entry.scale:g}")
@@ -49,6 +51,9 @@ def scaled_units(entry: RecordingTable, table: Table) -> list[str]:
     if given is not None and given.scale != 1.0:
         unit = table.input_unit or f"no unit, so SI ({given.kind})"
         words.append(f"input {given.column}: {unit}, times scale = {given.scale:g}")
+    foreign = table.input_unit not in UNITLESS
+    if given is not None and foreign and table.input_unit not in INPUT_UNITS[given.kind]:
+        words.append(f"input {given.column}: {table.input_unit}, taken as N; its gain is free")
     return words
 
 
@@ -70,12 +75,6 @@ def _clock(recording: Recording) -> str:
         f"{length:.3g} m long; state the unit in campaign.toml, time_unit = "
         f'"{unit}" (a period of {period * TIME_UNITS[unit]:.4g} s), or "s" where that is right'
     )
-
-
-def _alike(unit: str) -> Mapping[str, float]:
-    """Factor to SI of all units of a unit's quantity."""
-    own = UNITS.get(unit, (None, 1.0))[0]
-    return {other: factor for other, (quantity, factor) in UNITS.items() if quantity == own}
 
 
 def _scale(what: str, scale: float | None, unit: str, units: Mapping[str, float]) -> str:

@@ -59,7 +59,8 @@ def read_input(source: Path, entry: RecordingTable, data: bytes) -> Table:
         accepted = "the name of a column in quotes, or its number counted from 1"
         raise InputError(f"{source}, input, key column", "nothing", accepted)
     channels = read_channels(source, data, encoding=entry.encoding, skip_rows=entry.skip_rows or 0)
-    return choose(source, channels, replace(_wanted(entry, given.column), kind=given.kind))
+    wanted = replace(_wanted(entry, given.column), kind=given.kind, free=given.gain == "free")
+    return choose(source, channels, wanted)
 
 
 def _wanted(entry: RecordingTable, column: str | int | None) -> Wanted:

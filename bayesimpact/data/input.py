@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.data.quantity import units_like
 from bayesimpact.errors import InputError
 
 Kind = Literal["force_N", "base_m", "base_m_s2"]
@@ -15,10 +16,10 @@ Floats = NDArray[np.float64]
 
 UNITS: dict[Kind, dict[str, float]] = {
     "force_N": {"N": 1.0, "kN": 1e3, "mN": 1e-3},
-    "base_m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9},
-    "base_m_s2": {"m/s2": 1.0, "mm/s2": 1e-3, "g": 9.80665},
+    "base_m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, **units_like("rad")},
+    "base_m_s2": {"m/s2": 1.0, "mm/s2": 1e-3, "g": 9.80665, **units_like("rad/s2")},
 }
-"""Units that a file may state for an input of each kind, in SI."""
+"""Units that a file may state for an input of each kind, in SI; a base may turn about an axis."""
 FAST = 0.2  # of the sampling rate: from five samples a period on a spline follows
 LITTLE = 0.01  # of a base's mean square, mean and trend apart, that may lie above that
 LEAST = 12  # samples, for a spline of degree five and a spectrum
@@ -159,11 +160,16 @@ def checked(where: str, given: Input) -> Input:
     return given
 
 
-def unit_factor(where: str, kind: Kind, unit: str) -> float:
-    """From the unit that a file states for an input to SI; 1 where it states none, or volts."""
-    if unit in UNITLESS:
+def unit_factor(where: str, kind: Kind, unit: str, free: bool = False) -> float:
+    """From the unit that a file states for an input to SI; 1 where it states none, or volts.
+
+    free : the gain is an unknown, which turns whatever is proportional to a force into one, such as
+        the position of a driver at the far end of a spring
+    """
+    if unit in UNITLESS or (free and kind == "force_N" and unit not in UNITS[kind]):
         return 1.0
     if unit not in UNITS[kind]:
         accepted = f'for kind = "{kind}" one of {", ".join(UNITS[kind])}'
+        accepted += ', or any with gain = "free"' if kind == "force_N" else ""
         raise InputError(f"{where}, key input", f"a column in {unit}", accepted)
     return UNITS[kind][unit]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.data.foreign import read_input
 from bayesimpact.data.input import Input, checked
-from bayesimpact.data.quantity import Quantity, order_of, with_article
+from bayesimpact.data.quantity import UNITS, Quantity, is_angular, order_of, with_article
 from bayesimpact.data.schema import RecordingTable
 from bayesimpact.data.table import Table
 from bayesimpact.errors import InputError
@@ -38,16 +38,23 @@ def with_input(source: Path, entry: RecordingTable, data: bytes, table: Table) -
 
 
 def input_of(
-    where: str, entry: RecordingTable, values: NDArray[np.float64] | None, quantity: Quantity
+    where: str,
+    entry: RecordingTable,
+    values: NDArray[np.float64] | None,
+    quantity: Quantity,
+    unit: str,
 ) -> Input | None:
     """The input of an entry from its column (n,), SI units; None without one.
 
     quantity : what the entry's probe reads
+    unit : that the file states for the column; "" where it states none
 
     Raises
     ------
     InputError
-        for an input that cannot be used, or whose base does not tell what `absolute` asks for.
+        for an input that cannot be used, whose base does not tell what `absolute` asks for, or
+        moves along a line where the probe reads a motion about an axis, or the other way round,
+        with a known gain.
     """
     given = entry.input
     if given is None or values is None:
@@ -59,6 +66,12 @@ def input_of(
         found = f'true beside kind = "{given.kind}" and {with_article(quantity)}'
         accepted = "a base_m, or an acceleration beside a base_m_s2; else false: relative to it"
         raise InputError(f"{where}, input, key absolute", found, accepted)
+    turns = unit in UNITS and is_angular(UNITS[unit][0])
+    known_base = given.kind != "force_N" and given.gain == "known"
+    if known_base and unit in UNITS and turns != is_angular(quantity):
+        found = f"a base in {unit} beside {with_article(quantity)}"
+        accepted = 'both along a line, or both about an axis, or gain = "free"'
+        raise InputError(f"{where}, input, key column", found, accepted)
     samples = given.scale * (values - values.mean() if given.remove_mean else values)
     band_limited = given.hold == "band_limited"
     made = Input(samples, given.kind, given.gain == "free", band_limited, given.absolute)

@@ -69,6 +69,12 @@ def units_of(quantity: Quantity) -> tuple[str, ...]:
     return tuple(unit for unit, (q, _) in UNITS.items() if q == quantity)
 
 
+def units_like(unit: str) -> dict[str, float]:
+    """Factor to SI of every unit of a unit's quantity; nothing for what is none of `UNITS`."""
+    own = UNITS.get(unit, (None,))[0]
+    return {other: factor for other, (quantity, factor) in UNITS.items() if quantity == own}
+
+
 def with_article(quantity: Quantity) -> str:
     """As in "a displacement", "an angular velocity"."""
     words = quantity.replace("_", " ")

@@ -254,7 +254,7 @@ def _recording(
         start=table.start + first * interval,
         quantity=table.quantity,
         used=None if table.used is None else table.used[first:stop_at],
-        input=input_of(where, entry, given, table.quantity),
+        input=input_of(where, entry, given, table.quantity, table.input_unit),
         motion_name=entry.motion or "",
         free_gain=entry.gain == "free",
     )

@@ -55,6 +55,8 @@ def test_a_column_becomes_the_input(tmp_path: Path) -> None:
         ("Time [s],Weg [mm],base [mm]", "base_m", 1e-3),
         ("Time [s],Weg [mm],acc [g]", "base_m_s2", 9.80665),
         ("Time [s],Weg [mm],acc [V]", "base_m_s2", 1.0),
+        ("Time [s],Winkel [deg],table [deg]", "base_m", np.pi / 180.0),
+        ("Time [s],Winkel [deg],driver [rad]", "force_N", 1.0),  # by a spring: the gain is free
     ],
 )
 def test_units_of_the_file(tmp_path: Path, header: str, kind: str, factor: float) -> None:
@@ -96,6 +98,31 @@ def test_resampling_acts_on_both(tmp_path: Path) -> None:
     assert given.samples.size == samples.size
     kept = slice(None) if used is None else used
     np.testing.assert_allclose(given.samples[kept], np.sin(9.0 * even)[kept], atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("header", "keys", "words"),
+    [
+        (
+            "Time [s],Weg [mm],driver [rad]",
+            'kind = "force_N"',
+            'N, kN, mN, or any with gain = "free"',
+        ),
+        ("Time [s],Weg [mm],table [deg]", 'kind = "base_m"', "a base in deg beside a displacement"),
+        ("Time [s],Winkel [deg],table [mm]", 'kind = "base_m"', "a base in mm beside an angle"),
+    ],
+)
+def test_units_that_are_not_those_of_the_motion(
+    tmp_path: Path, header: str, keys: str, words: str
+) -> None:
+    keys = f"column = 2\ninput = {{ column = 3, {keys}"
+    with pytest.raises(InputError) as caught:
+        _load(tmp_path, keys + " }", header)
+    assert words in str(caught.value)
+    campaign = _load(tmp_path, keys + ', gain = "free" }', header)
+    assert _only(campaign)[1].free
+    taken = ("a, input 3: rad, taken as N; its gain is free",)
+    assert campaign.scaled == (taken if "force_N" in keys else ())
 
 
 @pytest.mark.parametrize("kind", ["force_N", "base_m", "base_m_s2"])

@@ -29,7 +29,8 @@ class Wanted:
     """What a [[recording]] says of the channel it means.
 
     `column` and `time_column` are names, or numbers counted from 1 in the file's (or block's) own
-    order; `start` and `end` in s. `kind`: what is wanted is an input of that kind, no response.
+    order; `start` and `end` in s. `kind`: what is wanted is an input of that kind, no response,
+    and `free` says that its gain is an unknown.
     """
 
     column: str | int | None = None
@@ -43,6 +44,7 @@ class Wanted:
     end: float | None = None
     resample: bool = False
     kind: Kind | None = None
+    free: bool = False
 
 
 def choose(path: Path, channels: Sequence[Channel], wanted: Wanted) -> Table:
@@ -149,7 +151,8 @@ def _quantity(path: Path, channel: Channel, wanted: Wanted) -> tuple[str, Quanti
     """Unit, what was measured, factor to SI units; an input's own quantity does not matter."""
     if wanted.kind is not None:
         where = f"{path}, channel {channel.name}"
-        return channel.unit, "displacement", unit_factor(where, wanted.kind, channel.unit)
+        factor = unit_factor(where, wanted.kind, channel.unit, wanted.free)
+        return channel.unit, "displacement", factor
     unit = _unit(path, channel, wanted)
     return unit, *UNITS[unit]
 
