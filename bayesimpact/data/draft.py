@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import filecmp
-import json
 import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,21 +10,30 @@ from pathlib import Path
 
 import numpy as np
 
+from bayesimpact.data.draft_lines import (
+    ASSUMED,
+    NEEDED,
+    SHOWN,
+    channel_lines,
+    input_lines,
+    likely_responses,
+    one_line,
+    resample_lines,
+    toml,
+)
 from bayesimpact.data.foreign import file_bytes
-from bayesimpact.data.input import UNITS as INPUT_UNITS
-from bayesimpact.data.input import Kind
+from bayesimpact.data.one_sided import shortened
 from bayesimpact.data.quantity import RESPONSE_COLUMNS, UNITS, is_angular, order_of
 from bayesimpact.data.readers import text
 from bayesimpact.data.readers.channel import Channel
 from bayesimpact.data.readers.formats import is_instrument_file, read_channels
-from bayesimpact.data.readers.guess import guessed_response, nearest_clock
+from bayesimpact.data.readers.guess import quantity_of
 from bayesimpact.data.table import TIME_COLUMNS
 from bayesimpact.errors import InputError
 
-ASSUMED = "ASSUMED"
-NEEDED = "NEEDED"
-SHOWN = 20
-"""Channels of one file that its comment lists."""
+SHORTER = 0.05
+"""Of a half cycle: what is seen of an obstacle with a quarter of the spring's stiffness, see
+`shortened`: it takes off a tenth, of which half is left where it is hit to the end."""
 FEW = 3
 """Files that are named one by one where the same is assumed of them."""
 
@@ -110,38 +118,29 @@ def _look(path: Path, file: str, outside: bool) -> Look:
 
 def draft(title: str, looks: Sequence[Look], rig: DraftedRig) -> Draft:
     """campaign.toml with one [[recording]] per file that may hold a response."""
-    angle = any(
-        is_angular(UNITS[c.unit][0]) for one in looks for c in guessed_response(one.channels)
-    )
-    what = "the inertia in kg m2" if angle else "the moving mass"
+    stop, stop_line = _stop(looks, rig)
     lines = [
         f"# A first campaign.toml. {ASSUMED}: not in the files, to be checked. {NEEDED}: missing.",
-        f"name = {_toml(title)}",
-        "mass_kg = 1.0"
-        f"  # {ASSUMED}: put in {what}; with 1.0 all forces and stiffnesses are per unit of it"
-        if rig.mass is None
-        else f"mass_kg = {rig.mass!r}",
-        f"stop = true  # {ASSUMED}: there is an obstacle; false for an oscillator without one"
-        if rig.stop is None
-        else f"stop = {_toml(rig.stop)}",
+        f"name = {toml(title)}",
+        _mass_line(looks, rig),
+        stop_line,
     ]
     said = {"": lines[1:]}
     taken: set[str] = set()
     for one in looks:
-        lines += ["", *_listing(one), "[[recording]]", f"file = {_toml(one.file)}"]
+        lines += ["", *_listing(one), "[[recording]]", f"file = {toml(one.file)}"]
         begin = len(lines)
         stem = Path(one.file).stem
         if stem in taken:
             stem = next(
                 f"{stem}-{i}" for i in range(2, len(looks) + 2) if f"{stem}-{i}" not in taken
             )
-            lines.append(f"name = {_toml(stem)}")
+            lines.append(f"name = {toml(stem)}")
         taken.add(stem)
-        if rig.stop is not False:
+        if stop:
             note = "" if rig.case else f"  # {ASSUMED}: recordings of one obstacle share a case"
-            lines.append(f"case = {_toml(rig.case or '1')}{note}")
-        lines += [] if one.own_kind else _keys(one, rig)
-        lines += _input_lines(one)
+            lines.append(f"case = {toml(rig.case or '1')}{note}")
+        lines += _recording_lines(one, rig)
         said[one.file] = lines[begin:]
     told = _told(said)
     return Draft(
@@ -149,6 +148,56 @@ def draft(title: str, looks: Sequence[Look], rig: DraftedRig) -> Draft:
         tuple(line for line in told if f"# {ASSUMED}" in line),
         tuple(line for line in told if f"{NEEDED}:" in line),
     )
+
+
+def _mass_line(looks: Sequence[Look], rig: DraftedRig) -> str:
+    if rig.mass is not None:
+        return f"mass_kg = {rig.mass!r}"
+    responses = [c for one in looks for c in likely_responses(one.channels)[:1]]
+    quantities = [quantity for c in responses if (quantity := quantity_of(c)) is not None]
+    angle = any(map(is_angular, quantities)) or (
+        rig.unit is not None and is_angular(UNITS[rig.unit][0])
+    )
+    what = "the inertia in kg m2" if angle else "the moving mass"
+    per = "with 1.0 all forces and stiffnesses are per unit of it"
+    return f"mass_kg = 1.0  # {ASSUMED}: put in {what}; {per}"
+
+
+def _stop(looks: Sequence[Look], rig: DraftedRig) -> tuple[bool, str]:
+    """Whether there is an obstacle, and the line that says so: as told, else as readings show."""
+    if rig.stop is not None or rig.case is not None:
+        stop = rig.stop is not False
+        return stop, f"stop = {toml(stop)}"
+    responses = [c for one in looks for c in likely_responses(one.channels)[:1]]
+    shown = [shortened(c.samples) for c in responses if _order(c, rig) != 1]
+    known = [share for share in shown if share is not None]
+    if known and max(known) > SHORTER:
+        why = f"half cycles to one side are {100 * max(known):.0f} % shorter, as by an obstacle"
+        return True, f"stop = true  # {ASSUMED}: {why} there; false without one"
+    if known:
+        why = "half cycles to either side last alike; true where there is an obstacle, and a case"
+        return False, f"stop = false  # {ASSUMED}: {why} in every recording"
+    why = "the readings do not tell; false for an oscillator without an obstacle"
+    return True, f"stop = true  # {ASSUMED}: {why}"
+
+
+def _order(channel: Channel, rig: DraftedRig) -> int:
+    """Which time derivative of a displacement a response is taken for."""
+    if channel.unit not in UNITS and rig.unit is not None:
+        return order_of(UNITS[rig.unit][0])
+    quantity = quantity_of(channel)
+    return 0 if quantity is None else order_of(quantity)
+
+
+def _recording_lines(one: Look, rig: DraftedRig) -> list[str]:
+    """The keys of one file: what it says itself needs none."""
+    lines = [f"encoding = {toml(one.encoding)}"] if one.encoding else []
+    if one.own_kind:
+        clock = next(c for c in one.channels if c.name in TIME_COLUMNS)
+        lines += resample_lines(clock)
+    else:
+        lines += channel_lines(one.channels, rig.unit, rig.rate)
+    return lines + input_lines(one.channels)
 
 
 def _told(said: Mapping[str, Sequence[str]]) -> list[str]:
@@ -178,7 +227,7 @@ def listing(channel: Channel) -> str:
         parts.append(f"{finite.min():.4g} to {finite.max():.4g}")
     parts += [f"block {channel.block}"] if channel.block else []
     parts += [channel.sensor] if channel.sensor else []
-    return _one_line(", ".join(parts))
+    return one_line(", ".join(parts))
 
 
 def write(folder: Path, looks: Sequence[Look], made: Draft) -> Path:
@@ -216,115 +265,9 @@ def _copy(source: Path, target: Path) -> None:
 
 def _listing(one: Look) -> list[str]:
     origin = "" if one.source is None else f", copied from {one.source},"
-    lines = [f"# {_one_line(one.file + origin)} holds"]
+    lines = [f"# {one_line(one.file + origin)} holds"]
     for number, channel in enumerate(one.channels[:SHOWN], 1):
         lines.append(f"#   {number}: {listing(channel)}")
     if len(one.channels) > SHOWN:
         lines.append(f"#   and {len(one.channels) - SHOWN} more")
     return lines
-
-
-def _keys(one: Look, rig: DraftedRig) -> list[str]:
-    """The lines that choose the channel and its clock."""
-    lines = [f"encoding = {_toml(one.encoding)}"] if one.encoding else []
-    candidates = guessed_response(one.channels)
-    others = [c for c in one.channels if not c.is_time]
-    first_is_time = _rises_evenly(one.channels[0])
-    if not candidates:
-        candidates = [c for c in others if not (first_is_time and c is one.channels[0])]
-    if not candidates:
-        motion = ", ".join(dict.fromkeys(f"{c.label}" for c in one.channels))
-        return [*lines, f"# {NEEDED}: a displacement or an angle; the file has {_one_line(motion)}"]
-    response = candidates[0]
-    note = ""
-    if len(candidates) > 1:
-        rest = ", ".join(c.label for c in candidates[1:SHOWN])
-        note = f"  # {ASSUMED}: the first that may be the response; others: {_one_line(rest)}"
-    blocks = list(dict.fromkeys(c.block for c in one.channels))
-    inside = [c for c in one.channels if c.block == response.block]
-    if len(blocks) > 1:
-        block = response.block or str(blocks.index(response.block) + 1)
-        lines.append(f"block = {_toml(block)}")
-    lines.append(f"column = {_chosen(inside, response)}{note}")
-    if response.unit in UNITS and order_of(UNITS[response.unit][0]) > 0:
-        lines.append(f"quantity = {_toml(UNITS[response.unit][0])}")
-    if response.unit not in UNITS and rig.unit is not None:
-        lines.append(f"unit = {_toml(rig.unit)}")
-    elif response.unit not in UNITS:
-        lines.append(f'# unit = "mm"  # {NEEDED}: the file gives no unit; {", ".join(UNITS)}')
-    return lines + _clock_lines(one, inside, response, first_is_time, rig.rate)
-
-
-def _input_lines(one: Look) -> list[str]:
-    """The line of a measured input of the response's clock: a force, or a base's motion by name."""
-    known = [c for c in one.channels if c.name in RESPONSE_COLUMNS]
-    response = next(iter(known or guessed_response(one.channels)), None)
-    if response is None:
-        return []
-    inside = [c for c in one.channels if c.block == response.block]
-    timed = [c for c in inside if c.interval == response.interval and np.any(c.samples != 0.0)]
-    found = [(c, kind) for c in timed if (kind := _input_kind(c)) and c is not response]
-    if not found:
-        return []
-    channel, kind = found[0]
-    others = ", ".join(c.label for c, _ in found[1:SHOWN])
-    note = f"  # {ASSUMED}: it drove the motion{f'; others: {_one_line(others)}' if others else ''}"
-    return [f"input = {{ column = {_chosen(inside, channel)}, kind = {_toml(kind)} }}{note}"]
-
-
-def _input_kind(channel: Channel) -> Kind | None:
-    """As what a channel may have driven the motion; None where neither name nor unit says so."""
-    named = next((kind for kind in INPUT_UNITS if channel.name == kind), None)
-    return named or ("force_N" if channel.unit in INPUT_UNITS["force_N"] else None)
-
-
-def _clock_lines(
-    one: Look,
-    inside: Sequence[Channel],
-    response: Channel,
-    first_is_time: bool,
-    rate: float | None,
-) -> list[str]:
-    if response.times is not None:
-        return []
-    stated = nearest_clock(inside, response)
-    guessed = False
-    if stated is None and response.interval is not None:
-        return []
-    if stated is None and first_is_time and one.channels[0] is not response:
-        stated, guessed = one.channels[0], True
-    if stated is None and rate is not None:
-        return [f"sample_rate_hz = {rate!r}"]
-    if stated is None:
-        return [f"# sample_rate_hz = 1000.0  # {NEEDED}: the file has no clock"]
-    note = f"  # {ASSUMED}: it rises evenly" if guessed else ""
-    if not stated.unit:
-        note = f"{note}, in s" if guessed else f"  # {ASSUMED}: in s"
-    return [f"time_column = {_chosen(inside, stated)}{note}"]
-
-
-def _rises_evenly(channel: Channel) -> bool:
-    steps = np.diff(channel.samples)
-    return bool(
-        steps.size > 1
-        and np.all(np.isfinite(steps))
-        and np.all(steps > 0.0)
-        and steps.max() < 1.5 * np.median(steps)
-    )
-
-
-def _chosen(channels: Sequence[Channel], channel: Channel) -> str:
-    """A channel's name where only it has that name, else its number."""
-    same = [c for c in channels if c.name == channel.name]
-    headless = channel.name.isdigit()
-    if len(same) == 1 and not headless:
-        return _toml(channel.name)
-    return str([c is channel for c in channels].index(True) + 1)
-
-
-def _one_line(words: str) -> str:
-    return "".join(c if c.isprintable() else " " for c in words)
-
-
-def _toml(value: object) -> str:
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -35,7 +35,7 @@ def test_files_that_say_all(tmp_path: Path, kind: str) -> None:
     assert "ready for: bayesimpact check" in result.output
     assert (tmp_path / "new rig" / "channels.png").stat().st_size > 1000
     campaign = load_campaign(tmp_path / "new rig")  # on its own: the file was copied there
-    assert (campaign.name, campaign.mass, campaign.cases) == ("new rig", 1.0, ("1",))
+    assert (campaign.name, campaign.mass, campaign.stop) == ("new rig", 1.0, False)
     np.testing.assert_allclose(campaign.recordings[0].samples, decay(), rtol=1e-9, atol=1e-13)
     assert campaign.recordings[0].interval == pytest.approx(2e-3, rel=1e-6)
 
@@ -76,7 +76,7 @@ def test_what_is_assumed_of_several_files_is_said_once_and_of_which(tmp_path: Pa
     for name in "bcde":
         made.npy(tmp_path / f"{name}.npy")
     files = [tmp_path / "a.lvm", *(tmp_path / f"{name}.npy" for name in "bcde")]
-    told = _new(tmp_path, *files).output.partition("written: ")[2].splitlines()
+    told = _new(tmp_path, *files, "--stop").output.partition("written: ")[2].splitlines()
     assert [line for line in told if "ASSUMED: recordings of one" in line] == [
         '  every file: case = "1"  # ASSUMED: recordings of one obstacle share a case'
     ]

@@ -102,8 +102,13 @@ class Channel:
 
 def says_time(name: str) -> bool:
     """True for names such as `Time`, `t`, `Time A`, `Time Stamp`, `tiempo_s`."""
-    words = _WORD.findall(name.lower())
-    return name.lower() in _TIMES or any(word in _TIMES for word in words if len(word) > 1)
+    words = [word for word in words_of(name) if len(word) > 1]  # "t 3" may be a temperature
+    return name.lower() in _TIMES or any(word in _TIMES for word in words)
+
+
+def words_of(name: str) -> list[str]:
+    """The words of a name, in small letters."""
+    return _WORD.findall(name.lower())
 
 
 def spelt(unit: str) -> str:

@@ -14,7 +14,13 @@ from bayesimpact.data.gaps import on_clock
 from bayesimpact.data.input import Kind, unit_factor
 from bayesimpact.data.quantity import UNITS, Quantity, units_of
 from bayesimpact.data.readers.channel import TIME_UNITS, Channel, name_and_unit
-from bayesimpact.data.readers.guess import clocks_of, guessed_response
+from bayesimpact.data.readers.guess import (
+    clocks_of,
+    guessed_response,
+    named_response,
+    other_responses,
+    units_by_name,
+)
 from bayesimpact.data.table import Table, squeezed
 from bayesimpact.data.window import unbroken, window
 from bayesimpact.errors import InputError
@@ -133,14 +139,16 @@ def _called(channels: Sequence[Channel], asked: str | int) -> list[Channel]:
 def _response(path: Path, channels: Sequence[Channel], wanted: Wanted) -> Channel:
     if wanted.column is not None:
         return _named(path, channels, "column", wanted.column)
+    stated = UNITS[wanted.unit][0] if wanted.unit is not None else None
     fitting = guessed_response(channels, wanted.quantity)
+    fitting = fitting or named_response(channels, wanted.quantity or stated)
     if not fitting:
         times = (
             ()
             if wanted.time_column is None
             else (_named(path, channels, "time_column", wanted.time_column),)
         )
-        fitting = [c for c in channels if not c.is_time and c not in times]
+        fitting = other_responses([c for c in channels if c not in times])
     if len(fitting) == 1:
         return fitting[0]
     found = f"{'several' if fitting else 'no'} channels that may be the response"
@@ -166,8 +174,12 @@ def _unit(path: Path, channel: Channel, wanted: Wanted) -> str:
         return channel.unit
     if asked is None:
         found = f"the unit {channel.unit}" if channel.unit else "no unit for it"
-        units = UNITS if wanted.quantity is None else units_of(wanted.quantity)
-        raise InputError(where, found, f"unit = ... in campaign.toml ({', '.join(units)})")
+        asked_of = wanted.quantity
+        units = units_by_name(channel.name) if asked_of is None else units_of(asked_of)
+        accepted = f"unit = ... in campaign.toml ({', '.join(units)})"
+        if channel.unit:
+            accepted += f", and scale = how many of it one {channel.unit} is"
+        raise InputError(where, found, accepted)
     return asked
 
 
