@@ -24,7 +24,7 @@ def is_foreign(source: Path, entry: RecordingTable, data: bytes) -> bool:
     """False for a text of this package's own kind: comments, a header row, columns.
 
     True by the ending of the file, by a key that only other files need, or for a text whose header
-    names units in brackets or in a row of their own.
+    names units in brackets or in a row of their own, or stands in a comment.
     """
     asked = any(getattr(entry, key) is not None for key in _KEYS) or isinstance(entry.column, int)
     return is_instrument_file(source) or asked or text.is_labelled(data)

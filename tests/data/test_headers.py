@@ -13,6 +13,7 @@ from bayesimpact.data.fields import fields
 from bayesimpact.data.read import load_campaign
 from bayesimpact.data.readers.channel import name_and_unit
 from bayesimpact.data.readers.formats import read_channels
+from bayesimpact.errors import InputError
 
 ONE = 'name = "rig"\nmass_kg = 0.5\nstop = false\n[[recording]]\nfile = "a.csv"\n'
 
@@ -107,3 +108,18 @@ def test_names_and_units_in_rows_of_their_own(
 def test_names_of_two_rows_without_units_are_those_of_the_last(tmp_path: Path) -> None:
     made.text("# first,release", "# t,laser")(tmp_path / "a.csv")
     assert channels(tmp_path) == ["t", "laser"]
+
+
+@pytest.mark.parametrize(
+    ("head", "keys"),
+    [(["# time_s,displacement_mm"], ""), (["# by laser", "# t,laser"], 'unit = "mm"\n')],
+)
+def test_a_header_in_a_comment_is_one(tmp_path: Path, head: list[str], keys: str) -> None:
+    made.text(*head)(tmp_path / "a.csv")
+    np.testing.assert_allclose(read(tmp_path, keys), decay(), rtol=1e-11)
+
+
+def test_a_comment_above_numbers_is_no_header(tmp_path: Path) -> None:
+    made.text("# made by hand")(tmp_path / "a.csv")
+    with pytest.raises(InputError, match="in place of the header row"):
+        read(tmp_path, 'unit = "mm"\n')

@@ -80,6 +80,15 @@ def has_units(rows: Sequence[Sequence[Cell]]) -> bool:
     return not plain or (first > 1 and any(units))
 
 
+def has_names(rows: Sequence[Sequence[Cell]]) -> bool:
+    """True where a row above the numbers names every column."""
+    try:
+        first, _, width, _ = _numbers_at("", rows)
+    except InputError:
+        return False
+    return all(_labels(rows[:first], width)[0])
+
+
 def number(cell: Cell) -> float:
     """A finite number; NaN for anything else."""
     try:

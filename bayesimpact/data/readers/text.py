@@ -8,7 +8,7 @@ from pathlib import Path
 
 from bayesimpact.data.fields import fields, unquoted
 from bayesimpact.data.readers.channel import Channel
-from bayesimpact.data.readers.grid import Cell, channels_of, has_units, number
+from bayesimpact.data.readers.grid import Cell, channels_of, has_names, has_units, number
 from bayesimpact.errors import InputError
 
 LOOKED_AT = 25
@@ -25,7 +25,7 @@ def read(path: Path, content: bytes, encoding: str = "utf-8-sig", skip: int = 0)
 
 
 def is_labelled(content: bytes) -> bool:
-    """True for a text whose header names units in brackets or in a row of their own."""
+    """True for a text whose header names units in brackets, or stands in a comment."""
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -33,7 +33,10 @@ def is_labelled(content: bytes) -> bool:
     if "\0" in text:
         return False
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    return has_units(_cells(lines, 0)[0])
+    rows, numbers = _cells(lines, 0)
+    bare = (row for row, i in zip(rows, numbers, strict=True) if not _is_comment(lines[i - 1]))
+    headless = all(number(cell) == number(cell) for cell in next(bare, ["no numbers"]))
+    return has_units(rows) or (headless and has_names(rows))
 
 
 def text_of(path: Path, content: bytes, encoding: str) -> str:
@@ -75,7 +78,7 @@ def _cells(lines: Sequence[str], skip: int) -> tuple[list[list[Cell]], list[int]
     rows: list[list[Cell]] = []
     numbers: list[int] = []
     for i, line in kept:
-        commented = line.lstrip(' \t"').startswith("#")
+        commented = _is_comment(line)
         if commented and rows and any(number(cell) == number(cell) for cell in rows[-1]):
             continue  # a comment among the numbers
         plain = _comment(line) if commented else line
@@ -85,6 +88,10 @@ def _cells(lines: Sequence[str], skip: int) -> tuple[list[list[Cell]], list[int]
         rows.append(cells)
         numbers.append(i)
     return rows, numbers
+
+
+def _is_comment(line: str) -> bool:
+    return line.lstrip(' \t"').startswith("#")
 
 
 def _comment(line: str) -> str:
