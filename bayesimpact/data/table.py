@@ -15,6 +15,7 @@ from bayesimpact.data.clock import check_rate
 from bayesimpact.data.fields import fields, unquoted
 from bayesimpact.data.gaps import on_clock
 from bayesimpact.data.quantity import RESPONSE_COLUMNS, UNITS, Quantity
+from bayesimpact.data.readers.channel import says_time
 from bayesimpact.data.window import unbroken, window
 from bayesimpact.errors import InputError
 
@@ -100,6 +101,9 @@ def read_table(
     if layout.time is None:
         if sample_rate is None:
             accepted = f"a column {' or '.join(TIME_COLUMNS)}, or sample_rate_hz in campaign.toml"
+            clock = next((name for name in layout.names if says_time(name)), None)
+            if clock is not None:
+                accepted += f', or time_column = "{clock}" and time_unit there'
             found = f"no time column among {', '.join(layout.names)}"
             raise InputError(f"{path}, header row", found, accepted)
         interval = 1.0 / sample_rate

@@ -136,3 +136,14 @@ def test_a_rate_that_is_stated_comes_before_a_clock_that_is_guessed(tmp_path: Pa
     columns(tmp_path, "Time,x [mm]", made.TIMES, made.MM)
     with pytest.raises(InputError, match="sample_rate_hz = 400, and a clock at 500 Hz"):
         load(tmp_path, "sample_rate_hz = 400\n")
+
+
+def test_a_clock_of_another_name_in_a_plain_table_is_named_with_the_keys_that_read_it(
+    tmp_path: Path,
+) -> None:
+    columns(tmp_path, "Time Stamp,laser", TICKS, made.MM)
+    keys = 'column = "laser"\nunit = "mm"\n'
+    with pytest.raises(InputError, match='or time_column = "Time Stamp" and time_unit there'):
+        load(tmp_path, keys)
+    recording = load(tmp_path, keys + 'time_column = "Time Stamp"\ntime_unit = "us"\n')
+    assert recording.interval == pytest.approx(2e-3, rel=1e-6)
