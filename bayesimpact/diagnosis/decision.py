@@ -81,7 +81,7 @@ class Decision:
 def decide(naming: Naming) -> Decision:
     """The verdict on a finished search.
 
-    Where something remains, `naming.states` must hold the chosen model and what it is without each
+    Where something remains, `naming.tried` must hold the chosen model and what it is without each
     of its effects, and `naming.residual` the chosen model and, where an effect `may_be_needed`, the
     base model and, unless that shows `is_imitated`, the models without each such effect and with
     others in its place.
@@ -260,7 +260,7 @@ def with_its_evidence(candidate: Candidate) -> Candidate:
 def misses(naming: Naming, effect: Effect) -> bool:
     """Whether `EXCESS` times as much misfit is left without an effect."""
     smaller = frozenset(naming.chosen.candidate.ids) - {effect.id}
-    return exceeds(naming, naming.states[smaller].candidate.fit)
+    return exceeds(naming, next(c.fit for c in naming.tried if frozenset(c.ids) == smaller))
 
 
 def exceeds(naming: Naming, fit: Fit) -> bool:

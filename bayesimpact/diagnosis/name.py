@@ -8,7 +8,7 @@ physics and decide between near-opposites that scores cannot tell apart.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -81,8 +81,8 @@ def name(
     """
     say = progress or (lambda message: None)
     search = _Search(effects, scales, rng, say, budget)
-    if first is None and is_large(fit):
-        first = _beside_hums(fit, _Search(effects, scales, rng, say, search.budget))
+    if first is None:
+        first = _beside_hums(fit, lambda: _Search(effects, scales, rng, say, search.budget))
     base, state = search.found(fit, first)
     asks = search.was_cut or search.budget.may_search_again()
     anew = posed_anew(fit, state, say) if asks else None
@@ -99,13 +99,14 @@ def name(
     return search.naming(base, state)
 
 
-def _beside_hums(fit: Fit, search: _Search) -> Fit | None:
+def _beside_hums(fit: Fit, begun: Callable[[], _Search]) -> Fit | None:
     """The model that the recordings less their hums ask for, fitted to them as they are; None where
-    they have none, or it leaves a large misfit.
+    they have none or leave no large misfit, or where that model leaves one.
     """
-    quiet = without_hums(fit)
+    quiet = without_hums(fit) if is_large(fit) else None
     if quiet is None:
         return None
+    search = begun()
     search.progress("a hum is taken out of the recordings first")
     search.is_last = True
     base = search.examine(base_candidate(quiet))

@@ -38,7 +38,7 @@ class Remaining(Settling):
         chosen = found.chosen.candidate
         if found.chosen.is_white:
             return replace(found, beside=None)
-        smaller = {e.id: self.examine(self.drop(chosen, e)).candidate for e in chosen.effects}
+        smaller = {e.id: self.drop(chosen, e) for e in chosen.effects}
         for effect in chosen.effects:
             self.simplified(chosen, effect)
         tried = tuple(sorted(self.tried.values(), key=found.log_odds, reverse=True))

@@ -44,9 +44,10 @@ class Settling(Ranked):
         """Leave out effects, the least useful first, that the recordings do not demand; where
         something remains, put the law that one refines in its place.
 
-        An effect stays when the model without it is decisively worse, or leaves something.
+        An effect stays when the model without it is decisively worse, or leaves something. When
+        time is up and something remains, all stay: what is needed is compared then (`decision`).
         """
-        while smaller := self.smaller(state):
+        while (state.is_white or self.may_go_on()) and (smaller := self.smaller(state)):
             best = max(smaller, key=self.log_odds)
             lost = self.log_odds(state.candidate) - self.log_odds(best)
             complete = state.is_white and not self.examine(best).is_white

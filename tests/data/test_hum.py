@@ -7,7 +7,7 @@ import pytest
 
 from bayesimpact.data import hum as hum_module
 from bayesimpact.data.bundled import bundled_campaign
-from bayesimpact.data.hum import find_hum
+from bayesimpact.data.hum import find_hum, hum_at
 from bayesimpact.data.read import load_campaign
 
 INTERVAL, SIZE = 1e-3, 5000
@@ -70,6 +70,17 @@ def test_a_hum_between_the_multiples_of_a_motion_that_slows_down(times: float) -
         hum = find_hum(motion + line + noise, INTERVAL)
         assert hum is not None and hum.frequency == pytest.approx(times * 28.0, abs=0.02)
         assert hum.amplitude == pytest.approx(14e-6, rel=0.1)
+
+
+def test_a_line_of_a_known_frequency_is_found_where_the_motion_has_its_own() -> None:
+    rng = np.random.default_rng(3)
+    phase = 2 * np.pi * 28.0 * np.cumsum(1.0 + 0.15 * np.exp(-3.0 * TIMES)) * INTERVAL
+    motion = 3e-3 * np.exp(-3.0 * TIMES) * np.cos(phase) + 3e-6 * rng.standard_normal(SIZE)
+    line = 14e-6 * np.cos(2 * np.pi * 60.0 * TIMES + 0.4)  # twice of what it has
+    assert find_hum(motion + line, INTERVAL) is None and hum_at(motion, INTERVAL, 60.0) is None
+    hum = hum_at(motion + line, INTERVAL, 60.02)
+    assert hum is not None and hum.frequency == pytest.approx(60.0, abs=0.01)
+    assert np.std(hum.readings(TIMES) - line) < 0.05 * 14e-6
 
 
 @pytest.mark.parametrize("rate", [0.02, 0.4])

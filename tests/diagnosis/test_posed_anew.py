@@ -160,6 +160,7 @@ def test_which_search_answers(
     anew = SimpleNamespace(base="clean", first=None, spikes=("spike",)) if posed else None
     monkeypatch.setattr(search, "_Search", Search)
     monkeypatch.setattr(search, "posed_anew", lambda *about: anew)
+    monkeypatch.setattr(search, "_beside_hums", lambda *about: None)
     fit: Any = "base"
     scales: Any = None
     found: Any = search.name(fit, (), scales, rng=RNG(0))

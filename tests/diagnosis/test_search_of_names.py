@@ -43,7 +43,8 @@ def run(monkeypatch):
         monkeypatch.setattr(search, "learn_force", lambda fit, force, scales: force.fit)
         monkeypatch.setattr(ranked, "residual_repetition", lambda fit: repetition)
         monkeypatch.setattr(remaining, "with_force", lambda candidate, *others, **near: candidate)
-        monkeypatch.setattr(remaining, "may_be_needed", lambda naming, effect: True)
+        for rule in ("may_be_needed", "is_needed", "is_told"):
+            monkeypatch.setattr(remaining, rule, lambda naming, effect: True)
         monkeypatch.setattr(remaining, "is_imitated", lambda naming: False)
         monkeypatch.setattr(search, "promising_pairs", lambda scan, count: ())
         monkeypatch.setattr(search, "posed_anew", lambda *about: None)
