@@ -36,7 +36,9 @@ from bayesimpact.inference.noise import Noise
 Array = NDArray[np.float64]
 
 MISFIT = 4.0  # reduced chi-squared of a recording alone from which on the other sign is tried
-REVERSED = 0.25  # of that misfit, at most, for the other sign to be believed
+# Of that misfit, at most, for the other sign to be believed; as much more than the others have, or
+# than alone, is a reason to try it.
+REVERSED = 0.25
 SIGNIFICANT = 4.0  # standard errors of a reduced chi-squared that call for a comparison
 SHARE = 1 / 3  # of the recordings, at most, that may be faulty: the others are the majority
 LEAST = 3  # recordings: of two that differ neither is the faulty one
@@ -94,7 +96,7 @@ def compare_recordings(fit: Fit, model: SharedModel) -> tuple[Compared, ...]:
         return ()
     campaign = fit.target.oscillator.campaign
     alone = {r.name: fit_alone(campaign, r, model) for r in campaign.recordings}
-    signs, campaign, chi2 = _signs(campaign, alone, model, fit.reduced_chi2)
+    signs, campaign, chi2 = _signs(campaign, alone, model, fit)
     slips, campaign, chi2 = _slips(campaign, alone, model, fit, chi2)
     differing: list[Compared] = []
     allowed = int(SHARE * len(campaign.recordings))
@@ -110,24 +112,16 @@ def compare_recordings(fit: Fit, model: SharedModel) -> tuple[Compared, ...]:
 
 
 def _signs(
-    campaign: Campaign, alone: dict[str, Alone | None], model: SharedModel, chi2: float
+    campaign: Campaign, alone: dict[str, Alone | None], model: SharedModel, fit: Fit
 ) -> tuple[list[Compared], Campaign, float]:
     """Recordings that only fit with the other sign, corrected; `alone` is brought up to date."""
-    found: list[Compared] = []
+    found, chi2 = list[Compared](), fit.reduced_chi2
     if not campaign.stop:
         return found, campaign, chi2
-    turned: list[tuple[int, float]] = []
-    for i, recording in enumerate(campaign.recordings):
-        own = alone[recording.name]
-        misfit = np.inf if own is None else own.reduced_chi2
-        if misfit < MISFIT:
-            continue
-        other = fit_alone(campaign, inverted(recording), model)
-        if other is not None and other.reduced_chi2 < REVERSED * misfit:
-            alone[recording.name] = other
-            size = recording.samples.size
-            nats = size * np.log(misfit / other.reduced_chi2) / 2 if own else float(size)
-            turned.append((i, float(nats)))
+    first, others = _doubted(campaign, alone, fit)
+    turned = _turned(campaign, alone, model, first)
+    if turned:
+        turned = sorted(turned + _turned(campaign, alone, model, others))
     for i, nats in turned:
         recording = campaign.recordings[i]
         guess = Weighed(Hypothesis("recording_reversed", i), nats)
@@ -142,6 +136,45 @@ def _signs(
         found = [replace(f, after=after) for f in found]
         chi2 = after
     return found, campaign, chi2
+
+
+def _doubted(
+    campaign: Campaign, alone: dict[str, Alone | None], fit: Fit
+) -> tuple[list[int], list[int]]:
+    """Recordings that the other sign is tried of first, and those only where one of these has it.
+
+    What fits alone about as well as the others, and together with them about as well as alone, has
+    their sign; the worst one of such recordings stands for all.
+    """
+    rows = [alone[r.name] for r in campaign.recordings]
+    own = np.array([np.inf if one is None else one.reduced_chi2 for one in rows])
+    sums = fit.sums / fit.target.likelihood.sizes
+    together = sums / fit.target.likelihood.noise.level**2
+    doubted = [int(i) for i in np.argsort(-own, kind="stable") if own[i] >= MISFIT]
+    usual = float(np.median(own))
+    apart = [
+        i for i in doubted if not (own[i] * REVERSED <= usual and together[i] * REVERSED <= own[i])
+    ]
+    first = apart or doubted[:1]
+    return first, [i for i in doubted if i not in first]
+
+
+def _turned(
+    campaign: Campaign, alone: dict[str, Alone | None], model: SharedModel, numbers: Sequence[int]
+) -> list[tuple[int, float]]:
+    """Which of some recordings fit with the other sign only, and by how many nats."""
+    found = []
+    for i in numbers:
+        recording = campaign.recordings[i]
+        own = alone[recording.name]
+        misfit = np.inf if own is None else own.reduced_chi2
+        other = fit_alone(campaign, inverted(recording), model)
+        if other is not None and other.reduced_chi2 < REVERSED * misfit:
+            alone[recording.name] = other
+            size = recording.samples.size
+            nats = size * np.log(misfit / other.reduced_chi2) / 2 if own else float(size)
+            found.append((i, float(nats)))
+    return found
 
 
 def _slips(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from bayesimpact.data.bundled import bundled_campaign
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.read import load_campaign
 from bayesimpact.data.recording import Recording
+from bayesimpact.diagnosis.faults import compare
 from bayesimpact.diagnosis.faults.alone import SharedModel, fit_alone
 from bayesimpact.diagnosis.faults.compare import Compared, base_failed, compare_recordings
 from bayesimpact.inference.identify import identify
@@ -166,3 +168,23 @@ def test_samples_missing_at_a_turning_point(paper: Campaign, count: int) -> None
     assert found.fault.start_s - 0.003 <= place <= found.fault.end_s + 0.003
     corrected = found.campaign.recordings[ODD]
     assert corrected.samples.size == pytest.approx(max(turn, x.size - turn), abs=12)
+
+
+@pytest.mark.parametrize(("own", "together", "first", "others"), [
+    ((50.0, 90.0, 60.0), (100.0, 200.0, 90.0), [1], [2, 0]),  # the worst one stands for all
+    ((50.0, 300.0, 60.0), (100.0, 400.0, 90.0), [1], [2, 0]),  # worse than the others
+    ((50.0, 90.0, 60.0), (250.0, 200.0, 300.0), [2, 0], [1]),  # not together with them
+    ((3.0, 90.0, 2.0), (5.0, 100.0, 4.0), [1], []),  # those that fit are in no doubt
+    ((3.0, 2.0, 2.0), (5.0, 9.0, 4.0), [], []),
+])  # fmt: skip
+def test_which_recordings_the_other_sign_is_tried_of_first(
+    paper: Campaign, own: tuple[float, ...], together: tuple[float, ...],
+    first: list[int], others: list[int],
+) -> None:  # fmt: skip
+    campaign = replace(paper, recordings=paper.recordings[:3])
+    names = [r.name for r in campaign.recordings]
+    alone = {n: SimpleNamespace(reduced_chi2=x) for n, x in zip(names, own, strict=True)}
+    noise, sizes = SimpleNamespace(level=2.0), np.full(3, 10.0)
+    target = SimpleNamespace(likelihood=SimpleNamespace(noise=noise, sizes=sizes))
+    fit = SimpleNamespace(sums=40.0 * np.array(together), target=target)
+    assert compare._doubted(campaign, alone, fit) == (first, others)
