@@ -13,8 +13,8 @@ import numpy as np
 
 from bayesimpact.data.hum import Hum, find_hum, hum_at
 from bayesimpact.data.recording import Recording
-from bayesimpact.diagnosis.faults.outliers import refitted
 from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.refitted import refitted
 
 
 def quiet(recordings: Sequence[Recording]) -> tuple[Recording, ...]:

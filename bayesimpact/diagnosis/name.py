@@ -15,7 +15,6 @@ import numpy as np
 
 from bayesimpact.diagnosis.budget import Budget
 from bayesimpact.diagnosis.evidence import model_evidence
-from bayesimpact.diagnosis.faults.outliers import refitted
 from bayesimpact.diagnosis.force import missing_contact
 from bayesimpact.diagnosis.hums import without_hums
 from bayesimpact.diagnosis.models import NOTHING, STARTS, UNCONVERGED_SHORTFALL, Progress
@@ -36,6 +35,7 @@ from bayesimpact.diagnosis.refit import (
 from bayesimpact.diagnosis.unknown import learn_force
 from bayesimpact.diagnosis.unlisted import Problem, Unlisted
 from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.refitted import refitted
 from bayesimpact.model.effects.effect import Effect, Scales
 
 # Effects from which on a single force in contact is fitted in their place: three sizes can follow

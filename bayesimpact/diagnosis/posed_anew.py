@@ -13,13 +13,14 @@ import numpy as np
 
 from bayesimpact.data.faults.fault import gaussian_threshold
 from bayesimpact.diagnosis.faults.compare import Compared
-from bayesimpact.diagnosis.faults.outliers import beside_spikes, refitted
+from bayesimpact.diagnosis.faults.outliers import beside_spikes
 from bayesimpact.diagnosis.models import Progress
 from bayesimpact.diagnosis.naming import State, is_large
-from bayesimpact.diagnosis.slow_noise import remaining_noise, under_noise
+from bayesimpact.diagnosis.slow_noise import remaining_noise
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.onsets import without_onsets
+from bayesimpact.inference.refitted import refitted
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +45,8 @@ def posed_anew(base: Fit, state: State, say: Progress) -> Posed | None:
     if noise is None:
         return None
     say("what remains is slow noise: once more under that")
-    first = under_noise(found, noise) if found is not base else None
-    return Posed(under_noise(base, noise), first)
+    first = refitted(found, noise=noise) if found is not base else None
+    return Posed(refitted(base, noise=noise), first)
 
 
 def _without_readings(base: Fit, found: Fit, say: Progress) -> Posed | None:
@@ -58,7 +59,7 @@ def _without_readings(base: Fit, found: Fit, say: Progress) -> Posed | None:
     told = tuple(Compared(f, clean.target.oscillator.campaign, *change) for f in spikes)
     gained = not spikes and clean.log_posterior > found.log_posterior + DECISIVE
     if misses_onsets(clean):
-        clean = refitted(found, without_onsets(clean), clean)
+        clean = refitted(found, without_onsets(clean), start=clean)
     campaign = clean.target.oscillator.campaign
     is_same = campaign is found.target.oscillator.campaign
     if is_same and not gained:

@@ -14,13 +14,12 @@ from bayesimpact.diagnosis.discrepancy import discrepancy
 from bayesimpact.diagnosis.faults.compare import base_failed
 from bayesimpact.diagnosis.thresholds import ALPHA, DECISIVE
 from bayesimpact.diagnosis.whiteness import combined, ljung_box, whiteness_p
-from bayesimpact.inference.declared import climbed
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification
-from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.noise_refined import COLOURED
 from bayesimpact.inference.noise_slow import slow_noise
+from bayesimpact.inference.refitted import refitted
 
 
 def remaining_noise(fit: Fit) -> Noise | None:
@@ -38,15 +37,9 @@ def remaining_noise(fit: Fit) -> Noise | None:
     return found.noise
 
 
-def under_noise(fit: Fit, noise: Noise) -> Fit:
-    """A model's mode under another noise."""
-    likelihood = Likelihood(fit.target.oscillator, noise)
-    return climbed(replace(fit.target, likelihood=likelihood), fit)
-
-
 def with_slow_noise(before: Identification) -> Identification:
     """The same under the slow noise that the base model leaves, if it leaves nothing else."""
     noise = None if base_failed(before.fit) else remaining_noise(before.fit)
     if noise is None:
         return before
-    return replace(before, fit=under_noise(before.fit, noise), noise=noise)
+    return replace(before, fit=refitted(before.fit, noise=noise), noise=noise)

@@ -14,12 +14,13 @@ from effect_rigs import BY_ID
 from bayesimpact.diagnosis import name as search
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.faults import outliers
-from bayesimpact.diagnosis.faults.outliers import beside_spikes, refitted, residual_spikes
+from bayesimpact.diagnosis.faults.outliers import beside_spikes, residual_spikes
 from bayesimpact.diagnosis.posed_anew import is_spoilt, misses_onsets, posed_anew
 from bayesimpact.diagnosis.refit import fit_from
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.onsets import without_onsets
+from bayesimpact.inference.refitted import refitted
 
 RNG = np.random.default_rng
 DAMPED = replace(small_rig.RIG, c2=8.0)
@@ -66,7 +67,7 @@ def test_onsets_are_those_of_the_good_model(base: Fit, good: Fit, across: Fit) -
     assert campaign is anew.base.target.oscillator.campaign
     assert not is_spoilt(anew.first) and 0.9 < anew.first.reduced_chi2 < 1.1
     ends = [
-        refitted(good, without_onsets(good), replace(good, mode=start)).log_posterior
+        refitted(good, without_onsets(good), start=replace(good, mode=start)).log_posterior
         for start in good.draws(RNG(2), 6)
     ]
     assert np.ptp(ends) < 0.01

@@ -21,11 +21,9 @@ from bayesimpact.data.faults.local import robust_sd
 from bayesimpact.data.faults.spikes import lone_spikes
 from bayesimpact.diagnosis.naming import leaves_something
 from bayesimpact.diagnosis.thresholds import LARGE
-from bayesimpact.inference.declared import climbed
 from bayesimpact.inference.fit import Fit
-from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.onsets import without_onsets
-from bayesimpact.model.oscillator import Oscillator
+from bayesimpact.inference.refitted import refitted
 
 Array = NDArray[np.float64]
 
@@ -64,7 +62,7 @@ def beside_spikes(fit: Fit) -> tuple[tuple[Fault, ...], Fit] | None:
     lasting = _still_off(campaign, clean, spikes)
     if len(lasting) < len(spikes):
         counted = faults_set_aside(campaign, lasting) if lasting else campaign
-        clean = refitted(fit, counted, clean)
+        clean = refitted(fit, counted, start=clean)
     return lasting, clean
 
 
@@ -78,14 +76,6 @@ def _misses_most(fit: Fit) -> bool:
         kept = residual if recording.used is None else residual[recording.used]
         found.append(np.abs(kept) / (noise.level * noise.scales[recording.order]))
     return bool(np.median(np.concatenate(found)) > LARGE * HALF_WITHIN)
-
-
-def refitted(fit: Fit, campaign: Campaign, start: Fit | None = None) -> Fit:
-    """A model's mode for its campaign with other samples set aside, from the fit's or `start`'s."""
-    old = fit.target.oscillator
-    oscillator = Oscillator(campaign, old.effects, old.layout, old.smoothing)
-    likelihood = Likelihood(oscillator, fit.target.likelihood.noise)
-    return climbed(replace(fit.target, likelihood=likelihood), start or fit)
 
 
 def _still_off(campaign: Campaign, clean: Fit, faults: Sequence[Fault]) -> tuple[Fault, ...]:
