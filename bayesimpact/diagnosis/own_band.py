@@ -103,10 +103,10 @@ def _spectrum(recording: Recording, finer: int = 1, *, window: bool = False) -> 
     """Amplitudes at multiples of the reciprocal of the duration, or `finer`, but for the mean;
     seen through a Hann window, or as recorded.
 
-    Without a steady line above the motion's band: that is no motion.
+    Without a steady line beside the motion's band: that is no motion, unless something drives it.
     """
     samples = recording.samples
-    hum = find_hum(samples, recording.interval)
+    hum = find_hum(samples, recording.interval) if recording.input is None else None
     if hum is not None:
         samples = samples - hum.readings(recording.times)
     samples = samples - samples.mean()

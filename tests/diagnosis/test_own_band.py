@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from effect_rigs import BY_ID
 
+from bayesimpact.data.input import Input
 from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.own_band import (
     _moves_at,
@@ -104,3 +105,12 @@ def test_two_steady_lines_that_no_recording_tells_apart_are_none(apart, refused)
     values = {f"{i}.frequency": f for i, f in lines.items()}
     fit = SimpleNamespace(target=SimpleNamespace(oscillator=oscillator), value=values.get)
     assert shakes_in_own_band(fit, remains=False) is refused
+
+
+@pytest.mark.parametrize("driven", [False, True])
+def test_a_line_of_a_driven_recording_is_its_motion(driven: bool) -> None:
+    """Of a free one a steady line beside the motion is a hum, and no motion."""
+    t = INTERVAL * np.arange(2000)
+    motion = np.exp(-0.5 * t) * np.cos(60 * np.pi * t) + 0.05 * np.cos(2 * np.pi * 71.0 * t)
+    given = Input(np.zeros(t.size)) if driven else None
+    assert _moves_at(Recording("a", "", motion, INTERVAL, input=given), 71.0) is driven

@@ -11,7 +11,7 @@ from bayesimpact.data.recording import Recording
 
 
 def find_hum_notice(recording: Recording) -> list[Fault]:
-    """The strongest steady line above the motion's own low harmonics."""
+    """The steady line that stands out most beside the motion's own."""
     hum = find_hum(recording.samples, recording.interval)
     if hum is None:
         return []
@@ -25,8 +25,9 @@ def find_hum_notice(recording: Recording) -> list[Fault]:
             end_s=file_time(recording, end - 1),
             size=hum.amplitude,
             unit=recording.unit,
-            statement=f"a steady hum of {hum.frequency:.4g} Hz, "
-            f"{amount(hum.amplitude, recording.unit)}, through the whole recording",
+            statement=f"a steady line of {hum.frequency:.4g} Hz, "
+            f"{amount(hum.amplitude, recording.unit)}, through the whole recording: a hum in the "
+            "readings, or of a force",
             remedy="",
             strength=hum.strength,
             threshold=hum.threshold,
