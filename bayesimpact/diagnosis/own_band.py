@@ -11,6 +11,7 @@ from scipy.signal import hilbert
 from bayesimpact.data.hum import find_hum
 from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.directions import is_periodic, is_steady
+from bayesimpact.diagnosis.sidebands import is_sideband
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect
 
@@ -35,13 +36,16 @@ def shakes_in_own_band(fit: Fit, remains: bool) -> bool:
     mode is what any law that is not linear makes of the motion, and so is a steady line where no
     recording decays enough to tell. A line too slow for any recording to show it come and go passes
     for a drift; and two that no recording tells apart, for one whose amplitude every recording sets
-    anew, as what a motion makes does.
+    anew, as what a motion makes does. Where something remains, a line whose mirror image about the
+    motion's own is there too may be a sideband of it (`sidebands`).
     """
     recordings = fit.target.oscillator.campaign.recordings
     longest = max(r.duration for r in recordings)
     if any(frequency * longest < SLOWEST for _, frequency in _lines(fit)):
         return True
     if _is_one_line([f for e, f in _lines(fit) if is_steady(e)], longest):
+        return True
+    if remains and _has_sideband(fit):
         return True
     for effect, frequency in _lines(fit):
         steady = is_steady(effect)
@@ -67,6 +71,17 @@ def _is_one_line(frequencies: list[float], longest: float) -> bool:
     seconds resolve.
     """
     return bool(np.any(np.diff(np.sort(frequencies)) * longest < 1.0))
+
+
+def _has_sideband(fit: Fit) -> bool:
+    """Whether a line of a model has its mirror image in every recording that nothing drives."""
+    frequencies = [f for _, f in _lines(fit)]
+    pairs = zip(fit.target.oscillator.campaign.recordings, fit.residuals, strict=True)
+    free = [(r, x) for r, x in pairs if r.input is None and r.samples.size == x.size]
+    return any(
+        bool(free) and all(is_sideband(r, left, _strongest(r), f, frequencies) for r, left in free)
+        for f in frequencies
+    )
 
 
 def _without(recording: Recording, effect: Effect, fit: Fit) -> Recording:
