@@ -24,8 +24,8 @@ Foucault's in the Panthéon is 67 m long.
 """
 SLOWEST = 2.0 * math.pi * math.sqrt(TALLEST / STANDARD_GRAVITY)
 """Period of such an oscillator, s: for a spring that sags by h under its mass as for a pendulum of
-length h it is 2 pi sqrt(h / g). Only a balance of torsion, or a pendulum that swings in a nearly
-horizontal plane, is slower."""
+length h it is 2 pi sqrt(h / g). Slower are balances of torsion, gliders on soft springs, pendulums
+that swing in a nearly horizontal plane or are balanced: they state their unit."""
 NEAR = 2e-3
 """Relative distance up to which a factor is that of a change of units, as 9.81 and 0.0175 are."""
 

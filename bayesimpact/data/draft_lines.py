@@ -150,6 +150,8 @@ def is_even(clock: Channel) -> bool:
 def _period(clock: Channel, response: Channel) -> float:
     """Period of a response in the clock's unit, in s where it has none; 0 where none shows."""
     steps = np.diff(clock.seconds())
+    if not np.isfinite(steps).any():
+        return 0.0
     good = response.samples[np.isfinite(response.samples)]
     return crossing_period(good, float(np.nanmedian(steps))) or 0.0
 

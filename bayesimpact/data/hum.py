@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -16,7 +17,8 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 FROM = 1.25  # times the motion's lowest frequency: below are slow drifts of its own
-MULTIPLES = 3  # of the motion's frequency, about which a line is its own
+MULTIPLES = 3  # of all frequencies that a motion goes through, between which a line is its own
+HARMONICS = 5  # of each of them: the last ones, where impacts have ceased, are those that last
 BESIDE = 0.03  # of a frequency, and `APART` lines of the spectrum: what its band is widened by
 APART = 3
 MOVES = 0.2  # of the largest excursion: a part with less does not tell the motion's frequency
@@ -29,6 +31,7 @@ STEADY = 3  # of them: impacts may drown it in one
 COMB = 0.25  # of its amplitude: neighbours one motion's frequency away make it one of a comb
 ALIKE = 0.3  # how far amplitudes (of their median) and phases (rad) of the parts may differ
 LEAST_PART = 64  # samples
+LIKE = 2.0  # times the amplitude that another recording has of the same hum
 
 
 @dataclass(frozen=True)
@@ -79,11 +82,22 @@ def find_hum(samples: Array, interval: float, motion: Array | None = None) -> Hu
     return next((hum for hum in found if hum is not None), None)
 
 
-def hum_at(samples: Array, interval: float, frequency: float) -> Hum | None:
-    """The steady line at a known frequency, Hz, as that of another recording, if there is one."""
-    if samples.size < PARTS * LEAST_PART:
+def hum_at(samples: Array, interval: float, known: Hum) -> Hum | None:
+    """The steady line of another recording in this one, if it has it: at that frequency, up to what
+    the duration resolves, beside the motion's own, and no more than `LIKE` times as strong or weak.
+    """
+    period = crossing_period(samples, interval)
+    if period is None or samples.size < PARTS * LEAST_PART:
         return None
-    return _steady(samples, interval, frequency, np.nan, np.nan)
+    resolution = 1.0 / ((samples.size - 2) * interval)
+    place, count = round(known.frequency / resolution), (samples.size - 2) // 2 + 1
+    own = _own_frequencies(samples, interval) or [1.0 / period]
+    if place >= count or not _beside(own, resolution, count)[place]:
+        return None
+    found = _steady(samples, interval, known.frequency, np.nan, np.nan)
+    if found is None or abs(found.frequency - known.frequency) > resolution:
+        return None
+    return found if 1 / LIKE < found.amplitude / known.amplitude < LIKE else None
 
 
 def _lines(
@@ -121,7 +135,8 @@ def _level(power: Array) -> Array:
 
 @cache
 def _threshold(count: int) -> float:
-    """The ratio that one of `count` lines exceeds by chance `FALSE_ALARM` times.
+    """The ratio that one of `count` lines exceeds by chance `FALSE_ALARM` times, were lines
+    independent; behind a taper three times as many do at 1e-4 (simulated).
 
     Of n independent exponentials the k-th smallest is a sum of k exponentials of means 1 / (n - k +
     1) to 1 / n (Renyi 1953); another one exceeds it t times with the product of i / (i + t) over
@@ -149,6 +164,8 @@ def _beside(own: Sequence[float], resolution: float, count: int) -> Flags:
         low = n * min(own) * (1.0 - BESIDE) - APART * resolution
         high = n * max(own) * (1.0 + BESIDE) + APART * resolution
         free &= (frequencies < low) | (frequencies > high)
+    for n, one in itertools.product(range(MULTIPLES + 1, HARMONICS + 1), own):
+        free &= np.abs(frequencies - n * one) > n * one * BESIDE + APART * resolution
     free[-NEIGHBOURS // 2 :] = False
     return np.asarray(free)
 

@@ -20,9 +20,11 @@ def crossing_period(samples: NDArray[np.float64], interval: float) -> float | No
     noise at the crossing is not counted twice. The band is four standard deviations of the noise
     as second differences show it, but 2 to 20 % of the largest excursion.
     """
+    if samples.size < 3:
+        return None
     centred = samples - np.median(samples)
     largest = float(np.max(np.abs(centred)))
-    if samples.size < 3 or largest == 0.0:
+    if largest == 0.0:
         return None
     noise = float(np.median(np.abs(np.diff(samples, 2)))) / (0.6745 * np.sqrt(6.0))
     band = float(np.clip(4.0 * noise, 0.02 * largest, 0.2 * largest))

@@ -186,13 +186,11 @@ def is_compared(naming: Naming, group: Group) -> bool:
     """Whether a search that ended by its limit has still fitted what an effect must beat.
 
     With a residual force: the chosen model, the base model, the one without the effect, and the
-    likeliest with another, not of its group, in its place; where none was tried, it was not. And
-    the law that it refines in its place.
+    likeliest with another, not of its group, in its place; where none was tried, it was not.
     """
     chosen = frozenset(naming.chosen.candidate.ids)
     other = in_its_place(naming, group)
-    refined = not refines_another(naming, group[0]) or with_refined_law(naming, group[0])
-    if other is None or not refined:
+    if other is None:
         return False
     rivals = {chosen, frozenset[str](), chosen - {group[0].id}, frozenset(other.ids)}
     return rivals <= naming.residual.keys()

@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from bayesimpact.data.hum import Hum, find_hum, hum_at
 from bayesimpact.data.recording import Recording
 from bayesimpact.inference.fit import Fit
@@ -20,17 +18,27 @@ from bayesimpact.inference.refitted import refitted
 def quiet(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
     """Recordings less the steady hums that their spectra show, if any.
 
-    One that shows none may have it at the frequency of the others. Driven motions may be steady
-    lines themselves, and stay as they are.
+    One that shows none may have the one that the others share. Driven motions may be steady lines
+    themselves, and stay as they are.
     """
     hums = [None if r.input else find_hum(r.samples, r.interval) for r in recordings]
-    told = [hum.frequency for hum in hums if hum is not None]
+    told = [hum for hum in hums if hum is not None]
+    shared = _shared(told, min(r.duration for r in recordings))
     found = list[Recording]()
     for recording, hum in zip(recordings, hums, strict=True):
-        if hum is None and told and recording.input is None:
-            hum = hum_at(recording.samples, recording.interval, float(np.median(told)))
+        if hum is None and shared is not None and recording.input is None:
+            hum = hum_at(recording.samples, recording.interval, shared)
         found.append(recording if hum is None else _less(recording, hum))
     return tuple(found)
+
+
+def _shared(told: Sequence[Hum], shortest: float) -> Hum | None:
+    """The middle one of hums of one frequency, as far as recordings of `shortest` s resolve it."""
+    if not told:
+        return None
+    middle = sorted(told, key=lambda hum: hum.frequency)[len(told) // 2]
+    same = [hum for hum in told if abs(hum.frequency - middle.frequency) * shortest < 1.0]
+    return middle if len(same) == len(told) else None
 
 
 def _less(recording: Recording, hum: Hum) -> Recording:

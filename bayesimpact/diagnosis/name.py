@@ -113,7 +113,8 @@ def _beside_hums(fit: Fit, begun: Callable[[], _Search]) -> Fit | None:
     state = search.asked_for(base)[0] if search.is_large else base
     if is_large(state.candidate.fit):
         return None
-    return refitted(state.candidate.fit, fit.target.oscillator.campaign)
+    found = refitted(state.candidate.fit, fit.target.oscillator.campaign)
+    return found if np.isfinite(found.log_posterior) else None
 
 
 class _Search(Unlisted):

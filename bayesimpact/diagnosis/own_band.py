@@ -78,8 +78,9 @@ def _has_sideband(fit: Fit) -> bool:
     frequencies = [f for _, f in _lines(fit)]
     pairs = zip(fit.target.oscillator.campaign.recordings, fit.residuals, strict=True)
     free = [(r, x) for r, x in pairs if r.input is None and r.samples.size == x.size]
-    return any(
-        bool(free) and all(is_sideband(r, left, _strongest(r), f, frequencies) for r, left in free)
+    own = [_strongest(r) for r, _ in free] if frequencies else []
+    return bool(own) and any(
+        all(is_sideband(r, x, o, f, frequencies) for (r, x), o in zip(free, own, strict=True))
         for f in frequencies
     )
 

@@ -39,8 +39,8 @@ class Remaining(Settling):
         if found.chosen.is_white:
             return replace(found, beside=None)
         smaller = {e.id: self.drop(chosen, e) for e in chosen.effects}
-        for effect in chosen.effects:
-            self.simplified(chosen, effect)
+        for effect in chosen.effects:  # whether time is up or not: no law is told without
+            self.in_simpler_form(chosen, effect)
         tried = tuple(sorted(self.tried.values(), key=found.log_odds, reverse=True))
         found = replace(found, tried=tried, states=dict(self.states))
         alone = [(e,) for e in ordered(found, chosen.effects)]

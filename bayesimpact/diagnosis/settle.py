@@ -134,9 +134,13 @@ class Settling(Ranked):
 
     def simplified(self, chosen: Candidate, effect: Effect) -> list[Candidate]:
         """What an effect refines in its place, whatever scores on a model without both say."""
+        return self.in_simpler_form(chosen, effect) if self.may_go_on() else []
+
+    def in_simpler_form(self, chosen: Candidate, effect: Effect) -> list[Candidate]:
+        """The same, whether time is up or not."""
         found = []
         for simpler in self.effects:
-            if simpler.id == effect.prefer and simpler.id not in chosen.ids and self.may_go_on():
+            if simpler.id == effect.prefer and simpler.id not in chosen.ids:
                 self.exchange_in_place(chosen, effect, simpler)
                 found.append(self.tried[frozenset(chosen.ids) - {effect.id} | {simpler.id}])
         return found

@@ -1,8 +1,9 @@
 """Is a line of a model a sideband of the motion?
 
-What pulsates, a stiffness say, makes of a motion at f0 two lines at f0 - f and f0 + f, alike in
-strength (Nayfeh and Mook 1979, Nonlinear Oscillations, chapter 5). A mode or a hum fits one of them
-well. That the other one is there too, as far below as this one is above, tells that it is neither.
+What pulsates, a stiffness say, makes of a motion at f0 two lines at f0 - f and f0 + f (Nayfeh and
+Mook 1979, Nonlinear Oscillations, chapter 5); to first order the upper one has (2 f0 - f) / (2 f0 +
+f) of the lower one's amplitude. A mode or a hum fits one of them well. That the other one is there
+too, as far below as this one is above, tells that it is neither.
 """
 
 from __future__ import annotations
@@ -37,7 +38,8 @@ def is_sideband(
     resolved = 1.0 / (recording.samples.size * recording.interval)
     mirror = 2.0 * own - frequency
     k, m = round(frequency / resolved), round(mirror / resolved)
-    if abs(k - own / resolved) < CLOSE or m < BESIDE.stop or m + BESIDE.stop > left.size // 2:
+    last = left.size // 2 - BESIDE.stop
+    if abs(k - own / resolved) < CLOSE or not (BESIDE.stop <= m <= last and NEAR < k <= last):
         return False
     if any(abs(other - mirror) < (NEAR + 0.5) * resolved for other in others):
         return True

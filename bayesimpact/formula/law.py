@@ -31,21 +31,23 @@ def force(y, v, d, t, z, touching, p, q):  # type: ignore[no-untyped-def]
 
     p = (size, place, width, fade, region, side, exponent and parity of the coordinate, of the
     speed, drift); regions are numbered as in `grammar.REGIONS`. z is the side of a surface (box,
-    beyond, second stage) or the direction of the motion (dry friction; outside a box 0).
+    beyond, second stage) or the direction of the motion (dry friction; 0 beyond a surface).
     """
-    inside = 1.0
+    inside, beyond = 1.0, z <= 0.0
+    if p[8] == 0.0 and p[9] > 0.0:
+        beyond = z == 0.0
     x = y - p[5] * p[1]
     if p[4] == 1.0:
         x = d - p[1]  # called in contact only: a force that jumps at impact is there at d = 0
-        if p[1] > 0.0 and z <= 0.0:
+        if p[1] > 0.0 and beyond:
             inside = 0.0
     elif p[4] == 2.0:
         x = p[5] * y - p[1]
-        if z <= 0.0:
+        if beyond:
             inside = 0.0
     elif p[4] == 3.0:
         inside = math.exp(-(x * x) / (p[2] * p[2]))
-    elif p[4] == 4.0 and (z == 0.0 if p[8] == 0.0 and p[9] > 0.0 else z <= 0.0):
+    elif p[4] == 4.0 and beyond:
         inside = 0.0
     if inside == 0.0:
         return 0.0

@@ -31,6 +31,7 @@ from bayesimpact.inference.noise_windows import centred, period_of, smooth_parts
 
 Array = NDArray[np.float64]
 
+FAST = 4.0  # times the motion's frequency
 WINDOWS_PER_PERIOD = 12.0  # short: nothing of the motion is left at its highest speed either
 LEAST_WINDOWS = 40
 GROWS = 20.0  # nats over noise that is alike everywhere, as for noise that is coloured (`COLOURED`)
@@ -89,7 +90,7 @@ def _energies(noise: Noise, recordings: Sequence[Recording]) -> Energies | None:
     """None where windows are too short to follow a rate, or too few, or hold a hum."""
     shortest = min(period_of(r) for r in recordings)
     length = min(int(shortest / WINDOWS_PER_PERIOD), LARGEST)
-    if length < SMALLEST or any(find_hum(r.samples, r.interval) for r in recordings):
+    if length < SMALLEST or any(_has_fast_hum(r) for r in recordings):
         return None
     basis = null_space(np.vander(np.linspace(-1, 1, length), DEGREE + 1).T)
     covariance = basis.T @ toeplitz(noise.correlation ** np.arange(length)) @ basis
@@ -211,3 +212,9 @@ def _correlations(covariance: Array) -> Array:
     """At the first lags, (LAGS,), of a covariance (L, L)."""
     sums = [np.trace(covariance, offset=k) for k in range(LAGS + 1)]
     return np.asarray(np.array(sums[1:]) / sums[0])
+
+
+def _has_fast_hum(recording: Recording) -> bool:
+    """Whether a recording shows a hum that windows do not follow as they follow the motion."""
+    hum = find_hum(recording.samples, recording.interval)
+    return hum is not None and hum.frequency * recording.interval * period_of(recording) > FAST

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from bayesimpact.data import hum as hum_module
 from bayesimpact.data.bundled import bundled_campaign
-from bayesimpact.data.hum import find_hum, hum_at
+from bayesimpact.data.hum import Hum, find_hum, hum_at
 from bayesimpact.data.read import load_campaign
 
 INTERVAL, SIZE = 1e-3, 5000
 TIMES = np.arange(SIZE) * INTERVAL
+LINE = 49.98
+KNOWN = Hum(50.0, 14e-6, 0.0, 100.0, 30.0)
 
 
 def decay(rng: np.random.Generator, third: float = 0.0) -> np.ndarray:
@@ -72,15 +76,39 @@ def test_a_hum_between_the_multiples_of_a_motion_that_slows_down(times: float) -
         assert hum.amplitude == pytest.approx(14e-6, rel=0.1)
 
 
-def test_a_line_of_a_known_frequency_is_found_where_the_motion_has_its_own() -> None:
+def test_the_hum_of_another_recording_is_found_where_the_motion_hides_it() -> None:
+    """Knocks at the beginning lift the level beside the line; three parts of four have it."""
     rng = np.random.default_rng(3)
-    phase = 2 * np.pi * 28.0 * np.cumsum(1.0 + 0.15 * np.exp(-3.0 * TIMES)) * INTERVAL
-    motion = 3e-3 * np.exp(-3.0 * TIMES) * np.cos(phase) + 3e-6 * rng.standard_normal(SIZE)
-    line = 14e-6 * np.cos(2 * np.pi * 60.0 * TIMES + 0.4)  # twice of what it has
-    assert find_hum(motion + line, INTERVAL) is None and hum_at(motion, INTERVAL, 60.0) is None
-    hum = hum_at(motion + line, INTERVAL, 60.02)
-    assert hum is not None and hum.frequency == pytest.approx(60.0, abs=0.01)
-    assert np.std(hum.readings(TIMES) - line) < 0.05 * 14e-6
+    motion = 3e-3 * np.exp(-3.0 * TIMES) * np.cos(2 * np.pi * 28.0 * TIMES)
+    motion[:1200] += 2e-4 * rng.standard_normal(1200)
+    motion += 1e-6 * rng.standard_normal(SIZE)
+    line = 14e-6 * np.cos(2 * np.pi * LINE * TIMES + 0.4)
+    assert find_hum(motion + line, INTERVAL) is None
+    for known, has in ((KNOWN, True), (replace(KNOWN, frequency=63.0), False),
+                       (replace(KNOWN, cosine=40e-6), False),
+                       (replace(KNOWN, frequency=1060.0), False)):  # fmt: skip
+        found = hum_at(motion + line, INTERVAL, known)
+        assert (found is not None) is has
+        if found is not None:
+            assert found.frequency == pytest.approx(LINE, abs=0.01)
+            assert np.std(found.readings(TIMES) - line) < 0.05 * 14e-6
+
+
+def test_a_motion_at_the_frequency_of_another_recordings_hum_is_none() -> None:
+    own = 1e-5 * np.exp(-0.02 * TIMES) * np.cos(2 * np.pi * LINE * TIMES)
+    noise = 1e-7 * np.random.default_rng(0).standard_normal(SIZE)
+    assert hum_at(own + noise, INTERVAL, KNOWN) is None
+
+
+def test_no_hum_in_odd_harmonics_of_a_motion_that_hardly_decays() -> None:
+    """A cubic spring leaves the even ones empty, between which they would stand alone."""
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        height, phase = np.exp(-0.02 * TIMES), 2 * np.pi * 6.0 * TIMES + rng.uniform(0, 6.0)
+        motion = sum(
+            height**n * a * np.cos(n * phase) for n, a in ((1, 5e-3), (3, 3e-4), (5, 1e-5))
+        )
+        assert find_hum(motion + 1e-7 * rng.standard_normal(SIZE), INTERVAL) is None
 
 
 @pytest.mark.parametrize("rate", [0.02, 0.4])

@@ -11,9 +11,10 @@ import pytest
 import small_rig
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.hum import Hum
 from bayesimpact.data.input import Input
 from bayesimpact.diagnosis import name as search
-from bayesimpact.diagnosis.hums import quiet, without_hums
+from bayesimpact.diagnosis.hums import _shared, quiet, without_hums
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 
@@ -76,3 +77,10 @@ def test_a_search_begins_with_what_quiet_recordings_ask_for(humming: Fit, left: 
     else:
         own = humming.target.oscillator.campaign
         assert found is not None and found.target.oscillator.campaign is own
+
+
+def test_hums_of_different_frequencies_are_shared_by_none() -> None:
+    one, other = Hum(50.0, 1.0, 0.0, 9.0, 1.0), Hum(150.0, 1.0, 0.0, 9.0, 1.0)
+    near = Hum(50.1, 1.0, 0.0, 9.0, 1.0)
+    assert _shared((one, other), 4.0) is None and _shared((), 4.0) is None
+    assert _shared((one, near), 4.0) in (one, near) and _shared((one, near), 40.0) is None

@@ -245,18 +245,6 @@ def test_a_law_is_told_from_the_one_that_it_refines_where_that_leaves_far_more(m
     assert [tuple(e.id for e in g) for g in decision.either] == either
 
 
-def test_a_search_that_ended_by_its_limit_needs_the_law_that_an_effect_refines_fitted() -> None:
-    chosen = state(
-        candidate("power_damping", 100.0), p_force=ALPHA / 2, force_evidence=2 * DECISIVE
-    )
-    other, refined = candidate("structural_damping", 50.0), with_misfit(candidate(DRAG, 40.0), 90.0)
-    for known, verdict in (((refined,), "partly"), ((), "unknown")):
-        found = remaining(chosen, 100.0, 10.0, other, *known, beside=110.0, instead=100.0)
-        fitted = {frozenset(other.ids): beside_force(other, 50.0)}
-        ended = replace(found, finished=False, residual={**found.residual, **fitted})
-        assert judge(ended) == verdict
-
-
 @pytest.mark.parametrize(("instead", "told"), [(0.1, True), (-0.1, False)])
 def test_a_law_that_a_residual_force_makes_of_the_one_it_refines_is_told_with_that(instead, told):
     """Far more is left with the simpler law alone, but none of that beside a residual force."""

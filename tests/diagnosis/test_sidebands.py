@@ -47,3 +47,12 @@ def test_a_mode_or_a_hum_has_none_and_what_is_left_about_the_motion_is_none() ->
     assert not is_sideband(recording, phase + NOISE, OWN, OWN + PULSE, (OWN + PULSE,))
     assert not is_sideband(recording, phase, OWN, OWN + 1.0, (OWN + 1.0,))  # of its own band
     assert not is_sideband(recording, NOISE, OWN, 85.0, (85.0,))  # no mirror image above zero
+
+
+@pytest.mark.parametrize(
+    ("own", "line"), [(10.0, 0.4), (10.0, 19.6), (900.0, 990.0), (10.0, 990.0)]
+)
+def test_lines_at_the_ends_of_a_spectrum_have_no_mirror_image(own: float, line: float) -> None:
+    """A recording of one second, beside longer ones that do resolve the line."""
+    recording = Recording("a", "", NOISE[:2000].copy(), INTERVAL)
+    assert not is_sideband(recording, NOISE[:2000], own, line, (line,))

@@ -27,7 +27,7 @@ def find_hum_notice(recording: Recording) -> list[Fault]:
             unit=recording.unit,
             statement=f"a steady line of {hum.frequency:.4g} Hz, "
             f"{amount(hum.amplitude, recording.unit)}, through the whole recording: a hum in the "
-            "readings, or of a force",
+            "readings, or of a force or a mode that hardly decays",
             remedy="",
             strength=hum.strength,
             threshold=hum.threshold,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -74,7 +75,9 @@ def _cells(lines: Sequence[str], skip: int) -> tuple[list[list[Cell]], list[int]
         kept.pop()
     middle = [line for _, line in kept[len(kept) // 2 :][:LOOKED_AT] if line.strip()]
     separator, decimal = _format([unquoted(line) for line in middle])
-    decimal = decimal or any("," in part for line in middle for part in line.split('"')[1::2])
+    quoted = [part for line in middle for part in line.split('"')[1::2]]
+    points = any(re.search(r"\d\.\d", line) for line in middle)
+    decimal = decimal or (not points and any(re.fullmatch(r"-?\d*,\d*", q) for q in quoted))
     rows: list[list[Cell]] = []
     numbers: list[int] = []
     for i, line in kept:

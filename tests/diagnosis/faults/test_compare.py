@@ -171,7 +171,8 @@ def test_samples_missing_at_a_turning_point(paper: Campaign, count: int) -> None
 
 
 @pytest.mark.parametrize(("own", "together", "first", "others"), [
-    ((50.0, 90.0, 60.0), (100.0, 200.0, 90.0), [1], [2, 0]),  # the worst one stands for all
+    ((50.0, 90.0, 55.0), (100.0, 200.0, 90.0), [1], [2, 0]),  # the worst one stands for all
+    ((50.0, 90.0, 65.0), (100.0, 200.0, 90.0), [1, 2], [0]),  # and those nearly as bad
     ((50.0, 300.0, 60.0), (100.0, 400.0, 90.0), [1], [2, 0]),  # worse than the others
     ((50.0, 90.0, 60.0), (250.0, 200.0, 300.0), [2, 0], [1]),  # not together with them
     ((3.0, 90.0, 2.0), (5.0, 100.0, 4.0), [1], []),  # those that fit are in no doubt
