@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -18,7 +17,7 @@ Flags = NDArray[np.bool_]
 
 FROM = 1.25  # times the motion's lowest frequency: below are slow drifts of its own
 MULTIPLES = 3  # of all frequencies that a motion goes through, between which a line is its own
-HARMONICS = 5  # of each of them: the last ones, where impacts have ceased, are those that last
+HARMONICS = 5  # of the lowest of them, that of free flight: what impacts make does not last
 BESIDE = 0.03  # of a frequency, and `APART` lines of the spectrum: what its band is widened by
 APART = 3
 MOVES = 0.2  # of the largest excursion: a part with less does not tell the motion's frequency
@@ -164,8 +163,9 @@ def _beside(own: Sequence[float], resolution: float, count: int) -> Flags:
         low = n * min(own) * (1.0 - BESIDE) - APART * resolution
         high = n * max(own) * (1.0 + BESIDE) + APART * resolution
         free &= (frequencies < low) | (frequencies > high)
-    for n, one in itertools.product(range(MULTIPLES + 1, HARMONICS + 1), own):
-        free &= np.abs(frequencies - n * one) > n * one * BESIDE + APART * resolution
+    for n in range(MULTIPLES + 1, HARMONICS + 1):
+        one = n * min(own)
+        free &= np.abs(frequencies - one) > one * BESIDE + APART * resolution
     free[-NEIGHBOURS // 2 :] = False
     return np.asarray(free)
 
