@@ -135,7 +135,7 @@ def _level(power: Array) -> Array:
 @cache
 def _threshold(count: int) -> float:
     """The ratio that one of `count` lines exceeds by chance `FALSE_ALARM` times, were lines
-    independent; behind a taper three times as many do at 1e-4 (simulated).
+    independent; behind a taper they are not, and at 1e-3 twice as many do.
 
     Of n independent exponentials the k-th smallest is a sum of k exponentials of means 1 / (n - k +
     1) to 1 / n (Renyi 1953); another one exceeds it t times with the product of i / (i + t) over

@@ -20,7 +20,7 @@ from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.directions import is_periodic
 from bayesimpact.diagnosis.equation_error import is_a_force
 from bayesimpact.diagnosis.extend import transfer
-from bayesimpact.diagnosis.hums import quiet
+from bayesimpact.diagnosis.hums import recordings_without_hums
 from bayesimpact.diagnosis.likely_sets import Known, LikelySets, shapes_of
 from bayesimpact.diagnosis.period_sets import PeriodSets
 from bayesimpact.diagnosis.period_terms import periods_with_terms
@@ -45,7 +45,7 @@ class Asked:
         self.of_periods: dict[tuple[object, ...], PeriodSets] = {}
         self.has_stop = base.target.oscillator.campaign.stop
         recordings = base.target.oscillator.campaign.recordings
-        self.quiet = quiet(recordings)
+        self.quiet = recordings_without_hums(recordings)
         self.hums = any(a is not b for a, b in zip(self.quiet, recordings, strict=True))
 
     def about(self, model: Candidate, flight: bool) -> LikelySets:

@@ -98,7 +98,7 @@ def decide(naming: Naming) -> Decision:
         return Decision("named" if settled else "ambiguous", effects, rivals)
     if is_imitated(naming):
         return Decision("unknown", ())
-    needed = tuple(e for e in effects if is_told(naming, e) and is_needed(naming, (e,)))
+    needed = tuple(e for e in effects if is_told_apart(naming, e) and is_needed(naming, (e,)))
     groups = (group_of(naming, e) for e in effects if e not in needed)
     either = tuple(g for g in groups if len(g) > 1 and is_needed(naming, g))
     if not needed:
@@ -123,7 +123,7 @@ def is_needed(naming: Naming, group: Group) -> bool:
     )
 
 
-def is_told(naming: Naming, effect: Effect) -> bool:
+def is_told_apart(naming: Naming, effect: Effect) -> bool:
     """Whether far more is left with the law that an effect refines in its place, if it does."""
     found = with_refined_law(naming, effect)
     return found is None or exceeds(naming, found.fit)
@@ -132,15 +132,10 @@ def is_told(naming: Naming, effect: Effect) -> bool:
 def with_refined_law(naming: Naming, effect: Effect) -> Candidate | None:
     """The chosen model with the law that an effect refines in its place, if it was fitted."""
     ids = frozenset(naming.chosen.candidate.ids)
-    if not refines_another(naming, effect):
+    if effect.prefer is None or effect.prefer in ids:
         return None
     wanted = ids - {effect.id} | {effect.prefer}
     return next((c for c in naming.tried if frozenset(c.ids) == wanted), None)
-
-
-def refines_another(naming: Naming, effect: Effect) -> bool:
-    """Whether an effect refines a law that the chosen model does not have beside it."""
-    return effect.prefer is not None and effect.prefer not in naming.chosen.candidate.ids
 
 
 def group_of(naming: Naming, effect: Effect) -> Group:

@@ -15,7 +15,7 @@ from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.refitted import refitted
 
 
-def quiet(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
+def recordings_without_hums(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
     """Recordings less the steady hums that their spectra show, if any.
 
     One that shows none may have the one that the others share. Driven motions may be steady lines
@@ -45,12 +45,12 @@ def _less(recording: Recording, hum: Hum) -> Recording:
     return replace(recording, samples=recording.samples - hum.readings(recording.times))
 
 
-def without_hums(fit: Fit) -> Fit | None:
+def fit_without_hums(fit: Fit) -> Fit | None:
     """A model's mode for the recordings less their hums; None where they have none, or where more
     is left without them, as where a force moves a mass that meets a stop.
     """
     campaign = fit.target.oscillator.campaign
-    recordings = quiet(campaign.recordings)
+    recordings = recordings_without_hums(campaign.recordings)
     if all(a is b for a, b in zip(recordings, campaign.recordings, strict=True)):
         return None
     found = refitted(fit, replace(campaign, recordings=recordings))

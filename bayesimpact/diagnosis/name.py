@@ -16,7 +16,7 @@ import numpy as np
 from bayesimpact.diagnosis.budget import Budget
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.force import missing_contact
-from bayesimpact.diagnosis.hums import without_hums
+from bayesimpact.diagnosis.hums import fit_without_hums
 from bayesimpact.diagnosis.models import NOTHING, STARTS, UNCONVERGED_SHORTFALL, Progress
 from bayesimpact.diagnosis.naming import Naming, State, explains_most, is_large
 from bayesimpact.diagnosis.pairs import promising_pairs
@@ -103,7 +103,7 @@ def _beside_hums(fit: Fit, begun: Callable[[], _Search]) -> Fit | None:
     """The model that the recordings less their hums ask for, fitted to them as they are; None where
     they have none or leave no large misfit, or where that model leaves one.
     """
-    quiet = without_hums(fit) if is_large(fit) else None
+    quiet = fit_without_hums(fit) if is_large(fit) else None
     if quiet is None:
         return None
     search = begun()

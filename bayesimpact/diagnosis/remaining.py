@@ -11,7 +11,7 @@ from bayesimpact.diagnosis.decision import (
     in_its_place,
     is_imitated,
     is_needed,
-    is_told,
+    is_told_apart,
     leads_without,
     may_be_needed,
     misses,
@@ -40,12 +40,12 @@ class Remaining(Settling):
             return replace(found, beside=None)
         smaller = {e.id: self.drop(chosen, e) for e in chosen.effects}
         for effect in chosen.effects:  # whether time is up or not: no law is told without
-            self.in_simpler_form(chosen, effect)
+            self.simplified(chosen, effect)
         tried = tuple(sorted(self.tried.values(), key=found.log_odds, reverse=True))
         found = replace(found, tried=tried, states=dict(self.states))
         alone = [(e,) for e in ordered(found, chosen.effects)]
         groups = [
-            g if leads_without(found, g) and is_told(found, g[0]) else group_of(found, g[0])
+            g if leads_without(found, g) and is_told_apart(found, g[0]) else group_of(found, g[0])
             for g in alone
         ]
         leading = [g for g in groups if leads_without(found, g)]
@@ -67,10 +67,10 @@ class Remaining(Settling):
             found = self.with_forces(found, [found.base.candidate])
         found = self.with_forces(found, [chosen])
         for group in needed if not is_imitated(found) else ():
-            found = self.with_forces(found, [smaller[group[0].id], *others(found, group)])
+            found = self.with_forces(found, [smaller[group[0].id], *rivals_in_place(found, group)])
             wider = group_of(found, group[0])
             if len(wider) > len(group) and not is_needed(found, group):
-                found = self.with_forces(found, others(found, wider))
+                found = self.with_forces(found, rivals_in_place(found, wider))
         return found
 
     def with_forces(self, found: Naming, candidates: Sequence[Candidate]) -> Naming:
@@ -118,7 +118,7 @@ class Remaining(Settling):
         return with_force(state.candidate, state.unknown, self.scales, least_gain=least)
 
 
-def others(found: Naming, group: Group) -> list[Candidate]:
+def rivals_in_place(found: Naming, group: Group) -> list[Candidate]:
     """The likeliest model with another effect, not of a group, in the place of its first."""
     other = in_its_place(found, group)
     return [] if other is None else [other]

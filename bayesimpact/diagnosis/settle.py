@@ -60,7 +60,7 @@ class Settling(Ranked):
         """Models with one effect less, or with a simpler one where something remains."""
         chosen = state.candidate
         found = [self.drop(chosen, e) for e in chosen.effects if len(chosen.effects) > 1]
-        if not state.is_white:
+        if not state.is_white and self.may_go_on():
             found += [c for e in chosen.effects for c in self.simplified(chosen, e)]
         return found
 
@@ -102,7 +102,7 @@ class Settling(Ranked):
             if is_formula(effect):  # compared with all others of the grammar
                 continue
             rest = self.drop(chosen, effect)
-            if self.is_large:
+            if self.is_large and self.may_go_on():
                 self.simplified(chosen, effect)
             found = self.scanned(rest, self.effects)
             large = is_large(rest.fit)
@@ -134,10 +134,6 @@ class Settling(Ranked):
 
     def simplified(self, chosen: Candidate, effect: Effect) -> list[Candidate]:
         """What an effect refines in its place, whatever scores on a model without both say."""
-        return self.in_simpler_form(chosen, effect) if self.may_go_on() else []
-
-    def in_simpler_form(self, chosen: Candidate, effect: Effect) -> list[Candidate]:
-        """The same, whether time is up or not."""
         found = []
         for simpler in self.effects:
             if simpler.id == effect.prefer and simpler.id not in chosen.ids:

@@ -13,6 +13,7 @@ from bayesimpact.data.fields import fields
 from bayesimpact.data.read import load_campaign
 from bayesimpact.data.readers.channel import name_and_unit
 from bayesimpact.data.readers.formats import read_channels
+from bayesimpact.data.readers.text import _cells
 from bayesimpact.errors import InputError
 
 ONE = 'name = "rig"\nmass_kg = 0.5\nstop = false\n[[recording]]\nfile = "a.csv"\n'
@@ -123,3 +124,15 @@ def test_a_comment_above_numbers_is_no_header(tmp_path: Path) -> None:
     made.text("# made by hand")(tmp_path / "a.csv")
     with pytest.raises(InputError, match="in place of the header row"):
         read(tmp_path, 'unit = "mm"\n')
+
+
+@pytest.mark.parametrize(("cells", "read"), [
+    (('0.001', '"1,234"'), ["0.001", "1,234"]),  # thousands beside decimal points
+    (('"0,001"', '"1,234"'), ["0.001", "1.234"]),
+    (('1', '"knock, loud"'), ["1", "knock, loud"]),
+])  # fmt: skip
+def test_a_comma_in_quotes_is_a_decimal_one_only_where_numbers_have_no_point(
+    cells: tuple[str, ...], read: list[str]
+) -> None:
+    rows, _ = _cells(["a,b", *[",".join(cells)] * 4], 0)
+    assert rows[-1] == read

@@ -121,16 +121,21 @@ def test_no_hum_in_the_double_frequency_of_a_motion_that_hardly_decays(rate: flo
         assert find_hum(motion + 1e-6 * rng.standard_normal(SIZE), INTERVAL) is None
 
 
-def test_the_chance_of_a_line_in_noise_is_the_stated_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of lines of white noise 1 in 50 by chance; neighbours behind a taper are not independent."""
-    monkeypatch.setattr(hum_module, "FALSE_ALARM", 0.02)
-    rng, count, trials = np.random.default_rng(0), 0, 400
+@pytest.mark.parametrize(("tapered", "expected"), [(False, 1e-3), (True, 2e-3)])
+def test_the_chance_of_a_line_in_noise_is_the_stated_one(
+    monkeypatch: pytest.MonkeyPatch, tapered: bool, expected: float
+) -> None:
+    """Neighbours behind a taper are not independent: twice as many exceed the level of 1e-3."""
+    monkeypatch.setattr(hum_module, "FALSE_ALARM", 1e-3)
     threshold = hum_module._threshold.__wrapped__(1)
+    rng, above, trials = np.random.default_rng(0), 0, 1500
     for _ in range(trials):
-        power = np.abs(np.fft.rfft(rng.standard_normal(600))) ** 2
-        count += int((power / hum_module._level(power) > threshold)[20:-20].sum())
-    lines = trials * (301 - 40)
-    assert abs(count / lines - 0.02) < 4 * np.sqrt(0.02 / lines)
+        noise = rng.standard_normal(602)
+        series = np.diff(noise, 2) * np.hanning(600) if tapered else noise
+        power = np.abs(np.fft.rfft(series)) ** 2
+        above += int((power / hum_module._level(power) > threshold)[40:-40].sum())
+    lines = trials * 221
+    assert abs(above / lines - expected) < 5 * np.sqrt(2 * expected / lines)
 
 
 def test_no_hum_in_the_bundled_recordings() -> None:

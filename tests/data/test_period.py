@@ -39,3 +39,7 @@ def test_coarse_sampling() -> None:
 )
 def test_no_oscillation_has_no_period(samples: np.ndarray) -> None:
     assert crossing_period(samples, 1.0) is None
+
+
+def test_no_samples_have_no_period() -> None:
+    assert crossing_period(np.array([]), 1e-3) is None

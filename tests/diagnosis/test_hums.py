@@ -14,7 +14,7 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.hum import Hum
 from bayesimpact.data.input import Input
 from bayesimpact.diagnosis import name as search
-from bayesimpact.diagnosis.hums import _shared, quiet, without_hums
+from bayesimpact.diagnosis.hums import _shared, fit_without_hums, recordings_without_hums
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 
@@ -39,32 +39,32 @@ def humming() -> Fit:
 
 def test_recordings_are_quiet_without_their_hums() -> None:
     loud, still = (decays(**e).recordings for e in ({"sensor_hum": HUM}, {}))
-    for own, known in zip(quiet(loud), still, strict=True):
+    for own, known in zip(recordings_without_hums(loud), still, strict=True):
         assert np.std(own.samples - known.samples) < 0.05 * HUM["amplitude"]
-    assert all(a is b for a, b in zip(quiet(still), still, strict=True))
+    assert all(a is b for a, b in zip(recordings_without_hums(still), still, strict=True))
 
 
 def test_a_driven_motion_may_be_a_line_itself() -> None:
     first, *others = decays(sensor_hum=HUM).recordings
     driven = replace(first, input=Input(np.zeros(first.samples.size)))
-    found = quiet((driven, *others))
+    found = recordings_without_hums((driven, *others))
     assert found[0] is driven and found[1] is not others[0]
 
 
 def test_a_hum_is_taken_out_only_where_that_leaves_less(
     humming: Fit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    found = without_hums(humming)
+    found = fit_without_hums(humming)
     assert found is not None and found.reduced_chi2 < humming.reduced_chi2
-    assert without_hums(fitted(decays(spring_cubic=CUBIC))) is None
+    assert fit_without_hums(fitted(decays(spring_cubic=CUBIC))) is None
     monkeypatch.setattr("bayesimpact.diagnosis.hums.refitted", lambda fit, campaign: fit)
-    assert without_hums(humming) is None
+    assert fit_without_hums(humming) is None
 
 
 @pytest.mark.parametrize("left", [1.0, 100.0])
 def test_a_search_begins_with_what_quiet_recordings_ask_for(humming: Fit, left: float) -> None:
     """Unless that leaves a large misfit; the model is then fitted to the recordings as they are."""
-    quieter = without_hums(humming)
+    quieter = fit_without_hums(humming)
     assert quieter is not None
     fit = replace(quieter, sums=quieter.sums * left / quieter.reduced_chi2)
     state = SimpleNamespace(candidate=SimpleNamespace(fit=fit))

@@ -93,7 +93,9 @@ def test_what_a_model_has_and_no_grid_holds_is_known_to_the_equation(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A hum at its frequency and phases, a formula at its place; only their sizes are free."""
-    monkeypatch.setattr(asked_module, "quiet", tuple)  # a hum that no spectrum shows
+    monkeypatch.setattr(
+        asked_module, "recordings_without_hums", tuple
+    )  # a hum that no spectrum shows
     fit = fitted({"sensor_hum": HUM, "spring_cubic": CUBIC})
     scales, hum, cubic = campaign_scales(fit), BY_ID["sensor_hum"], BY_ID["spring_cubic"]
     phases = {f"sensor_hum.phase[{r.name}]": HUM["phase"] for r in _recordings(fit)}

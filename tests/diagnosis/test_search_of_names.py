@@ -43,7 +43,7 @@ def run(monkeypatch):
         monkeypatch.setattr(search, "learn_force", lambda fit, force, scales: force.fit)
         monkeypatch.setattr(ranked, "residual_repetition", lambda fit: repetition)
         monkeypatch.setattr(remaining, "with_force", lambda candidate, *others, **near: candidate)
-        for rule in ("may_be_needed", "is_needed", "is_told"):
+        for rule in ("may_be_needed", "is_needed", "is_told_apart"):
             monkeypatch.setattr(remaining, rule, lambda naming, effect: True)
         monkeypatch.setattr(remaining, "is_imitated", lambda naming: False)
         monkeypatch.setattr(search, "promising_pairs", lambda scan, count: ())
@@ -398,3 +398,15 @@ def test_of_two_equal_ends_the_one_that_came_to_rest_is_kept(monkeypatch, second
     rested = table.candidate((A,), 100.0 + second)
     assert (known.keep(rested) is rested) == kept
     assert known.keep(first) is (rested if kept else first)
+
+
+def test_where_something_remains_the_law_that_an_effect_refines_is_fitted_in_its_place(
+    run, monkeypatch
+):
+    """Though neither scores nor time ask for it: no law is told from one that was not fitted."""
+    monkeypatch.setattr(search._Search, "smaller", lambda self, state: [])
+    power = "power_damping"
+    table = Table({power: 300.0, C: 280.0, f"{power} {C}": 450.0}, chi2=4.0)
+    found = run(table, effects=(BY_ID[power], BY_ID[B], BY_ID[C]))
+    assert set(found.chosen.candidate.ids) == {power, C}
+    assert frozenset({B, C}) in {frozenset(c.ids) for c in found.tried}

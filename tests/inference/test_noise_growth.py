@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.hum import find_hum
 from bayesimpact.data.recording import Recording
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.noise_estimate import estimate_noise
+from bayesimpact.inference.noise_growth import _has_fast_hum
 
 RATE, DURATION, LEVEL = 1000.0, 6.0, 3e-6
 TIME = np.arange(int(RATE * DURATION)) / RATE
@@ -86,3 +88,13 @@ def test_intervals_hold_the_truth_where_stamps_jitter():
         for name, truth in (("k1", 0.5 * w2), ("c1", 0.4)):
             i = fit.names.index(name)
             assert abs(fit.mode[i] - truth) < 4 * fit.sd[i]
+
+
+@pytest.mark.parametrize(("times", "fast"), [(2.6, False), (8.4, True)])
+def test_only_a_line_that_windows_do_not_follow_ends_the_search_for_growth(times, fast) -> None:
+    t = np.arange(4000) / 1000.0
+    noise = 1e-6 * np.random.default_rng(0).standard_normal(t.size)
+    motion = 5e-3 * np.exp(-0.4 * t) * np.cos(2 * np.pi * 5.0 * t)
+    line = 5e-5 * np.cos(2 * np.pi * 5.0 * times * t)
+    assert find_hum(motion + line + noise, 1e-3) is not None
+    assert _has_fast_hum(Recording("a", "", motion + line + noise, 1e-3)) is fast
