@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from effect_rigs import BY_ID
-from made_up_models import TARGET
+from made_up_models import TARGET, A, Table
 
 from bayesimpact.diagnosis import models
 from bayesimpact.diagnosis.budget import COMPARISONS, LOOKS, PATIENCE, begin
@@ -151,3 +151,14 @@ def test_a_set_that_is_asked_for_must_reach_what_it_contains(monkeypatch):
     for one in sets:
         search.fit_sets(None, [one])
     assert [goal for _, goal in goals] == [40.0, 200.0, 120.0]
+
+
+@pytest.mark.parametrize(("second", "kept"), [(-0.04, True), (-0.06, False), (0.04, True)])
+def test_of_two_equal_ends_the_one_that_came_to_rest_is_kept(monkeypatch, second, kept):
+    """Climbs to one mode differ by less than 0.05 nats."""
+    search, table = made_up(monkeypatch), Table({A: 100.0}, unfinished={A: 0.0})
+    first = search.keep(table.candidate((A,), 100.0))
+    table.unfinished.clear()
+    rested = table.candidate((A,), 100.0 + second)
+    assert (search.keep(rested) is rested) == kept
+    assert search.keep(first) is (rested if kept else first)

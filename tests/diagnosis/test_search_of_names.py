@@ -385,21 +385,6 @@ def test_an_examined_model_is_not_scored_again_for_a_restart(run, monkeypatch):
     assert len(scored) == len(set(scored))
 
 
-@pytest.mark.parametrize(("second", "kept"), [(-0.04, True), (-0.06, False), (0.04, True)])
-def test_of_two_equal_ends_the_one_that_came_to_rest_is_kept(monkeypatch, second, kept):
-    """Climbs to one mode differ by less than 0.05 nats."""
-    monkeypatch.setattr(models, "shakes_in_own_band", lambda fit, remains: False)
-    monkeypatch.setattr(models, "leaves_something", lambda fit: False)
-    monkeypatch.setattr(models, "is_refuted", lambda fit: False)
-    table = Table({A: 100.0}, unfinished={A: 0.0})
-    known = models.Models(EFFECTS, None, np.random.default_rng(0), lambda message: None)
-    first = known.keep(table.candidate((A,), 100.0))
-    table.unfinished.clear()
-    rested = table.candidate((A,), 100.0 + second)
-    assert (known.keep(rested) is rested) == kept
-    assert known.keep(first) is (rested if kept else first)
-
-
 def test_where_something_remains_the_law_that_an_effect_refines_is_fitted_in_its_place(
     run, monkeypatch
 ):
