@@ -59,7 +59,7 @@ def sets_with_a_term(
     if not problem.terms:
         return []
     sets = [(), problem.shaped(own), *(c for level in problem.levels(most) for c in level[:LIKELY])]
-    least = min(_design(problem, problem.refined(chosen)).left for chosen in sets)
+    least = min(design(problem, problem.refined(chosen)).left for chosen in sets)
     reach = reach_of(problem.paths)
     terms = unlisted((*library(problem.scales, *reach), *local_starts(*reach)))
     price = prices_by_kind(terms)
@@ -105,7 +105,7 @@ def _refined(problem: LikelySets, best: _Beside, price: Prices) -> _Beside:
 
 
 @dataclass(frozen=True, eq=False)
-class _Design:
+class Design:
     """The columns of a set, orthonormal, and what they leave of the target and its square."""
 
     basis: Array
@@ -113,28 +113,29 @@ class _Design:
     left: float
 
 
-def _design(problem: LikelySets, chosen: Chosen) -> _Design:
+def design(problem: LikelySets, chosen: Chosen) -> Design:
+    """Of the base model and the terms of a set."""
     columns = problem.every[:, problem.columns(chosen)]
     basis = np.linalg.qr(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))[0]
     rest = problem.target - basis @ (basis.T @ problem.target)
-    return _Design(basis, rest, float(rest @ rest))
+    return Design(basis, rest, float(rest @ rest))
 
 
 def _best(
     problem: LikelySets, chosen: Chosen, terms: Sequence[Term], columns: Array, price: Prices
 ) -> _Beside:
     """The likeliest of some terms, with their `columns` (stretches, K), beside a set."""
-    design = _design(problem, chosen)
-    beside = columns - design.basis @ (design.basis.T @ columns)
+    held = design(problem, chosen)
+    beside = columns - held.basis @ (held.basis.T @ columns)
     square = np.einsum("nk,nk->k", beside, beside)
     whole = np.einsum("nk,nk->k", columns, columns)
-    size = beside.T @ design.rest / np.maximum(square, 1e-300)
+    size = beside.T @ held.rest / np.maximum(square, 1e-300)
     told = (square > SEEN * whole) & (whole > 0.0)
     told &= (size > 0.0) | [t.energy != "dissipates" for t in terms]
-    left = np.where(told, design.left - size * size * square, design.left)
+    left = np.where(told, held.left - size * size * square, held.left)
     unknowns = np.array([1 + len(t.shapes) for t in terms])
     cost = 0.5 * unknowns * np.log(problem.rows) + [price[t.kind] for t in terms]
-    before, after = (np.log(np.maximum(x / problem.rows, 1.0)) for x in (design.left, left))
+    before, after = (np.log(np.maximum(x / problem.rows, 1.0)) for x in (held.left, left))
     odds = problem.log_odds(chosen) + 0.5 * problem.rows * (before - after) - cost
     k = int(np.argmax(odds))
     return _Beside(terms[k], chosen, float(odds[k]), float(left[k]))

@@ -204,6 +204,9 @@ class _Search(Unlisted):
         What the stop does may be still to come after flight, and so where that is not all, this
         model stays in the beam beside the likeliest.
         """
+        base = self.with_a_line(base)
+        if self.is_spoilt(base):
+            return [base]
         ways: list[list[Problem]] = [[self.of_all]]
         if self.asked.has_stop:
             ways = [[self.of_periods], [self.of_flight, self.of_periods], *ways]

@@ -52,9 +52,13 @@ class Ranked(Models):
 
     def promise(self, candidate: Candidate) -> float:
         """What a model is worth on the way: every sample counts, for what remains may yet be
-        explained.
+        explained, and so may a line that is refused as long as something does, where the equation
+        of motion asked for it.
         """
-        return candidate.log_evidence - candidate.price(self.cost)
+        evidence = candidate.log_evidence
+        if self.is_shaken and candidate.refused is not None:
+            evidence = candidate.refused
+        return evidence - candidate.price(self.cost)
 
     def log_odds(self, candidate: Candidate) -> float:
         """Log posterior odds up to a constant: beside the force of time that remains where one does

@@ -1,4 +1,7 @@
-"""Forces that no effect of the catalogue is, met on the way of a search.
+"""Forces that no set of effects holds, met on the way of a search: of time, and of no effect.
+
+Where the equation of motion leaves far less of a large misfit by a harmonic force, the search
+begins beside it (`line_sets`): in flight, for what a stop does has lines of its own.
 
 Where the catalogue leaves a large misfit, the equation of motion may tell a term of the grammar
 that leaves far less of it (`likely_terms`). The search goes on beside it. It is no name yet: once
@@ -9,22 +12,48 @@ may be what tells it from the force that it stands for; so an effect joins it on
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
+from bayesimpact.diagnosis.directions import is_periodic
+from bayesimpact.diagnosis.likely_sets import LikelySets
 from bayesimpact.diagnosis.likely_terms import sets_with_a_term
+from bayesimpact.diagnosis.line_sets import sets_with_a_line
 from bayesimpact.diagnosis.naming import State, is_large
 from bayesimpact.diagnosis.period_terms import sets_with_a_term_ahead
 from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.remaining import Remaining
+from bayesimpact.diagnosis.term_sets import EffectSet
 from bayesimpact.diagnosis.thresholds import EXCESS
 from bayesimpact.formula.law import is_formula
+from bayesimpact.model.effects.harmonic_forcing import EFFECT as HARMONIC_FORCING
 
 Problem = Callable[[Candidate], list[Candidate]]
 """Models that a problem posed about one asks for."""
 
+SetsBeside = Callable[[LikelySets, int], list[EffectSet]]
+"""Sets with one more force that a problem asks for, of so many effects at most."""
+
 
 class Unlisted(Remaining):
     """A search that may leave the catalogue."""
+
+    def with_a_line(self, state: State) -> State:
+        """A model, or where its misfit is large one with a harmonic force, where the equation of
+        motion leaves `EXCESS` times less by it than by effects that are none.
+        """
+        about = state.candidate
+        shaken = [e for e in self.effects if e.id == HARMONIC_FORCING.id]
+        acting = (*about.fit.target.oscillator.acting, *about.effects)
+        if not (shaken and is_large(about.fit)) or any(map(is_periodic, acting)):
+            return state
+
+        def sets(problem: LikelySets, most: int) -> list[EffectSet]:
+            return sets_with_a_line(problem, shaken[0], most, about.ids)
+
+        self.is_shaken = True
+        found = self.beside_sets(state, ("line",), sets, [self.asked.has_stop])
+        self.is_shaken = found is not state
+        return found
 
     def with_a_term(self, state: State, *, excess: float = EXCESS) -> State:
         """A model, or one with a term of the grammar that explains more, where the equation of
@@ -37,30 +66,49 @@ class Unlisted(Remaining):
         something = is_large(about.fit) if excess > 1.0 else not state.is_white and self.is_large
         if not something or any(map(is_formula, about.effects)):
             return state
-        for flight in (True, False) if self.asked.has_stop else (False,):
-            key = ("term", about.ids, about.fit.log_posterior, flight, excess)
+
+        def sets(problem: LikelySets, most: int) -> list[EffectSet]:
+            return sets_with_a_term(problem, most, about.ids, excess)
+
+        ways = [True, False] if self.asked.has_stop else [False]
+        return self.beside_sets(state, ("term", excess), sets, ways)
+
+    def beside_sets(
+        self,
+        state: State,
+        kind: tuple[object, ...],
+        sets: SetsBeside,
+        ways: Sequence[bool],
+    ) -> State:
+        """A model, or a likelier one with a force beside sets of effects, by the first of some
+        `ways` that leads to one: in flight or in all of the motion; once about every model.
+        """
+        about = state.candidate
+        for flight in ways:
+            key = (*kind, about.ids, about.fit.log_posterior, flight)
             if key in self.begun or not self.may_go_on():
                 continue
             self.begun.add(key)
-            found = [about, *self.fit_sets_with_a_term(about, flight, excess)]
+            problem = self.asked.about(about, flight)
+            asked = sets(problem, self.most - len(problem.known))
+            found = [about, *self.fit_up_to_small(problem, asked, about)]
             best = max(found, key=self.promise)
             if best is not about:
                 return self.examine(best)
         return state
 
-    def fit_sets_with_a_term(
-        self, about: Candidate, flight: bool, excess: float
+    def fit_up_to_small(
+        self, problem: LikelySets, sets: Sequence[EffectSet], about: Candidate
     ) -> list[Candidate]:
-        """Models with a term of the grammar that the equation of motion asks for about a model;
-        larger ones up to the first whose misfit is not large.
+        """Models of sets that a problem posed about a model asks for; larger ones up to the first
+        whose misfit is not large, where the model's is.
         """
-        found, problem = list[Candidate](), self.asked.about(about, flight)
-        most = self.most - len(problem.known)
-        for chosen in sets_with_a_term(problem, most, about.ids, excess):
+        found = list[Candidate]()
+        for chosen in sets:
             if not self.may_go_on():
                 break
             found.append(self.fit_set(problem.fit, chosen, about.fit.log_likelihood))
-            if excess > 1.0 and not is_large(found[-1].fit):
+            if is_large(about.fit) and not is_large(found[-1].fit):
                 break
         return found
 
