@@ -71,7 +71,7 @@ def _gap(recording: Recording) -> tuple[Array, int] | None:
     A hum in the input, one line, is not its band.
     """
     assert recording.input is not None
-    driving, response = _powers(recording.input.samples), _powers(recording.samples)
+    driving, response = powers(recording.input.samples), powers(recording.samples)
     for width in BANDS:
         count = int(TOP * driving.size) // width
         if count < LEAST_BANDS:
@@ -86,7 +86,7 @@ def _gap(recording: Recording) -> tuple[Array, int] | None:
     return None
 
 
-def _powers(samples: Array) -> Array:
+def powers(samples: Array) -> Array:
     """Periodogram under a Hann window, (n // 2 + 1,), of mean 1 for white noise of variance 1."""
     window = np.hanning(samples.size)
     spectrum = np.fft.rfft((samples - samples.mean()) * window)

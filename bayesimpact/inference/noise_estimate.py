@@ -28,6 +28,7 @@ from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.noise_driven import driven_noise
+from bayesimpact.inference.noise_fast import fast_noise
 from bayesimpact.inference.noise_filtered import filtered_noise, lower
 from bayesimpact.inference.noise_growth import with_growth
 from bayesimpact.inference.noise_remainders import (
@@ -90,26 +91,38 @@ def _of_one(recordings: Sequence[Recording], smoothing: Smoothing | None) -> Noi
 
 
 def unfiltered_noise(recordings: Sequence[Recording]) -> Noise:
-    """Of recordings of one quantity that passed no filter: of free decays, where there are any."""
-    free = [r for r in recordings if r.input is None]
-    return raw_noise(free) if free else driven_noise(recordings, raw_noise(recordings))
-
-
-def raw_noise(recordings: Sequence[Recording]) -> Noise:
-    """Level and correlation from polynomial remainders, for recordings that passed no filter.
+    """Of recordings of one quantity that passed no filter: of free decays, where there are any.
 
     Raises `InputError` when the recordings are too short.
     """
+    free = [r for r in recordings if r.input is None]
+    told = free or recordings
+    found = _of_windows(told)
+    if free:
+        found = fast_noise(free, found)
+    if found is None:
+        raise _too_short(told)
+    found = _with_step(found, told)
+    return found if free else driven_noise(recordings, found)
+
+
+def _too_short(recordings: Sequence[Recording]) -> InputError:
+    total, least = sum(r.samples.size for r in recordings), 5 * SMALLEST
+    if total < least:
+        return InputError("noise estimate", f"{total} samples in all", f"at least {least}")
+    rows = f"{SMALLEST} samples in a row"
+    return InputError("noise estimate", f"hardly any {rows} among {total}", f"{least} in such rows")
+
+
+def _of_windows(recordings: Sequence[Recording]) -> Noise | None:
+    """Level and correlation from polynomial remainders; None where there are too few windows."""
     hums = [find_hum(r.samples, r.interval) for r in recordings]
     found = _longest(recordings, hums, False) if recordings[0].order > 0 else None
     if found is None or any(r.input is not None for r in recordings):
         # under an input few windows fit between turning points: they count where a jump shows
         across = _longest(recordings, hums, True)
         found = found if found and across and _rises(found, across.level) else across
-    if found is None:
-        total = sum(r.samples.size for r in recordings)
-        raise InputError("noise estimate", f"{total} samples in all", f"at least {5 * SMALLEST}")
-    return _with_step(found, recordings)
+    return found
 
 
 def _longest(

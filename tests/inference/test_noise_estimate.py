@@ -14,7 +14,7 @@ from bayesimpact.data.campaign import Campaign, Measurement
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 from bayesimpact.inference.noise import Noise
-from bayesimpact.inference.noise_estimate import estimate_noise, raw_noise
+from bayesimpact.inference.noise_estimate import estimate_noise, unfiltered_noise
 from bayesimpact.trial.rig import Release, Rig
 from bayesimpact.trial.rig_chain import Chain
 
@@ -51,7 +51,7 @@ def chi2_limits(count: int) -> tuple[float, float]:
     [("rig", 5e-6), ("rig", 5e-5), ("few samples", 5e-6), ("hard stop", 2e-6), ("no stop", 5e-6)],
 )
 def test_white_noise_is_found_white_and_its_level_within_its_error(name, sigma):
-    found = [raw_noise(noisy(silent(name), 0.0, sigma, seed)) for seed in range(8)]
+    found = [unfiltered_noise(noisy(silent(name), 0.0, sigma, seed)) for seed in range(8)]
     assert sum(f.correlation != 0.0 for f in found) <= 1
     z = np.array([(f.level / sigma - 1) / f.level_error for f in found])
     assert np.sum(z**2) < chi2_limits(8)[1] and abs(z.mean()) < 4 / np.sqrt(8)
@@ -61,7 +61,7 @@ def test_white_noise_is_found_white_and_its_level_within_its_error(name, sigma):
 @pytest.mark.parametrize("rho", [0.3, 0.6, -0.3])
 def test_level_and_correlation_of_coloured_noise(rho):
     sigma = 5e-6
-    found = [raw_noise(noisy(silent("rig"), rho, sigma, seed)) for seed in range(8)]
+    found = [unfiltered_noise(noisy(silent("rig"), rho, sigma, seed)) for seed in range(8)]
     for z in (
         np.array([(f.correlation - rho) / f.correlation_error for f in found]),
         np.array([(f.level / sigma - 1) / f.level_error for f in found]),
@@ -81,7 +81,7 @@ def test_a_steady_hum_is_no_noise(name):
             replace(r, samples=r.samples + 2e-4 * np.sin(2 * np.pi * 180.07 * r.times + seed))
             for r in clean
         ]
-        found = raw_noise(humming)
+        found = unfiltered_noise(humming)
         z.append((found.level / 5e-6 - 1) / found.level_error)
         assert found.correlation == 0.0
     assert np.sum(np.square(z)) < chi2_limits(8)[1] and abs(np.mean(z)) < 4 / np.sqrt(8)
@@ -91,13 +91,13 @@ def test_a_few_disturbed_windows_do_not_count():
     """Glitches of thirty deviations in two of a hundred windows."""
     campaign, rng = silent("no stop"), np.random.default_rng(0)
     recordings = noisy(campaign, 0.0, 5e-6, 1)
-    clean = raw_noise(recordings)
+    clean = unfiltered_noise(recordings)
     spoilt = []
     for r in recordings:
         samples = r.samples.copy()
         samples[rng.integers(0, samples.size, 3)] += 1.5e-4
         spoilt.append(replace(r, samples=samples))
-    found = raw_noise(spoilt)
+    found = unfiltered_noise(spoilt)
     assert found.correlation == 0.0
     assert found.level == pytest.approx(clean.level, rel=0.05)
 
@@ -107,12 +107,12 @@ def test_a_stated_noise_level_is_taken():
     campaign = replace(silent("rig"), recordings=recordings, measurement=Measurement(noise=7e-6))
     noise = estimate_noise(campaign)
     assert noise.level == 7e-6 and noise.source == "campaign.toml"
-    assert noise.correlation == raw_noise(recordings).correlation != 0.0
+    assert noise.correlation == unfiltered_noise(recordings).correlation != 0.0
 
 
 def test_recordings_too_short_are_refused():
     with pytest.raises(InputError, match="30 samples"):
-        raw_noise([Recording("a", "", np.sin(np.arange(30.0)), 1e-3)])
+        unfiltered_noise([Recording("a", "", np.sin(np.arange(30.0)), 1e-3)])
 
 
 def test_a_motion_that_ends_below_the_step_of_its_readings():
@@ -123,6 +123,6 @@ def test_a_motion_that_ends_below_the_step_of_its_readings():
     readings = step * np.round(motion / step)
     recording = Recording("a", "", readings, 1e-3, quantity="angle")
     with np.errstate(all="raise"):
-        noise = raw_noise([recording])
+        noise = unfiltered_noise([recording])
     assert noise.level == pytest.approx(step / np.sqrt(12), rel=1e-6)
     assert noise.source == "the step of the readings" and noise.level_error > 0.0

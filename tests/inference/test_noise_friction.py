@@ -9,7 +9,7 @@ import pytest
 import small_rig
 from driven_rigs import driven_rig
 
-from bayesimpact.inference.noise_estimate import estimate_noise, raw_noise
+from bayesimpact.inference.noise_estimate import estimate_noise, unfiltered_noise
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.oscillator import build_oscillator
 from bayesimpact.trial.rig_chain import Chain
@@ -32,7 +32,7 @@ def _z(name: str, quantity, rate: float, force: float) -> np.ndarray:
     level, z = LEVELS[quantity], []
     for seed in range(SEEDS):
         rng = np.random.default_rng(seed)
-        found = raw_noise(
+        found = unfiltered_noise(
             [
                 replace(r, samples=r.samples + level * rng.standard_normal(r.samples.size))
                 for r in campaign.recordings

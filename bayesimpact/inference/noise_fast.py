@@ -1,0 +1,89 @@
+"""Noise of free decays that few samples a period show, from the spectrum above their motion.
+
+Polynomials over short windows follow a motion of many samples a period. Of fewer, part of a period
+is left in a window of the fewest samples, and passes for noise of the motion's own correlation. The
+spectrum tells the noise between the lines above the motion: medians of bands do not see lines, and
+their slope is the noise's colour. What a law makes of the motion there may fill it, so that this is
+no less than the noise either, and the lower one counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.data.recording import Recording
+from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise_driven import MEDIAN, SHORTEST_PERIOD, TOP, powers
+from bayesimpact.inference.noise_ordinates import Ordinates
+from bayesimpact.response.half_cycles import spectral_period
+
+Array = NDArray[np.float64]
+
+ABOVE = 1.5  # times the motion's frequency: a window's side lobes are gone, multiples to come
+BANDS = (64, 32, 16, 8)  # ordinates, as many as leave enough bands
+LEAST_BANDS = 4
+# nats of bands' likelihood, to call the noise coloured: 1 false call in 200
+LEAST_GAIN = 4.0
+AS_GOOD = 1.0  # nats below the likeliest correlation: 1.4 standard errors
+WEAKER = 50  # correlations up to it
+EFFICIENCY = 0.48  # of a median of exponential numbers, against their mean: ln(2)^2
+
+
+def fast_noise(recordings: Sequence[Recording], remainders: Noise | None) -> Noise | None:
+    """The polynomial `remainders`, or what the spectra of free recordings of one quantity without a
+    stop say, where that is less and their motion is fast; whatever it is where there are none.
+    """
+    fast = [r for r in recordings if spectral_period(r.samples, r.order) < SHORTEST_PERIOD]
+    if len(fast) < len(recordings) or any(r.case or r.used is not None for r in recordings):
+        return remainders
+    bands = [own for r in recordings if (own := _bands(r)) is not None]
+    if not bands:
+        return remainders
+    angle, power, weight = (np.concatenate(parts) for parts in zip(*bands, strict=True))
+    ordinates = Ordinates(angle, power, np.ones(power.size), 0.0)
+    each = EFFICIENCY * float(weight.mean())  # independent ordinates of a band
+    rho = _correlation(ordinates, each)
+    level = float(np.sqrt(ordinates.variance(rho)))
+    error = float(np.sqrt(0.5 / (each * power.size)))
+    if remainders is not None and remainders.level < level * (1.0 + 3.0 * error):
+        return remainders
+    return Noise(
+        rho,
+        level=level,
+        level_error=error,
+        correlation_error=ordinates.errors(rho)[0] / float(np.sqrt(each)) if rho else 0.0,
+        source="spectrum above the motion",
+    )
+
+
+def _correlation(ordinates: Ordinates, each: float) -> float:
+    """The weakest one that is as good as likeliest: below the motion, where nothing is seen of the
+    noise, a stronger one would add any power. 0 where the gain over white noise is small.
+    """
+    found = ordinates.correlation()
+    best = ordinates.cost(found)
+    if each * (ordinates.cost(0.0) - best) < LEAST_GAIN:
+        return 0.0
+    weaker = np.linspace(0.0, found, WEAKER)
+    return float(next(rho for rho in weaker if each * (ordinates.cost(rho) - best) <= AS_GOOD))
+
+
+def _bands(recording: Recording) -> tuple[Array, Array, Array] | None:
+    """Angular frequencies per sample of bands above the motion, their mean powers per sample as
+    medians tell them, and their numbers of ordinates; None where there are few.
+    """
+    samples = recording.samples
+    own = powers(samples)
+    last = int(TOP * own.size)
+    first = int(np.ceil(ABOVE * samples.size / spectral_period(samples, recording.order)))
+    for width in BANDS:
+        count = (last - first) // width
+        if count >= LEAST_BANDS:
+            some = own[first : first + count * width].reshape(count, width)
+            middle = first + width * (np.arange(count) + 0.5)
+            angle = 2 * np.pi * middle / samples.size
+            return angle, np.median(some, axis=1) / MEDIAN, np.full(count, float(width))
+    return None

@@ -1,0 +1,77 @@
+"""The noise of decays that few samples a period show."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from bayesimpact.data.recording import Recording
+from bayesimpact.errors import InputError
+from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise_estimate import unfiltered_noise
+from bayesimpact.inference.noise_fast import fast_noise
+
+SIGMA, INTERVAL, COUNT = 1e-3, 0.05, 400
+
+
+def decay(period: float, cubic: float = 0.0) -> np.ndarray:
+    """A mass of 1 kg from 0.5 m, `period` samples a cycle, damped by 1 %; cubic, 1/m2, of k1."""
+    rate = 2 * np.pi / (period * INTERVAL)
+
+    def motion(t: float, x: np.ndarray) -> list[float]:
+        return [x[1], -rate * rate * (x[0] + cubic * x[0] ** 3) - 0.02 * rate * x[1]]
+
+    times = INTERVAL * np.arange(COUNT)
+    found = solve_ivp(motion, (0.0, times[-1]), [0.5, 0.0], t_eval=times, rtol=1e-10, atol=1e-12)
+    return np.asarray(found.y[0])
+
+
+def recordings(clean: np.ndarray, correlation: float, seed: int) -> list[Recording]:
+    rng, noise = np.random.default_rng(seed), Noise(correlation)
+    return [
+        Recording(n, "", clean + noise.coloured(rng, COUNT, INTERVAL, SIGMA), INTERVAL)
+        for n in "ab"
+    ]
+
+
+@pytest.mark.parametrize("cubic", [0.0, 0.5])
+@pytest.mark.parametrize("period", [7.0, 12.0])
+@pytest.mark.parametrize("correlation", [0.0, 0.5])
+def test_the_spectrum_above_the_motion_tells_level_and_colour(
+    period: float, cubic: float, correlation: float
+) -> None:
+    """Windows of twelve samples hold a period and more: their remainders are motion."""
+    clean = decay(period, cubic)
+    found = [unfiltered_noise(recordings(clean, correlation, seed)) for seed in range(8)]
+    assert {n.source for n in found} == {"spectrum above the motion"}
+    ratios = np.array([n.level / SIGMA for n in found])
+    if not correlation:
+        error = np.mean([n.level_error for n in found])
+        assert abs(ratios.mean() - 1.0) < 4 * error / np.sqrt(8) + 0.05 * bool(cubic)
+    # of coloured noise it sees what is faster than the motion, and errs to less and to whiter
+    assert np.all((ratios > 0.5) & (ratios < 1.5))
+    assert np.all([-0.3 < n.correlation < correlation + 0.2 for n in found])
+
+
+def test_polynomials_tell_the_noise_of_a_slow_motion() -> None:
+    slow = recordings(decay(60.0), 0.0, 0)
+    remainders = Noise(level=2 * SIGMA, level_error=0.01)
+    assert fast_noise(slow, remainders) is remainders
+    assert unfiltered_noise(slow).source == "polynomial remainders"
+
+
+def test_of_two_bounds_the_lower_one_counts() -> None:
+    fast = recordings(decay(12.0), 0.0, 0)
+    low, high = Noise(level=0.5 * SIGMA), Noise(level=2 * SIGMA)
+    assert fast_noise(fast, low) is low
+    found = fast_noise(fast, high)
+    assert found is not None and found.level == pytest.approx(SIGMA, rel=0.15)
+
+
+def test_readings_without_rows_of_samples_are_refused_in_true_words() -> None:
+    used = np.arange(COUNT) % 4 != 0
+    samples = np.where(used, decay(60.0), 0.0)
+    gappy = [Recording("a", "", samples, INTERVAL, used=used)]
+    with pytest.raises(InputError, match="12 samples in a row among 400"):
+        unfiltered_noise(gappy)
