@@ -31,8 +31,9 @@ def shakes_in_own_band(fit: Fit, remains: bool) -> bool:
     slow change of frequency or damping: over the whole band where something `remains`, and as far
     from its line as both decay. What a steady force makes the mass do is none of that. A mode that
     rings down there passes for a damping that changes with amplitude, whether anything remains or
-    not; a force, which has a motion of its own to begin with, passes for one where the recordings
-    are too short to tell both frequencies apart. At a multiple of the motion's frequency such a
+    not; and so does a steady line where the recordings are too short to tell both frequencies
+    apart: of a free motion and a steady one that beat nobody knows then which is which. At a
+    multiple of the motion's frequency such a
     mode is what any law that is not linear makes of the motion, and so is a steady line where no
     recording decays enough to tell. A line too slow for any recording to show it come and go passes
     for a drift; and two that no recording tells apart, for one whose amplitude every recording sets
@@ -56,8 +57,7 @@ def shakes_in_own_band(fit: Fit, remains: bool) -> bool:
                 return True
             if (remains or not steady) and _overlaps(motion, frequency, decay, steady=steady):
                 return True
-            own_motion = effect.observe is None or not steady
-            if not remains and own_motion and _is_unresolved(motion, frequency):
+            if not remains and _is_unresolved(motion, frequency):
                 return True
             if not steady and multiple_of(motion, frequency):
                 return True

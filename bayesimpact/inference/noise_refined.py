@@ -44,6 +44,8 @@ def refined_noise(fit: Fit) -> Noise:
         told = replace(noise, level=level, level_error=error, is_independent=False)
         return replace(told, source="residual of the base model")
     plain = noise.correlation == 0.0 and noise.smoothing is None
+    # of coarse steps the residual is rounding, which no correlation describes
+    plain = plain or any(fit.target.likelihood.steps)
     if plain or fit.reduced_chi2 > LARGE_MISFIT or fit.target.oscillator.campaign.mixed:
         return noise
     found = _ordinates(fit, lowest := ABOVE * fastest_frequency(fit))

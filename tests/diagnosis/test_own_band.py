@@ -114,3 +114,19 @@ def test_a_line_of_a_driven_recording_is_its_motion(driven: bool) -> None:
     motion = np.exp(-0.5 * t) * np.cos(60 * np.pi * t) + 0.05 * np.cos(2 * np.pi * 71.0 * t)
     given = Input(np.zeros(t.size)) if driven else None
     assert _moves_at(Recording("a", "", motion, INTERVAL, input=given), 71.0) is driven
+
+
+@pytest.mark.parametrize("line", ["sensor_hum", "harmonic_forcing"])
+@pytest.mark.parametrize(("apart", "refused"), [(0.5, True), (40.0, False)])
+def test_a_line_that_beats_with_the_motion_is_none_where_both_are_one_line(
+    line: str, apart: float, refused: bool
+) -> None:
+    """Nobody knows then which of the two the mass makes by itself: a spring that a shaker moved was
+    named a hum of 30 % of the motion, its own motion taken for the shaker's.
+    """
+    oscillator = SimpleNamespace(
+        campaign=SimpleNamespace(recordings=(decay(30.0, 30.0),)), acting=(BY_ID[line],)
+    )
+    values = {f"{line}.frequency": 30.0 + apart * LINE}
+    fit = SimpleNamespace(target=SimpleNamespace(oscillator=oscillator), value=values.get)
+    assert shakes_in_own_band(fit, remains=False) is refused

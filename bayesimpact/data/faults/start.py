@@ -35,7 +35,8 @@ def find_start(recording: Recording) -> list[Fault]:
     """The sample from which on the motion can be a free decay, where that is not the first one.
 
     Rest: the readings keep to the first one for longer than a free motion can about a turning
-    point, sqrt(2 b / A) of a radian for a band b and an amplitude A. Hand: the largest excursion
+    point, sqrt(2 b / A) of a radian for a band b and an amplitude A; where the motion grows from
+    there, the decay begins at the largest excursion. Hand: the largest excursion
     comes late and exceeds what came before on its side, or the first turning point is reached from
     a speed with which a free motion would not get there; the free decay begins where that is left.
     """
@@ -52,7 +53,7 @@ def find_start(recording: Recording) -> list[Fault]:
     x = median_filter(quiet, 2 * max(half, 0) + 1, mode="nearest")  # blind to spikes
     noise, step = noise_level(quiet), reading_step(recording.samples)
     settled = float(np.median(x[x.size // 2 :]))
-    peak = int(np.argmax(np.abs(x - settled)))
+    largest = peak = int(np.argmax(np.abs(x - settled)))
     height = abs(float(x[peak] - settled))
     band = max(BAND * noise, 2.0 * step, LEAST_BAND * height)
     natural = np.sqrt(2.0 * band / max(height, band)) * period / (2 * np.pi)
@@ -65,10 +66,12 @@ def find_start(recording: Recording) -> list[Fault]:
     rest = _leaves(x, peak if hand else 0, band, None if hum is None else hum.frequency)
     if not hand and (moves or rest <= least):
         return []
-    first = rest if not hand else max(rest, peak)
+    moved = not hand and _is_moved(x - settled, rest, band) and order_of(recording.quantity) == 0
+    first = max(rest, peak if hand else largest) if hand or moved else rest
     if first > 0.7 * x.size:
         return []
     kind = "the motion is not yet free" if hand else "at rest"
+    kind = "at rest, then moved" if moved else kind
     return [
         Fault(
             id="recording_start",
@@ -86,6 +89,14 @@ def find_start(recording: Recording) -> list[Fault]:
             action="cut",
         )
     ]
+
+
+def _is_moved(centred: Array, rest: int, band: float) -> bool:
+    """Whether what follows a rest is larger than where that ends by far: a hand, or a blow, moved
+    the mass first.
+    """
+    begun = float(np.abs(centred[rest - 1 : rest + 1]).max(initial=0.0))
+    return bool(np.abs(centred).max() > GROWTH * begun + band)
 
 
 def _moves(x: Array, band: float) -> bool:

@@ -85,3 +85,21 @@ def test_an_acceleration_of_release_is_no_rest(rest: float) -> None:
     """It stays near its first reading for as long as contacts that are far larger allow."""
     found = [f for f in recording_faults(bouncing(rest)) if f.id == "recording_start"]
     assert [round(f.size, 3) for f in found] == ([rest] if rest else [])
+
+
+@pytest.mark.parametrize("moved", [True, False])
+def test_a_mass_that_is_moved_after_a_rest_is_free_from_its_largest_excursion(moved: bool) -> None:
+    """A wheel rested, a hand wound it for a third of a period, then it swung: it was told released
+    from where it had rested.
+    """
+    t = np.arange(0.0, 12.0, 1 / 30)
+    begun, wound = 0.7, 0.35  # s; the period is 1 s
+    free = np.exp(-0.05 * (t - begun - wound)) * np.cos(2 * np.pi * (t - begun - wound))
+    way = np.sin(0.5 * np.pi * np.clip((t - begun) / wound, 0.0, 1.0)) ** 2
+    y = np.where(t < begun + wound, way if moved else 1.0, free)
+    y = y + 1e-3 * np.random.default_rng(0).standard_normal(t.size)
+    (found,) = recording_faults(Recording("p", "", y, 1 / 30, quantity="angle"))
+    assert found.id == "recording_start"
+    assert ("at rest, then moved" in found.statement) is moved
+    assert found.end_s == pytest.approx(begun + wound, abs=2.5 / 30)
+    assert "released from 5" in found.statement or not moved  # degrees
