@@ -64,6 +64,7 @@ from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification, identify
 from bayesimpact.inference.spectrum import Fingerprint
+from bayesimpact.model.compiled import compilation_left_out
 from bayesimpact.model.effects import SEARCHED
 from bayesimpact.model.effects.effect import Effect
 from bayesimpact.model.threads import linear_algebra_alone
@@ -142,13 +143,26 @@ def diagnose(
     effects : the catalogue, and effects of one's own
     search : False leaves out the global search and trusts the quick estimates
     progress : called with a few words before every longer step
-    clock : s, of the budget; it begins with the first search of physics
+    clock : s, of the budget, from the first search of physics on; compiling does not count
 
     Raises
     ------
     InputError : a recording shows no oscillation
     """
     say = progress or (lambda message: None)
+    with compilation_left_out(clock) as computing:
+        return _diagnosed(campaign, rng, effects, search, say, computing)
+
+
+def _diagnosed(
+    campaign: Campaign,
+    rng: np.random.Generator,
+    effects: Sequence[Effect],
+    search: bool,
+    say: Progress,
+    clock: Callable[[], float],
+) -> Diagnosis:
+    """Stage by stage, see above."""
     say("fitting the base model")
     cleaned = cleaned_campaign(campaign, rng=rng, search=search)
     first = cleaned.identification.fit

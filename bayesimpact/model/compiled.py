@@ -122,6 +122,34 @@ def compilation_announced(say: Callable[[str], None], after: float = 1.0) -> Ite
         yield
 
 
+@contextmanager
+def compilation_left_out(clock: Callable[[], float]) -> Iterator[Callable[[], float]]:
+    """A clock, s, that stands still while anything is compiled."""
+    listener: Any = _Stopwatch(clock)
+    with event.install_listener("numba:compile", listener):  # type: ignore[no-untyped-call]
+        yield listener.left_out
+
+
+class _Stopwatch(event.Listener):  # type: ignore[misc]
+    """Adds up how long outermost functions, whosoever's they are, take to be compiled."""
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self.clock, self.seconds = clock, 0.0
+        self.starts: list[float] = []
+
+    def left_out(self) -> float:
+        """The clock's reading less what compiling has taken; that of its begin while it goes on."""
+        return (self.starts[0] if self.starts else self.clock()) - self.seconds
+
+    def on_start(self, event: Any) -> None:
+        self.starts.append(self.clock())
+
+    def on_end(self, event: Any) -> None:
+        begun = self.starts.pop()
+        if not self.starts:
+            self.seconds += self.clock() - begun
+
+
 class _Announcer(event.Listener):  # type: ignore[misc]
     """Speaks of outermost functions of the package, not of those that they call or short waits."""
 

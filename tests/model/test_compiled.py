@@ -89,3 +89,22 @@ def test_a_cache_of_older_sources_is_never_unpickled(tmp_path: Path) -> None:
     for version in older:
         (tmp_path / "index.nbi").write_bytes(version + missing)
         assert cache_file._load_index() == {}
+
+
+def test_a_clock_stands_still_while_something_is_compiled() -> None:
+    readings = iter(range(0, 1000, 10))
+
+    @numba.njit  # type: ignore[untyped-decorator]
+    def below(x: float) -> float:
+        return x + 1.0
+
+    @numba.njit  # type: ignore[untyped-decorator]
+    def above(x: float) -> float:
+        return below(x) + 1.0
+
+    with compiled.compilation_left_out(lambda: next(readings)) as clock:
+        assert clock() == 0
+        assert above(1.0) == 3.0  # read at 10 and 40, and at 20 and 30 for what it calls
+        assert clock() == 50 - 30
+        assert above(2.0) == 4.0
+        assert clock() == 60 - 30
