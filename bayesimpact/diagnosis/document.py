@@ -93,6 +93,8 @@ def document(
                 probe=_is_of_the_probe(d),
                 more=len(d.after.target.oscillator.effects) > len(d.effects),
                 either=d.either,
+                finished=d.naming.finished,
+                band_limited=d.naming.band_limited,
             )
         )
         + slow_noise_words(noise)

@@ -23,9 +23,11 @@ from bayesimpact.diagnosis.limits import Limit, limits
 from bayesimpact.diagnosis.locate import Location, locate, locate_effect
 from bayesimpact.diagnosis.name import name
 from bayesimpact.diagnosis.naming import Naming, State, is_large
+from bayesimpact.diagnosis.posed_anew import band_limited
 from bayesimpact.diagnosis.recording_faults import Corrected
 from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.smoothing import SAVITZKY_GOLAY
+from bayesimpact.diagnosis.thresholds import EXCESS
 from bayesimpact.diagnosis.unknown import with_force
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification
@@ -125,7 +127,10 @@ def diagnose_fit(
     if base.target.oscillator.smoothing is not None:  # a chain has one filter
         effects = [e for e in effects if e.id != SAVITZKY_GOLAY.id]
     scales = campaign_scales(base)
-    naming = name(base, effects, scales, rng=rng, progress=say, budget=budget, first=first)
+    smooth = _with_smooth_inputs(base) if first is None else None
+    begun = smooth or base
+    naming = name(begun, effects, scales, rng=rng, progress=say, budget=budget, first=first)
+    naming = replace(naming, band_limited=naming.band_limited or smooth is not None)
     if naming.base.candidate.fit is not base:  # posed anew, see `posed_anew`
         base = naming.base.candidate.fit
         noise = base.target.likelihood.noise
@@ -172,6 +177,15 @@ def diagnose_fit(
         formulas=answer.formulas,
         either=decision.either,
     )
+
+
+def _with_smooth_inputs(base: Fit) -> Fit | None:
+    """A base fit with a large misfit, with inputs that are band-limited between their samples where
+    these leave far less; a smaller gain shows beside a better model only, see `posed_anew`.
+    """
+    smooth = band_limited(base) if is_large(base) else None
+    far_less = smooth is not None and EXCESS * smooth.reduced_chi2 < base.reduced_chi2
+    return smooth if far_less else None
 
 
 def _beside(

@@ -71,10 +71,10 @@ def name(
     Where the misfit is large and the spectra of the recordings show a hum, the search begins with
     what the recordings less that ask for.
 
-    Where what remains is slow noise of the measuring chain or spikes of the readings, or where
-    accelerations lie at onsets of contacts that only a good model shows, and time allows, the
-    search begins once more under that noise, or without these, from that model. It counts if it
-    leaves nothing then, or if the first one was cut short for it.
+    Where what remains is slow noise of the measuring chain, spikes of the readings or what inputs
+    did between their samples, or where accelerations lie at onsets of contacts that only a good
+    model shows, and time allows, the search begins once more with that, from that model. It counts
+    if it leaves nothing then, or if the first one was cut short for it.
 
     A search that has used up the `budget` begins no more refits, and names nothing that it has not
     compared with all that might do the same.
@@ -91,7 +91,8 @@ def name(
         again.is_last = True
         quiet = again.found(anew.base, anew.first)
         if search.was_cut or quiet[1].is_white:
-            return replace(again.naming(*quiet), spikes=anew.spikes)
+            told = again.naming(*quiet)
+            return replace(told, spikes=anew.spikes, band_limited=anew.band_limited)
     elif search.was_cut:
         search.is_last = True
         reached = state.candidate.fit

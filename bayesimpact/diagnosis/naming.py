@@ -99,6 +99,7 @@ class Naming:
     power : of the force of time that models leave about the motion's own frequencies, N2, by their
         ids: the chosen one and those without an effect that may be needed
     spikes : readings that a model which left nothing else showed to be far off, set aside
+    band_limited : inputs are taken for that between their samples, as a good model asked for
     """
 
     base: State
@@ -116,6 +117,7 @@ class Naming:
     apart: Mapping[str, float] = field(default_factory=dict)
     power: Mapping[frozenset[str], float] = field(default_factory=dict)
     spikes: tuple[Compared, ...] = ()
+    band_limited: bool = False
 
     __repr__ = short_repr
 

@@ -1,13 +1,13 @@
 """A search posed anew, on what a model that is nearly good enough has shown of the readings.
 
 Spikes beside a contact, the instants at which contacts begin and end, where an acceleration jumps,
-and noise that is slow show only against a model that leaves little else. Before they are known,
-whatever follows them is fitted.
+noise that is slow, and what an input did between its samples show only against a model that leaves
+little else. Before they are known, whatever follows them is fitted.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,20 +25,24 @@ from bayesimpact.inference.refitted import refitted
 
 @dataclass(frozen=True, eq=False)
 class Posed:
-    """A search posed anew: from which base model, from which other one if any, without what."""
+    """A search posed anew: from which base model, from which other one if any, without what; and
+    whether inputs are taken for band-limited.
+    """
 
     base: Fit
     first: Fit | None
     spikes: tuple[Compared, ...] = ()
+    band_limited: bool = False
 
 
 def posed_anew(base: Fit, state: State, say: Progress) -> Posed | None:
-    """The search without the readings that spoil it, or under the slow noise that is all that a
-    model leaves.
+    """The search without the readings that spoil it, with the inputs between their samples that a
+    model asks for, or under the slow noise that is all that it leaves.
     """
     found = state.candidate.fit
     if not (state.is_white and found is base):
         posed = _without_readings(base, found, say)
+        posed = posed or _with_band_limited_inputs(base, found, say)
         if posed is not None:
             return posed
     noise = None if state.is_white or is_large(found) else remaining_noise(found)
@@ -47,6 +51,34 @@ def posed_anew(base: Fit, state: State, say: Progress) -> Posed | None:
     say("what remains is slow noise: once more under that")
     first = refitted(found, noise=noise) if found is not base else None
     return Posed(refitted(base, noise=noise), first)
+
+
+def _with_band_limited_inputs(base: Fit, found: Fit, say: Progress) -> Posed | None:
+    """With inputs that are band-limited between their samples, not lines, where that explains
+    decisively more: the change is small, and tells nothing beside a large misfit.
+    """
+    other = None if is_large(found) else band_limited(found)
+    if other is None or not other.log_posterior > found.log_posterior + DECISIVE:
+        return None
+    say("inputs are band-limited between their samples: once more with these")
+    if found is base:
+        return Posed(other, None, band_limited=True)
+    smooth = refitted(base, other.target.oscillator.campaign)
+    return Posed(smooth, other, band_limited=True)
+
+
+def band_limited(fit: Fit) -> Fit | None:
+    """The model's mode with inputs that are band-limited between their samples; None where there
+    are none that are not.
+    """
+    campaign = fit.target.oscillator.campaign
+    if all(r.input is None or r.input.band_limited for r in campaign.recordings):
+        return None
+    recordings = [
+        replace(r, input=replace(r.input, band_limited=True)) if r.input else r
+        for r in campaign.recordings
+    ]
+    return refitted(fit, replace(campaign, recordings=tuple(recordings)))
 
 
 def _without_readings(base: Fit, found: Fit, say: Progress) -> Posed | None:

@@ -13,6 +13,10 @@ from bayesimpact.model.units import two_digits
 
 FOLD = 10.0  # a change of more than ten times the value is told as a multiple, not in per cent
 TOLD = 2.0  # posterior standard deviations of a force, from which on its size means something
+BAND_LIMITED = (
+    " Between its samples the input is taken for band-limited: lines between them leave more "
+    '(hold = "band_limited" in campaign.toml says so from the beginning).'
+)
 MOST_TOLD = 3  # alternatives in one sentence; a table has them all
 
 
@@ -33,6 +37,8 @@ class Findings:
     probe : all of the likeliest model of the catalogue acts in the measuring chain
     more : the fitted model has effects that are not named
     either : groups of effects, of each of which every likely set has one
+    finished : the search was not ended by its limit
+    band_limited : a good model asked for inputs that are so between their samples
     """
 
     verdict: str
@@ -49,6 +55,8 @@ class Findings:
     probe: bool = False
     more: bool = False
     either: tuple[tuple[Effect, ...], ...] = ()
+    finished: bool = True
+    band_limited: bool = False
 
     @property
     def cost(self) -> str:
@@ -59,6 +67,10 @@ class Findings:
 
 def summary(found: Findings) -> str:
     """One paragraph on what was found."""
+    return _found(found) + BAND_LIMITED * found.band_limited
+
+
+def _found(found: Findings) -> str:
     if found.verdict == "adequate":
         said = "Nothing is missing: the base model describes the recordings down to the noise."
         return f"{said} {found.detectable}".strip()
@@ -90,6 +102,8 @@ def _unknown(found: Findings, location: Location) -> str:
     seen = found.probe and location.regime != "measurement"
     acts = "Seen as a force it would act" if seen else "It acts"
     head = "Something is missing that the catalogue does not hold."
+    if not found.finished:
+        head = "Something is missing that the search has not found."
     if found.faults:  # they are all that has a name
         faults = f"Faults of recordings are set aside or corrected.{found.faults}"
         head = f"{faults} The rest is unknown."

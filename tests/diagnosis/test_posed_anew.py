@@ -124,6 +124,7 @@ class MadeUpNaming:
 
     of: str
     spikes: tuple[Any, ...] = ()
+    band_limited: bool = False
 
 
 @pytest.mark.parametrize(
@@ -158,14 +159,18 @@ def test_which_search_answers(
             first = "first to its end" if self.is_last else "first"
             return MadeUpNaming(first if self is made[0] else "anew")
 
-    anew = SimpleNamespace(base="clean", first=None, spikes=("spike",)) if posed else None
+    anew = (
+        SimpleNamespace(base="clean", first=None, spikes=("spike",), band_limited=True)
+        if posed
+        else None
+    )
     monkeypatch.setattr(search, "_Search", Search)
     monkeypatch.setattr(search, "posed_anew", lambda *about: anew)
     monkeypatch.setattr(search, "_beside_hums", lambda *about: None)
     fit: Any = "base"
     scales: Any = None
     found: Any = search.name(fit, (), scales, rng=RNG(0))
-    assert found == MadeUpNaming(of, ("spike",) if of == "anew" else ())
+    assert found == MadeUpNaming(of, *((("spike",), True) if of == "anew" else ()))
 
 
 def test_a_reading_across_the_jump_of_an_onset_is_no_spike(across: Fit) -> None:

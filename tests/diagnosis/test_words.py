@@ -156,7 +156,11 @@ def test_the_paragraph():
     )
     said = told("unknown", (), (), place("contact"), (), {"k1": ParameterShift(0.04)}, "")
     assert "\N{MINUS SIGN}2.0 to 1.5 mm" in said and "0.012 N rms" in said
-    assert "raises k1 by 4.0 %" in said
+    assert "raises k1 by 4.0 %" in said and said.startswith("Something is missing that the cat")
+    said = told("unknown", (), (), place("contact"), (), {}, "", finished=False)
+    assert said.startswith("Something is missing that the search has not found.")
+    said = told("named", friction, ("It rubs.",), place("free"), (), {}, "", band_limited=True)
+    assert 'hold = "band_limited"' in said
     said = told("partly", friction, ("It rubs.",), place("free"), (), {}, "", " More.")
     assert said.startswith("Dry friction is needed by every likely model")
     assert "It rubs." in said and said.endswith(" More.")

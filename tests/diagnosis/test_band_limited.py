@@ -1,0 +1,43 @@
+"""What an input did between its samples shows once a model leaves little else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.input import Input
+from bayesimpact.data.recording import Recording
+from bayesimpact.diagnosis.diagnose import diagnose
+
+MASS, C1, K1 = 0.5, 0.6, 800.0
+INTERVAL, NOISE = 4e-3, 5e-6
+
+
+def shaken(lines: bool) -> Campaign:
+    """A linear oscillator under three sines, of 10 to 30 samples a period, in closed form; or under
+    the `lines` between their samples, each of whose harmonics it answers in the same way.
+    """
+    t = INTERVAL * np.arange(1500)
+    rng, drive, moved = np.random.default_rng(2), np.zeros(t.size), np.zeros(t.size)
+    for frequency, size, phase in ((8.3, 2.0, 0.3), (13.1, 4.0, 1.9), (24.7, 9.0, 2.2)):
+        drive += size * np.cos(2 * np.pi * frequency * t + phase)
+        images = [frequency + n / INTERVAL for n in range(-40, 41)] if lines else [frequency]
+        for image in images:
+            share = np.sinc(image * INTERVAL) ** 2 if lines else 1.0
+            w = 2 * np.pi * image
+            answer = share * size * np.exp(1j * phase) / (K1 - MASS * w * w + 1j * w * C1)
+            moved += (answer * np.exp(1j * w * t)).real
+    samples = moved + NOISE * rng.standard_normal(t.size)
+    recording = Recording("a", "", samples, INTERVAL, input=Input(drive))
+    return Campaign("shaken", MASS, (recording,), stop=False)
+
+
+@pytest.mark.parametrize("lines", [True, False])
+def test_what_an_input_does_between_samples_is_told(lines: bool) -> None:
+    """Before this was asked, a force of no effect was learned for it."""
+    found = diagnose(shaken(lines), rng=np.random.default_rng(0), search=False)
+    assert found.verdict == "adequate" and not found.effects
+    assert found.naming.band_limited is not lines
+    assert found.after.reduced_chi2 == pytest.approx(1.0, abs=0.12)
+    assert abs(found.after.value("k1") - K1) < 4 * found.after.sd[found.after.names.index("k1")]
