@@ -2,7 +2,8 @@
 
 Where strong physics is missing from the base model, a clock or a gain that is off in one recording
 is lost beside it; and a search for physics that does not know of it adds law after law. Beside the
-law that the equation of motion asks for first it may be all that is left: then every recording by
+law that the equation of motion asks for first, or periods ahead where that tells nothing, it may be
+all that is left: then every recording by
 itself leaves nothing, and all of them together do not agree. What a stop does is asked of periods
 ahead, of recordings that each have a stop of their own, so that no wrong label has a part in it.
 """
@@ -37,7 +38,7 @@ from bayesimpact.diagnosis.recording_faults import (
     values_of,
 )
 from bayesimpact.diagnosis.refit import fit_from
-from bayesimpact.diagnosis.term_sets import EffectSet
+from bayesimpact.diagnosis.term_sets import EffectSet, TermSets
 from bayesimpact.diagnosis.thresholds import EXCESS
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.noise import Noise
@@ -63,7 +64,10 @@ def faults_beside_physics(
     if campaign.keep_faults or not told or enough:
         return ()
     scales = campaign_scales(fit)
-    for chosen in LikelySets(fit, effects, scales).best(MOST):
+    along: TermSets = LikelySets(fit, effects, scales)
+    if not along.terms and campaign.stop:  # of readings that can be made no displacement
+        along = PeriodSets(fit, shared_effects(effects), scales)
+    for chosen in along.best(MOST):
         if len(shared_effects(chosen.effects)) < len(chosen.effects):
             continue
         whole = fit_from(fit, chosen.effects, chosen.values, scales).fit

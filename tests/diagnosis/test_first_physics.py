@@ -44,6 +44,27 @@ def test_a_clock_shows_beside_the_law_that_is_asked_for_first(seed):
     assert "-0.4" in fault.fault.statement or "-0.39" in fault.fault.statement
 
 
+@pytest.mark.parametrize("gain", [1.03, 1.0])
+def test_a_gain_of_accelerations_shows_beside_what_periods_ahead_ask_for(gain):
+    """No displacement is told from them with a stop, and gaps of every recording's own took its
+    place, with dampings per obstacle: two wrong names.
+    """
+    chain = small_rig.Chain(noise=0.05, offsets=dict.fromkeys("abc", 0.0))
+    cubic = {"spring_cubic": {"stiffness": 6e6}}
+    campaign = small_rig.record(
+        5, cubic, chain=chain, quantity="acceleration", rate=2000.0, duration=2.0
+    )
+    first, second, *others = campaign.recordings
+    wrong = replace(second, samples=gain * second.samples)
+    steps = found(replace(campaign, recordings=(first, wrong, *others)))
+    if gain == 1.0:
+        assert steps == ()
+        return
+    ((fault,),) = steps
+    assert fault.fault.id == "recording_gain" and fault.fault.recording == "b"
+    assert "+3" in fault.fault.statement or "+2.9" in fault.fault.statement
+
+
 def test_without_a_fault_or_where_more_is_missing_none_is_found():
     assert found(timed(73, 1.0, FRICTION)) == ()
     assert found(timed(74, 1.004, FRICTION | BUMP)) == ()
