@@ -36,6 +36,7 @@ class Alone:
     covariance : (p, p) of these
     reduced_chi2 : of the fit to this recording alone
     amplitude : half of what its readings span, in their unit
+    fit : itself
     """
 
     recording: str
@@ -43,6 +44,7 @@ class Alone:
     covariance: Array
     reduced_chi2: float
     amplitude: float
+    fit: Fit | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +121,7 @@ def fit_alone(campaign: Campaign, recording: Recording, model: SharedModel) -> A
     covariance[:, lost] = 0.0
     covariance[lost, lost] = 1e6
     amplitude = float(np.ptp(recording.samples)) / 2
-    return Alone(recording.name, np.log(scale), covariance, chi2, amplitude)
+    return Alone(recording.name, np.log(scale), covariance, chi2, amplitude, fit)
 
 
 def _name(name: str, case: str) -> str:

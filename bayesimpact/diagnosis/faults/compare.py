@@ -193,7 +193,8 @@ def _slips(
     )
     least = largest_by_chance(misfit, fit.target.likelihood.sizes, model.noise)
     for i in np.flatnonzero(misfit > least):
-        shifted = find_shift(campaign, recordings[i], model)
+        known = alone[recordings[i].name]
+        shifted = find_shift(campaign, recordings[i], model, None if known is None else known.fit)
         if shifted is None or shifted[1].reduced_chi2 > least[i]:
             continue
         fault = slip_fault(recordings[i], shifted[0])

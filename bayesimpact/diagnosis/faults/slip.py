@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 
 PLACE = 0.5 * float(chi2.isf(1e-3, 1))  # nats: less likely places than this are no candidates
 NEAR = 2  # samples beside these places: where many are lost, the score is not linear
+HELPS = 2.0  # times less, that the likeliest number of samples must leave; set by hand
 EDGE = 8  # samples at either end, after which a shift is told from the start values
 
 
@@ -105,16 +106,23 @@ def put_right(recording: Recording, between: tuple[int, int], samples: int) -> R
 
 
 def find_shift(
-    campaign: Campaign, recording: Recording, model: SharedModel
+    campaign: Campaign, recording: Recording, model: SharedModel, own: Fit | None
 ) -> tuple[SampleShift, Fit] | None:
-    """The shift of a recording, in whole samples, and the fit to it with that put right."""
-    own = own_fit(campaign, recording, model)
-    shift = None if own is None or recording.input is not None else likeliest_shift(own)
+    """The shift of a recording, in whole samples, and the fit to it with that put right.
+
+    own : the fit to the recording as it is, if there is one
+    """
+    if own is None or recording.input is not None:
+        return None
+    shift = likeliest_shift(own)
     if shift is None:
         return None
     between = shift.earliest - NEAR, shift.latest + NEAR
-    tried = []
-    for samples in {round(shift.samples) + by for by in (-1, 0, 1)} - {0}:
+    tried: list[tuple[float, int, Fit]] = []
+    near = {round(shift.samples) + by for by in (-1, 0, 1)} - {0}
+    for samples in sorted(near, key=lambda n: (abs(n - shift.samples), n)):
+        if tried and HELPS * tried[0][0] > own.reduced_chi2:
+            break  # a sample more or less does not put it right either
         try:
             again = put_right(recording, between, samples)
         except ValueError:  # it may lie nearly anywhere: what is left would not show it

@@ -13,7 +13,13 @@ from bayesimpact.data.campaign import Campaign, Smoothing
 from bayesimpact.data.read import load_campaign
 from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.faults.alone import SharedModel, own_fit
-from bayesimpact.diagnosis.faults.slip import find_shift, likeliest_shift, put_right
+from bayesimpact.diagnosis.faults.slip import (
+    SampleShift,
+    find_shift,
+    likeliest_shift,
+    put_right,
+)
+from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.noise import Noise
 from bayesimpact.model.measurement import smooth
@@ -38,6 +44,12 @@ def lost(recording: Recording, count: int) -> Recording:
     return replace(recording, samples=np.concatenate([x[:PLACE], x[PLACE + count :]]))
 
 
+def shift_of(
+    campaign: Campaign, recording: Recording, model: SharedModel
+) -> tuple[SampleShift, Fit] | None:
+    return find_shift(campaign, recording, model, own_fit(campaign, recording, model))
+
+
 def test_readings_are_put_where_they_belong(campaign: Campaign) -> None:
     (whole,) = campaign.recordings
     between = PLACE - 2, PLACE + 3
@@ -54,7 +66,7 @@ def test_readings_are_put_where_they_belong(campaign: Campaign) -> None:
 @pytest.mark.parametrize("count", [-4, -1, 1, 2, 6, 14])
 def test_the_count_and_the_place(campaign: Campaign, noise: Noise, count: int) -> None:
     spoiled = lost(campaign.recordings[0], count)
-    found = find_shift(campaign, spoiled, SharedModel(noise))
+    found = shift_of(campaign, spoiled, SharedModel(noise))
     assert found is not None
     shift, fit = found
     assert shift.samples == count
@@ -108,7 +120,7 @@ def test_a_shift_that_may_begin_anywhere_is_no_slip() -> None:
     assert fit is not None
     shift = likeliest_shift(fit)
     assert shift is not None and shift.latest - shift.earliest > 0.8 * recording.samples.size
-    assert find_shift(creeping, recording, SharedModel(noise)) is None
+    assert shift_of(creeping, recording, SharedModel(noise)) is None
 
 
 def test_the_place_behind_a_filter(campaign: Campaign) -> None:
@@ -123,6 +135,6 @@ def test_the_place_behind_a_filter(campaign: Campaign) -> None:
     assert fit is not None
     shift = likeliest_shift(fit)
     assert shift is not None and shift.place == pytest.approx(PLACE, abs=2)
-    found = find_shift(behind, lost(smoothed, 2), SharedModel(noise))
+    found = shift_of(behind, lost(smoothed, 2), SharedModel(noise))
     assert found is not None and found[0].samples == 2
     assert found[1].reduced_chi2 < 1.15
