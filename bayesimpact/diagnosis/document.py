@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from bayesimpact.diagnosis.faults.compare import base_failed
 from bayesimpact.diagnosis.formula_words import formula_entries
 from bayesimpact.diagnosis.intervals import Intervals, intervals
+from bayesimpact.diagnosis.learned import LEARNED
 from bayesimpact.diagnosis.limits import PRACTICAL, Limit
 from bayesimpact.diagnosis.locate import Location
 from bayesimpact.diagnosis.loop import Diagnosis
@@ -92,6 +93,7 @@ def document(
                 drifts=d.naming.unknown.reach > 0,
                 probe=_is_of_the_probe(d),
                 more=len(d.after.target.oscillator.effects) > len(d.effects),
+                unproved=_unproved(d),
                 either=d.either,
                 finished=d.naming.finished,
                 band_limited=d.naming.band_limited,
@@ -186,6 +188,15 @@ def _detectable(d: Diagnosis) -> str:
         f"What could still hide below its limit moves {name} by at most {sd:.1f} of its standard "
         f"deviations ({effect_id})."
     )
+
+
+def _unproved(d: Diagnosis) -> tuple[str, ...]:
+    """Titles of effects that the fitted model holds beside those that are named, or of which one of
+    a group is.
+    """
+    told = {LEARNED, *(e.id for e in (*d.effects, *(e for group in d.either for e in group)))}
+    effects = d.after.target.oscillator.effects
+    return tuple(e.title for e in effects if e.id not in told and not is_formula_id(e.id))
 
 
 def _unfinished(d: Diagnosis) -> str:

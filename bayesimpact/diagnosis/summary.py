@@ -36,6 +36,7 @@ class Findings:
     drifts : the likelier unknown force changes with time
     probe : all of the likeliest model of the catalogue acts in the measuring chain
     more : the fitted model has effects that are not named
+    unproved : titles of those of the catalogue
     either : groups of effects, of each of which every likely set has one
     finished : the search was not ended by its limit
     band_limited : a good model asked for inputs that are so between their samples
@@ -54,6 +55,7 @@ class Findings:
     drifts: bool = False
     probe: bool = False
     more: bool = False
+    unproved: tuple[str, ...] = ()
     either: tuple[tuple[Effect, ...], ...] = ()
     finished: bool = True
     band_limited: bool = False
@@ -86,7 +88,8 @@ def _found(found: Findings) -> str:
         needed = "is needed" if len(found.effects) == 1 else "are needed"
         return (
             f"{_capital(titles)} {needed} by every likely model, but something else "
-            f"is missing too. {statements}{_groups(found)}{found.cost}{found.remains}{found.faults}"
+            f"is missing too. {statements}{_groups(found)}{found.cost}{_unproved(found)}"
+            f"{found.remains}{found.faults}"
         )
     place = REGIMES[found.location.regime]
     modes = all(e.family == "modes" for e in found.effects)
@@ -110,8 +113,16 @@ def _unknown(found: Findings, location: Location) -> str:
     return (
         f"{head}{_groups(found)} {acts} {REGIMES[location.regime]}, mostly at "
         f"{span(location.displacement, 'rad' if found.angle else 'm')}, {force}."
-        f"{slowly}{cost}{found.remains}"
+        f"{slowly}{cost}{_unproved(found)}{found.remains}"
     )
+
+
+def _unproved(found: Findings) -> str:
+    """What else the fitted model holds."""
+    if not found.unproved:
+        return ""
+    too = " too" if found.effects else ""
+    return f" The fitted model holds {listed(found.unproved)}{too}, which nothing proves."
 
 
 def _groups(found: Findings) -> str:

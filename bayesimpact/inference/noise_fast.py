@@ -56,6 +56,7 @@ def fast_noise(recordings: Sequence[Recording], remainders: Noise | None) -> Noi
         level_error=error,
         correlation_error=ordinates.errors(rho)[0] / float(np.sqrt(each)) if rho else 0.0,
         source="spectrum above the motion",
+        is_bound=True,
     )
 
 

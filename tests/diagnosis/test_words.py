@@ -163,7 +163,11 @@ def test_the_paragraph():
     assert 'hold = "band_limited"' in said
     said = told("partly", friction, ("It rubs.",), place("free"), (), {}, "", " More.")
     assert said.startswith("Dry friction is needed by every likely model")
-    assert "It rubs." in said and said.endswith(" More.")
+    assert "It rubs." in said and said.endswith(" More.") and "nothing proves" not in said
+    said = told("partly", friction, ("It rubs.",), place("free"), unproved=("a hum", "a bias"))
+    assert said.endswith(" The fitted model holds a hum and a bias too, which nothing proves.")
+    said = told("unknown", (), (), place("contact"), unproved=("a hum",))
+    assert said.endswith(" The fitted model holds a hum, which nothing proves.")
     said = told("partly", (), (), place("contact"), (), {}, "", faults=" A spike.")
     head = "Faults of recordings are set aside or corrected. A spike. The rest is unknown."
     assert said.startswith(head)
