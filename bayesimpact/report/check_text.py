@@ -18,6 +18,7 @@ COLUMNS = 40
 # of an input, lost between its samples: an error that a gain cannot take up; a sine loses as much
 # with 18 samples a period
 WEAKENED = 0.01
+LEFT = 2.0  # periods: after a release at least
 
 
 def measured_noise(campaign: Campaign) -> Noise | None:
@@ -95,9 +96,15 @@ def _recording_warnings(recording: Recording, *, stop: bool) -> list[str]:
     late = largest * recording.interval
     grown = way[largest] > GROWTH * way[: int(per_period) + 1].max()  # by no beat of two modes
     if late > period and grown and recording.input is None:
+        if late < recording.duration - LEFT * period:
+            action = (
+                "if the recording begins before the release, "
+                f"set start_s = {recording.start + late:.6g}"
+            )
+        else:
+            action = "the motion grows, as if something drove it"
         warnings.append(
-            f"the largest excursion comes {late:.3g} s after the first sample: if the recording "
-            f"begins before the release, set start_s = {recording.start + late:.6g}"
+            f"the largest excursion comes {late:.3g} s after the first sample: {action}"
         )
     return warnings
 

@@ -47,3 +47,14 @@ def test_how_much_of_an_input_lines_between_its_samples_lose() -> None:
     for period in (5, 10, 40):
         wave = Input(np.sin(2 * np.pi * np.arange(400) / period))
         assert wave.weakened == pytest.approx(1.0 - np.sinc(1.0 / period) ** 2, rel=1e-6)
+
+
+@pytest.mark.parametrize("grows", [True, False])
+def test_what_is_largest_at_its_end_was_not_released_there(grows: bool) -> None:
+    """Of a spring that a shaker moves `check` advised to begin two samples before the end."""
+    t = np.arange(600) / 100
+    envelope = 0.2 + 0.3 * t if grows else np.where(t < 1.5, 0.1, np.exp(-0.1 * t))
+    samples = envelope * np.cos(2 * np.pi * t)
+    campaign = Campaign("rig", 1.0, (Recording("a", "", samples, 0.01),), stop=False)
+    (said,) = (w for w in campaign_warnings(campaign, None) if "largest excursion" in w)
+    assert ("something drove it" in said) is grows and ("set start_s" in said) is not grows
