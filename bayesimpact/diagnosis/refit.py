@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.short_repr import short_repr
+from bayesimpact.diagnosis.equivalent import equivalent
 from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.extend import (
     at_null,
@@ -269,21 +270,32 @@ def exchanged(
     """The candidate's model with an effect in the place of one of its own.
 
     The climb begins where that one stands: an effect without a size cannot grow from nothing, and
-    the model without either may be a side minimum from which another one does not.
+    the model without either may be a side minimum from which another one does not. A force begins
+    with the size at which it does most of what the other one does (`equivalent`).
     """
     effects = (*(e for e in candidate.effects if e.id != old.id), new)
-    return _refitted(candidate, effects, scales, enough)
+    values = equivalent(old, new, candidate.fit, scales)
+    return _refitted(candidate, effects, scales, enough, values)
 
 
 def _refitted(
-    candidate: Candidate, effects: tuple[Effect, ...], scales: Scales, enough: Enough = TO_THE_MODE
+    candidate: Candidate,
+    effects: tuple[Effect, ...],
+    scales: Scales,
+    enough: Enough = TO_THE_MODE,
+    values: Mapping[str, float] | None = None,
 ) -> Candidate:
-    """A model fitted from the candidate's mode, effects that it lacks at their null."""
+    """A model fitted from the candidate's mode, effects that it lacks at some `values`, where these
+    are likelier, or at their null.
+    """
     target = extend(candidate.fit, effects, scales)
     layout = target.oscillator.layout
     start = transfer(candidate.fit, layout, effects, scales, {})
     sizes = step_sizes(layout.names, target.oscillator.acting, scales, ())
     steps = difference_steps(candidate.fit, target, sizes)
+    if values:
+        known = [values.get(name, own) for name, own in zip(layout.names, start, strict=True)]
+        start = best_start(target, start, np.array(known), steps)
     goal = enough.goal + prior_at(target, start)
     options: dict[str, Any] = {
         "steps": steps, "tolerance": TOLERANCE, "max_iterations": ITERATIONS, "goal": goal,

@@ -43,8 +43,9 @@ class Unlisted(Remaining):
         """
         about = state.candidate
         shaken = [e for e in self.effects if e.id == HARMONIC_FORCING.id]
-        acting = (*about.fit.target.oscillator.acting, *about.effects)
-        if not (shaken and is_large(about.fit)) or any(map(is_periodic, acting)):
+        if not (shaken and is_large(about.fit)):
+            return state
+        if any(map(is_periodic, (*about.fit.target.oscillator.acting, *about.effects))):
             return state
 
         def sets(problem: LikelySets, most: int) -> list[EffectSet]:
