@@ -22,6 +22,7 @@ from bayesimpact.diagnosis.thresholds import EXCESS
 from bayesimpact.formula.grammar import Term
 from bayesimpact.formula.law import effect_of, is_friction, starts_of
 from bayesimpact.formula.library import library, local_starts, neighbours
+from bayesimpact.formula.listed import listed_as
 from bayesimpact.formula.responses import Along, forces_along
 from bayesimpact.model.effects.effect import Effect, Scales
 
@@ -61,7 +62,8 @@ def sets_with_a_term(
     sets = [(), problem.shaped(own), *(c for level in problem.levels(most) for c in level[:LIKELY])]
     least = min(design(problem, problem.refined(chosen)).left for chosen in sets)
     reach = reach_of(problem.paths)
-    terms = unlisted((*library(problem.scales, *reach), *local_starts(*reach)))
+    listed = {t.effect.id for t in (*problem.terms, *problem.known)}
+    terms = unlisted((*library(problem.scales, *reach), *local_starts(*reach)), listed)
     price = prices_by_kind(terms)
     columns = _columns(problem, terms)
     found = []
@@ -81,9 +83,9 @@ def reach_of(paths: Sequence[Path]) -> tuple[float, float]:
     return low, max(float(path.y.max()) for path in paths)
 
 
-def unlisted(terms: Sequence[Term]) -> tuple[Term, ...]:
-    """Terms that the catalogue has no law with events of its own for."""
-    return tuple(t for t in terms if not is_friction(t))
+def unlisted(terms: Sequence[Term], listed: Collection[str]) -> tuple[Term, ...]:
+    """Terms that are none of the effects by the ids `listed`, nor a law with events of its own."""
+    return tuple(t for t in terms if not is_friction(t) and listed_as(t) not in listed)
 
 
 def prices_by_kind(terms: Sequence[Term]) -> Prices:

@@ -43,7 +43,9 @@ def periods_with_terms(
     if fit.target.oscillator.counts.sum() > MOST_SAMPLES:
         return PeriodSets(fit, effects, scales, recordings=recordings)
     paths = measured_paths(fit if recordings is None else fit.with_recordings(recordings))
-    terms = unlisted(library(scales, *reach_of(paths)))
+    acting = fit.target.oscillator.acting
+    listed = {e.id for e in (*effects, *acting) if e in acting or e.admissible(scales)}
+    terms = unlisted(library(scales, *reach_of(paths)), listed)
     price, cost = prices_by_kind(terms), float(np.log(2 * len(effects)))
     beyond = [max(price[t.kind] - cost, 0.0) for t in terms]
     grammar = as_effects(paths, scales, terms, beyond)
