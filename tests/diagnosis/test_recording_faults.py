@@ -116,7 +116,7 @@ def test_spikes_that_show_only_beside_the_physics_are_set_aside_too() -> None:
     )
     samples = campaign.recordings[1].samples.copy()
     for place in (130, 610):
-        samples[place : place + 3] += 15 * small_rig.NOISE
+        samples[place : place + 3] += 25 * small_rig.NOISE
     spoiled = replace(campaign.recordings[1], samples=samples)
     recordings = (campaign.recordings[0], spoiled, *campaign.recordings[2:])
     campaign = replace(campaign, recordings=recordings)
@@ -125,6 +125,7 @@ def test_spikes_that_show_only_beside_the_physics_are_set_aside_too() -> None:
     assert found.verdict == "named" and [e.id for e in found.effects] == ["spring_cubic"]
     assert found.corrected is not None
     assert [f.id for f in found.corrected.faults] == ["recording_spikes"]
+    assert found.after.reduced_chi2 < 1.2
 
 
 @pytest.mark.long
