@@ -35,10 +35,10 @@ def find_start(recording: Recording) -> list[Fault]:
     """The sample from which on the motion can be a free decay, where that is not the first one.
 
     Rest: the readings keep to the first one for longer than a free motion can about a turning
-    point, sqrt(2 b / A) of a radian for a band b and an amplitude A; where the motion grows from
-    there, the decay begins at the largest excursion. Hand: the largest excursion
-    comes late and exceeds what came before on its side, or the first turning point is reached from
-    a speed with which a free motion would not get there; the free decay begins where that is left.
+    point, sqrt(2 b / A) of a radian for a band b and an amplitude A; where the motion is largest
+    soon after, and by far, the decay begins there. Hand: the largest excursion comes late and
+    exceeds what came before on its side, or the first turning point is reached from a speed with
+    which a free motion would not get there; the free decay begins where that is left.
     """
     if recording.used is not None and not recording.used[:3].all():
         return []
@@ -66,7 +66,8 @@ def find_start(recording: Recording) -> list[Fault]:
     rest = _leaves(x, peak if hand else 0, band, None if hum is None else hum.frequency)
     if not hand and (moves or rest <= least):
         return []
-    moved = not hand and _is_moved(x - settled, rest, band) and order_of(recording.quantity) == 0
+    soon = not hand and largest < rest + LATE * period and order_of(recording.quantity) == 0
+    moved = soon and _is_moved(x - settled, rest, band)
     first = max(rest, peak if hand else largest) if hand or moved else rest
     if first > 0.7 * x.size:
         return []
