@@ -27,7 +27,7 @@ from bayesimpact.model.parameters import instance_name
 Array = NDArray[np.float64]
 
 SPACING = 0.5  # of a grid of frequencies, in reciprocals of the longest recording
-MOST_FREQUENCIES = 2_000  # of a grid, set by hand: more than a few hundred periods of the motion
+ENTRIES = 20_000_000  # of all sines and cosines at stretches that are held: 160 MB
 FINER = (0.2, 0.04)  # of the spacing: around the best frequency, five steps to either side
 
 
@@ -74,13 +74,14 @@ def sets_with_a_line(
 
 def _frequencies(problem: LikelySets) -> Array:
     """A grid, Hz: from a few periods in the longest recording on, as far as a force moves a free
-    mass.
+    mass, or as memory allows.
     """
     duration = max((float(path.t[-1] - path.t[0]) for path in problem.paths), default=0.0)
     if duration <= 0.0:
         return np.zeros(0)
     lowest, highest = LINE_PERIODS / duration, FLIGHT_REACH * problem.scales.natural_frequency
-    count = min(int((highest - lowest) * duration / SPACING), MOST_FREQUENCIES)
+    held = 2 * sum(path.rows.target.size for path in problem.paths)
+    count = min(int((highest - lowest) * duration / SPACING), ENTRIES // held)
     return np.asarray(lowest + SPACING / duration * np.arange(max(count, 0)), dtype=np.float64)
 
 

@@ -71,7 +71,8 @@ def estimate_noise(campaign: Campaign) -> Noise:
         first, second, third = (found.get(o, noise).level / noise.level for o in range(3))
         return replace(noise, scales=(first, second, third))
     if known is None:
-        plain = smoothing is None and all(
+        # of a bound, what windows leave is motion
+        plain = not (smoothing or noise.is_bound) and all(
             r.input is None and r.order == 0 for r in campaign.recordings
         )
         return with_growth(noise, campaign.recordings) if plain else noise

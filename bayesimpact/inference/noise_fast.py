@@ -14,6 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.data.gaps import runs
 from bayesimpact.data.recording import Recording
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.noise_driven import MEDIAN, SHORTEST_PERIOD, TOP, powers
@@ -37,7 +38,7 @@ def fast_noise(recordings: Sequence[Recording], remainders: Noise | None) -> Noi
     stop say, where that is less and their motion is fast; whatever it is where there are none.
     """
     fast = [r for r in recordings if spectral_period(r.samples, r.order) < SHORTEST_PERIOD]
-    if len(fast) < len(recordings) or any(r.case or r.used is not None for r in recordings):
+    if len(fast) < len(recordings) or any(r.case for r in recordings):
         return remainders
     bands = [own for r in recordings if (own := _bands(r)) is not None]
     if not bands:
@@ -74,12 +75,18 @@ def _correlation(ordinates: Ordinates, each: float) -> float:
 
 def _bands(recording: Recording) -> tuple[Array, Array, Array] | None:
     """Angular frequencies per sample of bands above the motion, their mean powers per sample as
-    medians tell them, and their numbers of ordinates; None where there are few.
+    medians tell them, and their numbers of ordinates; None where there are few. Of a recording with
+    gaps the longest stretch between two.
     """
     samples = recording.samples
+    if recording.used is not None:
+        first, end = max(runs(recording.used), key=lambda run: run[1] - run[0], default=(0, 0))
+        samples = samples[first:end]
+    if samples.size <= BANDS[-1]:
+        return None
     own = powers(samples)
     last = int(TOP * own.size)
-    first = int(np.ceil(ABOVE * samples.size / spectral_period(samples, recording.order)))
+    first = int(np.ceil(ABOVE * samples.size / spectral_period(recording.samples, recording.order)))
     for width in BANDS:
         count = (last - first) // width
         if count >= LEAST_BANDS:

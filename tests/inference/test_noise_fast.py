@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -68,6 +70,17 @@ def test_of_two_bounds_the_lower_one_counts() -> None:
     assert fast_noise(fast, low) is low
     found = fast_noise(fast, high)
     assert found is not None and found.level == pytest.approx(SIGMA, rel=0.15)
+
+
+def test_of_a_recording_with_gaps_the_longest_stretch_tells() -> None:
+    """Spikes that were set aside: bridged readings are none of the motion's."""
+    whole = recordings(decay(12.0), 0.0, 3)
+    used = np.ones(COUNT, dtype=bool)
+    used[[40, 41, 42]] = False
+    spoilt = [replace(r, samples=np.where(used, r.samples, 0.0), used=used) for r in whole]
+    found = unfiltered_noise(spoilt)
+    assert found.source == "spectrum above the motion"
+    assert found.level == pytest.approx(unfiltered_noise(whole).level, rel=0.15)
 
 
 def test_readings_without_rows_of_samples_are_refused_in_true_words() -> None:
