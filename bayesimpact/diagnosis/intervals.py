@@ -24,6 +24,8 @@ from bayesimpact.inference.fit import Fit
 
 Array = NDArray[np.float64]
 
+NINETY = 1.645  # standard deviations to either end of a 90 % interval
+
 
 @dataclass(frozen=True, eq=False)
 class Intervals:
@@ -58,7 +60,7 @@ class Intervals:
         found = [float(within.ppf(q)) for q in (0.05, 0.5, 0.95)]
         if not np.all(np.isfinite(found)):  # all of the mass lies far beyond a bound
             held = min(max(middle, low), high)
-            found = [max(held - 1.645 * sd, low), held, min(held + 1.645 * sd, high)]
+            found = [max(held - NINETY * sd, low), held, min(held + NINETY * sd, high)]
         return found[0], found[1], found[2]
 
 

@@ -28,6 +28,7 @@ from bayesimpact.diagnosis.recording_faults import Corrected
 from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.smoothing import SAVITZKY_GOLAY
 from bayesimpact.diagnosis.thresholds import EXCESS
+from bayesimpact.diagnosis.told_sizes import of_told_size
 from bayesimpact.diagnosis.unknown import with_force
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification
@@ -140,6 +141,13 @@ def diagnose_fit(
     answer = Answer(naming, decision, after, state)
     answer = with_formulas(answer, effects, scales, rng=rng, progress=say, budget=budget)
     naming, decision, after, state = answer.naming, answer.decision, answer.after, answer.state
+    ranges = intervals(
+        after,
+        remains=state is not None,
+        known=naming.own,
+        beside=_beside(naming, decision, after, state),
+    )
+    decision = of_told_size(decision, ranges, after)
     location, held, cases = None, None, None
     locations: tuple[Location, ...] = ()
     if decision.verdict != "adequate":
@@ -166,12 +174,7 @@ def diagnose_fit(
         held,
         cases,
         limits(chosen.candidate.fit, chosen.scan, scales),
-        intervals(
-            after,
-            remains=state is not None,
-            known=naming.own,
-            beside=_beside(naming, decision, after, state),
-        ),
+        ranges,
         state,
         scales,
         formulas=answer.formulas,
