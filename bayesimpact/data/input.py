@@ -49,6 +49,7 @@ class Input:
     free : its gain is an unknown, `input_gain`; else it is 1
     band_limited : see above
     absolute : the recording is of the motion in space, not relative to the base; only of a base
+    lines_stated : it was stated that lines lie between its samples: nothing else is tried
     """
 
     samples: Floats
@@ -56,6 +57,7 @@ class Input:
     free: bool = False
     band_limited: bool = False
     absolute: bool = False
+    lines_stated: bool = False
 
     def __post_init__(self) -> None:
         samples = np.array(self.samples, dtype=np.float64)

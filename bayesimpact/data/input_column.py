@@ -73,6 +73,12 @@ def input_of(
         accepted = 'both along a line, or both about an axis, or gain = "free"'
         raise InputError(f"{where}, input, key column", found, accepted)
     samples = given.scale * (values - values.mean() if given.remove_mean else values)
-    band_limited = given.hold == "band_limited"
-    made = Input(samples, given.kind, given.gain == "free", band_limited, given.absolute)
+    made = Input(
+        samples,
+        given.kind,
+        free=given.gain == "free",
+        band_limited=given.hold == "band_limited",
+        absolute=given.absolute,
+        lines_stated=given.hold == "first_order",
+    )
     return checked(where, made)

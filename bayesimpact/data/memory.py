@@ -131,7 +131,8 @@ def _entry(where: str, given: object) -> dict[str, Any]:
         entry["motion"] = given.motion_name or None
         if given.input is not None:
             gain = "free" if given.input.free else "known"
-            hold = "band_limited" if given.input.band_limited else "first_order"
+            stated = "first_order" if given.input.lines_stated else None
+            hold = "band_limited" if given.input.band_limited else stated
             entry["input"] = {
                 "samples": given.input.samples, "kind": given.input.kind, "gain": gain,
                 "hold": hold, "absolute": given.input.absolute,

@@ -57,8 +57,8 @@ class InputTable(_Table):
         "known", description='"known" (1) or "free": an unknown, input_gain'
     )
     remove_mean: bool = Field(False, description="true or false, without quotes")
-    hold: Literal["first_order", "band_limited"] = Field(
-        "first_order", description='"first_order" (a line between samples) or "band_limited"'
+    hold: Literal["first_order", "band_limited"] | None = Field(
+        None, description='"first_order" (a line between samples) or "band_limited"'
     )
     absolute: bool = Field(False, description="true or false, without quotes")
 

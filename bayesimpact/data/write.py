@@ -97,7 +97,8 @@ def _csv(recording: Recording, decimals: int | None) -> str:
 
 def _input(given: Input) -> dict[str, Any]:
     free = {"gain": "free"} if given.free else {}
-    hold = {"hold": "band_limited"} if given.band_limited else {}
+    hold = {"hold": "first_order"} if given.lines_stated else {}
+    hold = {"hold": "band_limited"} if given.band_limited else hold
     absolute = {"absolute": True} if given.absolute else {}
     return {"column": INPUT_COLUMN, "kind": given.kind, **free, **hold, **absolute}
 

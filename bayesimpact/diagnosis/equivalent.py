@@ -18,9 +18,10 @@ POINTS = 2000  # of all recordings
 def equivalent(old: Effect, new: Effect, fit: Fit, scales: Scales) -> dict[str, float]:
     """Parameters of an effect whose force along a fitted motion is nearest to that of another one,
     which the fit has: shapes of one name are its, sizes those of least squares; {} where either is
-    no force of place, speed and time alone, or has a parameter of a case or recording.
+    no force of place, speed and time alone, or has a parameter of a case or recording, or is not
+    finite.
     """
-    if not (_is_plain(old) and _is_plain(new)):
+    if not (_is_plain(old) and _is_plain(new) and new.admissible(scales)):
         return {}
     theirs = {p.name: fit.value(f"{old.id}.{p.name}") for p in old.parameters if p.is_shape}
     start = np.array(
@@ -34,9 +35,12 @@ def equivalent(old: Effect, new: Effect, fit: Fit, scales: Scales) -> dict[str, 
     rows = [_forces(old, new, fit, r, points) for r in range(len(fit.linearisation))]
     own, *forces = np.concatenate(rows, axis=1)
     columns = np.stack([(force - forces[0]) for force in forces[1:]], axis=1)
+    if not (np.isfinite(columns).all() and np.isfinite(own - forces[0]).all()):
+        return {}
     found = np.linalg.lstsq(columns, own - forces[0], rcond=None)[0]
     for i, step, number in zip(sizes, steps, found, strict=True):
-        start[i] = max(start[i] + step * number, new.parameters[i].lower)
+        kind = new.parameters[i]
+        start[i] = min(max(start[i] + step * number, kind.lower), kind.upper)
     names = [f"{new.id}.{p.name}" for p in new.parameters]
     return dict(zip(names, map(float, start), strict=True))
 

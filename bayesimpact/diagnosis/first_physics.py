@@ -3,9 +3,9 @@
 Where strong physics is missing from the base model, a clock or a gain that is off in one recording
 is lost beside it; and a search for physics that does not know of it adds law after law. Beside the
 law that the equation of motion asks for first, or periods ahead where that tells nothing, it may be
-all that is left: then every recording by
-itself leaves nothing, and all of them together do not agree. What a stop does is asked of periods
-ahead, of recordings that each have a stop of their own, so that no wrong label has a part in it.
+all that is left: then every recording by itself leaves nothing, and all of them together do not
+agree. What a stop does is asked of periods ahead, of recordings that each have a stop of their own,
+so that no wrong label has a part in it.
 """
 
 from __future__ import annotations

@@ -10,14 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import islice, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.diagnosis.equation_error import Path, without_rest
 from bayesimpact.diagnosis.likely_sets import LikelySets
-from bayesimpact.diagnosis.likely_terms import LIKELY, Design, design
+from bayesimpact.diagnosis.likely_terms import LIKELY, SEEN, Design, design
 from bayesimpact.diagnosis.periodic import FLIGHT_REACH, LINE_PERIODS
 from bayesimpact.diagnosis.term_sets import Chosen, EffectColumns, EffectSet
 from bayesimpact.diagnosis.thresholds import EXCESS
@@ -27,8 +27,10 @@ from bayesimpact.model.parameters import instance_name
 Array = NDArray[np.float64]
 
 SPACING = 0.5  # of a grid of frequencies, in reciprocals of the longest recording
-ENTRIES = 20_000_000  # of all sines and cosines at stretches that are held: 160 MB
-FINER = (0.2, 0.04)  # of the spacing: around the best frequency, five steps to either side
+AT_ONCE = 64  # frequencies, so that memory stays bounded
+PEAKS = 5  # frequencies of every number of effects that are refined
+FINER = (0.2, 0.04)  # of the spacing: around each of them, five steps to either side
+ROWS = 3  # stretches for every unknown, at least
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,35 +56,57 @@ def sets_with_a_line(
 
     Beside the likeliest sets of every number, effects by the ids `own` are one to begin with.
     """
-    grid = _frequencies(problem)
-    if not problem.terms or not grid.size:
+    spacing, grid = _frequencies(problem)
+    unknowns = len(problem.base) + 2 * len(problem.paths) + 1
+    if not grid.size or problem.rows < ROWS * unknowns:
         return []
-    sets = [(), problem.shaped(own), *(c for level in problem.levels(most) for c in level[:LIKELY])]
-    sets = [problem.refined(chosen) for chosen in sets]
+    levels = (c for level in problem.levels(most) for c in level[:LIKELY])
+    sets = [problem.refined(c) for c in dict.fromkeys([(), problem.shaped(own), *levels])]
     least = min(design(problem, chosen).left for chosen in sets)
-    waves = [_waves(path, grid) for path in problem.paths]
+    smaller = [chosen for chosen in sets if len(chosen) < most]
+    explained = _explained(problem, smaller, grid)
     found = []
     for size in range(most):
-        beside = [_best(problem, c, grid, waves) for c in sets if len(c) == size]
-        best = max(beside, key=lambda one: one.log_odds, default=None)
-        if best is not None and np.isfinite(best.log_odds):
-            best = _refined(problem, best, float(grid[1] - grid[0]))
-            if EXCESS * max(best.left, problem.rows) < least:
-                found.append(_with_line(problem, best, effect))
+        at = [(c, row) for c, row in zip(smaller, explained, strict=True) if len(c) == size]
+        tried = (_refined(problem, line, spacing) for line in _peaks(problem, at, grid))
+        likely = sorted(tried, key=lambda one: -one.log_odds)
+        best = (line for line in likely if EXCESS * max(line.left, problem.rows) < least)
+        possible = (_with_line(problem, line, effect) for line in best)
+        found += [one for one in islice(filter(None, possible), 1)]
     return found
 
 
-def _frequencies(problem: LikelySets) -> Array:
-    """A grid, Hz: from a few periods in the longest recording on, as far as a force moves a free
-    mass, or as memory allows.
+def _frequencies(problem: LikelySets) -> tuple[float, Array]:
+    """Spacing and a grid, Hz: from a few periods in the longest recording on, as far as a force
+    moves a free mass.
     """
     duration = max((float(path.t[-1] - path.t[0]) for path in problem.paths), default=0.0)
     if duration <= 0.0:
-        return np.zeros(0)
+        return 0.0, np.zeros(0)
     lowest, highest = LINE_PERIODS / duration, FLIGHT_REACH * problem.scales.natural_frequency
-    held = 2 * sum(path.rows.target.size for path in problem.paths)
-    count = min(int((highest - lowest) * duration / SPACING), ENTRIES // held)
-    return np.asarray(lowest + SPACING / duration * np.arange(max(count, 0)), dtype=np.float64)
+    spacing = SPACING / duration
+    return spacing, np.arange(lowest, highest, spacing)
+
+
+def _peaks(
+    problem: LikelySets, explained: Sequence[tuple[Chosen, Array]], grid: Array
+) -> list[_Line]:
+    """The likeliest local maxima over a grid of frequencies, beside any of some sets."""
+    lines = list[_Line]()
+    for chosen, row in explained:
+        padded = np.pad(row, 1, constant_values=-np.inf)
+        peaks = np.flatnonzero((row >= padded[:-2]) & (row >= padded[2:]))
+        strongest = peaks[np.argsort(row[peaks])[-PEAKS:]]
+        lines += [_line(problem, chosen, float(grid[k]), float(row[k])) for k in strongest]
+    return sorted(lines, key=lambda one: -one.log_odds)[:PEAKS]
+
+
+def _line(problem: LikelySets, chosen: Chosen, frequency: float, explained: float) -> _Line:
+    left = max(design(problem, chosen).left - explained, 0.0)
+    unknowns = 2 * len(problem.paths) + 1
+    price = problem.price(chosen) + problem.cost + 0.5 * unknowns * float(np.log(problem.rows))
+    odds = -0.5 * problem.rows * float(np.log(max(left / problem.rows, 1.0))) - price
+    return _Line(frequency, chosen, odds, left)
 
 
 def _waves(path: Path, frequencies: Array) -> Array:
@@ -97,50 +121,60 @@ def _waves(path: Path, frequencies: Array) -> Array:
     return without_rest(path, both.reshape(begun.size, -1)).reshape(both.shape)
 
 
-def _best(problem: LikelySets, chosen: Chosen, frequencies: Array, waves: Sequence[Array]) -> _Line:
-    """The likeliest of some frequencies, with their `waves` in every recording, beside a set."""
-    held = design(problem, chosen)
-    left = held.left - _explained(held, waves)
-    unknowns = 2 * len(waves) + 1
-    cost = 0.5 * unknowns * float(np.log(problem.rows)) + problem.cost
-    before, after = (np.log(np.maximum(x / problem.rows, 1.0)) for x in (held.left, left))
-    odds = problem.log_odds(chosen) + 0.5 * problem.rows * (before - after) - cost
-    k = int(np.argmax(odds))
-    return _Line(float(frequencies[k]), chosen, float(odds[k]), float(left[k]))
+def _explained(problem: LikelySets, sets: Sequence[Chosen], frequencies: Array) -> Array:
+    """What a sine and a cosine in every recording explain beside each of some sets, (S, F)."""
+    designs = [design(problem, chosen) for chosen in sets]
+    found = np.empty((len(sets), frequencies.size))
+    for first in range(0, frequencies.size, AT_ONCE):
+        block = slice(first, first + AT_ONCE)
+        waves = [_waves(path, frequencies[block]) for path in problem.paths]
+        for row, held in zip(found, designs, strict=True):
+            row[block] = _explained_beside(held, waves)
+    return found
 
 
-def _explained(held: Design, waves: Sequence[Array]) -> Array:
-    """What a sine and a cosine in every recording explain beside a set, per frequency (F,)."""
+def _explained_beside(held: Design, waves: Sequence[Array]) -> Array:
+    """The same beside one set, of `waves` of some frequencies (F,); nothing by what the set's
+    columns explain of these.
+    """
     ends = np.cumsum([0, *(one.shape[0] for one in waves)])
-    parts = [slice(a, b) for a, b in pairwise(ends)]
-    pairs = list(zip(waves, parts, strict=True))
+    pairs = [(w, slice(a, b)) for w, (a, b) in zip(waves, pairwise(ends), strict=True)]
     score = np.concatenate([np.einsum("nfi,n->fi", w, held.rest[at]) for w, at in pairs], axis=1)
     shared = np.concatenate(
         [np.einsum("nfi,nb->fbi", w, held.basis[at], optimize=True) for w, at in pairs], axis=2
     )
     information = -np.einsum("fbi,fbj->fij", shared, shared, optimize=True)
+    whole = np.empty(score.shape)
     for r, one in enumerate(waves):
         at = slice(2 * r, 2 * r + 2)
-        information[:, at, at] += np.einsum("nfi,nfj->fij", one, one, optimize=True)
-    size = np.sqrt(np.maximum(np.einsum("fii->fi", information), 1e-300))
-    scaled = information / (size[:, :, None] * size[:, None, :]) + 1e-9 * np.eye(size.shape[1])
+        own = np.einsum("nfi,nfj->fij", one, one, optimize=True)
+        information[:, at, at] += own
+        whole[:, at] = np.einsum("fii->fi", own)
+    left = np.einsum("fii->fi", information)
+    told = (left > SEEN * whole) & (whole > 0.0)
+    size = np.sqrt(np.where(told, left, np.inf))
+    scaled = information / (size[:, :, None] * size[:, None, :])
+    scaled += (1e-9 + ~told)[:, :, None] * np.eye(size.shape[1])
     numbers = np.linalg.solve(scaled, (score / size)[..., None])[..., 0]
     return np.asarray(np.einsum("fi,fi->f", numbers, score / size))
 
 
 def _refined(problem: LikelySets, best: _Line, spacing: float) -> _Line:
-    """With all shapes and the frequency where they are likeliest, also between their grids."""
+    """With the frequency where it is likeliest, also between those of the grid."""
     for step in FINER:
         around = best.frequency + step * spacing * np.arange(-5.0, 6.0)
         around = np.asarray(around[around > 0.0], dtype=np.float64)
-        waves = [_waves(path, around) for path in problem.paths]
-        best = max(best, _best(problem, best.chosen, around, waves), key=lambda one: one.log_odds)
+        (row,) = _explained(problem, [best.chosen], around)
+        k = int(np.argmax(row))
+        near = _line(problem, best.chosen, float(around[k]), float(row[k]))
+        best = max(best, near, key=lambda one: one.log_odds)
     return best
 
 
-def _with_line(problem: LikelySets, best: _Line, effect: Effect) -> EffectSet:
-    """The set with the force: one amplitude, root mean square over the recordings, and in every one
-    a phase, as the least squares have them.
+def _with_line(problem: LikelySets, best: _Line, effect: Effect) -> EffectSet | None:
+    """The set with the force, as the least squares have it: one amplitude, root mean square over
+    the recordings by what each tells, and in every one a phase. None where all of it together
+    cannot be: a size below zero, or no stiffness.
     """
     recordings = [r.name for r in problem.fit.target.oscillator.campaign.recordings]
     waves = [_waves(path, np.array([best.frequency]))[:, 0] for path in problem.paths]
@@ -153,10 +187,14 @@ def _with_line(problem: LikelySets, best: _Line, effect: Effect) -> EffectSet:
     shapes = {instance_name(effect, effect.parameter("frequency"), None): best.frequency}
     term = EffectColumns(effect, shapes, names, tuple(columns), (False,) * len(names))
     found = problem.with_term(best.chosen, term, best.log_odds)
-    values = dict(found.values)
+    values, terms = dict(found.values), [problem.terms[t] for t in best.chosen]
+    sizes = [(n, s) for t in terms for n, s in zip(t.names, t.one_sided, strict=True)]
+    if not values["k1"] > 0.0 or any(s and values[n] <= 0.0 for n, s in sizes):
+        return None
     parts = np.array([[values.pop(f"{part}[{n}]") for part in ("sine", "cosine")]
                       for n in recordings])  # fmt: skip
-    size = float(np.sqrt(np.mean(np.sum(parts**2, axis=1))))
+    told = np.array([float(np.sum(one**2)) for one in waves])
+    size = float(np.sqrt(told @ np.sum(parts**2, axis=1) / told.sum()))
     values[instance_name(effect, effect.parameter("amplitude"), None)] = size
     for name, (sine, cosine) in zip(recordings, parts, strict=True):
         angle = float(np.arctan2(cosine, sine) % (2 * np.pi))

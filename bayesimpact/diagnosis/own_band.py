@@ -57,7 +57,7 @@ def shakes_in_own_band(fit: Fit, remains: bool) -> bool:
                 return True
             if (remains or not steady) and _overlaps(motion, frequency, decay, steady=steady):
                 return True
-            if not remains and _is_unresolved(motion, frequency):
+            if not remains and _is_unresolved(_unforced(motion, frequency, steady), frequency):
                 return True
             if not steady and multiple_of(motion, frequency):
                 return True

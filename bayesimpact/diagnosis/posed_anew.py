@@ -69,13 +69,16 @@ def _with_band_limited_inputs(base: Fit, found: Fit, say: Progress) -> Posed | N
 
 def band_limited(fit: Fit) -> Fit | None:
     """The model's mode with inputs that are band-limited between their samples; None where there
-    are none that are not.
+    are none that are not, or lines between them are stated.
     """
     campaign = fit.target.oscillator.campaign
-    if all(r.input is None or r.input.band_limited for r in campaign.recordings):
+    inputs = [r.input for r in campaign.recordings if r.input is not None]
+    if all(given.band_limited or given.lines_stated for given in inputs):
         return None
     recordings = [
-        replace(r, input=replace(r.input, band_limited=True)) if r.input else r
+        replace(r, input=replace(r.input, band_limited=True))
+        if r.input and not r.input.lines_stated
+        else r
         for r in campaign.recordings
     ]
     return refitted(fit, replace(campaign, recordings=tuple(recordings)))

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from bayesimpact.diagnosis.directions import is_periodic
 from bayesimpact.diagnosis.discrepancy import Discrepancy, discrepancy
 from bayesimpact.diagnosis.models import UNCONVERGED_SHORTFALL, Models
 from bayesimpact.diagnosis.naming import State, is_large, leaves_something
@@ -24,6 +25,7 @@ from bayesimpact.diagnosis.scores import Score
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect
+from bayesimpact.model.effects.harmonic_forcing import EFFECT as HARMONIC_FORCING
 
 MOST_EFFECTS = 3
 MOST_LARGE = 5  # where the base misfit is large: several strong effects act at once
@@ -55,8 +57,9 @@ class Ranked(Models):
         explained, and so may a line that is refused as long as something does, where the equation
         of motion asked for it.
         """
-        evidence = candidate.log_evidence
-        if self.is_shaken and candidate.refused is not None:
+        evidence, lines = candidate.log_evidence, [e for e in candidate.effects if is_periodic(e)]
+        asked = self.is_shaken and [e.id for e in lines] == [HARMONIC_FORCING.id]
+        if asked and candidate.refused is not None:
             evidence = candidate.refused
         return evidence - candidate.price(self.cost)
 

@@ -113,13 +113,17 @@ class TermSets:
         zero.
         """
         x, left = self.solve(chosen)
-        unknowns = x.size - len(self.base) + sum(len(self.terms[t].shapes) for t in chosen)
         signs = [s for t in chosen for s in self.terms[t].one_sided]
         if not self.is_possible(x) or np.any(x[len(self.base) :][signs] <= 0.0):
             return -np.inf
+        return -0.5 * self.rows * left - self.price(chosen)
+
+    def price(self, chosen: Sequence[int]) -> float:
+        """Of the unknowns of a set's terms, shapes among them, and of its effects, nats."""
+        terms = [self.terms[t] for t in chosen]
+        unknowns = sum(len(term.names) + len(term.shapes) for term in terms)
         price = 0.5 * unknowns * float(np.log(self.rows))
-        price += sum(self.cost + self.terms[t].effect.price for t in chosen)
-        return -0.5 * self.rows * left - price
+        return price + sum(self.cost + term.effect.price for term in terms)
 
     def best(self, most: int) -> list[EffectSet]:
         """The likeliest sets of one, two, ... effects; each is likelier than all smaller ones."""

@@ -3,8 +3,9 @@
 Polynomials over short windows follow a motion of many samples a period. Of fewer, part of a period
 is left in a window of the fewest samples, and passes for noise of the motion's own correlation. The
 spectrum tells the noise between the lines above the motion: medians of bands do not see lines, and
-their slope is the noise's colour. What a law makes of the motion there may fill it, so that this is
-no less than the noise either, and the lower one counts.
+their slope is the noise's colour. What a law makes of the motion there may fill it, so that white
+noise is no more than this either, and the lower one counts. Of coloured noise, which is strongest
+below where it is seen, the level may be less than it is.
 """
 
 from __future__ import annotations
@@ -26,8 +27,8 @@ Array = NDArray[np.float64]
 ABOVE = 1.5  # times the motion's frequency: a window's side lobes are gone, multiples to come
 BANDS = (64, 32, 16, 8)  # ordinates, as many as leave enough bands
 LEAST_BANDS = 4
-# nats of bands' likelihood, to call the noise coloured: 1 false call in 200
-LEAST_GAIN = 4.0
+LEAST_GAIN = 6.5  # nats of bands' likelihood, to call the noise coloured; neighbours are not
+# independent behind a window: by test one call of 100 is false
 AS_GOOD = 1.0  # nats below the likeliest correlation: 1.4 standard errors
 WEAKER = 50  # correlations up to it
 EFFICIENCY = 0.48  # of a median of exponential numbers, against their mean: ln(2)^2
@@ -49,15 +50,16 @@ def fast_noise(recordings: Sequence[Recording], remainders: Noise | None) -> Noi
     rho = _correlation(ordinates, each)
     level = float(np.sqrt(ordinates.variance(rho)))
     error = float(np.sqrt(0.5 / (each * power.size)))
+    errors = np.array(ordinates.errors(rho) if rho else (0.0, 0.0)) / np.sqrt(each)
     if remainders is not None and remainders.level < level * (1.0 + 3.0 * error):
         return remainders
     return Noise(
         rho,
         level=level,
-        level_error=error,
-        correlation_error=ordinates.errors(rho)[0] / float(np.sqrt(each)) if rho else 0.0,
+        level_error=max(error, float(errors[1])),
+        correlation_error=float(errors[0]),
         source="spectrum above the motion",
-        is_bound=True,
+        is_bound=rho == 0.0,
     )
 
 

@@ -145,6 +145,8 @@ class _Stopwatch(event.Listener):  # type: ignore[misc]
         self.starts.append(self.clock())
 
     def on_end(self, event: Any) -> None:
+        if not self.starts:  # it was being compiled before this clock began
+            return
         begun = self.starts.pop()
         if not self.starts:
             self.seconds += self.clock() - begun

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.input import Input
+from bayesimpact.data.read import load_campaign
 from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.diagnose import diagnose
+from bayesimpact.diagnosis.posed_anew import band_limited
+from bayesimpact.inference.identify import identify
 
 MASS, C1, K1 = 0.5, 0.6, 800.0
 INTERVAL, NOISE = 4e-3, 5e-6
@@ -31,6 +37,19 @@ def shaken(lines: bool) -> Campaign:
     samples = moved + NOISE * rng.standard_normal(t.size)
     recording = Recording("a", "", samples, INTERVAL, input=Input(drive))
     return Campaign("shaken", MASS, (recording,), stop=False)
+
+
+def test_a_stated_hold_stands(tmp_path: Path) -> None:
+    (recording,) = shaken(lines=False).recordings
+    assert recording.input is not None
+    stated = replace(recording, input=replace(recording.input, lines_stated=True))
+    for one, said in ((recording, False), (stated, True)):
+        campaign = replace(shaken(lines=False), recordings=(one,))
+        again = load_campaign(campaign.save(tmp_path / str(said)).parent)
+        given = again.recordings[0].input
+        assert given is not None and given.lines_stated is said
+        fit = identify(again, rng=np.random.default_rng(0), search=False).fit
+        assert (band_limited(fit) is None) is said
 
 
 @pytest.mark.parametrize("lines", [True, False])

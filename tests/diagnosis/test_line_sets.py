@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -68,6 +69,15 @@ def test_a_force_slower_than_the_motion_is_asked_for_in_flight(shaken: Fit) -> N
     assert found.reduced_chi2 < 1.1
 
 
+def test_a_recording_that_tells_nothing_takes_nothing_from_the_amplitude(shaken: Fit) -> None:
+    """In flight a short one may have no stretch at all."""
+    first, second, *others = shaken.target.oscillator.campaign.recordings
+    short = replace(second, used=np.arange(second.samples.size) < 60)
+    fit = shaken.with_recordings((first, short, *others))
+    value = asked_for(fit, flight=True)[0].values
+    assert value["harmonic_forcing.amplitude"] == pytest.approx(STRONG["amplitude"], rel=0.05)
+
+
 @pytest.mark.parametrize(
     "campaign",
     [
@@ -111,7 +121,9 @@ def test_a_refused_line_is_worth_something_on_the_way_where_it_was_asked_for(
 ) -> None:
     search = Unlisted((FORCE,), None, np.random.default_rng(0), print)  # type: ignore[arg-type]
     search.is_shaken = is_shaken
-    refused: Any = SimpleNamespace(log_evidence=-np.inf, refused=50.0, price=lambda cost: cost)
+    refused: Any = SimpleNamespace(
+        effects=(FORCE,), log_evidence=-np.inf, refused=50.0, price=lambda cost: cost
+    )
     worth = 50.0 - search.cost if is_shaken else -np.inf
     assert search.promise(refused) == worth
 

@@ -117,6 +117,21 @@ def test_a_line_of_a_driven_recording_is_its_motion(driven: bool) -> None:
 
 
 @pytest.mark.parametrize("line", ["sensor_hum", "harmonic_forcing"])
+@pytest.mark.parametrize("size", [0.05, 0.2, 1.0, 3.0])
+def test_a_line_far_from_the_motion_is_one_however_strong_it_is(line: str, size: float) -> None:
+    """Where it is the strongest of all lines of a recording, it is not its own motion."""
+    t = INTERVAL * np.arange(2000)
+    samples = np.exp(-5.0 * t) * np.cos(60 * np.pi * t) + size * np.cos(100 * np.pi * t + 0.4)
+    oscillator = SimpleNamespace(
+        campaign=SimpleNamespace(recordings=(Recording("a", "", samples, INTERVAL),)),
+        acting=(BY_ID[line],),
+    )
+    values = {f"{line}.frequency": 50.0}
+    fit = SimpleNamespace(target=SimpleNamespace(oscillator=oscillator), value=values.get)
+    assert not shakes_in_own_band(fit, remains=False)
+
+
+@pytest.mark.parametrize("line", ["sensor_hum", "harmonic_forcing"])
 @pytest.mark.parametrize(("apart", "refused"), [(0.5, True), (40.0, False)])
 def test_a_line_that_beats_with_the_motion_is_none_where_both_are_one_line(
     line: str, apart: float, refused: bool

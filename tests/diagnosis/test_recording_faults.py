@@ -116,6 +116,7 @@ def test_spikes_that_show_only_beside_the_physics_are_set_aside_too() -> None:
     )
     samples = campaign.recordings[1].samples.copy()
     for place in (130, 610):
+        # of 15 one lies within what the bends of a motion of 16 samples a period reach
         samples[place : place + 3] += 25 * small_rig.NOISE
     spoiled = replace(campaign.recordings[1], samples=samples)
     recordings = (campaign.recordings[0], spoiled, *campaign.recordings[2:])

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.stats import binom
 
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
@@ -47,7 +48,8 @@ def test_the_spectrum_above_the_motion_tells_level_and_colour(
     clean = decay(period, cubic)
     found = [unfiltered_noise(recordings(clean, correlation, seed)) for seed in range(8)]
     assert {n.source for n in found} == {"spectrum above the motion"}
-    assert all(n.is_bound for n in found)  # what a law makes of the motion may fill it
+    # what a law makes of the motion may fill it; of coloured noise it sees a part only
+    assert all(n.is_bound is (n.correlation == 0.0) for n in found)
     ratios = np.array([n.level / SIGMA for n in found])
     if not correlation:
         error = np.mean([n.level_error for n in found])
@@ -55,6 +57,16 @@ def test_the_spectrum_above_the_motion_tells_level_and_colour(
     # of coloured noise it sees what is faster than the motion, and errs to less and to whiter
     assert np.all((ratios > 0.5) & (ratios < 1.5))
     assert np.all([-0.3 < n.correlation < correlation + 0.2 for n in found])
+
+
+def test_white_noise_is_seldom_called_coloured() -> None:
+    clean, count = decay(12.0), 400
+    calls = 0
+    for seed in range(count):
+        found = fast_noise(recordings(clean, 0.0, 1000 + seed), None)
+        assert found is not None
+        calls += found.correlation != 0.0
+    assert calls <= binom.isf(1e-3, count, 0.01)
 
 
 def test_polynomials_tell_the_noise_of_a_slow_motion() -> None:

@@ -20,7 +20,13 @@ from numpy.typing import NDArray
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.faults.fault import Fault
 from bayesimpact.data.faults.find import applied
-from bayesimpact.diagnosis.faults.alone import Alone, SharedModel, fit_alone, inverted
+from bayesimpact.diagnosis.faults.alone import (
+    Alone,
+    SharedModel,
+    fit_alone,
+    inverted,
+    own_fit,
+)
 from bayesimpact.diagnosis.faults.correct import as_fault, corrected
 from bayesimpact.diagnosis.faults.slip import find_shift, slip_fault
 from bayesimpact.diagnosis.faults.together import (
@@ -194,7 +200,8 @@ def _slips(
     least = largest_by_chance(misfit, fit.target.likelihood.sizes, model.noise)
     for i in np.flatnonzero(misfit > least):
         known = alone[recordings[i].name]
-        shifted = find_shift(campaign, recordings[i], model, None if known is None else known.fit)
+        own = known.fit if known is not None else own_fit(campaign, recordings[i], model)
+        shifted = find_shift(campaign, recordings[i], model, own)
         if shifted is None or shifted[1].reduced_chi2 > least[i]:
             continue
         fault = slip_fault(recordings[i], shifted[0])
