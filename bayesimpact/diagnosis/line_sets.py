@@ -194,6 +194,8 @@ def _with_line(problem: LikelySets, best: _Line, effect: Effect) -> EffectSet | 
     parts = np.array([[values.pop(f"{part}[{n}]") for part in ("sine", "cosine")]
                       for n in recordings])  # fmt: skip
     told = np.array([float(np.sum(one**2)) for one in waves])
+    told[told < SEEN * told.max()] = 0.0  # rounding: no stretch, or one that its rest explains
+    parts[told == 0.0] = 0.0
     size = float(np.sqrt(told @ np.sum(parts**2, axis=1) / told.sum()))
     values[instance_name(effect, effect.parameter("amplitude"), None)] = size
     for name, (sine, cosine) in zip(recordings, parts, strict=True):
