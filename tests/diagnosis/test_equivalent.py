@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 import small_rig
 from effect_rigs import BY_ID
 
+from bayesimpact.diagnosis import refit
 from bayesimpact.diagnosis.equivalent import equivalent
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.refit import Candidate, exchanged, fit_from
+from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.identify import identify
+from bayesimpact.inference.mode import find_mode
 from bayesimpact.model.effects.effect import Scales
 
 DRAG, POWER = BY_ID["quadratic_drag"], BY_ID["power_damping"]
@@ -55,9 +59,19 @@ def test_what_is_no_force_of_place_and_speed_has_no_equal(
     assert equivalent(POWER, BY_ID[other], candidate.fit, scales) == {}
 
 
-def test_an_exchange_begins_there(dragged: tuple[Candidate, Scales]) -> None:
+def test_an_exchange_begins_there(
+    dragged: tuple[Candidate, Scales], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """From none at all a drag came to rest there, and the free power was named in its place."""
     candidate, scales = dragged
+    starts: list[float] = []
+
+    def climb(target: Target, start: np.ndarray, **options: Any) -> Fit:
+        starts.append(float(start[target.oscillator.layout.index("quadratic_drag.coefficient")]))
+        return find_mode(target, start, **options)
+
+    monkeypatch.setattr(refit, "find_mode", climb)
     found = exchanged(candidate, POWER, DRAG, scales)
+    assert starts[0] == pytest.approx(COEFFICIENT, rel=0.2)
     assert found.fit.log_likelihood > candidate.fit.log_likelihood - 2.0
     assert found.fit.value("quadratic_drag.coefficient") == pytest.approx(COEFFICIENT, rel=0.05)

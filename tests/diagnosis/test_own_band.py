@@ -137,7 +137,7 @@ def test_a_line_that_beats_with_the_motion_is_none_where_both_are_one_line(
     line: str, apart: float, refused: bool
 ) -> None:
     """Nobody knows then which of the two the mass makes by itself: a spring that a shaker moved was
-    named a hum of 30 % of the motion, its own motion taken for the shaker's.
+    named a hum, its own motion taken for the shaker's.
     """
     oscillator = SimpleNamespace(
         campaign=SimpleNamespace(recordings=(decay(30.0, 30.0),)), acting=(BY_ID[line],)

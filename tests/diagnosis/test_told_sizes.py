@@ -43,7 +43,7 @@ def found() -> Fit:
 def test_an_effect_is_not_named_whose_interval_holds_none(
     found: Fit, sd: float, verdict: Verdict, named: str, kept: list[str]
 ) -> None:
-    """A drift was needed by every likely model, from -0.8 to 1.8 % in 40 s."""
+    """A drift was needed by every likely model, and its interval held none."""
     ranges = intervals(found)
     i = found.names.index("stiffness_drift.rate")
     mean, covariance = ranges.mean.copy(), ranges.covariance.copy()
