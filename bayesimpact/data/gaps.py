@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.data.clock import JITTER, even_interval
+from bayesimpact.data.clock import JITTER, even_interval, rounded_interval
 from bayesimpact.data.period import crossing_period
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
@@ -26,11 +26,6 @@ BRIDGED = 0.3  # of a period: up to here a cubic bridges a gap
 PERIODS = 3.0  # that have to come before a long gap to tell what a recording does
 NEAR = 6  # samples on either side that tell its ends
 LEAST = 0.2  # of a recording's samples that have to be left
-# Steps of two units: so many are spread evenly by a clock that is slow, but not by chance (of five
-# places drawn at random 0 of 2,000 draws kept within `EVENLY`, of four 1 %)
-FEW_STEPS = 5
-# Units that the stamps of a slow clock differ by from even ones, and a little for the fit of a line
-EVENLY = 1.2
 GAP = 2.5  # typical intervals between two stamps: more is a gap
 
 
@@ -230,7 +225,7 @@ def on_even_clock(
         found = f"time that does not increase ({times[i + 1]:.9g} s after {times[i]:.9g} s)"
         raise InputError(f"{path}, {place} {rows[i + 1]}", found, "times that increase")
     typical = float(np.mean(steps[steps <= GAP * np.median(steps)]))
-    interval = _rounded_interval(times, steps)
+    interval = rounded_interval(times, steps)
     if interval is not None:
         return Even(samples, interval, None)
     missing = _missing_rows(times, samples, steps)
@@ -258,23 +253,3 @@ def _missing_rows(times: Array, samples: Array, steps: Array) -> Even | None:
     used[place] = True
     values = np.interp(np.arange(used.size), place, samples)
     return Even(bridged(values, used), float(slope), used)
-
-
-def _rounded_interval(times: Array, steps: Array) -> float | None:
-    """Interval of an even clock whose stamps were rounded to a coarse unit; None for any other.
-
-    Where most steps are one unit, longer ones are missing rows, unless as evenly spread as the
-    steps of a clock that is a little slow.
-    """
-    count = np.arange(times.size)
-    slope, first = np.polyfit(count, times - times[0], 1)
-    late = times - times[0] - first - slope * count
-    unit = float(np.diff(np.unique(np.round(steps, 9))).min(initial=np.inf))
-    whole = np.abs(steps / unit - np.round(steps / unit)).max() < 1e-3
-    if not (whole and np.abs(late).max() <= unit and np.ptp(steps) <= 1.5 * unit):
-        return None
-    ones = np.median(steps) < 1.5 * unit
-    longer = int(np.sum(steps > 1.5 * unit))
-    if ones and (longer < FEW_STEPS or np.ptp(late) > EVENLY * unit):
-        return None
-    return float(slope)

@@ -24,7 +24,7 @@ from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.search import Generation, SearchResult, metropolis_differential_evolution
-from bayesimpact.model.effects.effect import EffectParameter, Scales
+from bayesimpact.model.effects.effect import Effect, EffectParameter, Scales
 from bayesimpact.model.oscillator import Oscillator
 from bayesimpact.model.parameters import is_added
 from bayesimpact.response.driven_displacement import seen_displacement
@@ -133,7 +133,9 @@ class FirstCycles:
         short = campaign.excerpt(CYCLES * period).thinned(CYCLES * period / SAMPLES)
         self.short = replace(target.oscillator, campaign=short)
         self.guess, self.elsewhere = _at_excerpt(self.short, guess, period)
-        self.physical = layout.roles("physical", "effect")
+        refined = {n for e in target.oscillator.acting for n in further_sizes(e)}
+        searched = [i for i in layout.roles("physical", "effect") if layout.names[i] not in refined]
+        self.physical = np.array(searched, dtype=np.int64)
         self.logarithmic = lower[self.physical] > 0.0
         self.lower, self.upper = self._coded(lower), self._coded(upper)
         self.steps = STEP * np.maximum(np.maximum(np.abs(guess), np.abs(upper) * 1e-3), 1e-12)
@@ -165,6 +167,16 @@ class FirstCycles:
         return np.where(np.isfinite(value), value, np.inf)
 
 
+def further_sizes(effect: Effect) -> list[str]:
+    """Names of an effect's sizes beyond the first, where none is one of several.
+
+    Without them it is a simpler law of the same kind, from which a climb finds them; a search that
+    looks for them too more often ends in a lesser mode.
+    """
+    sizes = [p for p in effect.parameters if p.is_size and p.null is not None]
+    return [f"{effect.id}.{p.name}" for p in sizes[1:]]
+
+
 def _at_excerpt(short: Oscillator, guess: Array, period: float) -> tuple[Array, list[int]]:
     """The guess (d,) with the states in which excerpts of driven recordings begin; their places."""
     moved, places = guess.copy(), []
@@ -186,17 +198,16 @@ def _bounds(
 ) -> tuple[Array, Array, Array]:
     """Guess and bounds of the search, (d,) each."""
     layout, priors = target.oscillator.layout, target.priors
-    owners = {
-        f"{e.id}.{p.name}": p
-        for e in target.oscillator.acting
-        for p in e.parameters
-        if p.fixed is None
-    }
+    effects = target.oscillator.acting
+    owners = {f"{e.id}.{p.name}": p for e in effects for p in e.parameters if p.fixed is None}
+    refined = {name for effect in effects for name in further_sizes(effect)}
     guess, lower, upper = (np.zeros(layout.size) for _ in range(3))
     for i, parameter in enumerate(layout.parameters):
         bare = parameter.name.split("[")[0]
         if is_added(parameter.name):
             guess[i], lower[i], upper[i] = _range(owners[bare], scales)
+            if bare in refined:
+                guess[i] = owners[bare].null
         else:
             guess[i] = estimates.start(parameter.name, noise.level)
             lower[i], upper[i] = sorted((guess[i] / WIDE, guess[i] * WIDE))
@@ -213,7 +224,7 @@ def _range(parameter: EffectParameter, scales: Scales) -> tuple[float, float, fl
     scale = parameter.scale(scales)
     if parameter.grid is not None:
         grid = parameter.grid(scales)
-        return scale, 0.5 * float(grid.min()), 1.5 * float(grid.max())
+        return scale, 0.5 * float(grid.min()), float(grid.max())
     if parameter.lower >= 0.0:
         return scale, SIZES[0] * scale, SIZES[1] * scale
     return parameter.null or 0.0, -SIZES[1] * scale, SIZES[1] * scale

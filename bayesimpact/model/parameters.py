@@ -16,13 +16,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.campaign import SECOND_STOP, Campaign
 from bayesimpact.data.channels import keepers
 from bayesimpact.data.quantity import reading_unit
 from bayesimpact.data.recording import Recording
 from bayesimpact.data.short_repr import short_repr
 from bayesimpact.errors import InputError
 from bayesimpact.model.effects.effect import Effect, EffectParameter, catalogued
+from bayesimpact.model.second_stop import DECLARED
 
 BASE_SLOTS = ("c1", "k1", "c2", "g", "k2", "y0", "v0", "A", "w", "phase", "offset")
 ADDED_SLOTS = (
@@ -104,7 +105,7 @@ def declared_effects(campaign: Campaign) -> tuple[Effect, ...]:
     """Effects of a campaign's base model; `InputError` for an id not in the catalogue."""
     found = []
     for id in campaign.declared:
-        effect = catalogued(id)
+        effect = DECLARED if id == SECOND_STOP else catalogued(id)
         if effect is None:
             raise InputError(f"campaign {campaign.name!r}, declared", id, "an id of the catalogue")
         found.append(effect)

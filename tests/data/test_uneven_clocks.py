@@ -17,7 +17,7 @@ from nptdms import ChannelObject, TdmsWriter
 from scipy.io import savemat
 
 import bayesimpact as bi
-from bayesimpact.data.gaps import FEW_STEPS, _rounded_interval
+from bayesimpact.data.clock import FEW_STEPS, rounded_interval
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 
@@ -144,7 +144,7 @@ def test_rows_that_are_missing_by_chance_are_not_spread_evenly() -> None:
     for _ in range(300):
         kept = np.setdiff1d(np.arange(6000), rng.choice(np.arange(1, 5999), FEW_STEPS, False))
         times = 0.01 * kept
-        alike += _rounded_interval(times, np.diff(times)) is not None
+        alike += rounded_interval(times, np.diff(times)) is not None
     assert alike < 3
 
 
@@ -154,6 +154,29 @@ def test_stamps_of_a_slow_clock_lack_no_rows() -> None:
     samples = -6.0 * np.exp(-0.15 * times) * np.cos(2 * np.pi * 6.4 * times)
     read = _in_memory(np.round(times, 3), samples)
     assert read.used is None and read.interval == pytest.approx(1 / 995.0, rel=1e-4)
+
+
+@pytest.mark.parametrize(("rate", "digits"), [(120.0, 3), (995.0, 3), (24.0, 2)])
+def test_an_even_clock_in_a_coarse_unit_needs_no_key(
+    tmp_path: Path, rate: float, digits: int
+) -> None:
+    """120 Hz in milliseconds: up to 6 % of an interval off; stamps moved by two are refused."""
+    times = np.arange(1200) / rate
+    samples = -6.0 * np.exp(-0.15 * times) * np.cos(2 * np.pi * rate / 85.0 * times)
+
+    def write(stamps: np.ndarray) -> None:
+        rows = (f"{t:.{digits}f},{y:.6f}" for t, y in zip(stamps, samples, strict=True))
+        (tmp_path / "a.csv").write_text("\n".join(["time_s,displacement_mm", *rows]) + "\n")
+
+    write(times)
+    read = _read(tmp_path, "a.csv", "")
+    assert read.used is None and read.interval == pytest.approx(1 / rate, rel=1e-4)
+    np.testing.assert_allclose(read.samples, 1e-3 * samples, rtol=0, atol=1e-9)
+    moved = times.copy()
+    moved[600:] += 2 * 10.0**-digits
+    write(moved)
+    with pytest.raises(InputError, match="resample = true"):
+        _read(tmp_path, "a.csv", "")
 
 
 def test_samples_in_memory_are_resampled_as_a_csv(tmp_path: Path) -> None:

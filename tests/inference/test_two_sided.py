@@ -74,6 +74,21 @@ def test_the_mode_is_the_truth(
     assert fit.reduced_chi2 == pytest.approx(1.0, abs=0.15)
 
 
+def test_the_second_stop_has_a_damper_of_its_own() -> None:
+    """Against the independent rig, which knows it as a second spring with damping."""
+    second = {**SECOND, "damping": 4.0}
+    chain = small_rig.Chain(noise=5e-6, offsets={"a": 1e-5, "b": 0.0, "c": 0.0})
+    campaign = small_rig.record(3, {"spring_piecewise": second}, chain=chain, duration=1.5)
+    fit = identify(
+        replace(campaign, declared=(SECOND_STOP,)), rng=np.random.default_rng(0), search=False
+    ).fit
+    names = [f"opposite_stop.{name}" for name in second]
+    sd = [fit.sd[fit.names.index(name)] for name in names]
+    off = [(fit.value(n) - v) / s for n, v, s in zip(names, second.values(), sd, strict=True)]
+    assert np.abs(off).max() < 4.0 and fit.reduced_chi2 == pytest.approx(1.0, abs=0.15)
+    assert sd[-1] < 0.1 * second["damping"]
+
+
 def test_a_prior_beyond_all_estimates_is_searched() -> None:
     """And not left, however bad the fit: no estimate puts k1 above 40 kN/m."""
     prior = {"distribution": "uniform", "lower": 1e5, "upper": 2e5}

@@ -4,7 +4,7 @@ Equation: ks (y + gs) where y < -gs; ks in N/m, gs in m (for angles N m/rad, rad
 At its null: ks = 0 is the base model; gs then means nothing.
 Energy: conserves; potential ks (y + gs)^2 / 2.
 Valid: a frame, cable or end of a guide that is reached at large amplitude; elastic, without loss
-of its own; where campaign.toml says that there is no stop at all, none is looked for.
+of its own; the only stop where campaign.toml says that there is none.
 Its absence shows in the first cycles only, as half-periods on that side which are too long.
 Source: Shaw and Holmes 1983, J. Sound Vib. 90:129 (piecewise linear oscillators).
 Status: period checked against the closed form, energy conserved to rounding; compiled law against
@@ -42,7 +42,7 @@ EFFECT = Effect(
     regime="free",
     energy="conserves",
     statement=(
-        "Large amplitudes meet a second stop on the other side; it adds up to {size} "
+        "Large displacements to the negative side meet an elastic stop; it adds up to {size} "
         "({share} of the peak elastic force)."
     ),
     parameters=(
@@ -57,6 +57,5 @@ EFFECT = Effect(
         ),
     ),
     law=Law(force, surface=surface, polynomial=True, ignores_speed=True),
-    # a rig that is said to have no stop has no second one: there two of these imitate a detent
-    condition=lambda s: s.cases > 0,
+    replaces="second stop",  # a rig has one end of its travel on that side
 )

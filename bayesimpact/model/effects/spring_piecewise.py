@@ -6,8 +6,7 @@ At its null: kp = 0 with cp = 0 is the base model; gp then means nothing. cp = 0
 which is simpler and preferred.
 Energy: dissipates cp v^2 beyond the clearance; the spring's potential is kp (y + gp)^2 / 2.
 Valid: a bumper, a cable or a guide that is met at large amplitude and takes energy; a linear pair
-of spring and damper, which may pull for a moment when it is left; where campaign.toml says that
-there is no stop at all, none is looked for.
+of spring and damper, which may pull for a moment when it is left.
 Its absence shows in the first cycles only, as half-periods on that side which are too long and a
 loss that ends with them.
 Source: Shaw and Holmes 1983, J. Sound Vib. 90:129 (piecewise linear oscillators).
@@ -45,7 +44,8 @@ EFFECT = Effect(
     regime="free",
     energy="dissipates",
     statement=(
-        "Large amplitudes meet a second spring and damper on the other side; they add up to {size} "
+        "Large displacements to the negative side meet a second spring and damper, which add up to "
+        "{size} "
         "({share} of the peak elastic force)."
     ),
     parameters=(
@@ -67,7 +67,6 @@ EFFECT = Effect(
         ),
     ),
     law=Law(force, surface=surface, jump_at_surface=True, polynomial=True),
-    # a rig that is said to have no stop has no second one: there two of these imitate a detent
-    condition=lambda s: s.cases > 0,
+    replaces="second stop",  # a rig has one end of its travel on that side
     prefer="opposite_stop",
 )

@@ -205,8 +205,6 @@ def test_admissible_only_where_it_could_show():
     assert {e.id for e in EFFECTS if e.admissible(replace(silent, driven=False))} == of_any - {
         "input_delay"
     }
-    assert not BY_ID["opposite_stop"].admissible(replace(scales, cases=0))
-    assert not BY_ID["spring_piecewise"].admissible(replace(scales, cases=0))
     assert not BY_ID["gap_wear"].admissible(replace(scales, impacts=1))
     assert not BY_ID["contact_damping_per_case"].admissible(replace(scales, cases=1))
     assert not BY_ID["gap_per_recording"].admissible(replace(scales, recordings=1))
