@@ -8,6 +8,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+import numpy as np
+
+from bayesimpact.data.gaps import runs
 from bayesimpact.data.input import UNITLESS
 from bayesimpact.data.input import UNITS as INPUT_UNITS
 from bayesimpact.data.period import crossing_period
@@ -33,6 +36,7 @@ NEAR = 2e-3
 def doubts_of(entry: RecordingTable, table: Table, recording: Recording) -> list[str]:
     """What a user should look at in how an entry of campaign.toml was read, in words."""
     found = [_clock(recording)] if table.assumed_seconds else []
+    found.append(_hole(entry, table, recording))
     found.append(_scale("its readings are", entry.scale, table.unit, units_like(table.unit)))
     given = entry.input
     if given is not None:
@@ -61,6 +65,24 @@ def likely_unit(period: float) -> str:
     """Unit of a clock that makes of `period`, read in s, one of an oscillator in a building."""
     finer = (unit for unit, size in TIME_UNITS.items() if size < 1.0 and period * size <= SLOWEST)
     return next(finer, "s")
+
+
+def _hole(entry: RecordingTable, table: Table, recording: Recording) -> str:
+    """The longest gap in a file's own readings; "" where there is none of two or more."""
+    if table.used is None:
+        return ""
+    holes = [(end - first, first, end) for first, end in runs(~table.used) if end - first > 1]
+    if not holes:
+        return ""
+    _, first, end = max(holes)
+    begin, until = (table.start + i * table.interval for i in (first - 1, end))
+    text = f"its file has no readings between {begin:.4g} and {until:.4g} s"
+    if len(holes) > 1:
+        text += f", nor in {len(holes) - 1} shorter gaps"
+    asked = -np.inf if entry.start_s is None else entry.start_s
+    if recording.start > max(asked, table.start) + 0.5 * table.interval:
+        text += f"; it is read from {recording.start:.4g} s on, for few readings lie before"
+    return text
 
 
 def _clock(recording: Recording) -> str:

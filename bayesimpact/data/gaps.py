@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -71,6 +72,30 @@ def before_gap(recording: Recording) -> Recording:
         if first > 0 and end - first > max(BRIDGED * period, 2.0):
             return recording.part(0, first) if first >= PERIODS * period else recording
     return recording
+
+
+def after_lone_readings(recording: Recording) -> Recording:
+    """The recording without readings before a gap that are too few to tell how the motion goes on.
+
+    A mass may be released in such a gap: one reading at rest says nothing of what follows. The gap
+    is one that no cubic bridges.
+    """
+    if recording.used is None:
+        return recording
+    used, begin = recording.used, 0
+    long = max(BRIDGED * (_period(recording.samples, used) or np.inf), 2.0)
+    for (first, end), (following, _) in pairwise(runs(used)):
+        if end - first >= NEAR or following - end <= long:
+            break
+        begin = following
+    return recording.part(begin, used.size) if begin else recording
+
+
+def shown_period(recording: Recording) -> float | None:
+    """Rough period, s, of the longest stretch of samples that count; None where none shows one."""
+    used = np.ones(recording.samples.size, bool) if recording.used is None else recording.used
+    period = _period(recording.samples, used)
+    return None if period is None else period * recording.interval
 
 
 def _period(samples: Array, used: Mask) -> float | None:

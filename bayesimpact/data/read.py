@@ -20,7 +20,7 @@ from bayesimpact.data.channels import check_channels
 from bayesimpact.data.doubts import doubts_of, scaled_units
 from bayesimpact.data.entries import filled_in
 from bayesimpact.data.foreign import file_bytes, is_foreign, read_foreign
-from bayesimpact.data.gaps import excluded_spans
+from bayesimpact.data.gaps import after_lone_readings, excluded_spans
 from bayesimpact.data.input_column import input_of, with_input
 from bayesimpact.data.period import crossing_period
 from bayesimpact.data.prior_bounds import check_prior, parameter_ranges, prior_names
@@ -260,6 +260,7 @@ def _recording(
     )
     key = "exclude_s" if entry.exclude_s else "resample"
     recording = excluded_spans(f"{where}, key {key}", recording, entry.exclude_s or ())
+    recording = after_lone_readings(recording)
     _check_motion(source, recording)
     if entry.clock_ratio is None:
         return recording

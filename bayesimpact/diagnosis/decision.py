@@ -3,9 +3,10 @@
 Let S be the likeliest set of effects that the search reached.
 
 1. S leaves nothing that stands out from the noise (`State.is_white`):
-   `adequate` when S is empty; `unknown` when one free force in the place of all effects beats S by
-   the decisive odds; `ambiguous` when another set comes within these odds, or the search ended by
-   its limit before all that might were fitted; else `named`.
+   `adequate` when S is empty, or `unknown` where the base model leaves more than half of the signal
+   to coloured noise, which the motion may be itself; `unknown` when one free force in the place of
+   all effects beats S by the decisive odds; `ambiguous` when another set comes within these odds,
+   or the search ended by its limit before all that might were fitted; else `named`.
 2. Something remains beside S. All odds are those with a force of time beside every hypothesis,
    where what the model nearest to the recordings leaves beside one is noise.
    Nothing is needed where a free force in the place of all effects leaves `EXCESS` times less of
@@ -47,6 +48,7 @@ from typing import Literal
 import numpy as np
 
 from bayesimpact.diagnosis.directions import is_periodic
+from bayesimpact.diagnosis.faults.compare import base_failed
 from bayesimpact.diagnosis.learned import may_restate
 from bayesimpact.diagnosis.naming import Naming, State
 from bayesimpact.diagnosis.refit import Candidate
@@ -90,7 +92,9 @@ def decide(naming: Naming) -> Decision:
     effects = ordered(naming, chosen.candidate.effects)
     if chosen.is_white:
         if not effects:
-            return Decision("adequate", ())
+            fit = chosen.candidate.fit
+            hidden = base_failed(fit) and fit.target.likelihood.noise.correlation > 0.0
+            return Decision("unknown" if hidden else "adequate", ())
         if naming.prefers_learned_force():
             return Decision("unknown", ())
         rivals = naming.rivals()

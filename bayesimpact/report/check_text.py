@@ -6,7 +6,7 @@ import numpy as np
 
 from bayesimpact.data.campaign import SECOND_STOP, Campaign
 from bayesimpact.data.faults.start import GROWTH
-from bayesimpact.data.period import crossing_period
+from bayesimpact.data.gaps import shown_period
 from bayesimpact.data.recording import Recording
 from bayesimpact.data.text_table import text_table
 from bayesimpact.inference.noise import Noise
@@ -75,7 +75,7 @@ def campaign_warnings(campaign: Campaign, noise: Noise | None) -> list[str]:
 
 
 def _recording_warnings(recording: Recording, *, stop: bool) -> list[str]:
-    period = crossing_period(recording.samples, recording.interval)
+    period = shown_period(recording)
     assert period is not None  # load_campaign refuses recordings without one
     warnings = []
     per_period = period / recording.interval
@@ -115,7 +115,7 @@ def _recordings_block(campaign: Campaign) -> str:
     rows = [[*head, f"rest {' or '.join(units)}", "first", "largest", "decay"]]
     for r in campaign.recordings:
         scale, _ = _shown(r)
-        period = crossing_period(r.samples, r.interval)
+        period = shown_period(r)
         rest = _rest(r)
         shown = [rest, r.samples[0] - rest, np.abs(r.samples - rest).max()]
         numbers = [1 / r.interval, r.start, r.duration, period, *(x * scale for x in shown)]
@@ -154,7 +154,7 @@ def _shown(recording: Recording) -> tuple[float, str]:
 def envelope_bars(recording: Recording) -> str:
     """Largest excursion in equal spans of time of a period or more, as a row of bars."""
     excursion = np.abs(recording.samples - _rest(recording))
-    period = crossing_period(recording.samples, recording.interval) or recording.duration
+    period = shown_period(recording) or recording.duration
     count = min(COLUMNS, max(1, int(recording.duration / period)))
     spans = np.array_split(excursion, count)
     heights = np.array([span.max() for span in spans]) / excursion.max()
