@@ -3,7 +3,7 @@
 Where strong physics is missing from the base model, a clock or a gain that is off in one recording
 is lost beside it; and a search for physics that does not know of it adds law after law. Beside the
 law that the equation of motion asks for first, or periods ahead where that tells nothing, it may be
-all that is left: then every recording by itself leaves nothing, and all of them together do not
+all that is left: then most recordings by themselves leave nothing, and all of them together do not
 agree. What a stop does is asked of periods ahead, of recordings that each have a stop of their own,
 so that no wrong label has a part in it.
 """
@@ -17,7 +17,7 @@ import numpy as np
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.diagnosis.extend import campaign_scales, extend
 from bayesimpact.diagnosis.faults.alone import SharedModel, own_fit
-from bayesimpact.diagnosis.faults.compare import LEAST, Compared, base_failed, gain, misfits
+from bayesimpact.diagnosis.faults.compare import LEAST, SHARE, Compared, base_failed, gain, misfits
 from bayesimpact.diagnosis.faults.correct import as_fault, corrected
 from bayesimpact.diagnosis.faults.own_stops import (
     share_stops,
@@ -75,7 +75,7 @@ def faults_beside_physics(
             return ()  # physics is enough
         values = values_of(whole)
         model = SharedModel(noise, chosen.effects, values)
-        if not all(_leaves_nothing(own_fit(campaign, r, model)) for r in campaign.recordings):
+        if not _most_leave_nothing(campaign, model):
             continue
         steps = comparisons(before, as_read, chosen.effects, values)
         if steps and _leaves_nothing(model.fitted(steps[-1][-1].campaign)):
@@ -121,6 +121,18 @@ def _left_by(chosen: EffectSet, own: Layout, campaign: Campaign, noise: Noise) -
     values = shared_values(chosen.values, own, shared)
     found = SharedModel(noise, chosen.effects, values).fitted(campaign)
     return np.inf if found is None else found.reduced_chi2
+
+
+def _most_leave_nothing(campaign: Campaign, model: SharedModel) -> bool:
+    """Whether what recordings leave alone is no more than noise, but for as many as may be faulty:
+    one with samples lost does not fit alone either.
+    """
+    may_be_faulty = int(SHARE * len(campaign.recordings))
+    for recording in campaign.recordings:
+        may_be_faulty -= not _leaves_nothing(own_fit(campaign, recording, model))
+        if may_be_faulty < 0:
+            return False
+    return True
 
 
 def _leaves_nothing(fit: Fit | None) -> bool:

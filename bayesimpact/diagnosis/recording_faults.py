@@ -58,7 +58,18 @@ class Corrected:
         """Faults that were set aside or corrected."""
         kept = self.identification.fit.target.oscillator.campaign.keep_faults
         own = () if kept else tuple(f for f in self.own if f.action != "notice")
-        return (*own, *(c.fault for c in self.compared))
+        return (*own, *(c.fault for c in self.told))
+
+    @property
+    def told(self) -> tuple[Compared, ...]:
+        """Comparisons, without those that a later one of the same kind covers: a start that was
+        cut once and then again.
+        """
+        return tuple(
+            c
+            for i, c in enumerate(self.compared)
+            if not any(covers(later.fault, c.fault) for later in self.compared[i + 1 :])
+        )
 
     @property
     def is_open(self) -> bool:
@@ -67,6 +78,14 @@ class Corrected:
         Of two recordings of a stop that differ neither is the faulty one.
         """
         return any(_others(c) for c in self.compared)
+
+
+def covers(fault: Fault, other: Fault) -> bool:
+    """Whether a fault is of the same kind and recording as another, and lies around it."""
+    same = (fault.id, fault.recording) == (other.id, other.recording)
+    return (
+        same and bool(fault.spans) and fault.start_s <= other.start_s <= other.end_s <= fault.end_s
+    )
 
 
 def cleaned_campaign(campaign: Campaign, *, rng: np.random.Generator, search: bool) -> Corrected:
@@ -218,7 +237,7 @@ def fault_entries(corrected: Corrected) -> list[dict[str, Any]]:
     return entries + [
         fault_document(c.fault)
         | {"action": "correct", "chi2_before": c.before, "chi2_after": c.after}
-        for c in corrected.compared
+        for c in corrected.told
     ]
 
 

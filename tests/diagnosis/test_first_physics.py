@@ -65,6 +65,25 @@ def test_a_gain_of_accelerations_shows_beside_what_periods_ahead_ask_for(gain):
     assert "+3" in fault.fault.statement or "+2.9" in fault.fault.statement
 
 
+def test_samples_lost_near_a_turning_point_show_beside_a_law_of_the_contact():
+    """A recording that lacks them fits no law by itself either."""
+    law = {"contact_power_law": {"exponent": 1.12}}
+    campaign = small_rig.record(7, law, duration=2.0)
+    first, second, *others = campaign.recordings
+    period = 2 * np.pi * float(np.sqrt(campaign.mass / small_rig.RIG.k1))
+    at = round(3.0 * period / second.interval)
+    at += int(np.argmin(second.samples[at : at + round(period / second.interval)]))
+    less = replace(second, samples=np.delete(second.samples, np.s_[at - 3 : at + 4]))
+    effects = tuple(BY_ID[i] for i in ("contact_power_law", "quadratic_drag", "spring_cubic"))
+    before = cleaned_campaign(
+        campaign := replace(campaign, recordings=(first, less, *others)),
+        rng=np.random.default_rng(0), search=False,
+    )  # fmt: skip
+    ((fault,),) = faults_beside_physics(before, campaign, effects)
+    assert fault.fault.id == "recording_slip" and fault.fault.recording == "b"
+    assert fault.fault.statement.startswith("7 samples lost") and fault.after < 1.2
+
+
 def test_without_a_fault_or_where_more_is_missing_none_is_found():
     assert found(timed(73, 1.0, FRICTION)) == ()
     assert found(timed(74, 1.004, FRICTION | BUMP)) == ()

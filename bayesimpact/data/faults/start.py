@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.ndimage import median_filter
+from scipy.stats import norm
 
-from bayesimpact.data.faults.fault import Array, Fault, amount, file_time
+from bayesimpact.data.faults.fault import FALSE_ALARM, Array, Fault, amount, file_time
 from bayesimpact.data.faults.flat import reading_step
 from bayesimpact.data.hum import find_hum
 from bayesimpact.data.period import crossing_period, noise_level
@@ -28,6 +29,8 @@ NARROW = 1 / 8  # of a period, at most: a wider one bends the motion
 UNCROSSED = 0.75  # of a period: a free motion passes its rest within half a period
 GROWTH = 1.3  # largest excursion over what came before it, on either side
 WINDOW = 1 / 25  # of a period, in which a speed is told; two samples at least
+RELEASES = np.linspace(0.5, 0.95, 10)  # of a stretch that keeps to the band
+DRIFT = 0.2  # of the band: a parabola through it takes a quarter in the first half of the time
 SLOW = 1 / 3  # of a linear free motion's speed: those of a pendulum to 160 degrees are above half
 
 
@@ -35,10 +38,11 @@ def find_start(recording: Recording) -> list[Fault]:
     """The sample from which on the motion can be a free decay, where that is not the first one.
 
     Rest: the readings keep to the first one for longer than a free motion can about a turning
-    point, sqrt(2 b / A) of a radian for a band b and an amplitude A; where the motion is largest
-    soon after, and by far, the decay begins there. Hand: the largest excursion comes late and
-    exceeds what came before on its side, or the first turning point is reached from a speed with
-    which a free motion would not get there; the free decay begins where that is left.
+    point, sqrt(2 b / A) of a radian for a band b and an amplitude A, and do not move on
+    meanwhile; where the motion is largest soon after, and by far, the decay begins there. Hand: the
+    largest excursion comes late and exceeds what came before on its side, or the first turning
+    point is reached from a speed with which a free motion would not get there; the free decay
+    begins where that is left.
     """
     if recording.used is not None and not recording.used[:3].all():
         return []
@@ -64,7 +68,7 @@ def find_start(recording: Recording) -> list[Fault]:
         peak = _pushed(x - settled, band, period)
         hand = peak > 0
     rest = _leaves(x, peak if hand else 0, band, None if hum is None else hum.frequency)
-    if not hand and (moves or rest <= least):
+    if not hand and (moves or rest <= least or _moves_on(quiet[:rest], noise, band)):
         return []
     soon = not hand and largest < rest + LATE * period and order_of(recording.quantity) == 0
     moved = soon and _is_moved(x - settled, rest, band)
@@ -98,6 +102,33 @@ def _is_moved(centred: Array, rest: int, band: float) -> bool:
     """
     begun = float(np.abs(centred[rest - 1 : rest + 1]).max(initial=0.0))
     return bool(np.abs(centred).max() > GROWTH * begun + band)
+
+
+def _moves_on(x: Array, noise: float, band: float) -> bool:
+    """Whether readings that keep to a band move on through it from the first one, as about a
+    turning point that a force holds up, where a rest would last for half of the time and longer.
+
+    A rest may creep, but what follows it begins at once: a line with a parabola from an instant on.
+    """
+    rest = x[: x.size // 2 + 1]
+    if rest.size < FEWEST + 1:
+        return False
+    t = np.linspace(-0.5, 0.5, rest.size)
+    change = float(t @ rest / (t @ t))
+    spread = max(noise, float(np.sqrt(_left(t[:, None], rest) / (rest.size - 2))))
+    error = spread / float(np.sqrt(t @ t))
+    if abs(change) < max(DRIFT * band, float(norm.isf(0.5 * FALSE_ALARM)) * error):
+        return False
+    t = np.linspace(0.0, 1.0, x.size)
+    released = [np.column_stack([t, np.clip(t - begin, 0.0, None) ** 2]) for begin in RELEASES]
+    even = _left(np.column_stack([t, t**2, t**3]), x)
+    return even < min(_left(columns, x) for columns in released)
+
+
+def _left(columns: Array, x: Array) -> float:
+    """Sum of squares that columns (n, k) and a constant leave of x (n,)."""
+    design = np.column_stack([np.ones(x.size), columns])
+    return float(np.sum((x - design @ np.linalg.lstsq(design, x, rcond=None)[0]) ** 2))
 
 
 def _moves(x: Array, band: float) -> bool:
