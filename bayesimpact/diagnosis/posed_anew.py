@@ -12,10 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayesimpact.data.faults.fault import gaussian_threshold
+from bayesimpact.diagnosis.directions import is_periodic, is_steady
+from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.faults.compare import Compared
 from bayesimpact.diagnosis.faults.outliers import beside_spikes
 from bayesimpact.diagnosis.models import Progress
 from bayesimpact.diagnosis.naming import State, is_large
+from bayesimpact.diagnosis.refit import fit_from
 from bayesimpact.diagnosis.slow_noise import remaining_noise
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.inference.fit import Fit
@@ -55,16 +58,38 @@ def posed_anew(base: Fit, state: State, say: Progress) -> Posed | None:
 
 def _with_band_limited_inputs(base: Fit, found: Fit, say: Progress) -> Posed | None:
     """With inputs that are band-limited between their samples, not lines, where that explains
-    decisively more: the change is small, and tells nothing beside a large misfit.
+    decisively more, or as much as a steady force: the change is small, and tells nothing beside a
+    large misfit.
     """
     other = None if is_large(found) else band_limited(found)
-    if other is None or not other.log_posterior > found.log_posterior + DECISIVE:
+    if other is not None and other.log_posterior > found.log_posterior + DECISIVE:
+        first = other
+    else:
+        first = None if other is None else without_lines(base, found)
+    if first is None:
         return None
     say("inputs are band-limited between their samples: once more with these")
-    if found is base:
-        return Posed(other, None, band_limited=True)
-    smooth = refitted(base, other.target.oscillator.campaign)
-    return Posed(smooth, other, band_limited=True)
+    if not first.target.oscillator.effects:
+        return Posed(first, None, band_limited=True)
+    smooth = refitted(base, first.target.oscillator.campaign)
+    return Posed(smooth, first, band_limited=True)
+
+
+def without_lines(base: Fit, found: Fit) -> Fit | None:
+    """A model without its steady lines, with inputs that are band-limited between their samples;
+    None where it has none, or fits decisively worse: what lines between samples take from a steady
+    input, a force of its frequency would give back.
+    """
+    effects = found.target.oscillator.effects
+    rest = [e for e in effects if not (is_periodic(e) and is_steady(e))]
+    if len(rest) == len(effects):
+        return None
+    values = dict(zip(found.names, map(float, found.mode), strict=True))
+    plain = fit_from(base, rest, values, campaign_scales(base)).fit if rest else base
+    other = band_limited(plain)
+    if other is None or other.log_likelihood < found.log_likelihood - DECISIVE:
+        return None
+    return other
 
 
 def band_limited(fit: Fit) -> Fit | None:

@@ -22,7 +22,6 @@ from bayesimpact.diagnosis.refit import TOLERANCE
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.model.effects.effect import Effect
-from bayesimpact.model.parameters import is_added
 
 Array = NDArray[np.float64]
 
@@ -44,7 +43,7 @@ def profiled_shape(fit: Fit) -> int | None:
     step = np.abs(fit.covariance @ gradient(fit))
     found = {}
     for i, name in enumerate(fit.names):
-        if is_added(name) and fit.mode[i] > 0:
+        if name.split("[")[0] in own and fit.mode[i] > 0:
             parameter = owner(effects, name)[1]
             if parameter.is_shape and parameter.grid is not None and not parameter.spectral:
                 found[i] = float(step[i] / fit.mode[i])

@@ -160,7 +160,7 @@ def comparisons(
     if campaign.keep_faults:
         return ()
     effects = shared_effects(beside)
-    model = SharedModel(noise, effects, values or {})
+    model = SharedModel(noise, effects, values or values_of(base))
     whole = model.fitted(campaign) if effects else base
     if whole is None:
         return ()

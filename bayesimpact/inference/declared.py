@@ -9,7 +9,7 @@ looks at the cycles of its largest motion, and reads their start off the samples
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -103,6 +103,26 @@ def search_declared(
         ends.sort(key=lambda end: -np.nan_to_num(end[0].log_posterior, nan=-np.inf))
     (best, result), (second, _) = ends[:2]
     return result, (best, second)
+
+
+def climbed_from(
+    oscillator: Oscillator, estimates: Estimates, noise: Noise, values: Mapping[str, float]
+) -> Fit:
+    """The mode from known `values` of parameters, those of other recordings of the rig say; what
+    has none begins at its estimate.
+    """
+    scales = campaign_sizes(oscillator.campaign, estimates)
+    priors = default_priors(oscillator, estimates, noise, scales)
+    target = Target(Likelihood(oscillator, noise), priors)
+    guess, *bounds = _bounds(target, estimates, noise, scales)
+    first = FirstCycles(target, guess, *bounds)
+    layout = oscillator.layout
+    shared = {layout.names[i] for i in layout.roles("physical", "effect")}
+    start = [
+        values[name] if name in shared and name in values else own
+        for name, own in zip(layout.names, guess, strict=True)
+    ]
+    return best_climb(target, np.array(start), steps=first.steps, max_iterations=MOST)
 
 
 def is_same_mode(one: Fit, other: Fit) -> bool:

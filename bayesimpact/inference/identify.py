@@ -9,7 +9,7 @@ that a search that failed shows.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.inference.arviz_groups import arviz_groups, as_arviz, laplace_draws
-from bayesimpact.inference.declared import climbed, is_same_mode, search_declared
+from bayesimpact.inference.declared import climbed, climbed_from, is_same_mode, search_declared
 from bayesimpact.inference.defaults import default_priors
 from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.from_periods import or_by_periods
@@ -105,15 +105,20 @@ def identify(
     evaluations: int | None = None,
     sigma_per_recording: bool = False,
     callback: Callable[[Generation], None] | None = None,
+    known: Mapping[str, float] | None = None,
 ) -> Identification:
     """Mode of the base model's posterior for a campaign, nothing given.
 
-    Where the campaign declares effects the global search is made even without `search`.
+    Where the campaign declares effects the global search is made even without `search`, unless
+    values of parameters are `known`, from which to climb.
     Raises `InputError` when a recording shows no oscillation.
     """
     estimates = rough_estimates(campaign) if campaign.declared else estimate(campaign)
     given, noise = noise is not None, noise or about_average(estimate_noise(campaign), campaign)
     oscillator = build_oscillator(campaign, sigma_per_recording=sigma_per_recording)
+    if oscillator.acting and known:
+        fit = climbed_from(oscillator, estimates, noise, known)
+        return Identification(fit, estimates, noise, None, fit, None)
     if oscillator.acting:
         return _with_declared(
             oscillator, estimates, noise, given, rng=rng, evaluations=evaluations,

@@ -28,7 +28,7 @@ from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.noise_driven import driven_noise
-from bayesimpact.inference.noise_fast import fast_noise
+from bayesimpact.inference.noise_fast import fast_noise, floor_noise
 from bayesimpact.inference.noise_filtered import filtered_noise, lower
 from bayesimpact.inference.noise_growth import with_growth
 from bayesimpact.inference.noise_remainders import (
@@ -100,7 +100,7 @@ def unfiltered_noise(recordings: Sequence[Recording]) -> Noise:
     told = free or recordings
     found = _of_windows(told)
     if free:
-        found = fast_noise(free, found)
+        found = floor_noise(free, fast_noise(free, found))
     if found is None:
         raise _too_short(told)
     found = _with_step(found, told)

@@ -11,6 +11,7 @@ below where it is seen, the level may be less than it is.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,8 @@ LEAST_GAIN = 6.5  # nats of bands' likelihood, to call the noise coloured; neigh
 # independent behind a window: by test one call of 100 is false
 AS_GOOD = 1.0  # nats below the likeliest correlation: 1.4 standard errors
 WEAKER = 50  # correlations up to it
+UNTOLD = 0.5  # relative error of a level, beyond which it is not told
+PARTS = 4  # bands of the upper half of a spectrum
 EFFICIENCY = 0.48  # of a median of exponential numbers, against their mean: ln(2)^2
 
 
@@ -63,6 +66,42 @@ def fast_noise(recordings: Sequence[Recording], remainders: Noise | None) -> Noi
     )
 
 
+def floor_noise(recordings: Sequence[Recording], remainders: Noise | None) -> Noise | None:
+    """The polynomial `remainders` where they tell the level; else white noise that is no more than
+    the quietest part of the upper half of the spectra of free recordings of one quantity.
+
+    Velocities and accelerations have kinks and jumps at every contact: between stops on either side
+    no window may be free of them, and what is left passes for noise as slow as the motion. What
+    contacts add falls with frequency.
+    """
+    if remainders is not None and remainders.level_error < UNTOLD:
+        return remainders
+    spectra = [powers(s) for s in map(_longest_stretch, recordings) if s.size > 4 * PARTS * PARTS]
+    if not spectra:
+        return remainders
+    edges = np.linspace(0.5, TOP, PARTS + 1)
+    bands = [
+        np.concatenate([own[int(low * own.size) : int(high * own.size)] for own in spectra])
+        for low, high in pairwise(edges)
+    ]
+    quietest = min(bands, key=np.median)
+    return Noise(
+        level=float(np.sqrt(np.median(quietest) / MEDIAN)),
+        level_error=float(np.sqrt(0.5 / (EFFICIENCY * quietest.size))),
+        correlation_error=0.0,
+        source="upper end of the spectrum",
+        is_bound=True,
+    )
+
+
+def _longest_stretch(recording: Recording) -> Array:
+    """The samples of a recording, of one with gaps those between two."""
+    if recording.used is None:
+        return recording.samples
+    first, end = max(runs(recording.used), key=lambda run: run[1] - run[0], default=(0, 0))
+    return recording.samples[first:end]
+
+
 def _correlation(ordinates: Ordinates, each: float) -> float:
     """The weakest one that is as good as likeliest: below the motion, where nothing is seen of the
     noise, a stronger one would add any power. 0 where the gain over white noise is small.
@@ -80,10 +119,7 @@ def _bands(recording: Recording) -> tuple[Array, Array, Array] | None:
     medians tell them, and their numbers of ordinates; None where there are few. Of a recording with
     gaps the longest stretch between two.
     """
-    samples = recording.samples
-    if recording.used is not None:
-        first, end = max(runs(recording.used), key=lambda run: run[1] - run[0], default=(0, 0))
-        samples = samples[first:end]
+    samples = _longest_stretch(recording)
     if samples.size <= BANDS[-1]:
         return None
     own = powers(samples)

@@ -7,13 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from effect_rigs import BY_ID
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.input import Input
 from bayesimpact.data.read import load_campaign
 from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.diagnose import diagnose
-from bayesimpact.diagnosis.posed_anew import band_limited
+from bayesimpact.diagnosis.extend import campaign_scales
+from bayesimpact.diagnosis.posed_anew import band_limited, without_lines
+from bayesimpact.diagnosis.refit import fit_from
 from bayesimpact.inference.identify import identify
 
 MASS, C1, K1 = 0.5, 0.6, 800.0
@@ -60,3 +63,38 @@ def test_what_an_input_does_between_samples_is_told(lines: bool) -> None:
     assert found.naming.band_limited is not lines
     assert found.after.reduced_chi2 == pytest.approx(1.0, abs=0.12)
     assert abs(found.after.value("k1") - K1) < 4 * found.after.sd[found.after.names.index("k1")]
+
+
+def test_a_steady_force_is_not_what_a_hold_takes_from_a_steady_input() -> None:
+    """A line of the input's own frequency gives back what lines between its samples take away."""
+    t = INTERVAL * np.arange(1500)
+    recordings = []
+    for name, size in (("a", 9.0), ("b", 9.0)):
+        moved = NOISE * np.random.default_rng(len(recordings)).standard_normal(t.size)
+        drive = np.zeros(t.size)
+        for frequency, share in ((12.0, 1.0), (4.1, 0.2)):
+            w = 2 * np.pi * frequency
+            answer = share * size / (K1 - MASS * w * w + 1j * w * C1)
+            moved += (answer * np.exp(1j * w * t)).real
+            drive += share * size * np.cos(w * t)
+        recordings.append(Recording(name, "", moved, INTERVAL, input=Input(drive)))
+    campaign = Campaign("shaken", MASS, tuple(recordings), stop=False)
+    base = identify(campaign, rng=np.random.default_rng(0), search=False).fit
+    line = {"amplitude": 0.05, "frequency": 12.0, "phase[a]": 1.6, "phase[b]": 1.6}
+    values = {f"harmonic_forcing.{name}": value for name, value in line.items()}
+    forced = fit_from(base, [BY_ID["harmonic_forcing"]], values, campaign_scales(base)).fit
+    assert forced.reduced_chi2 < 1.2 < base.reduced_chi2
+    plain = without_lines(base, forced)
+    assert plain is not None and plain.reduced_chi2 == pytest.approx(1.0, abs=0.12)
+    real = replace(campaign, recordings=tuple(_pushed(r, 0.05, 9.0) for r in recordings))
+    base = identify(real, rng=np.random.default_rng(0), search=False).fit
+    values |= {"harmonic_forcing.frequency": 9.0}
+    forced = fit_from(base, [BY_ID["harmonic_forcing"]], values, campaign_scales(base)).fit
+    assert without_lines(base, forced) is None
+
+
+def _pushed(recording: Recording, size: float, frequency: float) -> Recording:
+    """By a force of its own frequency too."""
+    w = 2 * np.pi * frequency
+    answer = size / (K1 - MASS * w * w + 1j * w * C1) * np.exp(1j * w * recording.times)
+    return replace(recording, samples=recording.samples + answer.real)

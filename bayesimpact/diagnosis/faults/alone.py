@@ -55,7 +55,7 @@ class SharedModel:
     ----------
     noise : as the campaign shows it
     effects : of the catalogue, beside the base model, that hold for all recordings alike
-    values : parameter -> value, where their fits begin
+    values : parameter -> value, where fits with effects begin
     """
 
     noise: Noise
@@ -67,7 +67,7 @@ class SharedModel:
         rng = np.random.default_rng(0)
         effects = [e for e in self.effects if len(campaign.cases) > 1 or not _is_by_case(e)]
         try:
-            fit = identify(campaign, rng=rng, noise=self.noise, search=False).fit
+            fit = identify(campaign, rng=rng, noise=self.noise, search=False, known=self.values).fit
             scales = campaign_scales(fit)
             if not all(effect.admissible(scales) for effect in effects):
                 return None  # a recording that misses the obstacle shows nothing of contacts
