@@ -37,9 +37,11 @@ def profiled_shape(fit: Fit) -> int | None:
     """Position of the shape parameter (a time constant, a depth) that an unfinished climb moves on.
 
     The one that the undamped step would change by the largest factor; None without any. Frequencies
-    have side minima, no ridge.
+    have side minima, no ridge. Only of effects beside the base model: what its own stops are, is
+    known from the base fit.
     """
-    effects: Sequence[Effect] = fit.target.oscillator.acting
+    effects: Sequence[Effect] = fit.target.oscillator.effects
+    own = {f"{e.id}.{p.name}" for e in effects for p in e.parameters}
     step = np.abs(fit.covariance @ gradient(fit))
     found = {}
     for i, name in enumerate(fit.names):

@@ -21,11 +21,13 @@ from bayesimpact.model.effects.effect import Effect
 COST = 3.8
 OCCAM = 10.0  # nats between likelihood and evidence of a model with effects
 
+WHITE = SimpleNamespace(likelihood=SimpleNamespace(noise=SimpleNamespace(correlation=0.0)))
+
 
 def candidate(ids: str, evidence: float, chi2: float = 1.0) -> Candidate:
     """Effects by name, separated by blanks; log evidence over the base model's."""
     likelihood = 2000.0 + evidence + (OCCAM if ids else 0.0)
-    fit = SimpleNamespace(reduced_chi2=chi2, log_likelihood=likelihood)
+    fit = SimpleNamespace(reduced_chi2=chi2, log_likelihood=likelihood, target=WHITE)
     return Candidate(tuple(BY_ID[i] for i in ids.split()), fit, 1000.0 + evidence)
 
 
@@ -80,7 +82,8 @@ def remaining(
     for model, misfit in ((chosen, chi2), (base, without)):
         target = SimpleNamespace(
             likelihood=SimpleNamespace(
-                noise=SimpleNamespace(level=1.0, level_error=0.01), sizes=np.array([1000.0])
+                noise=SimpleNamespace(level=1.0, level_error=0.01, correlation=0.0),
+                sizes=np.array([1000.0]),
             )
         )
         vars(model.candidate.fit).update(

@@ -25,6 +25,18 @@ def test_nothing_missing_is_adequate_and_an_alarm_without_a_name_is_unknown():
         assert judge(naming(state(candidate("", 0.0), **alarm))) == "unknown"
 
 
+@pytest.mark.parametrize(("correlation", "left"), [(0.8, 0.6), (0.8, 0.4), (0.0, 0.6)])
+def test_coloured_noise_of_half_the_signal_may_be_the_motion(
+    correlation: float, left: float
+) -> None:
+    alone = candidate("", 0.0)
+    noise = SimpleNamespace(correlation=correlation)
+    target = SimpleNamespace(likelihood=SimpleNamespace(noise=noise))
+    fit = SimpleNamespace(**{**vars(alone.fit), "target": target, "rms": left, "signal": 1.0})
+    verdict = judge(naming(state(replace(alone, fit=fit))))
+    assert verdict == ("unknown" if correlation and left > 0.5 else "adequate")
+
+
 def test_a_name_needs_decisive_odds_over_every_rival():
     chosen = state(candidate(FRICTION, 100.0))
     far = candidate(DRAG, 100.0 - DECISIVE - 0.1)

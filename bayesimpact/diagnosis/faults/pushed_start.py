@@ -22,7 +22,7 @@ from bayesimpact.model.effects.effect import Effect, Scales
 INSTANTS = (0.25, 0.5, 1.0, 1.5, 2.0)  # of a free period, from which on the motion may be free
 MOST = 3  # effects that the equation may have
 BETTER = EXCESS**2  # times less left of the power, four of the force: set by hand
-NEARLY = 0.5  # of the best such ratio: the earliest instant that reaches so much is taken
+NEARLY = 0.8  # of the best such ratio: the earliest instant that reaches so much is taken
 
 
 def pushed_starts(fit: Fit, effects: Sequence[Effect], scales: Scales) -> tuple[Fault, ...]:
