@@ -15,7 +15,7 @@ from bayesimpact.data.clock import check_rate
 from bayesimpact.data.fields import fields, unquoted
 from bayesimpact.data.gaps import on_clock
 from bayesimpact.data.quantity import RESPONSE_COLUMNS, UNITS, Quantity
-from bayesimpact.data.readers.channel import says_time
+from bayesimpact.data.readers.channel import name_and_unit, says_time
 from bayesimpact.data.window import unbroken, window
 from bayesimpact.errors import InputError
 
@@ -177,6 +177,9 @@ def _layout(path: Path, line: int, header: str, column: str | None, unit: str | 
             f'unit = "{unit}" in campaign.toml',
             f'unit = "{known}", or no unit',
         )
+    if unit is None and known is None:
+        named = name_and_unit(names[response])[1]
+        known = named if named in UNITS else None
     if unit is None and known is None:
         accepted = f"with column = ... also unit = ... ({', '.join(UNITS)})"
         raise InputError(f"{where}, column {names[response]}", "no unit for it", accepted)

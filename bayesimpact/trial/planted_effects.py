@@ -339,8 +339,8 @@ PLANTED_EFFECTS: Mapping[str, PlantedEffect] = {
         ("free",), one_number("rate", lambda d: 0.3 / d.duration, signed=True), slots=("k1",)
     ),
     "harmonic_forcing": PlantedEffect(("everywhere", "free"), _forcing),
-    "opposite_stop": PlantedEffect(("free",), _opposite_stop),
-    "spring_piecewise": PlantedEffect(("free",), _spring_piecewise),
+    "opposite_stop": PlantedEffect(("free",), _opposite_stop, slots=("second stop",)),
+    "spring_piecewise": PlantedEffect(("free",), _spring_piecewise, slots=("second stop",)),
     "sensor_drift": PlantedEffect(
         ("measurement",), one_number("rate", lambda d: 0.3 * d.amplitude / d.duration, signed=True)
     ),

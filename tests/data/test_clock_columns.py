@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import instrument_files as made
 import numpy as np
@@ -147,3 +148,34 @@ def test_a_clock_of_another_name_in_a_plain_table_is_named_with_the_keys_that_re
         load(tmp_path, keys)
     recording = load(tmp_path, keys + 'time_column = "Time Stamp"\ntime_unit = "us"\n')
     assert recording.interval == pytest.approx(2e-3, rel=1e-6)
+
+
+def clocked(tmp_path: Path, stamps: list[str], keys: str = "") -> Any:
+    rows = [f"{stamp},{x:.9g}" for stamp, x in zip(stamps, made.MM, strict=True)]
+    (tmp_path / "a.csv").write_text("\n".join(["Timestamp,x [mm]", *rows]) + "\n")
+    return load(tmp_path, keys)
+
+
+@pytest.mark.parametrize("before", ["", "2024-05-01T"])
+def test_times_of_day_are_a_clock(tmp_path: Path, before: str) -> None:
+    """A minute ends on the way."""
+    seconds = 59.5 + np.array(made.TIMES)
+    stamps = [f"{before}16:{4 + int(s // 60):02d}:{s % 60:06.3f}" for s in seconds]
+    read = clocked(tmp_path, stamps)
+    assert read.interval == pytest.approx(2e-3, rel=1e-6)
+    assert read.start == pytest.approx(16 * 3600 + 4 * 60 + 59.5)
+    np.testing.assert_allclose(read.samples, decay(), rtol=1e-7)
+
+
+def test_a_stated_rate_stands_beside_stamps_of_batches(tmp_path: Path) -> None:
+    stamps = [f"16:04:{10 + i // 15:02d}.250" for i in range(len(made.TIMES))]
+    with pytest.raises(InputError, match="the same time twice"):
+        clocked(tmp_path, stamps)
+    assert clocked(tmp_path, stamps, "sample_rate_hz = 500\n").interval == 2e-3
+
+
+def test_a_unit_in_the_name_of_a_column_that_is_asked_for(tmp_path: Path) -> None:
+    rows = [f"{t:.6g},{x:.9g}" for t, x in zip(made.TIMES, made.MM, strict=True)]
+    (tmp_path / "a.csv").write_text("\n".join(["time_s,distance_mm", *rows]) + "\n")
+    read = load(tmp_path, 'column = "distance_mm"\n')
+    np.testing.assert_allclose(read.samples, decay(), rtol=1e-7)

@@ -179,6 +179,21 @@ def test_an_even_clock_in_a_coarse_unit_needs_no_key(
         _read(tmp_path, "a.csv", "")
 
 
+@pytest.mark.parametrize("few", [1, 5, 8])
+def test_few_readings_before_a_hole_tell_nothing(tmp_path: Path, few: int) -> None:
+    """The mass was let go in it; eight readings may tell how it moved before."""
+    times = np.concatenate([0.05 * np.arange(few), 2.25 + 0.05 * np.arange(120)])
+    later = np.clip(times - 2.0, 0.0, None)
+    samples = np.where(times < 2.0, 0.01, 3.0 * np.exp(-0.1 * later) * np.cos(4.5 * later))
+    rows = (f"{t:.4f},{y:.5f}" for t, y in zip(times, samples, strict=True))
+    (tmp_path / "a.csv").write_text("\n".join(["time_s,angle_rad", *rows]) + "\n")
+    read = _read(tmp_path, "a.csv")
+    assert read.start == pytest.approx(2.25 if few < 8 else 0.0, abs=0.03)
+    (doubt,) = bi.load(tmp_path).doubts
+    assert "no readings between" in doubt and "and 2.25 s" in doubt
+    assert ("it is read from" in doubt) is (few < 8)
+
+
 def test_samples_in_memory_are_resampled_as_a_csv(tmp_path: Path) -> None:
     _text("time_s,displacement_mm")(tmp_path / "a.csv")
     entry = {"name": "a", "samples": MM, "unit": "mm", "times_s": TIMES, "resample": True}

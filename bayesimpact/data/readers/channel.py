@@ -90,6 +90,11 @@ class Channel:
         steps = np.diff(self.samples[np.isfinite(self.samples)])
         return bool(steps.size and steps.min() >= 0.0 and steps.max() > 0.0)
 
+    @property
+    def rises(self) -> bool:
+        """True where every number is above the one before it: stamps of batches stand still."""
+        return bool(np.all(np.diff(self.samples[np.isfinite(self.samples)]) > 0.0))
+
     def seconds(self, unit: str | None = None) -> Floats:
         """The samples of a column of time stamps, s; `unit`, or else s, where it has none."""
         return self.samples * TIME_UNITS.get(self.unit or unit or "s", 1.0)

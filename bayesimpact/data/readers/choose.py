@@ -202,7 +202,7 @@ def _clock(
         return channel.times
     stated = clocks_of(channels, channel)
     if wanted.sample_rate is not None:  # what is stated comes before what is guessed
-        stated = [c for c in stated if c.is_called_time]
+        stated = [c for c in stated if c.is_called_time and c.rises]
     if len(stated) == 1:
         return stated[0]
     if channel.interval is not None:

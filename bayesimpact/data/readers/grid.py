@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -19,6 +20,9 @@ from bayesimpact.errors import InputError
 
 Cell = str | float | None
 _NO_UNIT = "[]()- "
+_CLOCK = re.compile(
+    r"(?:[\d./-]{6,10}[T ]\s*)?(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)(?:Z|[+-]\d{2}:?\d{2})?"
+)
 LOOKED_AT = 25
 """Rows in the middle of a grid that show which of its columns are numbers."""
 
@@ -90,12 +94,21 @@ def has_names(rows: Sequence[Sequence[Cell]]) -> bool:
 
 
 def number(cell: Cell) -> float:
-    """A finite number; NaN for anything else."""
+    """A finite number, or a time of day, s; NaN for anything else."""
     try:
         value = float(cell) if cell is not None else math.nan
     except ValueError:
-        return math.nan
+        return _time_of_day(cell)
     return value if math.isfinite(value) and "_" not in str(cell) else math.nan
+
+
+def _time_of_day(cell: Cell) -> float:
+    """Seconds since midnight of `16:04:31.273`, with a date before it or none; NaN for others."""
+    found = _CLOCK.fullmatch(cell.strip()) if isinstance(cell, str) else None
+    if found is None:
+        return math.nan
+    hours, minutes, seconds = found.groups()
+    return 3600.0 * int(hours) + 60.0 * int(minutes) + float(seconds.replace(",", "."))
 
 
 def _empty(cell: Cell) -> bool:
