@@ -105,6 +105,8 @@ def _unknown(found: Findings, location: Location) -> str:
     seen = found.probe and location.regime != "measurement"
     acts = "Seen as a force it would act" if seen else "It acts"
     head = "Something is missing that the catalogue does not hold."
+    if found.either:
+        head = "More is missing than the catalogue holds."
     if not found.finished:
         head = "Something is missing that the search has not found."
     if found.faults:  # they are all that has a name
@@ -196,4 +198,4 @@ def _size_of_force(location: Location, unit: str) -> str:
     if location.force_rms > TOLD * location.force_sd:
         return f"with {size} rms"
     most = two_digits(location.force_rms + TOLD * location.force_sd, unit)
-    return f"with a force that the recordings hardly tell (up to {most} rms)"
+    return f"with a force whose size the recordings do not tell (0 to {most} rms)"

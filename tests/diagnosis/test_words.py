@@ -207,7 +207,7 @@ def test_a_second_mode_is_mechanics():
 def test_a_group_of_which_one_is_needed_is_told():
     cubic, sine, five = (BY_ID[i] for i in ("spring_cubic", "pendulum_sine", "spring_quintic"))
     said = told("unknown", (), (), place("free"), either=((cubic, sine),))
-    assert "hold. Either cubic stiffness of the suspension or gravity pendulum is needed" in said
+    assert "holds. Either cubic stiffness of the suspension or gravity pendulum is needed" in said
     friction = (BY_ID["coulomb_friction"],)
     said = told("partly", friction, ("It rubs.",), place("free"), either=((cubic, sine, five),))
     assert "rubs. Cubic stiffness of the suspension, gravity pendulum or quintic" in said
@@ -224,7 +224,7 @@ def test_a_force_that_is_hardly_known_has_no_size():
         regime="free", displacement=(-2e-3, 1.5e-3), force_rms=3.5, force_sd=3.25
     )
     said = told("unknown", (), (), vague, (), {}, "")
-    assert "hardly tell (up to 10 N rms)" in said and "3.5" not in said
+    assert "do not tell (0 to 10 N rms)" in said and "3.5" not in said
 
 
 def test_what_comes_nearest():
