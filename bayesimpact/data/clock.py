@@ -20,6 +20,7 @@ Room for stamps that were rounded when written, as 25.6 kHz in microseconds.
 FEW_STEPS = 5
 # Units that the stamps of a slow clock differ by from even ones, and a little for the fit of a line
 EVENLY = 1.2
+FINE = 0.2  # of an interval: a coarser unit may hide that a clock is not even
 
 
 def even_interval(
@@ -51,8 +52,8 @@ def even_interval(
         found += f" ({times[i + 1]:.9g} s after {times[i]:.9g} s)"
         raise InputError(f"{path}, {place} {rows[i + 1]}", found, "times that increase evenly")
     typical = float(np.median(steps))
-    gaps, rounded = np.flatnonzero(steps > 1.5 * typical), rounded_interval(times, steps)
-    if gaps.size and rounded is None:
+    gaps = np.flatnonzero(steps > 1.5 * typical)
+    if gaps.size:
         i = int(gaps[0])
         found = f"a gap from {times[i]:.9g} s to {times[i + 1]:.9g} s"
         raise InputError(
@@ -69,7 +70,7 @@ def even_interval(
         late = late - first - slope * count
     worst = int(np.argmax(np.abs(late)))
     if abs(late[worst]) > JITTER * interval:
-        if rounded is not None:
+        if (rounded := _finely_rounded(times, steps)) is not None:
             return rounded
         found = (
             f"a sample at {times[worst]:.9g} s, {late[worst] / interval:+.1%} of an interval off"
@@ -80,6 +81,16 @@ def even_interval(
         )
         raise InputError(f"{path}, {place} {rows[worst]}", found, accepted)
     return interval
+
+
+def _finely_rounded(times: NDArray[np.float64], steps: NDArray[np.float64]) -> float | None:
+    """`rounded_interval` where the unit is so fine that a clock which is not even would show."""
+    interval = rounded_interval(times, steps)
+    if interval is None:
+        return None
+    unit = float(np.ptp(steps))  # every step is one of two neighbours
+    late = times - np.polyval(np.polyfit(np.arange(times.size), times, 1), np.arange(times.size))
+    return interval if unit <= FINE * interval and np.ptp(late) <= EVENLY * unit else None
 
 
 def rounded_interval(times: NDArray[np.float64], steps: NDArray[np.float64]) -> float | None:

@@ -8,8 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-import numpy as np
-
 from bayesimpact.data.gaps import runs
 from bayesimpact.data.input import UNITLESS
 from bayesimpact.data.input import UNITS as INPUT_UNITS
@@ -71,7 +69,14 @@ def _hole(entry: RecordingTable, table: Table, recording: Recording) -> str:
     """The longest gap in a file's own readings; "" where there is none of two or more."""
     if table.used is None:
         return ""
-    holes = [(end - first, first, end) for first, end in runs(~table.used) if end - first > 1]
+    asked = 0 if entry.start_s is None else (entry.start_s - table.start) / table.interval
+    begun = max(math.ceil(asked - 1e-6), 0)
+    last = round((recording.start + recording.duration - table.start) / table.interval)
+    holes = [
+        (end - first, first, end)
+        for first, end in runs(~table.used)
+        if end - first > 1 and first > begun and end <= last
+    ]
     if not holes:
         return ""
     _, first, end = max(holes)
@@ -79,8 +84,7 @@ def _hole(entry: RecordingTable, table: Table, recording: Recording) -> str:
     text = f"its file has no readings between {begin:.4g} and {until:.4g} s"
     if len(holes) > 1:
         text += f", nor in {len(holes) - 1} shorter gaps"
-    asked = -np.inf if entry.start_s is None else entry.start_s
-    if recording.start > max(asked, table.start) + 0.5 * table.interval:
+    if recording.start > table.start + (begun + 0.5) * table.interval:
         text += f"; it is read from {recording.start:.4g} s on, for few readings lie before"
     return text
 

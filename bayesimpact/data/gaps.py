@@ -92,9 +92,11 @@ def after_lone_readings(recording: Recording) -> Recording:
 
 
 def shown_period(recording: Recording) -> float | None:
-    """Rough period, s, of the longest stretch of samples that count; None where none shows one."""
+    """Rough period, s, of the longest stretch of samples that count, or where that shows none, of
+    all with their stand-ins; None where neither shows one.
+    """
     used = np.ones(recording.samples.size, bool) if recording.used is None else recording.used
-    period = _period(recording.samples, used)
+    period = _period(recording.samples, used) or crossing_period(recording.samples, 1.0)
     return None if period is None else period * recording.interval
 
 

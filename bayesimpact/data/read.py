@@ -260,7 +260,8 @@ def _recording(
     )
     key = "exclude_s" if entry.exclude_s else "resample"
     recording = excluded_spans(f"{where}, key {key}", recording, entry.exclude_s or ())
-    recording = after_lone_readings(recording)
+    if entry.resample:
+        recording = after_lone_readings(recording)
     _check_motion(source, recording)
     if entry.clock_ratio is None:
         return recording

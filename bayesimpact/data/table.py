@@ -16,6 +16,7 @@ from bayesimpact.data.fields import fields, unquoted
 from bayesimpact.data.gaps import on_clock
 from bayesimpact.data.quantity import RESPONSE_COLUMNS, UNITS, Quantity
 from bayesimpact.data.readers.channel import name_and_unit, says_time
+from bayesimpact.data.readers.guess import named_quantity
 from bayesimpact.data.window import unbroken, window
 from bayesimpact.errors import InputError
 
@@ -178,12 +179,17 @@ def _layout(path: Path, line: int, header: str, column: str | None, unit: str | 
             f'unit = "{known}", or no unit',
         )
     if unit is None and known is None:
-        named = name_and_unit(names[response])[1]
-        known = named if named in UNITS else None
+        known = _unit_by_name(names[response])
     if unit is None and known is None:
         accepted = f"with column = ... also unit = ... ({', '.join(UNITS)})"
         raise InputError(f"{where}, column {names[response]}", "no unit for it", accepted)
     return _Layout(names, separator, time, response, unit or known or "")
+
+
+def _unit_by_name(name: str) -> str | None:
+    """The unit that ends a column's name, unless the name says another quantity than it."""
+    unit, said = name_and_unit(name)[1], named_quantity(name)
+    return unit if unit in UNITS and said in (None, UNITS[unit][0]) else None
 
 
 def _response_column(

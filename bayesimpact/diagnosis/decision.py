@@ -93,7 +93,7 @@ def decide(naming: Naming) -> Decision:
     if chosen.is_white:
         if not effects:
             fit = chosen.candidate.fit
-            hidden = fit.target.likelihood.noise.correlation > 0.0 and base_failed(fit)
+            hidden = fit.target.likelihood.noise.is_coloured and base_failed(fit)
             return Decision("unknown" if hidden else "adequate", ())
         if naming.prefers_learned_force():
             return Decision("unknown", ())

@@ -81,11 +81,9 @@ class Corrected:
 
 
 def covers(fault: Fault, other: Fault) -> bool:
-    """Whether a fault is of the same kind and recording as another, and lies around it."""
-    same = (fault.id, fault.recording) == (other.id, other.recording)
-    return (
-        same and bool(fault.spans) and fault.start_s <= other.start_s <= other.end_s <= fault.end_s
-    )
+    """Whether a fault is a later start of the same recording."""
+    starts = fault.id == other.id == "recording_start" and fault.recording == other.recording
+    return starts and fault.start_s <= other.start_s <= other.end_s <= fault.end_s
 
 
 def cleaned_campaign(campaign: Campaign, *, rng: np.random.Generator, search: bool) -> Corrected:

@@ -116,13 +116,10 @@ def identify(
     estimates = rough_estimates(campaign) if campaign.declared else estimate(campaign)
     given, noise = noise is not None, noise or about_average(estimate_noise(campaign), campaign)
     oscillator = build_oscillator(campaign, sigma_per_recording=sigma_per_recording)
-    if oscillator.acting and known:
-        fit = climbed_from(oscillator, estimates, noise, known)
-        return Identification(fit, estimates, noise, None, fit, None)
     if oscillator.acting:
         return _with_declared(
             oscillator, estimates, noise, given, rng=rng, evaluations=evaluations,
-            callback=callback,
+            callback=callback, known=known,
         )  # fmt: skip
     priors = default_priors(oscillator, estimates, noise)
     guess = initial_theta(oscillator, estimates, noise)
@@ -160,11 +157,18 @@ def _with_declared(
     rng: np.random.Generator,
     evaluations: int | None,
     callback: Callable[[Generation], None] | None,
+    known: Mapping[str, float] | None,
 ) -> Identification:
-    """The mode of a base model with declared effects, on which two searches agree."""
-    result, (best, other) = search_declared(
-        oscillator, estimates, noise, rng=rng, evaluations=evaluations, callback=callback
-    )
+    """The mode of a base model with declared effects, on which two searches agree; or the nearest
+    to `known` values.
+    """
+    if known:
+        result, best = None, climbed_from(oscillator, estimates, noise, known)
+        other = best
+    else:
+        result, (best, other) = search_declared(
+            oscillator, estimates, noise, rng=rng, evaluations=evaluations, callback=callback
+        )
     if (smooth := without_onsets(best)) is not oscillator.campaign:
         oscillator = replace(oscillator, campaign=smooth)
         target = replace(best.target, likelihood=Likelihood(oscillator, noise))

@@ -34,6 +34,7 @@ AS_GOOD = 1.0  # nats below the likeliest correlation: 1.4 standard errors
 WEAKER = 50  # correlations up to it
 UNTOLD = 0.5  # relative error of a level, beyond which it is not told
 PARTS = 4  # bands of the upper half of a spectrum
+SHORTEST = 400  # samples: so long a stretch tells the level of a band to 15 %
 EFFICIENCY = 0.48  # of a median of exponential numbers, against their mean: ln(2)^2
 
 
@@ -76,7 +77,7 @@ def floor_noise(recordings: Sequence[Recording], remainders: Noise | None) -> No
     """
     if remainders is not None and remainders.level_error < UNTOLD:
         return remainders
-    spectra = [powers(s) for s in map(_longest_stretch, recordings) if s.size > 4 * PARTS * PARTS]
+    spectra = [powers(s) for s in map(_longest_stretch, recordings) if s.size > SHORTEST]
     if not spectra:
         return remainders
     edges = np.linspace(0.5, TOP, PARTS + 1)
@@ -85,8 +86,11 @@ def floor_noise(recordings: Sequence[Recording], remainders: Noise | None) -> No
         for low, high in pairwise(edges)
     ]
     quietest = min(bands, key=np.median)
+    level = float(np.sqrt(np.median(quietest) / MEDIAN))
+    if remainders is not None and remainders.level < level:
+        return remainders
     return Noise(
-        level=float(np.sqrt(np.median(quietest) / MEDIAN)),
+        level=level,
         level_error=float(np.sqrt(0.5 / (EFFICIENCY * quietest.size))),
         correlation_error=0.0,
         source="upper end of the spectrum",

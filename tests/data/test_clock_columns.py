@@ -168,10 +168,12 @@ def test_times_of_day_are_a_clock(tmp_path: Path, before: str) -> None:
 
 
 def test_a_stated_rate_stands_beside_stamps_of_batches(tmp_path: Path) -> None:
-    stamps = [f"16:04:{10 + i // 15:02d}.250" for i in range(len(made.TIMES))]
+    stamps = [f"16:04:{10 + 0.03 * (i // 15):06.3f}" for i in range(len(made.TIMES))]
     with pytest.raises(InputError, match="the same time twice"):
         clocked(tmp_path, stamps)
     assert clocked(tmp_path, stamps, "sample_rate_hz = 500\n").interval == 2e-3
+    with pytest.raises(InputError, match="rows a second by the time column"):
+        clocked(tmp_path, stamps, "sample_rate_hz = 50\n")
 
 
 def test_a_unit_in_the_name_of_a_column_that_is_asked_for(tmp_path: Path) -> None:
@@ -179,3 +181,11 @@ def test_a_unit_in_the_name_of_a_column_that_is_asked_for(tmp_path: Path) -> Non
     (tmp_path / "a.csv").write_text("\n".join(["time_s,distance_mm", *rows]) + "\n")
     read = load(tmp_path, 'column = "distance_mm"\n')
     np.testing.assert_allclose(read.samples, decay(), rtol=1e-7)
+
+
+def test_a_time_of_day_stands_beside_a_clock_with_a_unit(tmp_path: Path) -> None:
+    rows = [
+        f"16:04:{10 + t:06.3f},{t:.6g},{x:.9g}" for t, x in zip(made.TIMES, made.MM, strict=True)
+    ]
+    (tmp_path / "a.csv").write_text("\n".join(["Time of day,Time [s],x [mm]", *rows]) + "\n")
+    assert load(tmp_path).start == 0.0

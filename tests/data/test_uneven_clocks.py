@@ -13,10 +13,12 @@ import pytest
 import pyuff
 import xarray as xr
 from campaigns import write
+from click.testing import CliRunner
 from nptdms import ChannelObject, TdmsWriter
 from scipy.io import savemat
 
 import bayesimpact as bi
+from bayesimpact.cli import main
 from bayesimpact.data.clock import FEW_STEPS, rounded_interval
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
@@ -156,7 +158,7 @@ def test_stamps_of_a_slow_clock_lack_no_rows() -> None:
     assert read.used is None and read.interval == pytest.approx(1 / 995.0, rel=1e-4)
 
 
-@pytest.mark.parametrize(("rate", "digits"), [(120.0, 3), (995.0, 3), (24.0, 2)])
+@pytest.mark.parametrize(("rate", "digits"), [(120.0, 3), (160.0, 3), (12.5, 2)])
 def test_an_even_clock_in_a_coarse_unit_needs_no_key(
     tmp_path: Path, rate: float, digits: int
 ) -> None:
@@ -192,6 +194,30 @@ def test_few_readings_before_a_hole_tell_nothing(tmp_path: Path, few: int) -> No
     (doubt,) = bi.load(tmp_path).doubts
     assert "no readings between" in doubt and "and 2.25 s" in doubt
     assert ("it is read from" in doubt) is (few < 8)
+
+
+@pytest.mark.parametrize("stamps", ["slipped", "every tenth lost"])
+def test_a_clock_that_is_not_even_is_no_rounded_one(tmp_path: Path, stamps: str) -> None:
+    if stamps == "slipped":
+        times = 2e-3 * np.arange(1200) + 1e-3 * (np.arange(1200) >= 500)
+    else:
+        times = 1e-2 * np.delete(np.arange(1200), np.s_[9::10])
+    samples = -6.0 * np.exp(-0.15 * times) * np.cos(2 * np.pi * 6.4 * times)
+    rows = (f"{t:.3f},{y:.6f}" for t, y in zip(times, samples, strict=True))
+    (tmp_path / "a.csv").write_text("\n".join(["time_s,displacement_mm", *rows]) + "\n")
+    with pytest.raises(InputError, match="resample = true"):
+        _read(tmp_path, "a.csv", "")
+
+
+def test_many_short_gaps_show_a_period_all_the_same(tmp_path: Path) -> None:
+    times = np.arange(2000) / 500.0
+    times = times[times % 0.2 < 0.15]
+    samples = 3.0 * np.exp(-0.1 * times) * np.cos(2 * np.pi * 2.0 * times)
+    rows = (f"{t:.4f},{y:.5f}" for t, y in zip(times, samples, strict=True))
+    (tmp_path / "a.csv").write_text("\n".join(["time_s,displacement_mm", *rows]) + "\n")
+    _read(tmp_path, "a.csv")
+    result = CliRunner().invoke(main, ["check", str(tmp_path)])
+    assert result.exit_code == 0 and " 0.5" in result.output
 
 
 def test_samples_in_memory_are_resampled_as_a_csv(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from bayesimpact.model.effects.effect import Effect
 COST = 3.8
 OCCAM = 10.0  # nats between likelihood and evidence of a model with effects
 
-WHITE = SimpleNamespace(likelihood=SimpleNamespace(noise=SimpleNamespace(correlation=0.0)))
+WHITE = SimpleNamespace(likelihood=SimpleNamespace(noise=SimpleNamespace(is_coloured=False)))
 
 
 def candidate(ids: str, evidence: float, chi2: float = 1.0) -> Candidate:
@@ -82,7 +82,7 @@ def remaining(
     for model, misfit in ((chosen, chi2), (base, without)):
         target = SimpleNamespace(
             likelihood=SimpleNamespace(
-                noise=SimpleNamespace(level=1.0, level_error=0.01, correlation=0.0),
+                noise=SimpleNamespace(level=1.0, level_error=0.01, is_coloured=False),
                 sizes=np.array([1000.0]),
             )
         )

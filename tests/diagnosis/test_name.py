@@ -17,6 +17,7 @@ from bayesimpact.diagnosis.thresholds import (
     DECISIVE,
     largest_log_odds,
 )
+from bayesimpact.inference.noise import Noise
 
 
 def test_nothing_missing_is_adequate_and_an_alarm_without_a_name_is_unknown():
@@ -30,7 +31,7 @@ def test_coloured_noise_of_half_the_signal_may_be_the_motion(
     correlation: float, left: float
 ) -> None:
     alone = candidate("", 0.0)
-    noise = SimpleNamespace(correlation=correlation)
+    noise = Noise(correlation, level=1.0)
     target = SimpleNamespace(likelihood=SimpleNamespace(noise=noise))
     fit = SimpleNamespace(**{**vars(alone.fit), "target": target, "rms": left, "signal": 1.0})
     verdict = judge(naming(state(replace(alone, fit=fit))))

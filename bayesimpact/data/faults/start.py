@@ -30,6 +30,7 @@ UNCROSSED = 0.75  # of a period: a free motion passes its rest within half a per
 GROWTH = 1.3  # largest excursion over what came before it, on either side
 WINDOW = 1 / 25  # of a period, in which a speed is told; two samples at least
 RELEASES = np.linspace(0.5, 0.95, 10)  # of a stretch that keeps to the band
+LIKELIER = 1.0  # nats: of a dozen samples hardly more is to be had
 DRIFT = 0.2  # of the band: a parabola through it takes a quarter in the first half of the time
 SLOW = 1 / 3  # of a linear free motion's speed: those of a pendulum to 160 degrees are above half
 
@@ -68,7 +69,9 @@ def find_start(recording: Recording) -> list[Fault]:
         peak = _pushed(x - settled, band, period)
         hand = peak > 0
     rest = _leaves(x, peak if hand else 0, band, None if hum is None else hum.frequency)
-    if not hand and (moves or rest <= least or _moves_on(quiet[:rest], noise, band)):
+    if not hand and (
+        moves or rest <= least or _moves_on(quiet[:rest], max(noise, step / np.sqrt(12)), band)
+    ):
         return []
     soon = not hand and largest < rest + LATE * period and order_of(recording.quantity) == 0
     moved = soon and _is_moved(x - settled, rest, band)
@@ -122,7 +125,8 @@ def _moves_on(x: Array, noise: float, band: float) -> bool:
     t = np.linspace(0.0, 1.0, x.size)
     released = [np.column_stack([t, np.clip(t - begin, 0.0, None) ** 2]) for begin in RELEASES]
     even = _left(np.column_stack([t, t**2, t**3]), x)
-    return even < min(_left(columns, x) for columns in released)
+    rests = min(_left(columns, x) for columns in released)
+    return bool(0.5 * x.size * np.log(max(rests, 1e-300) / max(even, 1e-300)) > LIKELIER)
 
 
 def _left(columns: Array, x: Array) -> float:

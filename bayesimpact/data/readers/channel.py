@@ -45,6 +45,10 @@ _LABEL = re.compile(r"^(.*?)\s*(?:\[([^\[\]]*)\]|\(([^()]*)\)|/\s*([^/\s]+(?:/[^
 _BRACKETS = re.compile(r"\s*(?:\[([^\[\]]*)\]|\(([^()]*)\))(?=\s)")
 
 
+BATCHED = 0.1
+"""Of the steps of a column, that stand still: more are no slip of a clock."""
+
+
 @dataclass(frozen=True, eq=False)
 class Channel:
     """Samples of one sensor, as the file gives them.
@@ -91,9 +95,9 @@ class Channel:
         return bool(steps.size and steps.min() >= 0.0 and steps.max() > 0.0)
 
     @property
-    def rises(self) -> bool:
-        """True where every number is above the one before it: stamps of batches stand still."""
-        return bool(np.all(np.diff(self.samples[np.isfinite(self.samples)]) > 0.0))
+    def in_batches(self) -> bool:
+        """True for stamps that stand still for many rows: when these were sent, not read."""
+        return self.never_falls and bool(np.mean(np.diff(self.samples) == 0.0) > BATCHED)
 
     def seconds(self, unit: str | None = None) -> Floats:
         """The samples of a column of time stamps, s; `unit`, or else s, where it has none."""

@@ -26,6 +26,7 @@ from bayesimpact.data.window import unbroken, window
 from bayesimpact.errors import InputError
 
 Floats = NDArray[np.float64]
+ON_THE_WHOLE = 0.1  # relative: of a few batches the last may be short
 SHOWN = 12
 """Channels that a message lists."""
 
@@ -202,7 +203,14 @@ def _clock(
         return channel.times
     stated = clocks_of(channels, channel)
     if wanted.sample_rate is not None:  # what is stated comes before what is guessed
-        stated = [c for c in stated if c.is_called_time and c.rises]
+        stated = [c for c in stated if c.is_called_time]
+        if len(stated) == 1 and stated[0].in_batches:
+            times = stated[0].seconds(wanted.time_unit)
+            _check_mean_rate(path, times, wanted.sample_rate)
+            return 1.0 / wanted.sample_rate, float(times[0])
+    if len(stated) > 1:  # a time of day beside a clock with a unit
+        with_unit = [c for c in stated if c.unit]
+        stated = with_unit if len(with_unit) == 1 else stated
     if len(stated) == 1:
         return stated[0]
     if channel.interval is not None:
@@ -215,6 +223,15 @@ def _clock(
         raise InputError(str(path), found, f'time_column = "...", one of {listed(stated)}')
     found = f"no clock for channel {channel.name} among {listed(channels)}"
     raise InputError(str(path), found, "time_column, or sample_rate_hz in campaign.toml")
+
+
+def _check_mean_rate(path: Path, times: Floats, rate: float) -> None:
+    """Refuse a stated rate that stamps of batches contradict on the whole."""
+    span = float(times[-1] - times[0])
+    mean = (times.size - 1) / span if span > 0.0 else 0.0
+    if abs(mean - rate) > ON_THE_WHOLE * rate:
+        found = f"sample_rate_hz = {rate:g}, and {mean:.4g} rows a second by the time column"
+        raise InputError(str(path), found, "a rate that agrees with the rows on the whole")
 
 
 def _times(

@@ -21,7 +21,8 @@ from bayesimpact.errors import InputError
 Cell = str | float | None
 _NO_UNIT = "[]()- "
 _CLOCK = re.compile(
-    r"(?:[\d./-]{6,10}[T ]\s*)?(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)(?:Z|[+-]\d{2}:?\d{2})?"
+    r"(?:[\d./-]{6,10}[T ]\s*)?([01]?\d|2[0-3]):([0-5]\d):([0-5]\d(?:[.,]\d+)?)"
+    r"(?:Z|[+-]\d{2}:?\d{2})?"
 )
 LOOKED_AT = 25
 """Rows in the middle of a grid that show which of its columns are numbers."""

@@ -121,10 +121,10 @@ def test_a_turning_point_that_a_force_holds_up_is_no_rest(release: float, phase:
     y = solve_ivp(rates, (0.0, t[-1]), [release, 0.0], t_eval=t, rtol=1e-9, atol=1e-12).y[0]
     noise = 2e-5 * np.random.default_rng(3).standard_normal((20, t.size))
     found = [recording_faults(Recording("p", "", y + more, 1 / rate)) for more in noise]
-    assert sum("at rest" in f.statement for faults in found for f in faults) <= 8
+    assert sum("at rest" in f.statement for faults in found for f in faults) <= 10
 
 
-@pytest.mark.parametrize("creep", [0.0, 2e-4])
+@pytest.mark.parametrize("creep", [0.0, 2e-4, -1e-4])
 def test_a_rest_before_a_release_may_creep(creep: float) -> None:
     rate, rest = 250.0, 40
     t = np.arange(1000) / rate
