@@ -62,10 +62,10 @@ def _with_band_limited_inputs(base: Fit, found: Fit, say: Progress) -> Posed | N
     large misfit.
     """
     other = None if is_large(found) else band_limited(found)
-    if other is not None and other.log_posterior > found.log_posterior + DECISIVE:
-        first = other
-    else:
-        first = None if other is None else without_lines(base, found)
+    if other is None:
+        return None
+    better = other.log_posterior > found.log_posterior + DECISIVE
+    first = other if better else without_lines(base, found)
     if first is None:
         return None
     say("inputs are band-limited between their samples: once more with these")
