@@ -34,7 +34,7 @@ AS_GOOD = 1.0  # nats below the likeliest correlation: 1.4 standard errors
 WEAKER = 50  # correlations up to it
 UNTOLD = 0.5  # relative error of a level, beyond which it is not told
 PARTS = 4  # bands of the upper half of a spectrum
-SHORTEST = 400  # samples: so long a stretch tells the level of a band to 15 %
+SHORTEST = 400  # samples: one so long stretch tells the level of a band to 21 %
 EFFICIENCY = 0.48  # of a median of exponential numbers, against their mean: ln(2)^2
 
 

@@ -6,7 +6,7 @@ import json
 from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -348,3 +348,19 @@ def test_a_formula_is_looked_for_anew_where_a_fault_is_needless(monkeypatch, for
     before: Any = SimpleNamespace(compared=())
     module._without_needless_faults(found, before, searches)
     assert begun == [None if formula else beside]
+
+
+def test_a_start_that_was_cut_twice_is_told_once() -> None:
+    """Another recording's, and what is no start, are told however they lie."""
+
+    def compared(id: str, recording: str, end: float) -> Any:
+        fault = SimpleNamespace(id=id, recording=recording, start_s=0.0, end_s=end)
+        return SimpleNamespace(fault=fault)
+
+    first, other, gain, again, second = (
+        compared("recording_start", "a", 0.5), compared("recording_start", "b", 0.2),
+        compared("recording_gain", "a", 3.0), compared("recording_gain", "a", 3.0),
+        compared("recording_start", "a", 0.7),
+    )  # fmt: skip
+    found = Corrected(cast(Any, None), compared=(first, other, gain, again, second))
+    assert found.told == (other, gain, again, second)

@@ -13,7 +13,7 @@ from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.noise_estimate import unfiltered_noise
-from bayesimpact.inference.noise_fast import fast_noise
+from bayesimpact.inference.noise_fast import fast_noise, floor_noise
 
 SIGMA, INTERVAL, COUNT = 1e-3, 0.05, 400
 
@@ -101,3 +101,22 @@ def test_readings_without_rows_of_samples_are_refused_in_true_words() -> None:
     gappy = [Recording("a", "", samples, INTERVAL, used=used)]
     with pytest.raises(InputError, match="12 samples in a row among 400"):
         unfiltered_noise(gappy)
+
+
+def test_the_end_of_a_spectrum_tells_noise_that_windows_do_not() -> None:
+    """A velocity whose slope jumps eight times a period, as between damped stops on either side."""
+    t = np.arange(5000) / 5000.0
+    moved = 50 * SIGMA * np.abs((60.0 * t * 8) % 2 - 1) * np.exp(-t)
+    noise = SIGMA * np.random.default_rng(4).standard_normal((4, t.size))
+    rows = [
+        Recording(f"r{i}", "1", moved + x, 2e-4, quantity="velocity") for i, x in enumerate(noise)
+    ]
+    found = floor_noise(rows, Noise(0.98, level=10 * SIGMA, level_error=9.0))
+    assert found is not None and found.is_bound and found.correlation == 0.0
+    assert found.level == pytest.approx(SIGMA, abs=4 * found.level_error * SIGMA)
+    assert found.level_error < 0.05
+    for known in (
+        Noise(level=10 * SIGMA, level_error=0.1),
+        Noise(level=0.1 * SIGMA, level_error=9.0),
+    ):
+        assert floor_noise(rows, known) is known
