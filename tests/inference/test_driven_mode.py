@@ -152,14 +152,17 @@ def test_noise_without_a_gap_is_a_bound_that_a_residual_lowers() -> None:
 
 
 def test_noise_under_a_rough_input() -> None:
-    """Kinks of the force at every sample are motion, which polynomials take for noise."""
+    """Kinks of the force at every sample are motion, which polynomials take for noise: the input
+    tells it from noise, and without one the upper end of the spectrum, as a bound.
+    """
     for stop in (False, True):
         campaign = _campaign(("noise",), stop)
         noise = estimate_noise(campaign)
         assert noise.level == pytest.approx(NOISE, rel=0.08)
         free = replace(campaign.recordings[0], input=None)
         alone = estimate_noise(replace(campaign, recordings=(free,)))
-        assert alone.level > 1.2 * noise.level
+        assert alone.is_bound and not noise.is_bound
+        assert alone.level == pytest.approx(NOISE, rel=3 * alone.level_error)
 
 
 def test_rest_and_loud_parts_of_an_input_are_no_faults() -> None:
