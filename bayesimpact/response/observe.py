@@ -21,6 +21,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 DRIFT = 0.005  # of the motion: what an integrated reading is off, however smooth it looks
+AS_NOISE = 1.2  # times the noise of neighbours: what a line leaves of readings is that
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +123,8 @@ def observe_decay(observed: Observed) -> Flight | None:
     """The oscillator without a stop, from all samples; None without an oscillation.
 
     The frequency of the half cycles and that of the strongest line are tried; where no half cycles
-    stand out (slow decays cut short, a beat), the line's must explain most of the readings.
+    stand out (slow decays cut short, a beat, much noise), the line's must explain most of the
+    readings, or all but noise.
     """
     found = [] if (rate := _rate_of_half_cycles(observed)) is None else [_decay(observed, rate)]
     other = _decay(observed, observed.omega)
@@ -136,10 +138,22 @@ def _decay(observed: Observed, omega: float) -> Flight | None:
 
 
 def _explains(flight: Flight, observed: Observed) -> bool:
-    """Whether a fit leaves less than half of the readings' variance."""
+    """Whether a fit leaves less than half of the readings' variance; or no more than the noise that
+    neighbours show, and the likelihood gains what its unknowns cost (Schwarz 1978), among as many
+    frequencies as there are samples.
+    """
     square = [float(np.sum((x - np.mean(x)) ** 2)) for x in observed.samples]
     size = sum(x.size for x in observed.samples)
-    return flight.rms**2 < 0.5 * sum(square) / size
+    gained = float(np.log(sum(square) / size / flight.rms**2))
+    if gained > np.log(2.0):
+        return True
+    noise = float(np.sqrt(np.average(np.square(observed.noises), weights=_sizes(observed))))
+    cost = (2 + 2 * len(square)) / 2 + 1  # frequency, decay, amplitudes; the choice of a frequency
+    return flight.rms < AS_NOISE * noise and 0.5 * size * gained > cost * np.log(size)
+
+
+def _sizes(observed: Observed) -> list[int]:
+    return [x.size for x in observed.samples]
 
 
 def _rate_of_half_cycles(observed: Observed) -> float | None:

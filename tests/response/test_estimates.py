@@ -270,6 +270,17 @@ def test_two_slow_periods_are_an_oscillation() -> None:
     assert estimate(plain(y, 0.1)).k1 == pytest.approx(0.71**2 + 0.08**2, rel=0.03)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_line_in_much_noise_is_an_oscillation(seed: int) -> None:
+    """A steady line of less than half of the variance; readings without it are refused."""
+    t = np.arange(400) / 40.0
+    noise = 2.6e-3 * np.random.default_rng(seed).standard_normal(t.size)
+    y = 3e-3 * np.cos(2 * np.pi * 4.16 * t) + noise
+    assert estimate(plain(y, 1 / 40)).k1 == pytest.approx((2 * np.pi * 4.16) ** 2, rel=0.02)
+    with pytest.raises(InputError, match="no oscillation"):
+        estimate(plain(noise, 1 / 40))
+
+
 def test_a_beat_is_an_oscillation() -> None:
     t = np.arange(0.0, 6.6, 0.025)
     y = np.cos(14.2 * t) + 0.5 * np.cos(13.0 * t + 1.0) + 0.5 * np.cos(1.1 * t)
