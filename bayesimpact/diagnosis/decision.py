@@ -24,7 +24,9 @@ Let S be the likeliest set of effects that the search reached.
    - its size is apart from none at all by `APART` of its own standard deviations, with what the
      remainder may have done to it in them (`discrepancy`),
    - where it refines a simpler law (`Effect.prefer`), `EXCESS` times as much is left with that law
-     in its place: what remains may be all that tells the two apart,
+     in its place: what remains may be all that tells the two apart; where one of its family has no
+     parameters at all, its size is more than one part in `EXCESS` from that at which it does what
+     that one does: a size that is free also does a part of what remains,
    - no set without it, with a residual force of whichever form is likeliest, is likelier than S
      with its own residual force: by these odds (as in 1), where that force depends on what the
      effect's depends on and may be no more than the effect itself, and
@@ -48,6 +50,8 @@ from typing import Literal
 import numpy as np
 
 from bayesimpact.diagnosis.directions import is_periodic
+from bayesimpact.diagnosis.equivalent import equivalent
+from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.faults.compare import base_failed
 from bayesimpact.diagnosis.learned import may_restate
 from bayesimpact.diagnosis.naming import Naming, State
@@ -128,29 +132,53 @@ def is_needed(naming: Naming, group: Group) -> bool:
 
 
 def is_told_apart(naming: Naming, effect: Effect) -> bool:
-    """Whether far more is left with the law that an effect refines in its place, if it does."""
-    found = with_refined_law(naming, effect)
-    return found is None or exceeds(naming, found.fit)
+    """Whether far more is left with the law that an effect refines in its place, if it does, and
+    its size is not that at which it does what a law without parameters does.
+    """
+    for law, candidate in simpler_laws(naming, effect):
+        if law.id == effect.prefer and not exceeds(naming, candidate.fit):
+            return False
+        if not law.parameters and is_of_fixed_size(naming, effect, law, candidate.fit):
+            return False
+    return True
 
 
-def with_refined_law(naming: Naming, effect: Effect) -> Candidate | None:
-    """The chosen model with the law that an effect refines in its place, if it was fitted."""
+def simpler_laws(naming: Naming, effect: Effect) -> list[tuple[Effect, Candidate]]:
+    """The law that an effect refines, and those of its family without parameters, with the chosen
+    model with them in its place, as far as these were fitted.
+    """
     ids = frozenset(naming.chosen.candidate.ids)
-    if effect.prefer is None or effect.prefer in ids:
-        return None
-    wanted = ids - {effect.id} | {effect.prefer}
-    return next((c for c in naming.tried if frozenset(c.ids) == wanted), None)
+    rest = ids - {effect.id}
+    found = []
+    for candidate in naming.tried:
+        new = [e for e in candidate.effects if e.id not in ids]
+        if len(new) == 1 and frozenset(candidate.ids) == rest | {new[0].id}:
+            fixed = new[0].family == effect.family and not new[0].parameters
+            if fixed or new[0].id == effect.prefer:
+                found.append((new[0], candidate))
+    return found
+
+
+def is_of_fixed_size(naming: Naming, effect: Effect, law: Effect, fit: Fit) -> bool:
+    """Whether an effect of one size has nearly that at which it does what a law without parameters
+    does along a `fit` with that.
+    """
+    if len(effect.parameters) != 1:
+        return False
+    name = f"{effect.id}.{effect.parameters[0].name}"
+    at = equivalent(law, effect, fit, campaign_scales(naming.base.candidate.fit))
+    size = naming.chosen.candidate.fit.value(name)
+    return bool(at) and EXCESS * abs(at[name] - size) < abs(at[name])
 
 
 def group_of(naming: Naming, effect: Effect) -> Group:
-    """An effect of the chosen model, the law that it refines, and those of its family that likely
+    """An effect of the chosen model, a simpler law like it, and those of its family that likely
     sets without it have in its place; without these where one of the sets has none, or there are
     too many.
     """
-    chosen, simpler = naming.chosen.candidate, with_refined_law(naming, effect)
-    alone = (
-        (effect, *(e for e in simpler.effects if e.id == effect.prefer)) if simpler else (effect,)
-    )
+    chosen, apart = naming.chosen.candidate, is_told_apart(naming, effect)
+    simpler = [e for e, _ in simpler_laws(naming, effect) if e.id == effect.prefer or not apart]
+    alone = (effect, *simpler[:1])
     least = naming.log_odds(chosen) - DECISIVE
     others = {e.id: e for e in alone[1:]}
     for candidate in naming.tried:

@@ -21,7 +21,7 @@ def equivalent(old: Effect, new: Effect, fit: Fit, scales: Scales) -> dict[str, 
     no force of place, speed and time alone, or has a parameter of a case or recording, or is not
     finite.
     """
-    if not (_is_plain(old) and _is_plain(new) and new.admissible(scales)):
+    if not (_is_plain(old) and _is_plain(new) and new.has_size and new.admissible(scales)):
         return {}
     theirs = {p.name: fit.value(f"{old.id}.{p.name}") for p in old.parameters if p.is_shape}
     start = np.array(
@@ -50,7 +50,6 @@ def _is_plain(effect: Effect) -> bool:
     return (
         law is not None
         and not (law.rate or law.travel or effect.sets or effect.observe)
-        and effect.has_size
         and all(
             p.scope == "campaign" and not p.circular and p.fixed is None for p in effect.parameters
         )
@@ -62,10 +61,15 @@ def _forces(old: Effect, new: Effect, fit: Fit, r: int, points: Array) -> Array:
     (1 + k, n).
     """
     assert old.law is not None and new.law is not None
+    path = _path(fit, r)
+    slots = fit.target.oscillator.layout.slots(fit.mode)[r]
+    mine = force_along(old.law, *path, effect_numbers(old, fit, r), slots)
+    return np.stack([mine, *(force_along(new.law, *path, p, slots) for p in points)])
+
+
+def _path(fit: Fit, r: int) -> tuple[Array, Array, Array]:
+    """Displacements, speeds and times of some points of recording r."""
     y, v = list(trajectory_points(fit))[r]
     t = np.asarray(fit.target.oscillator.campaign.recordings[r].times)
     few = slice(0, y.size, max(1, y.size * len(fit.linearisation) // POINTS))
-    slots = fit.target.oscillator.layout.slots(fit.mode)[r]
-    path = y[few], v[few], t[few]
-    mine = force_along(old.law, *path, effect_numbers(old, fit, r), slots)
-    return np.stack([mine, *(force_along(new.law, *path, p, slots) for p in points)])
+    return y[few], v[few], t[few]

@@ -10,6 +10,10 @@ named when
   and all other formulas that do not contain it, fitted or, where none of their kind was, scored;
   with the price of their lengths and without it, as effects are compared.
 
+Where the misfit is small, formulas that score best beside the base model are asked, too, whether
+one is decisively likelier than the effects that explain all: several of them may imitate one force
+that the map of the free one is too coarse for, as a friction of the stop.
+
 Else the formulas are listed with their odds, and the verdict stays; but an effect that the
 likeliest of all models lacks, formulas among them, is not named: it imitated what a formula is.
 """
@@ -32,15 +36,18 @@ from bayesimpact.diagnosis.formula_refits import (
     kind_ids,
     kinds_of,
     length_price,
+    refit_candidates,
+    refitted,
 )
 from bayesimpact.diagnosis.formula_rounds import (
     Refits,
     fitted_formulas,
     is_told,
+    joined,
     scored_rivals,
 )
 from bayesimpact.diagnosis.learned import LEARNED
-from bayesimpact.diagnosis.naming import Naming, State, leaves_something
+from bayesimpact.diagnosis.naming import Naming, State, is_large, leaves_something
 from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.scan import scan
 from bayesimpact.diagnosis.thresholds import DECISIVE
@@ -78,9 +85,12 @@ def with_formulas(
 
     Where the budget ends before all formulas are fitted that may be the likeliest, none is named.
     """
+    means = _Means(effects, scales, rng, progress, budget)
     something = answer.decision.verdict in ("unknown", "partly") or _has_formula(answer.after)
+    if not something and answer.decision.effects and not is_large(answer.naming.base.candidate.fit):
+        answer, something = _imitated(answer, means)
     if something and answer.naming.finished:
-        answer = _compared(answer, _Means(effects, scales, rng, progress, budget), TURNS)
+        answer = _compared(answer, means, TURNS)
     certain = answer.formulas is not None and answer.formulas.named
     return answer if certain else _uncertain(answer)
 
@@ -94,6 +104,28 @@ class _Means:
     rng: np.random.Generator
     progress: Callable[[str], None]
     budget: Budget
+
+
+def _imitated(answer: Answer, means: _Means) -> tuple[Answer, bool]:
+    """The answer with the likeliest formula in the place of its effects where that is decisively
+    likelier and has no more terms, and whether one is.
+    """
+    naming, base = answer.naming, answer.naming.base.candidate.fit
+    means.progress("scoring formulas in place of the effects")
+    question = asked_about(base, naming.prior_cost, means.scales)
+    if question is None:
+        return answer, False
+    most = len(answer.decision.effects)
+    fewer = [s for s in question.ranked if len(s.terms) <= most]
+    fitted = list[Candidate]()
+    for subset in refit_candidates(fewer, question.scores.terms):
+        if means.budget.may_go_on() and (found := refitted(question, subset)) is not None:
+            fitted.append(found)
+    naming = joined(naming, fitted)
+    first = max(fitted, key=naming.log_odds, default=naming.chosen.candidate)
+    if not naming.log_odds(first) > naming.log_odds(naming.chosen.candidate) + DECISIVE:
+        return answer, False
+    return replace(answer, naming=naming, after=first.fit), True
 
 
 def _compared(answer: Answer, means: _Means, turns: int) -> Answer:

@@ -69,7 +69,8 @@ class Remaining(Settling):
         for group in needed if not is_imitated(found) else ():
             found = self.with_forces(found, [smaller[group[0].id], *rivals_in_place(found, group)])
             wider = group_of(found, group[0])
-            if len(wider) > len(group) and not is_needed(found, group):
+            told = is_needed(found, group) and is_told_apart(found, group[0])
+            if len(wider) > len(group) and not told:
                 found = self.with_forces(found, rivals_in_place(found, wider))
         return found
 

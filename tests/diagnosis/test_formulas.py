@@ -26,7 +26,7 @@ from bayesimpact.diagnosis.scan import scan
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.formula.evidence import Subset
 from bayesimpact.formula.grammar import ONE, Power, Term
-from bayesimpact.formula.law import is_formula
+from bayesimpact.formula.law import is_formula, kind_id
 from bayesimpact.model.effects.effect import Effect, Scales
 from bayesimpact.model.own_effects import load_effects
 from bayesimpact.report.formula_arrays import formula_arrays
@@ -82,6 +82,29 @@ def test_an_effect_that_imitated_the_force_goes_once_the_formula_is_in(detent: A
     named = [e.id for e in found.decision.effects]
     assert named == [e.id for e in detent[1].decision.effects]
     assert found.naming.chosen.candidate.ids == tuple(named)
+
+
+def test_a_formula_takes_the_place_of_effects_that_only_imitate_it(detent: Any) -> None:
+    imitating = tuple(BY_ID[i] for i in ("spring_cubic", "spring_quadratic"))
+    before, scales = unknown({"detent": DETENT}, named=imitating)
+    found = asked(_said(before), scales)
+    assert found.decision.verdict == "named"
+    own, alone = ([kind_id(e.id) for e in a.decision.effects] for a in (found, detent[1]))
+    assert own == alone
+
+
+def test_no_formula_takes_the_place_of_the_law_that_acts() -> None:
+    before, scales = unknown({"quadratic_drag": DRAG}, named=(BY_ID["quadratic_drag"],))
+    named = _said(before)
+    said: list[str] = []
+    assert asked(named, scales, said=said) is named
+    assert said == ["scoring formulas in place of the effects"]
+
+
+def _said(answer: Answer) -> Answer:
+    """An answer that names the effects of its model, as if nothing were left."""
+    decision = replace(answer.decision, verdict="named")
+    return Answer(answer.naming, decision, answer.naming.chosen.candidate.fit, None)
 
 
 def test_a_term_that_says_nothing_beside_another_goes(detent: Any, monkeypatch: Any) -> None:

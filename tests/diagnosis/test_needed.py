@@ -24,6 +24,7 @@ from made_up_evidence import (
     with_misfit,
 )
 
+from bayesimpact.diagnosis import decision
 from bayesimpact.diagnosis.decision import decide, in_its_place, leads_without
 from bayesimpact.diagnosis.thresholds import (
     ALPHA,
@@ -46,6 +47,24 @@ def test_an_effect_that_another_could_stand_for_is_not_needed():
     near, far = (candidate(DRAG, 100.0 - DECISIVE + x) for x in (0.1, -0.1))
     assert judge(remaining(something_left(), 100.0, 10.0, near)) == "unknown"
     assert judge(remaining(something_left(), 100.0, 10.0, far)) == "partly"
+
+
+@pytest.mark.parametrize(("off", "verdict"), [(0.2, "unknown"), (0.3, "partly")])
+def test_a_size_near_that_of_a_law_without_parameters_is_no_name(
+    monkeypatch: pytest.MonkeyPatch, off: float, verdict: str
+) -> None:
+    """A cubic spring of about -k1 / 6 in angles may be a pendulum, whatever else its size does."""
+    monkeypatch.setattr(decision, "campaign_scales", lambda fit: None)
+    at = {"spring_cubic.stiffness": -0.2}
+    monkeypatch.setattr(decision, "equivalent", lambda *_: at)
+    chosen = state(candidate("spring_cubic", 100.0), ALPHA / 2, ALPHA / 2, 2 * DECISIVE)
+    pendulum = with_misfit(candidate("pendulum_sine", 50.0), 60.0)
+    found = remaining(chosen, 100.0, 10.0, pendulum)
+    found.chosen.candidate.fit.value = lambda name: at[name] * (1.0 + off)
+    said = decide(found)
+    assert said.verdict == verdict
+    alike = [[e.id for e in group] for group in said.either]
+    assert alike == ([["spring_cubic", "pendulum_sine"]] if verdict == "unknown" else [])
 
 
 @pytest.mark.parametrize("effect", ["released_mode", FRICTION])
