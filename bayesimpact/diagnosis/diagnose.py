@@ -68,8 +68,12 @@ from bayesimpact.model.compiled import compilation_left_out
 from bayesimpact.model.effects import SEARCHED
 from bayesimpact.model.effects.effect import Effect
 from bayesimpact.model.threads import linear_algebra_alone
+from bayesimpact.model.workload import workload_counted
 
 Array = NDArray[np.float64]
+
+SLOWEST = 3.0
+"""Times as slow as `workload` expects that a machine may be before its own seconds count."""
 
 BESIDE: Mapping[Verdict, Verdict] = {
     "adequate": "named",
@@ -132,7 +136,7 @@ def diagnose(
     effects: Sequence[Effect] = SEARCHED,
     search: bool = True,
     progress: Progress | None = None,
-    clock: Callable[[], float] = time.process_time,
+    clock: Callable[[], float] | None = None,
 ) -> Diagnosis:
     """Locate, name and model what the base oscillator leaves out of a campaign's recordings.
 
@@ -143,15 +147,20 @@ def diagnose(
     effects : the catalogue, and effects of one's own
     search : False leaves out the global search and trusts the quick estimates
     progress : called with a few words before every longer step
-    clock : s, of the budget, from the first search of physics on; compiling does not count
+    clock : s, of the budget, from the first search of physics on; compiling does not count. Without
+        one that of what is simulated, so that no other work of the machine changes an answer, as
+        long as the machine is not `SLOWEST` times slower than that expects
 
     Raises
     ------
     InputError : a recording shows no oscillation
     """
     say = progress or (lambda message: None)
-    with compilation_left_out(clock) as computing:
-        return _diagnosed(campaign, rng, effects, search, say, computing)
+    with workload_counted() as simulated:
+        slow = time.process_time
+        reading = clock or (lambda: max(simulated(), slow() / SLOWEST))
+        with compilation_left_out(reading) as computing:
+            return _diagnosed(campaign, rng, effects, search, say, computing)
 
 
 def _diagnosed(

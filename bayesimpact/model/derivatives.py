@@ -31,6 +31,7 @@ from bayesimpact.model.normalized import OK, OVERFLOW, PHASE, A
 from bayesimpact.model.sensitivity_pass import Columns, sensitivity_pass, workspace
 from bayesimpact.model.tables import ResponseTables, response_tables
 from bayesimpact.model.threads import in_shares
+from bayesimpact.model.workload import count
 
 #: Events for which there is room at first, at least, and samples for one more; a recording with
 #: more of them is run once more.
@@ -188,6 +189,7 @@ def _work(
     out: Floats, values: Floats, jacobian: Floats,
 ) -> Ints:  # fmt: skip
     batch, recordings = len(model.theta), len(model.columns)
+    count(batch * int(model.counts.sum()), "derivatives")
     codes = np.empty((batch, recordings), dtype=np.int64)
     waves, first_wave = check_inputs(inputs, model)
     harmonic = (model.columns[:, A] >= 0) | (model.constants[:, A] != 0.0)

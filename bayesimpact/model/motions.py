@@ -14,6 +14,7 @@ from bayesimpact.model.arguments import Inputs
 from bayesimpact.model.general import integrate_many
 from bayesimpact.model.parameters import BASE_SLOTS
 from bayesimpact.model.simulate import predictions
+from bayesimpact.model.workload import count
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -70,6 +71,7 @@ def general_motions(
     Every row may begin anew, see `integrate_many`.
     """
     out = np.empty((q.shape[0], int(counts.max())))
+    count(int(counts.sum()), "general")
     codes = integrate_many(
         q, mass, intervals, counts, laws, out, inputs, orders=orders, restarts=restarts
     )

@@ -35,6 +35,7 @@ from bayesimpact.model.arguments import (
 )
 from bayesimpact.model.batch import Floats, Ints
 from bayesimpact.model.normalized import Q
+from bayesimpact.model.workload import count
 
 #: What a failure code means.
 CODES: Mapping[int, str] = MappingProxyType(
@@ -228,6 +229,7 @@ def _work(
     sse: Floats, values: Floats,
 ) -> Ints:  # fmt: skip
     batch, recordings = len(model.theta), len(model.columns)
+    count(batch * int(model.counts.sum()), "closed form")
     codes = np.empty((batch, recordings), dtype=np.int64)
     arguments = (
         model.theta, model.columns, model.constants, float(mass), data, first, model.counts,

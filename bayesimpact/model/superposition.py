@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from bayesimpact.model.free_changes import FreeChanges, free_changes
 from bayesimpact.model.oscillator import Oscillator
 from bayesimpact.model.parameters import SLOTS
+from bayesimpact.model.workload import count
 
 Array = NDArray[np.float64]
 
@@ -109,6 +110,7 @@ def answers(motion: Motion, forces: Array) -> Array:
 
     Laws stand on the left-hand side: their force acts against the motion's direction.
     """
+    count(forces.size, "response")
     out = np.empty((forces.shape[0], motion.samples))
     state = np.zeros((2, forces.shape[0]))
     changes, factor = motion.changes, motion.factor
@@ -131,12 +133,12 @@ def answers(motion: Motion, forces: Array) -> Array:
 def _states(impulses: Array, forces: Array, steps: Array, factor: int) -> Array:
     """What forces (K, n) make of both free changes by every sample, (2, K, samples)."""
     before, after = steps[0] * impulses[:, :-1], steps[1] * impulses[:, 1:]
-    count, samples = forces.shape[0], (forces.shape[1] - 1) // factor + 1
+    number, samples = forces.shape[0], (forces.shape[1] - 1) // factor + 1
     inner = before[:, 1:] + after[:, :-1]
     nodes = np.concatenate([before[:, :1], inner], axis=1).reshape(2, samples - 1, factor)
     nodes[:, 1:, 0] = before[:, factor::factor]  # what ends at a sample is added there
-    cells = forces[:, :-1].reshape(count, samples - 1, factor)
+    cells = forces[:, :-1].reshape(number, samples - 1, factor)
     last = after[:, None, factor - 1 :: factor] * forces[:, factor::factor]
-    states = np.zeros((2, count, samples))
+    states = np.zeros((2, number, samples))
     np.cumsum(np.einsum("ksf,tsf->kts", nodes, cells) + last, axis=2, out=states[:, :, 1:])
     return states
