@@ -14,8 +14,8 @@ from contextvars import ContextVar
 # s of a processor of 2023 with nothing beside it, fitted to the searches of
 # tests/benchmarks/workload.py: of a call that simulates, and of a sample of the closed form, with
 # derivatives, and of the general law
-PER_CALL = 2.7e-3
-PER_SAMPLE = {"closed form": 4e-8, "derivatives": 3e-7, "general": 7e-8, "response": 1e-8}
+PER_CALL = 2.5e-3
+PER_SAMPLE = {"closed form": 4e-8, "derivatives": 3e-7, "general": 1.2e-7, "response": 1e-8}
 
 
 class Workload:
