@@ -25,7 +25,8 @@ def find_noise(recording: Recording) -> list[Fault]:
     """Blocks whose noise is above twice the recording's usual level.
 
     Above three times they are excluded, below told. Levels are the bulk of sixth differences. What
-    motion leaves there is no noise: the level from fourth differences has to rise as much.
+    motion leaves there is no noise: the level from fourth differences has to rise as much, and a
+    part with far more motion than all others has its own fast modes.
     """
     x = recording.samples
     count = min(BLOCKS, x.size // LEAST_BLOCK)
@@ -45,6 +46,9 @@ def find_noise(recording: Recording) -> list[Fault]:
     strong = (ratio > FACTOR) & ((ratio - 1.0) / sd > least)
     strong &= np.abs(fourth / other - ratio) < SAME * ratio
     if not strong.any() or strong.sum() > count // 2:
+        return []
+    motion = np.array([np.std(x[a:b]) for a, b in parts])
+    if motion[strong].min() > FACTOR * motion[~strong].max():
         return []
     reach = int(EDGE * x.size / count)
     loud = np.zeros(x.size, dtype=bool)
