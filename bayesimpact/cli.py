@@ -174,7 +174,7 @@ def sample(
     from bayesimpact.workflow import sample_campaign
 
     command = f"bayesimpact sample {campaign} --out {out} --seed {seed}"
-    folder = made_folder(out, f"{command} --resume")
+    folder = made_folder(out, command, kept="draws")
     told: dict[str, Any] = {"say": telling(quiet), "bar": False if quiet else None}
     outcome = sample_campaign(loaded, folder, seed=seed, resume=resume, command=command, **told)
     announce(outcome, out, quiet)
@@ -225,7 +225,7 @@ def diagnose(
     command += " --quick" * quick + f" --certify {certify}" * bool(certify)
     outcome = diagnose_campaign(
         loaded,
-        made_folder(out, command + " --resume" * (not quick)),
+        made_folder(out, command, kept="nothing" if quick else "draws"),
         seed=seed,
         quick=quick,
         certify=certify,

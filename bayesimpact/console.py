@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, Literal, NoReturn
 
 import click
 
@@ -26,7 +26,13 @@ BAD_INPUT = 2
 NOT_CONVERGED = 3
 INTERRUPTED = 130
 FAILED_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
-_GO_ON = "bayesimpact.go_on"  # in a context's meta: what to type after an interruption
+_GO_ON = "bayesimpact.go_on"  # in a context's meta: tells what to type after an interruption
+_BLOCKS = "chain/**/block-*.npz"  # of `inference.chainfile`, in a folder of results
+
+Kept = Literal["nothing", "draws", "finished"]
+"""What an interrupted command leaves to go on with: the sampler's draws, by `--resume`, or the
+campaigns that were finished, by the same command.
+"""
 
 
 class Commands(click.Group):
@@ -66,8 +72,8 @@ class Commands(click.Group):
 
 
 def _how_to_go_on(ctx: click.Context) -> str:
-    words = ctx.meta.get(_GO_ON)
-    return f"; {words}" if words else ""
+    tell = ctx.meta.get(_GO_ON)
+    return f"; {tell()}" if tell else ""
 
 
 def _end(ctx: click.Context, message: str, code: int) -> NoReturn:
@@ -140,21 +146,35 @@ def results_folder(campaign: Path, out: Path | None) -> Path:
     return home / str(click.get_current_context().info_name)
 
 
-def made_folder(out: Path, go_on: str = "") -> Path:
+def made_folder(out: Path, command: str = "", *, kept: Kept = "nothing") -> Path:
     """Make the folder of `--out` and hold it until the command ends; called once the input has
-    proved good. `go_on`: the command that goes on after an interruption.
+    proved good.
+
+    Parameters
+    ----------
+    command : what to type after an interruption; "" where that needs no telling
+    kept : what it goes on with then
     """
     ctx = click.get_current_context()
     try:
         out.mkdir(parents=True, exist_ok=True)
-        if go_on:  # before the lock: who sees it may interrupt at once
-            ctx.meta[_GO_ON] = f"what was done is kept in {out}; to go on: {go_on}"
+        if command:  # before the lock: who sees it may interrupt at once
+            ctx.meta[_GO_ON] = lambda: _after_interruption(out, command, kept)
         ctx.with_resource(locked(out))
         clear_unfinished(out)
     except OSError as error:
         reason = error.strerror or str(error)
         raise InputError(f"--out {out}", reason.lower(), "a folder that can be written") from None
     return out
+
+
+def _after_interruption(out: Path, command: str, kept: Kept) -> str:
+    """What is left to go on with, and what to type; a search leaves nothing."""
+    if kept == "finished":
+        return f"what was finished is kept in {out}; to go on: {command}"
+    if kept == "draws" and any(out.glob(_BLOCKS)):
+        return f"the draws so far are kept in {out}; to go on with them: {command} --resume"
+    return f"there is nothing to resume; to begin again: {command}"
 
 
 def telling(quiet: bool) -> Callable[[str], None]:

@@ -59,7 +59,9 @@ def test_a_full_disk_ends_in_one_message(
     )
     lines = [x for x in done.stderr.splitlines() if x.startswith("bayesimpact:")]
     assert (done.returncode, len(lines)) == (code, 1), done.stderr
-    assert "too large" in lines[0] and ("to go on: bayesimpact fit" in lines[0]) == (code == 1)
+    assert "too large" in lines[0] and ("to begin again: bayesimpact fit" in lines[0]) == (
+        code == 1
+    )
     assert "Traceback" not in done.stderr
     assert not list(tmp_path.glob(".*.nc*")), "half a file is left"
 
@@ -145,7 +147,8 @@ def test_sigterm_is_like_ctrl_c_and_says_how_to_go_on(campaign: Path, tmp_path: 
     assert process.wait() == 130, error
     last = error.splitlines()[-1]
     assert last.startswith("bayesimpact: interrupted") and "Traceback" not in error
-    assert f"bayesimpact sample {campaign} --out {tmp_path} --seed 0 --resume" in last
+    again = f"to begin again: bayesimpact sample {campaign} --out {tmp_path} --seed 0"
+    assert last.endswith(again), "no draws are kept before the sampler has saved some"
 
 
 def test_an_interruption_right_after_the_lock_says_how_to_go_on(
@@ -161,7 +164,40 @@ def test_an_interruption_right_after_the_lock_says_how_to_go_on(
     monkeypatch.setattr("bayesimpact.console.clear_unfinished", interrupted)
     code, error = ended(capsys, "fit", campaign, "--out", tmp_path)
     assert code == 130
-    assert f"to go on: bayesimpact fit {campaign} --out {tmp_path}" in error.splitlines()[-1]
+    assert f"to begin again: bayesimpact fit {campaign} --out {tmp_path}" in error.splitlines()[-1]
+
+
+@pytest.mark.parametrize(
+    ("command", "drawn", "told"),
+    [
+        (("diagnose", "--quick"), "chain/before", False),
+        (("diagnose",), "", False),
+        (("diagnose",), "chain/before", True),
+        (("sample",), "chain", True),
+        (("fit",), "chain", False),
+    ],
+)
+def test_an_interruption_promises_only_draws_that_are_there(
+    command: tuple[str, ...],
+    drawn: str,
+    told: bool,
+    campaign: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def interrupted(folder: Path) -> None:
+        if drawn:
+            (folder / drawn).mkdir(parents=True)
+            (folder / drawn / "block-000000.npz").write_bytes(b"")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("bayesimpact.console.clear_unfinished", interrupted)
+    name, *flags = command
+    code, error = ended(capsys, name, campaign, "--out", tmp_path, *flags)
+    last = error.splitlines()[-1]
+    assert code == 130 and ("--resume" in last) == ("draws so far are kept" in last) == told
+    assert ("nothing to resume; to begin again" in last) != told
 
 
 def test_an_interruption_outlives_a_clean_up_that_fails() -> None:

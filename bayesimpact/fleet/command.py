@@ -62,7 +62,7 @@ def fleet(
     plan = load_plan(file)
     out = out or file.with_suffix("")
     command = f"bayesimpact fleet {file} --out {out} --seed {seed}"
-    folder = made_folder(out, command)
+    folder = made_folder(out, command, kept="finished")
     from tqdm.auto import tqdm
 
     with tqdm(total=len(plan.sessions), desc=plan.command, unit="campaign", disable=quiet) as bar:

@@ -112,7 +112,7 @@ def trial(
     results = run_trials(
         settings,
         range(seed, seed + number),
-        made_folder(out, "the same command"),
+        made_folder(out, "the same command", kept="finished"),
         workers=workers,
         scheduler=scheduler,
         keep=keep,
