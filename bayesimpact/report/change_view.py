@@ -8,38 +8,19 @@ from typing import Any
 from markupsafe import Markup
 
 from bayesimpact.diagnosis.words import excludes, parameter_shift
-from bayesimpact.model.units import (
-    decimals,
-    number,
-    percent,
-    readable,
-    signed,
-    span,
-    typeset,
-    without_zero,
-)
+from bayesimpact.model.units import percent, signed
+from bayesimpact.report.digits import digits
 from bayesimpact.report.rows import Z90
 from bayesimpact.report.tables import symbol
 
-ALIKE = 10.0  # intervals that differ by less are told with the same digits
 NUISANCES = ("y0", "v0", "offset", "gain", "sigma")
 
 
 def estimate(content: Mapping[str, Any], *, like: Mapping[str, Any] | None = None) -> str:
-    """Median with its 90 % interval and unit.
-
-    `like`: another estimate of the same parameter, told with the same digits unless its interval
-    is of another order.
-    """
-    low, high = content["ci90"]
-    half = 0.5 * (high - low)
-    shown = readable(content["unit"], max(abs(content["median"]), half))
-    wider = half if like is None else max(half, 0.5 * (like["ci90"][1] - like["ci90"][0]))
-    places = decimals((wider if wider < ALIKE * half else half) * shown.scale)
-    places = without_zero(places, low * shown.scale, high * shown.scale)
-    ends = span(low, high, shown.scale, places)
-    value = number(content["median"] * shown.scale, places)
-    return f"{value} ({ends}) {typeset(shown.unit)}".rstrip()
+    """Median with its 90 % interval and unit; `like` is another estimate of the same parameter."""
+    others = () if like is None else (like,)
+    shown = digits(content["unit"], content["median"], content["ci90"], others)
+    return shown.estimate(content["median"], content["ci90"])
 
 
 def change_row(

@@ -7,11 +7,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from bayesimpact.formula.law import is_formula_id
-from bayesimpact.model.units import MINUS, interval_decimals, number, quantity, readable
+from bayesimpact.model.units import MINUS, quantity, typeset
 from bayesimpact.report.change_view import NUISANCES, change_words
+from bayesimpact.report.digits import Digits, digits
 from bayesimpact.report.formula_text import latex_formula, letter
 from bayesimpact.report.limit_view import not_found
-from bayesimpact.report.results import Results, Row
+from bayesimpact.report.results import Results
 
 _SPECIAL = {c: f"\\{c}" for c in "&%$#_{}"} | {
     "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
@@ -71,22 +72,20 @@ def _table(caption: str, columns: str, head: Sequence[str], rows: Iterable[Seque
 
 def _parameters(results: Results) -> str:
     centre = results.centre
-    rows = [_row(row) for row in results.select("physical", "effect")]
+    rows = []
+    for row in results.select("physical", "effect"):
+        shown = results.digits(row)
+        rows.append((symbol(row.name), *_cells(shown, row.median, row.ci90), _unit(shown)))
     caption = f"Parameters of {escaped(results.name)}: {centre} and 90\\,\\% interval."
     return _table(caption, "lrll", ("parameter", centre, r"90\,\% interval", "unit"), rows)
 
 
-def _row(row: Row) -> tuple[str, ...]:
-    return (symbol(row.name), *_cells(row.unit, row.median, row.ci90))
+def _cells(shown: Digits, median: float, ends: Sequence[float]) -> tuple[str, str]:
+    return escaped(shown.value(median)), escaped(shown.interval(ends))
 
 
-def _cells(unit: str, median: float, ends: Sequence[float]) -> tuple[str, str, str]:
-    low, high = ends
-    shown = readable(unit, max(abs(median), 0.5 * (high - low)))
-    places = interval_decimals(low * shown.scale, high * shown.scale)
-    numbers = [escaped(number(x * shown.scale, places)) for x in (median, low, high)]
-    printed = escaped(quantity(1.0 / shown.scale, unit).partition("\N{NO-BREAK SPACE}")[2])
-    return numbers[0], f"{numbers[1]} to {numbers[2]}", printed
+def _unit(shown: Digits) -> str:
+    return escaped(typeset(shown.unit))
 
 
 def _models(diagnosis: Mapping[str, Any]) -> str:
@@ -97,9 +96,11 @@ def _models(diagnosis: Mapping[str, Any]) -> str:
         if name not in after or name.partition("[")[0] in NUISANCES:
             continue
         new = after[name]
-        first, second = (_cells(x["unit"], x["median"], x["ci90"]) for x in (old, new))
-        change = escaped(change_words(old, new))
-        rows.append((symbol(name), *first[:2], *second, change))
+        cells: list[str] = []
+        for one, other in ((old, new), (new, old)):
+            shown = digits(one["unit"], one["median"], one["ci90"], (other,))
+            cells += _cells(shown, one["median"], one["ci90"])
+        rows.append((symbol(name), *cells, _unit(shown), escaped(change_words(old, new))))
     if not rows:
         return ""
     ids = ", ".join(map(_name, diagnosis.get("effects", ())))

@@ -12,10 +12,12 @@ from typing import Any, cast
 
 import numpy as np
 
-from bayesimpact.data.html import html_table, resolved
+from bayesimpact.data.html import html_table
 from bayesimpact.data.quantity import Quantity, is_angular, unit_of
 from bayesimpact.data.short_repr import short_repr
+from bayesimpact.model.units import typeset
 from bayesimpact.report.codec import Array as Array
+from bayesimpact.report.digits import Digits, digits
 from bayesimpact.report.recording_result import RecordingResult as RecordingResult
 
 
@@ -303,12 +305,12 @@ class Results:
         return f"<Results of {self.name!r}: {found}, {count}>"
 
     def _repr_html_(self) -> str:
-        """Parameters that all recordings share, with 90 % intervals, SI, for a notebook."""
+        """Parameters that all recordings share, with 90 % intervals, as the report has them."""
         rows = []
         for row in self.select("physical", "effect"):
-            width = row.ci90[1] - row.ci90[0]
-            shown = (resolved(x, width) for x in (row.median, *row.ci90))
-            rows.append((row.name, *shown, row.unit))
+            shown = self.digits(row)
+            values = map(shown.value, (row.median, *row.ci90))
+            rows.append((row.name, *values, typeset(shown.unit)))
         return html_table(repr(self), ("parameter", self.centre, "5 %", "95 %", "unit"), rows)
 
     @property
@@ -370,6 +372,12 @@ class Results:
             if row.name == name:
                 return row
         raise KeyError(name)
+
+    def digits(self, row: Row) -> Digits:
+        """How a row's numbers are written, beside what a diagnosis says of its parameter."""
+        both = (self.diagnosis or {}).get("parameters") or {}
+        known = [both.get(key, {}).get(row.name) for key in ("before", "after")]
+        return digits(row.unit, row.median, row.ci90, [x for x in known if x is not None])
 
     def select(self, *roles: str) -> tuple[Row, ...]:
         """Rows with one of the given roles."""

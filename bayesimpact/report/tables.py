@@ -14,16 +14,15 @@ from bayesimpact.model.units import (
     chi2,
     decimals,
     display,
-    interval_decimals,
     number,
     p_value,
-    readable,
     reading,
     signed,
     significant,
     span,
     typeset,
 )
+from bayesimpact.report.digits import Digits, places
 from bayesimpact.report.formula_text import letter, written
 from bayesimpact.report.results import Results, Row
 
@@ -79,7 +78,7 @@ def symbol(name: str) -> Markup:
 def parameter_views(results: Results, rows: tuple[Row, ...]) -> list[ParameterView]:
     """Rows of the table of parameters; reference cells in the order of `reference_labels`."""
     labels = reference_labels(rows)
-    return [_view(row, labels) for row in rows]
+    return [_view(row, labels, results.digits(row)) for row in rows]
 
 
 def reference_labels(rows: tuple[Row, ...]) -> list[str]:
@@ -87,35 +86,31 @@ def reference_labels(rows: tuple[Row, ...]) -> list[str]:
     return list(dict.fromkeys(label for row in rows for label in row.references))
 
 
-def _view(row: Row, labels: list[str]) -> ParameterView:
-    low, high = row.ci90
-    half = 0.5 * (high - low)
-    shown = readable(row.unit, max(abs(row.median), half))
-    places = interval_decimals(low * shown.scale, high * shown.scale)
-    total_places = interval_decimals(*(end * shown.scale for end in row.total90))
+def _view(row: Row, labels: list[str], shown: Digits) -> ParameterView:
+    total_places = places(row.median * shown.scale, [end * shown.scale for end in row.total90])
     ratio, ratio_low, ratio_high = row.ratio
-    ratio_places = interval_decimals(ratio_low, ratio_high)
+    ratio_places = places(ratio, (ratio_low, ratio_high))
     return ParameterView(
         symbol=symbol(row.name),
         meaning=written(row.meaning),
         unit=typeset(shown.unit),
-        median=number(row.median * shown.scale, places),
-        interval=span(low, high, shown.scale, places),
+        median=shown.value(row.median),
+        interval=shown.interval(row.ci90),
         total=span(*row.total90, shown.scale, total_places),
         ratio=number(ratio, ratio_places) if row.ratio_unit else "",
         ratio_interval=span(ratio_low, ratio_high, 1.0, ratio_places) if row.ratio_unit else "",
         ratio_unit=typeset(row.ratio_unit),
-        references=tuple(_reference(row, label, shown.scale, places) for label in labels),
+        references=tuple(_reference(row, label, shown) for label in labels),
         prior=row.prior,
     )
 
 
-def _reference(row: Row, label: str, scale: float, places: int) -> Cell:
+def _reference(row: Row, label: str, shown: Digits) -> Cell:
     """A value to compare with, and how far the median lies from it."""
     if label not in row.references:
         return Cell("")
     value = row.references[label]
-    return Cell(number(value * scale, places), deviation(row, value))
+    return Cell(shown.value(value), deviation(row, value))
 
 
 def deviation(row: Row, value: float) -> str:
@@ -173,8 +168,8 @@ def release_views(results: Results) -> list[dict[str, str]]:
             shown = Display(scale, "") if unit else display(row.unit, _largest([row]))
             shown = Display(1.0, "") if row.unit == "-" else shown
             half = _half(row) * shown.scale
-            places = decimals(half)
-            text = f"{number(row.median * shown.scale, places)} ± {number(half, places)}"
+            own = decimals(half)
+            text = f"{number(row.median * shown.scale, own)} ± {number(half, own)}"
             cells[key] = f"{text} {typeset(shown.unit)}".rstrip()
         rows.append(cells)
     return rows

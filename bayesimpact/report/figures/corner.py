@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from bayesimpact.model.units import decimals, display, number, typeset
+from bayesimpact.model.units import typeset
+from bayesimpact.report.digits import Digits, digits
 from bayesimpact.report.figures.clouds import LEVELS, Cloud, Law, NormalLaw, plotted
 from bayesimpact.report.figures.style import (
     BLACK,
@@ -45,6 +46,7 @@ def corner_figure(
     truths: Mapping[str, float] | None = None,
     truth_label: str = "reference",
     estimates: Mapping[str, Estimate] | None = None,
+    shown: Mapping[str, Digits] | None = None,
 ) -> Figure:
     """Marginals and pairs of a posterior, with a second one and reference values where given.
 
@@ -55,10 +57,15 @@ def corner_figure(
     truths : parameter -> value in SI, drawn as lines where it lies near
     truth_label : what these are
     estimates : parameter -> numbers for its title, as other tables have them; else of the draws
+    shown : parameter -> their digits; else those that the interval of the estimate allows
     """
     names = draws.names[:MOST]
     known = {name: _estimate(draws, k) for k, name in enumerate(names)} | dict(estimates or {})
-    axes = [_axis(draws, before, k, known[name]) for k, name in enumerate(names)]
+    told = {
+        name: digits(draws.units[k], known[name][0], known[name][1:])
+        for k, name in enumerate(names)
+    } | dict(shown or {})
+    axes = [_axis(draws, before, k, known[name], told[name]) for k, name in enumerate(names)]
     clouds = [plotted(draws, names, axes, BLUE)]
     if before is not None:
         clouds.insert(0, plotted(before, names, axes, ORANGE))
@@ -72,7 +79,7 @@ def corner_figure(
     for i in range(len(names)):
         for j in range(i + 1):
             _panel(panels[i, j], i, j, clouds, limits, marks)
-        _title(panels[i, i], names[i], draws.units[i], known[names[i]])
+        _title(panels[i, i], names[i], known[names[i]], told[names[i]])
         _outer_labels(panels, axes, i)
     figure.align_labels()
     _legend(figure, clouds, marks, truth_label)
@@ -109,7 +116,7 @@ def _estimate(law: Law, k: int) -> Estimate:
     return median, low, high
 
 
-def _axis(law: Law, before: Law | None, k: int, estimate: Estimate) -> LabScale:
+def _axis(law: Law, before: Law | None, k: int, estimate: Estimate, shown: Digits) -> LabScale:
     """The axis of a parameter: from zero, or from the median as its title has it."""
     name, unit = law.names[k], law.units[k]
     both = [law.values[:, k]]
@@ -118,16 +125,9 @@ def _axis(law: Law, before: Law | None, k: int, estimate: Estimate) -> LabScale:
     axis = scaled(name, unit, np.concatenate(both))
     if not axis.offset:
         return axis
-    shown, places = _shown(unit, estimate)
-    offset = round(estimate[0] * shown, places) / shown
+    offset = round(estimate[0] * shown.scale, shown.places) / shown.scale
     base = scaled(name, unit, np.zeros(1)).quantity
     return replace(axis, offset=offset, quantity=f"Δ{base}")
-
-
-def _shown(unit: str, estimate: Estimate) -> tuple[float, int]:
-    median, low, high = estimate
-    scale = display(unit, abs(median)).scale
-    return scale, decimals(0.5 * (high - low) * scale)
 
 
 def _limits(clouds: list[Cloud], k: int, mark: float | None) -> tuple[float, float]:
@@ -170,13 +170,11 @@ def _panel(
         axis.set_ylim(bottom=0)
 
 
-def _title(axis: Axes, name: str, unit: str, estimate: Estimate) -> None:
+def _title(axis: Axes, name: str, estimate: Estimate, shown: Digits) -> None:
     """Symbol, median and half of the 90 % interval above a marginal, into the empty corner."""
     median, low, high = estimate
-    scale, places = _shown(unit, estimate)
-    half = number(0.5 * (high - low) * scale, places)
-    shown = typeset(display(unit, abs(median)).unit)
-    text = f"{number(median * scale, places)} ± {half} {shown}"
+    half = shown.value(0.5 * (high - low))
+    text = f"{shown.value(median)} ± {half} {typeset(shown.unit)}"
     symbol = full_symbol(name)
     symbol = symbol if "$" in symbol else fill(symbol, _TITLE_COLUMNS)
     axis.set_title(f"{symbol}\n{text}", loc="left", fontsize=8.5)

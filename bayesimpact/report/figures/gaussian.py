@@ -21,13 +21,13 @@ def gaussian_figures(results: Results) -> Mapping[str, Figure]:
     arrays, diagnosis = results.diagnosis_arrays, results.diagnosis or {}
     if results.draws is not None or results.remains or "before_chi2" not in arrays:
         return {}
-    shown = results.select("physical", "effect")
-    columns = [i for i, row in enumerate(results.rows) if row in shown]
+    interest = results.select("physical", "effect")
+    columns = [i for i, row in enumerate(results.rows) if row in interest]
     after = NormalLaw(
         "with what was added",
-        tuple(row.name for row in shown),
-        tuple(row.unit for row in shown),
-        np.array([row.mode for row in shown]),
+        tuple(row.name for row in interest),
+        tuple(row.unit for row in interest),
+        np.array([row.mode for row in interest]),
         results.covariance[np.ix_(columns, columns)],
     )
     mode = arrays["before_mode"]
@@ -40,5 +40,6 @@ def gaussian_figures(results: Results) -> Mapping[str, Figure]:
         mode[columns],
         arrays["before_covariance"][np.ix_(columns, columns)],
     )
-    told = {row.name: (row.median, *row.ci90) for row in shown}
-    return {"corner": corner_figure(after, before=before, estimates=told)}
+    told = {row.name: (row.median, *row.ci90) for row in interest}
+    shown = {row.name: results.digits(row) for row in interest}
+    return {"corner": corner_figure(after, before=before, estimates=told, shown=shown)}

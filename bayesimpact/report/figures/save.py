@@ -90,6 +90,7 @@ def _corner(results: Results) -> dict[str, Figure]:
         truth_label=PUBLISHED,
         # where something remains, tables carry it and draws do not: their titles are their own
         estimates=None if results.remains else {r.name: (r.median, *r.ci90) for r in results.rows},
+        shown=None if results.remains else {r.name: results.digits(r) for r in results.rows},
     )
     return {"corner": figure}
 
