@@ -22,9 +22,10 @@ from bayesimpact.model.units import (
 from bayesimpact.report.change_view import NUISANCES, change_row, estimate
 from bayesimpact.report.formula_text import effect_title, in_words
 from bayesimpact.report.limit_view import limit_row, not_found, seen
+from bayesimpact.report.names import of_recordings, own_parameters
 from bayesimpact.report.next_words import next_view
 from bayesimpact.report.results import Results
-from bayesimpact.report.tables import symbol
+from bayesimpact.report.tables import own_symbol
 
 FORMULAS, UNLIKELY = 5, 1e-3
 """Formulas that are shown whatever their probability; the others from this probability on."""
@@ -192,15 +193,14 @@ def _formula(formula: Mapping[str, Any], force: str) -> dict[str, str]:
 def _effect(effect: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "id": effect["id"],
-        "title": effect_title(effect["id"], effect.get("title", "")),
+        "title": effect_title(effect["id"], effect.get("title", "")) + of_recordings(effect),
         "family": effect.get("family", ""),
         "size": size_words(effect.get("size")),
         "statement": effect.get("statement", ""),
         "probability": probability(effect.get("probability")),
         "evidence": _plain(effect.get("delta_log_evidence"), 1),
         "parameters": [
-            (symbol(name), estimate(content))
-            for name, content in effect.get("parameters", {}).items()
+            (own_symbol(name), estimate(content)) for name, content in own_parameters(effect)
         ],
     }
 

@@ -6,6 +6,7 @@ import re
 
 from markupsafe import Markup, escape
 
+from bayesimpact.diagnosis.words import title_of
 from bayesimpact.formula.law import is_formula_id
 
 LETTERS = {"size": "A", "place": "p", "width": "w", "fade": "u"}
@@ -45,16 +46,10 @@ def latex_formula(text: str) -> str:
 
 def effect_title(effect_id: str, title: str = "") -> str:
     """What an effect is called, in HTML: a formula typeset, else words."""
-    title = title or effect_id.replace("_", " ")
     if not is_formula_id(effect_id):
-        return written(title)
+        return written(title or title_of(effect_id))
+    title = title or effect_id.replace("_", " ")
     return Markup("force {}").format(typeset_formula(title.removeprefix("force ")))
-
-
-def as_code(effect_id: str) -> Markup:
-    """An id as it is typed, after a blank; empty where a formula's is in it."""
-    made = any(map(is_formula_id, effect_id.split(" + ")))
-    return Markup() if made else Markup(" <code>{}</code>").format(effect_id)
 
 
 def letter(name: str) -> str | None:

@@ -21,7 +21,6 @@ from bayesimpact.report.checks import MISFIT
 from bayesimpact.report.diagnosis_view import diagnosis_view
 from bayesimpact.report.figures.save import DPI
 from bayesimpact.report.formula_text import (
-    as_code,
     effect_title,
     raised,
     typeset_formula,
@@ -92,7 +91,7 @@ def environment() -> jinja2.Environment:
     )
     made.filters["lower_first"] = lambda text: text[:1].lower() + text[1:]
     made.filters["bound"] = lambda text: raised(bound(text))
-    made.filters |= {"raised": raised, "typeset_formula": typeset_formula, "as_code": as_code}
+    made.filters |= {"raised": raised, "typeset_formula": typeset_formula}
     made.filters["effect_title"] = effect_title
     made.tests["formula"] = is_formula_id
     return made

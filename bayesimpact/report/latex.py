@@ -6,12 +6,14 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from bayesimpact.diagnosis.words import title_of
 from bayesimpact.formula.law import is_formula_id
 from bayesimpact.model.units import MINUS, quantity, typeset
 from bayesimpact.report.change_view import NUISANCES, change_words
 from bayesimpact.report.digits import Digits, digits
 from bayesimpact.report.formula_text import latex_formula, letter
 from bayesimpact.report.limit_view import not_found
+from bayesimpact.report.names import in_words, of_recordings, split
 from bayesimpact.report.results import Results
 
 _SPECIAL = {c: f"\\{c}" for c in "&%$#_{}"} | {
@@ -47,18 +49,19 @@ def escaped(text: str) -> str:
 
 def symbol(name: str) -> str:
     """A parameter's name: "k2[1]" becomes "$k_{2}$[1]"."""
-    base, bracket, key = name.partition("[")
-    known = letter(base)
-    if known is not None:
-        words = f"formula: ${known}$"
-    elif "." in base:
-        words = base.replace("_", " ").replace(".", ": ")
-    elif base[-1].isdigit():
-        words = f"${base[:-1]}_{{{base[-1]}}}$"
-    else:
-        words = f"${base}$" if len(base) == 1 else base
-    plain = words if "$" in words else escaped(words)
-    return plain + escaped(bracket + key)
+    effect, own, key = split(name)
+    known = letter(name.partition("[")[0])
+    before = f"{effect}: " if effect else ""
+    return escaped(before) + _own_symbol(known or own) + escaped(key)
+
+
+def _own_symbol(own: str) -> str:
+    """A letter or a letter with a number as mathematics, words as they are."""
+    if len(own) == 1:
+        return f"${own}$"
+    if len(own) == 2 and own[1].isdigit():
+        return f"${own[0]}_{{{own[1]}}}$"
+    return escaped(own)
 
 
 def _table(caption: str, columns: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -120,17 +123,17 @@ def _models(diagnosis: Mapping[str, Any]) -> str:
 
 
 def _name(effect: Mapping[str, Any]) -> str:
-    """An effect's id, or the formula that it is."""
+    """What an effect is called, or the formula that it is."""
     if is_formula_id(effect["id"]) and effect.get("title"):
         return "force " + latex_formula(effect["title"].removeprefix("force "))
-    return r"\texttt{" + escaped(effect["id"]) + "}"
+    return escaped((effect.get("title") or title_of(effect["id"])) + of_recordings(effect))
 
 
 def _limits(limits: Sequence[Mapping[str, Any]]) -> str:
     rows = [
         (
-            r"\texttt{" + escaped(str(x["id"])) + "}",
-            escaped(str(x.get("parameter", "")).replace("_", " ")),
+            escaped(title_of(str(x["id"]))),
+            _own_symbol(in_words(str(x.get("parameter", "")))),
             escaped(quantity(float(x["upper95"]), str(x.get("unit", "")))),
         )
         for x in limits

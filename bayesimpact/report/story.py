@@ -19,9 +19,10 @@ from bayesimpact.report.diagnosis_view import (
     size_words,
     verdict_words,
 )
-from bayesimpact.report.formula_text import as_code, effect_title
+from bayesimpact.report.formula_text import effect_title
+from bayesimpact.report.names import of_recordings, own_parameters
 from bayesimpact.report.results import Results
-from bayesimpact.report.tables import symbol
+from bayesimpact.report.tables import own_symbol, symbol
 
 MOST_NAMES = 4
 """Recordings called by name; more are counted."""
@@ -88,22 +89,20 @@ def _physics(diagnosis: Mapping[str, Any]) -> list[str | Markup]:
     if diagnosis["verdict"] == "unknown":
         return ["a force that no effect of the catalogue explains; it was learned instead"]
     lines: list[str | Markup] = [
-        Markup("{}, probability {}{}").format(
-            _title(effect), probability(effect.get("probability")), as_code(effect["id"])
-        )
+        Markup("{}, probability {}").format(_title(effect), probability(effect.get("probability")))
         for effect in diagnosis.get("effects", ())
     ]
     others = diagnosis.get("alternatives", ()) if diagnosis["verdict"] == "ambiguous" else ()
     return lines + [
-        Markup("or {}, probability {}{}").format(
-            titles_of(other["id"]), probability(other.get("probability")), as_code(other["id"])
+        Markup("or {}, probability {}").format(
+            titles_of(other["id"]), probability(other.get("probability"))
         )
         for other in others
     ]
 
 
 def _title(effect: Mapping[str, Any]) -> str:
-    return effect_title(effect["id"], effect.get("title", ""))
+    return effect_title(effect["id"], effect.get("title", "")) + of_recordings(effect)
 
 
 def _size(results: Results, diagnosis: Mapping[str, Any]) -> list[str | Markup]:
@@ -112,8 +111,8 @@ def _size(results: Results, diagnosis: Mapping[str, Any]) -> list[str | Markup]:
         if size_words(effect.get("size")):
             lines.append(Markup("{}: {}").format(_title(effect), size_words(effect["size"])))
         lines += [
-            Markup("{} = {}").format(symbol(name), estimate(content))
-            for name, content in effect.get("parameters", {}).items()
+            Markup("{} = {}").format(own_symbol(name), estimate(content))
+            for name, content in own_parameters(effect)
         ]
     force = (diagnosis.get("location") or {}).get("force_rms_n")
     if force and not lines:
@@ -183,8 +182,8 @@ def _hidden(diagnosis: Mapping[str, Any]) -> list[str | Markup]:
     if biases:
         bias, name = max(biases, key=lambda b: abs(b[0]["sd"]))
         lines.append(
-            Markup("{} by at most {} of its standard deviations (<code>{}</code>)").format(
-                symbol(bias["parameter"]), significant(abs(bias["sd"]), 2), name
+            Markup("{} by at most {} of its standard deviations ({})").format(
+                symbol(bias["parameter"]), significant(abs(bias["sd"]), 2), title_of(name)
             )
         )
     if unsure:

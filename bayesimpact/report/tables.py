@@ -24,6 +24,7 @@ from bayesimpact.model.units import (
 )
 from bayesimpact.report.digits import Digits, places
 from bayesimpact.report.formula_text import letter, written
+from bayesimpact.report.names import split
 from bayesimpact.report.results import Results, Row
 
 GAIN = "gain"  # of a probe
@@ -55,24 +56,27 @@ class ParameterView:
 
 
 def symbol(name: str) -> Markup:
-    """A parameter's name for HTML: "k2[1]" with an italic k and a lowered 2."""
-    base, bracket, key = name.partition("[")
-    known = letter(base)
+    """A parameter's name for HTML: "k2[1]" with an italic k and a lowered 2, after its effect."""
+    effect, _, _ = split(name)
+    own = own_symbol(name)
+    return Markup("<span class=effect>{}:</span> {}").format(effect, own) if effect else own
+
+
+def own_symbol(name: str) -> Markup:
+    """The same where it is known which effect the parameter belongs to."""
+    _, own, key = split(name)
+    known = letter(name.partition("[")[0])
     if known is not None:
-        html = Markup("<span class=effect>formula:</span> <i>{}</i>").format(known)
-    elif "." in base:
-        effect, _, own = base.partition(".")
-        words = (effect.replace("_", " "), own.replace("_", " "))
-        html = Markup("<span class=effect>{}:</span> {}").format(*words)
-    elif base == "sigma":
+        html = Markup("<i>{}</i>").format(known)
+    elif own == "sigma":
         html = Markup("<i>σ</i>")
-    elif base[-1].isdigit():
-        html = Markup("<i>{}</i><sub>{}</sub>").format(base[:-1], base[-1])
-    elif len(base) == 1:
-        html = Markup("<i>{}</i>").format(base)
+    elif own[-1].isdigit() and len(own) == 2:
+        html = Markup("<i>{}</i><sub>{}</sub>").format(own[:-1], own[-1])
+    elif len(own) == 1:
+        html = Markup("<i>{}</i>").format(own)
     else:
-        html = escape(base)
-    return html + escape(bracket + key)
+        html = escape(own)
+    return html + escape(key)
 
 
 def parameter_views(results: Results, rows: tuple[Row, ...]) -> list[ParameterView]:
@@ -91,8 +95,8 @@ def _view(row: Row, labels: list[str], shown: Digits) -> ParameterView:
     ratio, ratio_low, ratio_high = row.ratio
     ratio_places = places(ratio, (ratio_low, ratio_high))
     return ParameterView(
-        symbol=symbol(row.name),
-        meaning=written(row.meaning),
+        symbol=own_symbol(row.name),
+        meaning=written(_meaning(row)),
         unit=typeset(shown.unit),
         median=shown.value(row.median),
         interval=shown.interval(row.ci90),
@@ -102,6 +106,16 @@ def _view(row: Row, labels: list[str], shown: Digits) -> ParameterView:
         ratio_unit=typeset(row.ratio_unit),
         references=tuple(_reference(row, label, shown) for label in labels),
         prior=row.prior,
+    )
+
+
+def _meaning(row: Row) -> str:
+    """What a parameter is; of an effect's, whose own name stands beside it, which effect."""
+    _, own, _ = split(row.name)
+    return (
+        row.meaning.rpartition(f": {own}")[0] or row.meaning
+        if row.role == "effect"
+        else row.meaning
     )
 
 

@@ -36,7 +36,7 @@ def test_letters_are_those_of_the_formula() -> None:
     assert all(str(x) in effect.title for x in letters)
     name = f"{effect.id}.place"
     assert symbol(name).striptags() == "formula: p"
-    assert full_symbol(name) == "formula: $p$" and latex_symbol(name) == "formula: $p$"
+    assert full_symbol(name, 24) == "formula: $p$" and latex_symbol(name) == "formula: $p$"
     assert letter("gap_wear.step") is None and letter("k2[1]") is None
     assert in_words(f"{effect.id} + gap_wear") == "formula + gap wear"
 

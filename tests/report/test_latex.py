@@ -31,7 +31,7 @@ def test_special_characters() -> None:
     )
     assert escaped("3.34 × 10⁻⁴ µN s²/m²") == r"3.34 $\times$ 10$^{-4}$ $\mu$N s$^{2}$/m$^{2}$"
     assert symbol("k2[a_1]") == r"$k_{2}$[a\_1]" and symbol("g") == "$g$"
-    assert symbol("gap_wear.step") == "gap wear: step"
+    assert symbol("gap_wear.step") == "a gap that grows at every impact: step"
 
 
 def test_tables_hold_the_numbers_of_the_report() -> None:
@@ -41,8 +41,8 @@ def test_tables_hold_the_numbers_of_the_report() -> None:
     assert "rig $<$1$>$ \\& others" in text
     told = latex_tables(diagnosed(parameters=STIFF, limits=LIMITS)).replace("~", " ")
     row = r"$k_{2}$[a\_1] & 5358.2 & 5357.7 to 5358.7 & 5349.0 & 5348.2 to 5349.8 & N/m &"
-    assert row + r" $-$0.17 \% \\" in told and r"\texttt{coulomb\_friction}" in told
-    assert r"\texttt{contact\_relaxation} & stiffness & 95.0 N/m \\" in told
+    assert row + r" $-$0.17 \% \\" in told and "(dry friction)" in told
+    assert r"relaxation of the obstacle & stiffness & 95.0 N/m \\" in told
     assert "sigma" not in told
     bare = latex_tables(diagnosed(verdict="adequate", limits=[]))
     assert bare.count(r"\begin{table}") == 1

@@ -244,7 +244,7 @@ def test_coefficients_of_a_learned_force_are_no_parameters() -> None:
     added = tuple(row(f"learned_force.a{i}", 1e-3, 1e-4, "N", "learned") for i in range(24))
     text = page(replace(results, rows=(*results.rows, *added)))[1].text
     assert "learned_force.a" not in text
-    assert "learned_force of 24 coefficients" in text
+    assert "learned force of 24 coefficients" in text
 
 
 @pytest.mark.parametrize("verdict", ["adequate", "unknown"])

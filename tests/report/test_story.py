@@ -36,7 +36,7 @@ def test_every_question_of_a_named_effect() -> None:
     assert story["verdict"] == "What is missing is named"
     assert "wherever the mass moves" in story["place"]
     assert "shows in run_0; case 1" not in story["place"]
-    assert "coulomb friction, probability > 0.999" in story["physics"]
+    assert "dry friction, probability > 0.999" in story["physics"]
     assert "force = 160 (150 to 170) µN" in story["size"]
     assert "5.40 µm → 5.00 µm" in story["improvement"] and "+320 ± 79" in story["improvement"]
 
@@ -54,6 +54,31 @@ def test_corrected_stiffness_comes_first() -> None:
     assert corrected({"parameters": STIFF}) == ["k2[1]"]
     free = {side: {"k1": values["k1"], "sigma": values["k1"]} for side, values in STIFF.items()}
     assert corrected({"parameters": free}) == ["k1"]
+
+
+def test_parameters_stand_under_words_and_not_under_ids() -> None:
+    """Once `gap_wear` and "gap wear: step" in the story, "recording start: size[r4]" of a fault."""
+    gap = {
+        **DIAGNOSIS["effects"][0],  # type: ignore[dict-item, index]
+        "id": "gap_wear",
+        "parameters": {"gap_wear.step": estimate(8.6e-8, 6e-9, "m")},
+    }
+    start = {
+        **gap,
+        "id": "recording_start",
+        "title": "start",
+        "family": "recording",
+        "parameters": {"recording_start.size[r4]": estimate(0.016, 0.0, "s")},
+        "size": {"value": 0.016, "unit": "s"},
+        "location": {"recordings": ["r4"]},
+    }
+    results = diagnosed(effects=[gap, start])
+    story = told(results)
+    assert story["physics"].startswith("a gap that grows at every impact, probability")
+    assert "/ step = 0.086 (0.080 to 0.092) µm / start of r4: 0.016 s" in f"/ {story['size']}"
+    assert "size[r4]" not in page(results)[1].text and "start of r4" in latex_tables(results)
+    for text in (page(results)[1].text, latex_tables(results)):
+        assert "gap_wear" not in text and "gap wear" not in text
 
 
 def test_unknown_physics_is_not_given_a_name() -> None:
@@ -115,7 +140,7 @@ def test_a_formula_is_typeset_wherever_an_effect_of_the_catalogue_has_its_id(sam
 
 def test_alternatives_are_told_when_several_fit_alike() -> None:
     story = told(diagnosed(verdict="ambiguous"))
-    assert "or mass of the obstacle, probability 0.010 obstacle_mass" in story["physics"]
+    assert "or mass of the obstacle, probability 0.010" in story["physics"]
     assert "obstacle_mass" not in told(diagnosed())["physics"]
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -175,9 +174,7 @@ def _title(axis: Axes, name: str, estimate: Estimate, shown: Digits) -> None:
     median, low, high = estimate
     half = shown.value(0.5 * (high - low))
     text = f"{shown.value(median)} ± {half} {typeset(shown.unit)}"
-    symbol = full_symbol(name)
-    symbol = symbol if "$" in symbol else fill(symbol, _TITLE_COLUMNS)
-    axis.set_title(f"{symbol}\n{text}", loc="left", fontsize=8.5)
+    axis.set_title(f"{full_symbol(name, _TITLE_COLUMNS)}\n{text}", loc="left", fontsize=8.5)
 
 
 def _outer_labels(panels: np.ndarray, axes: list[LabScale], i: int) -> None:

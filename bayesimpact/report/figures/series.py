@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 DATES: Any = dates  # carries no types
 ROW = 2.0  # height, in
 ACROSS = 2
+_TITLE_COLUMNS = 60  # characters
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,7 @@ def series_figure(panels: Sequence[Panel]) -> Figure:
         axis.errorbar(x, middle, width, fmt="o", color=BLUE, ecolor=GREY, ms=3, lw=0.8)
         if panel.change is not None:
             axis.plot(x, shown(panel.change), color=RED, lw=1.4)
-        axis.set_title(full_symbol(panel.parameter), loc="left")
+        axis.set_title(full_symbol(panel.parameter, _TITLE_COLUMNS), loc="left")
         axis.set_ylabel(shown.label)
         axis.set_xlabel("" if panel.is_date else label(panel.along.replace("_", " "), ""))
         axis.grid(axis="y")

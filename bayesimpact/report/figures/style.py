@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import wraps
+from textwrap import fill
 from typing import Any, ParamSpec, TypeVar
 
 import matplotlib
@@ -14,7 +15,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from bayesimpact.model.units import Display, decimals, display, number, readable, reading, typeset
-from bayesimpact.report.formula_text import in_words, letter
+from bayesimpact.report.formula_text import letter
+from bayesimpact.report.names import split
 from bayesimpact.report.results import RecordingResult, Results
 
 Array = NDArray[np.float64]
@@ -139,26 +141,26 @@ def polyline(x: Array, y: Array, columns: int = _POINTS) -> tuple[Array, Array]:
 
 def symbol(name: str) -> str:
     """A parameter's name in mathtext: "k2[1]" becomes "$k_2$[1]"."""
-    base, _, key = name.partition("[")
-    key = key.rstrip("]")
-    known = letter(base)
-    if known is not None:
-        base = f"${known}$"
-    elif "." in base:
-        base = base.partition(".")[2].replace("_", " ")
-    elif base == "sigma":
-        base = r"$\sigma$"
-    elif base[-1].isdigit():
-        base = f"${base[:-1]}_{base[-1]}$"
-    else:
-        base = f"${base}$" if len(base) == 1 else base
-    return f"{base}[{key}]" if key else base
+    _, own, key = split(name)
+    own = letter(name.partition("[")[0]) or own
+    if own == "sigma":
+        own = r"$\sigma$"
+    elif len(own) == 2 and own[1].isdigit():
+        own = f"${own[0]}_{own[1]}$"
+    elif len(own) == 1:
+        own = f"${own}$"
+    return own + key
 
 
-def full_symbol(name: str) -> str:
-    """`symbol`, with the effect that an added parameter belongs to: "gap wear: step"."""
-    effect, dot, _ = name.partition("[")[0].partition(".")
-    return f"{in_words(effect)}: {symbol(name)}" if dot else symbol(name)
+def full_symbol(name: str, columns: int) -> str:
+    """`symbol`, after the effect that an added parameter belongs to, in lines of so many
+    characters.
+    """
+    effect, _, _ = split(name)
+    if not effect:
+        return symbol(name)
+    # mathematics is not to be broken: it has no blanks, as the case in brackets may have
+    return fill(f"{effect}: {symbol(name)}", columns, break_long_words=False)
 
 
 @dataclass(frozen=True)

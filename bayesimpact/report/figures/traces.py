@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from textwrap import fill
+
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -9,15 +11,15 @@ from bayesimpact.model.units import typeset
 from bayesimpact.report.figures.style import (
     CYCLE,
     WIDTH,
-    full_symbol,
     new_figure,
     scaled,
     styled,
-    symbol,
 )
+from bayesimpact.report.names import split
 from bayesimpact.report.results import SamplerSummary
 
 MOST = 14
+_TITLE_COLUMNS = 60  # characters
 """Parameters shown."""
 
 
@@ -38,8 +40,9 @@ def trace_figure(sampler: SamplerSummary) -> Figure:
             axis.plot(sampler.trace_steps, shown(draws[e]), color=CYCLE[e % len(CYCLE)],
                       lw=0.45, alpha=0.6, rasterized=True)  # fmt: skip
         unit = typeset(shown.unit)
-        effect = full_symbol(names[k]).removesuffix(symbol(names[k]))
-        title = effect + shown.quantity + (f", in {unit}" if unit else "")
+        effect, _, _ = split(names[k])
+        title = shown.quantity + (f", in {unit}" if unit else "")
+        title = fill(f"{effect}: {title}", _TITLE_COLUMNS) if effect else title
         axis.set_title(title, loc="left", fontsize=8.0)
         axis.set_xlim(0, max(float(sampler.trace_steps[-1]), 1.0))
         axis.tick_params(labelbottom=k >= len(names) - columns)

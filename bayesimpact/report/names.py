@@ -1,0 +1,44 @@
+"""What the parameters of effects are called: in words, never by their ids."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from bayesimpact.diagnosis.words import title_of
+from bayesimpact.formula.law import is_formula_id
+
+
+def split(name: str) -> tuple[str, str, str]:
+    """Effect in words, own name, and case or recording with its brackets: each may be empty.
+
+    "gap_wear.step" gives "a gap that grows at every impact", "step" and "".
+    """
+    base, bracket, key = name.partition("[")
+    effect, dot, own = base.partition(".")
+    if not dot:
+        return "", in_words(base), bracket + key
+    words = "formula" if is_formula_id(effect) else title_of(effect)
+    return words, in_words(own), bracket + key
+
+
+def in_words(name: str) -> str:
+    """An identifier as words: "time_constant" becomes "time constant"."""
+    return name.replace("_", " ")
+
+
+def own_parameters(effect: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:
+    """Parameters of an effect of diagnosis.json; none of a fault, whose size is told as such."""
+    return [] if _is_fault(effect) else list(effect.get("parameters", {}).items())
+
+
+def of_recordings(effect: Mapping[str, Any]) -> str:
+    """Of a fault its recording, to follow its title: " of r4"; "" for effects."""
+    if not _is_fault(effect):
+        return ""
+    recordings = (effect.get("location") or {}).get("recordings") or ()
+    return f" of {', '.join(map(str, recordings))}" if recordings else ""
+
+
+def _is_fault(effect: Mapping[str, Any]) -> bool:
+    return effect.get("family") == "recording"
