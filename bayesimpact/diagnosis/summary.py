@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from bayesimpact.diagnosis.locate import Location
-from bayesimpact.diagnosis.words import REGIMES, ParameterShift, listed, span, title_of
+from bayesimpact.diagnosis.words import REGIMES, ParameterShift, listed, span, title_of, together
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.effects.effect import Effect
 from bayesimpact.model.units import two_digits
@@ -91,7 +91,9 @@ def _found(found: Findings) -> str:
             f"is missing too. {statements}{_groups(found)}{found.cost}{_unproved(found)}"
             f"{found.remains}{found.faults}"
         )
-    place = REGIMES[found.location.regime]
+    several = len(found.effects) > 1
+    acts = [e.regime for e in found.effects] if several else [found.location.regime]
+    place = listed(REGIMES[x] for x in together(acts))
     modes = all(e.family == "modes" for e in found.effects)
     if found.location.regime == "measurement" and modes:  # mechanics, but no force on the mass
         place = "which the probe sees beside the oscillator's motion"

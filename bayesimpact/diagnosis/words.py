@@ -29,6 +29,17 @@ REGIMES = {
 }
 
 
+_IN_CONTACT = frozenset(("contact", "entry", "exit"))
+
+
+def together(regimes: Iterable[str]) -> list[str]:
+    """Where effects act that are told in one sentence: each regime once, and contact for several of
+    its stages.
+    """
+    found = list(dict.fromkeys(regimes))
+    return ["contact"] if len(found) > 1 and _IN_CONTACT.issuperset(found) else found
+
+
 def statement(effect: Effect, size: str, share: float) -> str:
     """One sentence on an effect: what it is and how large."""
     return effect.statement.format(size=size, share=f"{two_digits(100 * share)} %")

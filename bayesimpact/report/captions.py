@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from bayesimpact.diagnosis.thresholds import LARGE
+from bayesimpact.diagnosis.words import listed
+from bayesimpact.report.effect_forces import effect_forces, shown_cycle, without_force
 from bayesimpact.report.figures.corner import MOST as MOST_CORNER
 from bayesimpact.report.figures.traces import MOST as MOST_TRACES
 from bayesimpact.report.force_arrays import QUIET_WIDTH
@@ -93,12 +95,7 @@ def _more(stem: str, results: Results) -> str:
         return " Impacts are shown as far as half of the recordings have them."
     if stem == "story":
         contact = " Grey area: contact." if results.stop else ""
-        return contact + (
-            " Below: the force that the base model lacks, as far as it depends on displacement "
-            "and velocity, with its 90 % band."
-            if "force_y" in arrays
-            else ""
-        )
+        return contact + _below(results)
     if stem == "ranking":
         return _chosen(diagnosis)
     if stem == "improvement" and "held_out_recordings" in arrays:
@@ -125,6 +122,25 @@ def _more(stem: str, results: Results) -> str:
             "linearised problem: here it is a rough guide only."
         )
     return words
+
+
+def _below(results: Results) -> str:
+    """What the lowest panel of the story's picture is."""
+    cycle = shown_cycle(results)
+    if cycle is not None and effect_forces(results, cycle.recording, slice(0, 1)):
+        words = " Below: the forces of what was named along this motion, at the values found."
+        others = without_force(results)
+        words += f" Not drawn, being no force along it: {listed(others)}." if others else ""
+        if results.remains:
+            words += " What remains unexplained beside them is told above, and mapped below."
+        return words
+    if "force_y" not in results.diagnosis_arrays:
+        return ""
+    return (
+        " Below: the force that the base model leaves unexplained, as far as it depends on "
+        "displacement and velocity and no change of the base parameters imitates it, with its "
+        "90 % band."
+    )
 
 
 def _chosen(diagnosis: Mapping[str, Any]) -> str:

@@ -13,6 +13,8 @@ from bayesimpact.report.digits import digits
 from bayesimpact.report.rows import Z90
 from bayesimpact.report.tables import symbol
 
+UNTOLD = ("–", "not clear")
+"""What stands for a change where none is proved."""
 NUISANCES = ("y0", "v0", "offset", "gain", "sigma")
 
 
@@ -46,9 +48,9 @@ def change_words(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
     """The change of a parameter in per cent, as far as its interval after proves one."""
     old, shift = before["median"], parameter_shift(before, after)
     if not old:
-        return "–"
+        return UNTOLD[0]
     if not excludes(after, old):
-        return "not clear"
+        return UNTOLD[1]
     change = percent((_surely(before, after) - old) / abs(old))
     return f"at least {change}" if shift is not None and shift.least else change
 

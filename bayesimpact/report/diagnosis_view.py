@@ -30,6 +30,9 @@ from bayesimpact.report.tables import own_symbol
 FORMULAS, UNLIKELY = 5, 1e-3
 """Formulas that are shown whatever their probability; the others from this probability on."""
 
+LIKELY = 0.01
+"""Probability from which on another explanation stands on the first page."""
+
 VERDICTS = {
     "adequate": "Nothing is missing",
     "named": "What is missing is named",
@@ -101,10 +104,18 @@ def _likely(formula: Mapping[str, Any]) -> bool:
 def verdict_words(diagnosis: Mapping[str, Any]) -> str:
     """The verdict as a heading; faults of recordings are no part of the physics that is missing."""
     verdict = str(diagnosis["verdict"])
+    if verdict == "ambiguous" and not likely_others(diagnosis):
+        return "One explanation leads, but not all others were tried"
     families = {effect.get("family") for effect in diagnosis.get("effects") or ()}
     if verdict == "partly" and families == {"recording"}:
         return "Faults of recordings are set aside or corrected; the rest is unknown"
     return VERDICTS.get(verdict, verdict)
+
+
+def likely_others(diagnosis: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Other explanations that are likely enough to be told first; all are in the details."""
+    others = diagnosis.get("alternatives", ())
+    return [x for x in others if (x.get("probability") or 0.0) >= LIKELY]
 
 
 def _location(

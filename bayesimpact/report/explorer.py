@@ -21,8 +21,8 @@ from bayesimpact.report.cycles import (
     contact_onsets,
     contacts,
     stop_level,
-    telling_cycle,
 )
+from bayesimpact.report.effect_forces import shown_cycle
 from bayesimpact.report.figures.force_map import force_unit
 from bayesimpact.report.figures.recordings import shown_recordings
 from bayesimpact.report.figures.style import response, response_word
@@ -69,7 +69,7 @@ def explorer_data(results: Results) -> str:
     """Content of the page's data block: JSON that holds no "<"."""
     shown, most = _extent(results)
     before = before_predicted(results)
-    best = telling_cycle(results)
+    best = shown_cycle(results)
     force = force_unit(results, results.diagnosis_arrays) if _has_force(results) else None
     content: dict[str, Any] = {
         "word": response_word(results),

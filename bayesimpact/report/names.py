@@ -29,16 +29,17 @@ def in_words(name: str) -> str:
 
 def own_parameters(effect: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:
     """Parameters of an effect of diagnosis.json; none of a fault, whose size is told as such."""
-    return [] if _is_fault(effect) else list(effect.get("parameters", {}).items())
+    return [] if is_fault(effect) else list(effect.get("parameters", {}).items())
 
 
 def of_recordings(effect: Mapping[str, Any]) -> str:
     """Of a fault its recording, to follow its title: " of r4"; "" for effects."""
-    if not _is_fault(effect):
+    if not is_fault(effect):
         return ""
     recordings = (effect.get("location") or {}).get("recordings") or ()
     return f" of {', '.join(map(str, recordings))}" if recordings else ""
 
 
-def _is_fault(effect: Mapping[str, Any]) -> bool:
+def is_fault(effect: Mapping[str, Any]) -> bool:
+    """True for a fault of a recording, an entry of diagnosis.json's effects like any other."""
     return effect.get("family") == "recording"

@@ -7,13 +7,14 @@ from typing import Any
 
 from markupsafe import Markup
 
-from bayesimpact.diagnosis.words import title_of, titles_of
+from bayesimpact.diagnosis.words import title_of, titles_of, together
 from bayesimpact.model.units import percent, significant, span_of
 from bayesimpact.model.units import quantity as amount
-from bayesimpact.report.change_view import NUISANCES, estimate
+from bayesimpact.report.change_view import NUISANCES, UNTOLD, change_words, estimate
 from bayesimpact.report.diagnosis_view import (
     REGIMES,
     gain_words,
+    likely_others,
     probability,
     remainder_rows,
     size_words,
@@ -26,6 +27,10 @@ from bayesimpact.report.tables import own_symbol, symbol
 
 MOST_NAMES = 4
 """Recordings called by name; more are counted."""
+ABOVE_NOISE = 1.1
+"""Residual of the base model over the noise from which on its decrease tells something: below, the
+misfit is less than half of the noise, and a good model takes next to nothing off their sum.
+"""
 
 
 def story_rows(results: Results) -> list[tuple[str, list[str | Markup]]]:
@@ -35,7 +40,7 @@ def story_rows(results: Results) -> list[tuple[str, list[str | Markup]]]:
         return []
     rows = [
         ("verdict", [verdict_words(diagnosis)]),
-        ("place", _place(results, diagnosis.get("location"))),
+        ("place", _place(results, diagnosis)),
         ("physics", _physics(diagnosis)),
         ("size", _size(results, diagnosis)),
         ("remains", _remains(results, diagnosis.get("remainder"))),
@@ -54,11 +59,12 @@ def corrected(diagnosis: Mapping[str, Any]) -> list[str]:
     return stiffness or [n for n in both if n.partition("[")[0] not in NUISANCES]
 
 
-def _place(results: Results, location: Mapping[str, Any] | None) -> list[str | Markup]:
+def _place(results: Results, diagnosis: Mapping[str, Any]) -> list[str | Markup]:
+    location = diagnosis.get("location")
     if not location:
         return []
     regime = str(location["regime"])
-    lines: list[str | Markup] = [REGIMES.get(regime, regime)]
+    lines: list[str | Markup] = ["; ".join(REGIMES.get(x, x) for x in _regimes(diagnosis, regime))]
     if regime != "measurement":
         unit = results.length
         lines[0] += (
@@ -67,6 +73,12 @@ def _place(results: Results, location: Mapping[str, Any] | None) -> list[str | M
         )
     lines.append(_shown_in(results, location.get("recordings") or (), location.get("cases") or ()))
     return [line for line in lines if line]
+
+
+def _regimes(diagnosis: Mapping[str, Any], regime: str) -> list[str]:
+    """Where the named effects act, the first one first; of unknown forces where they are."""
+    own = [(e.get("location") or {}).get("regime") for e in diagnosis.get("effects", ())]
+    return together(str(x) for x in own if x) or [regime]
 
 
 def _shown_in(results: Results, recordings: Sequence[str], cases: Sequence[str]) -> str:
@@ -92,7 +104,7 @@ def _physics(diagnosis: Mapping[str, Any]) -> list[str | Markup]:
         Markup("{}, probability {}").format(_title(effect), probability(effect.get("probability")))
         for effect in diagnosis.get("effects", ())
     ]
-    others = diagnosis.get("alternatives", ()) if diagnosis["verdict"] == "ambiguous" else ()
+    others = likely_others(diagnosis) if diagnosis["verdict"] == "ambiguous" else ()
     return lines + [
         Markup("or {}, probability {}").format(
             titles_of(other["id"]), probability(other.get("probability"))
@@ -147,11 +159,25 @@ def _improvement(results: Results, diagnosis: Mapping[str, Any]) -> list[str | M
     if gain_words(gain) and gain.get("of") != 0:
         better = f", {gain['wins']} of {gain['of']} better" if gain.get("of") else ""
         lines.append(f"recordings held out: log score {gain_words(gain)}{better}")
+    lines += _corrections(diagnosis)
     old, new = before.get("rms_m"), after.get("rms_m")
-    if old and new is not None:
+    if old and new is not None and old > ABOVE_NOISE * results.noise.level:
         ends = f"{amount(old, results.unit)} → {amount(new, results.unit)}"
         lines.append(f"residual rms {ends} ({percent(new / old - 1)})")
     return lines
+
+
+def _corrections(diagnosis: Mapping[str, Any]) -> list[str | Markup]:
+    """By how much the stops' stiffnesses (else what moved) change, in one line."""
+    both = diagnosis.get("parameters") or {}
+    names = corrected(diagnosis)[:MOST_NAMES]
+    changes = [change_words(both["before"][name], both["after"][name]) for name in names]
+    told = [
+        Markup("{} {}").format(symbol(name), words)
+        for name, words in zip(names, changes, strict=True)
+        if words not in UNTOLD
+    ]
+    return [Markup(", ").join(told)] if told else []
 
 
 def _bootstrap(counts: Mapping[str, Any] | None) -> list[str | Markup]:

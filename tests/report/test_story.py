@@ -38,7 +38,28 @@ def test_every_question_of_a_named_effect() -> None:
     assert "shows in run_0; case 1" not in story["place"]
     assert "dry friction, probability > 0.999" in story["physics"]
     assert "force = 160 (150 to 170) µN" in story["size"]
-    assert "5.40 µm → 5.00 µm" in story["improvement"] and "+320 ± 79" in story["improvement"]
+    assert "+320 ± 79" in story["improvement"]
+
+
+def test_a_residual_at_the_noise_is_no_improvement() -> None:
+    """Once "5.06 µm → 5.02 µm (−0.82 %)" as the headline, beside a noise of 5.01 µm."""
+    small = told(diagnosed(parameters=STIFF))["improvement"]
+    assert small == "recordings held out: log score +320 ± 79 / k2[1] −0.17 %"
+    large = told(diagnosed(fit={"before": {"rms_m": 9e-6}, "after": {"rms_m": 5e-6}}))
+    assert "residual rms 9.00 µm → 5.00 µm (−44 %)" in large["improvement"]
+
+
+def test_unlikely_alternatives_are_not_told_first() -> None:
+    """Five below 0.001 stood under the words "several explanations fit alike"."""
+    other = {"id": "obstacle_mass", "probability": 0.002, "delta_log_evidence": 1.0}
+    results = diagnosed(verdict="ambiguous", alternatives=[other])
+    story = told(results)
+    assert "mass of the obstacle" not in story["physics"]
+    assert story["verdict"] == "One explanation leads, but not all others were tried"
+    assert page(results)[1].text.count("mass of the obstacle") == 1  # in the details
+    likely = told(diagnosed(verdict="ambiguous", alternatives=[{**other, "probability": 0.2}]))
+    assert "or mass of the obstacle, probability 0.20" in likely["physics"]
+    assert likely["verdict"] == "Several explanations fit alike"
 
 
 def test_the_story_comes_before_everything_else() -> None:
@@ -160,7 +181,8 @@ def test_no_diagnosis_no_story() -> None:
 
 def test_a_document_with_nulls_is_told() -> None:
     hollow = {"before": {"rms_m": None}, "after": {}, "held_out_gain": {"value": None, "se": None}}
-    story = told(diagnosed(fit=hollow, location={**DIAGNOSIS["location"], "share": None}))
+    location = {**DIAGNOSIS["location"], "share": None}  # type: ignore[dict-item]
+    story = told(diagnosed(fit=hollow, location=location, parameters={"before": {}, "after": {}}))
     assert "improvement" not in story and "place" in story
 
 

@@ -1,20 +1,25 @@
-"""The finding in one picture: a cycle in which it shows, both models, and the missing force."""
+"""The finding in one picture: a cycle in which it shows, both models, and the force behind it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import cycle as repeated
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from bayesimpact.model.units import display, quantity, significant
-from bayesimpact.report.cycles import Cycle, before_predicted, contacts, telling_cycle
+from bayesimpact.model.units import display, quantity, readable, significant
+from bayesimpact.report.cycles import Cycle, before_predicted, contacts
+from bayesimpact.report.effect_forces import effect_forces, shown_cycle
 from bayesimpact.report.figures.force_map import force_unit
 from bayesimpact.report.figures.style import (
     AFTER,
     BEFORE,
+    BLACK,
+    GREEN,
     GREY,
+    PURPLE,
     SKY,
     Array,
     label,
@@ -30,11 +35,12 @@ from bayesimpact.report.rows import Z90
 _CONTACT = "#ECECEC"
 _PLAIN = 1000.0  # nats; beyond, odds say nothing that the residuals do not
 _MARGIN = 0.25  # of the cycle, before it
+_LINES = ((BLACK, "-"), (PURPLE, (0, (5, 2))), (GREEN, (0, (1, 1))))  # told apart in grey too
 
 
 def story_figures(results: Results) -> Mapping[str, Figure]:
     """The picture of the first page; nothing where nothing was added to the base model."""
-    before, cycle = before_predicted(results), telling_cycle(results)
+    before, cycle = before_predicted(results), shown_cycle(results)
     if before is None or cycle is None or (results.diagnosis or {}).get("verdict") == "adequate":
         return {}
     return {"story": _figure(results, cycle, before[cycle.recording])}
@@ -42,7 +48,7 @@ def story_figures(results: Results) -> Mapping[str, Figure]:
 
 def best_gain(results: Results) -> str:
     """Recording and impact of the picture, in words."""
-    cycle = telling_cycle(results)
+    cycle = shown_cycle(results)
     if cycle is None:
         return ""
     recording = results.recordings[cycle.recording]
@@ -55,8 +61,9 @@ def _figure(results: Results, cycle: Cycle, before: Array) -> Figure:
     recording = results.recordings[cycle.recording]
     first = max(0, cycle.first - round(_MARGIN * (cycle.last - cycle.first)))
     part = slice(first, cycle.last + 1)
-    force = force_in_time(results, cycle.recording, before)
-    rows = 2 if force is None else 3
+    named = effect_forces(results, cycle.recording, part)
+    left = None if named else force_in_time(results, cycle.recording, before)
+    rows = 3 if named or left is not None else 2
     figure = new_figure(1.85 * rows + 0.6)
     panels = figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
     t = recording.times[part]
@@ -69,8 +76,10 @@ def _figure(results: Results, cycle: Cycle, before: Array) -> Figure:
             recording.predicted[part])  # fmt: skip
     _difference(panels[1], results, t, recording.samples[part] - before[part],
                 recording.predicted[part] - before[part])  # fmt: skip
-    if force is not None:
-        _force(panels[2], results, t, force[0][part], force[1][part])
+    if named:
+        _named(panels[2], results, t, named)
+    elif left is not None:
+        _unexplained(panels[2], results, t, left[0][part], left[1][part])
     panels[-1].set_xlabel(label("time since the first sample", "s"))
     panels[0].set_title(
         f"{best_gain(results)}: {_gain(results, cycle, before)}",
@@ -92,9 +101,9 @@ def _gain(results: Results, cycle: Cycle, before: Array) -> str:
     return f"residual {sizes[0]} rms, with what was added {sizes[1]}"
 
 
-def _legend(axis: Axes) -> None:
+def _legend(axis: Axes, columns: int = 4) -> None:
     """Above the panel, clear of the data, on the left: a narrow screen shows that side first."""
-    axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, borderaxespad=0.1)
+    axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, borderaxespad=0.1)
 
 
 def _motion(
@@ -123,11 +132,22 @@ def _difference(axis: Axes, results: Results, t: Array, samples: Array, after: A
     _legend(axis)
 
 
-def _force(axis: Axes, results: Results, t: Array, mean: Array, sd: Array) -> None:
+def _named(axis: Axes, results: Results, t: Array, forces: Mapping[str, Array]) -> None:
+    """Where the named effects act: their forces at the values found."""
+    size = max(float(np.max(np.abs(force))) for force in forces.values())
+    unit = readable("N m" if results.angular else "N", size)
+    for (title, force), (colour, dashes) in zip(forces.items(), repeated(_LINES), strict=False):
+        axis.plot(t, force * unit.scale, color=colour, ls=dashes, lw=1.5, label=title)
+    axis.axhline(0.0, color=GREY, lw=0.6)
+    axis.set_ylabel(label("force of what\nwas named", unit.unit))
+    _legend(axis, columns=2)
+
+
+def _unexplained(axis: Axes, results: Results, t: Array, mean: Array, sd: Array) -> None:
     unit = force_unit(results, results.diagnosis_arrays)
     low, high = ((mean + sign * Z90 * sd) * unit.scale for sign in (-1, 1))
     axis.fill_between(t, low, high, color=BEFORE, alpha=0.3, lw=0, label="90 % band")
     axis.plot(t, mean * unit.scale, color=BEFORE, lw=1.4, label="posterior mean")
     axis.axhline(0.0, color=GREY, lw=0.6)
-    axis.set_ylabel(label("missing force\n", unit.unit).replace("\n ", "\n"))
+    axis.set_ylabel(label("unexplained\nforce", unit.unit))
     _legend(axis)

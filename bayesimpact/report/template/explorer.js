@@ -1,4 +1,4 @@
-/* The explorer of a report: recording, residual and missing force on one time axis. */
+/* The explorer of a report: recording, residual and unexplained force on one time axis. */
 (function () {
   "use strict";
   const root = document.getElementById("explore");
@@ -110,7 +110,7 @@
     ];
     if (data.force) {
       const size = 1.05 * reach([data.low, data.high]), edge = { width: 0, stroke: "rgba(0,0,0,0)" };
-      panels.push([options("missing force (" + content.forceUnit + ")", 190, digits(size),
+      panels.push([options("unexplained force (" + content.forceUnit + ")", 190, digits(size),
         [{ label: "left out by the base model (" + content.forceUnit + ")", stroke: colours.force, width: 1.5 },
           Object.assign({ label: "95 %" }, edge), Object.assign({ label: "5 %" }, edge)],
         [-size, size], [{ series: [2, 3], fill: "rgba(90,90,90,0.22)" }], true),
