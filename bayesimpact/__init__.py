@@ -20,11 +20,14 @@ if TYPE_CHECKING:
     from bayesimpact.api import fit as fit
     from bayesimpact.api import open_results as open
     from bayesimpact.api import sample as sample
-    from bayesimpact.api import save as save
-    from bayesimpact.api import summary as summary
     from bayesimpact.data.campaign import Campaign as Campaign
     from bayesimpact.data.read import load_campaign as load
     from bayesimpact.data.recording import Recording as Recording
+    from bayesimpact.found import Diagnosis as Diagnosis
+    from bayesimpact.found import Identification as Identification
+    from bayesimpact.found import Posterior as Posterior
+    from bayesimpact.found import save as save
+    from bayesimpact.found import summary as summary
     from bayesimpact.model.effects import EFFECTS as EFFECTS
     from bayesimpact.model.effects import SEARCHED as SEARCHED
     from bayesimpact.model.effects import Effect as Effect
@@ -41,12 +44,15 @@ _NAMES = {
     "backbone": ("bayesimpact.response.backbone", "backbone"),
     "fit": ("bayesimpact.api", "fit"),
     "sample": ("bayesimpact.api", "sample"),
-    "summary": ("bayesimpact.api", "summary"),
-    "save": ("bayesimpact.api", "save"),
+    "summary": ("bayesimpact.found", "summary"),
+    "save": ("bayesimpact.found", "save"),
     "open": ("bayesimpact.api", "open_results"),
     "plot": ("bayesimpact.report.check_figure", "plot"),
     "corner": ("bayesimpact.report.notebook", "corner"),
     "diagnose": ("bayesimpact.api", "diagnose"),
+    "Identification": ("bayesimpact.found", "Identification"),
+    "Posterior": ("bayesimpact.found", "Posterior"),
+    "Diagnosis": ("bayesimpact.found", "Diagnosis"),
     "EFFECTS": ("bayesimpact.model.effects", "EFFECTS"),
     "SEARCHED": ("bayesimpact.model.effects", "SEARCHED"),
     "Effect": ("bayesimpact.model.effects", "Effect"),
@@ -56,7 +62,10 @@ __all__ = [
     "EFFECTS",
     "SEARCHED",
     "Campaign",
+    "Diagnosis",
     "Effect",
+    "Identification",
+    "Posterior",
     "Recording",
     "backbone",
     "corner",

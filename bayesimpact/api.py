@@ -6,24 +6,23 @@ neither is given, so that the same call gives the same result.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bayesimpact.data.campaign import Campaign
-from bayesimpact.diagnosis.loop import Diagnosis
+from bayesimpact.diagnosis import loop
 from bayesimpact.errors import InputError
+from bayesimpact.found import Diagnosis, Identification, Posterior
+from bayesimpact.inference import identify as identification
 from bayesimpact.inference.fit import Fit
-from bayesimpact.inference.identify import Identification, identify
-from bayesimpact.inference.posterior import Posterior
+from bayesimpact.inference.identify import identify
+from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.progress import compilation_shown, progress_bar, refit_bar
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
-
     from bayesimpact.model.effects import Effect
     from bayesimpact.report.results import Results
 
@@ -45,7 +44,15 @@ def generator(seed: int | None, rng: Random) -> np.random.Generator:
 
 
 def fit(
-    campaign: Campaign, *, seed: int | None = None, rng: Random = None, **settings: Any
+    campaign: Campaign,
+    *,
+    seed: int | None = None,
+    rng: Random = None,
+    search: bool = True,
+    evaluations: int | None = None,
+    noise: Noise | None = None,
+    sigma_per_recording: bool = False,
+    known: Mapping[str, float] | None = None,
 ) -> Identification:
     """Mode of the base model's posterior for a campaign, nothing given.
 
@@ -53,25 +60,42 @@ def fit(
     ----------
     campaign : of `bi.load`
     seed, rng : randomness; see the module
-    settings : `search=False` leaves the global search out; others as in `inference.identify`
+    search : False leaves the global search for the mode out
+    evaluations : of that search; None: as many as its dimension asks for
+    noise : None estimates it from the recordings
+    sigma_per_recording : a noise level of its own for every recording
+    known : values of parameters from which to climb, where the campaign declares effects
 
     Raises
     ------
     InputError : a recording shows no oscillation
     """
     with compilation_shown():
-        return identify(campaign, rng=generator(seed, rng), **settings)
+        return Identification.of(
+            identify(
+                campaign,
+                rng=generator(seed, rng),
+                search=search,
+                evaluations=evaluations,
+                noise=noise,
+                sigma_per_recording=sigma_per_recording,
+                known=known,
+            )
+        )
 
 
 def sample(
-    found: Identification | Diagnosis | Fit,
+    found: identification.Identification | loop.Diagnosis | Fit,
     *,
     seed: int | None = None,
     rng: Random = None,
     folder: Path | str | None = None,
     resume: bool = False,
     progress: bool | None = None,
-    **settings: Any,
+    walkers: int | None = None,
+    ensembles: int = 2,
+    max_steps: int = 20_000,
+    target_ess: float = 2000.0,
 ) -> Posterior:
     """Posterior around a mode, by emcee.
 
@@ -81,18 +105,30 @@ def sample(
     seed, rng : randomness; see the module
     folder, resume : where the chain is kept, and whether to go on with it
     progress : show a bar; None: when standard error is a terminal
-    settings : as in `inference.sample.sample_posterior`
+    walkers : of every ensemble, an even number; None: as many as the parameters ask for
+    ensembles : independent ones, two or more
+    max_steps : allowance of steps of every ensemble
+    target_ess : effective sample size demanded of every parameter
     """
     from bayesimpact.inference import posterior
 
-    mode = found.after if isinstance(found, Diagnosis) else found
-    mode = mode.fit if isinstance(mode, Identification) else mode
+    mode = found.after if isinstance(found, loop.Diagnosis) else found
+    mode = mode.fit if isinstance(mode, identification.Identification) else mode
     number = int(generator(seed, rng).integers(2**31)) if rng is not None else seed or 0
     place = None if folder is None else Path(folder)
     with compilation_shown(progress), progress_bar(progress) as callback:
-        return posterior.sample(
-            mode, seed=number, folder=place, resume=resume, callback=callback, **settings
+        drawn = posterior.sample(
+            mode,
+            seed=number,
+            folder=place,
+            resume=resume,
+            callback=callback,
+            walkers=walkers,
+            ensembles=ensembles,
+            max_steps=max_steps,
+            target_ess=target_ess,
         )
+    return Posterior.of(drawn)
 
 
 def diagnose(
@@ -131,55 +167,10 @@ def diagnose(
         check_effects(chosen)
     shown = None if progress is None else False
     with compilation_shown(), refit_bar(progress or (lambda words: None), shown) as tell:
-        return diagnosed(
+        found = diagnosed(
             campaign, rng=generator(seed, rng), effects=chosen, search=search, progress=tell
         )
-
-
-def summary(found: Identification | Posterior | Results | Diagnosis) -> DataFrame:
-    """Estimates of every parameter in lab units, as a DataFrame indexed by name.
-
-    Columns: estimate (median; mode of a fit), low and high (90 %), unit, meaning. Of a diagnosis:
-    of the extended model, with the intervals of its report.
-    """
-    import pandas
-
-    from bayesimpact.model.units import readable
-    from bayesimpact.report.results import Results
-
-    wider = found.intervals if isinstance(found, Diagnosis) else None
-    if isinstance(found, Diagnosis):
-        found = replace(found.identification, fit=found.after)
-    results = found if isinstance(found, Results) else _results(found)
-    rows = {}
-    for row in results.rows:
-        shown = readable(row.unit, abs(row.median))
-        known = wider.quantiles(row.name) if wider and row.name in wider.names else None
-        low, median, high = known or (row.ci90[0], row.median, row.ci90[1])
-        values = (shown.scale * x for x in (median, low, high))
-        rows[row.name] = (*values, shown.unit, row.meaning)
-    columns = ["estimate", "low", "high", "unit", "meaning"]
-    return pandas.DataFrame.from_dict(rows, orient="index", columns=columns)
-
-
-def save(found: Identification | Posterior | Diagnosis, folder: Path | str) -> Path:
-    """Write results, figures and report.html into a folder, made if absent; path of the page.
-
-    The report is that of the commands (of a diagnosis: that of `diagnose --quick`).
-    """
-    from bayesimpact.report.write import REPORT_FILE, write_results
-
-    out = Path(folder)
-    if isinstance(found, Diagnosis):
-        from bayesimpact.diagnosis.document import document
-        from bayesimpact.report.build import versions
-        from bayesimpact.workflow import write_diagnosis
-
-        content = document(found, seed=0, seconds=float("nan"), versions=versions())
-        write_diagnosis(found, content, None, None, out, 0, "")
-    else:
-        write_results(_results(found), out)
-    return out / REPORT_FILE
+    return Diagnosis.of(found)
 
 
 def open_results(folder: Path | str) -> Results:
@@ -187,11 +178,3 @@ def open_results(folder: Path | str) -> Results:
     from bayesimpact.report.archive import load_results
 
     return load_results(folder)
-
-
-def _results(found: Identification | Posterior) -> Results:
-    from bayesimpact.report.build import results_from_fit, results_from_posterior
-
-    if isinstance(found, Posterior):
-        return results_from_posterior(found)
-    return results_from_fit(found)

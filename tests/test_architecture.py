@@ -25,6 +25,7 @@ LAYERS = (
     "report",
     "workflow",
     "cluster",
+    "found",
     "api",
     "console",
     "trial",

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,12 +14,15 @@ import small_rig
 from effect_rigs import BY_ID
 
 import bayesimpact as bi
+from bayesimpact import errors as bi_errors
 from bayesimpact.data.html import html_table, resolved
 from bayesimpact.data.short_repr import short_repr
 from bayesimpact.diagnosis.diagnose import diagnose
+from bayesimpact.diagnosis.document import document
 from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.inference.posterior import Posterior
 from bayesimpact.report.build import results_from_fit, results_from_posterior
+from bayesimpact.report.change_view import change_row
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +88,7 @@ def test_the_summary_of_a_diagnosis_is_that_of_the_extended_model(found: Diagnos
 
 
 @pytest.fixture(scope="module")
-def posterior(found: Diagnosis) -> Posterior:
+def posterior(found: Diagnosis) -> bi.Posterior:
     return bi.sample(found, seed=1, target_ess=200.0)
 
 
@@ -92,6 +96,40 @@ def test_a_posterior_shows_medians(posterior: Posterior) -> None:
     shown = cells(posterior._repr_html_())
     assert shown[0] == "c1"
     assert float(shown[1]) == pytest.approx(np.median(posterior.column("c1")), rel=1e-3)
+
+
+def test_what_is_returned_has_the_methods(found: Diagnosis, posterior: bi.Posterior) -> None:
+    """Each calls the function of its name, and shows the numbers of the report."""
+    assert isinstance(posterior, bi.Posterior)
+    diagnosis, mode = bi.Diagnosis.of(found), bi.Identification.of(found.identification)
+    campaign = mode.fit.target.oscillator.campaign
+    for one in (diagnosis, mode, posterior):
+        assert one.summary().equals(bi.summary(one))
+        assert len(one.plot_recordings().axes) == len(campaign.recordings)
+        assert type(one.to_arviz()).__name__ in ("InferenceData", "DataTree")
+    shared = [name for name in found.before.names if name.split("[")[0] in ("c1", "k1", "k2")]
+    titles = " ".join(axis.get_title(loc="left") for axis in diagnosis.plot_corner().axes)
+    told = document(found, seed=0, seconds=0.0, versions={})["parameters"]
+    shown = diagnosis._repr_html_()
+    for name in shared:
+        row = change_row(name, told["before"][name], told["after"][name])
+        assert row["before"] in shown and row["after"] in shown
+        assert str(row["after"]).partition(" ")[0] in titles
+
+
+def test_a_notebook_has_the_units_of_the_report(posterior: bi.Posterior, tmp_path: Path) -> None:
+    """Once SI with digits of its own."""
+    shown = cells(posterior._repr_html_())
+    gap = shown.index("g")
+    assert shown[gap + 4] == "mm" and 0.5 < float(shown[gap + 1]) < 2.0
+    page = bi.save(posterior, tmp_path).read_text(encoding="utf-8")
+    assert shown[gap + 1] in page and posterior.names[0] == "c1"
+
+
+def test_what_remains_unexplained_is_in_no_corner_plot(found: Diagnosis) -> None:
+    left = replace(bi.Diagnosis.of(found), remains=found.naming.chosen)
+    with pytest.raises(bi_errors.InputError, match="unexplained"):
+        left.plot_corner()
 
 
 def test_results_of_a_folder_show_what_recordings_share(found: Diagnosis) -> None:

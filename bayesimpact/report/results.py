@@ -306,12 +306,17 @@ class Results:
 
     def _repr_html_(self) -> str:
         """Parameters that all recordings share, with 90 % intervals, as the report has them."""
+        return html_table(repr(self), *self.table)
+
+    @property
+    def table(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+        """Columns and rows of what all recordings share, with 90 % intervals, for a notebook."""
         rows = []
         for row in self.select("physical", "effect"):
             shown = self.digits(row)
             values = map(shown.value, (row.median, *row.ci90))
             rows.append((row.name, *values, typeset(shown.unit)))
-        return html_table(repr(self), ("parameter", self.centre, "5 %", "95 %", "unit"), rows)
+        return ("parameter", self.centre, "5 %", "95 %", "unit"), rows
 
     @property
     def cases(self) -> tuple[str, ...]:
