@@ -371,7 +371,7 @@ def effects(ctx: click.Context, own: Path | None, seed: int, quiet: bool) -> Non
             if not quiet or check.result == "failed":
                 click.echo(f"{check.effect}  {check.name:<32} {check.result:<8} {check.detail}")
         ctx.exit(BAD_INPUT if any(check.result == "failed" for check in checks) else 0)
-    for effect in EFFECTS:
+    for effect in () if quiet else EFFECTS:
         click.echo("\n".join(listing(effect)))
 
 

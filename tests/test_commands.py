@@ -99,6 +99,7 @@ def test_effects_lists_the_whole_catalogue(run: Run) -> None:
     assert code == 0
     assert all(f"\n{e.id}\n" in f"\n{out}" for e in EFFECTS)
     assert out.count("not looked for") == len(UNTRIED)
+    assert run("effects", "--quiet") == (0, "", "")  # as its help says: warnings and errors only
 
 
 def test_effects_of_ones_own_are_checked(run: Run, tmp_path: Path) -> None:
