@@ -21,7 +21,7 @@ from bayesimpact.report.diagnosis_view import (
     verdict_words,
 )
 from bayesimpact.report.formula_text import effect_title
-from bayesimpact.report.names import of_recordings, own_parameters
+from bayesimpact.report.names import is_fault, of_recordings, own_parameters
 from bayesimpact.report.results import Results
 from bayesimpact.report.tables import own_symbol, symbol
 
@@ -76,8 +76,9 @@ def _place(results: Results, diagnosis: Mapping[str, Any]) -> list[str | Markup]
 
 
 def _regimes(diagnosis: Mapping[str, Any], regime: str) -> list[str]:
-    """Where the named effects act, the first one first; of unknown forces where they are."""
-    own = [(e.get("location") or {}).get("regime") for e in diagnosis.get("effects", ())]
+    """Where the named effects act, the first one first; else where what is unknown does."""
+    effects = [e for e in diagnosis.get("effects", ()) if not is_fault(e)]
+    own = [(e.get("location") or {}).get("regime") for e in effects]
     return together(str(x) for x in own if x) or [regime]
 
 

@@ -50,3 +50,21 @@ def test_pages_are_full_and_whole(
         assert last.tag not in HEADS, last
     assert max(b.right for b in printed) <= PAGE[0] + 1
     assert {round(b.stretch, 2) for b in printed} == {1.0}
+
+
+def test_no_page_begins_with_the_figures_at_a_glance(
+    tab: Tab, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One line of them stood alone on top of the second page."""
+    draw_coarsely(monkeypatch)
+    monkeypatch.setattr(save, "_saved", blank)
+    ends = set()
+    for said in range(126, 154, 3):  # the summary grows by a line, and the page's end moves on
+        results = diagnosed(9, 3, sampled=False, summary="It rubs and it rubs again. " * said)
+        save_results(results, tmp_path)
+        printed = boxes(tab, rewrite_report(tmp_path).page)
+        (mass,) = (b for b in printed if b.text == "mass")
+        first = min((b for b in printed if b.page == mass.page), key=lambda b: b.top)
+        assert first.text != "mass", said
+        ends.add(mass.page)
+    assert ends == {0, 1}, "the line never came to the end of a page"

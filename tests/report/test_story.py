@@ -49,6 +49,25 @@ def test_a_residual_at_the_noise_is_no_improvement() -> None:
     assert "residual rms 9.00 µm → 5.00 µm (−44 %)" in large["improvement"]
 
 
+def test_the_place_is_that_of_the_named_effects_and_not_of_a_fault() -> None:
+    place = {"displacement_m": [-1e-3, 2e-3], "velocity_m_s": [-0.1, 0.1]}
+    gap, damping, fault = (
+        {**DIAGNOSIS["effects"][0], "id": i, "family": f, "location": {**place, "regime": where}}  # type: ignore[dict-item, index]
+        for i, f, where in (
+            ("gap_wear", "gap", "entry"),
+            ("contact_damping_speed", "contact damping", "contact"),
+            ("recording_start", "recording", "measurement"),
+        )
+    )
+    location = {**place, "regime": "everywhere"}
+    for effects, words in (
+        ([gap, damping], "contact with the stop, at"),
+        ([gap, fault], "the beginning of contact, at"),
+        ([fault], "the whole motion, at"),
+    ):
+        assert told(diagnosed(effects=effects, location=location))["place"].startswith(words)
+
+
 def test_unlikely_alternatives_are_not_told_first() -> None:
     """Five below 0.001 stood under the words "several explanations fit alike"."""
     other = {"id": "obstacle_mass", "probability": 0.002, "delta_log_evidence": 1.0}
