@@ -99,6 +99,8 @@ def test_the_main_steps_show_what_they_compile(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr("bayesimpact.api.compilation_shown", shown)
     for place in ("api.identify", "inference.posterior.sample", "diagnosis.diagnose.diagnose"):
         monkeypatch.setattr(f"bayesimpact.{place}", step)
+    for kind in ("Identification", "Posterior", "Diagnosis"):
+        monkeypatch.setattr(f"bayesimpact.found.{kind}.of", staticmethod(lambda found: found))
     campaign = Campaign("any", 1.0, (Recording("a", "", np.zeros(4), 1.0),), stop=False)
     assert all(call(campaign) is True for call in (bi.fit, bi.sample, bi.diagnose))
     assert listening == [True, False] * 3
