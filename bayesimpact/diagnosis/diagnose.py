@@ -72,7 +72,7 @@ from bayesimpact.model.workload import workload_counted
 
 Array = NDArray[np.float64]
 
-SLOWEST = 3.0
+SLOWEST = 2.0
 """Times as slow as `workload` expects that a machine may be before its own seconds count."""
 
 BESIDE: Mapping[Verdict, Verdict] = {

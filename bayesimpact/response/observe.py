@@ -22,6 +22,7 @@ Ints = NDArray[np.intp]
 
 DRIFT = 0.005  # of the motion: what an integrated reading is off, however smooth it looks
 AS_NOISE = 1.2  # times the noise of neighbours: what a line leaves of readings is that
+MANY, FAR = 10.0, 5.0  # periods, and times the noise: a motion, whatever one line leaves of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +125,8 @@ def observe_decay(observed: Observed) -> Flight | None:
 
     The frequency of the half cycles and that of the strongest line are tried; where no half cycles
     stand out (slow decays cut short, a beat, much noise), the line's must explain most of the
-    readings, or all but noise.
+    readings, or all but noise. Of many modes it may not: many periods far above the noise are a
+    motion, too.
     """
     found = [] if (rate := _rate_of_half_cycles(observed)) is None else [_decay(observed, rate)]
     other = _decay(observed, observed.omega)
@@ -140,7 +142,7 @@ def _decay(observed: Observed, omega: float) -> Flight | None:
 def _explains(flight: Flight, observed: Observed) -> bool:
     """Whether a fit leaves less than half of the readings' variance; or no more than the noise that
     neighbours show, and the likelihood gains what its unknowns cost (Schwarz 1978), among as many
-    frequencies as there are samples.
+    frequencies as there are samples; or the readings are of `MANY` periods `FAR` above the noise.
     """
     square = [float(np.sum((x - np.mean(x)) ** 2)) for x in observed.samples]
     size = sum(x.size for x in observed.samples)
@@ -148,6 +150,9 @@ def _explains(flight: Flight, observed: Observed) -> bool:
     if gained > np.log(2.0):
         return True
     noise = float(np.sqrt(np.average(np.square(observed.noises), weights=_sizes(observed))))
+    periods = min(x.size / p for x, p in zip(observed.samples, observed.periods, strict=True))
+    if periods > MANY and np.sqrt(sum(square) / size) > FAR * noise:
+        return True
     cost = (2 + 2 * len(square)) / 2 + 1  # frequency, decay, amplitudes; the choice of a frequency
     return flight.rms < AS_NOISE * noise and 0.5 * size * gained > cost * np.log(size)
 

@@ -61,4 +61,4 @@ def test_other_work_of_the_machine_is_not_counted(monkeypatch: pytest.MonkeyPatc
 
     monkeypatch.setattr(diagnose_module, "_diagnosed", run)
     diagnose_module.diagnose(None, rng=np.random.default_rng(0))
-    assert readings == pytest.approx([0.0, 90.0, 200.0], abs=0.1)
+    assert readings == pytest.approx([0.0, 90.0, 300.0], abs=0.1)
