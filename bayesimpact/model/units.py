@@ -205,11 +205,6 @@ def without_zero(places: int, *values: float) -> int:
     return places  # it is next to nothing
 
 
-def interval_decimals(low: float, high: float) -> int:
-    """Decimals for a 90 % interval and its median."""
-    return without_zero(decimals(0.5 * (high - low)), low, high)
-
-
 def span_of(ends: Sequence[float], unit: str) -> str:
     """A range with its unit."""
     low, high = ends
