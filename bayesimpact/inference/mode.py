@@ -12,6 +12,7 @@ whose Gauss-Newton matrix is J'J / sigma^2 plus the priors' curvature (Levenberg
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 from bayesimpact.inference.climb import Climb
 from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.likelihood import Linearisation
+from bayesimpact.inference.touch_jumps import beyond_touch
 
 Array = NDArray[np.float64]
 
@@ -28,6 +30,7 @@ SLOW = 0.5  # of the last step's size: above that, old derivatives are renewed
 STALLED = 4.0  # tolerances: a gain that such a step would have brought, or less
 STALLS = 2  # such steps in a row, with new derivatives: these tell no more
 LITTLE = 0.1  # nats: of a step by differences that promised more; two in a row do not lead far
+TOUCHES = 3  # readings that a climb may set right
 DOUBTFUL = 1.0  # last step, in standard deviations, that rough derivatives may still promise then
 
 
@@ -53,11 +56,41 @@ def find_mode(
     when a step is below `tolerance` standard deviations, or when new derivatives twice gain no more
     than a few such steps would (or than `LITTLE`, where differences promised more: not converged
     then). Where gains below `least_gain`, nats, decide nothing, two of them end a climb. So do two
-    that fall short of what every step left would have to gain for a log posterior of `goal`: an end
-    below it is of no use. A start where no motion is finite leads nowhere: log posterior -inf.
+    that fall short of what every step left would have to gain for a log posterior of `goal`: an
+    end below it is of no use. A start where no motion is finite leads nowhere: log posterior -inf.
+    Where a reading seems to stand on the wrong side of a touch, the climb goes on beyond that
+    (`touch_jumps`).
     """
-    climb = Climb(target, steps, slopes, held)
-    here = climb.evaluate(start)
+
+    limits = _Limits(tolerance, max_iterations, least_gain, goal)
+
+    def climbed(start: Array) -> Fit:
+        return _climbed(Climb(target, steps, slopes, held), start, limits)
+
+    found = climbed(start)
+    for _ in range(TOUCHES):
+        beyond = beyond_touch(found)
+        there = None if beyond is None else climbed(beyond)
+        if there is None or there.log_posterior <= found.log_posterior:
+            break
+        found = there
+    return found
+
+
+@dataclass(frozen=True)
+class _Limits:
+    """When a climb ends, see `find_mode`."""
+
+    tolerance: float
+    max_iterations: int
+    least_gain: float
+    goal: float
+
+
+def _climbed(climb: Climb, start: Array, limits: _Limits) -> Fit:
+    """One climb, see `find_mode`."""
+    tolerance, max_iterations = limits.tolerance, limits.max_iterations
+    here, differences = climb.evaluate(start), climb.steps is not None
     if not np.isfinite(here.value):
         return climb.without_mode(here, ())
     damping, converged, last, stalls = FIRST_DAMPING, False, np.inf, 0
@@ -81,8 +114,11 @@ def find_mode(
         if climb.stale and not moved:
             climb.renew()
         elif not (climb.stale or converged):
-            creeps = steps is not None and size > DOUBTFUL and gain < LITTLE
-            least = max(least_gain, (goal + here.value) / (max_iterations - climb.iterations + 1))
+            creeps = differences and size > DOUBTFUL and gain < LITTLE
+            least = max(
+                limits.least_gain,
+                (limits.goal + here.value) / (max_iterations - climb.iterations + 1),
+            )
             creeps = creeps or gain < max(least, 0.5 * (STALLED * tolerance) ** 2)
             stalls = stalls + 1 if creeps else 0
             if stalls < STALLS and moved:

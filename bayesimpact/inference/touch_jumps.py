@@ -1,0 +1,63 @@
+"""Where a climb goes on that ended on the wrong side of a touch.
+
+Readings of velocities and accelerations jump where a contact begins or ends: by what an obstacle's
+mass takes, by the force of a damper. A sample that lies beside such an instant is read before or
+after it, and the likelihood has a step where the instant passes the sample. No derivative shows
+it: a climb that comes from the wrong side ends before it, and any parameter that moves the instant
+a little seems to be worth what one reading is.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesimpact.inference.climb import Climb
+from bayesimpact.inference.fit import Fit
+
+Array = NDArray[np.float64]
+
+OUTLYING = 6.0  # standard deviations of a reading: one in a billion is, of the noise alone
+FEW = 8  # readings of one recording: more are no single instants
+SHARES = 2.0 ** np.arange(-6, 5)  # of what a parameter is uncertain by where all others are known
+MEDIAN = 0.6745  # of normal numbers' sizes, standard deviations
+GAINED = 3.0  # nats, for a climb to go on
+
+
+def beyond_touch(fit: Fit) -> Array | None:
+    """A likelier point (d,) than a mode, beside it, where one reading is on the other side of a
+    touch; None where no reading that may jump is far off, or nothing is gained.
+
+    A gap moves all touches, the initial state those of one recording.
+    """
+    oscillator = fit.target.oscillator
+    campaign = oscillator.campaign
+    if not campaign.stop or not np.isfinite(fit.log_posterior):
+        return None
+    rows = [
+        recording.name
+        for recording, part in zip(campaign.recordings, fit.linearisation, strict=True)
+        if recording.order > 0 and 0 < _outlying(part.residual) <= FEW
+    ]
+    if not rows:
+        return None
+    names = oscillator.layout.names
+    moving = {"g", *(f"{key}[{name}]" for name in rows for key in ("g", "y0", "v0"))}
+    curvature = np.diag(np.linalg.pinv(fit.covariance))
+    climb = Climb(fit.target, None, None, ())
+    found = (-fit.log_posterior - GAINED, fit.mode)
+    for i, name in enumerate(names):
+        if name in moving and curvature[i] > 0.0:
+            for by in np.concatenate([-SHARES, SHARES]) / np.sqrt(curvature[i]):
+                theta = fit.mode.copy()
+                theta[i] += by
+                there = climb.evaluate(theta)
+                if there.value < found[0]:
+                    found = there.value, there.theta
+    return None if found[1] is fit.mode else found[1]
+
+
+def _outlying(residual: Array) -> int:
+    """How many readings are far off, by what half of them are off at least."""
+    size = np.abs(residual[residual != 0.0])  # what is set aside is 0
+    return int(np.sum(size > OUTLYING * np.median(size) / MEDIAN)) if size.size else 0
