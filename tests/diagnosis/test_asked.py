@@ -58,8 +58,8 @@ def test_in_the_place_of_an_effect_only_what_comes_near_is_asked_for() -> None:
         small_rig.record(1, planted, duration=4.0), rng=np.random.default_rng(0), search=False
     ).fit
     scales = campaign_scales(fit)
-    # a frame that moves takes one of the few places
-    asked = Asked(fit, [e for e in SEARCHED if e.id != "base_motion"], scales)
+    others = {"base_motion", "adhesion"}  # they imitate it as well, and places are few
+    asked = Asked(fit, [e for e in SEARCHED if e.id not in others], scales)
     whole = fit_from(fit, [BY_ID[i] for i in planted], {}, scales)
     assert whole.fit.reduced_chi2 < 1.2
     drag, mass = (
