@@ -156,11 +156,14 @@ def diagnose(
     InputError : a recording shows no oscillation
     """
     say = progress or (lambda message: None)
-    with workload_counted() as simulated:
-        slow = time.process_time
-        reading = clock or (lambda: max(simulated(), slow() / SLOWEST))
-        with compilation_left_out(reading) as computing:
-            return _diagnosed(campaign, rng, effects, search, say, computing)
+    process = clock or time.process_time
+    with compilation_left_out(process) as computing, workload_counted() as simulated:
+        begun = computing()
+
+        def reading() -> float:
+            return computing() if clock else max(simulated(), (computing() - begun) / SLOWEST)
+
+        return _diagnosed(campaign, rng, effects, search, say, reading)
 
 
 def _diagnosed(

@@ -87,10 +87,10 @@ def with_formulas(
     """
     means = _Means(effects, scales, rng, progress, budget)
     something = answer.decision.verdict in ("unknown", "partly") or _has_formula(answer.after)
-    if not something and answer.decision.effects and not is_large(answer.naming.base.candidate.fit):
-        answer, something = _imitated(answer, means)
     if something and answer.naming.finished:
         answer = _compared(answer, means, TURNS)
+    elif answer.decision.effects and not is_large(answer.naming.base.candidate.fit):
+        answer = _or_a_formula(answer, means)
     certain = answer.formulas is not None and answer.formulas.named
     return answer if certain else _uncertain(answer)
 
@@ -106,26 +106,30 @@ class _Means:
     budget: Budget
 
 
-def _imitated(answer: Answer, means: _Means) -> tuple[Answer, bool]:
-    """The answer with the likeliest formula in the place of its effects where that is decisively
-    likelier and has no more terms, and whether one is.
+def _or_a_formula(answer: Answer, means: _Means) -> Answer:
+    """The answer, or that of formulas where one that has no more terms than it names effects, and
+    leaves nothing, is decisively likelier; as far as time allows to compare that with all others.
     """
+    if not (answer.naming.finished and means.budget.may_go_on()):
+        return answer
     naming, base = answer.naming, answer.naming.base.candidate.fit
     means.progress("scoring formulas in place of the effects")
     question = asked_about(base, naming.prior_cost, means.scales)
     if question is None:
-        return answer, False
+        return answer
     most = len(answer.decision.effects)
     fewer = [s for s in question.ranked if len(s.terms) <= most]
     fitted = list[Candidate]()
     for subset in refit_candidates(fewer, question.scores.terms):
-        if means.budget.may_go_on() and (found := refitted(question, subset)) is not None:
-            fitted.append(found)
+        one = refitted(question, subset) if means.budget.may_go_on() else None
+        if one is not None and one.fit.converged and not leaves_something(one.fit):
+            fitted.append(one)
     naming = joined(naming, fitted)
     first = max(fitted, key=naming.log_odds, default=naming.chosen.candidate)
     if not naming.log_odds(first) > naming.log_odds(naming.chosen.candidate) + DECISIVE:
-        return answer, False
-    return replace(answer, naming=naming, after=first.fit), True
+        return answer
+    found = _compared(replace(answer, naming=naming, after=first.fit), means, TURNS)
+    return found if found.naming.finished else answer
 
 
 def _compared(answer: Answer, means: _Means, turns: int) -> Answer:
@@ -284,6 +288,6 @@ def _decided(answer: Answer, candidate: Candidate) -> Decision:
     others = {e.id for e in candidate.effects} - {e.id for e in own}
     if not others <= known:
         return Decision("partly", (*before, *own))
-    if answer.decision.verdict == "ambiguous":  # beside the formula two effects do the same
+    if answer.decision.verdict == "ambiguous" and before:  # beside the formula two do the same
         return replace(answer.decision, effects=(*before, *own))
     return Decision("named", (*before, *own))

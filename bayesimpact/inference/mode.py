@@ -69,7 +69,7 @@ def find_mode(
 
     found = climbed(start)
     for _ in range(TOUCHES):
-        beyond = beyond_touch(found)
+        beyond = beyond_touch(found, held)
         there = None if beyond is None else climbed(beyond)
         if there is None or there.log_posterior <= found.log_posterior:
             break

@@ -9,11 +9,12 @@ a little seems to be worth what one reading is.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.inference.climb import Climb
-from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.fit import Fit, inverse
 
 Array = NDArray[np.float64]
 
@@ -24,14 +25,13 @@ MEDIAN = 0.6745  # of normal numbers' sizes, standard deviations
 GAINED = 3.0  # nats, for a climb to go on
 
 
-def beyond_touch(fit: Fit) -> Array | None:
+def beyond_touch(fit: Fit, held: Sequence[int] = ()) -> Array | None:
     """A likelier point (d,) than a mode, beside it, where one reading is on the other side of a
     touch; None where no reading that may jump is far off, or nothing is gained.
 
-    A gap moves all touches, the initial state those of one recording.
+    A gap moves all touches, the initial state those of one recording. Parameters `held` stay.
     """
-    oscillator = fit.target.oscillator
-    campaign = oscillator.campaign
+    campaign = fit.target.oscillator.campaign
     if not campaign.stop or not np.isfinite(fit.log_posterior):
         return None
     rows = [
@@ -41,20 +41,21 @@ def beyond_touch(fit: Fit) -> Array | None:
     ]
     if not rows:
         return None
-    names = oscillator.layout.names
-    moving = {"g", *(f"{key}[{name}]" for name in rows for key in ("g", "y0", "v0"))}
-    curvature = np.diag(np.linalg.pinv(fit.covariance))
-    climb = Climb(fit.target, None, None, ())
-    found = (-fit.log_posterior - GAINED, fit.mode)
-    for i, name in enumerate(names):
-        if name in moving and curvature[i] > 0.0:
-            for by in np.concatenate([-SHARES, SHARES]) / np.sqrt(curvature[i]):
-                theta = fit.mode.copy()
-                theta[i] += by
-                there = climb.evaluate(theta)
-                if there.value < found[0]:
-                    found = there.value, there.theta
-    return None if found[1] is fit.mode else found[1]
+    ends = ("g", *(f"{key}[{name}]" for name in rows for key in ("g", "y0", "v0")))
+    moving = [
+        i for i, name in enumerate(fit.names) if i not in held and name.rpartition(".")[2] in ends
+    ]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        sd = 1.0 / np.sqrt(np.diag(inverse(fit.covariance))[moving])
+    steps = np.outer(sd, np.concatenate([-SHARES, SHARES]))
+    points = np.repeat(fit.mode[None], steps.size, axis=0)
+    points[np.arange(steps.size), np.repeat(moving, 2 * SHARES.size)] += steps.ravel()
+    points = points[np.isfinite(points).all(axis=1)]
+    if not len(points):
+        return None
+    found = np.nan_to_num(fit.target(points), nan=-np.inf)
+    best = int(np.argmax(found))
+    return points[best] if found[best] > fit.log_posterior + GAINED else None
 
 
 def _outlying(residual: Array) -> int:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from math import isfinite
 from typing import Any
 
+from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.diagnosis.words import titles_of
 from bayesimpact.model.units import (
     chi2,
@@ -30,8 +32,8 @@ from bayesimpact.report.tables import own_symbol
 FORMULAS, UNLIKELY = 5, 1e-3
 """Formulas that are shown whatever their probability; the others from this probability on."""
 
-LIKELY = 0.01
-"""Probability from which on another explanation stands on the first page."""
+LIKELY = math.exp(-DECISIVE)
+"""Probability from which on another explanation stands on the first page: it is a rival."""
 
 VERDICTS = {
     "adequate": "Nothing is missing",
@@ -105,7 +107,7 @@ def verdict_words(diagnosis: Mapping[str, Any]) -> str:
     """The verdict as a heading; faults of recordings are no part of the physics that is missing."""
     verdict = str(diagnosis["verdict"])
     if verdict == "ambiguous" and not likely_others(diagnosis):
-        return "One explanation leads, but not all others were tried"
+        return "One explanation leads, but others are not ruled out"
     families = {effect.get("family") for effect in diagnosis.get("effects") or ()}
     if verdict == "partly" and families == {"recording"}:
         return "Faults of recordings are set aside or corrected; the rest is unknown"

@@ -110,6 +110,9 @@ def _slots(recording: RecordingResult, known: Mapping[str, float]) -> Array:
     for i, name in enumerate(SLOTS):
         for key in keys:
             slots[i] = known.get(name + key, slots[i])
-    if not any(f"g{key}" in known for key in keys):
+    own = [value for name, value in known.items() if name.endswith(f".g[{recording.name}]")]
+    if own:  # a gap of every recording's own
+        slots[_GAP] = own[0]
+    elif not any(f"g{key}" in known for key in keys):
         slots[_GAP] = np.inf
     return slots

@@ -382,7 +382,8 @@ class Results:
         """How a row's numbers are written, beside what a diagnosis says of its parameter."""
         both = (self.diagnosis or {}).get("parameters") or {}
         known = [both.get(key, {}).get(row.name) for key in ("before", "after")]
-        return digits(row.unit, row.median, row.ci90, [x for x in known if x is not None])
+        told = [x for x in known if x and None not in (x["median"], *x["ci90"])]
+        return digits(row.unit, row.median, row.ci90, told)
 
     def select(self, *roles: str) -> tuple[Row, ...]:
         """Rows with one of the given roles."""

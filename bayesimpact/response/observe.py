@@ -22,6 +22,7 @@ Ints = NDArray[np.intp]
 
 DRIFT = 0.005  # of the motion: what an integrated reading is off, however smooth it looks
 AS_NOISE = 1.2  # times the noise of neighbours: what a line leaves of readings is that
+SLOW = 0.1  # of the readings' variance
 MANY, FAR = 10.0, 5.0  # periods, and times the noise: a motion, whatever one line leaves of it
 
 
@@ -142,19 +143,27 @@ def _decay(observed: Observed, omega: float) -> Flight | None:
 def _explains(flight: Flight, observed: Observed) -> bool:
     """Whether a fit leaves less than half of the readings' variance; or no more than the noise that
     neighbours show, and the likelihood gains what its unknowns cost (Schwarz 1978), among as many
-    frequencies as there are samples; or the readings are of `MANY` periods `FAR` above the noise.
+    frequencies as there are samples; or the readings are of `MANY` periods `FAR` above the noise,
+    and do not wander.
     """
     square = [float(np.sum((x - np.mean(x)) ** 2)) for x in observed.samples]
     size = sum(x.size for x in observed.samples)
-    gained = float(np.log(sum(square) / size / flight.rms**2))
-    if gained > np.log(2.0):
+    if flight.rms**2 < 0.5 * sum(square) / size:
         return True
+    gained = float(np.log(sum(square) / size / flight.rms**2))
     noise = float(np.sqrt(np.average(np.square(observed.noises), weights=_sizes(observed))))
     periods = min(x.size / p for x, p in zip(observed.samples, observed.periods, strict=True))
     if periods > MANY and np.sqrt(sum(square) / size) > FAR * noise:
-        return True
+        return all(map(_is_fast, observed.samples, observed.periods))
     cost = (2 + 2 * len(square)) / 2 + 1  # frequency, decay, amplitudes; the choice of a frequency
     return flight.rms < AS_NOISE * noise and 0.5 * size * gained > cost * np.log(size)
+
+
+def _is_fast(samples: Floats, period: float) -> bool:
+    """Whether readings have little below a quarter of their frequency: drift has most there."""
+    power = np.abs(np.fft.rfft(samples - samples.mean())) ** 2
+    slow = int(np.ceil(0.25 * samples.size / period))
+    return bool(power[:slow].sum() < SLOW * power.sum())
 
 
 def _sizes(observed: Observed) -> list[int]:

@@ -101,6 +101,13 @@ def test_no_formula_takes_the_place_of_the_law_that_acts() -> None:
     assert said == ["scoring formulas in place of the effects"]
 
 
+def test_where_the_search_did_not_end_no_formula_takes_the_place_of_its_effects() -> None:
+    imitating = tuple(BY_ID[i] for i in ("spring_cubic", "spring_quadratic"))
+    before, scales = unknown({"detent": DETENT}, named=imitating)
+    late = replace(_said(before), naming=replace(before.naming, finished=False))
+    assert asked(late, scales) is late and asked(_said(before), scales, 0).decision.effects
+
+
 def _said(answer: Answer) -> Answer:
     """An answer that names the effects of its model, as if nothing were left."""
     decision = replace(answer.decision, verdict="named")

@@ -48,8 +48,10 @@ def test_every_way_to_simulate_counts(effects: tuple[Any, ...]) -> None:
 
 
 def test_other_work_of_the_machine_is_not_counted(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Seconds of the processor count only where they are far more than what is simulated takes."""
-    seconds = iter([0.0, 100.0, 600.0])
+    """Seconds of the processor, of this diagnosis, count only where they are far more than what is
+    simulated takes.
+    """
+    seconds = iter([1000.0, 1000.0, 1100.0, 1600.0])
     monkeypatch.setattr(diagnose_module.time, "process_time", lambda: next(seconds))
     readings: list[float] = []
 

@@ -74,7 +74,7 @@ def test_unlikely_alternatives_are_not_told_first() -> None:
     results = diagnosed(verdict="ambiguous", alternatives=[other])
     story = told(results)
     assert "mass of the obstacle" not in story["physics"]
-    assert story["verdict"] == "One explanation leads, but not all others were tried"
+    assert story["verdict"] == "One explanation leads, but others are not ruled out"
     assert page(results)[1].text.count("mass of the obstacle") == 1  # in the details
     likely = told(diagnosed(verdict="ambiguous", alternatives=[{**other, "probability": 0.2}]))
     assert "or mass of the obstacle, probability 0.20" in likely["physics"]

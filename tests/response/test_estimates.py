@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rigs import PAPER, Rig, paper_motion, random_rig
-from scipy.signal import savgol_filter
+from scipy.signal import lfilter, savgol_filter
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.gaps import without
@@ -279,6 +279,19 @@ def test_a_line_in_much_noise_is_an_oscillation(seed: int) -> None:
     assert estimate(plain(y, 1 / 40)).k1 == pytest.approx((2 * np.pi * 4.16) ** 2, rel=0.02)
     with pytest.raises(InputError, match="no oscillation"):
         estimate(plain(noise, 1 / 40))
+
+
+def test_many_modes_are_a_motion_and_what_wanders_is_none() -> None:
+    """No line explains most of a ring of many modes, nor of a walk, whose steps are smooth too."""
+    rng = np.random.default_rng(1)
+    t = np.arange(4000) * 5e-6
+    modes = zip((3900.0, 4400.0, 4700.0, 5100.0, 5600.0, 6300.0), rng.uniform(0, 6, 6), strict=True)
+    ring = np.exp(-t / 4e-3) * sum(np.cos(2 * np.pi * f * t + p) for f, p in modes)
+    assert 3500.0 < np.sqrt(estimate(plain(ring, 5e-6)).k1) / (2 * np.pi) < 6500.0
+    for rho in (1.0, 0.98):
+        x = lfilter([1.0], [1.0, -rho], rng.standard_normal(4000))
+        with pytest.raises(InputError, match="no oscillation"):
+            estimate(plain(x, 1e-3))
 
 
 def test_a_beat_is_an_oscillation() -> None:

@@ -47,7 +47,8 @@ def find_noise(recording: Recording) -> list[Fault]:
     strong &= np.abs(fourth / other - ratio) < SAME * ratio
     if not strong.any() or strong.sum() > count // 2:
         return []
-    motion = np.array([np.std(x[a:b]) for a, b in parts])
+    power = np.array([np.var(x[a:b]) for a, b in parts])
+    motion = np.sqrt(np.maximum(power - sixth**2, 0.0))
     if motion[strong].min() > FACTOR * motion[~strong].max():
         return []
     reach = int(EDGE * x.size / count)

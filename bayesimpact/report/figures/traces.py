@@ -19,8 +19,8 @@ from bayesimpact.report.names import split
 from bayesimpact.report.results import SamplerSummary
 
 MOST = 14
-_TITLE_COLUMNS = 60  # characters
 """Parameters shown."""
+_TITLE_COLUMNS = 60  # characters
 
 
 @styled
