@@ -135,12 +135,11 @@ def is_told_apart(naming: Naming, effect: Effect) -> bool:
     """Whether far more is left with the law that an effect refines in its place, if it does, and
     its size is not that at which it does what a law without parameters does.
     """
-    for law, candidate in simpler_laws(naming, effect):
-        if law.id == effect.prefer and not exceeds(naming, candidate.fit):
-            return False
-        if not law.parameters and is_of_fixed_size(naming, effect, law, candidate.fit):
-            return False
-    return True
+    return not any(
+        is_of_fixed_size(naming, effect, law, candidate.fit)
+        or (law.id == effect.prefer and not exceeds(naming, candidate.fit))
+        for law, candidate in simpler_laws(naming, effect)
+    )
 
 
 def simpler_laws(naming: Naming, effect: Effect) -> list[tuple[Effect, Candidate]]:
@@ -163,7 +162,7 @@ def is_of_fixed_size(naming: Naming, effect: Effect, law: Effect, fit: Fit) -> b
     """Whether an effect of one size has nearly that at which it does what a law without parameters
     does along a `fit` with that.
     """
-    if len(effect.parameters) != 1:
+    if law.parameters or len(effect.parameters) != 1:
         return False
     name = f"{effect.id}.{effect.parameters[0].name}"
     at = equivalent(law, effect, fit, campaign_scales(naming.base.candidate.fit))
@@ -176,8 +175,12 @@ def group_of(naming: Naming, effect: Effect) -> Group:
     sets without it have in its place; without these where one of the sets has none, or there are
     too many.
     """
-    chosen, apart = naming.chosen.candidate, is_told_apart(naming, effect)
-    simpler = [e for e, _ in simpler_laws(naming, effect) if e.id == effect.prefer or not apart]
+    chosen = naming.chosen.candidate
+    simpler = [
+        law
+        for law, candidate in simpler_laws(naming, effect)
+        if law.id == effect.prefer or is_of_fixed_size(naming, effect, law, candidate.fit)
+    ]
     alone = (effect, *simpler[:1])
     least = naming.log_odds(chosen) - DECISIVE
     others = {e.id: e for e in alone[1:]}

@@ -58,7 +58,7 @@ class Linear:
             return np.array([i for i, p in enumerate(self.parameters) if p.role in wanted])
 
         layout = SimpleNamespace(parameters=self.parameters, roles=roles)
-        return SimpleNamespace(layout=layout)
+        return SimpleNamespace(layout=layout, campaign=SimpleNamespace(stop=False))
 
     def residuals(self, theta: np.ndarray) -> tuple[np.ndarray, ...]:
         return (self.y - theta[:, :-1] @ self.x.T,)

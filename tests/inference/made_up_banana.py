@@ -39,7 +39,8 @@ class Banana:
             Parameter("sigma", "", "noise", 0.0),
         )
         roles = lambda *r: np.array([i for i, p in enumerate(parameters) if p.role in r])  # noqa: E731
-        return SimpleNamespace(layout=SimpleNamespace(parameters=parameters, roles=roles))
+        layout = SimpleNamespace(parameters=parameters, roles=roles)
+        return SimpleNamespace(layout=layout, campaign=SimpleNamespace(stop=False))
 
     def __post_init__(self) -> None:
         self.rng = np.random.default_rng(0)

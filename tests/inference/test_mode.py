@@ -213,7 +213,7 @@ def test_best_noise_level(prior, n):
     likelihood = SimpleNamespace(sizes=np.array([n / 2, n / 2]), sigma_columns=np.array([0, 0]))
     problem = SimpleNamespace(
         likelihood=likelihood,
-        oscillator=SimpleNamespace(layout=layout),
+        oscillator=SimpleNamespace(layout=layout, campaign=SimpleNamespace(stop=False)),
         priors=SimpleNamespace(parameters=(prior,)),
     )
     sums = np.array([0.7, 1.3]) * 0.5 * n * (5e-6) ** 2
