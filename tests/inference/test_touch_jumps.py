@@ -62,7 +62,7 @@ def test_a_reading_on_the_wrong_side_of_a_touch_is_set_right(
     assert beyond is not None
     assert fit.target(beyond)[0] > wrong.log_posterior + 30.0
     right = _beside(fit, late)
-    assert right.log_posterior == pytest.approx(float(fit.target(beyond)[0]), abs=1e-6)
+    assert right.log_posterior > float(fit.target(beyond)[0])  # with a noise level of its own
 
 
 def test_readings_that_do_not_jump_are_left_alone(touched: tuple[Fit, int]) -> None:

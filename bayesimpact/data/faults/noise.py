@@ -48,7 +48,7 @@ def find_noise(recording: Recording) -> list[Fault]:
     if not strong.any() or strong.sum() > count // 2:
         return []
     power = np.array([np.var(x[a:b]) for a, b in parts])
-    motion = np.sqrt(np.maximum(power - sixth**2, 0.0))
+    motion = np.sqrt(np.maximum(power - ((1.0 + SAME) * sixth) ** 2, 0.0))
     if motion[strong].min() > FACTOR * motion[~strong].max():
         return []
     reach = int(EDGE * x.size / count)
