@@ -21,6 +21,7 @@ from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.progress import compilation_shown, progress_bar, refit_bar
+from bayesimpact.inference.search import Generation
 
 if TYPE_CHECKING:
     from bayesimpact.model.effects import Effect
@@ -53,6 +54,7 @@ def fit(
     noise: Noise | None = None,
     sigma_per_recording: bool = False,
     known: Mapping[str, float] | None = None,
+    callback: Callable[[Generation], None] | None = None,
 ) -> Identification:
     """Mode of the base model's posterior for a campaign, nothing given.
 
@@ -65,6 +67,7 @@ def fit(
     noise : None estimates it from the recordings
     sigma_per_recording : a noise level of its own for every recording
     known : values of parameters from which to climb, where the campaign declares effects
+    callback : called after every generation of the global search
 
     Raises
     ------
@@ -80,6 +83,7 @@ def fit(
                 noise=noise,
                 sigma_per_recording=sigma_per_recording,
                 known=known,
+                callback=callback,
             )
         )
 
