@@ -31,7 +31,7 @@ Prices = Mapping[tuple[object, ...], float]
 """Nats by the kind of a term."""
 
 SEEN = 1e-4  # of a column's square that the others must leave, for its size to mean something
-LIKELY = 5  # sets of every number of effects beside which terms are put: set by hand
+LIKELY = 7  # sets of every number of effects beside which terms are put: set by hand
 BLOCK = 64  # terms at once, so that memory stays bounded
 
 

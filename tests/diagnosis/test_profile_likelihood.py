@@ -41,7 +41,9 @@ class Branch:
 
         layout = SimpleNamespace(parameters=parameters, roles=positions, names=NAMES, size=4)
         effects = (BY_ID["contact_relaxation"],)
-        self.oscillator = SimpleNamespace(layout=layout, acting=effects, effects=effects)
+        self.oscillator = SimpleNamespace(
+            layout=layout, campaign=SimpleNamespace(stop=False), acting=effects, effects=effects
+        )
 
     def residuals(self, theta: np.ndarray) -> tuple[np.ndarray, ...]:
         c, k, t = theta[:, 0], theta[:, 1], theta[:, 2]
