@@ -11,9 +11,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-# s of a processor of 2023 with nothing beside it, fitted to the searches of
-# tests/benchmarks/workload.py: of a call that simulates, and of a sample of the closed form, with
-# derivatives, and of the general law
+# s of one core with little beside it, by hand from seven searches (within a factor of two;
+# tests/benchmarks/workload.py measures others): of a call that simulates, and of a sample of the
+# closed form, with its derivatives, of the general law, and of a response by superposition
 PER_CALL = 2.5e-3
 PER_SAMPLE = {"closed form": 4e-8, "derivatives": 3e-7, "general": 1.2e-7, "response": 1e-8}
 
