@@ -53,7 +53,7 @@ from bayesimpact.diagnosis.scan import scan
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.formula.evidence import Subset
 from bayesimpact.formula.grammar import Term
-from bayesimpact.formula.law import is_formula
+from bayesimpact.formula.law import is_formula, kind_id
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
 
@@ -288,6 +288,7 @@ def _decided(answer: Answer, candidate: Candidate) -> Decision:
     others = {e.id for e in candidate.effects} - {e.id for e in own}
     if not others <= known:
         return Decision("partly", (*before, *own))
-    if answer.decision.verdict == "ambiguous" and before:  # beside the formula two do the same
+    kept = kind_ids(candidate) & {kind_id(e.id) for e in answer.decision.effects}
+    if answer.decision.verdict == "ambiguous" and kept:  # what it had named, two effects still do
         return replace(answer.decision, effects=(*before, *own))
     return Decision("named", (*before, *own))
