@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self, cast
 
 from bayesimpact.data.html import html_table
 from bayesimpact.diagnosis import loop
@@ -22,7 +22,6 @@ from bayesimpact.model.units import readable
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from bayesimpact.inference.fit import Fit
     from bayesimpact.report.notebook import Figure
     from bayesimpact.report.results import Results
 
@@ -82,25 +81,38 @@ def _results(found: identify.Identification | posterior.Posterior) -> Results:
     return results_from_fit(found)
 
 
-class Identification(identify.Identification):
-    """The mode of the base model and how it was found, as `bi.fit` returns it."""
+class _Shown:
+    """What all of them offer."""
 
     @classmethod
-    def of(cls, found: identify.Identification) -> Identification:
+    def of(cls, found: Any) -> Self:
         """The same with the methods below."""
-        return cls(**_content(found))
+        return cls(**{f.name: getattr(found, f.name) for f in fields(found)})
 
     def summary(self) -> DataFrame:
-        """Estimates in lab units: `bi.summary`."""
-        return summary(self)
+        """Estimates in lab units (of a diagnosis: of the extended model): `bi.summary`."""
+        return summary(cast(Found, self))
 
     def save(self, folder: Path | str) -> Path:
         """Results, figures and report.html into a folder: `bi.save`."""
-        return save(self, folder)
+        return save(cast(Found, self), folder)
 
     def plot_recordings(self) -> Figure:
         """The recordings: `bi.plot` of the campaign."""
-        return _plot_recordings(self.fit)
+        from bayesimpact.report.check_figure import plot
+
+        found: Any = self
+        fit = found.after if isinstance(found, loop.Diagnosis) else found.fit
+        return plot(fit.target.oscillator.campaign)
+
+    def _repr_html_(self) -> str:
+        """Parameters that all recordings share, in the units and digits of the report."""
+        found: Any = self
+        return html_table(repr(self), *_table(found))
+
+
+class Identification(_Shown, identify.Identification):
+    """The mode of the base model and how it was found, as `bi.fit` returns it."""
 
     def plot_corner(self) -> Figure:
         """Marginals and pairs of the normal law that has the posterior's curvature at the mode."""
@@ -108,30 +120,9 @@ class Identification(identify.Identification):
 
         return normal_corner(self.fit)
 
-    def _repr_html_(self) -> str:
-        """Parameters that all recordings share, in the units and digits of the report."""
-        return html_table(repr(self), *_table(self))
 
-
-class Posterior(posterior.Posterior):
+class Posterior(_Shown, posterior.Posterior):
     """Draws from the posterior of a model, as `bi.sample` returns them."""
-
-    @classmethod
-    def of(cls, found: posterior.Posterior) -> Posterior:
-        """The same with the methods below."""
-        return cls(**_content(found))
-
-    def summary(self) -> DataFrame:
-        """Estimates in lab units: `bi.summary`."""
-        return summary(self)
-
-    def save(self, folder: Path | str) -> Path:
-        """Results, figures and report.html into a folder: `bi.save`."""
-        return save(self, folder)
-
-    def plot_recordings(self) -> Figure:
-        """The recordings: `bi.plot` of the campaign."""
-        return _plot_recordings(self.fit)
 
     def plot_corner(self, before: posterior.Posterior | None = None) -> Figure:
         """Marginals and pairs, beside those of another posterior where given: `bi.corner`."""
@@ -139,30 +130,9 @@ class Posterior(posterior.Posterior):
 
         return corner(self, before)
 
-    def _repr_html_(self) -> str:
-        """Parameters that all recordings share, in the units and digits of the report."""
-        return html_table(repr(self), *_table(self))
 
-
-class Diagnosis(loop.Diagnosis):
+class Diagnosis(_Shown, loop.Diagnosis):
     """What the base model leaves out, as `bi.diagnose` returns it."""
-
-    @classmethod
-    def of(cls, found: loop.Diagnosis) -> Diagnosis:
-        """The same with the methods below."""
-        return cls(**_content(found))
-
-    def summary(self) -> DataFrame:
-        """Estimates of the extended model in lab units: `bi.summary`."""
-        return summary(self)
-
-    def save(self, folder: Path | str) -> Path:
-        """Results, figures and report.html into a folder: `bi.save`."""
-        return save(self, folder)
-
-    def plot_recordings(self) -> Figure:
-        """The recordings: `bi.plot` of the campaign."""
-        return _plot_recordings(self.after)
 
     def plot_corner(self) -> Figure:
         """Both models' normal laws at their modes, as in the report.
@@ -192,16 +162,6 @@ class Diagnosis(loop.Diagnosis):
         found += _changes(self)
         columns = ("", "base model, median (90 %)", "with what was added, median (90 %)")
         return html_table(repr(self), columns, found)
-
-
-def _content(found: Any) -> dict[str, Any]:
-    return {f.name: getattr(found, f.name) for f in fields(found)}
-
-
-def _plot_recordings(fit: Fit) -> Figure:
-    from bayesimpact.report.check_figure import plot
-
-    return plot(fit.target.oscillator.campaign)
 
 
 def _table(

@@ -183,28 +183,6 @@ def test_other_ends(
     assert words in err and "Traceback" not in err
 
 
-@pytest.mark.parametrize("drawn", [False, True])
-def test_interrupted_sampling_says_how_to_go_on(
-    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, drawn: bool
-) -> None:
-    """With the draws so far, where there are any."""
-
-    def stop(*_: object, **__: object) -> None:
-        if drawn:
-            chain = out / "chain" / "0"
-            chain.mkdir(parents=True)
-            (chain / "block-0.npz").touch()
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("bayesimpact.data.read.load_campaign", lambda *_: None)
-    monkeypatch.setattr("bayesimpact.workflow.sample_campaign", stop)
-    out = tmp_path / "out"
-    got, _, err = run("sample", tmp_path, "--out", out, "--seed", "3")
-    assert got == 130
-    assert f"bayesimpact sample {tmp_path} --out {out} --seed 3" in err
-    assert ("--resume" in err) is drawn
-
-
 def test_every_command_takes_the_common_options() -> None:
     for command in main.commands.values():
         options = {o for parameter in command.params for o in parameter.opts}

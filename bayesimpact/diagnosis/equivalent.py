@@ -61,15 +61,10 @@ def _forces(old: Effect, new: Effect, fit: Fit, r: int, points: Array) -> Array:
     (1 + k, n).
     """
     assert old.law is not None and new.law is not None
-    path = _path(fit, r)
-    slots = fit.target.oscillator.layout.slots(fit.mode)[r]
-    mine = force_along(old.law, *path, effect_numbers(old, fit, r), slots)
-    return np.stack([mine, *(force_along(new.law, *path, p, slots) for p in points)])
-
-
-def _path(fit: Fit, r: int) -> tuple[Array, Array, Array]:
-    """Displacements, speeds and times of some points of recording r."""
     y, v = list(trajectory_points(fit))[r]
     t = np.asarray(fit.target.oscillator.campaign.recordings[r].times)
     few = slice(0, y.size, max(1, y.size * len(fit.linearisation) // POINTS))
-    return y[few], v[few], t[few]
+    path = y[few], v[few], t[few]
+    slots = fit.target.oscillator.layout.slots(fit.mode)[r]
+    mine = force_along(old.law, *path, effect_numbers(old, fit, r), slots)
+    return np.stack([mine, *(force_along(new.law, *path, p, slots) for p in points)])
