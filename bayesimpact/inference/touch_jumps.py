@@ -19,10 +19,10 @@ from bayesimpact.inference.fit import Fit, inverse
 Array = NDArray[np.float64]
 
 OUTLYING = 6.0  # standard deviations of a reading: one in a billion is, of the noise alone
-FEW = 8  # readings of one recording: more are no single instants
+FEW = 8  # readings of one recording, set by hand: more are no single instants
 SHARES = 2.0 ** np.arange(-6, 5)  # of what a parameter is uncertain by where all others are known
 MEDIAN = 0.6745  # of normal numbers' sizes, standard deviations
-GAINED = 3.0  # nats, for a climb to go on
+GAINED = 3.0  # nats, for a climb to go on, set by hand
 
 
 def beyond_touch(fit: Fit, held: Sequence[int] = ()) -> Array | None:

@@ -22,7 +22,7 @@ Ints = NDArray[np.intp]
 
 DRIFT = 0.005  # of the motion: what an integrated reading is off, however smooth it looks
 AS_NOISE = 1.2  # times the noise of neighbours: what a line leaves of readings is that
-SLOW = 0.1  # of the readings' variance
+SLOW = 0.1  # of the readings' variance, set by hand, as are the next two
 MANY, FAR = 10.0, 5.0  # periods, and times the noise: a motion, whatever one line leaves of it
 
 
