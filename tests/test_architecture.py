@@ -133,3 +133,9 @@ def test_no_file_is_long() -> None:
     files = [f for top in ("bayesimpact", "tests", "examples") for f in (ROOT / top).rglob("*.py")]
     lengths = {str(f.relative_to(ROOT)): len(f.read_text().splitlines()) for f in files}
     assert {name: n for name, n in lengths.items() if n > 400} == {}
+
+
+def test_test_files_have_names_of_their_own() -> None:
+    """pytest imports them by their bare name: the second of one name is not collected."""
+    names = [file.name for file in (ROOT / "tests").rglob("test_*.py")]
+    assert sorted(names) == sorted(set(names))
