@@ -40,16 +40,25 @@ class HalfCycles:
         return np.diff(self.crossings)
 
 
+def rest_at_end(samples: Floats) -> float:
+    """Median of the last fifth of a recording."""
+    return float(np.median(samples[-max(samples.size // 5, 1) :]))
+
+
+def with_motion(samples: Floats) -> Floats:
+    """The part with motion: a decay that dies early must not drown in the noise after it."""
+    size = np.abs(samples - rest_at_end(samples))
+    last = int(np.flatnonzero(size > 0.05 * size.max())[-1]) if size.any() else 0
+    return samples[: min(samples.size, max(16, int(1.2 * last)))]
+
+
 def spectral_period(samples: Floats, order: int = 0) -> float:
     """Period of the strongest component, in samples: good to some ten per cent.
 
     `order` says which time derivative of the displacement the samples are.
     """
-    settled = float(np.median(samples[-max(samples.size // 5, 1) :]))
-    size = np.abs(samples - settled)
-    # Only the part with motion: a decay that dies early must not drown in the noise after it.
-    last = int(np.flatnonzero(size > 0.05 * size.max())[-1]) if size.any() else 0
-    active = samples[: min(samples.size, max(16, int(1.2 * last)))]
+    settled = rest_at_end(samples)
+    active = with_motion(samples)
     fade = np.cos(0.5 * np.pi * np.arange(active.size) / active.size) ** 2
     if order > 0:  # a derivative averages to zero, and its median may lie off that
         settled = float(np.average(active, weights=fade))

@@ -15,15 +15,13 @@ from bayesimpact.response.cycles import cycle
 from bayesimpact.response.displacement import displacement_of
 from bayesimpact.response.flight import Arc, Flight, lower_arcs, solve_flight, waves_of
 from bayesimpact.response.half_cycles import half_cycles, spectral_period
+from bayesimpact.response.lines import has_line
 from bayesimpact.response.rest import rest_position
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 DRIFT = 0.005  # of the motion: what an integrated reading is off, however smooth it looks
-AS_NOISE = 1.2  # times the noise of neighbours: what a line leaves of readings is that
-SLOW = 0.1  # of the readings' variance, set by hand, as are the next two
-MANY, FAR = 10.0, 5.0  # periods, and times the noise: a motion, whatever one line leaves of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +38,7 @@ class Observed:
     arcs : flights on the free side, [first, end)
     biases, reading_noises : offset of the probe (None: the displacement's rest reading is to be
         found), and standard deviation of the noise, in the unit of the recording
+    lines : whether a line stands out of the spectrum of the readings
     """
 
     samples: Sequence[Floats]
@@ -50,6 +49,7 @@ class Observed:
     arcs: Sequence[Sequence[Arc]]
     biases: Sequence[float | None]
     reading_noises: Sequence[float]
+    lines: Sequence[bool]
 
     def size(self, r: int) -> float:
         """Largest distance of a recording from its rest reading."""
@@ -85,7 +85,10 @@ def look(campaign: Campaign) -> Observed:
         ]
     whole: list[list[Arc]] = [[(0, x.size)] for x in samples]
     biases, reading_noises = [one.bias for one in found], [one.noise for one in found]
-    first = Observed(samples, intervals, periods, noises, rests, whole, biases, reading_noises)
+    lines = [has_line(r.samples) for r in campaign.recordings]
+    first = Observed(
+        samples, intervals, periods, noises, rests, whole, biases, reading_noises, lines
+    )
     return with_arcs(first) if campaign.stop else first
 
 
@@ -124,14 +127,13 @@ def _fit(observed: Observed) -> Flight | None:
 def observe_decay(observed: Observed) -> Flight | None:
     """The oscillator without a stop, from all samples; None without an oscillation.
 
-    The frequency of the half cycles and that of the strongest line are tried; where no half cycles
-    stand out (slow decays cut short, a beat, much noise), the line's must explain most of the
-    readings, or all but noise. Of many modes it may not: many periods far above the noise are a
-    motion, too.
+    The frequency of the half cycles and that of the strongest line are tried. Where no half cycles
+    stand out (slow decays cut short, a beat, many modes, much noise), that line must explain most
+    of the readings, or every recording's spectrum must show one.
     """
     found = [] if (rate := _rate_of_half_cycles(observed)) is None else [_decay(observed, rate)]
     other = _decay(observed, observed.omega)
-    if other is not None and (found or _explains(other, observed)):
+    if other is not None and (found or all(observed.lines) or _explains_most(other, observed)):
         found.append(other)
     return min((f for f in found if f is not None), key=lambda f: f.rms, default=None)
 
@@ -140,34 +142,10 @@ def _decay(observed: Observed, omega: float) -> Flight | None:
     return solve_flight(observed.samples, observed.arcs, observed.intervals, omega, scan=1.05)
 
 
-def _explains(flight: Flight, observed: Observed) -> bool:
-    """Whether a fit leaves less than half of the readings' variance; or no more than the noise that
-    neighbours show, and the likelihood gains what its unknowns cost (Schwarz 1978), among as many
-    frequencies as there are samples; or the readings are of `MANY` periods `FAR` above the noise,
-    and do not wander.
-    """
-    square = [float(np.sum((x - np.mean(x)) ** 2)) for x in observed.samples]
-    size = sum(x.size for x in observed.samples)
-    if flight.rms**2 < 0.5 * sum(square) / size:
-        return True
-    gained = float(np.log(sum(square) / size / flight.rms**2))
-    noise = float(np.sqrt(np.average(np.square(observed.noises), weights=_sizes(observed))))
-    periods = min(x.size / p for x, p in zip(observed.samples, observed.periods, strict=True))
-    if periods > MANY and np.sqrt(sum(square) / size) > FAR * noise:
-        return all(map(_is_fast, observed.samples, observed.periods))
-    cost = (2 + 2 * len(square)) / 2 + 1  # frequency, decay, amplitudes; the choice of a frequency
-    return flight.rms < AS_NOISE * noise and 0.5 * size * gained > cost * np.log(size)
-
-
-def _is_fast(samples: Floats, period: float) -> bool:
-    """Whether readings have little below a quarter of their frequency: drift has most there."""
-    power = np.abs(np.fft.rfft(samples - samples.mean())) ** 2
-    slow = int(np.ceil(0.25 * samples.size / period))
-    return bool(power[:slow].sum() < SLOW * power.sum())
-
-
-def _sizes(observed: Observed) -> list[int]:
-    return [x.size for x in observed.samples]
+def _explains_most(flight: Flight, observed: Observed) -> bool:
+    """Whether a fit leaves less than half of the readings' variance."""
+    square = sum(float(np.sum((x - np.mean(x)) ** 2)) for x in observed.samples)
+    return flight.rms**2 < 0.5 * square / sum(x.size for x in observed.samples)
 
 
 def _rate_of_half_cycles(observed: Observed) -> float | None:
