@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -29,7 +29,8 @@ ARRAY = "hypothesis_{}_{}"
 
 def rivals_content(rivals: Rivalry) -> tuple[dict[str, Any], dict[str, Array]]:
     """What JSON can say of the rivals, and their arrays by name."""
-    noise = asdict(rivals.noise)
+    noise = asdict(replace(rivals.noise, forces=None))  # of recordings that were made
+    del noise["forces"]
     content = {
         "noise": {k: noise[k] for k in ("correlation", "others", "smoothing", "scales", "source")},
         "repetition": rivals.repetition,

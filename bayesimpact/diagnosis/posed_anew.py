@@ -16,6 +16,7 @@ from bayesimpact.diagnosis.directions import is_periodic, is_steady
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.faults.compare import Compared
 from bayesimpact.diagnosis.faults.outliers import beside_spikes
+from bayesimpact.diagnosis.input_noise import input_noise
 from bayesimpact.diagnosis.models import Progress
 from bayesimpact.diagnosis.naming import State, is_large
 from bayesimpact.diagnosis.refit import fit_from
@@ -40,7 +41,7 @@ class Posed:
 
 def posed_anew(base: Fit, state: State, say: Progress) -> Posed | None:
     """The search without the readings that spoil it, with the inputs between their samples that a
-    model asks for, or under the slow noise that is all that it leaves.
+    model asks for, under the slow noise that is all that it leaves, or that of its inputs.
     """
     found = state.candidate.fit
     if not (state.is_white and found is base):
@@ -48,10 +49,14 @@ def posed_anew(base: Fit, state: State, say: Progress) -> Posed | None:
         posed = posed or _with_band_limited_inputs(base, found, say)
         if posed is not None:
             return posed
-    noise = None if state.is_white or is_large(found) else remaining_noise(found)
+    if is_large(found):
+        return None
+    noise, what = None if state.is_white else remaining_noise(found), "what remains is slow noise"
+    if noise is None and is_large(base):  # else it was asked of the base fit
+        noise, what = input_noise(found), "the noise of the input matters"
     if noise is None:
         return None
-    say("what remains is slow noise: once more under that")
+    say(f"{what}: once more under that")
     first = refitted(found, noise=noise) if found is not base else None
     return Posed(refitted(base, noise=noise), first)
 

@@ -21,6 +21,7 @@ from bayesimpact.diagnosis.faults.compare import (
     misfits,
 )
 from bayesimpact.diagnosis.faults.outliers import faults_set_aside, residual_spikes
+from bayesimpact.diagnosis.input_noise import with_input_noise
 from bayesimpact.diagnosis.slow_noise import with_slow_noise
 from bayesimpact.diagnosis.smoothing import proved_smoothing
 from bayesimpact.diagnosis.thresholds import DECISIVE
@@ -201,8 +202,10 @@ def with_steps(
 
 
 def _identified(campaign: Campaign, *, rng: np.random.Generator, search: bool) -> Identification:
-    """The base model's mode, under slow noise where it leaves that and nothing else."""
-    return with_slow_noise(identify(campaign, rng=rng, search=search))
+    """The base model's mode, under slow noise where it leaves that and nothing else, and that of
+    measured inputs.
+    """
+    return with_input_noise(with_slow_noise(identify(campaign, rng=rng, search=search)))
 
 
 def _through_filter(

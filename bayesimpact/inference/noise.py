@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from bayesimpact.data.campaign import Smoothing
 from bayesimpact.data.gaps import runs
 from bayesimpact.data.recording import Recording
+from bayesimpact.inference.noise_forces import RandomForces
 from bayesimpact.inference.noise_prediction import Parts, innovations, log_determinant
 from bayesimpact.inference.noise_sd import relative_sd
 from bayesimpact.model.measurement import edge, gain
@@ -63,6 +64,7 @@ class Noise:
     others : correlations of further AR(1) processes, 0 for white noise, each with its share of the
         raw noise's variance; what is left of it is that of `correlation`
     is_independent : its level is not that of what a model leaves of the motion
+    forces : random ones, whose responses the readings hold beside white noise, or None
     """
 
     correlation: float = 0.0
@@ -76,11 +78,13 @@ class Noise:
     growth: tuple[float, float] = (0.0, 0.0)
     others: Parts = ()
     is_independent: bool = field(default=True, compare=False)
+    forces: RandomForces | None = None
 
     @property
     def is_white(self) -> bool:
         """True when whitening does nothing."""
-        return not self.is_coloured and self.smoothing is None and not self.grows
+        plain = self.smoothing is None and self.forces is None
+        return plain and not self.is_coloured and not self.grows
 
     @property
     def grows(self) -> bool:
@@ -100,6 +104,8 @@ class Noise:
         if rate:
             jitter = f"{1e3 * rate * self.level:.2g} ms"
             raw += f", growing with its rate (as where time stamps jitter by {jitter})"
+        if self.forces is not None:
+            raw += f", and that of the measured input ({100 * self.forces.share:.2g} % of it)"
         return raw if self.smoothing is None else f"{raw}, smoothed ({self.smoothing.kind})"
 
     @property
@@ -117,7 +123,10 @@ class Noise:
         """Whitened signals of a recording: (..., n) samples to (..., m) numbers."""
         if self.grows:
             x = x / self.relative_sd(recording)
-        return self.whiten(x, recording.interval, recording.used, recording.order)
+        white = self.whiten(x, recording.interval, recording.used, recording.order)
+        if self.forces is None:
+            return white
+        return self.forces.whitened(recording.name, white, recording.used)
 
     def relative_sd(self, recording: Recording) -> Array:
         """Standard deviation at every sample of a recording over `level`, (n,)."""
@@ -225,12 +234,17 @@ class Noise:
         """A draw of a recording's raw noise of level `sigma` (before any smoothing), (n,), m."""
         size, order = recording.samples.size, recording.order
         drawn = self.coloured(rng, size, recording.interval, sigma, order)
+        if self.forces is not None:
+            moved = self.forces.drawn(rng, recording.name, size)
+            drawn = drawn + sigma * self.scales[order] * moved
         return drawn * self.relative_sd(recording) if self.grows else drawn
 
     def volume_of(self, recording: Recording) -> float:
         """Log determinant of `whitened`."""
         size, used = recording.samples.size, recording.used
         found = self.log_volume(size, recording.interval, used, recording.order)
+        if self.forces is not None:
+            found += self.forces.log_volume(recording.name, size, used)
         if not self.grows:
             return found
         sd = self.relative_sd(recording)

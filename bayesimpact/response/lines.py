@@ -45,4 +45,4 @@ def _background(power: Floats, k: int) -> float:
     """Expected power of noise at a frequency, from the octaves on either side."""
     below = np.median(power[k // 2 : k - NEAR + 1])
     above = np.median(power[k + NEAR : 2 * k])
-    return float(max(below, above)) / np.log(2)
+    return max(float(below), float(above)) / float(np.log(2))
