@@ -11,7 +11,8 @@
 4. An answer that explains everything keeps the corrections of 2 and 3 only where, beside its
    effects, the recordings as they were still differ by more than chance.
 5. A start that is no free decay yet may only show against a fit with that physics: then once more
-   without it. Spikes that only show there, and slow noise, are found by the search itself.
+   without it. Spikes, gains and clocks that only show there, and slow noise, are found by the
+   search itself.
 
 All searches have one budget of computing, which begins with the first. What is left of it after one
 is the next one's; where that is too little, the next one is not begun. An answer that was not
@@ -47,7 +48,7 @@ from bayesimpact.diagnosis.recording_faults import (
     fitted_beside,
     shared_effects,
     values_of,
-    with_spikes,
+    with_faults,
     with_steps,
     without_faults,
 )
@@ -327,8 +328,8 @@ def _of_corrected(
     found = diagnose_fit(
         through, rng=rng, effects=effects, progress=progress, budget=budget, first=first
     )
-    if found.naming.spikes:
-        corrected = with_spikes(corrected, found.identification, found.naming.spikes, as_read)
+    if found.naming.faults:
+        corrected = with_faults(corrected, found.identification, found.naming.faults, as_read)
         through = found.identification
     if corrected.filtered is not None:
         campaign = through.fit.target.oscillator.campaign

@@ -71,10 +71,11 @@ def name(
     Where the misfit is large and the spectra of the recordings show a hum, the search begins with
     what the recordings less that ask for.
 
-    Where what remains is slow noise of the measuring chain, spikes of the readings or what inputs
-    did between their samples, or where accelerations lie at onsets of contacts that only a good
-    model shows, and time allows, the search begins once more with that, from that model. It counts
-    if it leaves nothing then, or if the first one was cut short for it.
+    Where what remains is slow noise of the measuring chain, spikes of the readings, a gain or clock
+    of one recording or what inputs did between their samples, or where accelerations lie at onsets
+    of contacts that only a good model shows, and time allows, the search begins once more with
+    that, from that model. It counts if it leaves nothing then, or if the first one was cut short
+    for it.
 
     A search that has used up the `budget` begins no more refits, and names nothing that it has not
     compared with all that might do the same.
@@ -84,7 +85,7 @@ def name(
     if first is None:
         first = _beside_hums(fit, lambda: _Search(effects, scales, rng, say, search.budget))
     base, state = search.found(fit, first)
-    asks = search.was_cut or search.budget.may_search_again()
+    asks = bool(state.candidate.effects) or search.was_cut or search.budget.may_search_again()
     anew = posed_anew(fit, state, say) if asks else None
     if anew is not None:
         again = _Search(effects, scales, rng, say, search.budget)
@@ -92,7 +93,7 @@ def name(
         quiet = again.found(anew.base, anew.first)
         if search.was_cut or quiet[1].is_white:
             told = again.naming(*quiet)
-            return replace(told, spikes=anew.spikes, band_limited=anew.band_limited)
+            return replace(told, faults=anew.faults, band_limited=anew.band_limited)
     elif search.was_cut:
         search.is_last = True
         reached = state.candidate.fit
@@ -177,9 +178,11 @@ class _Search(Unlisted):
 
     def is_spoilt(self, state: State) -> bool:
         """Whether readings spoil what follows a model, and time is left to go on without them."""
-        if self.is_last or state.is_white or not self.budget.may_search_again():
+        goes_on = bool(state.candidate.effects) and self.may_go_on()  # from that model, not anew
+        may_be = goes_on or self.budget.may_search_again()
+        if self.is_last or state.is_white or not may_be:
             return False
-        self.was_cut = is_spoilt(state.candidate.fit)
+        self.was_cut = is_spoilt(self.states[frozenset()].candidate.fit, state.candidate.fit)
         return self.was_cut
 
     def extensions(self, beam: Sequence[State]) -> tuple[list[Candidate], list[State]]:

@@ -98,7 +98,8 @@ class Naming:
         remainder may have done to it in them (`discrepancy`); empty where nothing remains
     power : of the force of time that models leave about the motion's own frequencies, N2, by their
         ids: the chosen one and those without an effect that may be needed
-    spikes : readings that a model which left nothing else showed to be far off, set aside
+    faults : of readings and recordings that only a model which left little else showed, set aside
+        or corrected
     band_limited : inputs are taken for that between their samples, as a good model asked for
     """
 
@@ -116,7 +117,7 @@ class Naming:
     own: Discrepancy | None = None
     apart: Mapping[str, float] = field(default_factory=dict)
     power: Mapping[frozenset[str], float] = field(default_factory=dict)
-    spikes: tuple[Compared, ...] = ()
+    faults: tuple[Compared, ...] = ()
     band_limited: bool = False
 
     __repr__ = short_repr

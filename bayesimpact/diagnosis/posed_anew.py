@@ -1,8 +1,8 @@
 """A search posed anew, on what a model that is nearly good enough has shown of the readings.
 
 Spikes beside a contact, the instants at which contacts begin and end, where an acceleration jumps,
-noise that is slow, and what an input did between its samples show only against a model that leaves
-little else. Before they are known, whatever follows them is fitted.
+a gain or a clock that is off, noise that is slow, and what an input did between its samples show
+only against a model that leaves little else. Before they are known, what follows them is fitted.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 from bayesimpact.data.faults.fault import gaussian_threshold
 from bayesimpact.diagnosis.directions import is_periodic, is_steady
 from bayesimpact.diagnosis.extend import campaign_scales
+from bayesimpact.diagnosis.faults.beside_model import fault_beside
 from bayesimpact.diagnosis.faults.compare import Compared
 from bayesimpact.diagnosis.faults.outliers import beside_spikes
 from bayesimpact.diagnosis.input_noise import input_noise
@@ -23,6 +24,7 @@ from bayesimpact.diagnosis.refit import fit_from
 from bayesimpact.diagnosis.slow_noise import remaining_noise
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.onsets import without_onsets
 from bayesimpact.inference.refitted import refitted
 
@@ -35,30 +37,47 @@ class Posed:
 
     base: Fit
     first: Fit | None
-    spikes: tuple[Compared, ...] = ()
+    faults: tuple[Compared, ...] = ()
     band_limited: bool = False
 
 
 def posed_anew(base: Fit, state: State, say: Progress) -> Posed | None:
-    """The search without the readings that spoil it, with the inputs between their samples that a
-    model asks for, under the slow noise that is all that it leaves, or that of its inputs.
+    """The search without the readings that spoil it, with a recording corrected, with the inputs
+    between their samples that a model asks for, under the slow noise that is all that it leaves, or
+    that of its inputs.
     """
     found = state.candidate.fit
     if not (state.is_white and found is base):
         posed = _without_readings(base, found, say)
+        posed = posed or _with_a_recording_corrected(base, found, say)
         posed = posed or _with_band_limited_inputs(base, found, say)
         if posed is not None:
             return posed
     if is_large(found):
         return None
     noise, what = None if state.is_white else remaining_noise(found), "what remains is slow noise"
-    if noise is None and is_large(base):  # else it was asked of the base fit
-        noise, what = input_noise(found), "the noise of the input matters"
+    if noise is None:
+        noise, what = _of_inputs(base, found), "the noise of the input matters"
     if noise is None:
         return None
     say(f"{what}: once more under that")
     first = refitted(found, noise=noise) if found is not base else None
     return Posed(refitted(base, noise=noise), first)
+
+
+def _of_inputs(base: Fit, found: Fit) -> Noise | None:
+    """The noise of the inputs that a model tells; where the base model could, it has it already."""
+    return input_noise(found) if is_large(base) and not is_large(found) else None
+
+
+def _with_a_recording_corrected(base: Fit, found: Fit, say: Progress) -> Posed | None:
+    """With the gain or the clock of one recording corrected that the model shows to be off."""
+    told = fault_beside(base, found)
+    if told is None:
+        return None
+    compared, first = told
+    say(f"{compared.fault.recording}: {compared.fault.statement}: once more with that corrected")
+    return Posed(refitted(base, compared.campaign), first, (compared,))
 
 
 def _with_band_limited_inputs(base: Fit, found: Fit, say: Progress) -> Posed | None:
@@ -135,11 +154,13 @@ def _without_readings(base: Fit, found: Fit, say: Progress) -> Posed | None:
     return Posed(base if is_same else refitted(base, campaign), clean, told)
 
 
-def is_spoilt(fit: Fit) -> bool:
-    """Whether readings are off that only a model as good as this one shows: what is fitted to these
-    decides nothing.
+def is_spoilt(base: Fit, fit: Fit) -> bool:
+    """Whether readings are off that only a model as good as this one shows, those of an input among
+    them: what is fitted to these decides nothing.
     """
-    return beside_spikes(fit) is not None or misses_onsets(fit)
+    if beside_spikes(fit) or misses_onsets(fit) or _of_inputs(base, fit):
+        return True
+    return fit is not base and fault_beside(base, fit) is not None
 
 
 def misses_onsets(fit: Fit) -> bool:

@@ -127,12 +127,14 @@ def without_faults(
     )
 
 
-def with_spikes(
-    before: Corrected, identification: Identification, spikes: Step, as_read: Campaign
+def with_faults(
+    before: Corrected, identification: Identification, faults: Step, as_read: Campaign
 ) -> Corrected:
-    """The same with spikes set aside that a model showed; `identification` is without them."""
+    """The same with faults set aside or corrected that a model showed; `identification` is without
+    them.
+    """
     whole = before.identification.fit.target.oscillator.campaign
-    told = tuple(replace(one, fault=fault_as_read(one.fault, whole, as_read)) for one in spikes)
+    told = tuple(replace(one, fault=fault_as_read(one.fault, whole, as_read)) for one in faults)
     return replace(before, identification=identification, compared=(*before.compared, *told))
 
 

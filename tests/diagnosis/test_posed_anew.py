@@ -58,14 +58,14 @@ def across(good: Fit) -> Fit:
 def test_onsets_are_those_of_the_good_model(base: Fit, good: Fit, across: Fit) -> None:
     """Without them one mode is found from any side: no step lies between."""
     assert base.reduced_chi2 > 30 and good.reduced_chi2 < 2.0
-    assert misses_onsets(across) and not misses_onsets(good) and not is_spoilt(base)
+    assert misses_onsets(across) and not misses_onsets(good) and not is_spoilt(base, base)
     state: Any = SimpleNamespace(candidate=SimpleNamespace(fit=across), is_white=True)
     told: list[str] = []
     anew = posed_anew(base, state, told.append)
     assert anew is not None and anew.first is not None and told
     campaign = anew.first.target.oscillator.campaign
     assert campaign is anew.base.target.oscillator.campaign
-    assert not is_spoilt(anew.first) and 0.9 < anew.first.reduced_chi2 < 1.1
+    assert not is_spoilt(anew.base, anew.first) and 0.9 < anew.first.reduced_chi2 < 1.1
     ends = [
         refitted(good, without_onsets(good), start=replace(good, mode=start)).log_posterior
         for start in good.draws(RNG(2), 6)
@@ -101,7 +101,7 @@ def test_of_displacements_there_is_nothing_to_pose_anew() -> None:
     fit = identify(small_rig.record(5, CUBIC), rng=RNG(0), search=False).fit
     found = fit_from(fit, [BY_ID["spring_cubic"]], {}, campaign_scales(fit)).fit
     state: Any = SimpleNamespace(candidate=SimpleNamespace(fit=found), is_white=True)
-    assert not is_spoilt(found)
+    assert not is_spoilt(fit, found)
     assert posed_anew(fit, state, pytest.fail) is None
 
 
@@ -123,7 +123,7 @@ class MadeUpNaming:
     """Which search it is of: the first, the one posed anew, or the first gone on."""
 
     of: str
-    spikes: tuple[Any, ...] = ()
+    faults: tuple[Any, ...] = ()
     band_limited: bool = False
 
 
@@ -152,7 +152,9 @@ def test_which_search_answers(
 
         def found(self, base: Any, first: Any) -> tuple[Any, Any]:
             self.was_cut = cut and not self.is_last
-            state = SimpleNamespace(candidate=SimpleNamespace(fit="reached"), is_white=white)
+            state = SimpleNamespace(
+                candidate=SimpleNamespace(fit="reached", effects=()), is_white=white
+            )
             return base, state
 
         def naming(self, base: Any, state: Any) -> MadeUpNaming:
@@ -160,7 +162,7 @@ def test_which_search_answers(
             return MadeUpNaming(first if self is made[0] else "anew")
 
     anew = (
-        SimpleNamespace(base="clean", first=None, spikes=("spike",), band_limited=True)
+        SimpleNamespace(base="clean", first=None, faults=("spike",), band_limited=True)
         if posed
         else None
     )

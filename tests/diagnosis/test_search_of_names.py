@@ -48,7 +48,7 @@ def run(monkeypatch):
         monkeypatch.setattr(remaining, "is_imitated", lambda naming: False)
         monkeypatch.setattr(search, "promising_pairs", lambda scan, count: ())
         monkeypatch.setattr(search, "posed_anew", lambda *about: None)
-        monkeypatch.setattr(search, "is_spoilt", lambda fit: False)
+        monkeypatch.setattr(search, "is_spoilt", lambda base, fit: False)
         for force in ("missing_force", "missing_drift"):
             monkeypatch.setattr(models, force, table.missing)
         monkeypatch.setattr(

@@ -80,7 +80,10 @@ class SharedModel:
 
 def _is_by_case(effect: Effect) -> bool:
     """Whether an effect only gives every stop a base parameter of its own."""
-    return all(p.scope == "case" and replaced_slot(effect, p) for p in effect.parameters)
+    parameters = effect.parameters
+    return bool(parameters) and all(
+        p.scope == "case" and replaced_slot(effect, p) for p in parameters
+    )
 
 
 def inverted(recording: Recording) -> Recording:

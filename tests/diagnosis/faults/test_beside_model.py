@@ -1,0 +1,115 @@
+"""A gain or a clock that is off, told by a model with the physics that is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import small_rig
+
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.recording import Recording
+from bayesimpact.diagnosis.extend import campaign_scales
+from bayesimpact.diagnosis.faults import beside_model
+from bayesimpact.diagnosis.faults.beside_model import fault_beside
+from bayesimpact.diagnosis.posed_anew import is_spoilt
+from bayesimpact.diagnosis.refit import fit_from
+from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.identify import identify
+from bayesimpact.model.effects import EFFECTS
+
+BY_ID = {e.id: e for e in EFFECTS}
+PHYSICS = {"spring_cubic": {"stiffness": 6e6}, "coulomb_friction": {"force": 0.02}}
+OFF = {"recording_gain": 3.0, "recording_clock": -0.25}  # %, as statements have them
+Change = Callable[[Recording], Recording]
+CHANGES: dict[str, Change] = {
+    "recording_gain": lambda r: replace(r, samples=r.samples * 1.03),
+    "recording_clock": lambda r: replace(r, interval=r.interval * (1 - 0.0025)),
+}
+
+
+def recorded(change: Change | None, at: int = 1, seed: int = 5) -> Campaign:
+    campaign = small_rig.record(seed, PHYSICS)
+    recordings = list(campaign.recordings)
+    if change is not None:
+        recordings[at] = change(recordings[at])
+    return replace(campaign, recordings=tuple(recordings))
+
+
+def fits(campaign: Campaign, *more: str) -> tuple[Fit, Fit]:
+    """Of the base model and of the physics in the recordings, with more effects."""
+    base = identify(campaign, rng=np.random.default_rng(0), search=False).fit
+    effects = [BY_ID[name] for name in (*PHYSICS, *more)]
+    return base, fit_from(base, effects, {}, campaign_scales(base)).fit
+
+
+@pytest.mark.parametrize("more", [(), ("gap_per_recording",)])
+@pytest.mark.parametrize("kind", CHANGES)
+def test_a_fault_is_told_with_its_size(kind: str, more: tuple[str, ...]) -> None:
+    """Also where gaps of every recording's own have taken its place."""
+    base, found = fits(recorded(CHANGES[kind]), *more)
+    told = fault_beside(base, found)
+    assert told is not None
+    compared, fit = told
+    assert (compared.fault.id, compared.fault.recording) == (kind, "b")
+    assert compared.fault.size == pytest.approx(OFF[kind], rel=0.03)
+    assert fit.reduced_chi2 < 1.1 < compared.before
+    assert {e.id for e in fit.target.oscillator.effects} == set(PHYSICS)
+    assert fit.target.oscillator.campaign is compared.campaign
+    assert is_spoilt(base, found)
+
+
+def test_physics_that_is_missing_is_no_fault() -> None:
+    """Of each law alone, the other one left out."""
+    campaign = recorded(None)
+    base = identify(campaign, rng=np.random.default_rng(0), search=False).fit
+    for name in PHYSICS:
+        found = fit_from(base, [BY_ID[name]], {}, campaign_scales(base)).fit
+        assert found.reduced_chi2 > 2.0
+        assert fault_beside(base, found) is None
+
+
+def test_recordings_that_agree_have_none() -> None:
+    base, found = fits(recorded(None), "gap_per_recording")
+    assert fault_beside(base, found) is None and not is_spoilt(base, found)
+
+
+def test_gaps_of_every_recordings_own_are_no_gain_of_one() -> None:
+    """All three differ: one corrected gain leaves the others apart."""
+    gaps = {"gap_per_recording": {"g": {"a": 1.1e-3, "b": 1.06e-3, "c": 1.15e-3}}}
+    campaign = small_rig.record(7, {**PHYSICS, **gaps})
+    base, found = fits(campaign, "gap_per_recording")
+    assert found.reduced_chi2 < 1.1
+    assert fault_beside(base, found) is None
+
+
+def test_what_is_kept_as_read_is_not_asked() -> None:
+    base, found = fits(recorded(CHANGES["recording_gain"]))
+    campaign = found.target.oscillator.campaign
+    oscillator = replace(found.target.oscillator, campaign=replace(campaign, keep_faults=True))
+    likelihood = replace(found.target.likelihood, oscillator=oscillator)
+    kept = replace(found, target=replace(found.target, likelihood=likelihood))
+    assert fault_beside(base, kept) is None
+
+
+def test_of_two_recordings_neither_is_the_faulty_one() -> None:
+    campaign = recorded(CHANGES["recording_gain"])
+    base, found = fits(replace(campaign, recordings=campaign.recordings[:2]))
+    assert fault_beside(base, found) is None
+
+
+def test_directions_are_what_a_fault_changes() -> None:
+    """Against differences of the residual of corrected recordings."""
+    _, found = fits(recorded(None))
+    for kind in CHANGES:
+        hypothesis = beside_model.Hypothesis(kind, 1)
+        (direction,) = beside_model._directions(found, [hypothesis])[1].T
+        small = 1e-5
+        step = beside_model.Weighed(hypothesis, 0.0, value=small)
+        other = beside_model.corrected(found.target.oscillator.campaign, 1, step)
+        moved = found.with_recordings(other.recordings)
+        sigma = found.mode[found.target.likelihood.sigma_columns][1]
+        change = (found.residuals[1] - moved.residuals[1]) / small / sigma
+        assert change == pytest.approx(direction, abs=0.02 * float(np.abs(direction).max()))
