@@ -61,3 +61,12 @@ def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str
 def coarse_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Reports in a moment: see the module of this name."""
     draw_coarsely(monkeypatch)
+
+
+@pytest.fixture
+def catalogue_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Diagnoses without formulas, the search for which takes more than half of a small one: for
+    what is said of faults, noise and effects of the catalogue (of formulas: test_formulas.py).
+    """
+    without = "bayesimpact.diagnosis.loop.with_formulas"
+    monkeypatch.setattr(without, lambda answer, *_, **__: answer)

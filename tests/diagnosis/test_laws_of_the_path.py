@@ -22,6 +22,8 @@ from bayesimpact.diagnosis.scores import Score
 from bayesimpact.inference.prior import Normal
 from bayesimpact.model.effects import Effect
 
+pytestmark = pytest.mark.usefixtures("catalogue_alone")
+
 LOOP, DAHL = BY_ID["hysteresis_bouc_wen"], BY_ID["presliding_friction"]
 OTHERS = tuple(
     BY_ID[i]

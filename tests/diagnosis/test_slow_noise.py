@@ -16,6 +16,8 @@ from bayesimpact.diagnosis.recording_faults import cleaned_campaign
 from bayesimpact.diagnosis.slow_noise import remaining_noise
 from bayesimpact.inference.identify import identify
 
+pytestmark = pytest.mark.usefixtures("catalogue_alone")
+
 RNG = np.random.default_rng
 FEW = tuple(
     BY_ID[i]
