@@ -17,6 +17,8 @@ from bayesimpact.diagnosis.first_physics import faults_beside_physics
 from bayesimpact.diagnosis.naming import is_large
 from bayesimpact.diagnosis.recording_faults import Corrected, Step, cleaned_campaign
 
+pytestmark = pytest.mark.usefixtures("catalogue_alone")
+
 CATALOGUE = tuple(
     BY_ID[i] for i in ("coulomb_friction", "quadratic_drag", "spring_cubic", "harmonic_forcing")
 )

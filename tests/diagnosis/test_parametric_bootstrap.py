@@ -15,6 +15,8 @@ from bayesimpact.diagnosis.parametric_bootstrap import (
 )
 from bayesimpact.inference.identify import identify
 
+pytestmark = pytest.mark.usefixtures("catalogue_alone")
+
 FEW = [BY_ID[i] for i in ("coulomb_friction", "quadratic_drag", "sensor_drift")]
 
 

@@ -12,6 +12,8 @@ import bayesimpact as bi
 from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.diagnosis.own_band import shakes_in_own_band
 
+pytestmark = pytest.mark.usefixtures("catalogue_alone")
+
 RATE, SECONDS, MAIN, NOISE = 500.0, 6.0, 4.1, 5e-6
 FREQUENCY, DECAY = 17.3, 1.5
 EFFECTS = tuple(

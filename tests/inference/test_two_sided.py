@@ -99,6 +99,7 @@ def test_a_prior_beyond_all_estimates_is_searched() -> None:
 
 
 @pytest.mark.long
+@pytest.mark.usefixtures("catalogue_alone")
 def test_what_is_missing_is_named_beside_both_stops() -> None:
     campaign = recorded(SECOND, small_rig.RIG, quadratic_drag={"coefficient": DRAG})
     effects = tuple(BY_ID[i] for i in ("opposite_stop", "quadratic_drag", "spring_cubic"))

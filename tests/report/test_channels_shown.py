@@ -16,7 +16,7 @@ from bayesimpact.report.archive import load_results
 from bayesimpact.report.tables import release_columns, release_views
 from bayesimpact.workflow import diagnose_campaign, fit_campaign
 
-pytestmark = pytest.mark.usefixtures("coarse_figures")
+pytestmark = pytest.mark.usefixtures("coarse_figures", "catalogue_alone")
 
 
 def number(text: str) -> float:
