@@ -32,7 +32,7 @@ REAL = Path(
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("campaign")
-    write_campaign(folder, record(seed=3))
+    write_campaign(folder, record(seed=3, duration=1.0))
     return folder
 
 
@@ -73,6 +73,7 @@ def test_resume_gives_the_same_posterior(run: Run, campaign: Path, sampled: Path
     assert medians((sampled / "fit.json").read_text()) == medians(before)
 
 
+@pytest.mark.usefixtures("coarse_figures")
 def test_report_is_written_again_from_the_files(run: Run, sampled: Path) -> None:
     page = sampled / "report.html"
     page.unlink()
@@ -85,6 +86,7 @@ def test_report_of_an_empty_folder_is_refused(run: Run, tmp_path: Path) -> None:
     assert (code, out) == (2, "") and str(tmp_path) in err and list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.usefixtures("coarse_figures")
 def test_diagnose_finds_nothing_where_nothing_is(run: Run, campaign: Path, tmp_path: Path) -> None:
     code, out, _ = run("diagnose", campaign, "--out", tmp_path, "--quick")
     content = json.loads((tmp_path / "diagnosis.json").read_text())

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from kills import killed_and_resumed, run, state, unfinished
-from small_rig import RELEASES, record
+from small_rig import PLAIN, PLAIN_RELEASES, record
 
 from bayesimpact.trial.rig_files import write_campaign
 
@@ -19,7 +19,8 @@ pytestmark = pytest.mark.long
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[str], Path, int]:
     folder, out = tmp_path_factory.mktemp("campaign"), tmp_path_factory.mktemp("undisturbed")
-    write_campaign(folder, record(seed=3, duration=1.0, releases=RELEASES[:2]))
+    plain = record(seed=3, rig=PLAIN, releases=PLAIN_RELEASES[:1], duration=1.0)
+    write_campaign(folder, plain)
     arguments = ["sample", str(folder), "--quiet"]
     code, said = run([*arguments, "--out", str(out)])
     assert code in (0, 3), said

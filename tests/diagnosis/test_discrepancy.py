@@ -183,7 +183,7 @@ def test_intervals_hold_the_truth_under_a_random_force():
     truth = {"c1": small_rig.PLAIN.c1, "k1": small_rig.PLAIN.k1}
     held, naive, z = 0, 0, []
     for seed in range(12):
-        fit = plain_fit(shaken(seed, 1e-2))
+        fit = plain_fit(shaken(seed, 1e-2, duration=2.0))
         wide, narrow = intervals(fit, remains=True), intervals(fit)
         scatter = np.sqrt(np.diag(left_by(fit).covariance))
         for name, value in truth.items():

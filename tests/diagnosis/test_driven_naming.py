@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from driven_rigs import driven_rig
 from driven_twin import Law, driven_motion
+from effect_rigs import BY_ID
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.input import Input
@@ -17,6 +18,14 @@ from bayesimpact.diagnosis.diagnose import diagnose
 TRUTH = {"mass": 0.5, "c1": 0.6, "k1": 800.0, "y0": 1e-4, "v0": 0.01}
 STOP = {"c2": 2.0, "g": 1.1e-3, "k2": 5000.0}
 INTERVAL, NOISE = 2e-3, 5e-6
+EFFECTS = tuple(
+    BY_ID[i]
+    for i in (
+        "spring_cubic", "spring_quadratic", "coulomb_friction", "quadratic_drag", "input_delay",
+        "contact_damping_indentation", "contact_damping_speed", "contact_hardening",
+        "sensor_quadratic", "sensor_drift",
+    )
+)  # fmt: skip
 
 
 def _campaign(law: Law, *, stop: bool, corner: bool, gain: float, n: int = 900) -> Campaign:
@@ -47,7 +56,7 @@ CONCEALED: dict[str, tuple[Law, float, bool, bool, float]] = {
 def test_a_concealed_effect_is_named(effect: str) -> None:
     law, size, stop, corner, gain = CONCEALED[effect]
     campaign = _campaign(law, stop=stop, corner=corner, gain=gain)
-    found = diagnose(campaign, rng=np.random.default_rng(0), search=False)
+    found = diagnose(campaign, rng=np.random.default_rng(0), effects=EFFECTS, search=False)
     assert found.verdict == "named"
     assert [e.id for e in found.effects] == [effect]
     (name,) = (n for n in found.after.names if n.startswith(effect))
@@ -92,7 +101,7 @@ def test_a_concealed_effect_is_named_from_a_derivative(effect: str) -> None:
         return size * shape(y, v, touching)
 
     campaign = driven_rig(seed, quantity, law, corner=effect != "spring_cubic").campaign
-    found = diagnose(campaign, rng=np.random.default_rng(0), search=False)
+    found = diagnose(campaign, rng=np.random.default_rng(0), effects=EFFECTS, search=False)
     assert (found.verdict, [e.id for e in found.effects]) == ("named", [effect])
     (name,) = (n for n in found.after.names if n.startswith(effect))
     sd = found.after.sd[found.after.names.index(name)]

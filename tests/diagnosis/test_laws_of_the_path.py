@@ -22,7 +22,16 @@ from bayesimpact.diagnosis.scores import Score
 from bayesimpact.inference.prior import Normal
 from bayesimpact.model.effects import Effect
 
+pytestmark = pytest.mark.usefixtures("catalogue_alone")
+
 LOOP, DAHL = BY_ID["hysteresis_bouc_wen"], BY_ID["presliding_friction"]
+OTHERS = tuple(
+    BY_ID[i]
+    for i in (
+        "coulomb_friction", "quadratic_drag", "power_damping", "structural_damping",
+        "spring_cubic", "stiffness_drift", "sensor_drift",
+    )
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("cut", [0, pytest.param(37, marks=pytest.mark.long), 120])
@@ -33,7 +42,8 @@ def test_a_memory_is_found_where_a_recording_was_cut(cut: int) -> None:
         1, {LOOP.id: truth}, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES, duration=4.0
     )
     left = tuple(r.part(cut, r.samples.size) for r in campaign.recordings)
-    found = bi.diagnose(replace(campaign, recordings=left), search=False, seed=0)
+    campaign = replace(campaign, recordings=left)
+    found = bi.diagnose(campaign, search=False, seed=0, effects=(*OTHERS, DAHL, LOOP))
     assert found.verdict == "named" and [e.id for e in found.effects] == [LOOP.id]
     assert shared_effects(found.effects) == found.effects  # its starts tell no recording apart
     assert not is_doubtful(found) and not shared_effects([BY_ID["gap_per_recording"]])
@@ -76,8 +86,7 @@ def score(effect: Effect) -> Score:
 def test_one_law_has_the_name_of_its_range(law: Effect, numbers: dict[str, float]) -> None:
     """A loop as wide as the swing, and friction that gives a little: small, and a large misfit."""
     campaign = small_rig.record(seed=11, effects={law.id: numbers})
-    both = (*(e for e in bi.SEARCHED if e.id not in (LOOP.id, DAHL.id)), LOOP, DAHL)
-    found = bi.diagnose(campaign, search=False, seed=0, effects=both)
+    found = bi.diagnose(campaign, search=False, seed=0, effects=(*OTHERS, LOOP, DAHL))
     assert found.verdict == "named" and [e.id for e in found.effects] == [law.id]
     for name, true in numbers.items():
         at = found.after.names.index(f"{law.id}.{name}")

@@ -132,8 +132,16 @@ def test_a_refused_line_is_worth_something_on_the_way_where_it_was_asked_for(
 def test_a_force_slower_than_the_motion_is_named_beside_what_the_stop_does() -> None:
     campaign = stopped({"harmonic_forcing": STRONG, "contact_second_stage": SECOND_STAGE})
     said: list[str] = []
+    names = (
+        "harmonic_forcing", "contact_second_stage", "contact_hardening", "contact_damping_speed",
+        "spring_cubic", "quadratic_drag", "coulomb_friction", "base_motion",
+    )  # fmt: skip
     found = diagnose(
-        campaign, rng=np.random.default_rng(0), search=False, progress=lambda m: said.append(str(m))
+        campaign,
+        rng=np.random.default_rng(0),
+        effects=tuple(BY_ID[name] for name in names),
+        search=False,
+        progress=lambda m: said.append(str(m)),
     )
     assert found.before.reduced_chi2 > 100 and found.after.reduced_chi2 < 1.1
     assert found.verdict == "named"

@@ -15,7 +15,9 @@ from bayesimpact.diagnosis.parametric_bootstrap import (
 )
 from bayesimpact.inference.identify import identify
 
-FEW = [BY_ID[i] for i in ("coulomb_friction", "quadratic_drag", "gap_wear")]
+pytestmark = pytest.mark.usefixtures("catalogue_alone")
+
+FEW = [BY_ID[i] for i in ("coulomb_friction", "quadratic_drag", "sensor_drift")]
 
 
 def test_a_simulated_campaign_has_the_design_and_the_noise(small):
@@ -30,7 +32,13 @@ def test_a_simulated_campaign_has_the_design_and_the_noise(small):
 
 
 def test_a_certificate_of_what_stands_out():
-    campaign = small_rig.record(6, {"coulomb_friction": {"force": 6e-4}})
+    campaign = small_rig.record(
+        6,
+        {"coulomb_friction": {"force": 6e-4}},
+        rig=small_rig.PLAIN,
+        releases=small_rig.PLAIN_RELEASES,
+        rate=500.0,
+    )
     base = identify(campaign, rng=np.random.default_rng(0), search=False)
     found = diagnose_fit(base, rng=np.random.default_rng(0), effects=FEW)
     assert found.verdict == "named"

@@ -29,6 +29,8 @@ from bayesimpact.diagnosis.simpler import makes_idle
 from bayesimpact.inference.identify import identify
 from bayesimpact.trial.rig import Release
 
+pytestmark = pytest.mark.usefixtures("catalogue_alone")
+
 CATALOGUE = tuple(BY_ID[i] for i in ("coulomb_friction", "gap_per_recording", "sensor_drift"))
 
 

@@ -6,13 +6,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from effect_rigs import BY_ID
 
 import bayesimpact as bi
 from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.diagnosis.own_band import shakes_in_own_band
 
+pytestmark = pytest.mark.usefixtures("catalogue_alone")
+
 RATE, SECONDS, MAIN, NOISE = 500.0, 6.0, 4.1, 5e-6
 FREQUENCY, DECAY = 17.3, 1.5
+EFFECTS = tuple(
+    BY_ID[i]
+    for i in (
+        "released_mode", "sensor_hum", "harmonic_forcing", "base_motion", "second_mode",
+        "spring_quadratic", "spring_cubic", "coulomb_friction", "sensor_drift",
+    )
+)  # fmt: skip
 
 
 def diagnosed(amplitudes: tuple[float, ...], decay: float, seed: int) -> Diagnosis:
@@ -26,7 +36,7 @@ def diagnosed(amplitudes: tuple[float, ...], decay: float, seed: int) -> Diagnos
         y = y + amplitude * np.exp(-decay * t) * line + NOISE * rng.standard_normal(t.size)
         recordings.append({"name": f"r{i}", "samples": y, "unit": "m", "sample_rate_hz": RATE})
     campaign = bi.Campaign.from_arrays(recordings, name="beam", mass_kg=0.5, stop=False)
-    return bi.diagnose(campaign)
+    return bi.diagnose(campaign, effects=EFFECTS, search=False)
 
 
 @pytest.mark.parametrize("size", [1e-5, pytest.param(3e-4, marks=pytest.mark.long)])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import small_rig
+from effect_rigs import BY_ID
 
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.smoothing import whole_campaign
@@ -14,6 +15,14 @@ pytestmark = pytest.mark.long
 
 NOISE = {"velocity": 2e-4, "acceleration": 2e-2}
 TRUE = 400.0
+EFFECTS = tuple(
+    BY_ID[i]
+    for i in (
+        "contact_damping_indentation", "contact_damping_speed", "hunt_crossley", "adhesion",
+        "contact_hardening", "contact_relaxation", "gap_per_recording", "quadratic_drag",
+        "spring_cubic", "sensor_drift",
+    )
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("quantity", NOISE)
@@ -24,7 +33,7 @@ def test_a_concealed_effect_is_named(quantity):
         chain=Chain(noise=NOISE[quantity]),
         quantity=quantity,
     )
-    found = diagnose(campaign, rng=np.random.default_rng(0), search=False)
+    found = diagnose(campaign, rng=np.random.default_rng(0), effects=EFFECTS, search=False)
     assert found.verdict == "named"
     assert [e.id for e in found.effects] == ["contact_damping_indentation"]
     i = found.after.names.index("contact_damping_indentation.coefficient")

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import small_rig
+from effect_rigs import BY_ID
 
 from bayesimpact.diagnosis import diagnose as whole
 from bayesimpact.diagnosis.budget import begin
@@ -15,7 +16,13 @@ from bayesimpact.diagnosis.recording_faults import cleaned_campaign
 from bayesimpact.diagnosis.slow_noise import remaining_noise
 from bayesimpact.inference.identify import identify
 
+pytestmark = pytest.mark.usefixtures("catalogue_alone")
+
 RNG = np.random.default_rng
+FEW = tuple(
+    BY_ID[i]
+    for i in ("quadratic_drag", "coulomb_friction", "contact_hardening", "base_motion", "gap_wear")
+)
 
 
 @pytest.mark.parametrize("seed", [0, 1])
@@ -39,7 +46,7 @@ def test_noise_of_many_correlation_times_is_noise():
     )
     for number, correlation in enumerate((0.7, 0.95, 0.99, 0.999)):
         campaign = small_rig.with_slow(campaign, number, 1.0, correlation)
-    found = diagnose(campaign, rng=RNG(0), search=False)
+    found = diagnose(campaign, rng=RNG(0), effects=FEW, search=False)
     assert found.verdict == "adequate"
     assert len(found.after.target.likelihood.noise.parts) > 3
 
@@ -50,7 +57,7 @@ DRAG = {"quadratic_drag": {"coefficient": 3.0}}
 @pytest.mark.long
 def test_physics_beside_slow_noise_is_named_and_the_noise_found_beside_it():
     campaign = small_rig.with_slow(small_rig.record(2, DRAG), 2, 1.25)
-    found = diagnose(campaign, rng=RNG(0), search=False)
+    found = diagnose(campaign, rng=RNG(0), effects=FEW, search=False)
     assert [e.id for e in found.effects] == ["quadratic_drag"]
     assert found.verdict in ("named", "ambiguous")
     assert found.after.target.likelihood.noise.others
@@ -93,7 +100,8 @@ def test_slow_noise_is_found_again_beside_a_fault_of_a_recording():
     campaign = small_rig.with_slow(small_rig.record(5), 5, 1.25)
     first, *others = campaign.recordings
     turned = replace(first, samples=-first.samples)
-    found = diagnose(replace(campaign, recordings=(turned, *others)), rng=RNG(0), search=False)
+    campaign = replace(campaign, recordings=(turned, *others))
+    found = diagnose(campaign, rng=RNG(0), effects=FEW, search=False)
     assert found.verdict == "named" and not found.effects
     assert [f.id for f in found.corrected.faults] == ["recording_reversed"]
     assert found.after.target.likelihood.noise.others

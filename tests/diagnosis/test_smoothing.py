@@ -17,6 +17,8 @@ from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.diagnosis.smoothing import LAG, is_refuted, proved_smoothing
 from bayesimpact.trial.rig_chain import Chain
 
+pytestmark = pytest.mark.usefixtures("catalogue_alone")
+
 CATALOGUE = tuple(
     BY_ID[i] for i in ("smoothing", "coulomb_friction", "contact_hardening", "sensor_cubic")
 )

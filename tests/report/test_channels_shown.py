@@ -9,13 +9,14 @@ from pathlib import Path
 
 import pytest
 from channel_rigs import channels
+from effect_rigs import BY_ID
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.report.archive import load_results
 from bayesimpact.report.tables import release_columns, release_views
 from bayesimpact.workflow import diagnose_campaign, fit_campaign
 
-pytestmark = pytest.mark.usefixtures("coarse_figures")
+pytestmark = pytest.mark.usefixtures("coarse_figures", "catalogue_alone")
 
 
 def number(text: str) -> float:
@@ -62,7 +63,9 @@ def test_what_both_channels_feel_is_named(tmp_path: Path) -> None:
         for r in campaign.recordings
     )
     campaign = replace(campaign, recordings=read)
-    made = diagnose_campaign(campaign, tmp_path, quick=True)
+    names = ("spring_cubic", "quadratic_drag", "contact_hardening", "sensor_cubic", "sensor_drift")
+    effects = tuple(BY_ID[name] for name in names)
+    made = diagnose_campaign(campaign, tmp_path, quick=True, effects=effects)
     assert made.diagnosis is not None and not made.failed
     assert made.diagnosis["verdict"] == "named"
     (effect,) = made.diagnosis["effects"]

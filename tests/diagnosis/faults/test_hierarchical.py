@@ -82,10 +82,10 @@ def test_evidence_against_the_dense_covariance(trend: int, scatter: int) -> None
     [{"slope": 30.0}, {"slope": 30.0, "bend": 5.0}, {"scatter": 10.0}, {"slope": 30, "scatter": 3}],
 )
 def test_physics_of_the_amplitude_is_no_fault_of_a_recording(physics: dict[str, float]) -> None:
-    """None in 420 such draws of 6 to 10 recordings, so one in 6 would mean more than 1 %."""
+    """None in 420 such draws of 6 to 10 recordings, so one in 4 would mean more than 1 %."""
     rng = np.random.default_rng(2)
     for layout in ((3,), NINE):
-        for _ in range(3):
+        for _ in range(2):
             alone, cases = recordings(layout, rng, **physics)
             none, ranked, needed = weigh_all(alone, cases, True, len(cases) // 3)
             count = len(cases) * (6 + len(layout) - 1)

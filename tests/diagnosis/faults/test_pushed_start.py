@@ -16,6 +16,8 @@ from bayesimpact.diagnosis.faults.pushed_start import pushed_starts
 from bayesimpact.diagnosis.recording_faults import cleaned_campaign
 from bayesimpact.model.effects import SEARCHED
 
+pytestmark = pytest.mark.usefixtures("catalogue_alone")
+
 RIG, CUBIC, BUMPER = small_rig.PLAIN, 3e6, 6e3
 PERIOD = 2 * np.pi * np.sqrt(RIG.mass / RIG.k1)
 LASTS = 0.9 * PERIOD

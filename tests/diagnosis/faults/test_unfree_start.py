@@ -16,6 +16,8 @@ from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.free_changes import motions_beside
 
+pytestmark = pytest.mark.usefixtures("catalogue_alone")
+
 PERIOD = 2 * np.pi * np.sqrt(small_rig.PLAIN.mass / small_rig.PLAIN.k1)
 
 
