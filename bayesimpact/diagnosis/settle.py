@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
+import numpy as np
+
 from bayesimpact.diagnosis.models import NOTHING
 from bayesimpact.diagnosis.naming import State, is_large
 from bayesimpact.diagnosis.promising import NEAR_BEST, families, in_place_of, is_redundant
@@ -13,9 +15,11 @@ from bayesimpact.diagnosis.scan import Scan
 from bayesimpact.diagnosis.scores import Score
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.formula.law import is_formula
+from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect
 
 EXCHANGES = 3  # rounds of leaving out and exchanging effects
+END = 1e-3  # of a shape's range, in which it lies at an end: climbs stop there
 
 
 class Settling(Ranked):
@@ -120,10 +124,11 @@ class Settling(Ranked):
                     self.fit_one(rest, found, score, chosen)
                     if not score.effect.has_size:
                         self.exchange_in_place(chosen, effect, score.effect)
-            if _is_seen(effect, found, rest, chosen):
-                continue
-            # where the rest of a large misfit stands in a side minimum, scores do not see these
-            for new in _unseen(found, asked - {effect.id}, promising):
+            wanted = _alike(effect, self.effects) if is_at_an_end(chosen.fit, effect) else set()
+            if not _is_seen(effect, found, rest, chosen):
+                # where the rest of a large misfit stands in a side minimum, scores see none of them
+                wanted |= set(asked)
+            for new in _unseen(found, wanted - {effect.id}, promising):
                 if self.may_go_on() and not is_redundant(rest, new):
                     self.exchange_in_place(chosen, effect, new)
 
@@ -148,6 +153,25 @@ def _is_seen(effect: Effect, found: Scan, rest: Candidate, chosen: Candidate) ->
     """
     own = max((s.gain for s in found.best() if s.effect.id == effect.id), default=0.0)
     return own > NEAR_BEST * (chosen.fit.log_likelihood - rest.fit.log_likelihood)
+
+
+def is_at_an_end(fit: Fit, effect: Effect) -> bool:
+    """Whether a shape of an effect lies at an end of its range: it is not the law that is asked."""
+    parameters, lower = fit.target.oscillator.layout.parameters, fit.target.priors.lower
+    upper = fit.target.priors.upper
+    shapes = {f"{effect.id}.{p.name}" for p in effect.parameters if p.is_shape and not p.circular}
+    for i, parameter in enumerate(parameters):
+        low, high = max(parameter.lower, lower[i]), min(parameter.upper, upper[i])
+        if parameter.name.split("[")[0] in shapes and np.isfinite(high - low):
+            inside = min(fit.mode[i] - low, high - fit.mode[i])
+            if inside < END * (high - low):
+                return True
+    return False
+
+
+def _alike(effect: Effect, effects: Sequence[Effect]) -> set[str]:
+    """Ids of an effect's family."""
+    return {e.id for e in effects if e.family == effect.family}
 
 
 def _unseen(found: Scan, asked: Collection[str], promising: Sequence[Score]) -> list[Effect]:

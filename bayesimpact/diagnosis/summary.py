@@ -126,7 +126,8 @@ def _unproved(found: Findings) -> str:
     if not found.unproved:
         return ""
     too = " too" if found.effects else ""
-    return f" The fitted model holds {listed(found.unproved)}{too}, which nothing proves."
+    why = "nothing proves" if found.finished else "was not compared with all that may do the same"
+    return f" The fitted model holds {listed(found.unproved)}{too}, which {why}."
 
 
 def _groups(found: Findings) -> str:

@@ -49,6 +49,7 @@ def run(monkeypatch):
         monkeypatch.setattr(search, "promising_pairs", lambda scan, count: ())
         monkeypatch.setattr(search, "posed_anew", lambda *about: None)
         monkeypatch.setattr(search, "is_spoilt", lambda base, fit: False)
+        monkeypatch.setattr(settle, "is_at_an_end", lambda fit, effect: False)
         for force in ("missing_force", "missing_drift"):
             monkeypatch.setattr(models, force, table.missing)
         monkeypatch.setattr(

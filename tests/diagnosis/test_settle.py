@@ -10,17 +10,24 @@ import pytest
 from effect_rigs import BY_ID
 from made_up_models import A, B, Table
 
-from bayesimpact.diagnosis import ranked
+from bayesimpact.diagnosis import ranked, settle
 from bayesimpact.diagnosis.refit import Candidate
 from bayesimpact.diagnosis.scan import Scan
 from bayesimpact.diagnosis.settle import Settling
 
+RNG = np.random.default_rng
 FRICTION, DRAG, SPRING = "coulomb_friction", "quadratic_drag", "spring_cubic"
 HYSTERESIS = "hysteresis_bouc_wen"
 
 
 def model(ids: str, chi2: float) -> Candidate:
-    fit: Any = SimpleNamespace(reduced_chi2=chi2, converged=True, log_likelihood=-500.0 * chi2)
+    shapeless = SimpleNamespace(
+        oscillator=SimpleNamespace(layout=SimpleNamespace(parameters=())),
+        priors=SimpleNamespace(lower=(), upper=()),
+    )
+    fit: Any = SimpleNamespace(
+        reduced_chi2=chi2, converged=True, log_likelihood=-500.0 * chi2, target=shapeless
+    )
     return Candidate(tuple(BY_ID[i] for i in ids.split()), fit, 0.0)
 
 
@@ -29,7 +36,7 @@ def test_laws_that_are_asked_for_take_the_place_where_scores_see_nothing(base, s
     """Where the misfit was large the model without either law may stand in a side minimum; not
     where scores there see what the law that was left out is known to do, 1,450 nats.
     """
-    search: Any = Settling((), None, np.random.default_rng(0), lambda words: None)
+    search: Any = Settling((), None, RNG(0), lambda words: None)
     search.states = {frozenset(): SimpleNamespace(candidate=model("", base))}
     search.asked = SimpleNamespace(first=lambda *about: ({DRAG, HYSTERESIS}, {DRAG}))
     gains = {HYSTERESIS: seen, SPRING: 0.9 * seen, DRAG: 0.0}
@@ -47,7 +54,7 @@ def test_laws_that_are_asked_for_take_the_place_where_scores_see_nothing(base, s
 
 @pytest.mark.parametrize("white", [True, False])
 def test_beside_a_model_that_leaves_nothing_rivals_must_come_near_what_they_replace(white) -> None:
-    search: Any = Settling((), None, np.random.default_rng(0), lambda words: None)
+    search: Any = Settling((), None, RNG(0), lambda words: None)
     chosen = model(f"{FRICTION} {SPRING}", 1.0)
     search.states = {
         frozenset(): SimpleNamespace(candidate=model("", 400.0)),
@@ -90,7 +97,7 @@ def test_a_better_end_of_the_same_set_settles_once_more(monkeypatch):
 )  # fmt: skip
 def test_models_are_weighed_beside_what_remains(monkeypatch, base, misses, noise, weighed) -> None:
     """Where the misfit was large, something is left and a force of time describes it."""
-    search: Any = Settling((BY_ID[DRAG],), None, np.random.default_rng(0), lambda words: None)
+    search: Any = Settling((BY_ID[DRAG],), None, RNG(0), lambda words: None)
     near, far = model(f"{FRICTION} {SPRING}", 2.0), model(FRICTION, 3.0)
     search.states = {frozenset(): SimpleNamespace(candidate=model("", base))}
     search.tried = {frozenset(c.ids): c for c in (far, near)}
@@ -118,7 +125,7 @@ def test_a_law_may_have_taken_the_place_of_two(odds: float, white: bool, extende
     chosen, rival = model(f"{FRICTION} {HYSTERESIS}", 1.0), model(f"{FRICTION} {DRAG}", 1.1)
     more, part = model(f"{FRICTION} {DRAG} {SPRING}", 1.0), model(FRICTION, 1.2)
     known = {chosen.ids: 500.0, rival.ids: odds, part.ids: odds - 1.0, more.ids: 600.0}
-    search: Any = Settling((), None, np.random.default_rng(0), lambda words: None)
+    search: Any = Settling((), None, RNG(0), lambda words: None)
     search.states = {frozenset(): SimpleNamespace(candidate=model("", 400.0))}
     search.log_odds = lambda candidate: known[candidate.ids]
     search.ranked = lambda models: sorted(models, key=search.log_odds, reverse=True)
@@ -129,3 +136,36 @@ def test_a_law_may_have_taken_the_place_of_two(odds: float, white: bool, extende
     search.extended = lambda state: asked.append(state.candidate) or [more]
     found = search.beside_rival(SimpleNamespace(candidate=chosen, is_white=white))
     assert (found, asked) == (([more], [rival]) if extended else ([], []))
+
+
+def test_laws_of_a_family_take_the_place_of_one_that_ends_at_its_range(monkeypatch) -> None:
+    """However well scores see it: its shape says that the law is another one."""
+    monkeypatch.setattr(settle, "is_at_an_end", lambda fit, effect: effect.id == HYSTERESIS)
+    search: Any = Settling((BY_ID[FRICTION], BY_ID[HYSTERESIS]), None, RNG(0), lambda words: None)
+    search.states = {frozenset(): SimpleNamespace(candidate=model("", 400.0))}
+    search.asked = SimpleNamespace(first=lambda *about: (set(), set()))
+    scores = (Table.score(BY_ID[HYSTERESIS], 1e6), Table.score(BY_ID[FRICTION], 0.0))
+    search.drop = lambda chosen, effect: model(SPRING, 3.9)
+    search.simplified = lambda chosen, effect: []
+    search.scanned = lambda rest, effects: Scan(scores, 1e-6, None, (), ())
+    in_place = []
+    search.fit_one = lambda *about: None
+    search.exchange_in_place = lambda chosen, old, new: in_place.append((old.id, new.id))
+    search.exchange(model(f"{HYSTERESIS} {SPRING}", 1.0))
+    alike = BY_ID[FRICTION].family == BY_ID[HYSTERESIS].family
+    assert alike is ((HYSTERESIS, FRICTION) in in_place)
+
+
+@pytest.mark.parametrize(("at", "ends"), [(0.5, False), (0.2501, True), (4.9999, True)])
+def test_a_range_ends_where_climbs_stop(at: float, ends: bool) -> None:
+    power = BY_ID["power_damping"]
+    names = [f"power_damping.{p.name}" for p in power.parameters]
+    shape = [p.is_shape for p in power.parameters].index(True)
+    parameters = [SimpleNamespace(name=n, lower=0.25, upper=5.0) for n in names]
+    priors = SimpleNamespace(lower=[-np.inf] * len(names), upper=[np.inf] * len(names))
+    layout = SimpleNamespace(parameters=parameters)
+    target = SimpleNamespace(oscillator=SimpleNamespace(layout=layout), priors=priors)
+    mode = np.full(len(names), 1.0)
+    mode[shape] = at
+    fit: Any = SimpleNamespace(target=target, mode=mode)
+    assert settle.is_at_an_end(fit, power) is ends
