@@ -129,11 +129,14 @@ def _basis(at: Array, far: Array, period: float) -> Array:
 
 
 def _is_step(x: Array, places: Array, noise: float, period: float) -> bool:
-    """Whether one step of the readings (samples lost, a zero that moved) explains them as well."""
+    """Whether one step of the readings (a zero that moved), which may change their slope as well
+    (samples lost), explains them as well.
+    """
     places = np.sort(places)
     basis = _basis(places, places, period)
     for step in places[GUARD:-GUARD]:
-        columns = np.column_stack([basis, places >= step])
+        behind = places >= step
+        columns = np.column_stack([basis, behind, np.where(behind, places - step, 0)])
         left = x[places] - columns @ np.linalg.lstsq(columns, x[places], rcond=1e-6)[0]
         if left @ left < (JOINED * noise) ** 2 * places.size:
             return True

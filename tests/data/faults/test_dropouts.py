@@ -102,3 +102,19 @@ def test_they_are_told_as_spikes_and_no_samples_are_lost_there() -> None:
     bad = {i for a, b in fault.spans for i in range(a, b)}
     planted = {i for a in (500, 1800, 3000) for i in range(a, a + 12)}
     assert bad <= planted and len(bad) > 30
+
+
+@pytest.mark.parametrize("lost", [9, 20])
+def test_samples_lost_by_an_encoder_are_no_drop_out(lost: int) -> None:
+    """Place and slope jump together; on either side the motion goes on in coarse steps."""
+    kinds = []
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        t = np.arange(3000) / 200.0
+        x = 80.0 * np.exp(-0.05 * t) * np.cos(2 * np.pi * 0.7 * t) + 0.7
+        step = 0.045 * np.round((x + 0.01 * rng.standard_normal(t.size)) / 0.045)
+        at = int(rng.integers(500, 2400))
+        read = np.radians(np.delete(step, np.s_[at : at + lost]))
+        kinds.append([f.id for f in recording_faults(Recording("a", "", read, 5e-3))])
+    assert sum("recording_slip" in ids for ids in kinds) >= 4
+    assert not any("recording_spikes" in ids for ids in kinds)
