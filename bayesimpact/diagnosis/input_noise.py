@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.recording import Recording
-from bayesimpact.diagnosis.discrepancy import Discrepancy, discrepancy
+from bayesimpact.diagnosis.discrepancy import Discrepancy, discrepancy, force_responses, free_period
 from bayesimpact.diagnosis.naming import is_large
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.inference.fit import Fit
@@ -47,36 +47,38 @@ def input_noise(fit: Fit) -> Noise | None:
     """The noise with that of the measured inputs, as a fit without a large misfit tells it; None
     where it does not matter, cannot be told from the input, or is known already.
 
-    Beside readings of coloured, growing or filtered noise, or a base's displacement, whose second
-    derivative is the force, it is not looked for.
+    Beside readings of growing or filtered noise, or a base's displacement, whose second derivative
+    is the force, it is not looked for.
     """
     noise, campaign = fit.target.likelihood.noise, fit.target.oscillator.campaign
     floors = {r.name: _floor(r) for r in campaign.recordings}
-    if not (noise.is_white and any(floors.values())):
+    known = noise.forces is not None or noise.grows or noise.smoothing is not None
+    if known or not any(floors.values()):
         return None
     force = discrepancy(fit)
     if force is None or force.gain(fit, fit.log_posterior) < DECISIVE or not _tells(fit, force):
         return None
-    responses, shares = {}, []
+    responses, raw, shares = {}, {}, []
     for r, part, motion in zip(campaign.recordings, force.parts, force.motions, strict=True):
         floor = _force(fit, r) * floors[r.name]
         between = float(motion.t[-1]) / (part.squares.size - 1)
         k = min(force.k, floor**2 * r.interval / between)
         if r.input is not None and k * float(part.squares.max()) > SMALL:
             responses[r.name] = np.sqrt(k) * part.responses
+            rows = force_responses(fit, motion, free_period(fit)).T
+            raw[r.name] = np.sqrt(k) / noise.level * rows
             error = float(np.sqrt(k * between / r.interval)) / _force(fit, r)
             shares.append(error / float(np.sqrt(np.mean(r.input.samples**2))))
     if not responses:
         return None
-    return replace(noise, forces=RandomForces(MappingProxyType(responses), max(shares)))
+    forces = RandomForces(MappingProxyType(responses), MappingProxyType(raw), max(shares))
+    return replace(noise, forces=forces)
 
 
 def _tells(fit: Fit, force: Discrepancy) -> bool:
     """Whether the force's knots are dense enough in every recording."""
-    mass = fit.target.oscillator.campaign.mass
-    period = 2 * np.pi * float(np.sqrt(mass / fit.value("k1")))
     return all(
-        (part.squares.size - 1) * period >= FEWEST * float(motion.t[-1])
+        (part.squares.size - 1) * free_period(fit) >= FEWEST * float(motion.t[-1])
         for part, motion in zip(force.parts, force.motions, strict=True)
     )
 

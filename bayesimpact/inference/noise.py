@@ -236,7 +236,7 @@ class Noise:
         drawn = self.coloured(rng, size, recording.interval, sigma, order)
         if self.forces is not None:
             moved = self.forces.drawn(rng, recording.name, size)
-            drawn = drawn + sigma * self.scales[order] * moved
+            drawn = drawn + sigma * moved
         return drawn * self.relative_sd(recording) if self.grows else drawn
 
     def volume_of(self, recording: Recording) -> float:

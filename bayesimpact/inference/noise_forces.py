@@ -30,10 +30,12 @@ class RandomForces:
     Attributes
     ----------
     responses : by recording, D (n, K), whitened, over the level of the noise
+    raw : the same as read, not whitened
     share : of the input, for words: rms of the random one over that of the measured one
     """
 
     responses: Mapping[str, Array] = field(repr=False)
+    raw: Mapping[str, Array] = field(repr=False)
     share: float
     _turned: dict[object, Turned] = field(default_factory=dict, repr=False)
 
@@ -59,9 +61,9 @@ class RandomForces:
 
     def drawn(self, rng: np.random.Generator, name: str, n: int) -> Array:
         """A draw of what the forces move n readings by, over the level of the noise."""
-        if name not in self.responses:
+        if name not in self.raw:
             return np.zeros(n)
-        rows = self.responses[name][:n]
+        rows = self.raw[name][:n]
         return np.asarray(rows @ rng.standard_normal(rows.shape[1]))
 
     def _along(self, name: str, n: int, used: Mask | None) -> Turned:

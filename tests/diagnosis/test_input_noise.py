@@ -85,7 +85,7 @@ def test_an_input_that_fills_the_band_tells_nothing() -> None:
 def test_whitening_is_that_of_the_covariance(used: np.ndarray | None) -> None:
     rng = np.random.default_rng(2)
     n, rows = 40, rng.standard_normal((40, 3))
-    forces = RandomForces({"a": rows}, 0.1)
+    forces = RandomForces({"a": rows}, {"a": rows}, 0.1)
     kept = rows if used is None else np.where(used[:, None], rows, 0.0)
     covariance = np.eye(n) + kept @ kept.T
     x, y = rng.standard_normal((2, n))
@@ -100,7 +100,7 @@ def test_whitening_is_that_of_the_covariance(used: np.ndarray | None) -> None:
 
 def test_draws_have_the_covariance() -> None:
     rows = np.random.default_rng(2).standard_normal((5, 3))
-    forces, rng = RandomForces({"a": rows}, 0.1), np.random.default_rng(3)
+    forces, rng = RandomForces({"a": rows}, {"a": rows}, 0.1), np.random.default_rng(3)
     drawn = np.array([forces.drawn(rng, "a", 5) for _ in range(20_000)])
     assert np.cov(drawn.T) == pytest.approx(rows @ rows.T, abs=6 * np.sqrt(2 * 25 / 20_000))
     assert not forces.drawn(rng, "b", 5).any()
@@ -110,10 +110,27 @@ def test_noise_passes_forces_on() -> None:
     rig = driven_rig(4, "displacement", kind="sweep")
     (recording,) = rig.campaign.recordings
     n = recording.samples.size
-    forces = RandomForces({"a": np.sin(np.arange(n) / 9.0)[:, None]}, 0.1)
+    rows = {"a": np.sin(np.arange(n) / 9.0)[:, None]}
+    forces = RandomForces(rows, rows, 0.1)
     noise = Noise(level=1.0, forces=forces)
     assert not noise.is_white
     assert "measured input (10 % of it)" in noise.kind
     x = np.random.default_rng(0).standard_normal(n)
     np.testing.assert_array_equal(noise.whitened(recording, x), forces.whitened("a", x, None))
     assert noise.volume_of(recording) == forces.log_volume("a", n, None)
+
+
+def test_draws_whitened_are_independent_beside_coloured_noise() -> None:
+    """Of a response as whitened beside AR(1) noise, drawn as read: unit variance once whitened."""
+    rig = driven_rig(4, "displacement", kind="sweep")
+    (recording,) = rig.campaign.recordings
+    rows = 30.0 * np.sin(np.arange(recording.samples.size) / 9.0)[:, None]
+    plain = Noise(0.6, level=1.0)
+    forces = RandomForces({"a": plain.whitened(recording, rows.T).T}, {"a": rows}, 0.1)
+    noise, rng = replace(plain, forces=forces), np.random.default_rng(5)
+    drawn = np.array(
+        [noise.whitened(recording, noise.drawn(rng, recording, 1.0)) for _ in range(9)]
+    )
+    assert np.var(drawn) == pytest.approx(1.0, abs=5 * np.sqrt(2 / drawn.size))
+    bare = np.array([plain.whitened(recording, noise.drawn(rng, recording, 1.0)) for _ in range(9)])
+    assert np.var(bare) > 2.0
