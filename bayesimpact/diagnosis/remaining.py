@@ -19,9 +19,11 @@ from bayesimpact.diagnosis.decision import (
 )
 from bayesimpact.diagnosis.discrepancy import Discrepancy, discrepancy
 from bayesimpact.diagnosis.naming import Naming, State
+from bayesimpact.diagnosis.promising import is_redundant
 from bayesimpact.diagnosis.refit import Candidate, in_words
 from bayesimpact.diagnosis.settle import EXCHANGES, Settling
 from bayesimpact.diagnosis.unknown import with_force
+from bayesimpact.model.effects.effect import Effect
 
 
 class Remaining(Settling):
@@ -41,6 +43,8 @@ class Remaining(Settling):
         smaller = {e.id: self.drop(chosen, e) for e in chosen.effects}
         for effect in chosen.effects:  # whether time is up or not: no law is told without
             self.simplified(chosen, effect)
+            if in_its_place(found, (effect,)) is None and self.budget.may_compare_on(self.look):
+                self.likeliest_in_place(chosen, effect)
         tried = tuple(sorted(self.tried.values(), key=found.log_odds, reverse=True))
         found = replace(found, tried=tried, states=dict(self.states))
         alone = [(e,) for e in ordered(found, chosen.effects)]
@@ -73,6 +77,22 @@ class Remaining(Settling):
             if len(wider) > len(group) and not told:
                 found = self.with_forces(found, rivals_in_place(found, wider))
         return found
+
+    def likeliest_in_place(self, chosen: Candidate, effect: Effect) -> None:
+        """Put the effect of which scores promise most in the place of one that a search which was
+        cut short has compared with none.
+        """
+        rest = self.drop(chosen, effect)
+        found = self.scanned(rest, self.effects)
+        others = [
+            s
+            for s in found.best()
+            if s.effect.id not in chosen.ids and not is_redundant(rest, s.effect)
+        ]
+        if others:
+            best = max(others, key=lambda s: s.gain)
+            self.fit_one(rest, found, best, chosen)
+            self.exchange_in_place(chosen, effect, best.effect)
 
     def with_forces(self, found: Naming, candidates: Sequence[Candidate]) -> Naming:
         """With the models of these that have a residual force beside their effects, as far as time
