@@ -167,10 +167,10 @@ def discrepancy(fit: Fit) -> Discrepancy | None:
     """The force of time that the remainder of a fit asks for; None where the fitted motion is none
     that a small force could change: it ran away, or does not move.
     """
-    moves = all(np.isfinite(y).all() and np.ptp(y) for y in fit.displacements)
-    if not (fit.value("k1") > 0 and moves):
+    stiffness = fit.value("k1")
+    if not (stiffness > 0 and all(np.isfinite(y).all() and np.ptp(y) for y in fit.displacements)):
         return None
-    period = free_period(fit)
+    period = 2 * np.pi * float(np.sqrt(fit.target.oscillator.campaign.mass / stiffness))
     try:
         motions = tuple(motion_of(fit, r) for r in range(len(fit.linearisation)))
         parts = tuple(_part(fit, r, motion, period) for r, motion in enumerate(motions))
@@ -179,13 +179,7 @@ def discrepancy(fit: Fit) -> Discrepancy | None:
         return None
 
 
-def free_period(fit: Fit) -> float:
-    """Of the oscillator off its stop, s."""
-    return 2 * np.pi * float(np.sqrt(fit.target.oscillator.campaign.mass / fit.value("k1")))
-
-
-def force_responses(fit: Fit, motion: Motion, period: float) -> Array:
-    """What a recording reads of a force of 1 N at every knot, (K, n), as its quantity."""
+def _part(fit: Fit, r: int, motion: Motion, period: float) -> Part:
     duration, n = float(motion.t[-1]), motion.samples
     cycles = duration / period
     most = max(QUICK, (KNOTS if fit.target.oscillator.campaign.stop else FEWEST) * cycles)
@@ -197,11 +191,6 @@ def force_responses(fit: Fit, motion: Motion, period: float) -> Array:
         near = knots[first : first + BLOCK, None]
         tents = np.maximum(1.0 - np.abs(motion.t - near) / knots[1], 0.0)
         raw[first : first + BLOCK] = answers(motion, tents)
-    return raw
-
-
-def _part(fit: Fit, r: int, motion: Motion, period: float) -> Part:
-    raw = force_responses(fit, motion, period)
     level = np.full(r + 1, fit.target.likelihood.noise.level)
     white = whitened_one(fit, r, raw, level)
     squares, vectors = np.linalg.eigh(white @ white.T)

@@ -1,30 +1,34 @@
 """The noise of a measured input, which moves the model and not the mass.
 
 An input's readings hold noise of their own, and the model's response to that is part of what it
-leaves. A white error e of every reading is a force of time (`discrepancy`) of power e^2 dt per
-hertz; so strong are independent values at knots h apart of variance e^2 dt / h. Its size is what
-the remainder of a fit asks for, but no more than the floor of the input's own spectrum: a missing
-law of the motion, which may ask for more, is no noise of the input's.
+leaves: independent random forces, one a sample, along the fitted motion (`noise_forces`). Their
+size is what the remainder of a fit asks for, the parameters at their best, but no more than the
+floor of the input's own spectrum: a missing law of the motion, which may ask for more, is no noise
+of the input's.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from bayesimpact.data.recording import Recording
-from bayesimpact.diagnosis.discrepancy import Discrepancy, discrepancy, force_responses, free_period
 from bayesimpact.diagnosis.naming import is_large
 from bayesimpact.diagnosis.thresholds import DECISIVE
-from bayesimpact.inference.fit import Fit
+from bayesimpact.formula.responses import motion_of
+from bayesimpact.inference.fit import Fit, inverse
 from bayesimpact.inference.identify import Identification
+from bayesimpact.inference.likelihood import Linearisation
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.noise_driven import BANDS, MEDIAN, SILENT, TOP, powers
-from bayesimpact.inference.noise_forces import SMALL, RandomForces
+from bayesimpact.inference.noise_forces import RandomForces
 from bayesimpact.inference.refitted import refitted
+from bayesimpact.model.superposition import state_space
 
 Array = NDArray[np.float64]
 
@@ -32,7 +36,9 @@ QUIETEST = 0.1  # of an input's bands: the loudest one of these is its floor
 # ... but for what the median of a band of m ordinates errs by, 1 / (ln 2 m^(1/2)) of itself: the
 # quietest tenth of equal ones lies 1.28 of that too low
 ERROR = 1.28 / np.log(2.0)
-FEWEST = 4.0  # knots in a period that tell a force at the oscillator's own frequency
+SMALLEST = 1e-3  # of the floor: a size that is sought down to there
+CLOSE = 0.02  # of ln size
+STEP = 0.05  # of a standard deviation, other parameters as they are: for differences
 
 
 def with_input_noise(before: Identification) -> Identification:
@@ -51,36 +57,74 @@ def input_noise(fit: Fit) -> Noise | None:
     is the force, it is not looked for.
     """
     noise, campaign = fit.target.likelihood.noise, fit.target.oscillator.campaign
-    floors = {r.name: _floor(r) for r in campaign.recordings}
+    floors = {r.name: _force(fit, r) * _floor(r) for r in campaign.recordings}
+    floors = {name: floor for name, floor in floors.items() if floor > 0.0}
     known = noise.forces is not None or noise.grows or noise.smoothing is not None
-    if known or not any(floors.values()):
+    if known or not floors:
         return None
-    force = discrepancy(fit)
-    if force is None or force.gain(fit, fit.log_posterior) < DECISIVE or not _tells(fit, force):
+    moves = all(np.isfinite(y).all() and np.ptp(y) for y in fit.displacements)
+    if not (moves and fit.value("k1") > 0):
         return None
-    responses, raw, shares = {}, {}, []
-    for r, part, motion in zip(campaign.recordings, force.parts, force.motions, strict=True):
-        floor = _force(fit, r) * floors[r.name]
-        between = float(motion.t[-1]) / (part.squares.size - 1)
-        k = min(force.k, floor**2 * r.interval / between)
-        if r.input is not None and k * float(part.squares.max()) > SMALL:
-            responses[r.name] = np.sqrt(k) * part.responses
-            rows = force_responses(fit, motion, free_period(fit)).T
-            raw[r.name] = np.sqrt(k) / noise.level * rows
-            error = float(np.sqrt(k * between / r.interval)) / _force(fit, r)
-            shares.append(error / float(np.sqrt(np.mean(r.input.samples**2))))
-    if not responses:
+    whole, linear = _of_floors(fit, floors), _as_read(fit)
+
+    def minus(log_size: float) -> float:
+        return -_log_likelihood(fit, linear, _scaled(noise, whole, float(np.exp(log_size))))
+
+    bounds = float(np.log(SMALLEST)), 0.0
+    best = minimize_scalar(minus, bounds=bounds, method="bounded", options={"xatol": CLOSE})
+    if -float(best.fun) < _log_likelihood(fit, linear, noise) + DECISIVE:
         return None
-    forces = RandomForces(MappingProxyType(responses), MappingProxyType(raw), max(shares))
-    return replace(noise, forces=forces)
+    return _scaled(noise, whole, float(np.exp(best.x)))
 
 
-def _tells(fit: Fit, force: Discrepancy) -> bool:
-    """Whether the force's knots are dense enough in every recording."""
-    return all(
-        (part.squares.size - 1) * free_period(fit) >= FEWEST * float(motion.t[-1])
-        for part, motion in zip(force.parts, force.motions, strict=True)
+def _of_floors(fit: Fit, floors: Mapping[str, float]) -> RandomForces:
+    """Random forces as large as the inputs' floors, N."""
+    noise, recordings = fit.target.likelihood.noise, fit.target.oscillator.campaign.recordings
+    paths, sizes, shares = {}, {}, []
+    for r, one in enumerate(recordings):
+        if one.name in floors and one.input is not None:
+            paths[one.name] = state_space(motion_of(fit, r))
+            sizes[one.name] = floors[one.name] / (noise.level * noise.scales[one.order])
+            measured = _force(fit, one) * float(np.sqrt(np.mean(one.input.samples**2)))
+            shares.append(floors[one.name] / measured)
+    return RandomForces(MappingProxyType(paths), MappingProxyType(sizes), max(shares))
+
+
+def _scaled(noise: Noise, forces: RandomForces, by: float) -> Noise:
+    """The noise with forces of another size."""
+    sizes = {name: by * size for name, size in forces.sizes.items()}
+    return replace(
+        noise, forces=RandomForces(forces.paths, MappingProxyType(sizes), by * forces.share)
     )
+
+
+def _as_read(fit: Fit) -> tuple[Linearisation, ...]:
+    """The fit's residuals and derivatives, not whitened."""
+    likelihood = fit.target.likelihood
+    plain = replace(likelihood, noise=Noise(level=likelihood.noise.level))
+    steps = STEP / np.sqrt(np.diag(inverse(fit.covariance)))
+    return plain.linearise(fit.mode, steps, roughly=True)
+
+
+def _log_likelihood(fit: Fit, linear: tuple[Linearisation, ...], noise: Noise) -> float:
+    """Of what a fit leaves under a noise, its level and, to first order, all parameters at their
+    best; up to a constant.
+    """
+    size, total, volume = fit.mode.size, 0.0, 0.0
+    products = np.zeros((size + 1, size + 1))
+    recordings = fit.target.oscillator.campaign.recordings
+    for recording, lin in zip(recordings, linear, strict=True):
+        at = np.append(lin.columns, size)
+        white = noise.whitened(recording, np.column_stack([lin.jacobian, lin.residual]).T)
+        products[np.ix_(at, at)] += white @ white.T / noise.level**2
+        total += noise.size(recording.samples.size, recording.interval, recording.used)
+        volume += noise.volume_of(recording)
+    prior = np.array(fit.target.priors.information(fit.mode))
+    prior[fit.target.oscillator.layout.roles("noise")] = 1.0
+    score = products[:-1, -1]
+    moved = float(score @ inverse(products[:-1, :-1] + np.diag(prior)) @ score)
+    rest = max(float(products[-1, -1]) - moved, 1e-300)
+    return volume - 0.5 * total * float(np.log(rest / total))
 
 
 def _floor(recording: Recording) -> float:

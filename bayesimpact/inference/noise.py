@@ -64,7 +64,7 @@ class Noise:
     others : correlations of further AR(1) processes, 0 for white noise, each with its share of the
         raw noise's variance; what is left of it is that of `correlation`
     is_independent : its level is not that of what a model leaves of the motion
-    forces : random ones, whose responses the readings hold beside white noise, or None
+    forces : random ones, whose responses the readings hold beside noise of their own, or None
     """
 
     correlation: float = 0.0
@@ -123,10 +123,10 @@ class Noise:
         """Whitened signals of a recording: (..., n) samples to (..., m) numbers."""
         if self.grows:
             x = x / self.relative_sd(recording)
-        white = self.whiten(x, recording.interval, recording.used, recording.order)
-        if self.forces is None:
-            return white
-        return self.forces.whitened(recording.name, white, recording.used)
+        if self.forces is not None and recording.name in self.forces.paths:
+            x = x / self.scales[recording.order]
+            return self.forces.innovations(recording.name, x, self.parts, recording.used)
+        return self.whiten(x, recording.interval, recording.used, recording.order)
 
     def relative_sd(self, recording: Recording) -> Array:
         """Standard deviation at every sample of a recording over `level`, (n,)."""
@@ -236,15 +236,19 @@ class Noise:
         drawn = self.coloured(rng, size, recording.interval, sigma, order)
         if self.forces is not None:
             moved = self.forces.drawn(rng, recording.name, size)
-            drawn = drawn + sigma * moved
+            drawn = drawn + sigma * self.scales[order] * moved
         return drawn * self.relative_sd(recording) if self.grows else drawn
 
     def volume_of(self, recording: Recording) -> float:
         """Log determinant of `whitened`."""
         size, used = recording.samples.size, recording.used
+        if self.forces is not None and recording.name in self.forces.paths:
+            scaled = self.size(size, recording.interval, used) * np.log(
+                self.scales[recording.order]
+            )
+            name = recording.name
+            return self.forces.log_determinant(name, size, self.parts, used) - float(scaled)
         found = self.log_volume(size, recording.interval, used, recording.order)
-        if self.forces is not None:
-            found += self.forces.log_volume(recording.name, size, used)
         if not self.grows:
             return found
         sd = self.relative_sd(recording)

@@ -1,8 +1,9 @@
 """Noise that reaches the readings through the oscillator, as that of a measured input does.
 
-With z independent normal values, whitened readings hold D z beside their own noise: their
-covariance is sigma^2 (1 + D D'). The symmetric inverse root of that whitens them; it changes the
-readings along the few directions only in which D D' is not small.
+A random force changes the motion's two free changes, and these the readings. What the samples so
+far say of both, and of the readings' own noise, is a normal distribution that one step of Kalman's
+filter (Kalman 1960, J. Basic Eng. 82:35) carries on, as in `noise_prediction`: exact, over gaps
+too, at a cost that grows with the number of samples.
 """
 
 from __future__ import annotations
@@ -14,66 +15,134 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.inference.noise_prediction import Parts
+from bayesimpact.model.compiled import compiled
+from bayesimpact.model.superposition import StateSpace
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-Turned = tuple[
-    Array, Array
-]  # directions (n, K), orthonormal; variance along each, over the noise's
-
-SMALL = 0.01  # of the noise's variance: a direction that has less changes the likelihood by less
 
 
 @dataclass(frozen=True, eq=False)
 class RandomForces:
-    """Responses to random forces.
+    """A random force in every recording, of independent values from sample to sample.
 
     Attributes
     ----------
-    responses : by recording, D (n, K), whitened, over the level of the noise
-    raw : the same as read, not whitened
-    share : of the input, for words: rms of the random one over that of the measured one
+    paths : by recording, how forces change its readings
+    sizes : by recording, standard deviation of the force, N, over the level of the noise
+    share : of the input, for words: rms of the random force over that of the measured one
     """
 
-    responses: Mapping[str, Array] = field(repr=False)
-    raw: Mapping[str, Array] = field(repr=False)
+    paths: Mapping[str, StateSpace] = field(repr=False)
+    sizes: Mapping[str, float]
     share: float
-    _turned: dict[object, Turned] = field(default_factory=dict, repr=False)
+    _known: dict[object, tuple[Array, Array]] = field(default_factory=dict, repr=False)
 
     def __repr__(self) -> str:
         whole = hashlib.sha256()
-        for name, rows in sorted(self.responses.items()):
-            whole.update(name.encode() + np.ascontiguousarray(rows).tobytes())
-        return f"RandomForces(share={self.share!r}, sha256={whole.hexdigest()[:16]})"
+        for name, path in sorted(self.paths.items()):
+            whole.update(name.encode() + np.ascontiguousarray(path.readings).tobytes())
+        sizes = dict(self.sizes)
+        return f"RandomForces({sizes!r}, share={self.share!r}, {whole.hexdigest()[:16]})"
 
-    def whitened(self, name: str, white: Array, used: Mask | None) -> Array:
-        """(..., n) readings that their own noise's whitening has passed, of independent values."""
-        if name not in self.responses:
-            return white
-        directions, variances = self._along(name, white.shape[-1], used)
-        weights = 1.0 / np.sqrt(1.0 + variances) - 1.0
-        return np.asarray(white + (white @ directions * weights) @ directions.T)
+    def innovations(self, name: str, x: Array, parts: Parts, used: Mask | None) -> Array:
+        """Innovations of a recording's signals (..., n) over their standard deviation, (..., n).
 
-    def log_volume(self, name: str, n: int, used: Mask | None) -> float:
-        """Log determinant of `whitened`."""
-        if name not in self.responses:
-            return 0.0
-        return -0.5 * float(np.log1p(self._along(name, n, used)[1]).sum())
+        They have the variance of the readings' noise, whose processes are `parts`. 0 where `used`
+        (n,) is False.
+        """
+        rows = np.ascontiguousarray(x.reshape(-1, x.shape[-1]))
+        n, path = rows.shape[1], self.paths[name]
+        sd, gains = self._steps(name, n, parts, used)
+        correlations = np.array([correlation for correlation, _ in parts])
+        white = _innovations(rows, path.readings[:n], path.turns[:n], correlations, sd, gains)
+        return np.asarray(white.reshape(x.shape))
+
+    def log_determinant(self, name: str, n: int, parts: Parts, used: Mask | None) -> float:
+        """Of the operator that makes `innovations` of the samples used."""
+        sd, _ = self._steps(name, n, parts, used)
+        return -float(np.sum(np.log(sd[np.isfinite(sd)])))
 
     def drawn(self, rng: np.random.Generator, name: str, n: int) -> Array:
-        """A draw of what the forces move n readings by, over the level of the noise."""
-        if name not in self.raw:
+        """A draw of what the force moves n readings by, over the level of the noise."""
+        if name not in self.paths:
             return np.zeros(n)
-        rows = self.raw[name][:n]
-        return np.asarray(rows @ rng.standard_normal(rows.shape[1]))
+        path, forces = self.paths[name], self.sizes[name] * rng.standard_normal(n)
+        return np.asarray(_moved(forces, path.readings[:n], path.kicks[:n], path.turns[:n]))
 
-    def _along(self, name: str, n: int, used: Mask | None) -> Turned:
-        """Of a recording's first n readings, without those set aside."""
-        key = name, n, None if used is None else used.tobytes()
-        if key not in self._turned:
-            rows = self.responses[name][:n]
-            rows = rows if used is None else np.where(used[:, None], rows, 0.0)
-            variances, vectors = np.linalg.eigh(rows.T @ rows)
-            large = variances > SMALL
-            directions = rows @ vectors[:, large] / np.sqrt(variances[large])
-            self._turned[key] = directions, variances[large]
-        return self._turned[key]
+    def _steps(self, name: str, n: int, parts: Parts, used: Mask | None) -> tuple[Array, Array]:
+        key = name, n, parts, None if used is None else used.tobytes()
+        if key not in self._known:
+            path, kept = self.paths[name], np.ones(n, dtype=np.bool_) if used is None else used
+            kicks = self.sizes[name] * path.kicks[:n]
+            correlations, shares = np.array(parts).T
+            self._known[key] = _filter(
+                path.readings[:n], kicks, path.turns[:n], kept, correlations, shares
+            )
+        return self._known[key]
+
+
+@compiled()
+def _filter(readings, kicks, turns, used, correlations, shares):  # type: ignore[no-untyped-def]
+    """Standard deviation of every innovation, infinite where there is none, and by how much of it
+    both free changes and every process are to be corrected, (n, 2 + K).
+    """
+    n, size = used.size, 2 + shares.size
+    sd, gains = np.empty(n), np.zeros((n, size))
+    covariance, step, seen = np.zeros((size, size)), np.zeros((size, size)), np.ones(size)
+    for j in range(2, size):
+        covariance[j, j], step[j, j] = shares[j - 2], correlations[j - 2]
+    for i in range(n):
+        if i > 0:
+            for a in range(2):
+                for b in range(2):
+                    covariance[a, b] += kicks[i, a] * kicks[i, b]
+                    step[a, b] = turns[i, a, b]
+            covariance = step @ covariance @ step.T
+            for j in range(2, size):
+                covariance[j, j] += shares[j - 2] * (1.0 - correlations[j - 2] ** 2)
+        seen[:2] = readings[i]
+        along = covariance @ seen
+        variance = seen @ along
+        sd[i] = np.sqrt(variance) if used[i] else np.inf
+        if used[i]:
+            gains[i] = along / sd[i]
+            for a in range(size):
+                for b in range(size):
+                    covariance[a, b] -= along[a] * along[b] / variance
+    return sd, gains
+
+
+@compiled()
+def _innovations(rows, readings, turns, correlations, sd, gains):  # type: ignore[no-untyped-def]
+    white, size = np.empty_like(rows), gains.shape[1]
+    expected = np.zeros(size)
+    for r in range(rows.shape[0]):
+        expected[:] = 0.0
+        for i in range(rows.shape[1]):
+            if i > 0:
+                first, second = expected[0], expected[1]
+                expected[0] = turns[i, 0, 0] * first + turns[i, 0, 1] * second
+                expected[1] = turns[i, 1, 0] * first + turns[i, 1, 1] * second
+                for j in range(2, size):
+                    expected[j] *= correlations[j - 2]
+            missed = rows[r, i] - readings[i, 0] * expected[0] - readings[i, 1] * expected[1]
+            for j in range(2, size):
+                missed -= expected[j]
+            white[r, i] = missed / sd[i]
+            for j in range(size):
+                expected[j] += gains[i, j] * white[r, i]
+    return white
+
+
+@compiled()
+def _moved(forces, readings, kicks, turns):  # type: ignore[no-untyped-def]
+    """What forces in the interval before every sample move the readings by, (n,)."""
+    moved, first, second = np.zeros(forces.size), 0.0, 0.0
+    for i in range(1, forces.size):
+        a, b = first + kicks[i, 0] * forces[i], second + kicks[i, 1] * forces[i]
+        first = turns[i, 0, 0] * a + turns[i, 0, 1] * b
+        second = turns[i, 1, 0] * a + turns[i, 1, 1] * b
+        moved[i] = readings[i, 0] * first + readings[i, 1] * second
+    return moved

@@ -105,6 +105,43 @@ def _crossing(u: Array, x0: Array, x1: Array, r0: Array, r1: Array) -> Array:
     return u
 
 
+@dataclass(frozen=True, eq=False)
+class StateSpace:
+    """How forces change one recording, sample by sample, by way of both free changes.
+
+    Attributes
+    ----------
+    readings : (n, 2), the reading's quantity per unit of either
+    kicks : (n, 2), what a newton during the interval before a sample adds to either
+    turns : (n, 2, 2), what either becomes at a sample, where others take their place
+    """
+
+    readings: Array
+    kicks: Array
+    turns: Array
+
+
+def state_space(motion: Motion) -> StateSpace:
+    """The motion's free changes at its samples; what an acceleration reads of a force at once is
+    left out.
+    """
+    n, changes, factor = motion.samples, motion.changes, motion.factor
+    readings, kicks = np.zeros((n, 2)), np.zeros((n, 2))
+    turns = np.tile(np.eye(2), (n, 1, 1))
+    parts = zip(changes.stretches, changes.impulses, changes.carried, strict=True)
+    for part, impulses, carried in parts:
+        own = slice(part.begin, part.begin + part.readings.shape[0] - 1)
+        rows = part.readings[::factor]
+        first, count = part.begin // factor, rows.shape[0]
+        unit = np.ones((1, part.readings.shape[0]))
+        states = _states(-impulses.T, unit, motion.steps[:, own], factor)[:, 0]
+        if first > 0:
+            turns[first] = carried
+        readings[first : first + count] = rows
+        kicks[first + 1 : first + count] = np.diff(states, axis=1).T
+    return StateSpace(readings, kicks, turns)
+
+
 def answers(motion: Motion, forces: Array) -> Array:
     """What the probe would read of forces (K, n) along the motion, before its filter, (K, samples).
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,10 +12,12 @@ from driven_rigs import DrivenRig, driven_rig
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.input import Input
 from bayesimpact.diagnosis.input_noise import input_noise, with_input_noise
+from bayesimpact.formula.responses import motion_of
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification, identify
 from bayesimpact.inference.noise import Noise
 from bayesimpact.inference.noise_forces import RandomForces
+from bayesimpact.model.superposition import StateSpace, answers, state_space
 
 ERROR = 0.02  # of the input's rms
 SEEDS = range(4)
@@ -81,56 +84,91 @@ def test_an_input_that_fills_the_band_tells_nothing() -> None:
     assert input_noise(fit) is None
 
 
-@pytest.mark.parametrize("used", [None, np.arange(40) % 7 != 3])
-def test_whitening_is_that_of_the_covariance(used: np.ndarray | None) -> None:
-    rng = np.random.default_rng(2)
-    n, rows = 40, rng.standard_normal((40, 3))
-    forces = RandomForces({"a": rows}, {"a": rows}, 0.1)
-    kept = rows if used is None else np.where(used[:, None], rows, 0.0)
-    covariance = np.eye(n) + kept @ kept.T
-    x, y = rng.standard_normal((2, n))
-    a, b = (
-        forces.whitened("a", s if used is None else np.where(used, s, 0.0), used) for s in (x, y)
-    )
-    x, y = (s if used is None else np.where(used, s, 0.0) for s in (x, y))
-    assert a @ b == pytest.approx(x @ np.linalg.solve(covariance, y), rel=1e-9)
-    volume = forces.log_volume("a", n, used)
+def path(n: int, seed: int = 2) -> StateSpace:
+    """Of a motion whose free changes are renewed twice."""
+    rng = np.random.default_rng(seed)
+    turns = np.tile(np.eye(2), (n, 1, 1))
+    turns[[n // 3, n // 2]] = rng.standard_normal((2, 2, 2))
+    return StateSpace(rng.standard_normal((n, 2)), rng.standard_normal((n, 2)), turns)
+
+
+def moved_by(space: StateSpace, size: float) -> np.ndarray:
+    """What a force of one standard deviation before every sample moves, (n, n), step by step."""
+    n = space.readings.shape[0]
+    moved = np.zeros((n, n))
+    for k in range(1, n):
+        state = np.zeros(2)
+        for i in range(1, n):
+            state = space.turns[i] @ (state + (size * space.kicks[i] if i == k else 0.0))
+            moved[i, k] = space.readings[i] @ state
+    return moved
+
+
+def forces_along(space: StateSpace, size: float = 0.7) -> RandomForces:
+    return RandomForces({"a": space}, {"a": size}, 0.1)
+
+
+PARTS = [((0.0, 1.0),), ((0.6, 1.0),), ((0.0, 0.7), (0.9, 0.3))]
+
+
+@pytest.mark.parametrize("parts", PARTS)
+@pytest.mark.parametrize("used", [None, np.arange(30) % 7 != 3])
+def test_whitening_is_that_of_the_covariance(used: np.ndarray | None, parts: Any) -> None:
+    """Against the inverse and the determinant of the whole matrix."""
+    n, space = 30, path(30)
+    kept = np.ones(n, bool) if used is None else used
+    moved, apart = moved_by(space, 0.7), np.abs(np.subtract.outer(np.arange(n), np.arange(n)))
+    own = sum(share * rho**apart for rho, share in parts)
+    covariance = (moved @ moved.T + own)[np.ix_(kept, kept)]
+    x, y = np.random.default_rng(3).standard_normal((2, n))
+    forces = forces_along(space)
+    a, b = (forces.innovations("a", s, parts, used) for s in (x, y))
+    assert a @ b == pytest.approx(x[kept] @ np.linalg.solve(covariance, y[kept]), rel=1e-9)
+    volume = forces.log_determinant("a", n, parts, used)
     assert volume == pytest.approx(-0.5 * np.linalg.slogdet(covariance)[1], rel=1e-9)
+    head = forces.innovations("a", x[:9], parts, None)  # of a recording cut short
+    if used is None:
+        np.testing.assert_array_equal(head, a[:9])
 
 
 def test_draws_have_the_covariance() -> None:
-    rows = np.random.default_rng(2).standard_normal((5, 3))
-    forces, rng = RandomForces({"a": rows}, {"a": rows}, 0.1), np.random.default_rng(3)
-    drawn = np.array([forces.drawn(rng, "a", 5) for _ in range(20_000)])
-    assert np.cov(drawn.T) == pytest.approx(rows @ rows.T, abs=6 * np.sqrt(2 * 25 / 20_000))
-    assert not forces.drawn(rng, "b", 5).any()
+    space = path(6)
+    forces, rng = forces_along(space), np.random.default_rng(3)
+    drawn = np.array([forces.drawn(rng, "a", 6) for _ in range(20_000)])
+    moved = moved_by(space, 0.7)
+    expected = moved @ moved.T
+    sd = np.sqrt(np.diag(expected))
+    error = np.sqrt((np.outer(sd, sd) ** 2 + expected**2) / 20_000)
+    assert np.all(np.abs(np.cov(drawn.T) - expected) < 5 * error + 1e-9)
+    assert not forces.drawn(rng, "b", 6).any()
+
+
+def test_forces_along_a_motion_are_those_of_the_superposition() -> None:
+    """A force that hardly changes from sample to sample; 0.5 % of its answer."""
+    fit = identified(driven_rig(0, "displacement", kind="sweep").campaign).fit  # with a stop
+    motion = motion_of(fit, 0)
+    force = np.sin(9.0 * motion.t) + np.cos(31.0 * motion.t)
+    space, at = state_space(motion), force[:: motion.factor]
+    between = np.append(0.0, 0.5 * (at[1:] + at[:-1]))
+    state, moved = np.zeros(2), np.zeros(at.size)
+    for i in range(1, at.size):
+        state = space.turns[i] @ (state + space.kicks[i] * between[i])
+        moved[i] = space.readings[i] @ state
+    exact = answers(motion, force[None])[0]
+    assert np.std(moved - exact) < 0.005 * np.std(exact)
 
 
 def test_noise_passes_forces_on() -> None:
-    rig = driven_rig(4, "displacement", kind="sweep")
-    (recording,) = rig.campaign.recordings
+    """Independent values of unit variance, once drawn readings are whitened; not without."""
+    (recording,) = driven_rig(4, "displacement", kind="sweep").campaign.recordings
     n = recording.samples.size
-    rows = {"a": np.sin(np.arange(n) / 9.0)[:, None]}
-    forces = RandomForces(rows, rows, 0.1)
-    noise = Noise(level=1.0, forces=forces)
-    assert not noise.is_white
-    assert "measured input (10 % of it)" in noise.kind
-    x = np.random.default_rng(0).standard_normal(n)
-    np.testing.assert_array_equal(noise.whitened(recording, x), forces.whitened("a", x, None))
-    assert noise.volume_of(recording) == forces.log_volume("a", n, None)
-
-
-def test_draws_whitened_are_independent_beside_coloured_noise() -> None:
-    """Of a response as whitened beside AR(1) noise, drawn as read: unit variance once whitened."""
-    rig = driven_rig(4, "displacement", kind="sweep")
-    (recording,) = rig.campaign.recordings
-    rows = 30.0 * np.sin(np.arange(recording.samples.size) / 9.0)[:, None]
+    space = StateSpace(np.ones((n, 2)), np.full((n, 2), 0.2), np.tile(np.eye(2), (n, 1, 1)))
     plain = Noise(0.6, level=1.0)
-    forces = RandomForces({"a": plain.whitened(recording, rows.T).T}, {"a": rows}, 0.1)
-    noise, rng = replace(plain, forces=forces), np.random.default_rng(5)
-    drawn = np.array(
-        [noise.whitened(recording, noise.drawn(rng, recording, 1.0)) for _ in range(9)]
-    )
-    assert np.var(drawn) == pytest.approx(1.0, abs=5 * np.sqrt(2 / drawn.size))
-    bare = np.array([plain.whitened(recording, noise.drawn(rng, recording, 1.0)) for _ in range(9)])
+    noise, rng = replace(plain, forces=forces_along(space)), np.random.default_rng(5)
+    assert not noise.is_white and "measured input (10 % of it)" in noise.kind
+    drawn = [noise.drawn(rng, recording, 1.0) for _ in range(9)]
+    white, bare = (np.array([n.whitened(recording, x) for x in drawn]) for n in (noise, plain))
+    assert np.var(white) == pytest.approx(1.0, abs=5 * np.sqrt(2 / white.size))
     assert np.var(bare) > 2.0
+    volume = noise.forces.log_determinant("a", n, noise.parts, None) if noise.forces else 0.0
+    assert noise.volume_of(recording) == volume
