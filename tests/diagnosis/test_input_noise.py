@@ -8,10 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 from driven_rigs import DrivenRig, driven_rig
+from effect_rigs import BY_ID
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.input import Input
+from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.input_noise import input_noise, with_input_noise
+from bayesimpact.diagnosis.thresholds import LARGE
 from bayesimpact.formula.responses import motion_of
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification, identify
@@ -65,6 +68,10 @@ def test_a_clean_input_has_none() -> None:
 
 def hardening(y: float, v: float, touching: bool) -> float:
     return 3e6 * y**3
+
+
+def stiff(y: float, v: float, touching: bool) -> float:
+    return 3e7 * y**3
 
 
 def test_a_missing_law_is_no_noise_of_a_clean_input() -> None:
@@ -172,3 +179,24 @@ def test_noise_passes_forces_on() -> None:
     assert np.var(bare) > 2.0
     volume = noise.forces.log_determinant("a", n, noise.parts, None) if noise.forces else 0.0
     assert noise.volume_of(recording) == volume
+
+
+def test_beside_what_is_missing_it_is_told_by_the_model_that_holds_that() -> None:
+    """The search begins once more under it, and names nothing else."""
+    rig = driven_rig(4, "displacement", stiff, kind="sweep")
+    campaign = with_noisy_input(rig, 1)
+    effects = [BY_ID[i] for i in ("spring_cubic", "quadratic_drag", "stiffness_drift")]
+    said: list[str] = []
+    found = diagnose(
+        campaign,
+        rng=np.random.default_rng(0),
+        effects=effects,
+        search=False,
+        progress=lambda words: said.append(str(words)),
+    )
+    assert found.before.reduced_chi2 > LARGE**2
+    assert any("noise of the input matters" in words for words in said)
+    assert found.verdict == "named" and [e.id for e in found.effects] == ["spring_cubic"]
+    forces = found.after.target.likelihood.noise.forces
+    assert forces is not None and forces.share == pytest.approx(ERROR, rel=0.25)
+    assert np.max(np.abs(deviations(found.after, rig))) < 4.0
