@@ -48,8 +48,9 @@ def find_spikes(recording: Recording) -> list[Fault]:
 def lone_spikes(recording: Recording, *, contacts: bool = True) -> list[Fault]:
     """Up to five samples in a row far off what both sides predict alike; impacts are none.
 
-    A brief contact is a spike of the acceleration away from the stop: such a one does not count, as
-    long as there may be `contacts` in the readings.
+    A brief contact is a spike of the acceleration away from the stop, and the flight between two of
+    them one towards it, back to what flights have: such ones do not count, as long as there may be
+    `contacts` in the readings.
 
     The statistic is the smaller of the deviations from either side over the bulk of such
     deviations. It has to pass the Gaussian threshold and four times the 97th percentile over the
@@ -68,7 +69,7 @@ def _unpredicted(recording: Recording, contacts: bool = True) -> list[Spike]:
     found: list[tuple[float, float, Span]] = []
     for width in range(1, LONGEST + 1):
         for strength, size, span in _of_width(x, form, width, least):
-            if size >= 0.0 or not brief:
+            if not brief or (size >= 0.0 and _is_above(x, span, period)):
                 found.append((strength, size, span))
     chosen: list[Spike] = []
     for strength, size, (first, end) in sorted(found, reverse=True):
@@ -76,6 +77,14 @@ def _unpredicted(recording: Recording, contacts: bool = True) -> list[Spike]:
             chosen.append(Spike((first, end), size, strength, least))
     count = sum(one.span[1] - one.span[0] for one in chosen)
     return chosen if count <= max(MOST * x.size, LONGEST) else []
+
+
+def _is_above(x: Array, span: Span, period: float | None) -> bool:
+    """Whether readings lie above all others within half a period."""
+    reach = x.size if period is None else int(np.ceil(0.5 * period))
+    first, end = span
+    around = np.concatenate([x[max(first - reach, 0) : first], x[end : end + reach]])
+    return bool(x[first:end].max() > np.max(around, initial=-np.inf))
 
 
 def _fault(recording: Recording, spikes: list[Spike]) -> list[Fault]:

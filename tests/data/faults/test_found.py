@@ -398,3 +398,26 @@ def test_a_swing_to_the_other_side_is_no_hand() -> None:
     fault = recording_faults(Recording("p", "", samples, 0.01, quantity="angle"))[0]
     assert fault.id == "recording_start" and "at rest" in fault.statement
     assert fault.end_s == pytest.approx(1.0, abs=0.12)
+
+
+def chatter(seed: int) -> np.ndarray:
+    """An acceleration, m/s2, with three brief contacts a period and flights between them."""
+    t = np.arange(6000) * 2.5e-4
+    x = 9.0 * np.exp(-0.4 * t) * np.cos(2 * np.pi * 6.0 * t)
+    for start in np.arange(330, 5600, 667):
+        for k in range(3):
+            first = start + 11 * k
+            x[first : first + 8] -= 18.0 * np.sin(np.pi * (np.arange(8) + 0.5) / 8)
+    return np.asarray(x + 0.02 * np.random.default_rng(seed).standard_normal(t.size))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_flights_between_brief_contacts_are_no_spikes(seed: int) -> None:
+    """But what lies above them is one."""
+    x = chatter(seed)
+    recording = Recording("a", "1", x, 2.5e-4, quantity="acceleration")
+    assert "recording_spikes" not in {f.id for f in recording_faults(recording)}
+    x[2900] += 25.0
+    found = recording_faults(replace(recording, samples=x))
+    spikes = [f for f in found if f.id == "recording_spikes"]
+    assert [f.spans for f in spikes] == [((2900, 2901),)]
