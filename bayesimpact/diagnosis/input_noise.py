@@ -42,30 +42,36 @@ STEP = 0.05  # of a standard deviation, other parameters as they are: for differ
 
 
 def with_input_noise(before: Identification) -> Identification:
-    """The same with the noise of the measured inputs, if they have any that matters."""
-    noise = None if is_large(before.fit) else input_noise(before.fit)
-    if noise is None:
+    """The same with the noise of the measured inputs, if they have any that matters; not where it
+    leaves a large misfit: what that is comes first.
+    """
+    noise = input_noise(before.fit)
+    fit = before.fit if noise is None else refitted(before.fit, noise=noise)
+    if noise is None or is_large(fit):
         return before
-    return replace(before, fit=refitted(before.fit, noise=noise), noise=noise)
+    return replace(before, fit=fit, noise=noise)
 
 
 def input_noise(fit: Fit) -> Noise | None:
-    """The noise with that of the measured inputs, as a fit without a large misfit tells it; None
-    where it does not matter, cannot be told from the input, or is known already.
+    """The noise with that of the measured inputs, as a fit tells it; None where it does not matter,
+    cannot be told from the input, or is known already.
 
-    Beside readings of growing or filtered noise, or a base's displacement, whose second derivative
-    is the force, it is not looked for.
+    Beside readings of growing or filtered noise, channels of one motion, which it moves together,
+    or a base's displacement, whose second derivative is the force, it is not looked for.
     """
     noise, campaign = fit.target.likelihood.noise, fit.target.oscillator.campaign
     floors = {r.name: _force(fit, r) * _floor(r) for r in campaign.recordings}
     floors = {name: floor for name, floor in floors.items() if floor > 0.0}
     known = noise.forces is not None or noise.grows or noise.smoothing is not None
-    if known or not floors:
+    if known or not floors or any(r.motion_name for r in campaign.recordings):
         return None
     moves = all(np.isfinite(y).all() and np.ptp(y) for y in fit.displacements)
     if not (moves and fit.value("k1") > 0):
         return None
-    whole, linear = _of_floors(fit, floors), _as_read(fit)
+    try:
+        whole, linear = _of_floors(fit, floors), _as_read(fit)
+    except np.linalg.LinAlgError:
+        return None  # a motion that no small force changes
 
     def minus(log_size: float) -> float:
         return -_log_likelihood(fit, linear, _scaled(noise, whole, float(np.exp(log_size))))

@@ -85,7 +85,8 @@ def name(
     if first is None:
         first = _beside_hums(fit, lambda: _Search(effects, scales, rng, say, search.budget))
     base, state = search.found(fit, first)
-    asks = bool(state.candidate.effects) or search.was_cut or search.budget.may_search_again()
+    goes_on = bool(state.candidate.effects) and search.budget.may_go_on()
+    asks = goes_on or search.was_cut or search.budget.may_search_again()
     anew = posed_anew(fit, state, say) if asks else None
     if anew is not None:
         again = _Search(effects, scales, rng, say, search.budget)

@@ -43,7 +43,8 @@ class Remaining(Settling):
         smaller = {e.id: self.drop(chosen, e) for e in chosen.effects}
         for effect in chosen.effects:  # whether time is up or not: no law is told without
             self.simplified(chosen, effect)
-            if in_its_place(found, (effect,)) is None and self.budget.may_compare_on(self.look):
+            late = not found.finished and self.budget.may_compare_on(self.look)
+            if late and in_its_place(found, (effect,)) is None:
                 self.likeliest_in_place(chosen, effect)
         tried = tuple(sorted(self.tried.values(), key=found.log_odds, reverse=True))
         found = replace(found, tried=tried, states=dict(self.states))

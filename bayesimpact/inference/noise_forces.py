@@ -11,10 +11,12 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.data.frozen import Picklable
 from bayesimpact.inference.noise_prediction import Parts
 from bayesimpact.model.compiled import compiled
 from bayesimpact.model.superposition import StateSpace
@@ -24,7 +26,7 @@ Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
-class RandomForces:
+class RandomForces(Picklable):
     """A random force in every recording, of independent values from sample to sample.
 
     Attributes
@@ -42,9 +44,18 @@ class RandomForces:
     def __repr__(self) -> str:
         whole = hashlib.sha256()
         for name, path in sorted(self.paths.items()):
-            whole.update(name.encode() + np.ascontiguousarray(path.readings).tobytes())
+            whole.update(name.encode())
+            for array in (path.readings, path.kicks, path.turns):
+                whole.update(np.ascontiguousarray(array).tobytes())
         sizes = dict(self.sizes)
         return f"RandomForces({sizes!r}, share={self.share!r}, {whole.hexdigest()[:16]})"
+
+    def __getstate__(self) -> dict[str, Any]:
+        return super().__getstate__() | {"_known": {}}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        super().__setstate__(state)
+        self.__dict__["_known"] = {}
 
     def innovations(self, name: str, x: Array, parts: Parts, used: Mask | None) -> Array:
         """Innovations of a recording's signals (..., n) over their standard deviation, (..., n).

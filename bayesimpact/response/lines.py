@@ -16,14 +16,14 @@ NEAR = 2  # bins on either side that Hann's window spreads a steady line over
 
 
 def has_line(samples: Floats) -> bool:
-    """Whether readings (n,) hold an oscillation of ten periods or more.
+    """Whether readings (n,) hold an oscillation of ten periods or more, of four samples or more.
 
     The periodogram over its background is compared with what noise shows. The background of a
     frequency is the larger one of the medians of the octaves below and above it, over the median of
     an exponential variable: what falls towards high frequencies, as drift, random walks and
-    integrated noise do, or has gaps, as what a filter leaves, does not stand out of it. The largest
-    of m such ratios exceeds ln(m / alpha) with chance alpha (Fisher 1929; background by medians:
-    Mann and Lees 1996).
+    integrated noise do, does not stand out of it. The largest of m such ratios exceeds
+    ln(m / alpha) with chance alpha (Fisher 1929; background by medians: Mann and Lees 1996);
+    between the gaps of a filter more often.
 
     Parameters
     ----------

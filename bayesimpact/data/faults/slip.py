@@ -42,10 +42,10 @@ def find_slips(recording: Recording) -> list[Fault]:
     passed, which is what corners of the motion reach, and what rounding may do to both. A slip is
     of whole samples: its sides are apart by half a sample's way of the motion or more, while an
     impact, or a stop that chatters, bends the motion by less. An acceleration jumps by itself where
-    the mass turns, and friction with it. A velocity becomes less at a touch, where the obstacle has
-    a mass; samples lost there show when recordings are compared. Where both sides do meet once a
-    few samples beside the place are left out, those were a spike. The remedy keeps the longest part
-    without a slip: how many samples are missing need then not be known.
+    the mass turns, and friction with it. A velocity towards the stop becomes less at a touch, where
+    the obstacle has a mass; samples lost there show when recordings are compared. Where both sides
+    do meet once a few samples beside the place are left out, those were a spike. The remedy keeps
+    the longest part without a slip: how many samples are missing need then not be known.
     """
     x = recording.samples
     period = crossing_period(x, 1.0)
@@ -70,7 +70,7 @@ def find_slips(recording: Recording) -> list[Fault]:
         size = np.abs(x - np.mean(x)) * 2.0 * np.pi / period
         strong &= ~(way < TURNING * size)
     if recording.order == 1 and recording.case:  # an obstacle's mass takes of it at every touch
-        strong &= ~(np.abs(sides.after) < np.abs(sides.before))
+        strong &= ~((sides.before > 0.0) & (np.abs(sides.after) < sides.before))
     places = [
         p
         for p in _peaks(jump, strong, form[1])

@@ -39,6 +39,7 @@ KINDS = ("recording_gain", "recording_clock")
 ROUNDS = 3  # of a correction and what the mode with it says of its size
 SETTLED = 0.1  # standard errors of the size: less is no correction
 TRIED = 2  # the likeliest one, and the one that it has to beat
+LOST = 1e-6  # of a direction's size, that parameters leave of it: less is rounding
 SLACK = 2.0  # times the misfit that may stay, that a score may promise: it is of first order
 
 
@@ -63,7 +64,7 @@ def fault_beside(base: Fit, found: Fit) -> tuple[Compared, Fit] | None:
     where there is none.
 
     It must leave no large misfit, `EXCESS` times less of it than the model of the same effects, no
-    more than `found`, and decisively less than any other such fault of any recording.
+    more than `found`, and decisively less than the next one that its score promises as much of.
     """
     campaign = found.target.oscillator.campaign
     if campaign.keep_faults or len(campaign.recordings) < LEAST:
@@ -72,7 +73,9 @@ def fault_beside(base: Fit, found: Fit) -> tuple[Compared, Fit] | None:
     if shared is None or not leaves_something(shared):
         return None
     guesses = [g for g in _guesses(shared) if _promises(shared, g)][:TRIED]
-    tried = sorted((_refined(shared, g) for g in guesses), key=lambda one: one[1].reduced_chi2)
+    tried = [_refined(shared, g) for g in guesses]
+    tried = [one for one in tried if np.isfinite(one[1].reduced_chi2)]
+    tried.sort(key=lambda one: one[1].reduced_chi2)
     if not tried:
         return None
     best, fit = tried[0]
@@ -128,7 +131,7 @@ def _guesses(fit: Fit) -> list[_Guess]:
     every = [Hypothesis(kind, r) for r in range(len(recordings)) for kind in kinds]
     found = project(fit, _directions(fit, every))
     information = np.diag(found.information)
-    seen = np.flatnonzero(information > 0.0)
+    seen = np.flatnonzero((information > 0.0) & (found.kept > LOST))
     guesses = [
         _Guess(
             every[i],
@@ -160,8 +163,9 @@ def _directions(fit: Fit, faults: Sequence[Hypothesis]) -> list[Array]:
 def _refined(fit: Fit, guess: _Guess) -> tuple[_Guess, Fit]:
     """The fault with the size at which the mode asks for no other one, and that mode."""
     hypothesis, whole = guess.hypothesis, fit.target.oscillator.campaign
-    value, sd, now = guess.value, guess.sd, fit
+    value, sd, further, now = guess.value, guess.sd, 0.0, fit
     for _ in range(ROUNDS):
+        value += further
         step = Weighed(hypothesis, guess.gained, value=value, sd=sd)
         now = refitted(now, corrected(whole, hypothesis.recording, step))
         left = project(now, _directions(now, [hypothesis]))
@@ -171,5 +175,4 @@ def _refined(fit: Fit, guess: _Guess) -> tuple[_Guess, Fit]:
         further, sd = float(left.score[0]) / information, information**-0.5
         if abs(further) < SETTLED * sd:
             break
-        value += further
     return _Guess(hypothesis, value, sd, guess.gained), now

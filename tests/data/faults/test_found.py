@@ -421,3 +421,21 @@ def test_flights_between_brief_contacts_are_no_spikes(seed: int) -> None:
     found = recording_faults(replace(recording, samples=x))
     spikes = [f for f in found if f.id == "recording_spikes"]
     assert [f.spans for f in spikes] == [((2900, 2901),)]
+
+
+def rebounds(seed: int) -> np.ndarray:
+    """A velocity, m/s, of which an obstacle's mass takes a part at every touch."""
+    t = np.arange(6000) * 5e-4
+    x = 0.2 * np.exp(-0.2 * t) * np.cos(2 * np.pi * 7.0 * t)
+    for touch in (551, 837):
+        x[touch:] *= 0.97
+    return np.asarray(x + 2e-5 * np.random.default_rng(seed).standard_normal(t.size))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_touches_of_an_obstacle_with_a_mass_are_no_slips(seed: int) -> None:
+    """A velocity towards the stop becomes less; without a stop samples were lost."""
+    x = rebounds(seed)
+    for case, slips in (("1", False), ("", True)):
+        recording = Recording("a", case, x, 5e-4, quantity="velocity")
+        assert any(f.id == "recording_slip" for f in recording_faults(recording)) is slips
