@@ -129,14 +129,15 @@ def _basis(at: Array, far: Array, period: float) -> Array:
 
 
 def _is_step(x: Array, places: Array, noise: float, period: float) -> bool:
-    """Whether one step of the readings (a zero that moved), which may change their slope as well
-    (samples lost), explains them as well.
+    """Whether one step of the readings (a zero that moved), behind which the vibration may have
+    another phase (samples lost), explains them as well.
     """
     places = np.sort(places)
     basis = _basis(places, places, period)
     for step in places[GUARD:-GUARD]:
         behind = places >= step
-        columns = np.column_stack([basis, behind, np.where(behind, places - step, 0)])
+        own = np.column_stack([np.ones(places.size), places - step, basis[:, 4:6]])
+        columns = np.column_stack([basis, behind[:, None] * own])
         left = x[places] - columns @ np.linalg.lstsq(columns, x[places], rcond=1e-6)[0]
         if left @ left < (JOINED * noise) ** 2 * places.size:
             return True
