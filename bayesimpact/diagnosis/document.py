@@ -30,9 +30,9 @@ from bayesimpact.diagnosis.words import (
     failure,
     left_open,
     nearest,
+    noise_words,
     parameter_shifts,
     remaining,
-    slow_noise_words,
     statement,
 )
 from bayesimpact.formula.law import is_formula_id
@@ -99,7 +99,7 @@ def document(
                 band_limited=d.naming.band_limited,
             )
         )
-        + slow_noise_words(noise)
+        + noise_words(noise)
         + _nearest(d)
         + _unfinished(d),
         "location": _location(d.location) or (place(faulty) if faulty else None),
@@ -134,6 +134,7 @@ def document(
             "correlation": "ar1" if noise.is_coloured else "white",
             "coefficient": noise.correlation,
             "parts": [{"coefficient": rho, "share": share} for rho, share in noise.parts],
+            "input_percent": None if noise.forces is None else 100 * noise.forces.share,
             "source": noise.source,
         },
         "seed": seed,

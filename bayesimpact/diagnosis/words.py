@@ -151,8 +151,11 @@ def remaining(left: Remainder | None, unit: str = "m") -> str:
     )
 
 
-def slow_noise_words(noise: Noise) -> str:
-    """A sentence where what a model leaves was taken for slow noise; else empty."""
+def noise_words(noise: Noise) -> str:
+    """A sentence where what a model leaves was taken for slow noise, or an input's; else empty."""
+    if noise.forces is not None:
+        size = f"{100 * noise.forces.share:.2g} % of it"
+        return f" The noise of the measured input ({size}) moves the model: intervals allow for it."
     if noise.is_independent or not noise.others:
         return ""
     return (

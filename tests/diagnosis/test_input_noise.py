@@ -16,6 +16,7 @@ from bayesimpact.data.input import Input
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.input_noise import input_noise, with_input_noise
 from bayesimpact.diagnosis.thresholds import LARGE
+from bayesimpact.diagnosis.words import noise_words
 from bayesimpact.formula.responses import motion_of
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification, identify
@@ -226,3 +227,9 @@ def test_noise_with_forces_pickles() -> None:
     again = pickle.loads(pickle.dumps(noise))
     np.testing.assert_array_equal(again.whitened(recording, x), white)
     assert repr(again) == repr(noise)
+
+
+def test_the_noise_of_an_input_is_told() -> None:
+    noise = Noise(level=1.0, forces=RandomForces({}, {}, 0.0123))
+    assert "noise of the measured input (1.2 % of it)" in noise_words(noise)
+    assert noise_words(Noise(level=1.0)) == ""

@@ -17,10 +17,10 @@ from bayesimpact.diagnosis.words import (
     failure,
     left_open,
     nearest,
+    noise_words,
     parameter_shift,
     parameter_shifts,
     remaining,
-    slow_noise_words,
     statement,
 )
 from bayesimpact.inference.noise import Noise
@@ -108,8 +108,8 @@ def test_a_failed_base_fit_says_what_may_be_wrong():
 
 
 def test_slow_noise_is_said_where_a_model_s_residual_showed_it():
-    assert slow_noise_words(Noise()) == slow_noise_words(Noise(0.4)) == ""
-    said = slow_noise_words(Noise(0.96, others=((0.0, 0.4),), is_independent=False))
+    assert noise_words(Noise()) == noise_words(Noise(0.4)) == ""
+    said = noise_words(Noise(0.96, others=((0.0, 0.4),), is_independent=False))
     assert "60 % AR(1), correlation 0.96, 40 % white" in said
 
 
