@@ -42,14 +42,13 @@ STEP = 0.05  # of a standard deviation, other parameters as they are: for differ
 
 
 def with_input_noise(before: Identification) -> Identification:
-    """The same with the noise of the measured inputs, if they have any that matters; not where it
-    leaves a large misfit: what that is comes first.
+    """The same with the noise of the measured inputs, if they have any that matters; not beside a
+    large misfit: what that is comes first.
     """
-    noise = input_noise(before.fit)
-    fit = before.fit if noise is None else refitted(before.fit, noise=noise)
-    if noise is None or is_large(fit):
+    noise = None if is_large(before.fit) else input_noise(before.fit)
+    if noise is None:
         return before
-    return replace(before, fit=fit, noise=noise)
+    return replace(before, fit=refitted(before.fit, noise=noise), noise=noise)
 
 
 def input_noise(fit: Fit) -> Noise | None:

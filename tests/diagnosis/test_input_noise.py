@@ -204,20 +204,6 @@ def test_beside_what_is_missing_it_is_told_by_the_model_that_holds_that() -> Non
     assert np.max(np.abs(deviations(found.after, rig))) < 4.0
 
 
-def test_a_large_misfit_that_is_all_the_inputs_noise_is_told_by_the_base_model() -> None:
-    """Of a good sensor beside an ordinary load cell; one with a law missing stays as it is."""
-    rig = driven_rig(4, "displacement", kind="sweep")
-    before = identified(with_noisy_input(rig, 0, error=0.15))
-    assert before.fit.reduced_chi2 > LARGE**2
-    after = with_input_noise(before)
-    assert after.fit.reduced_chi2 == pytest.approx(1.0, abs=0.15)
-    assert after.noise.forces is not None
-    assert after.noise.forces.share == pytest.approx(0.15, rel=0.25)
-    missing = driven_rig(4, "displacement", stiff, kind="sweep")
-    other = identified(with_noisy_input(missing, 0))
-    assert with_input_noise(other) is other
-
-
 def test_noise_with_forces_pickles() -> None:
     (recording,) = driven_rig(4, "displacement", kind="sweep").campaign.recordings
     n = recording.samples.size
