@@ -13,7 +13,7 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.faults.fault import Fault, fault_document
 from bayesimpact.data.faults.find import set_aside
 from bayesimpact.data.short_repr import short_repr
-from bayesimpact.diagnosis.faults.alone import SharedModel
+from bayesimpact.diagnosis.faults.alone import SharedModel, has_own_size
 from bayesimpact.diagnosis.faults.compare import (
     Compared,
     base_failed,
@@ -186,11 +186,7 @@ def values_of(fit: Fit) -> dict[str, float]:
 
 def shared_effects(effects: Sequence[Effect]) -> tuple[Effect, ...]:
     """Effects of the catalogue without a parameter of every recording's own."""
-    return tuple(
-        e
-        for e in effects
-        if not is_formula(e) and all(p.scope != "recording" or p.initial for p in e.parameters)
-    )
+    return tuple(e for e in effects if not (is_formula(e) or has_own_size(e)))
 
 
 def with_steps(

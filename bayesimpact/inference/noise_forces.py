@@ -45,7 +45,7 @@ class RandomForces(Picklable):
         whole = hashlib.sha256()
         for name, path in sorted(self.paths.items()):
             whole.update(name.encode())
-            for array in (path.readings, path.kicks, path.turns):
+            for array in (path.readings, path.increments, path.transitions):
                 whole.update(np.ascontiguousarray(array).tobytes())
         sizes = dict(self.sizes)
         return f"RandomForces({sizes!r}, share={self.share!r}, {whole.hexdigest()[:16]})"
@@ -67,7 +67,7 @@ class RandomForces(Picklable):
         n, path = rows.shape[1], self.paths[name]
         sd, gains = self._steps(name, n, parts, used)
         correlations = np.array([correlation for correlation, _ in parts])
-        white = _innovations(rows, path.readings[:n], path.turns[:n], correlations, sd, gains)
+        white = _innovations(rows, path.readings[:n], path.transitions[:n], correlations, sd, gains)
         return np.asarray(white.reshape(x.shape))
 
     def log_determinant(self, name: str, n: int, parts: Parts, used: Mask | None) -> float:
@@ -80,22 +80,24 @@ class RandomForces(Picklable):
         if name not in self.paths:
             return np.zeros(n)
         path, forces = self.paths[name], self.sizes[name] * rng.standard_normal(n)
-        return np.asarray(_moved(forces, path.readings[:n], path.kicks[:n], path.turns[:n]))
+        return np.asarray(
+            _moved(forces, path.readings[:n], path.increments[:n], path.transitions[:n])
+        )
 
     def _steps(self, name: str, n: int, parts: Parts, used: Mask | None) -> tuple[Array, Array]:
         key = name, n, parts, None if used is None else used.tobytes()
         if key not in self._known:
             path, kept = self.paths[name], np.ones(n, dtype=np.bool_) if used is None else used
-            kicks = self.sizes[name] * path.kicks[:n]
+            increments = self.sizes[name] * path.increments[:n]
             correlations, shares = np.array(parts).T
             self._known[key] = _filter(
-                path.readings[:n], kicks, path.turns[:n], kept, correlations, shares
+                path.readings[:n], increments, path.transitions[:n], kept, correlations, shares
             )
         return self._known[key]
 
 
 @compiled()
-def _filter(readings, kicks, turns, used, correlations, shares):  # type: ignore[no-untyped-def]
+def _filter(readings, increments, transitions, used, correlations, shares):  # type: ignore[no-untyped-def]
     """Standard deviation of every innovation, infinite where there is none, and by how much of it
     both free changes and every process are to be corrected, (n, 2 + K).
     """
@@ -108,8 +110,8 @@ def _filter(readings, kicks, turns, used, correlations, shares):  # type: ignore
         if i > 0:
             for a in range(2):
                 for b in range(2):
-                    covariance[a, b] += kicks[i, a] * kicks[i, b]
-                    step[a, b] = turns[i, a, b]
+                    covariance[a, b] += increments[i, a] * increments[i, b]
+                    step[a, b] = transitions[i, a, b]
             covariance = step @ covariance @ step.T
             for j in range(2, size):
                 covariance[j, j] += shares[j - 2] * (1.0 - correlations[j - 2] ** 2)
@@ -126,7 +128,7 @@ def _filter(readings, kicks, turns, used, correlations, shares):  # type: ignore
 
 
 @compiled()
-def _innovations(rows, readings, turns, correlations, sd, gains):  # type: ignore[no-untyped-def]
+def _innovations(rows, readings, transitions, correlations, sd, gains):  # type: ignore[no-untyped-def]
     white, size = np.empty_like(rows), gains.shape[1]
     expected = np.zeros(size)
     for r in range(rows.shape[0]):
@@ -134,8 +136,8 @@ def _innovations(rows, readings, turns, correlations, sd, gains):  # type: ignor
         for i in range(rows.shape[1]):
             if i > 0:
                 first, second = expected[0], expected[1]
-                expected[0] = turns[i, 0, 0] * first + turns[i, 0, 1] * second
-                expected[1] = turns[i, 1, 0] * first + turns[i, 1, 1] * second
+                expected[0] = transitions[i, 0, 0] * first + transitions[i, 0, 1] * second
+                expected[1] = transitions[i, 1, 0] * first + transitions[i, 1, 1] * second
                 for j in range(2, size):
                     expected[j] *= correlations[j - 2]
             missed = rows[r, i] - readings[i, 0] * expected[0] - readings[i, 1] * expected[1]
@@ -148,12 +150,12 @@ def _innovations(rows, readings, turns, correlations, sd, gains):  # type: ignor
 
 
 @compiled()
-def _moved(forces, readings, kicks, turns):  # type: ignore[no-untyped-def]
+def _moved(forces, readings, increments, transitions):  # type: ignore[no-untyped-def]
     """What forces in the interval before every sample move the readings by, (n,)."""
     moved, first, second = np.zeros(forces.size), 0.0, 0.0
     for i in range(1, forces.size):
-        a, b = first + kicks[i, 0] * forces[i], second + kicks[i, 1] * forces[i]
-        first = turns[i, 0, 0] * a + turns[i, 0, 1] * b
-        second = turns[i, 1, 0] * a + turns[i, 1, 1] * b
+        a, b = first + increments[i, 0] * forces[i], second + increments[i, 1] * forces[i]
+        first = transitions[i, 0, 0] * a + transitions[i, 0, 1] * b
+        second = transitions[i, 1, 0] * a + transitions[i, 1, 1] * b
         moved[i] = readings[i, 0] * first + readings[i, 1] * second
     return moved

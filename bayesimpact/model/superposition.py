@@ -112,13 +112,13 @@ class StateSpace:
     Attributes
     ----------
     readings : (n, 2), the reading's quantity per unit of either
-    kicks : (n, 2), what a newton during the interval before a sample adds to either
-    turns : (n, 2, 2), what either becomes at a sample, where others take their place
+    increments : (n, 2), what a newton during the interval before a sample adds to either
+    transitions : (n, 2, 2), what either becomes at a sample, where others take their place
     """
 
     readings: Array
-    kicks: Array
-    turns: Array
+    increments: Array
+    transitions: Array
 
 
 def state_space(motion: Motion) -> StateSpace:
@@ -126,8 +126,8 @@ def state_space(motion: Motion) -> StateSpace:
     left out.
     """
     n, changes, factor = motion.samples, motion.changes, motion.factor
-    readings, kicks = np.zeros((n, 2)), np.zeros((n, 2))
-    turns = np.tile(np.eye(2), (n, 1, 1))
+    readings, increments = np.zeros((n, 2)), np.zeros((n, 2))
+    transitions = np.tile(np.eye(2), (n, 1, 1))
     parts = zip(changes.stretches, changes.impulses, changes.carried, strict=True)
     for part, impulses, carried in parts:
         own = slice(part.begin, part.begin + part.readings.shape[0] - 1)
@@ -136,10 +136,10 @@ def state_space(motion: Motion) -> StateSpace:
         unit = np.ones((1, part.readings.shape[0]))
         states = _states(-impulses.T, unit, motion.steps[:, own], factor)[:, 0]
         if first > 0:
-            turns[first] = carried
+            transitions[first] = carried
         readings[first : first + count] = rows
-        kicks[first + 1 : first + count] = np.diff(states, axis=1).T
-    return StateSpace(readings, kicks, turns)
+        increments[first + 1 : first + count] = np.diff(states, axis=1).T
+    return StateSpace(readings, increments, transitions)
 
 
 def answers(motion: Motion, forces: Array) -> Array:

@@ -96,9 +96,9 @@ def test_an_input_that_fills_the_band_tells_nothing() -> None:
 def path(n: int, seed: int = 2) -> StateSpace:
     """Of a motion whose free changes are renewed twice."""
     rng = np.random.default_rng(seed)
-    turns = np.tile(np.eye(2), (n, 1, 1))
-    turns[[n // 3, n // 2]] = rng.standard_normal((2, 2, 2))
-    return StateSpace(rng.standard_normal((n, 2)), rng.standard_normal((n, 2)), turns)
+    transitions = np.tile(np.eye(2), (n, 1, 1))
+    transitions[[n // 3, n // 2]] = rng.standard_normal((2, 2, 2))
+    return StateSpace(rng.standard_normal((n, 2)), rng.standard_normal((n, 2)), transitions)
 
 
 def moved_by(space: StateSpace, size: float) -> np.ndarray:
@@ -108,7 +108,7 @@ def moved_by(space: StateSpace, size: float) -> np.ndarray:
     for k in range(1, n):
         state = np.zeros(2)
         for i in range(1, n):
-            state = space.turns[i] @ (state + (size * space.kicks[i] if i == k else 0.0))
+            state = space.transitions[i] @ (state + (size * space.increments[i] if i == k else 0.0))
             moved[i, k] = space.readings[i] @ state
     return moved
 
@@ -161,7 +161,7 @@ def test_forces_along_a_motion_are_those_of_the_superposition() -> None:
     between = np.append(0.0, 0.5 * (at[1:] + at[:-1]))
     state, moved = np.zeros(2), np.zeros(at.size)
     for i in range(1, at.size):
-        state = space.turns[i] @ (state + space.kicks[i] * between[i])
+        state = space.transitions[i] @ (state + space.increments[i] * between[i])
         moved[i] = space.readings[i] @ state
     exact = answers(motion, force[None])[0]
     assert np.std(moved - exact) < 0.005 * np.std(exact)

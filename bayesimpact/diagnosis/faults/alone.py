@@ -86,6 +86,11 @@ def _is_by_case(effect: Effect) -> bool:
     )
 
 
+def has_own_size(effect: Effect) -> bool:
+    """Whether every recording has a size of its own."""
+    return any(p.scope == "recording" and not p.initial for p in effect.parameters)
+
+
 def inverted(recording: Recording) -> Recording:
     """The recording with the other sign."""
     return replace(recording, samples=-recording.samples)

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.diagnosis.directions import whitened
 from bayesimpact.diagnosis.extend import campaign_scales
+from bayesimpact.diagnosis.faults.alone import has_own_size
 from bayesimpact.diagnosis.faults.compare import LEAST, Compared, gain
 from bayesimpact.diagnosis.faults.correct import as_fault, corrected
 from bayesimpact.diagnosis.faults.together import CERTAIN, Hypothesis, Weighed
@@ -31,7 +32,6 @@ from bayesimpact.diagnosis.thresholds import DECISIVE, DOUBT, EXCESS, LARGE
 from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.refitted import refitted
-from bayesimpact.model.effects.effect import Effect
 
 Array = NDArray[np.float64]
 
@@ -103,11 +103,6 @@ def without_own(base: Fit, found: Fit) -> Fit | None:
         return found
     values = dict(zip(found.names, map(float, found.mode), strict=True))
     return fit_from(base, rest, values, campaign_scales(base)).fit
-
-
-def has_own_size(effect: Effect) -> bool:
-    """Whether every recording has a size of its own."""
-    return any(p.scope == "recording" and not p.initial for p in effect.parameters)
 
 
 def _above(fit: Fit) -> float:
