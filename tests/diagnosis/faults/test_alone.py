@@ -8,8 +8,10 @@ import numpy as np
 import small_rig
 from effect_rigs import BY_ID
 
+from bayesimpact.diagnosis.faults import alone
 from bayesimpact.diagnosis.faults.alone import NAMES, SharedModel, fit_alone, inverted, own_fit
 from bayesimpact.inference.noise import Noise
+from bayesimpact.model.effects import EFFECTS
 
 
 def test_a_recording_that_misses_the_obstacle_shows_nothing_of_contacts():
@@ -36,3 +38,11 @@ def test_what_a_law_of_the_contact_replaces_counts_as_not_measured():
     assert found is not None
     variance = dict(zip(NAMES, np.diag(found.covariance), strict=True))
     assert variance["k1"] < 1.0 and variance["g"] < 1.0 and variance["c2"] == 1e6
+
+
+def test_a_law_without_parameters_stays_beside_a_recording_alone() -> None:
+    """It is none that only gives every stop a parameter of its own."""
+    by_id = {e.id: e for e in EFFECTS}
+    assert not alone._is_by_case(by_id["pendulum_sine"])
+    assert not alone._is_by_case(by_id["contact_no_tension"])
+    assert alone._is_by_case(by_id["contact_damping_per_case"])
