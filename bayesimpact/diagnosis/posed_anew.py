@@ -40,24 +40,51 @@ class Posed:
     faults: tuple[Compared, ...] = ()
     band_limited: bool = False
 
+    @property
+    def found(self) -> Fit:
+        """The model from which it begins."""
+        return self.base if self.first is None else self.first
+
+    def followed_by(self, other: Posed) -> Posed:
+        """Another one that was posed on this one's."""
+        return replace(
+            other,
+            faults=(*self.faults, *other.faults),
+            band_limited=self.band_limited or other.band_limited,
+        )
+
 
 def posed_anew(base: Fit, state: State, say: Progress) -> Posed | None:
-    """The search without the readings that spoil it, with a recording corrected, with the inputs
-    between their samples that a model asks for, under the slow noise that is all that it leaves, or
-    that of its inputs.
+    """The search without the readings that spoil it, with recordings corrected, with the inputs
+    between their samples that a model asks for, under the noise of its inputs and the slow one that
+    is all that it leaves; None where there is nothing of these.
+
+    Several may be off at once: each is asked of the model with what was told before it.
     """
     found = state.candidate.fit
-    if not (state.is_white and found is base):
-        posed = _without_readings(base, found, say)
-        posed = posed or _with_a_recording_corrected(base, found, say)
-        posed = posed or _with_band_limited_inputs(base, found, say)
-        if posed is not None:
-            return posed
-    if is_large(found):
-        return None
-    noise, what = None if state.is_white else remaining_noise(found), "what remains is slow noise"
-    if noise is None:
-        noise, what = _of_inputs(base, found), "the noise of the input matters"
+    posed = begun = Posed(base, None if found is base else found)
+    steps = () if state.is_white and found is base else READINGS
+    steps = (*steps, _under_noise_of_inputs, *([] if state.is_white else [_under_slow_noise]))
+    while True:
+        told = (step(posed.base, posed.found, say) for step in steps)
+        other = next((one for one in told if one is not None), None)
+        if other is None:
+            return None if posed is begun else posed
+        posed = posed.followed_by(other)
+
+
+def _under_noise_of_inputs(base: Fit, found: Fit, say: Progress) -> Posed | None:
+    """Under the noise of the inputs that a model tells."""
+    return _under(base, found, _of_inputs(base, found), "the noise of the input matters", say)
+
+
+def _under_slow_noise(base: Fit, found: Fit, say: Progress) -> Posed | None:
+    """Under the slow noise that is all that a model leaves."""
+    noise = None if is_large(found) else remaining_noise(found)
+    return _under(base, found, noise, "what remains is slow noise", say)
+
+
+def _under(base: Fit, found: Fit, noise: Noise | None, what: str, say: Progress) -> Posed | None:
     if noise is None:
         return None
     say(f"{what}: once more under that")
@@ -152,6 +179,9 @@ def _without_readings(base: Fit, found: Fit, say: Progress) -> Posed | None:
     if found is base:
         return Posed(clean, None, told)
     return Posed(base if is_same else refitted(base, campaign), clean, told)
+
+
+READINGS = (_without_readings, _with_a_recording_corrected, _with_band_limited_inputs)
 
 
 def is_spoilt(base: Fit, fit: Fit) -> bool:

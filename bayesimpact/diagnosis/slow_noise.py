@@ -23,10 +23,8 @@ from bayesimpact.inference.refitted import refitted
 
 
 def remaining_noise(fit: Fit) -> Noise | None:
-    """The slow noise that a fit leaves; None where it leaves none, or anything else as well, or
-    where that of an input is known.
-    """
-    if fit.target.likelihood.noise.forces is not None or whiteness_p(fit) >= ALPHA:
+    """The slow noise that a fit leaves; None where it leaves none, or anything else as well."""
+    if whiteness_p(fit) >= ALPHA:
         return None
     found = slow_noise(fit)
     if found is None or found.gain < COLOURED:

@@ -6,7 +6,7 @@ parameters, is taken for noise of both kinds: r - J x ~ N(0, s^2 C), with C the 
 and AR(1) noise, of one correlation time or, where that says much more, of two or three, as noise
 that rises over decades of frequency (1/f) asks for; the parameters are integrated out. What physics
 a fit may have left out is in the residual too: whether this noise explains it better is for the
-caller to ask.
+caller to ask. That of an input, where it is known, stays beside both.
 """
 
 from __future__ import annotations
@@ -65,15 +65,19 @@ def slow_noise(fit: Fit) -> SlowNoise | None:
     noise, known = likelihood.noise, not likelihood.noise.level_error
     if noise.smoothing is not None or known or fit.target.oscillator.campaign.mixed:
         return None
-    plain = Likelihood(fit.target.oscillator, replace(noise, correlation=0.0, others=()))
-    linear = plain.linearise(fit.mode, STEP * fit.sd)
+    as_read = Likelihood(fit.target.oscillator, Noise(level=noise.level))
+    linear = as_read.linearise(fit.mode, STEP * fit.sd)
     if not all(np.isfinite(x).all() for part in linear for x in (part.residual, part.jacobian)):
         return None
     recordings = fit.target.oscillator.campaign.recordings
     longest = max(r.duration / r.interval for r in recordings)
     most = min(float(np.exp(-TIMES / longest)), MOST)
 
-    spectra = _Spectra(fit, linear)
+    log_evidence = _Spectra(fit, linear).log_evidence
+    if noise.forces is not None:  # what these move has no spectrum of its own
+
+        def log_evidence(noise: Noise) -> float:
+            return _Whole(fit, linear, noise).log_evidence
 
     def shape(place: Array) -> Noise:
         """From correlations and, of all AR(1) processes, the log of share over the white one."""
@@ -85,7 +89,7 @@ def slow_noise(fit: Fit) -> SlowNoise | None:
 
     def likeliest(starts: Sequence[Array]) -> _Whole:
         def cost(place: Array) -> float:
-            return -spectra.log_evidence(shape(place))
+            return -log_evidence(shape(place))
 
         rough = min(starts, key=cost)
         simplex = np.vstack([rough, rough + np.eye(rough.size)])
@@ -140,11 +144,14 @@ class _Spectra:
 
     def __init__(self, fit: Fit, linear: tuple[Linearisation, ...]) -> None:
         recordings = fit.target.oscillator.campaign.recordings
-        level, size = fit.target.likelihood.noise.level, fit.mode.size
+        noise, size = fit.target.likelihood.noise, fit.mode.size
+        level = noise.level
         self.free = fit.target.oscillator.layout.roles("physical", "effect", "nuisance")
         self.bands = []
         for part, recording in zip(linear, recordings, strict=True):
             rows = np.vstack([part.jacobian.T, part.residual]) / level
+            if noise.grows:
+                rows = rows / noise.relative_sd(recording)
             waves = np.fft.rfft(rows)[:, 1:] * np.sqrt(2.0 / rows.shape[1])
             number = np.arange(1, waves.shape[1] + 1)
             band = np.unique(np.round(np.log(number) / BAND).astype(int), return_index=True)[1]
@@ -187,12 +194,11 @@ class _Whole:
         products, volume, total, white = np.zeros((size + 1, size + 1)), 0.0, 0, []
         for part, recording in zip(linear, recordings, strict=True):
             rows = np.vstack([part.jacobian.T, part.residual]) / level
-            white.append(noise.whiten(rows, recording.interval, recording.used))
+            white.append(noise.whitened(recording, rows))
             at = np.append(part.columns, size)
             products[np.ix_(at, at)] += white[-1] @ white[-1].T
-            n = recording.samples.size
-            volume += noise.log_volume(n, recording.interval, recording.used)
-            total += noise.size(n, recording.interval, recording.used)
+            volume += noise.volume_of(recording)
+            total += noise.size(recording.samples.size, recording.interval, recording.used)
         found = _integrated(products, free, volume, total)
         self.log_evidence, self.variance, step = found
         change = np.zeros(size)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,8 +15,12 @@ from effect_rigs import BY_ID
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.input import Input
 from bayesimpact.diagnosis.diagnose import diagnose
+from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.input_noise import input_noise, with_input_noise
+from bayesimpact.diagnosis.posed_anew import posed_anew
+from bayesimpact.diagnosis.refit import fit_from
 from bayesimpact.diagnosis.thresholds import LARGE
+from bayesimpact.diagnosis.whiteness import whiteness_p
 from bayesimpact.diagnosis.words import noise_words
 from bayesimpact.formula.responses import motion_of
 from bayesimpact.inference.fit import Fit
@@ -202,6 +207,31 @@ def test_beside_what_is_missing_it_is_told_by_the_model_that_holds_that() -> Non
     forces = found.after.target.likelihood.noise.forces
     assert forces is not None and forces.share == pytest.approx(ERROR, rel=0.25)
     assert np.max(np.abs(deviations(found.after, rig))) < 4.0
+
+
+def with_slow_noise_of_its_own(rig: DrivenRig, campaign: Campaign, seed: int) -> Campaign:
+    """Readings with as much AR(1) noise of correlation 0.8 as they have white noise."""
+    (recording,) = campaign.recordings
+    slow = Noise(0.8).coloured(np.random.default_rng(seed), 1500, recording.interval, rig.noise)
+    return replace(campaign, recordings=(replace(recording, samples=recording.samples + slow),))
+
+
+def test_slow_noise_of_the_readings_is_told_beside_that_of_the_input() -> None:
+    """Both at once, of a model that the base fit misses by far: either alone leaves the other."""
+    rig = driven_rig(4, "displacement", stiff, kind="sweep")
+    campaign = with_slow_noise_of_its_own(rig, with_noisy_input(rig, 1), 7)
+    base = identified(campaign).fit
+    model = fit_from(base, [BY_ID["spring_cubic"]], {}, campaign_scales(base)).fit
+    state: Any = SimpleNamespace(candidate=SimpleNamespace(fit=model), is_white=False)
+    said: list[str] = []
+    anew = posed_anew(base, state, said.append)
+    assert anew is not None and anew.first is not None and len(said) == 2
+    noise = anew.first.target.likelihood.noise
+    assert noise.forces is not None and noise.others
+    assert noise.forces.share == pytest.approx(ERROR, rel=0.3)
+    assert noise == anew.base.target.likelihood.noise
+    assert anew.first.reduced_chi2 == pytest.approx(1.0, abs=0.05)
+    assert whiteness_p(model) < 1e-6 < 0.01 < whiteness_p(anew.first)
 
 
 def test_noise_with_forces_pickles() -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +16,7 @@ from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.faults import beside_model
 from bayesimpact.diagnosis.faults.beside_model import fault_beside
-from bayesimpact.diagnosis.posed_anew import is_spoilt
+from bayesimpact.diagnosis.posed_anew import is_spoilt, posed_anew
 from bayesimpact.diagnosis.refit import fit_from
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
@@ -45,6 +47,11 @@ def fits(campaign: Campaign, *more: str) -> tuple[Fit, Fit]:
     return base, fit_from(base, effects, {}, campaign_scales(base)).fit
 
 
+def state_of(fit: Fit) -> Any:
+    """That leaves something."""
+    return SimpleNamespace(candidate=SimpleNamespace(fit=fit), is_white=False)
+
+
 @pytest.mark.parametrize("more", [(), ("gap_per_recording",)])
 @pytest.mark.parametrize("kind", CHANGES)
 def test_a_fault_is_told_with_its_size(kind: str, more: tuple[str, ...]) -> None:
@@ -59,6 +66,24 @@ def test_a_fault_is_told_with_its_size(kind: str, more: tuple[str, ...]) -> None
     assert {e.id for e in fit.target.oscillator.effects} == set(PHYSICS)
     assert fit.target.oscillator.campaign is compared.campaign
     assert is_spoilt(base, found)
+
+
+def test_a_search_is_posed_anew_without_all_that_is_off() -> None:
+    """A spike shows once the clock is right, and readings with it hardly tell of that."""
+    campaign = recorded(CHANGES["recording_clock"])
+    spiked, *others = campaign.recordings
+    samples = spiked.samples.copy()
+    samples[901] += 30 * small_rig.NOISE
+    campaign = replace(campaign, recordings=(replace(spiked, samples=samples), *others))
+    base, found = fits(campaign)
+    told: list[str] = []
+    anew = posed_anew(base, state_of(found), told.append)
+    assert anew is not None and anew.first is not None
+    kinds = {(one.fault.id, one.fault.recording) for one in anew.faults}
+    assert kinds == {("recording_clock", "b"), ("recording_spikes", "a")}, told
+    assert anew.first.reduced_chi2 < 1.1
+    assert anew.base.target.oscillator.campaign is anew.first.target.oscillator.campaign
+    assert posed_anew(anew.base, state_of(anew.first), told.append) is None
 
 
 def test_physics_that_is_missing_is_no_fault() -> None:
