@@ -19,7 +19,7 @@ from bayesimpact.found import Diagnosis, Identification, Posterior
 from bayesimpact.inference import identify as identification
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
-from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.inference.progress import compilation_shown, progress_bar, refit_bar
 from bayesimpact.inference.search import Generation
 

@@ -281,7 +281,7 @@ def next_(ctx: click.Context, folder: Path, own: Path | None, seed: int, quiet: 
     report with the table.
     """
     from bayesimpact.model.own_effects import load_effects
-    from bayesimpact.report.next_words import table_lines
+    from bayesimpact.report.diagnosis.next_words import table_lines
     from bayesimpact.workflow import NEXT_FILE, next_recording
 
     effects = load_effects(own) if own else ()

@@ -27,7 +27,7 @@ NOT_CONVERGED = 3
 INTERRUPTED = 130
 FAILED_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 _GO_ON = "bayesimpact.go_on"  # in a context's meta: tells what to type after an interruption
-_BLOCKS = "chain/**/block-*.npz"  # of `inference.chainfile`, in a folder of results
+_BLOCKS = "chain/**/block-*.npz"  # of `inference.sampling.chainfile`, in a folder of results
 
 Kept = Literal["nothing", "draws", "finished"]
 """What an interrupted command leaves to go on with: the sampler's draws, by `--resume`, or the
@@ -186,7 +186,7 @@ def telling(quiet: bool) -> Callable[[str], None]:
 
     from tqdm import tqdm
 
-    from bayesimpact.model.compiled import compilation_announced
+    from bayesimpact.model.jit.compiled import compilation_announced
 
     began = time.perf_counter()
 

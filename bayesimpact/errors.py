@@ -48,7 +48,7 @@ class InputError(BayesimpactError, ValueError):
 
 
 class SimulationError(BayesimpactError, RuntimeError):
-    """A simulation ended with a failure code (see `bayesimpact.model.simulate.CODES`)."""
+    """A simulation ended with a failure code (see `bayesimpact.model.exact.simulate.CODES`)."""
 
 
 def system_words(error: OSError) -> str:

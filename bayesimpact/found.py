@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Self, cast
 from bayesimpact.data.html import html_table
 from bayesimpact.diagnosis import loop
 from bayesimpact.diagnosis.intervals import Intervals, intervals
-from bayesimpact.diagnosis.learned import LEARNED
+from bayesimpact.diagnosis.residual_force.learned import LEARNED
 from bayesimpact.errors import InputError
 from bayesimpact.inference import identify, posterior
 from bayesimpact.model.units import readable
@@ -62,8 +62,8 @@ def save(found: Found, folder: Path | str) -> Path:
 
     out = Path(folder)
     if isinstance(found, loop.Diagnosis):
-        from bayesimpact.diagnosis.document import document
         from bayesimpact.report.build import versions
+        from bayesimpact.report.diagnosis.document import document
         from bayesimpact.workflow import write_diagnosis
 
         content = document(found, seed=0, seconds=float("nan"), versions=versions())
@@ -179,7 +179,7 @@ def _table(
 
 def _changes(found: loop.Diagnosis) -> Iterable[tuple[str, ...]]:
     """Name, estimate before and estimate after."""
-    from bayesimpact.report.change_view import estimate
+    from bayesimpact.report.diagnosis.change_view import estimate
 
     layout, base = found.after.target.oscillator.layout, intervals(found.before)
     for i in layout.roles("physical", "effect"):

@@ -20,8 +20,6 @@ from bayesimpact.design.hypotheses import Rivalry, rivalry
 from bayesimpact.design.rank import proposals
 from bayesimpact.design.store import rivals_content, rivals_from
 from bayesimpact.diagnosis.diagnose import diagnose
-from bayesimpact.diagnosis.document import document
-from bayesimpact.diagnosis.formula_words import EFFECT_FILE, found_file
 from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.diagnosis.parametric_bootstrap import parametric_bootstrap
 from bayesimpact.errors import InputError
@@ -32,9 +30,11 @@ from bayesimpact.model.effects import EFFECTS, SEARCHED
 from bayesimpact.model.effects.effect import Effect
 from bayesimpact.report.archive import load_results
 from bayesimpact.report.build import ReportContext, results_from_fit, versions
-from bayesimpact.report.diagnosis_arrays import diagnosis_arrays
+from bayesimpact.report.diagnosis.arrays import diagnosis_arrays
+from bayesimpact.report.diagnosis.document import document
+from bayesimpact.report.diagnosis.formula_entries import EFFECT_FILE, found_file
+from bayesimpact.report.diagnosis.next_words import sentence
 from bayesimpact.report.figures.save import reason
-from bayesimpact.report.next_words import sentence
 from bayesimpact.report.results import Results
 from bayesimpact.report.write import Written, write_posterior, write_results
 

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 from drawing import COLOURS, K2, TABLE_2, arguments, of_case, panels, paper_campaign, save, styled
 
-from bayesimpact.model.simulate import simulate
+from bayesimpact.inference.initial.estimates import estimate
+from bayesimpact.model.exact.simulate import simulate
 from bayesimpact.response.backbone import backbone
-from bayesimpact.response.estimates import estimate
 
 
 @styled

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayesimpact.model.simulate import simulate
+from bayesimpact.model.exact.simulate import simulate
 from bayesimpact.response.backbone import backbone
 
 SAMPLES_PER_PERIOD = 1000

@@ -14,7 +14,8 @@ import small_rig
 from effect_rigs import BY_ID
 
 from bayesimpact.inference.identify import identify
-from bayesimpact.model import batch, general
+from bayesimpact.model.exact import batch
+from bayesimpact.model.general import loop as general
 from bayesimpact.model.oscillator import build_oscillator
 
 

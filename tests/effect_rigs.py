@@ -11,7 +11,7 @@ from naive_general import Naive
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.recording import Recording
-from bayesimpact.diagnosis.extend import campaign_scales, extend, transfer
+from bayesimpact.diagnosis.refits.extend import campaign_scales, extend, transfer
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification
 from bayesimpact.model.effects import EFFECTS, Effect, EffectParameter, Scales

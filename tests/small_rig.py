@@ -11,7 +11,7 @@ import numpy as np
 
 from bayesimpact.data.campaign import Campaign, Measurement
 from bayesimpact.data.quantity import Quantity
-from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.model.parameters import Layout
 from bayesimpact.trial import rig as generator
 from bayesimpact.trial.rig import Effects, Release, Rig, make_campaign, motion

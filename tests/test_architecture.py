@@ -33,6 +33,16 @@ LAYERS = (
     "cli",
     "__main__",
 )
+# rooms of one storey: each of a line imports none that stands behind it
+ROOMS = (
+    ("model.jit", "model.exact", "model.exact.sensitivities"),
+    ("model.jit", "model.exact", "model.general", "model.linear_response"),
+    ("inference.sampling", "inference.noise", "inference.initial"),
+    ("diagnosis.score_test", "diagnosis.candidates", "diagnosis.selection"),
+    ("diagnosis.refits", "diagnosis.candidates", "diagnosis.selection"),
+    ("diagnosis.residual_force", "diagnosis.candidates", "diagnosis.selection"),
+    ("diagnosis.selection", "diagnosis.formulas"),
+)
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 
@@ -76,6 +86,27 @@ def test_imports_run_one_way(module: str) -> None:
             other = layer(name)
             assert other is not None, f"{module} imports the package's face"
             assert other <= own, f"{module} imports {name}"
+
+
+def room(module: str, among: tuple[str, ...]) -> str | None:
+    """The innermost of some rooms that holds a module; None when none does."""
+    holding = [one for one in among if module.startswith(f"bayesimpact.{one}.")]
+    return max(holding, key=len, default=None)
+
+
+@pytest.mark.parametrize("rooms", ROOMS, ids=lambda rooms: rooms[-1])
+def test_rooms_import_one_way(rooms: tuple[str, ...]) -> None:
+    seen = set()
+    for module in MODULES:
+        own = room(module, rooms)
+        if own is None:
+            continue
+        seen.add(own)
+        for name in imported(module):
+            other = room(f"{name}.", rooms)
+            behind = other is not None and rooms.index(other) > rooms.index(own)
+            assert not behind, f"{module} imports {name}"
+    assert seen == set(rooms)
 
 
 def test_no_circle_of_imports() -> None:

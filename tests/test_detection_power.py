@@ -16,7 +16,7 @@ from benchmarks.detection_power import (
 )
 from benchmarks.power_figures import limits_figure, power_figure
 
-from bayesimpact.diagnosis.naming import DECISIVE
+from bayesimpact.diagnosis.selection.outcome import DECISIVE
 from bayesimpact.trial.designs import draw_rig_design
 from bayesimpact.trial.sensitivity import Sensitivity
 

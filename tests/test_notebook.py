@@ -18,11 +18,11 @@ from bayesimpact import errors as bi_errors
 from bayesimpact.data.html import html_table, resolved
 from bayesimpact.data.short_repr import short_repr
 from bayesimpact.diagnosis.diagnose import diagnose
-from bayesimpact.diagnosis.document import document
 from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.inference.posterior import Posterior
 from bayesimpact.report.build import results_from_fit, results_from_posterior
-from bayesimpact.report.change_view import change_row
+from bayesimpact.report.diagnosis.change_view import change_row
+from bayesimpact.report.diagnosis.document import document
 
 
 @pytest.fixture(scope="module")

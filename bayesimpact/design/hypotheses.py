@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.quantity import Quantity
-from bayesimpact.diagnosis.decision import Verdict
-from bayesimpact.diagnosis.evidence import model_evidence
 from bayesimpact.diagnosis.loop import Diagnosis
-from bayesimpact.diagnosis.refit import Candidate
+from bayesimpact.diagnosis.refits.evidence import model_evidence
+from bayesimpact.diagnosis.refits.refit import Candidate
+from bayesimpact.diagnosis.selection.decision import Verdict
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.inference.fit import inverse
-from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.model.effects.effect import Effect
 from bayesimpact.model.parameters import SLOTS
 

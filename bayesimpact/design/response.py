@@ -21,7 +21,7 @@ from bayesimpact.design.candidates import PlannedRecording, usual_release
 from bayesimpact.design.hypotheses import FittedModel, Rivalry
 from bayesimpact.design.odds import Odds, PredictedRecording, expected_odds
 from bayesimpact.inference.likelihood import Likelihood
-from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.model.oscillator import Oscillator, build_oscillator
 from bayesimpact.model.parameters import SLOTS, bare_name
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Smoothing
 from bayesimpact.design.hypotheses import FittedModel, PastRelease, Rivalry
-from bayesimpact.diagnosis.learned import (
+from bayesimpact.diagnosis.residual_force.learned import (
     LEARNED,
     knots_of,
     learned_contact,
@@ -19,7 +19,7 @@ from bayesimpact.diagnosis.learned import (
     learned_force,
 )
 from bayesimpact.errors import InputError
-from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.model.effects.effect import Effect
 
 Array = NDArray[np.float64]

@@ -31,16 +31,11 @@ from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.diagnosis.budget import Budget, begin
-from bayesimpact.diagnosis.decision import Verdict
-from bayesimpact.diagnosis.extend import campaign_scales
+from bayesimpact.diagnosis.candidates.promising import NEAR_MARGIN, SCORE_UNDERESTIMATE
 from bayesimpact.diagnosis.faults.compare import base_failed, gain, misfits
+from bayesimpact.diagnosis.faults.first_physics import faults_beside_physics
 from bayesimpact.diagnosis.faults.pushed_start import pushed_starts
-from bayesimpact.diagnosis.faults.unfree_start import BETTER, unfree_starts
-from bayesimpact.diagnosis.first_physics import faults_beside_physics
-from bayesimpact.diagnosis.loop import Diagnosis, Progress, diagnose_fit
-from bayesimpact.diagnosis.naming import is_large
-from bayesimpact.diagnosis.promising import NEAR_MARGIN, SCORE_UNDERESTIMATE
-from bayesimpact.diagnosis.recording_faults import (
+from bayesimpact.diagnosis.faults.recording_faults import (
     Corrected,
     Step,
     cleaned_campaign,
@@ -52,24 +47,29 @@ from bayesimpact.diagnosis.recording_faults import (
     with_steps,
     without_faults,
 )
-from bayesimpact.diagnosis.scan import scan
-from bayesimpact.diagnosis.simpler import (
+from bayesimpact.diagnosis.faults.simpler import (
     OPEN,
     is_settled,
     is_simpler,
     makes_idle,
     may_be_simpler,
 )
-from bayesimpact.diagnosis.smoothing import SAVITZKY_GOLAY, whole_campaign
+from bayesimpact.diagnosis.faults.unfree_start import BETTER, unfree_starts
+from bayesimpact.diagnosis.loop import Diagnosis, Progress, diagnose_fit
+from bayesimpact.diagnosis.measurement.smoothing import SAVITZKY_GOLAY, whole_campaign
+from bayesimpact.diagnosis.refits.extend import campaign_scales
+from bayesimpact.diagnosis.score_test.scan import scan
+from bayesimpact.diagnosis.selection.decision import Verdict
+from bayesimpact.diagnosis.selection.outcome import is_large
 from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification, identify
-from bayesimpact.inference.spectrum import Fingerprint
-from bayesimpact.model.compiled import compilation_left_out
+from bayesimpact.inference.noise.spectrum import Fingerprint
 from bayesimpact.model.effects import SEARCHED
 from bayesimpact.model.effects.effect import Effect
-from bayesimpact.model.threads import linear_algebra_alone
-from bayesimpact.model.workload import workload_counted
+from bayesimpact.model.jit.compiled import compilation_left_out
+from bayesimpact.model.jit.threads import linear_algebra_alone
+from bayesimpact.model.jit.workload import workload_counted
 
 Array = NDArray[np.float64]
 

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from bayesimpact.data.short_repr import short_repr
-from bayesimpact.diagnosis.comparable import Comparable
-from bayesimpact.diagnosis.discrepancy import Discrepancy, discrepancy
-from bayesimpact.diagnosis.repetition import residual_repetition
+from bayesimpact.diagnosis.measurement.repetition import residual_repetition
+from bayesimpact.diagnosis.residual_force.discrepancy import Discrepancy, discrepancy
+from bayesimpact.diagnosis.selection.comparable import Comparable
 from bayesimpact.inference.fit import Fit
 
 Array = NDArray[np.float64]

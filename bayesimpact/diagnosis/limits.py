@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special, stats
 
-from bayesimpact.diagnosis.scan import Scan
-from bayesimpact.diagnosis.scores import Score
+from bayesimpact.diagnosis.score_test.scan import Scan
+from bayesimpact.diagnosis.score_test.scores import Score
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Scales
 from bayesimpact.model.parameters import unit_for

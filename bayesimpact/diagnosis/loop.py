@@ -10,32 +10,32 @@ from numpy.typing import NDArray
 
 from bayesimpact.data.html import html_table
 from bayesimpact.diagnosis.budget import Budget, begin
-from bayesimpact.diagnosis.comparable import Comparable, alike_in_misfit, alike_in_odds
-from bayesimpact.diagnosis.decision import Decision, Verdict, decide
-from bayesimpact.diagnosis.extend import campaign_scales
-from bayesimpact.diagnosis.force import MissingForce
-from bayesimpact.diagnosis.formula_list import Formulas
-from bayesimpact.diagnosis.formulas import Answer, with_formulas
-from bayesimpact.diagnosis.heldout import HeldOut, held_out_cases, held_out_recordings
+from bayesimpact.diagnosis.faults.recording_faults import Corrected
+from bayesimpact.diagnosis.formulas.listing import Formulas
+from bayesimpact.diagnosis.formulas.search import Answer, with_formulas
+from bayesimpact.diagnosis.held_out import HeldOut, held_out_cases, held_out_recordings
 from bayesimpact.diagnosis.intervals import Intervals, intervals
-from bayesimpact.diagnosis.learned import LEARNED
 from bayesimpact.diagnosis.limits import Limit, limits
-from bayesimpact.diagnosis.locate import Location, locate, locate_effect
-from bayesimpact.diagnosis.name import name
-from bayesimpact.diagnosis.naming import Naming, State, is_large
-from bayesimpact.diagnosis.posed_anew import band_limited
-from bayesimpact.diagnosis.recording_faults import Corrected
-from bayesimpact.diagnosis.refit import Candidate
-from bayesimpact.diagnosis.smoothing import SAVITZKY_GOLAY
+from bayesimpact.diagnosis.location import Location, locate, locate_effect
+from bayesimpact.diagnosis.measurement.smoothing import SAVITZKY_GOLAY
+from bayesimpact.diagnosis.refits.extend import campaign_scales
+from bayesimpact.diagnosis.refits.refit import Candidate
+from bayesimpact.diagnosis.residual_force.gaussian_process import MissingForce
+from bayesimpact.diagnosis.residual_force.learned import LEARNED
+from bayesimpact.diagnosis.selection.comparable import Comparable, alike_in_misfit, alike_in_odds
+from bayesimpact.diagnosis.selection.decision import Decision, Verdict, decide
+from bayesimpact.diagnosis.selection.outcome import Naming, State, is_large
+from bayesimpact.diagnosis.selection.posed_anew import band_limited
+from bayesimpact.diagnosis.selection.search import name
+from bayesimpact.diagnosis.selection.told_sizes import of_told_size
+from bayesimpact.diagnosis.selection.unknown import with_force
 from bayesimpact.diagnosis.thresholds import EXCESS
-from bayesimpact.diagnosis.told_sizes import of_told_size
-from bayesimpact.diagnosis.unknown import with_force
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification
-from bayesimpact.inference.spectrum import Fingerprint
+from bayesimpact.inference.noise.spectrum import Fingerprint
 from bayesimpact.model.effects import SEARCHED
 from bayesimpact.model.effects.effect import Effect, Scales
-from bayesimpact.model.threads import linear_algebra_alone
+from bayesimpact.model.jit.threads import linear_algebra_alone
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
@@ -47,7 +47,7 @@ class Diagnosis:
 
     Attributes
     ----------
-    verdict : see `bayesimpact.diagnosis.decision`
+    verdict : see `bayesimpact.diagnosis.selection.decision`
     identification : of the base model
     naming : all models that were tried
     before, after : base fit and the fit that the verdict stands for (where unknown, the learned

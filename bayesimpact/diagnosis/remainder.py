@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bayesimpact.diagnosis.formula_list import Formulas, formula_text
-from bayesimpact.diagnosis.locate import locate
-from bayesimpact.diagnosis.naming import Naming, State
+from bayesimpact.diagnosis.formulas.listing import Formulas, formula_text
+from bayesimpact.diagnosis.location import locate
+from bayesimpact.diagnosis.selection.outcome import Naming, State
 from bayesimpact.inference.fit import Fit
 
 

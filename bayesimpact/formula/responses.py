@@ -1,8 +1,8 @@
 """How the recordings would change under a small force of the state, without simulating it.
 
 Every term of the grammar costs one sum over its own force history along the fitted motion
-(`bayesimpact.model.superposition`). A spline a(y) + b(y) v would show only what is linear in v; the
-force history itself, scored on the residual, tells |v| v from v.
+(`bayesimpact.model.linear_response.superposition`). A spline a(y) + b(y) v would show only what is
+linear in v; the force history itself, scored on the residual, tells |v| v from v.
 
 Of laws with a memory or a further mode in the fitted model only displacement and velocity are
 perturbed; such a score is approximate, and the refit that follows is not.
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.formula.grammar import ONE, Term
 from bayesimpact.inference.fit import Fit
-from bayesimpact.model.superposition import Motion, answers, motion_along
+from bayesimpact.model.linear_response.superposition import Motion, answers, motion_along
 
 Array = NDArray[np.float64]
 

@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.inference.convergence import quiet_arviz
 from bayesimpact.inference.fit import Fit
-from bayesimpact.inference.half_cycles import half_cycle_blocks, log_likelihood
+from bayesimpact.inference.half_cycle_likelihood import half_cycle_blocks, log_likelihood
+from bayesimpact.inference.sampling.convergence import quiet_arviz
 from bayesimpact.model.units import display, reading
 
 Array = NDArray[np.float64]
@@ -65,9 +65,9 @@ def arviz_groups(fit: Fit, draws: ArvizDraws, *, lab_units: bool = False) -> dic
     """Groups posterior, prior, log_likelihood, observed_data, constant_data and those in `draws`.
 
     The log-likelihood has one value per half cycle and draw, which may be left out one at a time:
-    see `half_cycles` for why not samples or recordings; constant_data says where each begins.
-    Predictive draws are fewer than the others; each recording has its own time axis. `lab_units`:
-    mm, mN, ... and not SI.
+    see `half_cycle_likelihood` for why not samples or recordings; constant_data says where each
+    begins. Predictive draws are fewer than the others; each recording has its own time axis.
+    `lab_units`: mm, mN, ... and not SI.
     """
     oscillator, likelihood = fit.target.oscillator, fit.target.likelihood
     campaign = oscillator.campaign

@@ -19,17 +19,17 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.channels import keepers
 from bayesimpact.inference.defaults import default_priors
 from bayesimpact.inference.fit import Fit, Target
-from bayesimpact.inference.horizon import best_climb
+from bayesimpact.inference.initial.estimates import Estimates
+from bayesimpact.inference.initial.horizon import best_climb
+from bayesimpact.inference.initial.rough import first_state
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
-from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.inference.search import Generation, SearchResult, metropolis_differential_evolution
 from bayesimpact.model.effects.effect import Effect, EffectParameter, Scales
 from bayesimpact.model.oscillator import Oscillator
 from bayesimpact.model.parameters import is_added
 from bayesimpact.response.driven_displacement import seen_displacement
-from bayesimpact.response.estimates import Estimates
-from bayesimpact.response.rough import first_state
 
 Array = NDArray[np.float64]
 

@@ -23,7 +23,8 @@ from __future__ import annotations
 import numpy as np
 
 from bayesimpact.data.campaign import Campaign
-from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.initial.estimates import Estimates
+from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.inference.prior import (
     Cauchy,
     HalfCauchy,
@@ -37,7 +38,6 @@ from bayesimpact.inference.priors import Priors, prior_from_table
 from bayesimpact.model.effects.effect import Effect, EffectParameter, Scales
 from bayesimpact.model.oscillator import Oscillator
 from bayesimpact.model.parameters import GAIN, is_added
-from bayesimpact.response.estimates import Estimates
 
 GAIN_WIDTH = 0.1  # a calibration that is farther off is a wrong unit, and a fault
 SHAPE_WIDTH = 1.5  # of the log-normal prior of a depth, a time constant, a frequency

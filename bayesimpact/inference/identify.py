@@ -21,25 +21,25 @@ from bayesimpact.inference.arviz_groups import arviz_groups, as_arviz, laplace_d
 from bayesimpact.inference.declared import climbed, climbed_from, is_same_mode, search_declared
 from bayesimpact.inference.defaults import default_priors
 from bayesimpact.inference.fit import Fit, Target
-from bayesimpact.inference.from_periods import or_by_periods
-from bayesimpact.inference.horizon import best_climb
+from bayesimpact.inference.initial.estimates import Estimates, estimate
+from bayesimpact.inference.initial.from_periods import or_by_periods
+from bayesimpact.inference.initial.horizon import best_climb
+from bayesimpact.inference.initial.rough import rough_estimates
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
-from bayesimpact.inference.noise import Noise
-from bayesimpact.inference.noise_estimate import estimate_noise
-from bayesimpact.inference.noise_refined import refined_noise
+from bayesimpact.inference.noise.estimate import estimate_noise
+from bayesimpact.inference.noise.refined import refined_noise
+from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.inference.nuisances import nuisance_step
 from bayesimpact.inference.onsets import without_onsets
 from bayesimpact.inference.priors import Priors
 from bayesimpact.inference.search import Generation, SearchResult, metropolis_differential_evolution
-from bayesimpact.model.derivatives import grams
+from bayesimpact.model.exact.sensitivities.derivatives import grams
+from bayesimpact.model.exact.simulate import sums_of_squares
+from bayesimpact.model.jit.threads import linear_algebra_alone
 from bayesimpact.model.oscillator import Oscillator, build_oscillator
 from bayesimpact.model.parameters import BASE_SLOTS
 from bayesimpact.model.rounding import scatter
-from bayesimpact.model.simulate import sums_of_squares
-from bayesimpact.model.threads import linear_algebra_alone
-from bayesimpact.response.estimates import Estimates, estimate
-from bayesimpact.response.rough import rough_estimates
 
 Array = NDArray[np.float64]
 

@@ -17,14 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.short_repr import short_repr
-from bayesimpact.inference.noise import Noise
-from bayesimpact.model.derivatives import trajectories_and_derivatives
+from bayesimpact.inference.noise.whitening import Noise
+from bayesimpact.model.exact.sensitivities.derivatives import trajectories_and_derivatives
+from bayesimpact.model.exact.simulate import sums_of_squares
+from bayesimpact.model.linear_response.nearby import readings_near
 from bayesimpact.model.measurement import smooth
-from bayesimpact.model.nearby import readings_near
 from bayesimpact.model.oscillator import Oscillator
 from bayesimpact.model.parameters import BASE_SLOTS, SLOTS, Layout
 from bayesimpact.model.rounding import Rounding, average_square, coarse_step, likeliest_rounding
-from bayesimpact.model.simulate import sums_of_squares
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from bayesimpact.inference.climb import Climb
 from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.likelihood import Linearisation
-from bayesimpact.inference.touch_jumps import beyond_touch
+from bayesimpact.inference.onset_jumps import beyond_touch
 
 Array = NDArray[np.float64]
 
@@ -59,7 +59,7 @@ def find_mode(
     that fall short of what every step left would have to gain for a log posterior of `goal`: an
     end below it is of no use. A start where no motion is finite leads nowhere: log posterior -inf.
     Where a reading seems to stand on the wrong side of a touch, the climb goes on beyond that
-    (`touch_jumps`).
+    (`onset_jumps`).
     """
 
     limits = _Limits(tolerance, max_iterations, least_gain, goal)

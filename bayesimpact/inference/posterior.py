@@ -17,7 +17,7 @@ from bayesimpact.data.html import html_table, resolved
 from bayesimpact.errors import InputError
 from bayesimpact.inference.arviz_groups import ArvizDraws, arviz_groups, as_arviz, by_chain
 from bayesimpact.inference.fit import Fit
-from bayesimpact.inference.sample import Chains, sample_posterior
+from bayesimpact.inference.sampling.sample import Chains, sample_posterior
 from bayesimpact.model.measurement import smooth
 
 Array = NDArray[np.float64]
@@ -112,9 +112,10 @@ class Posterior:
         """ArviZ's `InferenceData` (0.23) or `DataTree` (1.x), one chain per independent ensemble.
 
         Groups: posterior, sample_stats, prior, log_likelihood (per half cycle, for `az.loo`: see
-        `inference.half_cycles`), observed_data, constant_data and posterior_predictive. At most
-        `ARVIZ_DRAWS` draws of every chain, evenly spaced: the attributes say by how many steps of
-        the sampler. `lab_units`: mm, mN, ... in place of SI, so that a summary shows digits.
+        `inference.half_cycle_likelihood`), observed_data, constant_data and posterior_predictive.
+        At most `ARVIZ_DRAWS` draws of every chain, evenly spaced: the attributes say by how many
+        steps of the sampler. `lab_units`: mm, mN, ... in place of SI, so that a summary shows
+        digits.
         """
         return as_arviz(self.arviz_groups({"seed": self.seed}, lab_units=lab_units))
 
@@ -163,8 +164,8 @@ def sample(
     seed : of every random number
     folder : where blocks of the chain are kept, so that `resume` can go on; None keeps nothing
     callback : called with the sampler's progress after every block
-    settings : further settings of `bayesimpact.inference.sample.sample_posterior`; its `tell` says
-        which saved blocks could not be used
+    settings : further settings of `bayesimpact.inference.sampling.sample.sample_posterior`; its
+        `tell` says which saved blocks could not be used
 
     Raises
     ------

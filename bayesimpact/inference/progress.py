@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from bayesimpact.inference.sample import Progress
-from bayesimpact.model.compiled import compilation_announced
+from bayesimpact.inference.sampling.sample import Progress
+from bayesimpact.model.jit.compiled import compilation_announced
 
 
 class Refit(str):

@@ -8,7 +8,7 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.inference.declared import climbed
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.likelihood import Likelihood
-from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.model.oscillator import Oscillator
 
 

@@ -10,12 +10,12 @@ import numpy as np
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError, SimulationError
-from bayesimpact.model import normalized
 from bayesimpact.model.effects import EFFECTS, Effect
+from bayesimpact.model.exact import normalized
+from bayesimpact.model.exact.simulate import CODES, Trajectory
+from bayesimpact.model.exact.simulate import simulate as base
 from bayesimpact.model.oscillator import Oscillator, build_oscillator
 from bayesimpact.model.parameters import bare_name, is_added
-from bayesimpact.model.simulate import CODES, Trajectory
-from bayesimpact.model.simulate import simulate as base
 
 Values = Mapping[str, float]
 Added = Mapping[str, Values] | Iterable[tuple[Effect, Values]]
@@ -48,7 +48,7 @@ def simulate(
         one's own and values
     name, case : of the recording that is returned when there are effects
     oscillator : mass, c1, k1, c2, g, k2, y0, v0, interval, n (and A, w, phase without effects): as
-        `bayesimpact.model.simulate.simulate`; with effects also `offset`, the probe's rest
+        `bayesimpact.model.exact.simulate.simulate`; with effects also `offset`, the probe's rest
         reading, m
 
     Returns

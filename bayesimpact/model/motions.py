@@ -10,11 +10,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.model.arguments import Inputs
-from bayesimpact.model.general import integrate_many
+from bayesimpact.model.exact.arguments import Inputs
+from bayesimpact.model.exact.simulate import predictions
+from bayesimpact.model.general.loop import integrate_many
+from bayesimpact.model.jit.workload import count
 from bayesimpact.model.parameters import BASE_SLOTS
-from bayesimpact.model.simulate import predictions
-from bayesimpact.model.workload import count
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from bayesimpact.data.campaign import Campaign, Smoothing
 from bayesimpact.data.short_repr import short_repr
 from bayesimpact.model import measurement
-from bayesimpact.model.arguments import Inputs
 from bayesimpact.model.effects.effect import LAW_ROW, Effect, law_row
+from bayesimpact.model.exact.arguments import Inputs
 from bayesimpact.model.motions import general_motions, motions
 from bayesimpact.model.parameters import (
     BASE_SLOTS,

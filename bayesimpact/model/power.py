@@ -16,7 +16,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from bayesimpact.model.compiled import compiled
+from bayesimpact.model.jit.compiled import compiled
 
 _MANTISSA, _BIAS = 52, 1023
 _LOG_BITS, _EXP_BITS = 10, 9

@@ -31,7 +31,7 @@ from scipy.optimize import brentq
 
 from bayesimpact.data.faults.flat import reading_step
 from bayesimpact.data.recording import Recording
-from bayesimpact.model.compiled import compiled
+from bayesimpact.model.jit.compiled import compiled
 
 Array = NDArray[np.float64]
 

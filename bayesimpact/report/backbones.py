@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayesimpact.diagnosis.whiteness import combined
+from bayesimpact.diagnosis.measurement.whiteness import combined
+from bayesimpact.inference.initial.observe import DRIFT
 from bayesimpact.inference.posterior import Posterior
 from bayesimpact.model.measurement import smooth
 from bayesimpact.report.results import Array, BackboneCurve, BackboneSummary
 from bayesimpact.response.check import BackboneCheck, check_backbone
 from bayesimpact.response.displacement import displacement
-from bayesimpact.response.observe import DRIFT
 
 TOTAL = 600
 """Simulated recordings of all recordings together, about."""

@@ -1,4 +1,4 @@
-"""From live fits and posteriors to `Results` (from diagnoses: `diagnosis_arrays`)."""
+"""From live fits and posteriors to `Results` (from diagnoses: `diagnosis.arrays`)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from bayesimpact.data.channels import keepers
 from bayesimpact.data.gaps import runs
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification
-from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.inference.posterior import Posterior
 from bayesimpact.model.measurement import gain
 from bayesimpact.report import checks

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from typing import Any
 
 from bayesimpact.diagnosis.thresholds import LARGE
-from bayesimpact.diagnosis.words import listed
-from bayesimpact.report.effect_forces import effect_forces, shown_cycle, without_force
+from bayesimpact.report.diagnosis.effect_forces import effect_forces, shown_cycle, without_force
+from bayesimpact.report.diagnosis.force_arrays import QUIET_WIDTH
+from bayesimpact.report.diagnosis.words import listed
 from bayesimpact.report.figures.corner import MOST as MOST_CORNER
 from bayesimpact.report.figures.traces import MOST as MOST_TRACES
-from bayesimpact.report.force_arrays import QUIET_WIDTH
 from bayesimpact.report.results import Results
 
 DIAGNOSIS = {

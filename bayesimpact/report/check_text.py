@@ -9,8 +9,8 @@ from bayesimpact.data.faults.start import GROWTH
 from bayesimpact.data.gaps import shown_period
 from bayesimpact.data.recording import Recording
 from bayesimpact.data.text_table import text_table
-from bayesimpact.inference.noise import Noise
-from bayesimpact.inference.noise_estimate import unfiltered_noise
+from bayesimpact.inference.noise.estimate import unfiltered_noise
+from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.model.parameters import build_layout
 
 BARS = "▁▂▃▄▅▆▇█"

@@ -22,11 +22,11 @@ from bayesimpact.report.cycles import (
     contacts,
     stop_level,
 )
-from bayesimpact.report.effect_forces import shown_cycle
+from bayesimpact.report.diagnosis.effect_forces import shown_cycle
+from bayesimpact.report.diagnosis.force_in_time import force_in_time
 from bayesimpact.report.figures.force_map import force_unit
 from bayesimpact.report.figures.recordings import shown_recordings
 from bayesimpact.report.figures.style import response, response_word
-from bayesimpact.report.force_in_time import force_in_time
 from bayesimpact.report.results import Array, RecordingResult, Results
 from bayesimpact.report.rows import Z90
 

@@ -18,16 +18,16 @@ from bayesimpact.model.units import bound, reading, typeset
 from bayesimpact.report import explorer, tables, words
 from bayesimpact.report.captions import caption
 from bayesimpact.report.checks import MISFIT
-from bayesimpact.report.diagnosis_view import diagnosis_view
-from bayesimpact.report.figures.save import DPI
-from bayesimpact.report.formula_text import (
+from bayesimpact.report.diagnosis.formula_text import (
     effect_title,
     raised,
     typeset_formula,
 )
+from bayesimpact.report.diagnosis.story import corrected, story_rows
+from bayesimpact.report.diagnosis.view import diagnosis_view
+from bayesimpact.report.figures.save import DPI
 from bayesimpact.report.policy import with_policy
 from bayesimpact.report.results import Results
-from bayesimpact.report.story import corrected, story_rows
 
 TEMPLATES = Path(__file__).parent / "template"
 _VERDICT_CLASS = {"adequate": "good", "inadequate": "bad", "slight": "", "overestimated": ""}

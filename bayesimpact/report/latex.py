@@ -6,13 +6,13 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from bayesimpact.diagnosis.words import title_of
 from bayesimpact.formula.law import is_formula_id
 from bayesimpact.model.units import MINUS, quantity, typeset
-from bayesimpact.report.change_view import NUISANCES, change_words
+from bayesimpact.report.diagnosis.change_view import NUISANCES, change_words
+from bayesimpact.report.diagnosis.formula_text import latex_formula, letter
+from bayesimpact.report.diagnosis.limit_view import not_found
+from bayesimpact.report.diagnosis.words import title_of
 from bayesimpact.report.digits import Digits, digits
-from bayesimpact.report.formula_text import latex_formula, letter
-from bayesimpact.report.limit_view import not_found
 from bayesimpact.report.names import in_words, of_recordings, split
 from bayesimpact.report.results import Results
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from bayesimpact.diagnosis.words import title_of
 from bayesimpact.formula.law import is_formula_id
+from bayesimpact.report.diagnosis.words import title_of
 
 
 def split(name: str) -> tuple[str, str, str]:

@@ -90,7 +90,7 @@ class SamplerSummary:
     ----------
     converged, reasons : the verdict, and what speaks against it in words
     names : d parameters
-    tau, ess_bulk, ess_tail, rhat : (d,) see `inference.convergence.ConvergenceRecord`
+    tau, ess_bulk, ess_tail, rhat : (d,) see `inference.sampling.convergence.ConvergenceRecord`
     ensembles, steps, walkers, draws : kept
     acceptance : fraction of accepted proposals
     trace_names, trace_units : p parameters whose traces are kept

@@ -22,8 +22,8 @@ from bayesimpact.model.units import (
     span,
     typeset,
 )
+from bayesimpact.report.diagnosis.formula_text import letter, written
 from bayesimpact.report.digits import Digits, places
-from bayesimpact.report.formula_text import letter, written
 from bayesimpact.report.names import split
 from bayesimpact.report.results import Results, Row
 

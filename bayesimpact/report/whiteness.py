@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from bayesimpact.diagnosis.whiteness import ljung_box
+from bayesimpact.diagnosis.measurement.whiteness import ljung_box
 from bayesimpact.inference.fit import Fit
 
 Array = NDArray[np.float64]

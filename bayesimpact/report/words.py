@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayesimpact.diagnosis.whiteness import LAGS
+from bayesimpact.diagnosis.measurement.whiteness import LAGS
 from bayesimpact.model.units import chi2, number, significant, typeset
 from bayesimpact.report.checks import amount
 from bayesimpact.report.figures.recordings import MOST as MOST_RECORDINGS

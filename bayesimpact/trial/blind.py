@@ -22,8 +22,8 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.read import load_campaign
 from bayesimpact.data.strict_json import strict
 from bayesimpact.diagnosis.diagnose import diagnose
-from bayesimpact.diagnosis.document import document
 from bayesimpact.errors import InputError
+from bayesimpact.report.diagnosis.document import document
 from bayesimpact.trial.rig_files import write_campaign
 from bayesimpact.workflow import DIAGNOSIS_FILE, diagnose_campaign
 

@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.recording import Recording
-from bayesimpact.diagnosis.directions import directions
-from bayesimpact.diagnosis.extend import campaign_scales
+from bayesimpact.diagnosis.refits.extend import campaign_scales
+from bayesimpact.diagnosis.score_test.directions import directions
 from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
-from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.inference.prior import LogUniform, Normal, Prior
 from bayesimpact.inference.priors import Priors
 from bayesimpact.model.effects import EFFECTS

@@ -24,9 +24,9 @@ import naive
 import numpy as np
 import systems
 
-from bayesimpact.model.derivatives import find_events
-from bayesimpact.model.simulate import predictions, simulate
-from bayesimpact.model.tables import response_tables
+from bayesimpact.model.exact.sensitivities.derivatives import find_events
+from bayesimpact.model.exact.simulate import predictions, simulate
+from bayesimpact.model.exact.tables import response_tables
 
 SEED = 7
 STEP = 1e-7  # relative, of every parameter

@@ -31,7 +31,7 @@ from benchmarks import kernel, recurrence
 from benchmarks.record import keep, rounds
 from effect_rigs import MOVING, TestRig, typical
 
-from bayesimpact.model.added import flows
+from bayesimpact.model.general import flows
 from bayesimpact.model.oscillator import build_oscillator
 
 SCALES = (2.0, 1.0, 0.5, 0.25)  # of all step sizes

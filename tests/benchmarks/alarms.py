@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 from benchmarks.uniformity import critical_tail, smallest_tail
 
-from bayesimpact.diagnosis.extend import campaign_scales
-from bayesimpact.diagnosis.force import missing_drift, missing_force
-from bayesimpact.diagnosis.naming import State
-from bayesimpact.diagnosis.refit import base_candidate
-from bayesimpact.diagnosis.scan import scan
-from bayesimpact.diagnosis.smoothing import proved_smoothing
+from bayesimpact.diagnosis.measurement.smoothing import proved_smoothing
+from bayesimpact.diagnosis.refits.extend import campaign_scales
+from bayesimpact.diagnosis.refits.refit import base_candidate
+from bayesimpact.diagnosis.residual_force.gaussian_process import missing_drift, missing_force
+from bayesimpact.diagnosis.score_test.scan import scan
+from bayesimpact.diagnosis.selection.outcome import State
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects import SEARCHED
 from bayesimpact.trial.draw import draw

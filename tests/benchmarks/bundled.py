@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from bayesimpact.data.read import load_campaign
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
+from bayesimpact.model.exact.simulate import trajectory
 from bayesimpact.model.parameters import BASE_SLOTS
-from bayesimpact.model.simulate import trajectory
 
 PAPER = Path(__file__).resolve().parents[2] / "data" / "paper"
 
@@ -32,7 +32,7 @@ class Problem:
 
     Attributes
     ----------
-    q : (11,) parameters in the order of `bayesimpact.model.simulate.Q`, SI units, not forced
+    q : (11,) parameters in the order of `bayesimpact.model.exact.simulate.Q`, SI units, not forced
     mass : kg
     interval : s
     n : samples

@@ -19,8 +19,8 @@ from scipy import stats
 from scipy.optimize import brentq
 
 from bayesimpact.data.campaign import Measurement
-from bayesimpact.diagnosis.extend import campaign_scales
-from bayesimpact.diagnosis.scan import scan
+from bayesimpact.diagnosis.refits.extend import campaign_scales
+from bayesimpact.diagnosis.score_test.scan import scan
 from bayesimpact.diagnosis.thresholds import DECISIVE, largest_log_odds
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.trial.bundle import PAPER_HEIGHTS, PAPER_RIG

@@ -29,8 +29,8 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.input import Input
 from bayesimpact.data.recording import Recording
 from bayesimpact.inference.identify import identify
+from bayesimpact.model.exact.simulate import sums_of_squares
 from bayesimpact.model.oscillator import Oscillator, build_oscillator
-from bayesimpact.model.simulate import sums_of_squares
 
 SAMPLES, INTERVAL, NOISE = 131_072, 1 / 610.3515625, 5e-6
 RIG = {"mass": 0.503, "c1": 0.6, "k1": 808.556, "c2": 2.085, "g": 1.1e-3, "k2[1]": 5350.156}

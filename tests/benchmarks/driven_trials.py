@@ -31,7 +31,7 @@ from driven_twin import Law
 
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.inference.likelihood import Likelihood
-from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.oscillator import build_oscillator
 from bayesimpact.trial.rates import rate

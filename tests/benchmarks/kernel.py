@@ -22,8 +22,8 @@ import numpy as np
 from benchmarks import recurrence
 from benchmarks.record import keep, rounds
 
-from bayesimpact.model.derivatives import grams, trajectories_and_derivatives
-from bayesimpact.model.simulate import predictions, sums_of_squares
+from bayesimpact.model.exact.sensitivities.derivatives import grams, trajectories_and_derivatives
+from bayesimpact.model.exact.simulate import predictions, sums_of_squares
 
 BATCH = 16
 MASS = 0.503

@@ -25,7 +25,7 @@ from benchmarks import recurrence
 from benchmarks.bundled import Array, Problem, problem
 from benchmarks.record import keep, present, rounds
 
-from bayesimpact.model.simulate import Q, simulate, trajectory
+from bayesimpact.model.exact.simulate import Q, simulate, trajectory
 
 ACCURACY = 1e-9  # m
 TOLERANCES = 10.0 ** -np.arange(6, 14)

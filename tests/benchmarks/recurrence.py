@@ -84,7 +84,7 @@ def sum_of_squares(q, mass, interval, data, out):
 
 @numba.njit
 def sums_of_squares(theta, columns, constants, mass, samples, starts, counts, intervals):
-    """As `bayesimpact.model.simulate.sums_of_squares` for one vector theta (d,)."""
+    """As `bayesimpact.model.exact.simulate.sums_of_squares` for one vector theta (d,)."""
     sse = np.empty(columns.shape[0])
     q = np.empty(11)
     out = np.empty(counts.max())

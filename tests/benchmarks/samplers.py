@@ -30,7 +30,7 @@ from benchmarks.bundled import fit
 from benchmarks.record import keep, present
 from benchmarks.sampling import Sampled
 
-from bayesimpact.inference.convergence import quiet_arviz
+from bayesimpact.inference.sampling.convergence import quiet_arviz
 
 SEED = 0
 LIMIT = 5.0  # Monte Carlo errors; 70 normal numbers pass it once in 25,000 times

@@ -16,17 +16,17 @@ import numba
 import numpy as np
 from benchmarks.bundled import Array
 
-from bayesimpact.inference.convergence import (
+from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.posterior import sample
+from bayesimpact.inference.prior import LogUniform, Uniform
+from bayesimpact.inference.sampling.convergence import (
     autocorrelation_time,
     effective_sizes,
     quiet_arviz,
 )
-from bayesimpact.inference.ensemble import WhitenedDensity, random_streams, start
-from bayesimpact.inference.fit import Fit
-from bayesimpact.inference.posterior import sample
-from bayesimpact.inference.prior import LogUniform, Uniform
-from bayesimpact.inference.whiten import cholesky
-from bayesimpact.model.derivatives import grams
+from bayesimpact.inference.sampling.ensemble import WhitenedDensity, random_streams, start
+from bayesimpact.inference.sampling.whiten import cholesky
+from bayesimpact.model.exact.sensitivities.derivatives import grams
 from bayesimpact.model.parameters import BASE_SLOTS
 
 THIN = 10  # of emcee's steps; its autocorrelation times are hundreds
@@ -71,7 +71,8 @@ def whitened(fit: Fit) -> WhitenedDensity:
 def moments(draws: Array) -> tuple[Array, Array, Array, Array, Array]:
     """The first five fields of `Sampled`, of draws (ensembles, steps, walkers, d).
 
-    As in `bayesimpact.inference.convergence`: each ensemble one chain, its walkers end to end.
+    As in `bayesimpact.inference.sampling.convergence`: each ensemble one chain, its walkers end to
+    end.
     """
     arviz, dimension = quiet_arviz(), draws.shape[-1]
     chains = draws.transpose(0, 2, 1, 3).reshape(len(draws), -1, dimension)

@@ -21,7 +21,7 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
-from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.inference.posterior import sample
 from bayesimpact.inference.priors import Priors, prior_from_table
 from bayesimpact.model.effects import EFFECTS

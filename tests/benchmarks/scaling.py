@@ -30,12 +30,12 @@ from benchmarks import recurrence
 from benchmarks.kernel import MASS, campaign
 from benchmarks.record import keep, rounds, slope
 
-from bayesimpact.model.simulate import simulate, sums_of_squares
+from bayesimpact.model.exact.simulate import simulate, sums_of_squares
 
 SAMPLES = (600, 2_000, 6_000, 20_000, 60_000)
 RECORDINGS = (9, 30, 99, 300, 999)
 INTERVALS = (0.125e-3, 0.25e-3, 0.5e-3, 1e-3, 2e-3)  # s
-COARSE = 4e-3  # s: beyond what `bayesimpact.model.return_time_prediction` takes
+COARSE = 4e-3  # s: beyond what `bayesimpact.model.exact.return_time_prediction` takes
 BATCHES = (1, 4, 16, 64, 256)
 IMPACT_SAMPLES = 6_000
 

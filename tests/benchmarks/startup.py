@@ -37,7 +37,7 @@ FIRST = f"""
 import numpy as np
 from bayesimpact.data.read import load_campaign
 from bayesimpact.inference.likelihood import Likelihood
-from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.model.oscillator import build_oscillator
 
 campaign = load_campaign({str(PAPER)!r})
@@ -67,12 +67,12 @@ assert fit.converged and fit.reduced_chi2 < 1.05
 EVERYTHING = (
     FIRST
     + """
-from bayesimpact.model.derivatives import grams
+from bayesimpact.model.exact.sensitivities.derivatives import grams
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.effects.effect import law_row
 from bayesimpact.model.motions import general_motions
 from bayesimpact.model.parameters import BASE_SLOTS
-from bayesimpact.model.simulate import simulate
+from bayesimpact.model.exact.simulate import simulate
 
 many, o = np.tile(theta, (16, 1)), oscillator
 assert np.allclose(likelihood(many), value)

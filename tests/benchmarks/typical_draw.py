@@ -21,7 +21,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import bayesimpact as bi
-from bayesimpact.diagnosis.document import document
+from bayesimpact.report.diagnosis.document import document
 from bayesimpact.trial.bundle import (
     CONCEALED_EFFECTS,
     DECIMALS,

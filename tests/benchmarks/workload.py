@@ -1,5 +1,5 @@
 """What searches take, beside what the clock of their simulations says: the constants of
-`bayesimpact.model.workload` in one table. `python tests/benchmarks/workload.py [NUMBER SEED]`
+`bayesimpact.model.jit.workload` in one table. `python tests/benchmarks/workload.py [NUMBER SEED]`
 
 Drawn trials of the strong regime are diagnosed as `diagnose --quick` does, on an idle machine; the
 clock should read about what the processor took. It is a limit, not a forecast: within a factor of
@@ -16,8 +16,8 @@ import numpy as np
 from benchmarks.record import keep
 
 from bayesimpact.diagnosis.diagnose import diagnose
-from bayesimpact.model.compiled import compilation_left_out
-from bayesimpact.model.workload import workload_counted
+from bayesimpact.model.jit.compiled import compilation_left_out
+from bayesimpact.model.jit.workload import workload_counted
 from bayesimpact.trial.draw import draw
 from bayesimpact.trial.settings import strong_settings
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from bayesimpact.design.hypotheses import FittedModel, Rivalry, releases
-from bayesimpact.diagnosis.extend import campaign_scales
-from bayesimpact.diagnosis.refit import Candidate, base_candidate, refit
-from bayesimpact.diagnosis.scan import scan
+from bayesimpact.diagnosis.refits.extend import campaign_scales
+from bayesimpact.diagnosis.refits.refit import Candidate, base_candidate, refit
+from bayesimpact.diagnosis.score_test.scan import scan
 from bayesimpact.inference.identify import Identification
 from bayesimpact.model.effects import EFFECTS
 

@@ -8,7 +8,7 @@ import pytest
 from rivals import base_rivalry
 
 from bayesimpact.design.candidates import first_designs, highest, repeats, variants
-from bayesimpact.diagnosis.learned import learned_force
+from bayesimpact.diagnosis.residual_force.learned import learned_force
 from bayesimpact.inference.identify import Identification
 
 

@@ -15,8 +15,8 @@ from bayesimpact.design.hypotheses import Rivalry
 from bayesimpact.design.odds import expected_odds
 from bayesimpact.design.response import Response, noise_at, odds_between, response
 from bayesimpact.inference.identify import Identification
-from bayesimpact.inference.noise import Noise
-from bayesimpact.model.simulate import simulate
+from bayesimpact.inference.noise.whitening import Noise
+from bayesimpact.model.exact.simulate import simulate
 
 
 @pytest.fixture(scope="module")

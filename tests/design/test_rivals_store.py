@@ -11,10 +11,15 @@ from rivals import base_rivalry
 
 from bayesimpact.data.campaign import Smoothing
 from bayesimpact.design.store import rivals_content, rivals_from
-from bayesimpact.diagnosis.learned import knots_of, learned_contact, learned_drift, learned_force
+from bayesimpact.diagnosis.residual_force.learned import (
+    knots_of,
+    learned_contact,
+    learned_drift,
+    learned_force,
+)
 from bayesimpact.errors import InputError
 from bayesimpact.inference.identify import Identification
-from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.model.effects import EFFECTS
 
 LEARNED = (

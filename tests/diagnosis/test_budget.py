@@ -22,12 +22,12 @@ from bayesimpact.diagnosis.budget import (
     Budget,
     begin,
 )
-from bayesimpact.diagnosis.document import document
+from bayesimpact.diagnosis.faults.simpler import may_be_simpler
 from bayesimpact.diagnosis.loop import Diagnosis
-from bayesimpact.diagnosis.naming import Naming
-from bayesimpact.diagnosis.refit import Candidate, Enough
-from bayesimpact.diagnosis.remaining import Remaining
-from bayesimpact.diagnosis.simpler import may_be_simpler
+from bayesimpact.diagnosis.refits.refit import Candidate, Enough
+from bayesimpact.diagnosis.selection.outcome import Naming
+from bayesimpact.diagnosis.selection.remaining import Remaining
+from bayesimpact.report.diagnosis.document import document
 
 whole = importlib.import_module("bayesimpact.diagnosis.diagnose")
 
@@ -235,7 +235,7 @@ def test_no_residual_force_is_fitted_once_the_time_is_up(look: float) -> None:
     [((), "the base model"), ((BY_ID["coulomb_friction"],), "coulomb_friction")],
 )
 def test_a_residual_force_is_said_to_stand_beside_a_model(effects, named, monkeypatch) -> None:
-    module = importlib.import_module("bayesimpact.diagnosis.remaining")
+    module = importlib.import_module("bayesimpact.diagnosis.selection.remaining")
     least: list[float] = []
 
     def fitted(candidate: Any, *others: Any, least_gain: float) -> Any:

@@ -13,11 +13,11 @@ from effect_rigs import BY_ID
 from scipy import stats
 
 from bayesimpact.diagnosis.diagnose import diagnose
-from bayesimpact.diagnosis.discrepancy import discrepancy
 from bayesimpact.diagnosis.intervals import Intervals
 from bayesimpact.diagnosis.loop import Diagnosis
-from bayesimpact.diagnosis.whiteness import combined, ljung_box, whiteness_p
-from bayesimpact.inference.noise import Noise
+from bayesimpact.diagnosis.measurement.whiteness import combined, ljung_box, whiteness_p
+from bayesimpact.diagnosis.residual_force.discrepancy import discrepancy
+from bayesimpact.inference.noise.whitening import Noise
 
 
 def test_intervals_are_central():
@@ -89,7 +89,7 @@ def leaving_something() -> Diagnosis:
 @pytest.mark.long
 def test_the_force_of_time_of_the_chosen_model_is_built_once(monkeypatch) -> None:
     """Its intervals rest on the one that the search compared, which is not kept beyond that."""
-    names = ("ranked", "remaining", "intervals", "loop")
+    names = ("selection.ranked", "selection.remaining", "intervals", "loop")
     *modules, loop = (importlib.import_module(f"bayesimpact.diagnosis.{name}") for name in names)
     built = []
 

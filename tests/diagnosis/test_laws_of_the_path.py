@@ -10,15 +10,15 @@ import small_rig
 from effect_rigs import BY_ID, with_effect
 
 import bayesimpact as bi
-from bayesimpact.diagnosis.decision import complexity, holds
+from bayesimpact.diagnosis.candidates.promising import families
 from bayesimpact.diagnosis.diagnose import is_doubtful
-from bayesimpact.diagnosis.directions import directions
-from bayesimpact.diagnosis.evidence import common_spread, structure
-from bayesimpact.diagnosis.extend import campaign_scales
-from bayesimpact.diagnosis.promising import families
-from bayesimpact.diagnosis.recording_faults import shared_effects
-from bayesimpact.diagnosis.scan import Scan
-from bayesimpact.diagnosis.scores import Score
+from bayesimpact.diagnosis.faults.recording_faults import shared_effects
+from bayesimpact.diagnosis.refits.evidence import common_spread, structure
+from bayesimpact.diagnosis.refits.extend import campaign_scales
+from bayesimpact.diagnosis.score_test.directions import directions
+from bayesimpact.diagnosis.score_test.scan import Scan
+from bayesimpact.diagnosis.score_test.scores import Score
+from bayesimpact.diagnosis.selection.decision import complexity, holds
 from bayesimpact.inference.prior import Normal
 from bayesimpact.model.effects import Effect
 

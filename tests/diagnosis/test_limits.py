@@ -9,10 +9,10 @@ import pytest
 from effect_rigs import BY_ID
 from scipy import stats
 
-from bayesimpact.diagnosis.document import _detectable
-from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.limits import Limit, _answer, limits, upper_limit
-from bayesimpact.diagnosis.scan import scan
+from bayesimpact.diagnosis.refits.extend import campaign_scales
+from bayesimpact.diagnosis.score_test.scan import scan
+from bayesimpact.report.diagnosis.document import _detectable
 
 
 @pytest.mark.parametrize("mean", [-3.0, -0.5, 0.0, 1.2, 6.0])

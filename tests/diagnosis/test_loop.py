@@ -14,10 +14,10 @@ from effect_rigs import BY_ID
 from scipy import stats
 
 from bayesimpact.data.strict_json import strict
-from bayesimpact.diagnosis.comparable import Comparable
 from bayesimpact.diagnosis.diagnose import diagnose
-from bayesimpact.diagnosis.document import document
 from bayesimpact.diagnosis.loop import Diagnosis
+from bayesimpact.diagnosis.selection.comparable import Comparable
+from bayesimpact.report.diagnosis.document import document
 
 CATALOGUE = tuple(
     BY_ID[i]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bayesimpact.diagnosis.remainder import beyond_noise
-from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise.whitening import Noise
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import small_rig
 from effect_rigs import BY_ID
 
 from bayesimpact.diagnosis.diagnose import diagnose
-from bayesimpact.diagnosis.smoothing import whole_campaign
+from bayesimpact.diagnosis.measurement.smoothing import whole_campaign
 from bayesimpact.trial.rig_chain import Chain
 
 pytestmark = pytest.mark.long

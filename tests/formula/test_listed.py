@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from effect_rigs import BY_ID
 
-from bayesimpact.diagnosis.size import force_along
+from bayesimpact.diagnosis.refits.size import force_along
 from bayesimpact.formula.grammar import Term
 from bayesimpact.formula.law import effect_of, starts_of
 from bayesimpact.formula.library import library

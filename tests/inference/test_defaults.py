@@ -11,7 +11,8 @@ from effect_rigs import BY_ID, TestRig
 
 from bayesimpact.data.campaign import Measurement
 from bayesimpact.inference.defaults import default_priors, effect_prior
-from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.initial.estimates import Estimates, estimate
+from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.inference.prior import (
     Cauchy,
     HalfCauchy,
@@ -23,7 +24,6 @@ from bayesimpact.inference.prior import (
     Uniform,
 )
 from bayesimpact.model.oscillator import build_oscillator
-from bayesimpact.response.estimates import Estimates, estimate
 
 NOISE = Noise(level=4e-6)
 SCALES = TestRig().scales()

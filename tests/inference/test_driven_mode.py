@@ -14,9 +14,9 @@ from bayesimpact.data.faults.find import find_faults
 from bayesimpact.data.input import Input
 from bayesimpact.data.recording import Recording
 from bayesimpact.inference.identify import identify
-from bayesimpact.inference.noise_estimate import estimate_noise
-from bayesimpact.response.driven import estimate_driven
-from bayesimpact.response.estimates import estimate
+from bayesimpact.inference.initial.driven import estimate_driven
+from bayesimpact.inference.initial.estimates import estimate
+from bayesimpact.inference.noise.estimate import estimate_noise
 from bayesimpact.response.weak_form import bump
 
 TRUTH = {"mass": 0.5, "c1": 0.6, "k1": 800.0, "c2": 2.0, "g": 1.1e-3, "k2": 5000.0}

@@ -15,7 +15,7 @@ from bayesimpact.data.gaps import without
 from bayesimpact.data.input import Input
 from bayesimpact.data.recording import Recording
 from bayesimpact.inference.identify import identify
-from bayesimpact.inference.noise_estimate import estimate_noise
+from bayesimpact.inference.noise.estimate import estimate_noise
 
 QUANTITIES = ("velocity", "acceleration")
 INSIDE = 1.645  # standard deviations, of a 90 % interval

@@ -15,7 +15,7 @@ from bayesimpact.data.read import load_campaign
 from bayesimpact.errors import InputError
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.likelihood import Likelihood
-from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.model.oscillator import Oscillator, build_oscillator
 
 GAIN = 1.03

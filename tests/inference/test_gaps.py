@@ -13,8 +13,8 @@ from bayesimpact.data.campaign import Campaign, Smoothing
 from bayesimpact.data.gaps import without
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.likelihood import Likelihood
-from bayesimpact.inference.noise import Noise
-from bayesimpact.inference.noise_estimate import estimate_noise
+from bayesimpact.inference.noise.estimate import estimate_noise
+from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.model.measurement import smooth
 from bayesimpact.model.oscillator import build_oscillator
 from bayesimpact.trial.bundle import PAPER_RIG

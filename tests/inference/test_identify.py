@@ -16,7 +16,6 @@ from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 from bayesimpact.inference.defaults import default_priors
 from bayesimpact.inference.fit import Fit
-from bayesimpact.inference.horizon import growing_horizon
 from bayesimpact.inference.identify import (
     Identification,
     _ProfiledObjective,
@@ -24,10 +23,11 @@ from bayesimpact.inference.identify import (
     identify,
     initial_theta,
 )
-from bayesimpact.inference.noise import Noise
-from bayesimpact.inference.noise_estimate import estimate_noise
+from bayesimpact.inference.initial.estimates import estimate
+from bayesimpact.inference.initial.horizon import growing_horizon
+from bayesimpact.inference.noise.estimate import estimate_noise
+from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.model.oscillator import build_oscillator
-from bayesimpact.response.estimates import estimate
 from bayesimpact.trial.bundle import PAPER_RIG
 from bayesimpact.trial.rig import Release
 from bayesimpact.trial.rig_chain import Chain

@@ -12,7 +12,7 @@ from scipy.linalg import toeplitz
 from bayesimpact.data.campaign import Smoothing
 from bayesimpact.inference import likelihood as module
 from bayesimpact.inference.likelihood import Likelihood
-from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.model.oscillator import Oscillator, build_oscillator
 
 SAVGOL = Smoothing("savgol", window=11, polyorder=2)

@@ -17,7 +17,7 @@ from bayesimpact.inference.climb import best_sigma
 from bayesimpact.inference.fit import Fit, Target, inverse
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
-from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.inference.prior import (
     HalfNormal,
     LogNormal,

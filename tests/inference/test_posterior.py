@@ -18,7 +18,7 @@ from bayesimpact.errors import InputError
 from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
-from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.inference.posterior import Posterior, sample
 from bayesimpact.inference.prior import LogUniform, Uniform
 from bayesimpact.inference.priors import Priors

@@ -12,9 +12,9 @@ import pytest
 import bayesimpact as bi
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.recording import Recording
-from bayesimpact.diagnosis.models import Models
+from bayesimpact.diagnosis.selection.models import Models
 from bayesimpact.inference.progress import Refit, compilation_shown, progress_bar, refit_bar
-from bayesimpact.inference.sample import Progress
+from bayesimpact.inference.sampling.sample import Progress
 
 WHERE = Progress(burning=False, steps=50, max_steps=200, tau=3.0, ess=1234.4)
 

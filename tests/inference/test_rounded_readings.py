@@ -8,11 +8,11 @@ import small_rig
 from effect_rigs import BY_ID
 
 from bayesimpact.data.campaign import Campaign
-from bayesimpact.diagnosis.extend import campaign_scales
-from bayesimpact.diagnosis.force import missing_force
 from bayesimpact.diagnosis.parametric_bootstrap import simulated
-from bayesimpact.diagnosis.refit import fit_from
-from bayesimpact.diagnosis.scan import scan
+from bayesimpact.diagnosis.refits.extend import campaign_scales
+from bayesimpact.diagnosis.refits.refit import fit_from
+from bayesimpact.diagnosis.residual_force.gaussian_process import missing_force
+from bayesimpact.diagnosis.score_test.scan import scan
 from bayesimpact.inference import likelihood
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects import SEARCHED

@@ -9,7 +9,7 @@ import pytest
 import small_rig
 
 from bayesimpact.inference.identify import identify
-from bayesimpact.inference.noise_estimate import estimate_noise
+from bayesimpact.inference.noise.estimate import estimate_noise
 
 NOISE = {"displacement": 5e-6, "velocity": 2e-4, "acceleration": 2e-2}
 

@@ -12,8 +12,8 @@ from scipy.signal import savgol_filter
 from bayesimpact.data.campaign import Campaign, Measurement, Smoothing
 from bayesimpact.data.recording import Recording
 from bayesimpact.model.effects import Effect
+from bayesimpact.model.exact.simulate import simulate
 from bayesimpact.model.oscillator import Oscillator, build_oscillator
-from bayesimpact.model.simulate import simulate
 from bayesimpact.trial.rig_chain import Probe
 
 SAVGOL = Smoothing("savgol", window=21, polyorder=2)

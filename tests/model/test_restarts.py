@@ -7,8 +7,8 @@ import pytest
 from effect_rigs import BY_ID, MOVING, TestRig, typical
 
 from bayesimpact.model.effects import Effect
+from bayesimpact.model.exact.simulate import simulate
 from bayesimpact.model.oscillator import build_oscillator
-from bayesimpact.model.simulate import simulate
 from bayesimpact.response.measured_motion import lowest_points
 
 RIG = TestRig(duration=3.0)

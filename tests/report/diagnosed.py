@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from synthetic import make_results
 
+from bayesimpact.report.diagnosis.force_arrays import POINTS
 from bayesimpact.report.figures.diagnosis import DRAWERS
-from bayesimpact.report.force_arrays import POINTS
 from bayesimpact.report.results import Array, Results
 
 

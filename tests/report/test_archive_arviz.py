@@ -13,7 +13,7 @@ from bayesimpact.inference.arviz_groups import (
     open_arviz,
     pack_parameters,
 )
-from bayesimpact.inference.convergence import quiet_arviz
+from bayesimpact.inference.sampling.convergence import quiet_arviz
 from bayesimpact.report.archive_arviz import write_posterior
 
 CASES = ("1", "2", "ü")

@@ -17,12 +17,12 @@ from matplotlib.text import Text
 
 from bayesimpact.report.archive import load_results, save_results
 from bayesimpact.report.captions import caption
-from bayesimpact.report.diagnosis_view import diagnosis_view
+from bayesimpact.report.diagnosis.limit_view import not_found
+from bayesimpact.report.diagnosis.view import diagnosis_view
 from bayesimpact.report.figures.improvement import shifts
 from bayesimpact.report.figures.ranking import FREE_FORCE, MOST, ranked
 from bayesimpact.report.figures.save import all_figures, png
 from bayesimpact.report.figures.style import AFTER, BLACK
-from bayesimpact.report.limit_view import not_found
 from bayesimpact.report.results import EffectSummary
 from bayesimpact.report.write import rewrite_report
 

@@ -9,7 +9,7 @@ import pytest
 from diagnosed import diagnosed, estimate
 from matplotlib.figure import Figure
 
-from bayesimpact.report.change_view import change_row
+from bayesimpact.report.diagnosis.change_view import change_row
 from bayesimpact.report.digits import digits, places
 from bayesimpact.report.figures.corner import corner_figure
 from bayesimpact.report.latex import latex_tables

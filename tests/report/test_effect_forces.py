@@ -11,7 +11,7 @@ from diagnosed import diagnosed
 
 from bayesimpact.report.captions import caption
 from bayesimpact.report.cycles import contacts, offset_of
-from bayesimpact.report.effect_forces import effect_forces, shown_cycle, without_force
+from bayesimpact.report.diagnosis.effect_forces import effect_forces, shown_cycle, without_force
 from bayesimpact.report.figures.story import story_figures
 from bayesimpact.report.results import Array, Results, Row
 

@@ -116,7 +116,7 @@ def test_report_of_every_effect(small: Identification, effect_id: str, tmp_path:
 @pytest.fixture
 def pair(small: Identification) -> Iterator[Fit]:
     """Two effects that take c2 and g away together."""
-    from bayesimpact.diagnosis.extend import campaign_scales, extend, transfer
+    from bayesimpact.diagnosis.refits.extend import campaign_scales, extend, transfer
 
     effects = tuple(BY_ID[i] for i in ("contact_damping_per_case", "gap_per_recording"))
     scales = campaign_scales(small.fit)

@@ -18,10 +18,10 @@ from synthetic import make_results, row
 
 from bayesimpact.report.archive import save_results
 from bayesimpact.report.cycles import contact_onsets, cycles, telling_cycle
+from bayesimpact.report.diagnosis.force_in_time import force_in_time
 from bayesimpact.report.explorer import MOST_SAMPLES, explorer_data, explorer_words, scripts
 from bayesimpact.report.figures.force_map import force_unit
 from bayesimpact.report.figures.recordings import close_up
-from bayesimpact.report.force_in_time import force_in_time
 from bayesimpact.report.html import render
 from bayesimpact.report.results import Array, Results
 from bayesimpact.report.write import rewrite_report

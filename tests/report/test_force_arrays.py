@@ -11,8 +11,8 @@ from effect_rigs import BY_ID
 
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.loop import Diagnosis
-from bayesimpact.report.diagnosis_arrays import diagnosis_arrays, spectrum
-from bayesimpact.report.force_arrays import POINTS, force_arrays
+from bayesimpact.report.diagnosis.arrays import diagnosis_arrays, spectrum
+from bayesimpact.report.diagnosis.force_arrays import POINTS, force_arrays
 from bayesimpact.report.results import Array
 
 STIFFNESS = 1.5e7  # N/m3

@@ -7,9 +7,9 @@ from diagnosed import diagnosed
 
 from bayesimpact.formula.grammar import Power, Term
 from bayesimpact.formula.law import effect_of
-from bayesimpact.report.diagnosis_view import FORMULAS, diagnosis_view
+from bayesimpact.report.diagnosis.formula_text import LETTERS, in_words, letter, written
+from bayesimpact.report.diagnosis.view import FORMULAS, diagnosis_view
 from bayesimpact.report.figures.style import full_symbol
-from bayesimpact.report.formula_text import LETTERS, in_words, letter, written
 from bayesimpact.report.latex import symbol as latex_symbol
 from bayesimpact.report.tables import symbol
 

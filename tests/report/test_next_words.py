@@ -6,9 +6,15 @@ from typing import Any
 
 from diagnosed import diagnosed, diagnosis_figures
 
-from bayesimpact.report.diagnosis_view import diagnosis_view
+from bayesimpact.report.diagnosis.next_words import (
+    MOST,
+    design_words,
+    next_view,
+    sentence,
+    table_lines,
+)
+from bayesimpact.report.diagnosis.view import diagnosis_view
 from bayesimpact.report.html import render
-from bayesimpact.report.next_words import MOST, design_words, next_view, sentence, table_lines
 
 
 def design(rank: int, **changes: Any) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from scipy import stats
 from synthetic import make_results
 
 from bayesimpact.data.campaign import Smoothing
-from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.model.measurement import smooth
 from bayesimpact.report.captions import caption
 from bayesimpact.report.checks import assess, assessed

@@ -11,10 +11,10 @@ from test_report_html import page
 
 from bayesimpact.formula.grammar import Power, Term
 from bayesimpact.formula.law import effect_of
-from bayesimpact.report.diagnosis_view import diagnosis_view
+from bayesimpact.report.diagnosis.story import corrected, story_rows
+from bayesimpact.report.diagnosis.view import diagnosis_view
 from bayesimpact.report.latex import latex_tables
 from bayesimpact.report.results import EffectSummary, Results
-from bayesimpact.report.story import corrected, story_rows
 
 
 def told(results: Results) -> dict[str, str]:

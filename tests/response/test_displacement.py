@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import small_rig
 
+from bayesimpact.inference.initial.estimates import estimate
 from bayesimpact.response.displacement import displacement
-from bayesimpact.response.estimates import estimate
 from bayesimpact.response.half_cycles import spectral_period
 from bayesimpact.trial.rig import motion
 

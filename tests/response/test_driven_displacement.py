@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from driven_rigs import driven_rig
 
-from bayesimpact.response.driven import estimate_driven
+from bayesimpact.inference.initial.driven import estimate_driven
+from bayesimpact.inference.initial.estimates import estimate
 from bayesimpact.response.driven_displacement import (
     Guess,
     displacement_under,
@@ -17,7 +18,6 @@ from bayesimpact.response.driven_displacement import (
     trend,
     without_base,
 )
-from bayesimpact.response.estimates import estimate
 
 QUANTITIES = ("displacement", "velocity", "acceleration")
 

@@ -1,7 +1,8 @@
 """The proof in small: blind trials, end to end, with the real diagnosis and the full catalogue.
 
-A force from outside is diagnosed in tests/diagnosis/test_likely_terms.py, and such answers are
-scored in test_formula_score.py and test_score.py: the search for a formula takes minutes here.
+A force from outside is diagnosed in tests/diagnosis/candidates/test_likely_terms.py, and such
+answers are scored in test_formula_score.py and test_score.py: the search for a formula takes
+minutes here.
 """
 
 from __future__ import annotations

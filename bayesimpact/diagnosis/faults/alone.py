@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.recording import Recording
-from bayesimpact.diagnosis.extend import campaign_scales, replaced_slot
-from bayesimpact.diagnosis.refit import fit_from
+from bayesimpact.diagnosis.refits.extend import campaign_scales, replaced_slot
+from bayesimpact.diagnosis.refits.refit import fit_from
 from bayesimpact.errors import BayesimpactError
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
-from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.model.effects.effect import Effect
 
 Array = NDArray[np.float64]

@@ -19,15 +19,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.diagnosis.directions import whitened
-from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.faults.alone import has_own_size
 from bayesimpact.diagnosis.faults.compare import LEAST, Compared, gain
 from bayesimpact.diagnosis.faults.correct import as_fault, corrected
 from bayesimpact.diagnosis.faults.together import CERTAIN, Hypothesis, Weighed
-from bayesimpact.diagnosis.naming import is_large, leaves_something
-from bayesimpact.diagnosis.projection import project
-from bayesimpact.diagnosis.refit import fit_from
+from bayesimpact.diagnosis.refits.extend import campaign_scales
+from bayesimpact.diagnosis.refits.refit import fit_from
+from bayesimpact.diagnosis.score_test.directions import whitened
+from bayesimpact.diagnosis.score_test.projection import project
+from bayesimpact.diagnosis.selection.outcome import is_large, leaves_something
 from bayesimpact.diagnosis.thresholds import DECISIVE, DOUBT, EXCESS, LARGE
 from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.fit import Fit

@@ -37,7 +37,7 @@ from bayesimpact.diagnosis.faults.together import (
     weigh_all,
 )
 from bayesimpact.inference.fit import Fit
-from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise.whitening import Noise
 
 Array = NDArray[np.float64]
 

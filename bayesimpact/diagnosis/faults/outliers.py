@@ -19,7 +19,7 @@ from bayesimpact.data.faults.fault import Fault, gaussian_threshold
 from bayesimpact.data.faults.find import applied
 from bayesimpact.data.faults.local import robust_sd
 from bayesimpact.data.faults.spikes import lone_spikes
-from bayesimpact.diagnosis.naming import leaves_something
+from bayesimpact.diagnosis.selection.outcome import leaves_something
 from bayesimpact.diagnosis.thresholds import LARGE
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.onsets import without_onsets

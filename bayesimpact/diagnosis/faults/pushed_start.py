@@ -13,8 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from bayesimpact.data.faults.fault import Fault
+from bayesimpact.diagnosis.candidates.likely_sets import LikelySets
 from bayesimpact.diagnosis.faults.unfree_start import start_fault
-from bayesimpact.diagnosis.likely_sets import LikelySets
 from bayesimpact.diagnosis.thresholds import EXCESS
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales

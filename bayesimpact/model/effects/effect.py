@@ -378,7 +378,7 @@ def address(function: Callable[..., float]) -> int:
 def _callback(function: Callable[..., float]) -> Any:
     from numba import types
 
-    from bayesimpact.model.compiled import compiled_callback
+    from bayesimpact.model.jit.compiled import compiled_callback
 
     number, pointer = types.float64, types.CPointer(types.float64)  # type: ignore[no-untyped-call]
     return compiled_callback(number(*[number] * 6, pointer, pointer))(function)

@@ -5,7 +5,7 @@ first one.
 At its null: tau = 0 is the base model.
 Energy: none: the motion is untouched.
 Valid: a single analogue low pass, or exponential smoothing; a Savitzky-Golay filter of the chain is
-found by the nulls of the noise spectrum instead (`bayesimpact.inference.spectrum`).
+found by the nulls of the noise spectrum instead (`bayesimpact.inference.noise.spectrum`).
 Its absence shows as contacts that begin and end too softly, while free flight, which a lag only
 delays and shrinks, fits perfectly.
 Source: Doebelin 1990, Measurement Systems, chapter 3 (first-order instruments).

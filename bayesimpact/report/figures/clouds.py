@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from bayesimpact.inference.convergence import quiet_arviz
+from bayesimpact.inference.sampling.convergence import quiet_arviz
 from bayesimpact.report.figures.style import Array, LabScale
 from bayesimpact.report.results import Draws
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from bayesimpact.report.diagnosis.next_words import design_words, shown, stiffness
 from bayesimpact.report.figures.style import AFTER, BLACK, GREY, RED, new_figure, rows_axis, styled
-from bayesimpact.report.next_words import design_words, shown, stiffness
 from bayesimpact.report.results import Results
 
 _ROW, _FRAME = 0.24, 1.05  # in

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
-from bayesimpact.report.change_view import NUISANCES
+from bayesimpact.report.diagnosis.change_view import NUISANCES
 from bayesimpact.report.figures.corner import NormalLaw, corner_figure
 from bayesimpact.report.results import Results
 

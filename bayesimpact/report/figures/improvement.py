@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from bayesimpact.report.change_view import NUISANCES
-from bayesimpact.report.diagnosis_view import gain_words
+from bayesimpact.report.diagnosis.change_view import NUISANCES
+from bayesimpact.report.diagnosis.view import gain_words
 from bayesimpact.report.figures.style import (
     AFTER,
     BEFORE,

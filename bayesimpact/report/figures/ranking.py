@@ -9,9 +9,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from bayesimpact.diagnosis.words import title_of
 from bayesimpact.model.units import quantity
-from bayesimpact.report.diagnosis_view import probability
+from bayesimpact.report.diagnosis.formula_text import in_words
+from bayesimpact.report.diagnosis.limit_view import not_found
+from bayesimpact.report.diagnosis.view import probability
+from bayesimpact.report.diagnosis.words import title_of
 from bayesimpact.report.figures.style import (
     AFTER,
     BLACK,
@@ -22,8 +24,6 @@ from bayesimpact.report.figures.style import (
     rows_axis,
     styled,
 )
-from bayesimpact.report.formula_text import in_words
-from bayesimpact.report.limit_view import not_found
 from bayesimpact.report.results import Results
 
 MOST = 12

@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 
 from bayesimpact.model.units import display, quantity, readable, significant
 from bayesimpact.report.cycles import Cycle, before_predicted, contacts
-from bayesimpact.report.effect_forces import effect_forces, shown_cycle
+from bayesimpact.report.diagnosis.effect_forces import effect_forces, shown_cycle
+from bayesimpact.report.diagnosis.force_in_time import force_in_time
 from bayesimpact.report.figures.force_map import force_unit
 from bayesimpact.report.figures.style import (
     AFTER,
@@ -28,7 +29,6 @@ from bayesimpact.report.figures.style import (
     response_word,
     styled,
 )
-from bayesimpact.report.force_in_time import force_in_time
 from bayesimpact.report.results import Results
 from bayesimpact.report.rows import Z90
 

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from bayesimpact.model.units import Display, decimals, display, number, readable, reading, typeset
-from bayesimpact.report.formula_text import letter
+from bayesimpact.report.diagnosis.formula_text import letter
 from bayesimpact.report.names import split
 from bayesimpact.report.results import RecordingResult, Results
 

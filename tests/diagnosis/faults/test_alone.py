@@ -10,7 +10,7 @@ from effect_rigs import BY_ID
 
 from bayesimpact.diagnosis.faults import alone
 from bayesimpact.diagnosis.faults.alone import NAMES, SharedModel, fit_alone, inverted, own_fit
-from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.model.effects import EFFECTS
 
 

@@ -10,8 +10,8 @@ import small_rig
 from effect_rigs import BY_ID
 
 from bayesimpact.data.campaign import Campaign
-from bayesimpact.diagnosis.extend import campaign_scales, extend
 from bayesimpact.diagnosis.faults.alone import NAMES, SharedModel, fit_alone
+from bayesimpact.diagnosis.faults.first_physics import faults_beside_physics
 from bayesimpact.diagnosis.faults.own_stops import (
     share_stops,
     shared_places,
@@ -19,10 +19,10 @@ from bayesimpact.diagnosis.faults.own_stops import (
     shown_label,
     with_own_stops,
 )
-from bayesimpact.diagnosis.first_physics import faults_beside_physics
-from bayesimpact.diagnosis.recording_faults import cleaned_campaign
+from bayesimpact.diagnosis.faults.recording_faults import cleaned_campaign
+from bayesimpact.diagnosis.refits.extend import campaign_scales, extend
 from bayesimpact.inference.identify import identify
-from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.trial.rig import Release
 
 LAWS = {"contact_hardening": {"stiffness": 1.5e9}, "quadratic_drag": {"coefficient": 1.0}}

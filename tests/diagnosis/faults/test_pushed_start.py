@@ -11,9 +11,9 @@ from scipy.integrate import solve_ivp
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.diagnose import diagnose
-from bayesimpact.diagnosis.extend import campaign_scales
 from bayesimpact.diagnosis.faults.pushed_start import pushed_starts
-from bayesimpact.diagnosis.recording_faults import cleaned_campaign
+from bayesimpact.diagnosis.faults.recording_faults import cleaned_campaign
+from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.model.effects import SEARCHED
 
 pytestmark = pytest.mark.usefixtures("catalogue_alone")

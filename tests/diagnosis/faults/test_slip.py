@@ -21,7 +21,7 @@ from bayesimpact.diagnosis.faults.slip import (
 )
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
-from bayesimpact.inference.noise import Noise
+from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.model.measurement import smooth
 
 COUNT = 1500

@@ -14,7 +14,7 @@ from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.faults.unfree_start import _alone, unfree_starts
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
-from bayesimpact.model.free_changes import motions_beside
+from bayesimpact.model.linear_response.free_changes import motions_beside
 
 pytestmark = pytest.mark.usefixtures("catalogue_alone")
 

@@ -12,7 +12,7 @@ import pytest
 from effect_rigs import BY_ID, TestRig
 
 import bayesimpact.model.effects as package
-from bayesimpact.diagnosis.size import yardstick
+from bayesimpact.diagnosis.refits.size import yardstick
 from bayesimpact.errors import InputError
 from bayesimpact.inference.defaults import effect_prior
 from bayesimpact.model.effects import EFFECTS, Scales

@@ -10,10 +10,10 @@ from scipy.optimize import brentq
 from scipy.special import airy, ellipk, gamma
 
 from bayesimpact.errors import InputError
+from bayesimpact.model.exact.simulate import simulate
 from bayesimpact.model.experiment import simulate as simulate_one
 from bayesimpact.model.oscillator import build_oscillator
 from bayesimpact.model.parameters import SLOTS
-from bayesimpact.model.simulate import simulate
 
 FREE = TestRig(mass=0.5, c1=0.0, k1=0.5 * (10 * np.pi) ** 2, k2=(), y0=(-6e-3,), v0=(0.0,))
 # almost no suspension: the mass flies into the obstacle and out again

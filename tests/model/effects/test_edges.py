@@ -7,10 +7,10 @@ import pytest
 from effect_rigs import BY_ID, MOVING, TestRig, by_hand, by_rig, moved, typical
 
 from bayesimpact.inference.defaults import effect_prior
-from bayesimpact.model.general import BAD_PARAMETERS, OK, integrate_many
+from bayesimpact.model.exact.simulate import simulate
+from bayesimpact.model.general.loop import BAD_PARAMETERS, OK, integrate_many
 from bayesimpact.model.oscillator import build_oscillator
 from bayesimpact.model.parameters import SLOTS, WITHOUT
-from bayesimpact.model.simulate import simulate
 
 NO_LAWS = np.empty((0, 6), dtype=np.int64)
 

@@ -7,8 +7,8 @@ import pytest
 from effect_rigs import BY_ID, TestRig, moved
 from scipy.linalg import expm
 
-from bayesimpact.model.added.second import joint_response, polynomial_response
-from bayesimpact.model.simulate import simulate
+from bayesimpact.model.exact.simulate import simulate
+from bayesimpact.model.general.second_mode import joint_response, polynomial_response
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,1 @@
+"""From a learned force to a formula."""

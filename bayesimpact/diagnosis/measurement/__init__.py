@@ -1,0 +1,1 @@
+"""What the measuring chain does: hums, filters, noise, and what looks alike."""

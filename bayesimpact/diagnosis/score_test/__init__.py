@@ -1,0 +1,1 @@
+"""What every effect would explain at best, without a refit."""

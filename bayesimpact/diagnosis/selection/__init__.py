@@ -1,0 +1,1 @@
+"""The search through the models, and the verdict that follows from it."""

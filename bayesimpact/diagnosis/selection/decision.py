@@ -1,0 +1,365 @@
+"""The verdict that follows from the odds of all hypotheses.
+
+Let S be the likeliest set of effects that the search reached.
+
+1. S leaves nothing that stands out from the noise (`State.is_white`):
+   `adequate` when S is empty, or `unknown` where the base model leaves more than half of the signal
+   to coloured noise, which the motion may be itself; `unknown` when one free force in the place of
+   all effects beats S by the decisive odds; `ambiguous` when another set comes within these odds,
+   or the search ended by its limit before all that might were fitted; else `named`.
+2. Something remains beside S. All odds are those with a force of time beside every hypothesis,
+   where what the model nearest to the recordings leaves beside one is noise.
+   Nothing is needed where a free force in the place of all effects leaves `EXCESS` times less of
+   the misfit, and S with such a force beside it is not decisively likelier than that force alone:
+   the effects only imitate it. Else an effect of S is needed when
+   - every set of effects without it trails S by the decisive odds, or trails at all a set with the
+     effect that has fewer effects or parameters; if it has more than S itself, one that has no
+     more: more to fit with makes imitation easy, and the rest of the truth may be among it. Where
+     the effect is a line, sets whose own line may be the motion's (`own_band`) are among these:
+     they are refused as names, and still are another explanation,
+   - `EXCESS` times as much is left without it, other effects refitted: of the misfit above the
+     noise, or, where a force of time is all that S leaves, of that force about the motion's own
+     frequencies. An effect that imitates what the catalogue lacks may put the phase right, but
+     leaves most of the force,
+   - its size is apart from none at all by `APART` of its own standard deviations, with what the
+     remainder may have done to it in them (`discrepancy`),
+   - where it refines a simpler law (`Effect.prefer`), `EXCESS` times as much is left with that law
+     in its place: what remains may be all that tells the two apart; where one of its family has no
+     parameters at all, its size is more than one part in `EXCESS` from that at which it does what
+     that one does: a size that is free also does a part of what remains,
+   - no set without it, with a residual force of whichever form is likeliest, is likelier than S
+     with its own residual force: by these odds (as in 1), where that force depends on what the
+     effect's depends on and may be no more than the effect itself, and
+   - no other effect in its place, with such a force beside, comes within these odds of that, or
+     above it where it has more parameters: what remains may be what tells two laws apart.
+   A search that ended by its limit must have fitted all of these.
+   With needed effects the verdict is `partly`, without any it is `unknown`. Other effects of S stay
+   in the fitted model, but are not named. Where every likely set that lacks one of them has another
+   of its family, or where a law and the one that it refines are not told apart, and all of the
+   above holds of these together, it is told that one of them is needed.
+
+A name never rests on one p-value.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from bayesimpact.diagnosis.faults.compare import base_failed
+from bayesimpact.diagnosis.refits.equivalent import equivalent
+from bayesimpact.diagnosis.refits.extend import campaign_scales
+from bayesimpact.diagnosis.refits.refit import Candidate
+from bayesimpact.diagnosis.residual_force.learned import may_restate
+from bayesimpact.diagnosis.score_test.directions import is_periodic
+from bayesimpact.diagnosis.selection.outcome import Naming, State
+from bayesimpact.diagnosis.thresholds import APART, DECISIVE, DOUBT, EXCESS
+from bayesimpact.inference.fit import Fit
+from bayesimpact.model.effects.effect import Effect
+
+Verdict = Literal["adequate", "named", "partly", "ambiguous", "unknown"]
+Group = tuple[Effect, ...]
+
+LARGEST_GROUP = 3  # effects of which one is needed: more tell little
+
+
+@dataclass(frozen=True, eq=False)
+class Decision:
+    """A verdict and what it stands on.
+
+    Attributes
+    ----------
+    verdict : see `bayesimpact.diagnosis.selection.decision`
+    effects : that are named, most important first
+    rivals : sets of effects that come within the decisive odds
+    either : groups of effects of one family, of each of which every likely set has one
+    """
+
+    verdict: Verdict
+    effects: tuple[Effect, ...]
+    rivals: tuple[Candidate, ...] = ()
+    either: tuple[Group, ...] = ()
+
+
+def decide(naming: Naming) -> Decision:
+    """The verdict on a finished search.
+
+    Where something remains, `naming.tried` must hold the chosen model and what it is without each
+    of its effects, and `naming.residual` the chosen model and, where an effect `may_be_needed`, the
+    base model and, unless that shows `is_imitated`, the models without each such effect and with
+    others in its place.
+    """
+    chosen = naming.chosen
+    effects = ordered(naming, chosen.candidate.effects)
+    if chosen.is_white:
+        if not effects:
+            fit = chosen.candidate.fit
+            hidden = fit.target.likelihood.noise.is_coloured and base_failed(fit)
+            return Decision("unknown" if hidden else "adequate", ())
+        if naming.prefers_learned_force():
+            return Decision("unknown", ())
+        rivals = naming.rivals()
+        settled = naming.finished and not rivals
+        return Decision("named" if settled else "ambiguous", effects, rivals)
+    if is_imitated(naming):
+        return Decision("unknown", ())
+    needed = tuple(e for e in effects if is_told_apart(naming, e) and is_needed(naming, (e,)))
+    groups = (group_of(naming, e) for e in effects if e not in needed)
+    either = tuple(g for g in groups if len(g) > 1 and is_needed(naming, g))
+    if not needed:
+        return Decision("unknown", (), either=either)
+    return Decision("partly", needed, naming.rivals(), either)
+
+
+def is_needed(naming: Naming, group: Group) -> bool:
+    """Whether every likely hypothesis has an effect of the chosen model, the first of a group, or
+    another of the group, although more remains.
+    """
+    if not may_be_needed(naming, group):
+        return False
+    chosen = frozenset(naming.chosen.candidate.ids)
+    if not (naming.finished or is_compared(naming, group)):
+        return False
+    reached = naming.with_residual_force(chosen)
+    return not any(
+        naming.with_residual_force(ids) > reached + lead(naming, ids, group[0])
+        for ids, candidate in naming.residual.items()
+        if not holds(candidate.effects, group)
+    )
+
+
+def is_told_apart(naming: Naming, effect: Effect) -> bool:
+    """Whether far more is left with the law that an effect refines in its place, if it does, and
+    its size is not that at which it does what a law without parameters does.
+    """
+    return not any(
+        is_of_fixed_size(naming, effect, law, candidate.fit)
+        or (law.id == effect.prefer and not exceeds(naming, candidate.fit))
+        for law, candidate in simpler_laws(naming, effect)
+    )
+
+
+def simpler_laws(naming: Naming, effect: Effect) -> list[tuple[Effect, Candidate]]:
+    """The law that an effect refines, and those of its family without parameters, with the chosen
+    model with them in its place, as far as these were fitted.
+    """
+    ids = frozenset(naming.chosen.candidate.ids)
+    rest = ids - {effect.id}
+    found = []
+    for candidate in naming.tried:
+        new = [e for e in candidate.effects if e.id not in ids]
+        if len(new) == 1 and frozenset(candidate.ids) == rest | {new[0].id}:
+            fixed = new[0].family == effect.family and not new[0].parameters
+            if fixed or new[0].id == effect.prefer:
+                found.append((new[0], candidate))
+    return found
+
+
+def is_of_fixed_size(naming: Naming, effect: Effect, law: Effect, fit: Fit) -> bool:
+    """Whether an effect of one size has nearly that at which it does what a law without parameters
+    does along a `fit` with that.
+    """
+    if law.parameters or len(effect.parameters) != 1:
+        return False
+    name = f"{effect.id}.{effect.parameters[0].name}"
+    at = equivalent(law, effect, fit, campaign_scales(naming.base.candidate.fit))
+    size = naming.chosen.candidate.fit.value(name)
+    return bool(at) and EXCESS * abs(at[name] - size) < abs(at[name])
+
+
+def group_of(naming: Naming, effect: Effect) -> Group:
+    """An effect of the chosen model, a simpler law like it, and those of its family that likely
+    sets without it have in its place; without these where one of the sets has none, or there are
+    too many.
+    """
+    chosen = naming.chosen.candidate
+    simpler = [
+        law
+        for law, candidate in simpler_laws(naming, effect)
+        if law.id == effect.prefer or is_of_fixed_size(naming, effect, law, candidate.fit)
+    ]
+    alone = (effect, *simpler[:1])
+    least = naming.log_odds(chosen) - DECISIVE
+    others = {e.id: e for e in alone[1:]}
+    for candidate in naming.tried:
+        if naming.log_odds(candidate) <= least or holds(candidate.effects, (effect,)):
+            continue
+        same = [e for e in candidate.effects if e.family == effect.family]
+        found = [e for e in same if e.id not in chosen.ids]
+        if len(found) != 1:
+            return alone
+        others[found[0].id] = found[0]
+    return (effect, *others.values()) if len(others) < LARGEST_GROUP else alone
+
+
+def is_imitated(naming: Naming) -> bool:
+    """Whether a free force in the place of all effects leaves far less of the misfit.
+
+    Not where the effects with a free force beside them are decisively likelier than that force
+    alone: then they do what it does not.
+    """
+    free = naming.residual.get(frozenset())
+    if free is None:
+        return False
+    left = misfit_above_noise(naming, naming.chosen.candidate.fit)
+    least = max(misfit_above_noise(naming, free.fit), doubtful_misfit(naming))
+    both = naming.residual.get(frozenset(naming.chosen.candidate.ids))
+    if both is not None and naming.log_odds(both) > naming.log_odds(free) + DECISIVE:
+        return False
+    return left > EXCESS * least
+
+
+def is_compared(naming: Naming, group: Group) -> bool:
+    """Whether a search that ended by its limit has still fitted what an effect must beat.
+
+    With a residual force: the chosen model, the base model, the one without the effect, and the
+    likeliest with another, not of its group, in its place; where none was tried, it was not.
+    """
+    chosen = frozenset(naming.chosen.candidate.ids)
+    other = in_its_place(naming, group)
+    if other is None:
+        return False
+    rivals = {chosen, frozenset[str](), chosen - {group[0].id}, frozenset(other.ids)}
+    return rivals <= naming.residual.keys()
+
+
+def lead(naming: Naming, ids: frozenset[str], effect: Effect) -> float:
+    """Odds by which a model with a residual force must lead the chosen one to unseat an effect.
+
+    One with fewer effects decisively where the force may be the effect itself (`may_restate`), for
+    it then contradicts nothing; else it is another explanation, and so is another effect in a
+    place: these may trail as much, or not at all where they have more parameters to fit with.
+    """
+    found = naming.residual[ids].effects
+    if len(ids) < len(naming.chosen.candidate.effects):
+        return DECISIVE if may_restate(found[-1], effect) else 0.0
+    named = tuple(e for e in found if e.id in ids)
+    return 0.0 if is_larger(named, naming.chosen) else -DECISIVE
+
+
+def is_larger(effects: Sequence[Effect], chosen: State) -> bool:
+    """Whether a set of effects is larger than the chosen one, or as large with more parameters."""
+    return complexity(effects) > complexity(chosen.candidate.effects)
+
+
+def complexity(effects: Sequence[Effect]) -> tuple[int, int]:
+    """Numbers of effects and of their parameters, states at the beginning apart."""
+    return len(effects), sum(not p.initial for e in effects for p in e.parameters)
+
+
+def may_be_needed(naming: Naming, group: Group) -> bool:
+    """`is_needed` as far as models without a residual force tell."""
+    return (
+        leads_without(naming, group)
+        and stands_out(naming, group[0])
+        and naming.apart.get(group[0].id, np.inf) >= APART
+    )
+
+
+def leads_without(naming: Naming, group: Group) -> bool:
+    """Whether every set without an effect of a group trails the chosen one decisively, or at all
+    one that has such an effect and is simpler; where it is larger than the chosen one, no larger.
+    """
+    chosen = naming.chosen
+    own = naming.log_odds(chosen.candidate)
+    with_it = [c for c in naming.tried if any(e.id in c.ids for e in group)]
+    sizes = [(complexity(c.effects), naming.log_odds(c)) for c in with_it]
+
+    def least(rival: Candidate) -> float:
+        most, larger = complexity(rival.effects), is_larger(rival.effects, chosen)
+        simpler = [odds for size, odds in sizes if size < most or (larger and size == most)]
+        return max([own - DECISIVE, *simpler])
+
+    others = [c for c in naming.tried if not holds(c.effects, group)]
+    if is_periodic(group[0]):
+        others = [with_its_evidence(c) for c in others]
+    return not any(naming.log_odds(c) > least(c) for c in others)
+
+
+def with_its_evidence(candidate: Candidate) -> Candidate:
+    """A model, with the evidence that it would have if it were not refused."""
+    refused = candidate.refused
+    return candidate if refused is None else replace(candidate, log_evidence=refused)
+
+
+def misses(naming: Naming, effect: Effect) -> bool:
+    """Whether `EXCESS` times as much misfit is left without an effect."""
+    smaller = frozenset(naming.chosen.candidate.ids) - {effect.id}
+    return exceeds(naming, next(c.fit for c in naming.tried if frozenset(c.ids) == smaller))
+
+
+def exceeds(naming: Naming, fit: Fit) -> bool:
+    """Whether a fit leaves `EXCESS` times as much misfit as the chosen model."""
+    with_it = misfit_above_noise(naming, naming.chosen.candidate.fit)
+    return misfit_above_noise(naming, fit) > EXCESS * with_it
+
+
+def stands_out(naming: Naming, effect: Effect) -> bool:
+    """Whether `EXCESS` times as much is left without an effect, of misfit or of force."""
+    if misses(naming, effect):
+        return True
+    if naming.own is not None and not naming.own.leaves_noise:
+        return False  # what is left is no force of time: a size of one says nothing
+    ids = frozenset(naming.chosen.candidate.ids)
+    smaller = ids - {effect.id}
+    return naming.power.get(smaller, 0.0) > EXCESS * naming.power.get(ids, np.inf)
+
+
+def in_its_place(naming: Naming, group: Group) -> Candidate | None:
+    """The likeliest model with an effect in the place of one of the chosen model's, the first of a
+    group, that is not of the group.
+    """
+    chosen = frozenset(naming.chosen.candidate.ids)
+    rest = chosen - {group[0].id}
+    others = [
+        c
+        for c in naming.tried
+        if len(c.ids) == len(chosen) and rest < frozenset(c.ids) and not holds(c.effects, group)
+    ]
+    return max(others, key=naming.log_odds, default=None)
+
+
+def holds(effects: Sequence[Effect], group: Group) -> bool:
+    """Whether a model has an effect of a group, one that reduces to it (`prefer`), or its
+    restatement.
+    """
+    return any(g.id in (e.id, e.prefer) or g.is_same_law(e) for e in effects for g in group)
+
+
+def misfit_above_noise(naming: Naming, fit: Fit) -> float:
+    """Sum of squares beyond that of the noise, in units of its variance.
+
+    The noise's own sum is what the recordings' noise estimate says, as far as that is certain;
+    within its uncertainty it is what the best hypothesis of all leaves.
+    """
+    chosen = naming.chosen.candidate.fit
+    level = chosen.target.likelihood.noise.level**2
+    own = float(chosen.target.likelihood.sizes.sum())
+    left = float(chosen.sums.sum()) / level
+    if left - own < doubtful_misfit(naming):  # as small as the estimate of the noise is uncertain
+        own = left - 2 * max(naming.chosen.unknown.gain, 0.0) * chosen.reduced_chi2
+    return max(float(fit.sums.sum()) / level - own, 1.0)
+
+
+def doubtful_misfit(naming: Naming) -> float:
+    """A sum of squares, in units of the noise's variance, that its estimate may be wrong by."""
+    likelihood = naming.chosen.candidate.fit.target.likelihood
+    error = likelihood.noise.level_error
+    return 2 * DOUBT * (error if np.isfinite(error) else 0.0) * float(likelihood.sizes.sum())
+
+
+def ordered(naming: Naming, effects: tuple[Effect, ...]) -> tuple[Effect, ...]:
+    """Effects by how much evidence the model loses without them."""
+    if len(effects) < 2:
+        return effects
+    chosen = set(naming.chosen.candidate.ids)
+    left = {frozenset(c.ids): c for c in naming.tried}
+
+    def loss(effect: Effect) -> float:
+        smaller = left.get(frozenset(chosen - {effect.id}))
+        return float("-inf") if smaller is None else smaller.log_evidence
+
+    return tuple(sorted(effects, key=loss))

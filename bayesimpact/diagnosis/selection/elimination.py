@@ -1,0 +1,185 @@
+"""Leaving effects out of a model, and putting others in their place."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from bayesimpact.diagnosis.candidates.promising import (
+    NEAR_BEST,
+    families,
+    in_place_of,
+    is_redundant,
+)
+from bayesimpact.diagnosis.refits.refit import Candidate
+from bayesimpact.diagnosis.score_test.scan import Scan
+from bayesimpact.diagnosis.score_test.scores import Score
+from bayesimpact.diagnosis.selection.models import NOTHING
+from bayesimpact.diagnosis.selection.outcome import State, is_large
+from bayesimpact.diagnosis.selection.ranked import Ranked
+from bayesimpact.diagnosis.thresholds import DECISIVE
+from bayesimpact.formula.law import is_formula
+from bayesimpact.inference.fit import Fit
+from bayesimpact.model.effects.effect import Effect
+
+EXCHANGES = 3  # rounds of leaving out and exchanging effects
+END = 1e-3  # of a shape's range, in which it lies at an end: climbs stop there
+
+
+class Settling(Ranked):
+    """How a model settles: effects left out and exchanged."""
+
+    def extended(self, state: State) -> list[Candidate]:
+        """Models with one more effect."""
+        raise NotImplementedError
+
+    def settled(self, state: State) -> State:
+        """The model that neither leaving out nor exchanging an effect improves."""
+        for _ in range(EXCHANGES):
+            self.weigh_remainder()
+            state = self.eliminated(state)
+            for candidate in self.near(state):
+                if self.may_go_on():
+                    self.exchange(candidate)
+            best = self.best(len(state.candidate.effects))
+            best = max([best, *self.beside_rival(state)], key=self.log_odds)
+            if best is state.candidate:  # the same set with a better end settles once more
+                return state
+            state = self.examine(best)
+        return self.eliminated(state)  # what the last exchange led to may need less too
+
+    def eliminated(self, state: State) -> State:
+        """Leave out effects, the least useful first, that the recordings do not demand; where
+        something remains, put the law that one refines in its place.
+
+        An effect stays when the model without it is decisively worse, or leaves something. When
+        time is up and something remains, all stay: what is needed is compared then (`decision`).
+        """
+        while (state.is_white or self.may_go_on()) and (smaller := self.smaller(state)):
+            best = max(smaller, key=self.log_odds)
+            lost = self.log_odds(state.candidate) - self.log_odds(best)
+            complete = state.is_white and not self.examine(best).is_white
+            if lost >= DECISIVE or (lost > 0 and complete):
+                return state
+            state = self.examine(best)
+        return state
+
+    def smaller(self, state: State) -> list[Candidate]:
+        """Models with one effect less, or with a simpler one where something remains."""
+        chosen = state.candidate
+        found = [self.drop(chosen, e) for e in chosen.effects if len(chosen.effects) > 1]
+        if not state.is_white and self.may_go_on():
+            found += [c for e in chosen.effects for c in self.simplified(chosen, e)]
+        return found
+
+    def near(self, state: State) -> list[Candidate]:
+        """The chosen model and those of at most its size that it does not beat decisively."""
+        least = self.log_odds(state.candidate) - DECISIVE
+        return [
+            c
+            for c in self.ranked(list(self.tried.values()))
+            if self.log_odds(c) >= least and len(c.effects) <= len(state.candidate.effects)
+        ]
+
+    def beside_rival(self, state: State) -> list[Candidate]:
+        """Extensions by one effect of the likeliest model that lacks an effect of one that leaves
+        nothing, and comes near it: a law of free shape may have taken the place of two.
+        """
+        chosen = state.candidate
+        least = self.log_odds(chosen) - 2 * DECISIVE
+        rivals = [
+            c
+            for c in self.ranked(list(self.tried.values()))
+            if self.log_odds(c) >= least
+            and len(c.effects) <= min(len(chosen.effects), self.most - 1)
+            and not set(chosen.ids) <= set(c.ids)
+        ]
+        if not (state.is_white and rivals and self.may_go_on()):
+            return []
+        return self.extended(self.examine(rivals[0]))
+
+    def exchange(self, chosen: Candidate) -> None:
+        """Put every other effect in the place of each chosen one.
+
+        Where the misfit was large, several of its own family together too: two damping laws make a
+        third one. Where it was not, all single effects have been fitted beside the base model.
+        """
+        if len(chosen.effects) < 2 and not self.is_large:
+            return
+        for effect in chosen.effects:
+            if is_formula(effect):  # compared with all others of the grammar
+                continue
+            rest = self.drop(chosen, effect)
+            if self.is_large and self.may_go_on():
+                self.simplified(chosen, effect)
+            found = self.scanned(rest, self.effects)
+            large = is_large(rest.fit)
+            instead = effect.id if self.leaves_nothing(chosen) else ""
+            asked, seen = self.asked.first(rest, chosen, instead) if self.is_large else NOTHING
+            if self.is_large and not seen:
+                others = [[s for s in j if s.effect.id != effect.id] for j in families(found)]
+                for joint in others:
+                    if len(joint) > 1 and joint[0].effect.family == effect.family:
+                        self.fit_more(rest, joint)
+            scores = self.asked_beside(rest, (asked, seen), found, self.refit_candidates(found))
+            promising = in_place_of(effect, scores, large, asked if large else ())
+            for score in promising:
+                if self.may_go_on() and not is_redundant(rest, score.effect):
+                    self.fit_one(rest, found, score, chosen)
+                    if not score.effect.has_size:
+                        self.exchange_in_place(chosen, effect, score.effect)
+            wanted = _alike(effect, self.effects) if is_at_an_end(chosen.fit, effect) else set()
+            if not _is_seen(effect, found, rest, chosen):
+                # where the rest of a large misfit stands in a side minimum, scores see none of them
+                wanted |= set(asked)
+            for new in _unseen(found, wanted - {effect.id}, promising):
+                if self.may_go_on() and not is_redundant(rest, new):
+                    self.exchange_in_place(chosen, effect, new)
+
+    def leaves_nothing(self, candidate: Candidate) -> bool:
+        """Whether a model has been examined, and nothing was missing from it."""
+        state = self.states.get(frozenset(candidate.ids))
+        return state is not None and state.candidate is candidate and state.is_white
+
+    def simplified(self, chosen: Candidate, effect: Effect) -> list[Candidate]:
+        """What an effect refines in its place, whatever scores on a model without both say."""
+        found = []
+        for simpler in self.effects:
+            if simpler.id == effect.prefer and simpler.id not in chosen.ids:
+                self.exchange_in_place(chosen, effect, simpler)
+                found.append(self.tried[frozenset(chosen.ids) - {effect.id} | {simpler.id}])
+        return found
+
+
+def _is_seen(effect: Effect, found: Scan, rest: Candidate, chosen: Candidate) -> bool:
+    """Whether scores on a model see, of the effect that was left out of it, what it is known to do:
+    then they can be believed about others in its place.
+    """
+    own = max((s.gain for s in found.best() if s.effect.id == effect.id), default=0.0)
+    return own > NEAR_BEST * (chosen.fit.log_likelihood - rest.fit.log_likelihood)
+
+
+def is_at_an_end(fit: Fit, effect: Effect) -> bool:
+    """Whether a shape of an effect lies at an end of its range: it is not the law that is asked."""
+    parameters, lower = fit.target.oscillator.layout.parameters, fit.target.priors.lower
+    upper = fit.target.priors.upper
+    shapes = {f"{effect.id}.{p.name}" for p in effect.parameters if p.is_shape and not p.circular}
+    for i, parameter in enumerate(parameters):
+        low, high = max(parameter.lower, lower[i]), min(parameter.upper, upper[i])
+        if parameter.name.split("[")[0] in shapes and np.isfinite(high - low):
+            inside = min(fit.mode[i] - low, high - fit.mode[i])
+            if inside < END * (high - low):
+                return True
+    return False
+
+
+def _alike(effect: Effect, effects: Sequence[Effect]) -> set[str]:
+    """Ids of an effect's family."""
+    return {e.id for e in effects if e.family == effect.family}
+
+
+def _unseen(found: Scan, asked: Collection[str], promising: Sequence[Score]) -> list[Effect]:
+    """Effects that are asked for and can stand beside a model, but are not promising by scores."""
+    known = {s.effect.id for s in promising}
+    return [s.effect for s in found.best() if s.effect.id in asked and s.effect.id not in known]

@@ -1,0 +1,146 @@
+"""Where a search ends with something left: what a verdict compares then."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from bayesimpact.diagnosis.candidates.promising import is_redundant
+from bayesimpact.diagnosis.refits.refit import Candidate, in_words
+from bayesimpact.diagnosis.residual_force.discrepancy import Discrepancy, discrepancy
+from bayesimpact.diagnosis.selection.decision import (
+    Group,
+    group_of,
+    in_its_place,
+    is_imitated,
+    is_needed,
+    is_told_apart,
+    leads_without,
+    may_be_needed,
+    misses,
+    ordered,
+)
+from bayesimpact.diagnosis.selection.elimination import EXCHANGES, Settling
+from bayesimpact.diagnosis.selection.outcome import Naming, State
+from bayesimpact.diagnosis.selection.unknown import with_force
+from bayesimpact.model.effects.effect import Effect
+
+
+class Remaining(Settling):
+    """Models beside a force of time, and beside a residual force."""
+
+    def with_residuals(self, found: Naming) -> Naming:
+        """What `decide` compares where something remains: the likeliest model beside a force of
+        time, what it is without each of its effects, and models with a residual force.
+        """
+        nearest = min(self.tried.values(), key=lambda c: c.fit.reduced_chi2)
+        left = self.remainder(nearest.fit)
+        if left is not None and left.leaves_noise:
+            found = self.beside_a_force(found, left)
+        chosen = found.chosen.candidate
+        if found.chosen.is_white:
+            return replace(found, beside=None)
+        smaller = {e.id: self.drop(chosen, e) for e in chosen.effects}
+        for effect in chosen.effects:  # whether time is up or not: no law is told without
+            self.simplified(chosen, effect)
+            late = not found.finished and self.budget.may_compare_on(self.look)
+            if late and in_its_place(found, (effect,)) is None:
+                self.likeliest_in_place(chosen, effect)
+        tried = tuple(sorted(self.tried.values(), key=found.log_odds, reverse=True))
+        found = replace(found, tried=tried, states=dict(self.states))
+        alone = [(e,) for e in ordered(found, chosen.effects)]
+        groups = [
+            g if leads_without(found, g) and is_told_apart(found, g[0]) else group_of(found, g[0])
+            for g in alone
+        ]
+        leading = [g for g in groups if leads_without(found, g)]
+        own = self.remainder(chosen.fit)
+        if own is not None:
+            doubtful = [g[0].id for g in leading if own.leaves_noise and not misses(found, g[0])]
+            without = {i: discrepancy(smaller[i].fit) for i in doubtful}
+            power = {
+                frozenset(smaller[i].ids): d.power for i, d in without.items() if d is not None
+            }
+            found = replace(
+                found,
+                own=own,
+                apart={e.id: own.apart(e) for e in chosen.effects},
+                power={**power, frozenset(chosen.ids): own.power},
+            )
+        needed = [g for g in leading if may_be_needed(found, g)]
+        if needed:
+            found = self.with_forces(found, [found.base.candidate])
+        found = self.with_forces(found, [chosen])
+        for group in needed if not is_imitated(found) else ():
+            found = self.with_forces(found, [smaller[group[0].id], *rivals_in_place(found, group)])
+            wider = group_of(found, group[0])
+            told = is_needed(found, group) and is_told_apart(found, group[0])
+            if len(wider) > len(group) and not told:
+                found = self.with_forces(found, rivals_in_place(found, wider))
+        return found
+
+    def likeliest_in_place(self, chosen: Candidate, effect: Effect) -> None:
+        """Put the effect of which scores promise most in the place of one that a search which was
+        cut short has compared with none.
+        """
+        rest = self.drop(chosen, effect)
+        found = self.scanned(rest, self.effects)
+        others = [
+            s
+            for s in found.best()
+            if s.effect.id not in chosen.ids and not is_redundant(rest, s.effect)
+        ]
+        if others:
+            best = max(others, key=lambda s: s.gain)
+            self.fit_one(rest, found, best, chosen)
+            self.exchange_in_place(chosen, effect, best.effect)
+
+    def with_forces(self, found: Naming, candidates: Sequence[Candidate]) -> Naming:
+        """With the models of these that have a residual force beside their effects, as far as time
+        allows: what is not compared with all of its own is not needed.
+        """
+        residual = dict(found.residual)
+        for candidate in candidates:
+            key = frozenset(candidate.ids)
+            if key not in residual and self.budget.may_compare_on(self.look):
+                residual[key] = self.with_residual(self.examine(candidate))
+        late = any(frozenset(c.ids) not in residual for c in candidates)
+        return replace(
+            found,
+            residual=residual,
+            states=dict(self.states),
+            finished=found.finished and not late,
+        )
+
+    def beside_a_force(self, found: Naming, left: Discrepancy) -> Naming:
+        """The search with a force of time beside every model, and the likeliest of them chosen.
+
+        A model that the search had not settled on is compared with exchanges of its own.
+        """
+        found = replace(found, beside=left)
+        for turn in range(EXCHANGES):
+            chosen = found.chosen.candidate
+            for effect in chosen.effects:
+                self.drop(chosen, effect)
+            if turn and self.may_go_on():
+                self.exchange(chosen)
+            tried = tuple(sorted(self.tried.values(), key=found.log_odds, reverse=True))
+            best = self.examine(tried[0])
+            found = replace(found, tried=tried, chosen=best)
+            if set(best.candidate.ids) == set(chosen.ids) or not self.may_go_on():
+                break
+        finished = found.finished and self.may_go_on()
+        return replace(found, states=dict(self.states), finished=finished)
+
+    def with_residual(self, state: State) -> Candidate:
+        """A model with the likelier form of a residual force beside its effects."""
+        beside = in_words(state.candidate.effects) or "the base model"
+        self.progress(f"fitting a residual force beside {beside}")
+        least = self.enough().least_gain
+        return with_force(state.candidate, state.unknown, self.scales, least_gain=least)
+
+
+def rivals_in_place(found: Naming, group: Group) -> list[Candidate]:
+    """The likeliest model with another effect, not of a group, in the place of its first."""
+    other = in_its_place(found, group)
+    return [] if other is None else [other]

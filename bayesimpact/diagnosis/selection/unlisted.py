@@ -1,0 +1,157 @@
+"""Forces that no set of effects holds, met on the way of a search: of time, and of no effect.
+
+Where the equation of motion leaves far less of a large misfit by a harmonic force, the search
+begins beside it (`line_sets`): in flight, for what a stop does has lines of its own.
+
+Where the catalogue leaves a large misfit, the equation of motion may tell a term of the grammar
+that leaves far less of it (`likely_terms`). The search goes on beside it. It is no name yet: once
+the motion is right, all formulas are compared in its place (`formulas`). What it leaves until then
+may be what tells it from the force that it stands for; so an effect joins it only where it leaves
+`EXCESS` times less.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from bayesimpact.diagnosis.candidates.likely_sets import LikelySets
+from bayesimpact.diagnosis.candidates.likely_terms import sets_with_a_term
+from bayesimpact.diagnosis.candidates.line_sets import sets_with_a_line
+from bayesimpact.diagnosis.candidates.period_terms import sets_with_a_term_ahead
+from bayesimpact.diagnosis.candidates.term_sets import EffectSet
+from bayesimpact.diagnosis.refits.refit import Candidate
+from bayesimpact.diagnosis.score_test.directions import is_periodic
+from bayesimpact.diagnosis.selection.outcome import State, is_large
+from bayesimpact.diagnosis.selection.remaining import Remaining
+from bayesimpact.diagnosis.thresholds import EXCESS
+from bayesimpact.formula.law import is_formula
+from bayesimpact.model.effects.harmonic_forcing import EFFECT as HARMONIC_FORCING
+
+Problem = Callable[[Candidate], list[Candidate]]
+"""Models that a problem posed about one asks for."""
+
+SetsBeside = Callable[[LikelySets, int], list[EffectSet]]
+"""Sets with one more force that a problem asks for, of so many effects at most."""
+
+
+class Unlisted(Remaining):
+    """A search that may leave the catalogue."""
+
+    def with_a_line(self, state: State) -> State:
+        """A model, or where its misfit is large one with a harmonic force, where the equation of
+        motion leaves `EXCESS` times less by it than by effects that are none.
+        """
+        about = state.candidate
+        shaken = [e for e in self.effects if e.id == HARMONIC_FORCING.id]
+        if not (shaken and is_large(about.fit)):
+            return state
+        if any(map(is_periodic, (*about.fit.target.oscillator.acting, *about.effects))):
+            return state
+
+        def sets(problem: LikelySets, most: int) -> list[EffectSet]:
+            return sets_with_a_line(problem, shaken[0], most, about.ids)
+
+        self.is_shaken = True
+        found = self.beside_sets(state, ("line",), sets, [self.asked.has_stop])
+        self.is_shaken = found is not state
+        return found
+
+    def with_a_term(self, state: State, *, excess: float = EXCESS) -> State:
+        """A model, or one with a term of the grammar that explains more, where the equation of
+        motion leaves `excess` times less by it than by the catalogue.
+
+        Of a large misfit only, or of what is left of one; once about every model, and never a
+        second term, for sums of terms are compared later.
+        """
+        about = state.candidate
+        something = is_large(about.fit) if excess > 1.0 else not state.is_white and self.is_large
+        if not something or any(map(is_formula, about.effects)):
+            return state
+
+        def sets(problem: LikelySets, most: int) -> list[EffectSet]:
+            return sets_with_a_term(problem, most, about.ids, excess)
+
+        ways = [True, False] if self.asked.has_stop else [False]
+        return self.beside_sets(state, ("term", excess), sets, ways)
+
+    def beside_sets(
+        self,
+        state: State,
+        kind: tuple[object, ...],
+        sets: SetsBeside,
+        ways: Sequence[bool],
+    ) -> State:
+        """A model, or a likelier one with a force beside sets of effects, by the first of some
+        `ways` that leads to one: in flight or in all of the motion; once about every model.
+        """
+        about = state.candidate
+        for flight in ways:
+            key = (*kind, about.ids, about.fit.log_posterior, flight)
+            if key in self.begun or not self.may_go_on():
+                continue
+            self.begun.add(key)
+            problem = self.asked.about(about, flight)
+            asked = sets(problem, self.most - len(problem.known))
+            found = [about, *self.fit_up_to_small(problem, asked, about)]
+            best = max(found, key=self.promise)
+            if best is not about:
+                return self.examine(best)
+        return state
+
+    def fit_up_to_small(
+        self, problem: LikelySets, sets: Sequence[EffectSet], about: Candidate
+    ) -> list[Candidate]:
+        """Models of sets that a problem posed about a model asks for; larger ones up to the first
+        whose misfit is not large, where the model's is.
+        """
+        found = list[Candidate]()
+        for chosen in sets:
+            if not self.may_go_on():
+                break
+            found.append(self.fit_set(problem.fit, chosen, about.fit.log_likelihood))
+            if is_large(about.fit) and not is_large(found[-1].fit):
+                break
+        return found
+
+    def with_a_term_ahead(self, base: State, state: State) -> State:
+        """A model, or where its misfit is large the one that periods ahead of the base model lead
+        to with a term of the grammar, if that leaves `EXCESS` times less.
+        """
+        wanted = self.asked.has_stop and is_large(state.candidate.fit)
+        if not (wanted and self.may_go_on()):
+            return state
+        found = self.asked_again(base.candidate, self.of_periods_with_a_term)
+        far_less = EXCESS * found.fit.reduced_chi2 < state.candidate.fit.reduced_chi2
+        return self.examine(found) if far_less else state
+
+    def asked_again(self, about: Candidate, problem: Problem) -> Candidate:
+        """The likeliest model that a problem asks for about one, then about that, and so on."""
+        best = about
+        while True:
+            found = problem(best)
+            better = max([best, *found], key=self.promise)
+            if better is best:
+                return best
+            best = better
+
+    def of_periods_with_a_term(self, about: Candidate) -> list[Candidate]:
+        """Models with a term of the grammar that periods ahead ask for about one; of one that has
+        a term those with more effects.
+        """
+        most = self.most - len(about.effects)
+        if any(map(is_formula, about.effects)):
+            problem = self.asked.ahead(about, about)
+            return self.fit_sets(problem.fit, problem.best(most))
+        problem = self.asked.ahead_with_terms(about)
+        found = list[Candidate]()
+        for sets in sets_with_a_term_ahead(problem, most):
+            found += self.fit_sets(problem.fit, sets)
+        return found
+
+    def leads_on(self, state: State, larger: Candidate) -> bool:
+        """Whether a larger model is the next one; beside a formula, where it leaves far less."""
+        chosen = state.candidate
+        if any(map(is_formula, chosen.effects)):
+            rest = max(larger.fit.reduced_chi2 - 1.0, 0.0)
+            return EXCESS * rest < chosen.fit.reduced_chi2 - 1.0 and super().leads_on(state, larger)
+        return super().leads_on(state, larger)

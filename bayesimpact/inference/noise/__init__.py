@@ -1,0 +1,1 @@
+"""Noise: how it whitens residuals, and its estimates from recordings and fits."""

@@ -1,0 +1,1 @@
+"""Posterior by ensembles of walkers, saved in blocks."""

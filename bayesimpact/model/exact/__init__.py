@@ -1,0 +1,1 @@
+"""The base oscillator in closed form, from event to event."""

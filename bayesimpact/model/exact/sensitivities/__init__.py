@@ -1,0 +1,1 @@
+"""Exact derivatives of its recordings, through the impacts."""

@@ -1,0 +1,1 @@
+"""The oscillator with added effects, integrated from event to event."""

@@ -1,0 +1,1 @@
+"""How and on how many threads the package compiles, and how much it simulates."""

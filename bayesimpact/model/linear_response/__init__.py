@@ -1,0 +1,1 @@
+"""What small forces along a known motion change, without simulating them."""

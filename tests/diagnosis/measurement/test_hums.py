@@ -1,0 +1,92 @@
+"""Recordings less their hums, and the search that begins with what those ask for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import small_rig
+
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.hum import Hum
+from bayesimpact.data.input import Input
+from bayesimpact.diagnosis.measurement.hums import (
+    _shared,
+    fit_without_hums,
+    recordings_without_hums,
+)
+from bayesimpact.diagnosis.selection import search
+from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.identify import identify
+
+HUM = {"amplitude": 4e-5, "frequency": 17.0, "phase": 1.0}
+CUBIC = {"stiffness": 1e6}
+
+
+def decays(**effects: Any) -> Campaign:
+    return small_rig.record(
+        3, effects, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES, duration=4.0, rate=500.0
+    )
+
+
+def fitted(campaign: Campaign) -> Fit:
+    return identify(campaign, rng=np.random.default_rng(0), search=False).fit
+
+
+@pytest.fixture(scope="module")
+def humming() -> Fit:
+    return fitted(decays(sensor_hum=HUM, spring_cubic=CUBIC))
+
+
+def test_recordings_are_quiet_without_their_hums() -> None:
+    loud, still = (decays(**e).recordings for e in ({"sensor_hum": HUM}, {}))
+    for own, known in zip(recordings_without_hums(loud), still, strict=True):
+        assert np.std(own.samples - known.samples) < 0.05 * HUM["amplitude"]
+    assert all(a is b for a, b in zip(recordings_without_hums(still), still, strict=True))
+
+
+def test_a_driven_motion_may_be_a_line_itself() -> None:
+    first, *others = decays(sensor_hum=HUM).recordings
+    driven = replace(first, input=Input(np.zeros(first.samples.size)))
+    found = recordings_without_hums((driven, *others))
+    assert found[0] is driven and found[1] is not others[0]
+
+
+def test_a_hum_is_taken_out_only_where_that_leaves_less(
+    humming: Fit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = fit_without_hums(humming)
+    assert found is not None and found.reduced_chi2 < humming.reduced_chi2
+    assert fit_without_hums(fitted(decays(spring_cubic=CUBIC))) is None
+    monkeypatch.setattr(
+        "bayesimpact.diagnosis.measurement.hums.refitted", lambda fit, campaign: fit
+    )
+    assert fit_without_hums(humming) is None
+
+
+@pytest.mark.parametrize("left", [1.0, 100.0])
+def test_a_search_begins_with_what_quiet_recordings_ask_for(humming: Fit, left: float) -> None:
+    """Unless that leaves a large misfit; the model is then fitted to the recordings as they are."""
+    quieter = fit_without_hums(humming)
+    assert quieter is not None
+    fit = replace(quieter, sums=quieter.sums * left / quieter.reduced_chi2)
+    state = SimpleNamespace(candidate=SimpleNamespace(fit=fit))
+    begun = SimpleNamespace(
+        progress=lambda words: None, examine=lambda c: state, asked_for=lambda s: [s], is_large=True
+    )
+    found = search._beside_hums(humming, lambda: begun)
+    if left > 1.0:
+        assert found is None
+    else:
+        own = humming.target.oscillator.campaign
+        assert found is not None and found.target.oscillator.campaign is own
+
+
+def test_hums_of_different_frequencies_are_shared_by_none() -> None:
+    one, other = Hum(50.0, 1.0, 0.0, 9.0, 1.0), Hum(150.0, 1.0, 0.0, 9.0, 1.0)
+    near = Hum(50.1, 1.0, 0.0, 9.0, 1.0)
+    assert _shared((one, other), 4.0) is None and _shared((), 4.0) is None
+    assert _shared((one, near), 4.0) in (one, near) and _shared((one, near), 40.0) is None

@@ -1,0 +1,398 @@
+"""The path through the models, on a table of made-up evidences: no model is ever fitted."""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from effect_rigs import BY_ID
+from made_up_models import EFFECTS, ENOUGH, A, B, C, D, N, S, Table
+
+from bayesimpact.diagnosis.thresholds import DECISIVE
+
+search = importlib.import_module("bayesimpact.diagnosis.selection.search")
+models = importlib.import_module("bayesimpact.diagnosis.selection.models")
+naming = importlib.import_module("bayesimpact.diagnosis.selection.outcome")
+ranked = importlib.import_module("bayesimpact.diagnosis.selection.ranked")
+settle = importlib.import_module("bayesimpact.diagnosis.selection.elimination")
+remaining = importlib.import_module("bayesimpact.diagnosis.selection.remaining")
+
+
+@pytest.fixture
+def run(monkeypatch):
+    def go(table: Table, effects=EFFECTS, repetition=1.0, refuted=None):
+        monkeypatch.setattr(models, "refit", table.refit)
+        monkeypatch.setattr(models, "without", table.without)
+        monkeypatch.setattr(models, "exchanged", table.exchanged)
+        monkeypatch.setattr(models, "fit_from", table.fit_from)
+        monkeypatch.setattr(models, "Asked", table.asks)
+        monkeypatch.setattr(models, "shakes_in_own_band", lambda fit, remains: False)
+        monkeypatch.setattr(models, "leaves_something", lambda fit: False)
+        monkeypatch.setattr(ranked, "leaves_something", lambda fit: fit.reduced_chi2 > 1.0)
+        monkeypatch.setattr(models, "is_refuted", lambda fit: fit.ids == refuted)
+        monkeypatch.setattr(models, "scan", table.scan)
+        monkeypatch.setattr(models, "profiled", table.profiled)
+        for module in (search, models):
+            monkeypatch.setattr(module, "model_evidence", lambda fit: fit.gain)
+        for module in (ranked, remaining):
+            monkeypatch.setattr(module, "discrepancy", lambda fit: None)
+        monkeypatch.setattr(search, "missing_contact", table.contact)
+        monkeypatch.setattr(search, "learn_force", lambda fit, force, scales: force.fit)
+        monkeypatch.setattr(ranked, "residual_repetition", lambda fit: repetition)
+        monkeypatch.setattr(remaining, "with_force", lambda candidate, *others, **near: candidate)
+        for rule in ("may_be_needed", "is_needed", "is_told_apart"):
+            monkeypatch.setattr(remaining, rule, lambda naming, effect: True)
+        monkeypatch.setattr(remaining, "is_imitated", lambda naming: False)
+        monkeypatch.setattr(search, "promising_pairs", lambda scan, count: ())
+        monkeypatch.setattr(search, "posed_anew", lambda *about: None)
+        monkeypatch.setattr(search, "is_spoilt", lambda base, fit: False)
+        monkeypatch.setattr(settle, "is_at_an_end", lambda fit, effect: False)
+        for force in ("missing_force", "missing_drift"):
+            monkeypatch.setattr(models, force, table.missing)
+        monkeypatch.setattr(
+            search, "base_candidate", lambda fit: table.candidate((), table.gain(()))
+        )
+        fit = SimpleNamespace(reduced_chi2=1.0)
+        return search.name(fit, effects, None, rng=np.random.default_rng(0))
+
+    return go
+
+
+def chosen(naming) -> set[str]:
+    return set(naming.chosen.candidate.ids)
+
+
+def test_nothing_is_fitted_where_nothing_is_missing(run):
+    assert chosen(run(table := Table({"": ENOUGH}))) == set() and table.fitted == []
+
+
+def test_where_the_misfit_is_large_what_gains_most_per_effect_comes_first(run):
+    """Two damping laws gain more than the cubic spring, but less than twice as much."""
+    gains = {A: 10.0, B: 10.0, f"{A} {B}": 400.0, C: 390.0, f"{A} {C}": 440.0, f"{B} {C}": 440.0}
+    table = Table({**gains, f"{A} {B} {C}": ENOUGH}, chi2=100.0)
+    assert chosen(run(table)) == {A, B, C}
+    first_step = [{A, B}, *({e} for e in (A, B, C, D, S))]
+    assert next(ids for ids in table.fitted if ids not in first_step) in ({A, C}, {B, C})
+
+
+@pytest.mark.parametrize("most", [ENOUGH, 320.0])
+def test_climbs_have_the_goal_to_come_near_what_they_are_compared_with(run, most):
+    """A model that leaves nothing, or the one that is exchanged; effects alone have none."""
+    gains = {A: 300.0, B: 20.0, f"{A} {B}": most, f"{A} {C}": 310.0, f"{B} {D}": 310.0}
+    table = Table(gains, chi2=100.0)
+    assert chosen(run(table)) == {A, B}
+    assert table.goals[table.fitted[0]] == -np.inf
+    expected = most - 2 * np.log(2 * len(EFFECTS)) - DECISIVE
+    assert table.goals[frozenset({B, D})] == pytest.approx(expected)
+
+
+def test_where_the_misfit_is_large_the_search_begins_with_what_the_equation_asks_for(run):
+    gains = {A: 10.0, B: 10.0, f"{A} {B}": 400.0, C: 390.0, f"{A} {B} {C}": ENOUGH}
+    table = Table(
+        gains, chi2=100.0, asked=(C, f"{A} {B} {C}"), seen={A: 1.0, B: 2.0, C: 3.0, D: 0.5}
+    )
+    assert chosen(run(table)) == {A, B, C}
+    assert table.fitted[:2] == [{C}, {A, B, C}]
+    small = Table(gains, asked=(f"{A} {B} {C}",))
+    run(small)
+    assert small.fitted[0] != {A, B, C}
+
+
+def test_beside_a_large_misfit_what_the_equation_asks_for_last_is_not_tried(run):
+    gains = {A: 300.0, f"{A} {B}": ENOUGH, f"{A} {C}": 400.0, f"{A} {D}": 400.0}
+    table = Table(gains, chi2=100.0, asked=(A,), seen={B: 9.0, C: 1.0}, first=1)
+    assert chosen(run(table)) == {A, B}
+    assert frozenset({A, C}) not in table.fitted
+    assert {frozenset({A, B}), frozenset({A, D})} <= set(table.fitted)
+
+
+def test_the_equation_is_asked_again_about_a_better_model(run):
+    """About the base model's rest C + D look right; about that of A, it is three others."""
+    gains = {A: 300.0, C: 1.0, f"{C} {D}": 2.0, f"{A} {B} {D}": ENOUGH}
+    table = Table(
+        gains, chi2=100.0, asked=(C, f"{C} {D}", A), asked_about={A: (A, f"{A} {B} {D}")},
+        seen={C: 1.0}, first=1,
+    )  # fmt: skip
+    assert chosen(run(table)) == {A, B, D}
+    assert table.fitted[3] == {A, B, D}
+
+
+def test_what_free_flight_asks_for_is_extended_beside_what_gains_more(run):
+    """Laws of the stop that imitate what it really does gain most as long as that is missing."""
+    gains = {A: 5.0, S: 200.0, f"{S} {C}": 300.0, f"{A} {N}": ENOUGH}
+    table = Table(
+        gains, chi2=100.0, asked=(S, f"{S} {C}"), asked_in_flight=(A,), seen={S: 9.0, C: 8.0}
+    )
+    assert chosen(run(table, (*EFFECTS, BY_ID[N]))) == {A, N}
+
+
+def test_with_a_stop_periods_ahead_are_asked_first(run):
+    """What they ask for is fitted before what free flight does, and where nothing large is left of
+    it flight is not asked.
+    """
+    gains = {A: 5.0, f"{S} {N}": ENOUGH}
+    effects = (*EFFECTS, BY_ID[N])
+    table = Table(
+        gains, chi2=100.0, left={f"{S} {N}": 1.0}, asked=(S,), asked_in_flight=(A,),
+        asked_ahead=(f"{S} {N}",),
+    )  # fmt: skip
+    assert chosen(run(table, effects)) == {S, N}
+    assert table.fitted[0] == {S, N} and {A} not in table.fitted[:3]
+
+
+@pytest.mark.parametrize(
+    ("before", "left", "ends"), [(35.0, 8.5, True), (33.0, 8.5, False), (100.0, 9.5, False)]
+)
+def test_one_effect_that_explains_most_of_a_large_misfit_ends_the_step(run, before, left, ends):
+    """The others are scored anew beside it: less than a quarter is left, and no large misfit."""
+    gains = {A: 300.0, C: 200.0, f"{A} {B}": ENOUGH}
+    table = Table(gains, chi2=before, left={A: left})
+    assert chosen(run(table)) == {A, B}
+    assert table.fitted[1] == ({A, B} if ends else {C})
+
+
+def test_an_effect_that_is_refused_ends_no_step(run):
+    """A force of the motion's own frequency may explain most of anything."""
+    gains = {A: 300.0, C: 200.0, f"{C} {B}": ENOUGH}
+    assert chosen(run(Table(gains, chi2=50.0, left={A: 5.0}), refuted=(A,))) == {B, C}
+
+
+def test_what_waited_is_extended_where_that_leads_no_further(run):
+    """An effect beside the likelier model explains most, but not all, and no other the rest."""
+    gains = {A: 5.0, S: 200.0, f"{S} {C}": 300.0, f"{S} {C} {D}": 310.0, f"{A} {N}": ENOUGH}
+    table = Table(gains, chi2=100.0, asked=(S, f"{S} {C}"), asked_in_flight=(A,),
+                  seen={D: 9.0, B: 8.0}, left={f"{S} {C} {D}": 8.0})  # fmt: skip
+    assert chosen(run(table, (*EFFECTS, BY_ID[N]))) == {A, N}
+
+
+def test_the_search_goes_on_where_leaving_out_has_made_room(run, monkeypatch):
+    """Five effects are the most: with three that imitate one, a fourth and fifth find no place."""
+    monkeypatch.setattr(ranked, "MOST_LARGE", 3)
+    gains = {f"{A} {C} {D}": 300.0, f"{A} {B}": 300.0, f"{A} {B} {S}": ENOUGH}
+    table = Table(gains, chi2=100.0, asked=(f"{A} {C} {D}",), seen={B: 1.0, C: 1.0, D: 1.0})
+    assert chosen(run(table)) == {A, B, S}
+
+
+def test_what_an_effect_refines_is_tried_in_its_place_whatever_scores_say(run, monkeypatch):
+    """The simpler one has no score beside a model without both."""
+    power = BY_ID["power_damping"]
+    table = Table({A: 10.0, f"{A} {power.id}": ENOUGH, f"{A} {B}": ENOUGH + 4.0}, chi2=100.0,
+                  asked=(A, f"{A} {power.id}"), seen={C: 1.0}, first=1)  # fmt: skip
+    monkeypatch.setattr(settle, "in_place_of", lambda *known: [])
+    assert chosen(run(table, (*EFFECTS, power))) == {A, B}
+
+
+def test_the_best_single_effect_ends_the_search(run):
+    table = Table({A: ENOUGH, B: 400.0})
+    assert chosen(run(table)) == {A}
+    assert all(len(ids) == 1 for ids in table.fitted)
+
+
+def test_a_pair_is_reached_though_its_best_part_is_not_the_best_single(run):
+    """Greedy selection from D alone would need three effects."""
+    table = Table({D: 300.0, A: 280.0, B: 200.0, f"{A} {B}": 600.0, f"{D} {A} {B}": 601.0})
+    assert chosen(run(table)) == {A, B}
+
+
+def test_an_effect_that_is_hardly_needed_is_left_out(run):
+    """Friction alone leaves nothing once it has been fitted from the pair."""
+    table = Table({A: 505.0, B: 250.0, f"{A} {B}": 510.0}, forward={A: 300.0})
+    assert chosen(run(table)) == {A}
+    needed = Table({A: 497.0, B: 250.0, f"{A} {B}": 510.0}, forward={A: 300.0})
+    assert chosen(run(needed)) == {A, B}
+
+
+@pytest.mark.parametrize(("lost", "simpler"), [(5.4, True), (5.6, False)])
+def test_where_something_remains_a_law_must_be_decisively_better_than_what_it_refines(
+    run, monkeypatch, lost, simpler
+):
+    monkeypatch.setitem(BY_ID, B, replace(BY_ID[B], prefer=A))
+    effects = tuple(BY_ID[i] for i in (A, B, C, D, S))
+    gains = {A: 40.0, B: 40.0, C: 50.0, f"{B} {C}": 400.0, f"{A} {C}": 400.0 - lost}
+    for left in (0.0, ENOUGH - 400.0):
+        table = Table({k: v + left for k, v in gains.items()} | {"": 0.0}, chi2=100.0)
+        expected = {A, C} if simpler and not left else {B, C}
+        assert chosen(run(table, effects)) == expected
+
+
+def test_an_exchange_replaces_an_imitation(run):
+    """The path to the three leads over the pair {A, C}; from {A, B} one with D is better."""
+    pairs = {f"{A} {C}": 450.0, f"{A} {B}": 440.0, f"{B} {C}": 430.0}
+    triples = {f"{A} {B} {C}": 520.0, f"{A} {B} {D}": 560.0}
+    table = Table({A: 400.0, C: 380.0, B: 300.0, D: 100.0} | pairs | triples)
+    assert chosen(run(table)) == {A, B, D}
+
+
+def test_what_the_last_exchange_leads_to_is_rid_of_what_it_does_not_need(run, monkeypatch):
+    monkeypatch.setattr(settle, "EXCHANGES", 1)
+    pairs = {f"{A} {C}": 450.0, f"{A} {B}": 440.0, f"{B} {C}": 430.0, f"{B} {D}": 560.0}
+    table = Table(
+        {A: 400.0, C: 380.0, B: 300.0, D: 100.0, f"{A} {B} {C}": 520.0} | pairs,
+        forward={f"{B} {D}": 310.0},
+    )
+    assert chosen(run(table)) == {B, D}
+
+
+def test_an_exchange_begins_at_rivals_too(run):
+    """No exchange leads from {A, B} to {D, S}, one from its equal {C, D} does."""
+    singles = {A: 400.0, B: 390.0, C: 380.0, D: 100.0, S: 50.0}
+    equal, far = {f"{A} {B}": 520.0, f"{C} {D}": 518.0}, {f"{A} {B}": 520.0, f"{C} {D}": 505.0}
+    assert chosen(run(Table(singles | equal | {f"{D} {S}": 560.0}))) == {D, S}
+    assert chosen(run(Table(singles | far | {f"{D} {S}": 560.0}))) == {A, B}
+
+
+@pytest.mark.parametrize(("force", "found"), [(465.0, {C, D}), (490.0, {A, B, C})])
+def test_exchanges_are_tried_before_a_model_is_given_up(run, force, found):
+    """Three imitate two and leave something; not where a free force is likelier than the three."""
+    gains = {A: 300.0, B: 250.0, C: 100.0, D: 80.0, f"{A} {B}": 450.0, f"{A} {B} {C}": 480.0}
+    assert chosen(run(Table(gains | {f"{C} {D}": 520.0}, force=force))) == found
+
+
+@pytest.mark.parametrize(("beside", "found"), [(100.0, {C, D}), (125.0, {A, B, C})])
+def test_no_exchange_is_tried_beside_which_a_force_explains_a_lot(run, beside, found):
+    """Beside the three a free force gains 40 nats, or 65."""
+    gains = {A: 250.0, B: 240.0, C: 100.0, D: 80.0, f"{A} {B}": 360.0, f"{A} {B} {C}": 480.0}
+    table = Table(gains | {f"{C} {D}": 520.0}, force=420.0, beside=beside)
+    assert chosen(run(table)) == found
+
+
+def test_the_search_ends_when_a_free_force_will_beat_all_names(run):
+    steps = {A: 100.0, f"{A} {B}": 120.0, f"{A} {B} {C}": 140.0}
+    dominated, promising = Table(steps, force=2000.0), Table(steps, force=130.0)
+    run(dominated)
+    run(promising)
+    assert max(map(len, dominated.fitted)) == 1
+    assert max(map(len, promising.fitted)) == 3
+
+
+def test_the_search_ends_when_a_free_force_explains_what_is_left(run):
+    """Beside A it gains 100 nats, two effects promise 20 each."""
+    steps = {A: 100.0, f"{A} {B}": 120.0, f"{A} {B} {C}": 140.0}
+    for beside, reached in ((200.0, 1), (170.0, 2), (150.0, 3)):
+        run(table := Table(steps, beside=beside))
+        assert max(map(len, table.fitted)) == reached
+
+
+def test_a_force_in_place_of_all_effects_counts_each_independent_sample_once(run, monkeypatch):
+    """As the odds of models do: else it ends a search whose next step explains all."""
+    for module in (ranked, naming):
+        monkeypatch.setattr(module, "tempered_evidence", lambda model, n: model.log_evidence / n)
+    table = Table({A: 100.0, f"{A} {B}": ENOUGH}, force=1000.0)
+    assert chosen(run(table, repetition=10.0)) == {A, B}
+
+
+def test_a_model_beside_which_a_force_explains_the_rest_is_not_extended(run):
+    """Beside A a free force gains 200 nats, effects promise 20; beside B they promise 200."""
+    table = Table({A: 100.0, B: 90.0, f"{A} {C}": 120.0, f"{B} {D}": 290.0}, force=300.0)
+    run(table)
+    assert frozenset({A, C}) not in table.fitted and frozenset({B, D}) in table.fitted
+
+
+@pytest.mark.parametrize(("alone", "again"), [(-20.0, True), (-140.0, False)])
+def test_an_effect_that_loses_more_than_there_is_to_gain_is_not_tried_again(run, alone, again):
+    """A free force gains 130 nats; an effect that is on or off is fitted whatever its score."""
+    gains = {A: 100.0, B: 60.0, C: 55.0, f"{A} {B}": 150.0}
+    table = Table(gains, force=130.0, forward={N: alone})
+    run(table, (*EFFECTS, BY_ID[N]))
+    assert frozenset({N}) in table.fitted
+    assert (frozenset({A, N}) in table.fitted) == again
+
+
+def test_a_refusal_alone_is_no_contradiction_beside_others(run):
+    """A force refused alone (it swings where the motion does) may be what B lacks."""
+    gains = {A: 250.0, B: 300.0, f"{A} {B}": 520.0}
+    table = Table(gains, force=100.0, forward={A: -np.inf})
+    assert chosen(run(table)) == {A, B}
+
+
+@pytest.mark.parametrize(("stuck", "fits"), [(545.0, 2), (559.0, 1)])
+def test_a_model_is_fitted_again_from_where_more_is_promised(run, stuck, fits):
+    """{C, D} is reached from C first; an exchange of {A, D} promises 560 nats of it."""
+    gains = {A: 400.0, C: 390.0, D: 100.0, f"{A} {D}": 550.0, f"{C} {D}": 560.0}
+    table = Table(gains, once={f"{C} {D}": stuck})
+    found = run(table)
+    assert table.fitted.count(frozenset({C, D})) == fits
+    assert found.tried[0].log_evidence == (560.0 if fits == 2 else stuck)
+
+
+def test_what_cannot_overtake_the_best_is_not_fitted(run):
+    """B has 250 nats less than A: C promises 150 more, D 250; scores underrate by half at most."""
+    table = Table({A: 400.0, B: 150.0, f"{B} {C}": 300.0, f"{B} {D}": 400.0})
+    run(table)
+    assert frozenset({B, C}) not in table.fitted and frozenset({B, D}) in table.fitted
+
+
+def test_a_climb_that_gave_up_near_the_best_is_finished_before_it_loses(run):
+    table = Table({A: 480.0, B: 520.0, C: 300.0}, unfinished={A: 60.0, C: 400.0})
+    assert chosen(run(table)) == {A}
+    assert table.finished == [frozenset({A})]  # once, and none that is far behind
+
+
+@pytest.mark.parametrize(("beside", "finished"), [(0.0, True), (20.0, False)])
+def test_the_best_model_s_valley_is_followed_where_that_may_be_all_it_lacks(run, beside, finished):
+    """A free force beside it gains 50 nats, or 70: more than an unconverged climb fell short of."""
+    table = Table({A: 470.0}, force=520.0, beside=beside, unfinished={A: 40.0})
+    assert run(table).chosen.is_white == finished
+    assert table.finished == [frozenset({A})] * finished
+
+
+def test_no_valley_is_followed_where_a_free_force_wins_anyhow(run):
+    table = Table({A: 100.0, B: 120.0}, force=900.0, unfinished={A: 60.0})
+    assert chosen(run(table)) != {A}
+    assert table.finished == []
+
+
+def test_a_force_in_contact_is_fitted_in_place_of_three_effects_only(run):
+    gains = {A: 200.0, B: 190.0, f"{A} {B}": 400.0, f"{A} {B} {C}": 600.0}
+    three = run(Table(gains, in_contact=650.0))
+    assert chosen(three) == {A, B, C} and three.contact_odds == 650.0
+    assert three.prefers_learned_force()
+    two = run(Table(gains | {f"{A} {B}": 550.0}, in_contact=650.0))
+    assert chosen(two) == {A, B} and two.contact_odds == -np.inf
+
+
+def test_shapes_are_sought_anew_before_a_model_is_given_up(run):
+    """The depth was found while friction was missing: a side minimum."""
+    pair = f"{A} {S}"
+    stuck = {f"{pair} {other}": 450.0 for other in (B, C, D)}
+    table = Table({S: 300.0, A: 200.0, pair: 600.0}, forward=stuck, once={pair: 450.0})
+    found = run(table)
+    assert chosen(found) == {A, S} and found.chosen.is_white
+    assert found.chosen.candidate.log_evidence == 600.0
+
+
+def test_no_start_is_fitted_twice(run):
+    """The restart of the pair from its first effect is where the pair came from."""
+    steps = {A: 300.0, S: 100.0, f"{A} {S}": 400.0}
+    table = Table(steps | {f"{A} {S} {other}": 410.0 for other in (B, C, D)})
+    run(table)
+    assert table.fitted.count(frozenset({A, S})) == 1
+
+
+def test_an_examined_model_is_not_scored_again_for_a_restart(run, monkeypatch):
+    pair = f"{A} {S}"
+    table = Table({S: 300.0, A: 200.0, pair: 600.0}, forward={pair: 450.0}, once={pair: 450.0})
+    scored, scan = [], table.scan
+
+    def noted(fit, *rest, **more):
+        scored.append((fit.ids, fit.gain))
+        return scan(fit, *rest, **more)
+
+    monkeypatch.setattr(table, "scan", noted)
+    run(table)
+    assert len(scored) == len(set(scored))
+
+
+def test_where_something_remains_the_law_that_an_effect_refines_is_fitted_in_its_place(
+    run, monkeypatch
+):
+    """Though neither scores nor time ask for it: no law is told from one that was not fitted."""
+    monkeypatch.setattr(search._Search, "smaller", lambda self, state: [])
+    power = "power_damping"
+    table = Table({power: 300.0, C: 280.0, f"{power} {C}": 450.0}, chi2=4.0)
+    found = run(table, effects=(BY_ID[power], BY_ID[B], BY_ID[C]))
+    assert set(found.chosen.candidate.ids) == {power, C}
+    assert frozenset({B, C}) in {frozenset(c.ids) for c in found.tried}
