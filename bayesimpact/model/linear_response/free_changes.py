@@ -1,12 +1,14 @@
 """Two independent free changes of a simulated motion, from which small forces can be superposed.
 
 They are differences of simulations, so they carry every law and every contact, jumps at impact
-included. As they decay they drown in rounding: others take over, stretch by stretch. Where the mass
-sticks there are none, and it does not answer.
+included. As they decay they drown in rounding, and where contacts stretch the motion they turn
+parallel: others take over, stretch by stretch. Where the mass sticks there are none, and it does
+not answer.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -24,6 +26,8 @@ Mask = NDArray[np.bool_]
 
 FADED = 1e-2  # of its largest size a change keeps four digits: of the noise, rounding is 1e-9
 ALIGNED = 1e-2  # sine between two changes, displacement and velocity in units of their size
+PARALLEL = 0.1  # a sine below which they stay to the end of a stretch: others take over
+ROUNDS = 4  # of stretches divided where their changes turn parallel
 POINTS = 6  # samples between which a response to impulses is interpolated
 SHORTEST = POINTS + 2  # samples of a stretch
 _Y0, _V0, _GAIN, _K1 = (SLOTS.index(name) for name in ("y0", "v0", "A", "k1"))
@@ -45,14 +49,28 @@ class Stretch:
     readings: Array
 
     @cached_property
+    def sine(self) -> Array:
+        """Of the angle between both changes, (n,); 0 where one of them is none."""
+        size = np.sqrt(np.mean(self.states**2, axis=(0, 2)))
+        scaled = self.states / np.where(size > 0.0, size, 1.0)[:, None]
+        one, other = np.linalg.norm(scaled, axis=1).T
+        product = one * other
+        return np.asarray(np.abs(np.linalg.det(scaled)) / np.where(product > 0.0, product, 1.0))
+
+    @cached_property
     def apart(self) -> Mask:
         """Where both changes still tell displacement from velocity, (n,): not where friction holds
         the mass, or it creeps under a root of its speed, for there no small force moves it.
         """
-        size = np.sqrt(np.mean(self.states**2, axis=(0, 2)))
-        scaled = self.states / np.where(size > 0.0, size, 1.0)[:, None]
-        one, other = np.linalg.norm(scaled, axis=1).T
-        return np.asarray(np.abs(np.linalg.det(scaled)) > ALIGNED * one * other)
+        return np.asarray(self.sine > ALIGNED)
+
+    def parallel_from(self, held: Mask) -> int | None:
+        """From where on both changes stay parallel, although the mass moves; None where they do
+        not. Where it is `held` (n,) they say nothing.
+        """
+        to_come = np.maximum.accumulate(np.where(held, 0.0, self.sine)[::-1])[::-1]
+        found = np.flatnonzero((to_come < PARALLEL) & ~held)
+        return int(found[0]) if found.size else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,42 +129,56 @@ def free_changes(
     """
     mass, interval = oscillator.campaign.mass, float(oscillator.intervals[r]) / factor
     last, rate = (int(oscillator.counts[r]) - 1) * factor, float(np.sqrt(slots[_K1] / mass))
-    apart = max(1, round(0.5 * np.pi / (rate * interval)))
     own = int(oscillator.orders[r])
-    waves = np.zeros((2, last + 1))
 
-    def motions(q: Array) -> dict[int, Array]:
+    def motions(q: Array, restarts: Sequence[Array] = ()) -> dict[int, Array]:
         return {
-            n: motions_beside(oscillator, r, q, n, waves=waves[: len(q)], factor=factor)
+            n: motions_beside(oscillator, r, q, n, factor=factor, restarts=restarts)
             for n in {0, 1, own}
         }
 
     base = motions(slots[None])
+    motion = np.concatenate([base[0], base[1]])
+    held = motion[1] == 0.0  # where the mass stays is not forgotten: no stretch begins there
+    moved = small * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, rate]])
 
-    def run(q: Array) -> Stretch:  # both changes over the whole recording
-        changes = {n: (x - base[n]).T for n, x in motions(q).items()}
+    def run(begins: Array) -> Stretch:
+        """Both changes over the whole recording, anew from some points on."""
+        states = [motion[:, begins].T + move for move in moved]
+        rows = np.tile(slots, (3, 1))
+        rows[:, [_Y0, _V0]] += moved
+        found = motions(rows, [np.column_stack([begins, x]) for x in states])
+        changes = {n: (x[1:] - x[0]).T for n, x in found.items()}
         return Stretch(0, np.stack([changes[0], changes[1]], axis=1), changes[own])
 
-    q = np.tile(slots, (2, 1))
-    q[0, _Y0] += small
-    q[1, _V0] += small * rate
-    whole = run(q)
-    length = _fading(whole.states * [[1.0], [1 / rate]], 2 * apart + SHORTEST)
-    length = -(-length // factor) * factor  # stretches begin on samples
+    def stretches(begins: Array) -> tuple[Stretch, ...]:
+        """Of two runs in turn: each ends where the next one begins, in the other run."""
+        runs = [run(begins[first::2]) for first in (2, 1)[: begins.size]]
+        ends = [*(int(b) for b in begins[1:]), last]
+        pairs = enumerate(zip(begins, ends, strict=True))
+        return tuple(_part(runs[i % 2], int(begin), end) for i, (begin, end) in pairs)
+
+    def whole(length: int) -> int:
+        """Points; stretches begin on samples."""
+        return -(-max(length, SHORTEST, round(np.pi / (rate * interval))) // factor) * factor
+
+    one = run(np.zeros(0, dtype=np.int64))
+    length = whole(_fading(one.states * [[1.0], [1 / rate]]))
     begins = np.arange(0, max(last - SHORTEST, 1), length)
-    held = base[1][0] == 0.0  # an impulse moves nothing, and where the mass stays is not forgotten
-    begins = begins[[b == 0 or not held[b - apart - 1 : b + 1].any() for b in begins]]
-    ends = [*(int(b) for b in begins[1:]), last]
-    found = [_part(whole, 0, ends[0])]
-    runs = []
-    for first in (1, 2):  # an impulse ends the stretch before in its run: neighbours take turns
-        waves[:] = 0.0
-        for begin in begins[first::2]:
-            waves[[0, 1], [begin - apart - 1, begin - 1]] = small * slots[_K1]
-        runs.append(run(np.tile(slots, (2, 1))) if begins.size > first else whole)
-    for number, (begin, end) in enumerate(zip(begins[1:], ends[1:], strict=True)):
-        found.append(_part(runs[number % 2], int(begin), end))
-    return FreeChanges(tuple(found), np.concatenate([base[0], base[1]]), mass, interval, own)
+    begins = begins[(begins == 0) | ~held[begins]]
+    found = stretches(begins)
+    for _ in range(ROUNDS):
+        more = [
+            np.arange(part.begin, part.begin + part.states.shape[0] - SHORTEST, whole(at))[1:]
+            for part in found
+            if (at := part.parallel_from(held[part.begin :][: part.states.shape[0]])) is not None
+        ]
+        divided = np.unique(np.concatenate([begins, *more]))
+        divided = divided[(divided == 0) | ~held[divided]]
+        if divided.size == begins.size:
+            break
+        begins, found = divided, stretches(divided)
+    return FreeChanges(found, motion, mass, interval, own)
 
 
 def _solved(states: Array, apart: Mask, wanted: Array) -> Array:
@@ -160,12 +192,12 @@ def _part(whole: Stretch, begin: int, end: int) -> Stretch:
     return Stretch(begin, whole.states[begin : end + 1], whole.readings[begin : end + 1])
 
 
-def _fading(states: Array, least: int) -> int:
-    """Samples until one of two changes (n, 2, 2) falls to `FADED` of its largest size."""
+def _fading(states: Array) -> int:
+    """Points until one of two changes (n, 2, 2) falls to `FADED` of its largest size."""
     size = np.sqrt(np.sum(states**2, axis=1)).min(axis=1)
     to_come = np.maximum.accumulate(size[::-1])[::-1]
     faded = np.flatnonzero(to_come < FADED * np.maximum.accumulate(size))
-    return max(int(faded[0]), least) if faded.size else states.shape[0] - 1
+    return int(faded[0]) if faded.size else states.shape[0] - 1
 
 
 def motions_beside(
@@ -177,12 +209,14 @@ def motions_beside(
     laws: Laws | None = None,
     waves: Array | None = None,
     factor: int = 1,
+    restarts: Sequence[Array] = (),
 ) -> Array:
     """Motions (K, n) of recording r for slots (K, Q), with forces beside its own and its input.
 
     laws : table for the general simulator; None: the oscillator's own
     waves : (K, n) forces at the points, N
     factor : points per sample
+    restarts : per row points and states from which it begins anew, see `integrate_many`
     """
     count = (int(oscillator.counts[r]) - 1) * factor + 1
     own = _measured_input(oscillator, r, factor)
@@ -200,7 +234,7 @@ def motions_beside(
     return general_motions(
         q, oscillator.campaign.mass, np.full(q.shape[0], count),
         np.full(q.shape[0], float(oscillator.intervals[r]) / factor),
-        oscillator.laws if laws is None else laws, np.full(q.shape[0], order), inputs,
+        oscillator.laws if laws is None else laws, np.full(q.shape[0], order), inputs, restarts,
     )  # fmt: skip
 
 
