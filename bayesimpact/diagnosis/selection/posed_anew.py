@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from bayesimpact.data.faults.fault import gaussian_threshold
 from bayesimpact.diagnosis.faults.beside_model import fault_beside
 from bayesimpact.diagnosis.faults.compare import Compared
 from bayesimpact.diagnosis.faults.outliers import beside_spikes
@@ -27,6 +27,10 @@ from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.inference.onsets import without_onsets
 from bayesimpact.inference.refitted import refitted
+
+Array = NDArray[np.float64]
+
+JUMP = 2.0  # of the noise: a reading on the wrong side of one costs 2 nats, half its square
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,15 +198,26 @@ def is_spoilt(base: Fit, fit: Fit) -> bool:
 
 
 def misses_onsets(fit: Fit) -> bool:
-    """Whether a fit that leaves no large misfit misses accelerations at onsets that it shows."""
+    """Whether accelerations count, beside a fit that leaves no large misfit, at onsets that it
+    shows to jump by more than the noise. No residual tells: parameters that such a reading has bent
+    until it stands on its side of the jump leave none.
+    """
     campaign = fit.target.oscillator.campaign
     cleaned = campaign if is_large(fit) else without_onsets(fit)
     noise = fit.target.likelihood.noise
-    rows = zip(campaign.recordings, cleaned.recordings, fit.residuals, strict=True)
-    for before, after, residual in rows:
+    rows = zip(campaign.recordings, cleaned.recordings, fit.predicted, strict=True)
+    for before, after, predicted in rows:
         if after.used is not None and after is not before:
             at = ~after.used if before.used is None else before.used & ~after.used
-            least = gaussian_threshold(residual.size) * noise.level * noise.scales[before.order]
-            if np.any(np.abs(residual[at]) > least):
+            least = JUMP * noise.level * noise.scales[before.order]
+            if np.any(_jumps(predicted)[at] > least):
                 return True
     return False
+
+
+def _jumps(x: Array) -> Array:
+    """By how much samples (n,) jump before or behind each, beyond what their neighbours do."""
+    steps = np.diff(x)
+    beside = np.pad(steps, 1, mode="edge")
+    alone = np.abs(steps - 0.5 * (beside[:-2] + beside[2:]))
+    return np.maximum(np.append(0.0, alone), np.append(alone, 0.0))
