@@ -22,12 +22,12 @@ from bayesimpact.design.information import updated_covariance
 from bayesimpact.design.odds import Odds
 from bayesimpact.design.response import Response, odds_between, response
 from bayesimpact.diagnosis.thresholds import DECISIVE
+from bayesimpact.inference.fit import Z90
 from bayesimpact.model.parameters import bare_name
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
-Z90 = 1.6448536269514722
 DRAWS = 256
 """Of each model's parameters: chances are then known to 0.03."""
 SAME_CHANCE = 0.02

@@ -209,7 +209,8 @@ def extension(
 
     Where the misfit is large, named effects are shown as the catalogue's model has them: beside a
     residual force, which may take their place, their sizes mean nothing. Where nothing is named,
-    the model that explains most; with a residual force only where the misfit is small.
+    the model that explains most; a residual force beside effects only where the misfit is small,
+    else one in the place of all of them.
     """
     base, chosen = naming.base, naming.chosen
     if decision.verdict in ("adequate", "named", "ambiguous"):
@@ -221,9 +222,11 @@ def extension(
         likelier = naming.log_odds(beside) > naming.log_odds(chosen.candidate) and not large
         return (beside if likelier else chosen.candidate).fit, chosen
     choices = [(c, naming.states.get(frozenset(c.ids), chosen)) for c in naming.tried]
-    if not is_large(base.candidate.fit):
+    learned = naming.residual.get(frozenset())
+    if is_large(base.candidate.fit):
+        choices += [] if learned is None else [(learned, base)]
+    else:
         choices += [(c, chosen) for c in naming.residual.values()]
-        learned = naming.residual.get(frozenset())
         if learned is None or naming.unknown is not base.unknown:  # a force in contact alone
             say("learning the force")
             learned = with_force(base.candidate, naming.unknown, scales)

@@ -21,6 +21,7 @@ from bayesimpact.model.parameters import SLOTS
 
 Array = NDArray[np.float64]
 _OFFSET = SLOTS.index("offset")
+Z90 = 1.6448536269514722  # 95 % quantile of the standard normal distribution
 RANK = 1e-14  # of the largest eigenvalue: smaller ones are rounding
 
 

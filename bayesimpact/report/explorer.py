@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from bayesimpact.inference.fit import Z90
 from bayesimpact.model.units import display, typeset
 from bayesimpact.report.cycles import (
     before_predicted,
@@ -28,7 +29,6 @@ from bayesimpact.report.figures.force_map import force_unit
 from bayesimpact.report.figures.recordings import shown_recordings
 from bayesimpact.report.figures.style import response, response_word
 from bayesimpact.report.results import Array, RecordingResult, Results
-from bayesimpact.report.rows import Z90
 
 FOLDER = Path(__file__).parent / "template"
 LIBRARY = FOLDER / "vendor" / "uPlot-1.6.32.iife.min.js"

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.fit import Z90, Fit
 from bayesimpact.inference.posterior import Posterior
 from bayesimpact.report.build import results_from_posterior
 from bayesimpact.report.digits import digits
-from bayesimpact.report.rows import LEARNED, Z90
+from bayesimpact.report.rows import LEARNED
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Figure

@@ -8,13 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.fit import Z90, Fit
 from bayesimpact.inference.prior import Prior
 from bayesimpact.model.parameters import Parameter
 from bayesimpact.model.units import dimensions, per_mass_unit, significant
 from bayesimpact.report.results import Array, ChainSummary, Row
-
-Z90 = 1.6448536269514722  # 95 % quantile of the standard normal distribution
 
 LEARNED = "learned_force."
 """How the names of a learned force's coefficients begin: they mean nothing one by one."""

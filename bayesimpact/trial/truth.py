@@ -10,8 +10,8 @@ from typing import Any
 
 from bayesimpact.data.text_table import text_table
 from bayesimpact.errors import InputError
+from bayesimpact.inference.fit import Z90
 from bayesimpact.model.units import decimals, display, number, signed, significant, typeset
-from bayesimpact.report.rows import Z90
 from bayesimpact.trial.rig_files import TRUTH_FILE
 
 NAMES = ("c1", "k1", "c2", "g", "k2")

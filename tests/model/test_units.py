@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from bayesimpact.inference.fit import Z90
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.parameters import Parameter, angular
 from bayesimpact.model.units import (
@@ -26,7 +27,7 @@ from bayesimpact.model.units import (
     without_zero,
 )
 from bayesimpact.report.results import ChainSummary
-from bayesimpact.report.rows import Z90, scaling_unit, widened
+from bayesimpact.report.rows import scaling_unit, widened
 
 BASE = {"m": "kg", "c1": "N s/m", "k1": "N/m", "c2": "N s/m", "g": "m", "k2": "N/m"}
 VALUES = {"m": 0.503, "c1": 0.148, "k1": 808.556, "c2": 2.085, "g": 1.1e-3, "k2": 5350.0}

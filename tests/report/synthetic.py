@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from bayesimpact.inference.fit import Z90
 from bayesimpact.model.units import per_mass_unit
 from bayesimpact.report import checks
 from bayesimpact.report.results import (
@@ -22,7 +23,7 @@ from bayesimpact.report.results import (
     SamplerSummary,
     SearchSummary,
 )
-from bayesimpact.report.rows import Z90, widened
+from bayesimpact.report.rows import widened
 
 NOISE = 5e-6
 MASS = 0.503

@@ -18,6 +18,7 @@ from bayesimpact.data.read import load_campaign
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 from bayesimpact.inference.arviz_groups import as_arviz, open_arviz
+from bayesimpact.inference.fit import Z90
 from bayesimpact.inference.identify import Identification, identify
 from bayesimpact.inference.posterior import Posterior, sample
 from bayesimpact.inference.sampling.convergence import quiet_arviz
@@ -25,7 +26,6 @@ from bayesimpact.report.archive import load_results
 from bayesimpact.report.backbones import backbone_summary
 from bayesimpact.report.build import ReportContext, results_from_fit, results_from_posterior
 from bayesimpact.report.figures.gaussian import gaussian_figures
-from bayesimpact.report.rows import Z90
 from bayesimpact.report.write import (
     POSTERIOR_FILE,
     REPORT_FILE,

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.data.faults.bursts import LONGEST, SURE, Spike
 from bayesimpact.data.faults.fault import Array, gaussian_threshold
+from bayesimpact.data.faults.flat import reading_step
 from bayesimpact.data.faults.local import best_form, predict_sides, robust_sd
 from bayesimpact.data.gaps import Mask
 from bayesimpact.data.recording import Recording
@@ -40,7 +41,9 @@ def find_dropouts(recording: Recording, period: float | None) -> list[Spike]:
     x = recording.samples
     used = np.ones(x.size, bool) if recording.used is None else recording.used.copy()
     before = x - predict_sides(x, best_form(x, period), 0).before
-    level, least = robust_sd(before[used]), gaussian_threshold(x.size)
+    # readings of a slow motion repeat: what a coarse step leaves of others is no less than that
+    level = max(robust_sd(before[used]), reading_step(x))
+    least = gaussian_threshold(x.size)
     if level == 0.0:
         return []
     found, end = list[Spike](), 0

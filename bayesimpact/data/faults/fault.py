@@ -35,6 +35,7 @@ class Fault:
     spans : first and last-plus-one sample of every place, in the recording as it was read
     start_s, end_s : from the first to the last place, s on the file's own clock
     size, unit : how large
+    error : standard error of the size, in its unit; 0 where it is counted or not known
     statement : one sentence for a report
     remedy : the line of campaign.toml that deals with it; "" for a notice
     strength, threshold : test statistic, and the value from which on it counts
@@ -55,6 +56,7 @@ class Fault:
     threshold: float
     action: Action = "exclude"
     false_alarm: float = FALSE_ALARM
+    error: float = 0.0
 
 
 def fault_document(fault: Fault) -> dict[str, Any]:

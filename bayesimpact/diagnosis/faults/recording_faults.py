@@ -26,7 +26,7 @@ from bayesimpact.diagnosis.measurement.slow_noise import with_slow_noise
 from bayesimpact.diagnosis.measurement.smoothing import proved_smoothing
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.formula.law import is_formula
-from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.fit import Z90, Fit
 from bayesimpact.inference.identify import Identification, identify
 from bayesimpact.inference.noise.spectrum import Fingerprint
 from bayesimpact.model.effects.effect import Effect
@@ -258,6 +258,7 @@ def _sentence(fault: Fault, compared: Compared | None) -> str:
 def _entry(fault: Fault, compared: Compared | None) -> dict[str, Any]:
     others = sum(p for _, p in compared.alternatives) if compared else 0.0
     size = float(fault.size) if np.isfinite(fault.size) else 0.0
+    half = Z90 * fault.error
     return {
         "id": fault.id,
         "title": fault.id.removeprefix("recording_").replace("_", " "),
@@ -269,7 +270,7 @@ def _entry(fault: Fault, compared: Compared | None) -> dict[str, Any]:
             f"{fault.id}.size[{fault.recording}]": {
                 "unit": fault.unit,
                 "median": size,
-                "ci90": [size, size],
+                "ci90": [size - half, size + half],
             }
         },
         "location": place([fault]),

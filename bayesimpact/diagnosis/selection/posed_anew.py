@@ -220,4 +220,4 @@ def _jumps(x: Array) -> Array:
     steps = np.diff(x)
     beside = np.pad(steps, 1, mode="edge")
     alone = np.abs(steps - 0.5 * (beside[:-2] + beside[2:]))
-    return np.maximum(np.append(0.0, alone), np.append(alone, 0.0))
+    return np.asarray(np.maximum(np.append(0.0, alone), np.append(alone, 0.0)))

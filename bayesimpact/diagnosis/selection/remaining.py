@@ -21,7 +21,7 @@ from bayesimpact.diagnosis.selection.decision import (
     ordered,
 )
 from bayesimpact.diagnosis.selection.elimination import EXCHANGES, Settling
-from bayesimpact.diagnosis.selection.outcome import Naming, State
+from bayesimpact.diagnosis.selection.outcome import Naming, State, is_large, leaves_something
 from bayesimpact.diagnosis.selection.unknown import with_force
 from bayesimpact.model.effects.effect import Effect
 
@@ -31,8 +31,11 @@ class Remaining(Settling):
 
     def with_residuals(self, found: Naming) -> Naming:
         """What `decide` compares where something remains: the likeliest model beside a force of
-        time, what it is without each of its effects, and models with a residual force.
+        time, what it is without each of its effects, and models with a residual force, that in the
+        place of all effects first.
         """
+        if self.is_no_set(found.chosen.candidate):
+            return self.with_forces(found, [found.base.candidate])
         nearest = min(self.tried.values(), key=lambda c: c.fit.reduced_chi2)
         left = self.remainder(nearest.fit)
         if left is not None and left.leaves_noise:
@@ -68,9 +71,9 @@ class Remaining(Settling):
                 power={**power, frozenset(chosen.ids): own.power},
             )
         needed = [g for g in leading if may_be_needed(found, g)]
-        if needed:
-            found = self.with_forces(found, [found.base.candidate])
-        found = self.with_forces(found, [chosen])
+        found = self.with_forces(found, [found.base.candidate])
+        if needed or not self.is_large:
+            found = self.with_forces(found, [chosen])
         for group in needed if not is_imitated(found) else ():
             found = self.with_forces(found, [smaller[group[0].id], *rivals_in_place(found, group)])
             wider = group_of(found, group[0])
@@ -133,11 +136,25 @@ class Remaining(Settling):
         return replace(found, states=dict(self.states), finished=finished)
 
     def with_residual(self, state: State) -> Candidate:
-        """A model with the likelier form of a residual force beside its effects."""
-        beside = in_words(state.candidate.effects) or "the base model"
-        self.progress(f"fitting a residual force beside {beside}")
-        least = self.enough().least_gain
-        return with_force(state.candidate, state.unknown, self.scales, least_gain=least)
+        """A model with the likelier form of a residual force beside its effects, fitted once."""
+        key = frozenset(state.candidate.ids)
+        begun, fitted = self.beside_forces.get(key, (None, state.candidate))
+        if begun is not state.candidate:
+            beside = in_words(state.candidate.effects) or "the base model"
+            self.progress(f"fitting a residual force beside {beside}")
+            least = self.enough().least_gain
+            fitted = with_force(state.candidate, state.unknown, self.scales, least_gain=least)
+            self.beside_forces[key] = state.candidate, fitted
+        return fitted
+
+    def is_no_set(self, candidate: Candidate) -> bool:
+        """Whether a free force in the place of all effects leaves no more than noise, where a model
+        still leaves a large misfit: what is missing depends on place and speed alone, and no set of
+        effects that was asked for is it.
+        """
+        if not (self.is_large and candidate.effects and is_large(candidate.fit)):
+            return False
+        return not leaves_something(self.with_residual(self.states[frozenset()]).fit)
 
 
 def rivals_in_place(found: Naming, group: Group) -> list[Candidate]:

@@ -65,8 +65,9 @@ def name(
     are left out afterwards, and each that stays is exchanged for every other that might do what it
     does. Where the misfit was large, the search begins with what the equation of motion asks for
     and, with a stop, simulations of one period ahead; it goes on from a model that has settled and
-    still leaves something. It begins with the model of `first` instead, a fit to the same campaign,
-    where that is given.
+    still leaves something, but not from one that leaves a large misfit where a free force alone
+    leaves nothing. It begins with the model of `first` instead, a fit to the same campaign, where
+    that is given.
 
     Where the misfit is large and the spectra of the recordings show a hum, the search begins with
     what the recordings less that ask for.
@@ -145,7 +146,7 @@ class _Search(Unlisted):
             if with_term is not state:
                 beam = [with_term]
                 continue
-            if not self.may_be_named(state):
+            if not self.may_be_named(state) or self.is_no_set(state.candidate):
                 break
             self.weigh_remainder()
             smaller = self.eliminated(state)
@@ -165,6 +166,8 @@ class _Search(Unlisted):
         """The model that ever more effects lead to from the first of a beam, or beside it."""
         state, self.left = beam[0], None
         while not (state.is_white or self.is_spoilt(state)) and self.may_go_on():
+            if self.is_no_set(state.candidate):
+                break
             found, waiting = self.extensions([s for s in beam if self.may_grow(s)])
             better = self.best_first(state, found)
             if not better or not self.leads_on(state, better[0]):
@@ -222,7 +225,7 @@ class _Search(Unlisted):
                 about = self.asked_again(about, problem)
                 begun.append(about)
                 in_flight = about if problem == self.of_flight else in_flight
-            if not is_large(about.fit):
+            if not is_large(about.fit) or self.is_no_set(max(begun, key=self.promise)):
                 break
         best = max(begun, key=self.promise)
         state = self.examine(best)

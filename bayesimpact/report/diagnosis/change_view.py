@@ -7,10 +7,10 @@ from typing import Any
 
 from markupsafe import Markup
 
+from bayesimpact.inference.fit import Z90
 from bayesimpact.model.units import percent, signed
 from bayesimpact.report.diagnosis.words import excludes, parameter_shift
 from bayesimpact.report.digits import digits
-from bayesimpact.report.rows import Z90
 from bayesimpact.report.tables import symbol
 
 UNTOLD = ("–", "not clear")

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from bayesimpact.inference.fit import Z90
 from bayesimpact.model.units import Display, readable, typeset
 from bayesimpact.report.figures.style import (
     AFTER,
@@ -22,7 +23,6 @@ from bayesimpact.report.figures.style import (
     styled,
 )
 from bayesimpact.report.results import Results
-from bayesimpact.report.rows import Z90
 
 _SPEEDS = 160
 _CONTACT = "#ECECEC"

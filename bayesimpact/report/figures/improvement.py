@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 
+from bayesimpact.inference.fit import Z90
 from bayesimpact.report.diagnosis.change_view import NUISANCES
 from bayesimpact.report.diagnosis.view import gain_words
 from bayesimpact.report.figures.style import (
@@ -25,7 +26,6 @@ from bayesimpact.report.figures.style import (
     symbol,
 )
 from bayesimpact.report.results import Results
-from bayesimpact.report.rows import Z90
 
 MOST = 16
 """Parameters shown; those that moved most."""

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from bayesimpact.inference.fit import Z90
 from bayesimpact.model.units import display, quantity, readable, significant
 from bayesimpact.report.cycles import Cycle, before_predicted, contacts
 from bayesimpact.report.diagnosis.effect_forces import effect_forces, shown_cycle
@@ -30,7 +31,6 @@ from bayesimpact.report.figures.style import (
     styled,
 )
 from bayesimpact.report.results import Results
-from bayesimpact.report.rows import Z90
 
 _CONTACT = "#ECECEC"
 _PLAIN = 1000.0  # nats; beyond, odds say nothing that the residuals do not

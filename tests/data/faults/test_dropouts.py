@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 import small_rig
 
+from bayesimpact.data.faults import dropouts
 from bayesimpact.data.faults.dropouts import find_dropouts
 from bayesimpact.data.faults.find import recording_faults
 from bayesimpact.data.period import crossing_period
@@ -47,6 +50,25 @@ def test_drop_outs_are_found_from_their_first_to_their_last_sample(seed: int, ki
     for a, b in found:
         near = [s for s in spans if s[0] - 2 <= a and b <= s[1] + 2]
         assert len(near) == 1 and b - a >= near[0][1] - near[0][0] - 4
+
+
+def test_coarse_readings_of_a_motion_that_has_died_away_are_no_bad_ones(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """They repeat, so that every step stands out from what most of them leave."""
+    asked: list[int] = []
+    grown = dropouts._grown
+
+    def counted(x: np.ndarray, used: np.ndarray, first: int, period: float, least: float) -> Any:
+        asked.append(first)
+        return grown(x, used, first, period, least)
+
+    monkeypatch.setattr(dropouts, "_grown", counted)
+    step = 0.02
+    coarse = step * np.round(decay(0) * np.exp(-np.arange(N) / 800.0) / step)
+    assert found_in(coarse) == [] and len(asked) < 20
+    coarse[700:712] += 0.4
+    assert len(found_in(coarse)) == 1
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -62,6 +62,7 @@ def test_a_fault_is_told_with_its_size(kind: str, more: tuple[str, ...]) -> None
     compared, fit = told
     assert (compared.fault.id, compared.fault.recording) == (kind, "b")
     assert compared.fault.size == pytest.approx(OFF[kind], rel=0.03)
+    assert abs(compared.fault.size - OFF[kind]) < 4 * compared.fault.error < 0.2 * abs(OFF[kind])
     assert fit.reduced_chi2 < 1.1 < compared.before
     assert {e.id for e in fit.target.oscillator.effects} == set(PHYSICS)
     assert fit.target.oscillator.campaign is compared.campaign

@@ -23,7 +23,7 @@ remaining = importlib.import_module("bayesimpact.diagnosis.selection.remaining")
 
 @pytest.fixture
 def run(monkeypatch):
-    def go(table: Table, effects=EFFECTS, repetition=1.0, refuted=None):
+    def go(table: Table, effects=EFFECTS, repetition=1.0, refuted=None, free=None):
         monkeypatch.setattr(models, "refit", table.refit)
         monkeypatch.setattr(models, "without", table.without)
         monkeypatch.setattr(models, "exchanged", table.exchanged)
@@ -42,7 +42,13 @@ def run(monkeypatch):
         monkeypatch.setattr(search, "missing_contact", table.contact)
         monkeypatch.setattr(search, "learn_force", lambda fit, force, scales: force.fit)
         monkeypatch.setattr(ranked, "residual_repetition", lambda fit: repetition)
-        monkeypatch.setattr(remaining, "with_force", lambda candidate, *others, **near: candidate)
+        monkeypatch.setattr(remaining, "leaves_something", lambda fit: fit is not free)
+
+        def with_force(candidate, *others, **near):
+            beside_base = free is not None and not candidate.effects
+            return replace(candidate, fit=free) if beside_base else candidate
+
+        monkeypatch.setattr(remaining, "with_force", with_force)
         for rule in ("may_be_needed", "is_needed", "is_told_apart"):
             monkeypatch.setattr(remaining, rule, lambda naming, effect: True)
         monkeypatch.setattr(remaining, "is_imitated", lambda naming: False)
@@ -87,6 +93,21 @@ def test_climbs_have_the_goal_to_come_near_what_they_are_compared_with(run, most
     assert table.goals[table.fitted[0]] == -np.inf
     expected = most - 2 * np.log(2 * len(EFFECTS)) - DECISIVE
     assert table.goals[frozenset({B, D})] == pytest.approx(expected)
+
+
+def test_sets_that_a_free_force_leaves_far_behind_are_not_grown(run):
+    """Where it alone leaves nothing, and they a large misfit; else nothing is told by it."""
+    gains = {A: 10.0, B: 20.0, f"{A} {B}": 40.0, f"{A} {B} {C}": 60.0}
+    asked = {"asked": (A, f"{A} {B}"), "chi2": 100.0}
+    free = SimpleNamespace(reduced_chi2=1.0)
+    table = Table(gains, **asked)
+    found = run(table, free=free)
+    assert all(len(ids) <= 2 for ids in table.fitted)
+    assert [c.fit for c in found.residual.values()] == [free] and found.finished
+    grown = Table(gains, **asked)
+    assert len(run(grown).chosen.candidate.ids) == 3
+    right = Table({**gains, f"{A} {B}": ENOUGH}, **asked)
+    assert chosen(run(right, free=free)) == {A, B}
 
 
 def test_where_the_misfit_is_large_the_search_begins_with_what_the_equation_asks_for(run):
