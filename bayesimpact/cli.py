@@ -334,7 +334,7 @@ def demo(ctx: click.Context, out: Path, seed: int, quiet: bool) -> None:
     second = diagnose_campaign(concealed, made_folder(out / "concealed"), quick=True, **told)
     announce(second, out / "concealed", quiet)
     if not quiet:
-        from bayesimpact.trial.truth import compared, open_truth
+        from bayesimpact.trial.run.truth import compared, open_truth
 
         click.echo("\nWhat was hidden, opened now:")
         for line in compared(second.diagnosis or {}, open_truth(hiding)):

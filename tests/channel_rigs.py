@@ -9,8 +9,8 @@ import numpy as np
 import small_rig
 
 from bayesimpact.data.campaign import Campaign
-from bayesimpact.trial.rig import Effects
-from bayesimpact.trial.rig_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.recordings import Effects
 
 LEVELS: dict[Any, float] = {"displacement": 5e-6, "acceleration": 1e-2}
 RATES = {"displacement": 1000.0, "acceleration": 800.0}

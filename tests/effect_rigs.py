@@ -16,7 +16,7 @@ from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification
 from bayesimpact.model.effects import EFFECTS, Effect, EffectParameter, Scales
 from bayesimpact.model.oscillator import Oscillator, build_oscillator
-from bayesimpact.trial.rig import Release, Rig, motion
+from bayesimpact.trial.rig.recordings import Release, Rig, motion
 
 BY_ID = {effect.id: effect for effect in EFFECTS}
 MOVING = tuple(effect for effect in EFFECTS if effect.observe is None)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from small_rig import PLAIN, PLAIN_RELEASES, record
 
-from bayesimpact.trial.rig_files import write_campaign
+from bayesimpact.trial.rig.files import write_campaign
 
 FIRST = date(2026, 1, 1)
 

@@ -13,10 +13,10 @@ from bayesimpact.data.campaign import Campaign, Measurement
 from bayesimpact.data.quantity import Quantity
 from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.model.parameters import Layout
-from bayesimpact.trial import rig as generator
-from bayesimpact.trial.rig import Effects, Release, Rig, make_campaign, motion
-from bayesimpact.trial.rig_chain import Chain
-from bayesimpact.trial.rig_motion import RigMotion
+from bayesimpact.trial.rig import recordings as generator
+from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.motion import RigMotion
+from bayesimpact.trial.rig.recordings import Effects, Release, Rig, make_campaign, motion
 
 RIG = Rig(
     mass=0.503,

@@ -42,6 +42,7 @@ ROOMS = (
     ("diagnosis.refits", "diagnosis.candidates", "diagnosis.selection"),
     ("diagnosis.residual_force", "diagnosis.candidates", "diagnosis.selection"),
     ("diagnosis.selection", "diagnosis.formulas"),
+    ("trial.rig", "trial.draw", "trial.score", "trial.run"),
 )
 FILES = sorted(PACKAGE.rglob("*.py"))
 

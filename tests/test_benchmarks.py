@@ -27,7 +27,7 @@ from benchmarks.record import stored
 from benchmarks.sampling import Sampled
 
 from bayesimpact.data.read import load_campaign
-from bayesimpact.trial.draw import draw
+from bayesimpact.trial.draw.one_trial import draw
 
 BENCHMARKS = Path(record.__file__).parent
 MEASURED = ("added", "kernel", "loops", "peers", "samplers", "scaling", "startup")

@@ -10,7 +10,7 @@ from benchmarks.sbc import MODELS, Replicate, replicate, verdicts
 from benchmarks.uniformity import band, critical_tail, grid, smallest_tail
 from scipy import stats
 
-from bayesimpact.trial.settings import Settings
+from bayesimpact.trial.draw.settings import Settings
 
 pytestmark = pytest.mark.long
 

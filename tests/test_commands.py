@@ -18,7 +18,7 @@ from bayesimpact.data.read import load_campaign
 from bayesimpact.model.effects import EFFECTS, UNTRIED
 from bayesimpact.model.experiment import simulate
 from bayesimpact.model.own_effects import load_effects
-from bayesimpact.trial.rig_files import write_campaign
+from bayesimpact.trial.rig.files import write_campaign
 
 Run = Callable[..., tuple[int, str, str]]
 EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "own_effect.py"

@@ -17,8 +17,8 @@ from benchmarks.detection_power import (
 from benchmarks.power_figures import limits_figure, power_figure
 
 from bayesimpact.diagnosis.selection.outcome import DECISIVE
-from bayesimpact.trial.designs import draw_rig_design
-from bayesimpact.trial.sensitivity import Sensitivity
+from bayesimpact.trial.draw.designs import draw_rig_design
+from bayesimpact.trial.draw.sensitivity import Sensitivity
 
 pytestmark = pytest.mark.long
 

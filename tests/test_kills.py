@@ -11,7 +11,7 @@ import pytest
 from kills import killed_and_resumed, run, state, unfinished
 from small_rig import PLAIN, PLAIN_RELEASES, record
 
-from bayesimpact.trial.rig_files import write_campaign
+from bayesimpact.trial.rig.files import write_campaign
 
 pytestmark = pytest.mark.long
 

@@ -21,7 +21,7 @@ from bayesimpact.data.read import load_campaign
 from bayesimpact.errors import interruption_kept
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.posterior import _fingerprint
-from bayesimpact.trial.rig_files import write_campaign
+from bayesimpact.trial.rig.files import write_campaign
 
 COMMAND = str(Path(sys.executable).with_name("bayesimpact"))
 LIMITED = """

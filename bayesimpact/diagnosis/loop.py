@@ -25,7 +25,7 @@ from bayesimpact.diagnosis.residual_force.learned import LEARNED
 from bayesimpact.diagnosis.selection.comparable import Comparable, alike_in_misfit, alike_in_odds
 from bayesimpact.diagnosis.selection.decision import Decision, Verdict, decide
 from bayesimpact.diagnosis.selection.outcome import Naming, State, is_large
-from bayesimpact.diagnosis.selection.posed_anew import band_limited
+from bayesimpact.diagnosis.selection.revision import band_limited
 from bayesimpact.diagnosis.selection.search import name
 from bayesimpact.diagnosis.selection.told_sizes import of_told_size
 from bayesimpact.diagnosis.selection.unknown import with_force

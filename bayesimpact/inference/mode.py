@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.inference.climb import Climb
+from bayesimpact.inference.ascent import Climb
 from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.likelihood import Linearisation
 from bayesimpact.inference.onset_jumps import beyond_touch

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from bayesimpact.data.campaign import Beam, Campaign
-from bayesimpact.trial.rig import Effects, Release, Rig, make_campaign
-from bayesimpact.trial.rig_chain import Chain
-from bayesimpact.trial.rig_files import TRUTH_FILE, write_campaign
+from bayesimpact.trial.rig.files import TRUTH_FILE, write_campaign
+from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.recordings import Effects, Release, Rig, make_campaign
 
 PAPER_RIG = Rig(
     mass=0.503,

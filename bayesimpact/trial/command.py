@@ -89,10 +89,10 @@ def trial(
     """
     one_thread_each()
     from bayesimpact.data.files import write_text
-    from bayesimpact.trial.run import run_trials
-    from bayesimpact.trial.settings import Settings, strong_settings
-    from bayesimpact.trial.stamp import stamped
-    from bayesimpact.trial.table import summary_text
+    from bayesimpact.trial.draw.settings import Settings, strong_settings
+    from bayesimpact.trial.run.stamp import stamped
+    from bayesimpact.trial.run.trials import run_trials
+    from bayesimpact.trial.score.table import summary_text
 
     given: dict[str, Any] = {
         "kinds": _listed(kinds),

@@ -21,9 +21,9 @@ from bayesimpact.diagnosis.score_test.scan import scan
 from bayesimpact.diagnosis.selection.outcome import State
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects import SEARCHED
-from bayesimpact.trial.draw import draw
-from bayesimpact.trial.settings import Settings
-from bayesimpact.trial.summary import rate
+from bayesimpact.trial.draw.one_trial import draw
+from bayesimpact.trial.draw.settings import Settings
+from bayesimpact.trial.score.summary import rate
 
 LEVEL = 0.99
 

@@ -23,8 +23,8 @@ from benchmarks.sbc import MODELS, replicate, verdicts
 from tqdm import tqdm
 
 from bayesimpact.cluster import executor
-from bayesimpact.trial.settings import Settings
-from bayesimpact.trial.stamp import origin
+from bayesimpact.trial.draw.settings import Settings
+from bayesimpact.trial.run.stamp import origin
 
 STORE = Path(__file__).parent / "sbc.json"
 

@@ -39,10 +39,10 @@ from bayesimpact.data.quantity import Quantity
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.posterior import sample
 from bayesimpact.trial.bundle import PAPER_RIG, paper_releases
-from bayesimpact.trial.rates import rate_in_groups
-from bayesimpact.trial.rig import Release, Rig, make_campaign
-from bayesimpact.trial.rig_chain import Chain
-from bayesimpact.trial.stamp import origin
+from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.recordings import Release, Rig, make_campaign
+from bayesimpact.trial.run.stamp import origin
+from bayesimpact.trial.score.rates import rate_in_groups
 from bayesimpact.workflow import without_faults
 
 NOISE: Mapping[Quantity, float] = {

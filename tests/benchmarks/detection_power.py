@@ -24,13 +24,13 @@ from bayesimpact.diagnosis.score_test.scan import scan
 from bayesimpact.diagnosis.thresholds import DECISIVE, largest_log_odds
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.trial.bundle import PAPER_HEIGHTS, PAPER_RIG
-from bayesimpact.trial.designs import DrawnRig
-from bayesimpact.trial.planted_effects import PLANTED_EFFECTS
-from bayesimpact.trial.rig import Release
-from bayesimpact.trial.rig_chain import Chain
-from bayesimpact.trial.sensitivity import Sensitivity, clean_readings, misfit
-from bayesimpact.trial.sizing import LIMIT, Unsuitable, sized
-from bayesimpact.trial.summary import rate
+from bayesimpact.trial.draw.designs import DrawnRig
+from bayesimpact.trial.draw.planted_effects import PLANTED_EFFECTS
+from bayesimpact.trial.draw.sensitivity import Sensitivity, clean_readings, misfit
+from bayesimpact.trial.draw.sizing import LIMIT, Unsuitable, sized
+from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.recordings import Release
+from bayesimpact.trial.score.summary import rate
 
 Array = NDArray[np.float64]
 

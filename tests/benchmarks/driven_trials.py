@@ -34,8 +34,8 @@ from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.oscillator import build_oscillator
-from bayesimpact.trial.rates import rate
-from bayesimpact.trial.stamp import origin
+from bayesimpact.trial.run.stamp import origin
+from bayesimpact.trial.score.rates import rate
 
 STORE = Path(__file__).with_suffix(".json")
 KINDS = ("sweep", "steps", "noise")

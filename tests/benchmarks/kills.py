@@ -27,7 +27,7 @@ from kills import RESUME, killed_and_resumed, run, state, unfinished
 from small_fleet import write_fleet
 from small_rig import RELEASES, record
 
-from bayesimpact.trial.rig_files import write_campaign
+from bayesimpact.trial.rig.files import write_campaign
 
 TRIALS = ["--number", "2", "--rig", "small", "--noise", "white", "--kinds", "control",
           "--no-report", "--no-search"]  # fmt: skip

@@ -31,9 +31,9 @@ from benchmarks.bundled import PAPER
 from benchmarks.record import keep, rounds
 from benchmarks.startup import processor
 
-from bayesimpact.trial.blind import campaign_files
-from bayesimpact.trial.draw import draw
-from bayesimpact.trial.settings import Settings
+from bayesimpact.trial.draw.one_trial import draw
+from bayesimpact.trial.draw.settings import Settings
+from bayesimpact.trial.run.blind import campaign_files
 
 BUNDLED = {"nothing missing": PAPER, "two effects concealed": PAPER.parent / "concealed"}
 OUTSIDE = ("friction_pad", "eddy_brake", "damping_bump")

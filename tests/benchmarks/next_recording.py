@@ -37,11 +37,11 @@ from bayesimpact.design.rank import Z90, Proposal, proposals
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.inference.fit import Fit
-from bayesimpact.trial.draw import draw
-from bayesimpact.trial.rig import Release, Rig, record
-from bayesimpact.trial.rig_chain import Chain
-from bayesimpact.trial.settings import Settings
-from bayesimpact.trial.stamp import origin
+from bayesimpact.trial.draw.one_trial import draw
+from bayesimpact.trial.draw.settings import Settings
+from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.recordings import Release, Rig, record
+from bayesimpact.trial.run.stamp import origin
 
 STORE = Path(__file__).with_suffix(".json")
 EFFECTS = (

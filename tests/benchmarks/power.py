@@ -20,7 +20,7 @@ if __name__ == "__main__":  # imports go by the tests' folder, not by this one
 import numpy as np
 from benchmarks.detection_power import observed, power_table, power_text
 
-from bayesimpact.trial.stamp import origin
+from bayesimpact.trial.run.stamp import origin
 
 STORE = Path(__file__).with_suffix(".json")
 

@@ -19,7 +19,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from bayesimpact.trial.stamp import commit
+from bayesimpact.trial.run.stamp import commit
 
 ROUNDS = 40
 REPEATS = 5

@@ -26,8 +26,8 @@ from bayesimpact.inference.posterior import sample
 from bayesimpact.inference.priors import Priors, prior_from_table
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.oscillator import Oscillator, build_oscillator
-from bayesimpact.trial.rig import Effects, Release, Rig, make_campaign
-from bayesimpact.trial.rig_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.recordings import Effects, Release, Rig, make_campaign
 
 Array = NDArray[np.float64]
 Table = Mapping[str, Mapping[str, Any]]

@@ -18,7 +18,7 @@ from typing import Any
 if __name__ == "__main__":  # imports go by the tests' folder, not by this one
     sys.path[0] = str(Path(__file__).resolve().parents[1])
 
-from bayesimpact.trial.line import trial_line
+from bayesimpact.trial.score.line import trial_line
 
 STORE = Path(__file__).with_suffix(".json")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from benchmarks.tables import HERE, grid, stored
 
-from bayesimpact.trial.summary import rate, rate_in_groups
+from bayesimpact.trial.score.summary import rate, rate_in_groups
 
 NOISES = {"white": "white", "ar1": "AR(1)", "smoothed": "smoothed by a declared filter"}
 

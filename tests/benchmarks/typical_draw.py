@@ -28,9 +28,9 @@ from bayesimpact.trial.bundle import (
     concealed_campaign,
     concealed_truth,
 )
-from bayesimpact.trial.rig_files import write_campaign
-from bayesimpact.trial.score import NORMAL_90
-from bayesimpact.trial.stamp import origin
+from bayesimpact.trial.rig.files import write_campaign
+from bayesimpact.trial.run.stamp import origin
+from bayesimpact.trial.score.answers import NORMAL_90
 
 STORE = Path(__file__).with_suffix(".json")
 FIRST, DRAWS = 20231101, 25

@@ -18,8 +18,8 @@ from benchmarks.record import keep
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.model.jit.compiled import compilation_left_out
 from bayesimpact.model.jit.workload import workload_counted
-from bayesimpact.trial.draw import draw
-from bayesimpact.trial.settings import strong_settings
+from bayesimpact.trial.draw.one_trial import draw
+from bayesimpact.trial.draw.settings import strong_settings
 
 
 def measured(seed: int) -> dict[str, Any]:

@@ -7,8 +7,8 @@ import pytest
 from effect_rigs import BY_ID
 
 from bayesimpact.diagnosis.diagnose import diagnose
-from bayesimpact.trial.rig import Release, Rig, make_campaign
-from bayesimpact.trial.rig_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.recordings import Release, Rig, make_campaign
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from effect_rigs import BY_ID
 
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.measurement.smoothing import whole_campaign
-from bayesimpact.trial.rig_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import Chain
 
 pytestmark = pytest.mark.long
 

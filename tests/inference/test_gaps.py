@@ -18,8 +18,8 @@ from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.model.measurement import smooth
 from bayesimpact.model.oscillator import build_oscillator
 from bayesimpact.trial.bundle import PAPER_RIG
-from bayesimpact.trial.rig import Release, make_campaign
-from bayesimpact.trial.rig_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.recordings import Release, make_campaign
 
 INTERVAL = 1e-3
 

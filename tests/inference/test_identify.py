@@ -29,8 +29,8 @@ from bayesimpact.inference.noise.estimate import estimate_noise
 from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.model.oscillator import build_oscillator
 from bayesimpact.trial.bundle import PAPER_RIG
-from bayesimpact.trial.rig import Release
-from bayesimpact.trial.rig_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.recordings import Release
 
 SAVGOL = Smoothing("savgol", window=15, polyorder=2)
 

@@ -13,7 +13,7 @@ from made_up_banana import banana
 from scipy.optimize import least_squares, minimize_scalar
 
 from bayesimpact.data.campaign import Smoothing
-from bayesimpact.inference.climb import best_sigma
+from bayesimpact.inference.ascent import best_sigma
 from bayesimpact.inference.fit import Fit, Target, inverse
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
@@ -27,7 +27,7 @@ from bayesimpact.inference.prior import (
 )
 from bayesimpact.inference.priors import Priors
 from bayesimpact.model.oscillator import build_oscillator
-from bayesimpact.trial.rig import Release, Rig
+from bayesimpact.trial.rig.recordings import Release, Rig
 
 SAVGOL = Smoothing("savgol", window=11, polyorder=2)
 WIDE = {

@@ -17,8 +17,8 @@ from bayesimpact.inference import likelihood
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects import SEARCHED
 from bayesimpact.model.rounding import Rounding
-from bayesimpact.trial.rig import Release
-from bayesimpact.trial.rig_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.recordings import Release
 
 STEP, DITHER = 2e-4, 0.2
 

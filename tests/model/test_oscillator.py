@@ -14,7 +14,7 @@ from bayesimpact.data.recording import Recording
 from bayesimpact.model.effects import Effect
 from bayesimpact.model.exact.simulate import simulate
 from bayesimpact.model.oscillator import Oscillator, build_oscillator
-from bayesimpact.trial.rig_chain import Probe
+from bayesimpact.trial.rig.measuring_chain import Probe
 
 SAVGOL = Smoothing("savgol", window=21, polyorder=2)
 LAG = Smoothing("lag", time_constant=2e-3)

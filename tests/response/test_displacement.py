@@ -9,7 +9,7 @@ import small_rig
 from bayesimpact.inference.initial.estimates import estimate
 from bayesimpact.response.displacement import displacement
 from bayesimpact.response.half_cycles import spectral_period
-from bayesimpact.trial.rig import motion
+from bayesimpact.trial.rig.recordings import motion
 
 NOISE = {1: 2e-4, 2: 2e-2}
 STIFF = small_rig.Rig(0.503, 0.148, 808.556, 2.085, 1.1e-3, {"1": 8e4})

@@ -10,7 +10,7 @@ import pytest
 from bayesimpact.data.bundled import bundled_campaign
 from bayesimpact.data.read import load_campaign
 from bayesimpact.trial.bundle import PAPER_RIG, main
-from bayesimpact.trial.rig import Release, motion
+from bayesimpact.trial.rig.recordings import Release, motion
 
 
 def test_paper_folder_is_made_again_bit_for_bit(tmp_path):

@@ -23,7 +23,7 @@ from bayesimpact.diagnosis.refits.extend import (
 from bayesimpact.diagnosis.score_test.scores import Score
 from bayesimpact.diagnosis.thresholds import LARGE
 from bayesimpact.formula.law import is_formula_id
-from bayesimpact.inference.climb import Climb
+from bayesimpact.inference.ascent import Climb
 from bayesimpact.inference.fit import Fit, Target
 from bayesimpact.inference.initial.horizon import by_stretches, growing_horizon
 from bayesimpact.inference.mode import find_mode

@@ -31,7 +31,7 @@ from bayesimpact.diagnosis.residual_force.gaussian_process import missing_contac
 from bayesimpact.diagnosis.score_test.pairs import promising_pairs
 from bayesimpact.diagnosis.selection.models import NOTHING, STARTS, UNCONVERGED_SHORTFALL, Progress
 from bayesimpact.diagnosis.selection.outcome import Naming, State, explains_most, is_large
-from bayesimpact.diagnosis.selection.posed_anew import is_spoilt, posed_anew
+from bayesimpact.diagnosis.selection.revision import is_spoilt, posed_anew
 from bayesimpact.diagnosis.selection.unknown import learn_force
 from bayesimpact.diagnosis.selection.unlisted import Problem, Unlisted
 from bayesimpact.inference.fit import Fit

@@ -13,8 +13,8 @@ from bayesimpact.data.faults.dropouts import find_dropouts
 from bayesimpact.data.faults.find import recording_faults
 from bayesimpact.data.period import crossing_period
 from bayesimpact.data.recording import Recording
-from bayesimpact.trial.rig import Effects
-from bayesimpact.trial.rig_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.recordings import Effects
 
 N, PERIOD = 6000, 105.0
 SIGMA = 0.002

@@ -31,8 +31,8 @@ from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects import EFFECTS, SEARCHED
 from bayesimpact.model.parameters import SLOTS
-from bayesimpact.trial.rig import Effects
-from bayesimpact.trial.rig_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.recordings import Effects
 
 FREE = {
     "spring_cubic": {"stiffness": 4e6},

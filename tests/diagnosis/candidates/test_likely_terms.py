@@ -29,7 +29,7 @@ from bayesimpact.formula.library import LINEAR, V, library
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects import SEARCHED
-from bayesimpact.trial.rig import Effects
+from bayesimpact.trial.rig.recordings import Effects
 
 DETENT = {"stiffness": 40.0, "place": -2.5e-3, "width": 7e-4}
 CUBIC = {"stiffness": 1e6}

@@ -23,7 +23,7 @@ from bayesimpact.diagnosis.selection.unlisted import Unlisted
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects import SEARCHED
-from bayesimpact.trial.rig import Effects
+from bayesimpact.trial.rig.recordings import Effects
 
 FORCE = BY_ID["harmonic_forcing"]
 STRONG = {"amplitude": 0.15, "frequency": 2.3, "phase": 1.0}  # below the motion's own frequency

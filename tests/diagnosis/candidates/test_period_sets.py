@@ -23,7 +23,7 @@ from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.initial.multiple_shooting import multiple_shooting
 from bayesimpact.model.effects import SEARCHED
-from bayesimpact.trial.rig_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import Chain
 
 MASS = {"obstacle_mass": {"mass": 0.01}, "quadratic_drag": {"coefficient": 1.5}}
 

@@ -17,7 +17,7 @@ from bayesimpact.diagnosis.faults import beside_model
 from bayesimpact.diagnosis.faults.beside_model import fault_beside
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import fit_from
-from bayesimpact.diagnosis.selection.posed_anew import is_spoilt, posed_anew
+from bayesimpact.diagnosis.selection.revision import is_spoilt, posed_anew
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects import EFFECTS

@@ -18,8 +18,8 @@ from bayesimpact.diagnosis.faults.alone import SharedModel, fit_alone
 from bayesimpact.diagnosis.faults.compare import Compared, base_failed, compare_recordings
 from bayesimpact.inference.identify import identify
 from bayesimpact.trial.bundle import PAPER_RIG, paper_releases
-from bayesimpact.trial.rig import Rig, record
-from bayesimpact.trial.rig_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.recordings import Rig, record
 
 SECONDS = 2.0
 ODD = 3  # case2_a among case1_a, 1_b, 1_c, 2_a, 2_b, 3_a

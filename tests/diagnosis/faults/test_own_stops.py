@@ -23,7 +23,7 @@ from bayesimpact.diagnosis.faults.recording_faults import cleaned_campaign
 from bayesimpact.diagnosis.refits.extend import campaign_scales, extend
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.noise.whitening import Noise
-from bayesimpact.trial.rig import Release
+from bayesimpact.trial.rig.recordings import Release
 
 LAWS = {"contact_hardening": {"stiffness": 1.5e9}, "quadratic_drag": {"coefficient": 1.0}}
 RELEASES = tuple(

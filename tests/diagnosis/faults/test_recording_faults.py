@@ -27,7 +27,7 @@ from bayesimpact.diagnosis.faults.simpler import makes_idle
 from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.inference.identify import identify
 from bayesimpact.report.diagnosis.document import document
-from bayesimpact.trial.rig import Release
+from bayesimpact.trial.rig.recordings import Release
 
 pytestmark = pytest.mark.usefixtures("catalogue_alone")
 

@@ -19,7 +19,7 @@ from bayesimpact.diagnosis.measurement.input_noise import input_noise, with_inpu
 from bayesimpact.diagnosis.measurement.whiteness import whiteness_p
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import fit_from
-from bayesimpact.diagnosis.selection.posed_anew import posed_anew
+from bayesimpact.diagnosis.selection.revision import posed_anew
 from bayesimpact.diagnosis.thresholds import LARGE
 from bayesimpact.formula.responses import motion_of
 from bayesimpact.inference.fit import Fit

@@ -15,7 +15,7 @@ from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.diagnosis.measurement.smoothing import LAG, is_refuted, proved_smoothing
 from bayesimpact.diagnosis.refits.extend import campaign_scales, extend, transfer
 from bayesimpact.report.diagnosis.document import document
-from bayesimpact.trial.rig_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import Chain
 
 pytestmark = pytest.mark.usefixtures("catalogue_alone")
 

@@ -21,7 +21,7 @@ from bayesimpact.diagnosis.residual_force.gaussian_process import missing_force
 from bayesimpact.diagnosis.residual_force.marginal import gain
 from bayesimpact.diagnosis.selection.unknown import learn_force
 from bayesimpact.diagnosis.thresholds import DECISIVE, EXCESS
-from bayesimpact.inference.climb import Climb
+from bayesimpact.inference.ascent import Climb
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.linear_response.free_changes import motions_beside

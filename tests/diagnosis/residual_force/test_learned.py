@@ -21,7 +21,7 @@ from bayesimpact.diagnosis.residual_force.learned import (
 )
 from bayesimpact.model.effects.effect import address
 from bayesimpact.model.oscillator import build_oscillator
-from bayesimpact.trial.rig import Release, Rig, motion
+from bayesimpact.trial.rig.recordings import Release, Rig, motion
 
 LOW, HIGH, KNOTS = -6.5e-3, 3.5e-3, 12
 SPACING = (HIGH - LOW) / (KNOTS - 3)

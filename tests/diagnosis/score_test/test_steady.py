@@ -36,7 +36,7 @@ from bayesimpact.diagnosis.selection.models import Models
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.measurement import gain, smooth
-from bayesimpact.trial.rig_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import Chain
 
 FREQUENCY, AMPLITUDE = 61.3, 2e-6
 Envelope = Callable[[int, np.ndarray], np.ndarray]

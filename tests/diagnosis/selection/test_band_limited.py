@@ -16,7 +16,7 @@ from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import fit_from
-from bayesimpact.diagnosis.selection.posed_anew import band_limited, without_lines
+from bayesimpact.diagnosis.selection.revision import band_limited, without_lines
 from bayesimpact.inference.identify import identify
 
 MASS, C1, K1 = 0.5, 0.6, 800.0

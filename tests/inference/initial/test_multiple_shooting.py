@@ -15,7 +15,7 @@ from bayesimpact.inference.initial.multiple_shooting import MultipleShooting, mu
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.model.oscillator import build_oscillator
-from bayesimpact.trial.rig_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import Chain
 
 TRUE = small_rig.true_values()
 

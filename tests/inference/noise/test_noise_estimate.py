@@ -15,8 +15,8 @@ from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 from bayesimpact.inference.noise.estimate import estimate_noise, unfiltered_noise
 from bayesimpact.inference.noise.whitening import Noise
-from bayesimpact.trial.rig import Release, Rig
-from bayesimpact.trial.rig_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.recordings import Release, Rig
 
 STIFF = Rig(mass=0.1, c1=0.05, k1=2000.0, c2=1.0, g=5e-4, k2={"1": 60_000.0})
 RIGS = {

@@ -15,7 +15,7 @@ from bayesimpact.inference.identify import identify
 from bayesimpact.inference.noise.estimate import estimate_noise
 from bayesimpact.inference.noise.spectrum import smoothed_noise
 from bayesimpact.model.measurement import smooth
-from bayesimpact.trial.rig_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import Chain
 
 LEVELS = {"displacement": 5e-6, "velocity": 2e-4, "acceleration": 1e-2}
 QUANTITIES = tuple(LEVELS)

@@ -12,7 +12,7 @@ from driven_rigs import driven_rig
 from bayesimpact.inference.noise.estimate import estimate_noise, unfiltered_noise
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.oscillator import build_oscillator
-from bayesimpact.trial.rig_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import Chain
 
 LEVELS = {"velocity": 2e-4, "acceleration": 1e-2}
 SEEDS = 6

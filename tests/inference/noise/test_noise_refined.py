@@ -17,7 +17,7 @@ from bayesimpact.inference.noise.refined import (
     rounding_variance,
 )
 from bayesimpact.inference.noise.whitening import Noise
-from bayesimpact.trial.rig_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import Chain
 
 RNG = np.random.default_rng
 RHO = 0.75

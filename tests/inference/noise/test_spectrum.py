@@ -13,8 +13,8 @@ from bayesimpact.data.campaign import Smoothing
 from bayesimpact.data.recording import Recording
 from bayesimpact.inference.noise.spectrum import find_smoothing, nulls, smoothed_noise
 from bayesimpact.inference.noise.whitening import Noise
-from bayesimpact.trial.rig import Release
-from bayesimpact.trial.rig_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.recordings import Release
 
 FILTERS = [(9, 0), (7, 2), (11, 2), (15, 4), (21, 2), (31, 4), (25, 6)]
 

@@ -14,7 +14,7 @@ from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.exact.sensitivities.derivatives import grams, trajectories_and_derivatives
 from bayesimpact.model.exact.simulate import predictions, sums_of_squares
 from bayesimpact.model.oscillator import build_oscillator
-from bayesimpact.trial.rig import Release, Rig, motion
+from bayesimpact.trial.rig.recordings import Release, Rig, motion
 
 BY_ID = {effect.id: effect for effect in EFFECTS}
 RIG = Rig(0.503, 0.148, 808.556, 2.085, 1.1e-3, {"1": 5350.156})

@@ -1,0 +1,1 @@
+"""From a seed to a campaign and the truth about it."""

@@ -1,0 +1,1 @@
+"""Many trials: truths sealed first, campaigns diagnosed, seals opened."""

@@ -1,0 +1,1 @@
+"""Opened trials: was the answer right, and how often."""
