@@ -66,7 +66,7 @@ def fit(
     evaluations : of that search; None: as many as its dimension asks for
     noise : None estimates it from the recordings
     sigma_per_recording : a noise level of its own for every recording
-    known : values of parameters from which to climb, where the campaign declares effects
+    known : values of parameters from which to begin, where the campaign declares effects
     callback : called after every generation of the global search
 
     Raises

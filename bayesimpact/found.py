@@ -103,7 +103,7 @@ class _Shown:
 
         found: Any = self
         fit = found.after if isinstance(found, loop.Diagnosis) else found.fit
-        return plot(fit.target.oscillator.campaign)
+        return plot(fit.density.oscillator.campaign)
 
     def _repr_html_(self) -> str:
         """Parameters that all recordings share, in the units and digits of the report."""
@@ -157,7 +157,8 @@ class Diagnosis(_Shown, loop.Diagnosis):
     def _repr_html_(self) -> str:
         """Effects with their probabilities, and parameters before and after as in the report."""
         found: list[tuple[str, ...]] = [
-            (e.title, "", f"probability {self.naming.probability(e.id):.3g}") for e in self.effects
+            (e.title, "", f"probability {self.selection.probability(e.id):.3g}")
+            for e in self.effects
         ]
         found += _changes(self)
         columns = ("", "base model, median (90 %)", "with what was added, median (90 %)")
@@ -181,7 +182,7 @@ def _changes(found: loop.Diagnosis) -> Iterable[tuple[str, ...]]:
     """Name, estimate before and estimate after."""
     from bayesimpact.report.diagnosis.change_view import estimate
 
-    layout, base = found.after.target.oscillator.layout, intervals(found.before)
+    layout, base = found.after.density.oscillator.layout, intervals(found.before)
     for i in layout.roles("physical", "effect"):
         name, unit = layout.names[i], layout.parameters[i].unit
         if name.startswith(LEARNED):

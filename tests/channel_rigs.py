@@ -9,7 +9,7 @@ import numpy as np
 import small_rig
 
 from bayesimpact.data.campaign import Campaign
-from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 from bayesimpact.trial.rig.recordings import Effects
 
 LEVELS: dict[Any, float] = {"displacement": 5e-6, "acceleration": 1e-2}
@@ -21,7 +21,7 @@ def channels(seed: int, effects: Effects | None = None) -> Campaign:
     rng, found = np.random.default_rng(seed), []
     for quantity, level in LEVELS.items():
         campaign = small_rig.record(
-            effects=effects, chain=Chain(), quantity=quantity, rate=RATES[quantity]
+            effects=effects, chain=MeasuringChain(), quantity=quantity, rate=RATES[quantity]
         )
         for r in campaign.recordings:
             samples = r.samples + level * rng.standard_normal(r.samples.size)

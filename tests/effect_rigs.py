@@ -191,8 +191,8 @@ def by_rig(
 def with_effect(small: Identification, effect_id: str, **values: float) -> Fit:
     """The small rig's fit with an effect of given size put beside it."""
     scales, effects = campaign_scales(small.fit), (BY_ID[effect_id],)
-    target = extend(small.fit, effects, scales)
-    mode = transfer(small.fit, target.oscillator.layout, effects, scales, {})
+    density = extend(small.fit, effects, scales)
+    mode = transfer(small.fit, density.oscillator.layout, effects, scales, {})
     for name, value in values.items():
-        mode[target.oscillator.layout.index(f"{effect_id}.{name}")] = value
-    return dataclasses.replace(small.fit, target=target, mode=mode)
+        mode[density.oscillator.layout.index(f"{effect_id}.{name}")] = value
+    return dataclasses.replace(small.fit, density=density, mode=mode)

@@ -14,7 +14,7 @@ from bayesimpact.data.quantity import Quantity
 from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.model.parameters import Layout
 from bayesimpact.trial.rig import recordings as generator
-from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 from bayesimpact.trial.rig.motion import RigMotion
 from bayesimpact.trial.rig.recordings import Effects, Release, Rig, make_campaign, motion
 
@@ -56,7 +56,7 @@ def record(
     *,
     rig: Rig = RIG,
     releases: Sequence[Release] = RELEASES,
-    chain: Chain | None = None,
+    chain: MeasuringChain | None = None,
     rate: float = 1000.0,
     duration: float = 2.0,
     measurement: Measurement | None = None,
@@ -69,7 +69,7 @@ def record(
             rig,
             releases,
             effects,
-            chain or Chain(noise=NOISE, offsets=OFFSETS),
+            chain or MeasuringChain(noise=NOISE, offsets=OFFSETS),
             rate=rate,
             duration=duration,
             rng=np.random.default_rng(seed),

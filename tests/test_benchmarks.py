@@ -74,9 +74,9 @@ def test_the_gradient_for_nuts() -> None:
     both = sampling.with_gradient(fit)
     theta = fit.mode + 0.3 * fit.sd
     value, gradient = both(theta)
-    assert value == pytest.approx(float(fit.target(theta)[0]), abs=1e-6)
+    assert value == pytest.approx(float(fit.density(theta)[0]), abs=1e-6)
     steps = np.diag(1e-3 * fit.sd)
-    slopes = (fit.target(theta + steps) - fit.target(theta - steps)) / 2e-3
+    slopes = (fit.density(theta + steps) - fit.density(theta - steps)) / 2e-3
     np.testing.assert_allclose(gradient * fit.sd, slopes, atol=1e-4 * np.abs(slopes).max())
 
 

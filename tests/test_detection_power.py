@@ -26,7 +26,7 @@ ONE = Power("spring_cubic", "stiffness", 100.0, 1.0, 0.5, "spring_quadratic")
 CRITICAL = 3.8
 
 
-def test_the_law_of_detection_and_naming() -> None:
+def test_the_law_of_detection_and_selection() -> None:
     """Monte Carlo of what the law states: a score, and a likelihood ratio against the rival."""
     rng, n = np.random.default_rng(0), 200_000
     for strength in (0.8, 1.2, 2.0):

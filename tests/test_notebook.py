@@ -51,12 +51,12 @@ def test_a_number_has_two_digits_of_its_uncertainty() -> None:
 
 def test_a_figure_shows_itself(found: Diagnosis) -> None:
     """Without pyplot, that is; see `report.figures.inline`."""
-    figure = bi.plot(found.before.target.oscillator.campaign)
+    figure = bi.plot(found.before.density.oscillator.campaign)
     assert figure._repr_png_().startswith(b"\x89PNG")
 
 
 def test_a_campaign_lists_its_recordings(found: Diagnosis) -> None:
-    campaign = found.before.target.oscillator.campaign
+    campaign = found.before.density.oscillator.campaign
     shown = cells(campaign._repr_html_())
     assert [r.name for r in campaign.recordings] == shown[::6]
     assert shown[2] == str(campaign.recordings[0].samples.size) and shown[3] == "1000"
@@ -102,7 +102,7 @@ def test_what_is_returned_has_the_methods(found: Diagnosis, posterior: bi.Poster
     """Each calls the function of its name, and shows the numbers of the report."""
     assert isinstance(posterior, bi.Posterior)
     diagnosis, mode = bi.Diagnosis.of(found), bi.Identification.of(found.identification)
-    campaign = mode.fit.target.oscillator.campaign
+    campaign = mode.fit.density.oscillator.campaign
     for one in (diagnosis, mode, posterior):
         assert one.summary().equals(bi.summary(one))
         assert len(one.plot_recordings().axes) == len(campaign.recordings)
@@ -127,7 +127,7 @@ def test_a_notebook_has_the_units_of_the_report(posterior: bi.Posterior, tmp_pat
 
 
 def test_what_remains_unexplained_is_in_no_corner_plot(found: Diagnosis) -> None:
-    left = replace(bi.Diagnosis.of(found), remains=found.naming.chosen)
+    left = replace(bi.Diagnosis.of(found), remains=found.selection.chosen)
     with pytest.raises(bi_errors.InputError, match="unexplained"):
         left.plot_corner()
 
@@ -161,11 +161,11 @@ def is_record(value: Any) -> bool:
 
 
 def test_no_record_prints_pages(found: Diagnosis, posterior: Posterior) -> None:
-    """Naming once printed 223,000 characters: who asks for a part gets a line or two."""
+    """A selection once printed 223,000 characters: who asks for a part gets a line or two."""
     everything = (found, posterior, results_from_posterior(posterior))
     sizes = {(len(repr(one)), type(one).__name__) for one in records(everything, {})}
     met = {name for _, name in sizes}
-    assert {"Naming", "State", "MissingForce", "Chains", "Results", "Layout"} <= met
+    assert {"Selection", "ExaminedModel", "MissingForce", "Chains", "Results", "Layout"} <= met
     assert max(sizes) < (600, "")
 
 

@@ -92,9 +92,9 @@ def check_readings(samples: NDArray[np.float64], unit: str, where: str) -> None:
         raise InputError(
             where, f"a reading of {largest:.3g} {unit}", f"at most {READING:g} {unit}: see the unit"
         )
-    spread = float(np.ptp(samples))
-    if 0.0 < spread < MOTION:
-        found = f"readings that differ by {spread:.3g} {unit} at most"
+    extent = float(np.ptp(samples))
+    if 0.0 < extent < MOTION:
+        found = f"readings that differ by {extent:.3g} {unit} at most"
         raise InputError(where, found, f"a motion of {MOTION:g} {unit} or more: see the unit")
 
 

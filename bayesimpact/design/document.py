@@ -30,7 +30,7 @@ def next_document(rivals: Rivalry, found: Sequence[Proposal], seed: int) -> dict
 
 
 def _entry(number: int, p: Proposal, rivals: Rivalry) -> dict[str, Any]:
-    d, settles = p.design, rivals.is_open
+    d, decides = p.design, rivals.is_open
     return {
         "rank": number,
         "kind": d.kind,
@@ -43,8 +43,8 @@ def _entry(number: int, p: Proposal, rivals: Rivalry) -> dict[str, Any]:
         "gap_shift_m": d.gap_shift,
         "repeats": d.repeats or None,
         "same_campaign": d.joins,
-        "expected_log_odds": p.log_odds if settles else None,
-        "pairs": p.odds.tolist() if settles else None,
+        "expected_log_odds": p.log_odds if decides else None,
+        "pairs": p.odds.tolist() if decides else None,
         "chance_to_settle": p.chance if rivals.verdict == "ambiguous" else None,
         "half_ci90": {n: {"before": b, "after": a} for n, (b, a) in p.halves.items()},
         "narrowing": p.narrowing,

@@ -140,22 +140,22 @@ class Rivalry:
 def rivalry(d: Diagnosis) -> Rivalry:
     """The models that a diagnosis left open, with what a further recording would be made like."""
     chosen = candidates(d)
-    oscillator = chosen[0].fit.target.oscillator
+    oscillator = chosen[0].fit.density.oscillator
     first = oscillator.campaign.recordings[0]
     return Rivalry(
         d.verdict,
         tuple(
             FittedModel(
-                c.fit.target.oscillator.acting,
+                c.fit.density.oscillator.acting,
                 c.fit.names,
                 c.fit.mode,
                 c.fit.covariance,
-                d.naming.log_odds(c),
+                d.selection.log_odds(c),
             )
             for c in chosen
         ),
-        chosen[0].fit.target.likelihood.noise.with_smoothing(oscillator.smoothing),
-        max(1.0, d.naming.repetition),
+        chosen[0].fit.density.likelihood.noise.with_smoothing(oscillator.smoothing),
+        max(1.0, d.selection.repetition),
         oscillator.campaign.mass,
         oscillator.campaign.stop,
         first.quantity,
@@ -170,18 +170,18 @@ def candidates(d: Diagnosis) -> tuple[Candidate, ...]:
     residual force.
     """
     fit = d.after
-    own = Candidate(fit.target.oscillator.effects, fit, model_evidence(fit))
+    own = Candidate(fit.density.oscillator.effects, fit, model_evidence(fit))
     if d.verdict not in OPEN:
         return (own,)
     others: Sequence[Candidate] = d.alternatives
     if d.verdict != "ambiguous":
-        others = (*d.naming.residual.values(), d.naming.chosen.candidate, *d.naming.tried)
+        others = (*d.selection.residual.values(), d.selection.chosen.candidate, *d.selection.tried)
     distinct: dict[frozenset[str], Candidate] = {}
     for other in others:
         key = frozenset(other.ids)
         if key != set(own.ids) and usable(other):
             distinct.setdefault(key, other)
-    ranked = sorted(distinct.values(), key=d.naming.log_odds, reverse=True)
+    ranked = sorted(distinct.values(), key=d.selection.log_odds, reverse=True)
     return (own, *ranked[: MOST - 1])
 
 
@@ -194,7 +194,7 @@ def usable(candidate: Candidate) -> bool:
 def releases(candidate: Candidate) -> tuple[PastRelease, ...]:
     """How the recordings of a campaign were made, by a model's mode."""
     fit = candidate.fit
-    o = fit.target.oscillator
+    o = fit.density.oscillator
     slots = o.layout.slots(fit.mode)
     y0, v0 = (slots[:, SLOTS.index(name)] for name in ("y0", "v0"))
     return tuple(

@@ -120,7 +120,7 @@ def assess(design: PlannedRecording, rivals: Rivalry, draws: Array) -> Proposal 
     }
     for pair, odds in pairs.items():
         mean[pair] = odds.mean
-    chance = settled(rivals, pairs) if rivals.verdict == "ambiguous" else float("nan")
+    chance = decisive(rivals, pairs) if rivals.verdict == "ambiguous" else float("nan")
     return Proposal(design, mean, box_hill(rivals.probabilities, mean), chance, halves, narrowing)
 
 
@@ -131,7 +131,7 @@ def box_hill(probability: Array, odds: Array) -> float:
     return float(np.sum(weight * odds) / np.sum(weight))
 
 
-def settled(rivals: Rivalry, pairs: Mapping[tuple[int, int], Odds]) -> float:
+def decisive(rivals: Rivalry, pairs: Mapping[tuple[int, int], Odds]) -> float:
     """Probability that the model that is right then leads every rival by the decisive odds."""
     now = [h.log_odds for h in rivals.hypotheses]
     total = 0.0

@@ -32,7 +32,7 @@ ROUNDS = 12
 """Steps at most by which a rival's parameters imitate another model."""
 DAMPING = (0.0, 1e-6, 1e-4, 1e-2, 1.0)
 """Of a step, the next where one leads uphill: along a curve the linear problem points too far."""
-SETTLED = 0.02
+CONVERGED = 0.02
 """They stop where the sum of squares is what the linear problem promised, or falls no more, but for
 so much of it.
 """
@@ -151,7 +151,7 @@ def odds_between(right: Response, other: Response, draws: Array) -> Odds:
         promised = left - jacobian @ (moved - shift)
         hoped = float(promised @ promised + moved @ other.precision @ moved)
         near = min(abs(least - hoped), distance - least)
-        done = damping == 0.0 and near < SETTLED * (least + 1)
+        done = damping == 0.0 and near < CONVERGED * (least + 1)
         distance, theta, shift, left = least, trial, moved, remaining
         if done:
             break

@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.diagnosis.budget import Budget, begin
 from bayesimpact.diagnosis.candidates.promising import NEAR_MARGIN, SCORE_UNDERESTIMATE
-from bayesimpact.diagnosis.faults.compare import base_failed, gain, misfits
+from bayesimpact.diagnosis.faults.compare import base_failed, log_likelihood_gain, misfits
 from bayesimpact.diagnosis.faults.first_physics import faults_beside_physics
 from bayesimpact.diagnosis.faults.pushed_start import pushed_starts
 from bayesimpact.diagnosis.faults.recording_faults import (
@@ -49,7 +49,7 @@ from bayesimpact.diagnosis.faults.recording_faults import (
 )
 from bayesimpact.diagnosis.faults.simpler import (
     OPEN,
-    is_settled,
+    is_complete,
     is_simpler,
     makes_idle,
     may_be_simpler,
@@ -126,7 +126,7 @@ class Searches:
         other = self.search(corrected(), first)
         if is_better(other, found):
             return other
-        return found if other.naming.finished else unfinished(found)
+        return found if other.selection.finished else unfinished(found)
 
 
 @linear_algebra_alone()
@@ -197,18 +197,18 @@ def _diagnosed(
         certain = with_steps(certain, [doubtful.pop(0)], rng=rng, search=search)
     searches = Searches(rng, effects, say, begin(clock), campaign)
     found = searches.search(certain)
-    beside = [e for e in found.effects if e in found.after.target.oscillator.effects]
+    beside = [e for e in found.effects if e in found.after.density.oscillator.effects]
     if shared_effects(beside) and is_doubtful(found):
         say("comparing the recordings beside what is missing")
         doubtful = list(comparisons(certain, campaign, beside, values_of(found.after))) or doubtful
     if doubtful and is_doubtful(found) and may_be_simpler(doubtful, certain, found):
         found = _beside_faults(found, certain, doubtful, searches, search)
     elif certain is not cleaned and not proved and found.verdict not in OPEN:
-        found = searches.again(found, lambda: cleaned, lambda other, _: is_settled(other))
+        found = searches.again(found, lambda: cleaned, lambda other, _: is_complete(other))
     found = _without_needless_faults(found, cleaned, searches)
     found = _without_unfree_start(found, campaign, searches)
     undecided = found.corrected is not None and found.corrected.is_open
-    return replace(found, verdict="ambiguous") if undecided and is_settled(found) else found
+    return replace(found, verdict="ambiguous") if undecided and is_complete(found) else found
 
 
 def promised_gains(fit: Fit, effects: Sequence[Effect], *, rng: np.random.Generator) -> Array:
@@ -225,7 +225,7 @@ def exceeds(step: Step, fit: Fit, promised: float) -> bool:
     Where physics is missing, recordings of different amplitude show it each in its own way.
     """
     last = step[-1]
-    gained = gain(fit.reduced_chi2, last.after, last.campaign)
+    gained = log_likelihood_gain(fit.reduced_chi2, last.after, last.campaign)
     return base_failed(fit) or gained > SCORE_UNDERESTIMATE * promised + NEAR_MARGIN
 
 
@@ -238,13 +238,13 @@ def is_doubtful(found: Diagnosis) -> bool:
     parameters = [p for e in found.effects for p in e.parameters]
     own = any(p.scope != "campaign" and not (p.circular or p.initial) for p in parameters)
     own = own or any(map(is_formula, found.effects))
-    return own or not is_settled(found)
+    return own or not is_complete(found)
 
 
 def unfinished(found: Diagnosis) -> Diagnosis:
     """The answer where the time was up before it was compared with another one."""
     verdict: Verdict = "ambiguous" if found.verdict == "named" else found.verdict
-    return replace(found, verdict=verdict, naming=replace(found.naming, finished=False))
+    return replace(found, verdict=verdict, selection=replace(found.selection, finished=False))
 
 
 def _beside_faults(
@@ -257,7 +257,7 @@ def _beside_faults(
     def corrected() -> Corrected:
         return with_steps(before, steps, rng=searches.rng, search=search)
 
-    if not is_settled(found) or not searches.budget.may_go_on():
+    if not is_complete(found) or not searches.budget.may_go_on():
         return searches.again(found, corrected, is_simpler)
     again = corrected()
     if not makes_idle(again, found):
@@ -270,8 +270,8 @@ def _without_needless_faults(found: Diagnosis, before: Corrected, searches: Sear
     agree as they were: had its physics been known, nothing would have been compared.
     """
     more = found.corrected is not None and len(found.corrected.compared) > len(before.compared)
-    beside = [e for e in found.effects if e in found.after.target.oscillator.effects]
-    if not (more and beside and is_settled(found)):
+    beside = [e for e in found.effects if e in found.after.density.oscillator.effects]
+    if not (more and beside and is_complete(found)):
         return found
     fit = fitted_beside(before, beside, found.after)
     if fit is None or misfits(fit):
@@ -301,11 +301,11 @@ def _without_unfree_start(found: Diagnosis, as_read: Campaign, searches: Searche
 
 def without_uncertain_formulas(found: Diagnosis) -> Fit:
     """The fit that is shown, or where it has a formula that is not named, the catalogue's alone."""
-    effects = found.after.target.oscillator.effects
+    effects = found.after.density.oscillator.effects
     known = {e.id for e in effects if not is_formula(e)}
     if len(known) == len(effects) or (found.formulas is not None and found.formulas.named):
         return found.after
-    rest = [c.fit for c in found.naming.tried if set(c.ids) == known]
+    rest = [c.fit for c in found.selection.tried if set(c.ids) == known]
     return rest[0] if rest else found.before
 
 
@@ -328,11 +328,11 @@ def _of_corrected(
     found = diagnose_fit(
         through, rng=rng, effects=effects, progress=progress, budget=budget, first=first
     )
-    if found.naming.faults:
-        corrected = with_faults(corrected, found.identification, found.naming.faults, as_read)
+    if found.selection.faults:
+        corrected = with_faults(corrected, found.identification, found.selection.faults, as_read)
         through = found.identification
     if corrected.filtered is not None:
-        campaign = through.fit.target.oscillator.campaign
+        campaign = through.fit.density.oscillator.campaign
         measurement = replace(campaign.measurement, smoothing=None)
         plain = identify(replace(campaign, measurement=measurement), rng=rng, search=False)
         found = with_smoothing(found, plain, corrected.filtered)

@@ -21,7 +21,7 @@ from bayesimpact.data.short_repr import short_repr
 from bayesimpact.diagnosis.refits.evidence import log_evidence
 from bayesimpact.diagnosis.refits.extend import difference_steps
 from bayesimpact.diagnosis.refits.refit import TOLERANCE
-from bayesimpact.inference.fit import Fit, Target
+from bayesimpact.inference.fit import Fit, PosteriorDensity
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.model.measurement import edge
@@ -78,14 +78,14 @@ class HeldOut:
 
 def held_out_recordings(before: Fit, after: Fit) -> HeldOut:
     """Scores with each recording held out in turn."""
-    recordings = before.target.oscillator.campaign.recordings
+    recordings = before.density.oscillator.campaign.recordings
     groups = [[r] for r in range(len(recordings))]
     return _held_out(tuple(r.name for r in recordings), groups, before, after)
 
 
 def held_out_cases(before: Fit, after: Fit) -> HeldOut:
     """Scores with all recordings of each obstacle held out in turn."""
-    campaign = before.target.oscillator.campaign
+    campaign = before.density.oscillator.campaign
     groups = [
         [i for i, r in enumerate(campaign.recordings) if r.case == case] for case in campaign.cases
     ]
@@ -107,15 +107,19 @@ def _without(fit: Fit, group: Sequence[int]) -> Fit:
 
     The derivatives stay those of the whole fit: leaving data out moves the mode by little.
     """
-    old = fit.target.oscillator
+    old = fit.density.oscillator
     campaign = _cut(old.campaign, group, old.smoothing)
     oscillator = Oscillator(campaign, old.effects, old.layout, old.smoothing)
-    target = Target(Likelihood(oscillator, fit.target.likelihood.noise), fit.target.priors)
-    cut = target.likelihood.linearise(fit.mode, difference_steps(fit, target, {}), group)
+    density = PosteriorDensity(
+        Likelihood(oscillator, fit.density.likelihood.noise), fit.density.priors
+    )
+    cut = density.likelihood.linearise(fit.mode, difference_steps(fit, density, {}), group)
     slopes = list(fit.linearisation)
     for r, part in zip(group, cut, strict=True):
         slopes[r] = part
-    return find_mode(target, fit.mode, slopes=tuple(slopes), tolerance=TOLERANCE, max_iterations=12)
+    return find_mode(
+        density, fit.mode, slopes=tuple(slopes), tolerance=TOLERANCE, max_iterations=12
+    )
 
 
 def _cut(campaign: Campaign, group: Sequence[int], smoothing: Smoothing | None) -> Campaign:

@@ -54,13 +54,13 @@ class Intervals:
         middle, sd = float(self.mean[i]), float(np.sqrt(self.covariance[i, i]))
         low, high = float(self.lower[i]), float(self.upper[i])
         if not sd > 0.0:
-            held = min(max(middle, low), high)
-            return held, held, held
+            clipped = min(max(middle, low), high)
+            return clipped, clipped, clipped
         within = stats.truncnorm((low - middle) / sd, (high - middle) / sd, middle, sd)
         found = [float(within.ppf(q)) for q in (0.05, 0.5, 0.95)]
         if not np.all(np.isfinite(found)):  # all of the mass lies far beyond a bound
-            held = min(max(middle, low), high)
-            found = [max(held - NINETY * sd, low), held, min(held + NINETY * sd, high)]
+            clipped = min(max(middle, low), high)
+            found = [max(clipped - NINETY * sd, low), clipped, min(clipped + NINETY * sd, high)]
         return found[0], found[1], found[2]
 
 
@@ -83,5 +83,5 @@ def intervals(
             mean, covariance = left.posterior
     if beside is not None:
         covariance = covariance + beside.between(fit)
-    bounds = np.array([(p.lower, p.upper) for p in fit.target.oscillator.layout.parameters])
+    bounds = np.array([(p.lower, p.upper) for p in fit.density.oscillator.layout.parameters])
     return Intervals(fit.names, mean, covariance, bounds[:, 0], bounds[:, 1])

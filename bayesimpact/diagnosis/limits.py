@@ -71,13 +71,13 @@ def _limit(fit: Fit, score: Score, scan: Scan, scales: Scales) -> Limit:
     power = float(stats.norm.sf(DETECTED - practical / sd[0]))
     column = scan.groups[scan.scores.index(score)][0]
     shift = np.abs(scan.projection.absorbed[:, column]) * upper / fit.sd
-    shared = fit.target.oscillator.layout.roles("physical")
+    shared = fit.density.oscillator.layout.roles("physical")
     worst = int(shared[np.argmax(shift[shared])])
     k2 = [i for i in shared if fit.names[i].startswith("k2")]
     return Limit(
         score.effect.id,
         name,
-        unit_for(fit.target.oscillator.campaign, score.effect, parameter.unit),
+        unit_for(fit.density.oscillator.campaign, score.effect, parameter.unit),
         upper,
         score.limit,
         power,

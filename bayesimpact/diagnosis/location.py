@@ -18,7 +18,7 @@ from bayesimpact.data.short_repr import short_repr
 from bayesimpact.diagnosis.refits.size import effect_numbers, force_along
 from bayesimpact.diagnosis.residual_force.gaussian_process import MissingForce, trajectory_points
 from bayesimpact.diagnosis.score_test.directions import sigma_of
-from bayesimpact.diagnosis.selection.outcome import Naming
+from bayesimpact.diagnosis.selection.outcome import Selection
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Regime
 from bayesimpact.model.parameters import SLOTS
@@ -73,7 +73,7 @@ def locate(base: Fit, better: Fit, force: MissingForce, effects: tuple[Effect, .
     """
     effects = tuple(e for e in effects if e.regime != "measurement") or effects
     points = trajectory_points(base)
-    times = [r.times for r in base.target.oscillator.campaign.recordings]
+    times = [r.times for r in base.density.oscillator.campaign.recordings]
     own = [f for f in (own_force(e, better, points, times) for e in effects) if f is not None]
     if own and len(own) == len(effects):
         weights = [np.sum(parts, axis=0) ** 2 for parts in zip(*own, strict=True)]
@@ -82,13 +82,13 @@ def locate(base: Fit, better: Fit, force: MissingForce, effects: tuple[Effect, .
     return _place(base, better, weights, force, effects)
 
 
-def locate_effect(naming: Naming, effect: Effect, better: Fit) -> Location:
+def locate_effect(selection: Selection, effect: Effect, better: Fit) -> Location:
     """Place of one effect of `better`, from its own force, or from what the model without it
     leaves unexplained.
     """
-    ids = frozenset(e.id for e in better.target.oscillator.effects)
-    state = naming.states.get(ids - {effect.id}, naming.base)
-    return locate(state.candidate.fit, better, state.unknown, (effect,))
+    ids = frozenset(e.id for e in better.density.oscillator.effects)
+    examined = selection.examined_models.get(ids - {effect.id}, selection.base)
+    return locate(examined.candidate.fit, better, examined.unknown, (effect,))
 
 
 def own_force(
@@ -100,7 +100,7 @@ def own_force(
     law = effect.law
     if law is None or law.rate is not None or law.travel is not None:
         return None
-    slots = fit.target.oscillator.layout.slots(fit.mode)
+    slots = fit.density.oscillator.layout.slots(fit.mode)
     found = []
     for r, ((y, v), t) in enumerate(zip(points, times, strict=True)):
         found.append(force_along(law, y, v, t, effect_numbers(effect, fit, r), slots[r]))
@@ -115,7 +115,7 @@ def _place(
     effects: tuple[Effect, ...],
 ) -> Location:
     points = trajectory_points(base)
-    gaps = base.target.oscillator.layout.slots(base.mode)[:, _GAP]
+    gaps = base.density.oscillator.layout.slots(base.mode)[:, _GAP]
     within = [y >= g for (y, _), g in zip(points, gaps, strict=True)]
     beyond = sum(float(w[c].sum()) for w, c in zip(weights, within, strict=True))
     below = sum(float(w[~c].sum()) for w, c in zip(weights, within, strict=True))
@@ -127,16 +127,16 @@ def _place(
     y, v, w = (np.concatenate(c) for c in ([p[0] for p in points], [p[1] for p in points], weights))
     inside = np.concatenate(chosen)
     place = _ranges(y, v, np.where(inside, w, 0.0))
-    held = inside & _between(y, place[0]) & _between(v, place[1])
-    share = float(w[held].sum()) / max(beyond + below, 1e-300)
+    selected = inside & _between(y, place[0]) & _between(v, place[1])
+    share = float(w[selected].sum()) / max(beyond + below, 1e-300)
     if force is not None and not force.reach:
         share = force.share_within(*place[0])
-    rms = float(np.sqrt(np.mean(w[held]))) if held.any() else 0.0
+    rms = float(np.sqrt(np.mean(w[selected]))) if selected.any() else 0.0
     sd = 0.0
-    if force is not None and held.any():
-        times = [r.times for r in base.target.oscillator.campaign.recordings]
+    if force is not None and selected.any():
+        times = [r.times for r in base.density.oscillator.campaign.recordings]
         known = [force.deviation(*p, t) for p, t in zip(points, times, strict=True)]
-        sd = float(np.sqrt(np.mean(np.concatenate(known)[held] ** 2)))
+        sd = float(np.sqrt(np.mean(np.concatenate(known)[selected] ** 2)))
     if regime == "measurement":
         share, rms = _positive_share(gain), 0.0
     names, cases = _where(base, gain)
@@ -157,7 +157,7 @@ def gain_by_time(base: Fit, better: Fit) -> Array:
     """Gain in log likelihood of `better` over `base`, nats, per recording and time bin."""
     rows = []
     pairs = zip(base.linearisation, better.linearisation, sigma_of(base), strict=True)
-    smoothed = base.target.likelihood.noise.smoothing is not None
+    smoothed = base.density.likelihood.noise.smoothing is not None
     for r, (old, new, sigma) in enumerate(pairs):
         if smoothed:  # Fourier coefficients have no time: use the residuals themselves
             a, b = base.residuals[r], better.residuals[r]
@@ -206,7 +206,7 @@ def _positive_share(gain: Array) -> float:
 
 
 def _time_range(base: Fit, gain: Array) -> tuple[float, float]:
-    longest = max(r.duration for r in base.target.oscillator.campaign.recordings)
+    longest = max(r.duration for r in base.density.oscillator.campaign.recordings)
     profile = np.cumsum(np.maximum(gain.sum(axis=0), 0.0))
     if profile[-1] <= 0:
         return 0.0, longest
@@ -217,14 +217,14 @@ def _time_range(base: Fit, gain: Array) -> tuple[float, float]:
 
 def _where(base: Fit, gain: Array) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Recordings (and their obstacles) that together hold nine tenths of the gain."""
-    recordings = base.target.oscillator.campaign.recordings
+    recordings = base.density.oscillator.campaign.recordings
     per_recording = np.maximum(gain.sum(axis=1), 0.0)
     order = np.argsort(-per_recording)
     share = np.cumsum(per_recording[order]) / max(per_recording.sum(), 1e-300)
     count = int(np.searchsorted(share, 0.9)) + 1
     kept = [recordings[i] for i in order[:count]]
     cases = (
-        tuple(dict.fromkeys(r.case for r in kept)) if base.target.oscillator.campaign.stop else ()
+        tuple(dict.fromkeys(r.case for r in kept)) if base.density.oscillator.campaign.stop else ()
     )
     return tuple(r.name for r in kept), cases
 

@@ -24,9 +24,9 @@ from bayesimpact.diagnosis.residual_force.gaussian_process import MissingForce
 from bayesimpact.diagnosis.residual_force.learned import LEARNED
 from bayesimpact.diagnosis.selection.comparable import Comparable, alike_in_misfit, alike_in_odds
 from bayesimpact.diagnosis.selection.decision import Decision, Verdict, decide
-from bayesimpact.diagnosis.selection.outcome import Naming, State, is_large
+from bayesimpact.diagnosis.selection.outcome import ExaminedModel, Selection, is_large
 from bayesimpact.diagnosis.selection.revision import band_limited
-from bayesimpact.diagnosis.selection.search import name
+from bayesimpact.diagnosis.selection.search import select_model
 from bayesimpact.diagnosis.selection.told_sizes import of_told_size
 from bayesimpact.diagnosis.selection.unknown import with_force
 from bayesimpact.diagnosis.thresholds import EXCESS
@@ -49,7 +49,7 @@ class Diagnosis:
     ----------
     verdict : see `bayesimpact.diagnosis.selection.decision`
     identification : of the base model
-    naming : all models that were tried
+    selection : all models that were tried
     before, after : base fit and the fit that the verdict stands for (where unknown, the learned
         force or the best of the catalogue)
     effects : that are named, most important first; empty when adequate or unknown
@@ -70,7 +70,7 @@ class Diagnosis:
 
     verdict: Verdict
     identification: Identification
-    naming: Naming
+    selection: Selection
     before: Fit
     after: Fit
     effects: tuple[Effect, ...]
@@ -82,7 +82,7 @@ class Diagnosis:
     held_out_cases: HeldOut | None
     limits: tuple[Limit, ...]
     intervals: Intervals
-    remains: State | None
+    remains: ExaminedModel | None
     scales: Scales
     filtered: Fingerprint | None = None
     corrected: Corrected | None = None
@@ -98,9 +98,9 @@ class Diagnosis:
     def _repr_html_(self) -> str:
         """Effects with their probabilities, and parameters before and after, for a notebook."""
         found = [
-            (e.title, f"probability {self.naming.probability(e.id):.3g}") for e in self.effects
+            (e.title, f"probability {self.selection.probability(e.id):.3g}") for e in self.effects
         ]
-        layout = self.after.target.oscillator.layout
+        layout = self.after.density.oscillator.layout
         for i in layout.roles("physical", "effect"):
             name, unit = layout.names[i], layout.parameters[i].unit
             if not name.startswith(LEARNED):
@@ -125,57 +125,64 @@ def diagnose_fit(
     """
     say, budget = progress or (lambda message: None), budget or begin()
     base = identification.fit
-    if base.target.oscillator.smoothing is not None:  # a chain has one filter
+    if base.density.oscillator.smoothing is not None:  # a chain has one filter
         effects = [e for e in effects if e.id != SAVITZKY_GOLAY.id]
     scales = campaign_scales(base)
     smooth = _with_smooth_inputs(base) if first is None else None
     begun = smooth or base
-    naming = name(begun, effects, scales, rng=rng, progress=say, budget=budget, first=first)
-    naming = replace(naming, band_limited=naming.band_limited or smooth is not None)
-    if naming.base.candidate.fit is not base:  # posed anew, see `posed_anew`
-        base = naming.base.candidate.fit
-        noise = base.target.likelihood.noise
+    selection = select_model(
+        begun, effects, scales, rng=rng, progress=say, budget=budget, first=first
+    )
+    selection = replace(selection, band_limited=selection.band_limited or smooth is not None)
+    if selection.base.candidate.fit is not base:  # revised, see `revision`
+        base = selection.base.candidate.fit
+        noise = base.density.likelihood.noise
         identification = replace(identification, fit=base, noise=noise)
-    decision = decide(naming)
-    after, state = extension(naming, decision, scales, say)
-    answer = Answer(naming, decision, after, state)
+    decision = decide(selection)
+    after, examined = extension(selection, decision, scales, say)
+    answer = Answer(selection, decision, after, examined)
     answer = with_formulas(answer, effects, scales, rng=rng, progress=say, budget=budget)
-    naming, decision, after, state = answer.naming, answer.decision, answer.after, answer.state
+    selection, decision, after, examined = (
+        answer.selection,
+        answer.decision,
+        answer.after,
+        answer.examined,
+    )
     ranges = intervals(
         after,
-        remains=state is not None,
-        known=naming.own,
-        beside=_beside(naming, decision, after, state),
+        remains=examined is not None,
+        known=selection.own,
+        beside=_beside(selection, decision, after, examined),
     )
     decision = of_told_size(decision, ranges, after)
-    location, held, cases = None, None, None
+    location, held_out, cases = None, None, None
     locations: tuple[Location, ...] = ()
     if decision.verdict != "adequate":
         say("locating")
-        location = locate(base, after, naming.unknown, decision.effects)
-        locations = tuple(locate_effect(naming, e, after) for e in decision.effects)
-        if len(base.target.oscillator.campaign.recordings) > 1:
+        location = locate(base, after, selection.unknown, decision.effects)
+        locations = tuple(locate_effect(selection, e, after) for e in decision.effects)
+        if len(base.density.oscillator.campaign.recordings) > 1:
             say("predicting held-out recordings")
-            held = held_out_recordings(base, after)
-        if len(base.target.oscillator.campaign.cases) > 1:
+            held_out = held_out_recordings(base, after)
+        if len(base.density.oscillator.campaign.cases) > 1:
             cases = held_out_cases(base, after)
-    chosen = naming.chosen
+    chosen = selection.chosen
     return Diagnosis(
         decision.verdict,
         identification,
-        replace(naming, own=None),  # large, and of use for the intervals alone
+        replace(selection, own=None),  # large, and of use for the intervals alone
         base,
         after,
         decision.effects,
         decision.rivals,
         location,
         locations,
-        naming.base.force,
-        held,
+        selection.base.force,
+        held_out,
         cases,
         limits(chosen.candidate.fit, chosen.scan, scales),
         ranges,
-        state,
+        examined,
         scales,
         formulas=answer.formulas,
         either=decision.either,
@@ -184,7 +191,7 @@ def diagnose_fit(
 
 def _with_smooth_inputs(base: Fit) -> Fit | None:
     """A base fit with a large misfit, with inputs that are band-limited between their samples where
-    these leave far less; a smaller gain shows beside a better model only, see `posed_anew`.
+    these leave far less; a smaller gain shows beside a better model only, see `revised`.
     """
     smooth = band_limited(base) if is_large(base) else None
     far_less = smooth is not None and EXCESS * smooth.reduced_chi2 < base.reduced_chi2
@@ -192,19 +199,19 @@ def _with_smooth_inputs(base: Fit) -> Fit | None:
 
 
 def _beside(
-    naming: Naming, decision: Decision, after: Fit, state: State | None
+    selection: Selection, decision: Decision, after: Fit, examined: ExaminedModel | None
 ) -> Comparable | None:
     """Models that do not stand out from the one that is shown."""
-    if state is not None:
-        return alike_in_misfit(naming, after)
+    if examined is not None:
+        return alike_in_misfit(selection, after)
     if decision.verdict != "ambiguous":
         return None
-    return alike_in_odds(naming, naming.chosen.candidate, decision.rivals)
+    return alike_in_odds(selection, selection.chosen.candidate, decision.rivals)
 
 
 def extension(
-    naming: Naming, decision: Decision, scales: Scales, say: Progress
-) -> tuple[Fit, State | None]:
+    selection: Selection, decision: Decision, scales: Scales, say: Progress
+) -> tuple[Fit, ExaminedModel | None]:
     """The fit that a verdict stands for, never worse than the base fit, and what it leaves.
 
     Where the misfit is large, named effects are shown as the catalogue's model has them: beside a
@@ -212,25 +219,27 @@ def extension(
     the model that explains most; a residual force beside effects only where the misfit is small,
     else one in the place of all of them.
     """
-    base, chosen = naming.base, naming.chosen
+    base, chosen = selection.base, selection.chosen
     if decision.verdict in ("adequate", "named", "ambiguous"):
         return chosen.candidate.fit, None
     least = base.candidate.fit.reduced_chi2
     if decision.verdict == "partly" and chosen.candidate.fit.reduced_chi2 <= least:
-        beside = naming.residual.get(frozenset(chosen.candidate.ids), chosen.candidate)
+        beside = selection.residual.get(frozenset(chosen.candidate.ids), chosen.candidate)
         large = is_large(base.candidate.fit) or beside.fit.reduced_chi2 > least
-        likelier = naming.log_odds(beside) > naming.log_odds(chosen.candidate) and not large
+        likelier = selection.log_odds(beside) > selection.log_odds(chosen.candidate) and not large
         return (beside if likelier else chosen.candidate).fit, chosen
-    choices = [(c, naming.states.get(frozenset(c.ids), chosen)) for c in naming.tried]
-    learned = naming.residual.get(frozenset())
+    choices = [
+        (c, selection.examined_models.get(frozenset(c.ids), chosen)) for c in selection.tried
+    ]
+    learned = selection.residual.get(frozenset())
     if is_large(base.candidate.fit):
         choices += [] if learned is None else [(learned, base)]
     else:
-        choices += [(c, chosen) for c in naming.residual.values()]
-        if learned is None or naming.unknown is not base.unknown:  # a force in contact alone
+        choices += [(c, chosen) for c in selection.residual.values()]
+        if learned is None or selection.unknown is not base.unknown:  # a force in contact alone
             say("learning the force")
-            learned = with_force(base.candidate, naming.unknown, scales)
+            learned = with_force(base.candidate, selection.unknown, scales)
         choices.append((learned, base))
     choices = [(c, s) for c, s in choices if c.fit.reduced_chi2 <= least]
-    candidate, state = max(choices, key=lambda choice: naming.promise(choice[0]))
-    return candidate.fit, state
+    candidate, examined = max(choices, key=lambda choice: selection.promise(choice[0]))
+    return candidate.fit, examined

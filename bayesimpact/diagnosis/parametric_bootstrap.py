@@ -61,8 +61,8 @@ def parametric_bootstrap(
             found.append((again.verdict, frozenset(e.id for e in again.effects)))
         return found
 
-    controls = answers(diagnosis.naming.base.candidate.fit, "control")
-    named = diagnosis.naming.chosen.candidate
+    controls = answers(diagnosis.selection.base.candidate.fit, "control")
+    named = diagnosis.selection.chosen.candidate
     planted = answers(named.fit, "planted") if diagnosis.verdict == "named" and named.ids else []
     wanted = frozenset(named.ids)
     return ParametricBootstrap(
@@ -80,7 +80,7 @@ def simulated(fit: Fit, rng: Rng) -> Campaign:
 
     A filter that was only proved counts as declared.
     """
-    likelihood = fit.target.likelihood
+    likelihood = fit.density.likelihood
     noise, campaign = likelihood.noise, likelihood.oscillator.campaign
     recordings = []
     for r, (recording, motion) in enumerate(zip(campaign.recordings, fit.seen, strict=True)):

@@ -8,7 +8,7 @@ import numpy as np
 
 from bayesimpact.diagnosis.formulas.listing import Formulas, formula_text
 from bayesimpact.diagnosis.location import locate
-from bayesimpact.diagnosis.selection.outcome import Naming, State
+from bayesimpact.diagnosis.selection.outcome import ExaminedModel, Selection
 from bayesimpact.inference.fit import Fit
 
 
@@ -36,7 +36,7 @@ class Remainder:
 
 
 def remainder(
-    naming: Naming, after: Fit, left: State | None, formulas: Formulas | None = None
+    selection: Selection, after: Fit, left: ExaminedModel | None, formulas: Formulas | None = None
 ) -> Remainder | None:
     """What `after` leaves; `left` is the model whose remainder was examined, None for noise."""
     if left is None:
@@ -45,22 +45,22 @@ def remainder(
     rms = beyond_noise(after)
     signal = after.signal
     guess = likeliest_formula(formulas)
-    better = max(naming.tried, key=naming.log_odds).fit
+    better = max(selection.tried, key=selection.log_odds).fit
     if formulas is not None and guess:
         better = formulas.fit
-    have, effects = set(left.candidate.ids), better.target.oscillator.effects
+    have, effects = set(left.candidate.ids), better.density.oscillator.effects
     explains = bool(guess) or have < {e.id for e in effects}
     more = tuple(e for e in effects if e.id not in have) if explains else ()
     place = locate(left.candidate.fit, better, left.unknown, more)
     return Remainder(
         rms, rms / signal, over, place.regime, place.displacement, place.recordings,
-        guess or next_guess(naming, left),
+        guess or next_guess(selection, left),
     )  # fmt: skip
 
 
 def beyond_noise(fit: Fit) -> float:
     """Rms of what a fit leaves less the noise, m; all of it where the noise may be next to none."""
-    if fit.target.likelihood.noise.is_bound:
+    if fit.density.likelihood.noise.is_bound:
         return fit.rms
     return fit.rms * float(np.sqrt(max(1.0 - 1.0 / max(fit.reduced_chi2, 1.0), 0.0)))
 
@@ -69,17 +69,17 @@ def likeliest_formula(formulas: Formulas | None) -> str:
     """The first formula, where it is likelier than all other models together; else ""."""
     if formulas is None or not formulas.ranked:
         return ""
-    first, o = formulas.ranked[0], formulas.reference.target.oscillator
+    first, o = formulas.ranked[0], formulas.reference.density.oscillator
     if not (first.refitted and first.probability > 0.5):
         return ""
     return f"a force {formula_text(first.terms, angle=o.campaign.angular)}"
 
 
-def next_guess(naming: Naming, left: State) -> str:
+def next_guess(selection: Selection, left: ExaminedModel) -> str:
     """What the likeliest model tried has beyond `left`; else the likelier form of a free force."""
     have = set(left.candidate.ids)
-    larger = [c for c in naming.tried if have < set(c.ids)]
-    if larger and naming.log_odds(larger[0]) > naming.log_odds(left.candidate):
+    larger = [c for c in selection.tried if have < set(c.ids)]
+    if larger and selection.log_odds(larger[0]) > selection.log_odds(left.candidate):
         return " + ".join(i for i in larger[0].ids if i not in have)
     return (
         "a stiffness or damping that changes with time"

@@ -30,7 +30,7 @@ BLOCK = 64  # terms at once, so that memory stays bounded
 
 def motion_of(fit: Fit, r: int) -> Motion:
     """The fitted motion of one recording and its free changes."""
-    oscillator = fit.target.oscillator
+    oscillator = fit.density.oscillator
     reach = float(np.abs(fit.displacements[r]).max())
     return motion_along(oscillator, r, oscillator.layout.slots(fit.mode)[r], reach)
 

@@ -69,13 +69,13 @@ def arviz_groups(fit: Fit, draws: ArvizDraws, *, lab_units: bool = False) -> dic
     begins. Predictive draws are fewer than the others; each recording has its own time axis.
     `lab_units`: mm, mN, ... and not SI.
     """
-    oscillator, likelihood = fit.target.oscillator, fit.target.likelihood
+    oscillator, likelihood = fit.density.oscillator, fit.density.likelihood
     campaign = oscillator.campaign
     recordings = {r.name: r for r in campaign.recordings}
     coords = {"case": list(campaign.cases), "recording": list(recordings)}
     units = [p.unit for p in oscillator.layout.parameters]
     rng = np.random.default_rng(0)
-    prior = fit.target.priors.sample(rng, PRIOR_DRAWS)[None]
+    prior = fit.density.priors.sample(rng, PRIOR_DRAWS)[None]
     groups = {
         "posterior": pack_parameters(fit.names, draws.parameters, units, coords),
         "prior": pack_parameters(fit.names, prior, units, coords),
@@ -130,7 +130,7 @@ def arviz_groups(fit: Fit, draws: ArvizDraws, *, lab_units: bool = False) -> dic
 
 def laplace_draws(fit: Fit, *, seed: int = 0, chains: int = 4, draws: int = 250) -> ArvizDraws:
     """Independent draws of the Laplace approximation, kept inside the parameters' bounds."""
-    parameters = fit.target.oscillator.layout.parameters
+    parameters = fit.density.oscillator.layout.parameters
     rng = np.random.default_rng(seed)
     drawn = fit.draws(rng, chains * draws).reshape(chains, draws, -1)
     bounds = np.array([(p.lower, p.upper) for p in parameters]).T

@@ -1,4 +1,4 @@
-"""The steps of a climb to a mode: damped, in the bounds, corrected where a minimum is curved."""
+"""The steps of an ascent to a mode: damped, in the bounds, corrected where a minimum is curved."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.inference.fit import (
     Fit,
-    Target,
+    PosteriorDensity,
     grams,
     inverse,
     likelihood_gradient,
@@ -53,18 +53,18 @@ class Slope:
         return bool(np.isfinite(self.matrix).all() and np.isfinite(self.vector).all())
 
 
-class Climb:
+class Ascent:
     """One ascent: what stays fixed while theta moves, and the derivatives that still serve."""
 
     def __init__(
         self,
-        target: Target,
+        density: PosteriorDensity,
         steps: Array | None,
         slopes: tuple[Linearisation, ...] | None,
-        held: Sequence[int],
+        fixed: Sequence[int],
     ) -> None:
-        layout = target.oscillator.layout
-        self.target = target
+        layout = density.oscillator.layout
+        self.density = density
         self.steps, self.slopes = steps, slopes
         self.products = () if slopes is None else grams(slopes)
         self.frozen = slopes is not None
@@ -74,15 +74,15 @@ class Climb:
         self.iterations = 0
         self.noise = layout.roles("noise")
         free = layout.roles("physical", "effect", "nuisance")
-        self.moving = np.setdiff1d(free, np.array(held, dtype=np.int64))
+        self.moving = np.setdiff1d(free, np.array(fixed, dtype=np.int64))
         physical = np.array([(p.lower, p.upper) for p in layout.parameters])
-        self.lower = np.maximum(target.priors.lower, physical[:, 0])
-        self.upper = np.minimum(target.priors.upper, physical[:, 1])
+        self.lower = np.maximum(density.priors.lower, physical[:, 0])
+        self.upper = np.minimum(density.priors.upper, physical[:, 1])
 
     def evaluate(self, theta: Array) -> Point:
         """The point at theta, moved inside its bounds."""
         theta = np.clip(theta, self.lower, self.upper)
-        likelihood, left = self.target.likelihood, None
+        likelihood, left = self.density.likelihood, None
         if self.steps is None and not self.frozen:
             sums = likelihood.misfit(theta)[0]
         else:
@@ -91,20 +91,20 @@ class Climb:
             left = tuple(white[0] for white in residuals)
         if not np.isfinite(sums).all():
             return Point(theta, np.inf, sums, left)
-        theta[self.noise] = best_sigma(self.target, sums)
-        prior = float(self.target.priors.log_density(theta[None])[0])
+        theta[self.noise] = best_sigma(self.density, sums)
+        prior = float(self.density.priors.log_density(theta[None])[0])
         return Point(theta, -float(self._log_likelihood(theta, sums)) - prior, sums, left)
 
     def _log_likelihood(self, theta: Array, sums: Array) -> float:
-        likelihood = self.target.likelihood
+        likelihood = self.density.likelihood
         sigma = theta[likelihood.sigma_columns]
         constant = np.sum(likelihood.log_volume - 0.5 * likelihood.sizes * np.log(2 * np.pi))
-        spread = np.sum(likelihood.sizes * np.log(sigma) + sums / (2 * sigma**2))
-        return float(constant - spread)
+        misfit = np.sum(likelihood.sizes * np.log(sigma) + sums / (2 * sigma**2))
+        return float(constant - misfit)
 
     def linear(self, here: Point) -> Slope:
         """Normal equations of the next step; derivatives by differences serve several steps."""
-        likelihood, priors, theta = self.target.likelihood, self.target.priors, here.theta
+        likelihood, priors, theta = self.density.likelihood, self.density.priors, here.theta
         parts = self._parts(here)
         sigma = theta[likelihood.sigma_columns]
         matrix = likelihood_information(parts, self.products, sigma, theta.size)
@@ -124,7 +124,7 @@ class Climb:
 
     def _parts(self, here: Point) -> tuple[Linearisation, ...]:
         if self.slopes is None or here.residuals is None:
-            likelihood = self.target.likelihood
+            likelihood = self.density.likelihood
             self.slopes = likelihood.linearise(here.theta, self.steps, roughly=self.roughly)
             self.products = grams(self.slopes)
             self.stale = False
@@ -200,7 +200,7 @@ class Climb:
 
         The geodesic acceleration of Transtrum and Sethna 2012, from one more simulation.
         """
-        likelihood, part_way = self.target.likelihood, theta + BENT_AT * step
+        likelihood, part_way = self.density.likelihood, theta + BENT_AT * step
         if any(likelihood.steps):  # what readings scatter by about a staircase is no curvature
             return np.zeros(theta.size)
         ahead = []
@@ -214,14 +214,14 @@ class Climb:
         return 0.5 * self.step(theta, replace(slope, vector=vector), damping)
 
     def without_mode(self, here: Point, parts: tuple[Linearisation, ...]) -> Fit:
-        """The record of a climb that led to no mode of anything: the caller sees its value."""
+        """The record of an ascent that led to no mode of anything: the caller sees its value."""
         unknown = np.full((here.theta.size, here.theta.size), np.nan)
         return Fit(
-            self.target, here.theta, unknown, -np.inf, here.sums, False, self.iterations, parts
+            self.density, here.theta, unknown, -np.inf, here.sums, False, self.iterations, parts
         )
 
     def fit(self, here: Point, converged: bool) -> Fit:
-        """The record of a climb that ends here."""
+        """The record of an ascent that ends here."""
         theta, sums = here.theta, here.sums
         if self.stale or self.roughly:
             self.refine()
@@ -229,27 +229,27 @@ class Climb:
         parts, matrix = slope.parts, slope.matrix
         if not np.isfinite(matrix).all():
             return self.without_mode(here, parts)
-        sizes, sigma = self.target.likelihood.sizes, theta[self.target.likelihood.sigma_columns]
-        for column in np.unique(self.target.likelihood.sigma_columns):
-            mine = self.target.likelihood.sigma_columns == column
+        sizes, sigma = self.density.likelihood.sizes, theta[self.density.likelihood.sigma_columns]
+        for column in np.unique(self.density.likelihood.sigma_columns):
+            mine = self.density.likelihood.sigma_columns == column
             level = sigma[mine][0]
             information = 3 * sums[mine].sum() / level**4 - sizes[mine].sum() / level**2
-            prior = self.target.priors.hessian(theta)[column]
+            prior = self.density.priors.hessian(theta)[column]
             matrix[column, column] = max(information - prior, sizes[mine].sum() / level**2)
         return Fit(
-            self.target, theta, inverse(matrix), -here.value, sums, converged,
+            self.density, theta, inverse(matrix), -here.value, sums, converged,
             self.iterations, parts,
         )  # fmt: skip
 
 
-def best_sigma(target: Target, sums: Array) -> Array:
+def best_sigma(density: PosteriorDensity, sums: Array) -> Array:
     """Noise levels, one per noise parameter, m, that maximise the posterior for `sums` (R,)."""
-    likelihood, layout = target.likelihood, target.oscillator.layout
+    likelihood, layout = density.likelihood, density.oscillator.layout
     result = []
     for column in layout.roles("noise"):
         mine = likelihood.sigma_columns == column
         n, s = likelihood.sizes[mine].sum(), max(float(sums[mine].sum()), 1e-300)
-        prior = target.priors.parameters[column]
+        prior = density.priors.parameters[column]
         log_sigma = 0.5 * np.log(s / n)
         for _ in range(60):  # Newton in log sigma
             sigma = np.exp(log_sigma)

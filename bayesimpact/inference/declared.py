@@ -3,7 +3,7 @@
 No initial estimate knows of these effects, so a global search decides where the fit begins: it
 runs on the first cycles, with the general simulator, over the physical parameters and those of the
 effects. Start values come from the first samples and the tail of every recording. Searches are
-repeated until two ends of climbs, the best one among them, agree. Of a driven recording the search
+repeated until two ends of ascents, the best one among them, agree. Of a driven recording the search
 looks at the cycles of its largest motion, and reads their start off the samples.
 """
 
@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.channels import keepers
 from bayesimpact.inference.defaults import default_priors
-from bayesimpact.inference.fit import Fit, Target
+from bayesimpact.inference.fit import Fit, PosteriorDensity
 from bayesimpact.inference.initial.estimates import Estimates
-from bayesimpact.inference.initial.horizon import best_climb
+from bayesimpact.inference.initial.horizon import best_ascent
 from bayesimpact.inference.initial.rough import first_state
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
@@ -38,7 +38,7 @@ SAMPLES = 300  # of each recording in it
 EVALUATIONS = 600  # evaluations per parameter
 SEARCHES = 5  # at most
 MOST = 200  # iterations: where the mass is never free, ridges are long
-AGREE = 0.1  # standard deviations between two climbs to one mode
+AGREE = 0.1  # standard deviations between two ascents to one mode
 WIDE = 20.0  # a base parameter lies within this factor of its estimate, which knew of no effect
 SIZES = (1e-2, 1e4)  # of an effect, in its physical scale
 STEP = 1e-6  # of a parameter's reach: first step for differences, refined as errors become known
@@ -86,11 +86,11 @@ def search_declared(
     """
     campaign = oscillator.campaign
     scales = campaign_sizes(campaign, estimates)
-    target = Target(
+    density = PosteriorDensity(
         Likelihood(oscillator, noise), default_priors(oscillator, estimates, noise, scales)
     )
-    guess, *bounds = _bounds(target, estimates, noise, scales)
-    first = FirstCycles(target, guess, *bounds)
+    guess, *bounds = _bounds(density, estimates, noise, scales)
+    first = FirstCycles(density, guess, *bounds)
     ends: list[tuple[Fit, SearchResult]] = []
     while len(ends) < 2 or not (len(ends) == SEARCHES or is_same_mode(ends[0][0], ends[1][0])):
         result = metropolis_differential_evolution(
@@ -99,13 +99,13 @@ def search_declared(
         )  # fmt: skip
         start = first.complete(result.best[None])[0]
         start[first.elsewhere] = guess[first.elsewhere]
-        ends.append((best_climb(target, start, steps=first.steps, max_iterations=MOST), result))
+        ends.append((best_ascent(density, start, steps=first.steps, max_iterations=MOST), result))
         ends.sort(key=lambda end: -np.nan_to_num(end[0].log_posterior, nan=-np.inf))
     (best, result), (second, _) = ends[:2]
     return result, (best, second)
 
 
-def climbed_from(
+def ascended_from(
     oscillator: Oscillator, estimates: Estimates, noise: Noise, values: Mapping[str, float]
 ) -> Fit:
     """The mode from known `values` of parameters, those of other recordings of the rig say; what
@@ -113,26 +113,26 @@ def climbed_from(
     """
     scales = campaign_sizes(oscillator.campaign, estimates)
     priors = default_priors(oscillator, estimates, noise, scales)
-    target = Target(Likelihood(oscillator, noise), priors)
-    guess, *bounds = _bounds(target, estimates, noise, scales)
-    first = FirstCycles(target, guess, *bounds)
+    density = PosteriorDensity(Likelihood(oscillator, noise), priors)
+    guess, *bounds = _bounds(density, estimates, noise, scales)
+    first = FirstCycles(density, guess, *bounds)
     layout = oscillator.layout
     shared = {layout.names[i] for i in layout.roles("physical", "effect")}
     start = [
         values[name] if name in shared and name in values else own
         for name, own in zip(layout.names, guess, strict=True)
     ]
-    return best_climb(target, np.array(start), steps=first.steps, max_iterations=MOST)
+    return best_ascent(density, np.array(start), steps=first.steps, max_iterations=MOST)
 
 
 def is_same_mode(one: Fit, other: Fit) -> bool:
-    """True when two climbs ended within a tenth of a standard deviation of each other."""
+    """True when two ascents ended within a tenth of a standard deviation of each other."""
     return bool(np.all(np.abs(one.mode - other.mode) < AGREE * one.sd))
 
 
-def climbed(target: Target, fit: Fit) -> Fit:
+def ascended(density: PosteriorDensity, fit: Fit) -> Fit:
     """The mode of another posterior of the same parameters, from a fit's."""
-    return find_mode(target, fit.mode, steps=np.maximum(0.05 * fit.sd, 1e-300))
+    return find_mode(density, fit.mode, steps=np.maximum(0.05 * fit.sd, 1e-300))
 
 
 class FirstCycles:
@@ -146,14 +146,14 @@ class FirstCycles:
     elsewhere : places in theta of states in which an excerpt, not its recording, begins
     """
 
-    def __init__(self, target: Target, guess: Array, lower: Array, upper: Array) -> None:
-        self.levels = target.likelihood.scales
-        layout, campaign = target.oscillator.layout, target.oscillator.campaign
+    def __init__(self, density: PosteriorDensity, guess: Array, lower: Array, upper: Array) -> None:
+        self.levels = density.likelihood.scales
+        layout, campaign = density.oscillator.layout, density.oscillator.campaign
         period = 2 * np.pi / np.sqrt(guess[layout.index("k1")] / campaign.mass)
         short = campaign.excerpt(CYCLES * period).thinned(CYCLES * period / SAMPLES)
-        self.short = replace(target.oscillator, campaign=short)
+        self.short = replace(density.oscillator, campaign=short)
         self.guess, self.elsewhere = _at_excerpt(self.short, guess, period)
-        refined = {n for e in target.oscillator.acting for n in further_sizes(e)}
+        refined = {n for e in density.oscillator.acting for n in further_sizes(e)}
         searched = [i for i in layout.roles("physical", "effect") if layout.names[i] not in refined]
         self.physical = np.array(searched, dtype=np.int64)
         self.logarithmic = lower[self.physical] > 0.0
@@ -190,8 +190,8 @@ class FirstCycles:
 def further_sizes(effect: Effect) -> list[str]:
     """Names of an effect's sizes beyond the first, where none is one of several.
 
-    Without them it is a simpler law of the same kind, from which a climb finds them; a search that
-    looks for them too more often ends in a lesser mode.
+    Without them it is a simpler law of the same kind, from which an ascent finds them; a search
+    that looks for them too more often ends in a lesser mode.
     """
     sizes = [p for p in effect.parameters if p.is_size and p.null is not None]
     return [f"{effect.id}.{p.name}" for p in sizes[1:]]
@@ -214,11 +214,11 @@ def _at_excerpt(short: Oscillator, guess: Array, period: float) -> tuple[Array, 
 
 
 def _bounds(
-    target: Target, estimates: Estimates, noise: Noise, scales: Scales
+    density: PosteriorDensity, estimates: Estimates, noise: Noise, scales: Scales
 ) -> tuple[Array, Array, Array]:
     """Guess and bounds of the search, (d,) each."""
-    layout, priors = target.oscillator.layout, target.priors
-    effects = target.oscillator.acting
+    layout, priors = density.oscillator.layout, density.priors
+    effects = density.oscillator.acting
     owners = {f"{e.id}.{p.name}": p for e in effects for p in e.parameters if p.fixed is None}
     refined = {name for effect in effects for name in further_sizes(effect)}
     guess, lower, upper = (np.zeros(layout.size) for _ in range(3))

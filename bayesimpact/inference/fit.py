@@ -26,7 +26,7 @@ RANK = 1e-14  # of the largest eigenvalue: smaller ones are rounding
 
 
 @dataclass(frozen=True, eq=False)
-class Target:
+class PosteriorDensity:
     """A posterior density: likelihood times priors.
 
     Attributes
@@ -61,8 +61,8 @@ class Fit:
 
     Attributes
     ----------
-    target : what was maximised
-    mode : (d,) parameters in the order of `target.oscillator.layout`
+    density : what was maximised
+    mode : (d,) parameters in the order of `density.oscillator.layout`
     covariance : (d, d) inverse of the negative log posterior's Gauss-Newton Hessian (Laplace)
     log_posterior : at the mode
     sums : (R,) whitened sums of squares, squared unit of the readings
@@ -71,7 +71,7 @@ class Fit:
     linearisation : of every recording at the mode
     """
 
-    target: Target
+    density: PosteriorDensity
     mode: Array
     covariance: Array
     log_posterior: float
@@ -83,12 +83,12 @@ class Fit:
     def __repr__(self) -> str:
         """One line."""
         state = "at rest" if self.converged else "not converged"
-        campaign = self.target.oscillator.campaign.name
+        campaign = self.density.oscillator.campaign.name
         return f"<Fit of {campaign!r}: {self.mode.size} parameters, {state}>"
 
     def _repr_html_(self) -> str:
         """Parameters that all recordings share, SI, for a notebook."""
-        layout = self.target.oscillator.layout
+        layout = self.density.oscillator.layout
         rows = []
         for i in layout.roles("physical", "effect"):
             mode, sd = float(self.mode[i]), float(self.sd[i])
@@ -99,7 +99,7 @@ class Fit:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the parameters."""
-        return self.target.oscillator.layout.names
+        return self.density.oscillator.layout.names
 
     @property
     def sd(self) -> Array:
@@ -119,44 +119,44 @@ class Fit:
 
     def value(self, name: str) -> float:
         """The mode of one parameter."""
-        return float(self.mode[self.target.oscillator.layout.index(name)])
+        return float(self.mode[self.density.oscillator.layout.index(name)])
 
     def with_recordings(self, recordings: Sequence[Recording]) -> Fit:
         """The same point of a posterior of other recordings, of the same names: no mode of it, but
         what problems about the fit are posed on.
         """
-        o = self.target.oscillator
+        o = self.density.oscillator
         o = replace(o, campaign=replace(o.campaign, recordings=tuple(recordings)))
-        likelihood = replace(self.target.likelihood, oscillator=o)
-        return replace(self, target=replace(self.target, likelihood=likelihood))
+        likelihood = replace(self.density.likelihood, oscillator=o)
+        return replace(self, density=replace(self.density, likelihood=likelihood))
 
     @property
     def log_likelihood(self) -> float:
         """Of the mode, nats."""
-        return self.log_posterior - float(self.target.priors.log_density(self.mode[None])[0])
+        return self.log_posterior - float(self.density.priors.log_density(self.mode[None])[0])
 
     @property
     def reduced_chi2(self) -> float:
         """Misfit per degree of freedom against the noise level estimated from recordings alone."""
-        likelihood = self.target.likelihood
+        likelihood = self.density.likelihood
         freedom = float(likelihood.sizes.sum()) - (self.mode.size - 1)
         return float(self.sums.sum() / likelihood.noise.level**2 / freedom)
 
     @cached_property
     def seen(self) -> tuple[Array, ...]:
         """What the probe would have seen, per recording (n,), in the recording's SI unit."""
-        return self.target.oscillator.predict(self.mode)
+        return self.density.oscillator.predict(self.mode)
 
     @cached_property
     def predicted(self) -> tuple[Array, ...]:
         """The same as it would have been read on average, where readings come in steps."""
-        average = self.target.likelihood.average
+        average = self.density.likelihood.average
         return tuple(average(r, seen) for r, seen in enumerate(self.seen))
 
     @cached_property
     def readings(self) -> tuple[Array, ...]:
         """What was seen, counted from the reading at rest."""
-        offsets = self.target.oscillator.layout.slots(self.mode)[:, _OFFSET]
+        offsets = self.density.oscillator.layout.slots(self.mode)[:, _OFFSET]
         return tuple(p - b for p, b in zip(self.seen, offsets, strict=True))
 
     @cached_property
@@ -165,7 +165,7 @@ class Fit:
 
         For displacements as the probe saw it, sensor effects and filter included.
         """
-        o = self.target.oscillator
+        o = self.density.oscillator
         return self.readings if o.reads_displacements else o.displacements(self.mode)
 
     @cached_property
@@ -174,7 +174,7 @@ class Fit:
 
         0 where a sample is set aside.
         """
-        recordings = self.target.oscillator.campaign.recordings
+        recordings = self.density.oscillator.campaign.recordings
         pairs = zip(recordings, self.predicted, strict=True)
         return tuple(
             r.samples - p if r.used is None else np.where(r.used, r.samples - p, 0.0)
@@ -187,15 +187,15 @@ class Fit:
 
         Residuals of other quantities count by their noise, as in the likelihood.
         """
-        count = sum(r.count for r in self.target.oscillator.campaign.recordings)
-        pairs = zip(self.residuals, self.target.likelihood.scales, strict=True)
+        count = sum(r.count for r in self.density.oscillator.campaign.recordings)
+        pairs = zip(self.residuals, self.density.likelihood.scales, strict=True)
         return float(np.sqrt(sum(float(np.sum((r / s) ** 2)) for r, s in pairs) / count))
 
     @property
     def signal(self) -> float:
         """The same of the readings about their means."""
-        recordings = self.target.oscillator.campaign.recordings
-        pairs = zip(recordings, self.target.likelihood.scales, strict=True)
+        recordings = self.density.oscillator.campaign.recordings
+        pairs = zip(recordings, self.density.likelihood.scales, strict=True)
         centred = np.concatenate([(r.samples - r.samples.mean()) / s for r, s in pairs])
         return float(np.sqrt(np.mean(centred**2)))
 

@@ -74,14 +74,14 @@ def _blocks(likelihood: Likelihood, r: int, displacement: Array) -> Blocks:
     every = -(-(passages.size + 1) // most)
     first = np.append(0, passages[every - 1 :: every])
     ends = np.append(first[1:], counted.size)
-    held = np.array([counted[a:b].sum() for a, b in zip(first, ends, strict=True)])
-    first, held = first[held > 0.0], held[held > 0.0]
-    sizes = likelihood.sizes[r] * held / held.sum()
-    volumes = likelihood.log_volume[r] * held / held.sum()
+    contained = np.array([counted[a:b].sum() for a, b in zip(first, ends, strict=True)])
+    first, contained = first[contained > 0.0], contained[contained > 0.0]
+    sizes = likelihood.sizes[r] * contained / contained.sum()
+    volumes = likelihood.log_volume[r] * contained / contained.sum()
     if noise.grows:
         logs = counted * np.log(noise.relative_sd(recording))
         own = np.add.reduceat(logs, first)
-        volumes += held / held.sum() * own.sum() - own
+        volumes += contained / contained.sum() * own.sum() - own
     return Blocks(first, sizes, volumes, shift)
 
 

@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.inference.arviz_groups import arviz_groups, as_arviz, laplace_draws
-from bayesimpact.inference.declared import climbed, climbed_from, is_same_mode, search_declared
+from bayesimpact.inference.declared import ascended, ascended_from, is_same_mode, search_declared
 from bayesimpact.inference.defaults import default_priors
-from bayesimpact.inference.fit import Fit, Target
+from bayesimpact.inference.fit import Fit, PosteriorDensity
 from bayesimpact.inference.initial.estimates import Estimates, estimate
 from bayesimpact.inference.initial.from_periods import or_by_periods
-from bayesimpact.inference.initial.horizon import best_climb
+from bayesimpact.inference.initial.horizon import best_ascent
 from bayesimpact.inference.initial.rough import rough_estimates
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
@@ -110,7 +110,7 @@ def identify(
     """Mode of the base model's posterior for a campaign, nothing given.
 
     Where the campaign declares effects the global search is made even without `search`, unless
-    values of parameters are `known`, from which to climb.
+    values of parameters are `known`, from which to begin.
     Raises `InputError` when a recording shows no oscillation.
     """
     estimates = rough_estimates(campaign) if campaign.declared else estimate(campaign)
@@ -123,28 +123,28 @@ def identify(
         )  # fmt: skip
     priors = default_priors(oscillator, estimates, noise)
     guess = initial_theta(oscillator, estimates, noise)
-    target = Target(Likelihood(oscillator, noise), priors)
-    from_guess = best_climb(target, guess)
+    density = PosteriorDensity(Likelihood(oscillator, noise), priors)
+    from_guess = best_ascent(density, guess)
     result = from_search = None
     if search:
         result, start = global_search(
             oscillator, priors, guess, rng=rng, evaluations=evaluations, callback=callback,
-            scales=target.likelihood.scales,
+            scales=density.likelihood.scales,
         )  # fmt: skip
-        from_search = best_climb(target, start)
+        from_search = best_ascent(density, start)
     ends = [fit for fit in (from_guess, from_search) if fit is not None]
     best = max(ends, key=lambda fit: fit.log_posterior)
     if (smooth := without_onsets(best)) is not campaign:
         oscillator = replace(oscillator, campaign=smooth)
-        target = Target(Likelihood(oscillator, noise), priors)
-        ends = [find_mode(target, fit.mode) for fit in ends]
+        density = PosteriorDensity(Likelihood(oscillator, noise), priors)
+        ends = [find_mode(density, fit.mode) for fit in ends]
         from_guess, from_search = ends[0], ends[1] if search else None
         best = max(ends, key=lambda fit: fit.log_posterior)
     best = or_by_periods(best)
     refined = noise if given else refined_noise(best)
     if refined is not noise:
         noise = refined
-        best = find_mode(Target(Likelihood(oscillator, noise), priors), best.mode)
+        best = find_mode(PosteriorDensity(Likelihood(oscillator, noise), priors), best.mode)
     return Identification(best, estimates, noise, result, from_guess, from_search)
 
 
@@ -163,7 +163,7 @@ def _with_declared(
     to `known` values.
     """
     if known:
-        result, best = None, climbed_from(oscillator, estimates, noise, known)
+        result, best = None, ascended_from(oscillator, estimates, noise, known)
         other = best
     else:
         result, (best, other) = search_declared(
@@ -171,12 +171,12 @@ def _with_declared(
         )
     if (smooth := without_onsets(best)) is not oscillator.campaign:
         oscillator = replace(oscillator, campaign=smooth)
-        target = replace(best.target, likelihood=Likelihood(oscillator, noise))
-        best, other = climbed(target, best), climbed(target, other)
+        density = replace(best.density, likelihood=Likelihood(oscillator, noise))
+        best, other = ascended(density, best), ascended(density, other)
     fit = best = or_by_periods(best)
     refined = noise if given else refined_noise(best)
     if refined is not noise:
-        fit = climbed(replace(best.target, likelihood=Likelihood(oscillator, refined)), best)
+        fit = ascended(replace(best.density, likelihood=Likelihood(oscillator, refined)), best)
     return Identification(fit, estimates, refined, result, other, best)
 
 

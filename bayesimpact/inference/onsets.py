@@ -29,7 +29,7 @@ def without_onsets(fit: Fit) -> Campaign:
 
     The same object where there are none, or where a filter smears them.
     """
-    oscillator = fit.target.oscillator
+    oscillator = fit.density.oscillator
     campaign = oscillator.campaign
     if not (campaign.stop and np.any(oscillator.orders == 2)) or oscillator.smoothing is not None:
         return campaign

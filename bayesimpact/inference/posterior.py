@@ -55,7 +55,7 @@ class Posterior:
 
     def column(self, name: str) -> Array:
         """Draws of one parameter, (S,)."""
-        return np.asarray(self.draws[:, self.fit.target.oscillator.layout.index(name)])
+        return np.asarray(self.draws[:, self.fit.density.oscillator.layout.index(name)])
 
     def interval(
         self, name: str, probability: float = 0.9
@@ -79,12 +79,12 @@ class Posterior:
     def __repr__(self) -> str:
         """One line."""
         state = "converged" if self.chains.converged else "not converged"
-        campaign = self.fit.target.oscillator.campaign.name
+        campaign = self.fit.density.oscillator.campaign.name
         return f"<Posterior of {campaign!r}: {self.draws.shape[0]} draws, {state}>"
 
     def _repr_html_(self) -> str:
         """Medians and 90 % intervals of shared parameters, SI, for a notebook."""
-        layout = self.fit.target.oscillator.layout
+        layout = self.fit.density.oscillator.layout
         rows = []
         for i in layout.roles("physical", "effect"):
             low, middle, high = np.percentile(self.draws[:, i], [5, 50, 95]).tolist()
@@ -99,7 +99,7 @@ class Posterior:
 
     def predictive(self, r: int, count: int, rng: np.random.Generator) -> Array:
         """Simulated recordings `r`, (count, n), m: posterior draws with fresh noise, as read."""
-        likelihood = self.fit.target.likelihood
+        likelihood = self.fit.density.likelihood
         oscillator, noise = likelihood.oscillator, likelihood.noise
         theta = self.thinned(count, rng)
         motion = oscillator.predict_recording(r, theta)
@@ -138,7 +138,7 @@ class Posterior:
 
     def _predictive(self) -> dict[str, NDArray[np.float32]]:
         """Recording -> simulated recordings (1, draw, n), each drawn by itself."""
-        oscillator = self.fit.target.oscillator
+        oscillator = self.fit.density.oscillator
         count = max(4, min(_PREDICTIVE_DRAWS, _PREDICTED_VALUES // int(oscillator.counts.sum())))
         rng = np.random.default_rng([self.seed, 1])
         return {
@@ -171,18 +171,18 @@ def sample(
     ------
     InputError : `resume` with a chain that belongs to other data or settings
     """
-    target = fit.target
-    lower = np.array([p.lower for p in target.oscillator.layout.parameters])
-    upper = np.array([p.upper for p in target.oscillator.layout.parameters])
+    density = fit.density
+    lower = np.array([p.lower for p in density.oscillator.layout.parameters])
+    upper = np.array([p.upper for p in density.oscillator.layout.parameters])
     chains = sample_posterior(
-        target,
+        density,
         fit.mode,
         fit.covariance,
         seed=seed,
         folder=folder,
         resume=resume,
-        lower=np.maximum(lower, target.priors.lower),
-        upper=np.minimum(upper, target.priors.upper),
+        lower=np.maximum(lower, density.priors.lower),
+        upper=np.minimum(upper, density.priors.upper),
         fingerprint=_fingerprint(fit),
         names=fit.names,
         progress=callback,
@@ -195,8 +195,8 @@ def _fingerprint(fit: Fit) -> dict[str, str]:
     """What a saved chain must belong to, by name: what the campaign says, not how its files say it,
     the model with its priors and noise, and the package's version.
     """
-    target = fit.target
-    oscillator = target.oscillator
+    density = fit.density
+    oscillator = density.oscillator
     recordings = oscillator.campaign.recordings
     long = {
         "recordings": [(r.name, r.case, r.quantity, r.samples.size) for r in recordings],
@@ -205,8 +205,8 @@ def _fingerprint(fit: Fit) -> dict[str, str]:
         "intervals": oscillator.intervals.tolist(),
         "parameters": fit.names,
         "effects": [effect.id for effect in oscillator.effects],
-        "priors": target.priors.parameters,
-        "noise": target.likelihood.noise,
+        "priors": density.priors.parameters,
+        "noise": density.likelihood.noise,
     }
     short = {name: hashlib.sha256(repr(v).encode()).hexdigest()[:16] for name, v in long.items()}
     return {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from bayesimpact.data.campaign import Campaign
-from bayesimpact.inference.declared import climbed
+from bayesimpact.inference.declared import ascended
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.noise.whitening import Noise
@@ -23,9 +23,9 @@ def refitted(
     noise : None for the fit's
     start : a fit of the same parameters
     """
-    oscillator, likelihood = fit.target.oscillator, fit.target.likelihood
+    oscillator, likelihood = fit.density.oscillator, fit.density.likelihood
     if campaign is not None:
         old = oscillator
         oscillator = Oscillator(campaign, old.effects, old.layout, old.smoothing)
     likelihood = Likelihood(oscillator, noise or likelihood.noise)
-    return climbed(replace(fit.target, likelihood=likelihood), start or fit)
+    return ascended(replace(fit.density, likelihood=likelihood), start or fit)

@@ -21,10 +21,10 @@ well-defined form, and for any objective. One generation, for all individuals x_
 
 *Cooling.* T falls geometrically from the standard deviation of f over the first population to 1
 over the first 70 % of the budget, and is 0 (greedy selection) in the rest: at T = 1 a population
-would keep a spread of order sqrt(d / 2) for ever. Nor is T ever above the present spread of f, for
-then everything is accepted and the cold part of the schedule comes too late. T = 1 is one unit of
-f, so the natural objective is a negative log posterior, or (N / 2) log(sum of squared residuals),
-in nats. A raw sum of squares spans decades: no temperature suits it.
+would keep an sd of order sqrt(d / 2) for ever. Nor is T ever above the present standard deviation
+of f, for then everything is accepted and the cold part of the schedule comes too late. T = 1 is one
+unit of f, so the natural objective is a negative log posterior, or (N / 2) log(sum of squared
+residuals), in nats. A raw sum of squares spans decades: no temperature suits it.
 
 *Exploring.* Where nearly everything is accepted, the pull to x_pbest only contracts the population
 (its variance changes by about 1 - 2 F + 3 F^2 a generation, below 1 for F < 2/3; see Zaharie 2002
@@ -176,9 +176,9 @@ def metropolis_differential_evolution(
     hottest = _first_temperature(state.f, coldest) if metropolis else 0.0
     spent = size
     track: list[Generation] = []
-    while _spread(state.f) >= tolerance and spent + len(state.x) <= budget:
+    while _standard_deviation(state.f) >= tolerance and spent + len(state.x) <= budget:
         progress = spent / budget
-        temperature = min(_cooled(progress, hottest, coldest), _spread(state.f))
+        temperature = min(_cooled(progress, hottest, coldest), _standard_deviation(state.f))
         pull = 0.0 if metropolis and progress < EXPLORING else 1.0
         spent += len(state.x)
         state, step = generation(state, objective, box, temperature, pull, rng)
@@ -209,7 +209,7 @@ def _size(progress: float, first: int) -> int:
     return max(FEWEST, round(first + (FEWEST - first) * progress))
 
 
-def _spread(f: Array) -> float:
+def _standard_deviation(f: Array) -> float:
     """Standard deviation of f over the population; inf while one value is inadmissible."""
     return _deviation(f) if np.isfinite(f).all() else math.inf
 
@@ -226,7 +226,7 @@ def _summary(f: Array, spent: int, temperature: float, step: Step) -> Generation
         evaluations=spent,
         best=float(f.min()),
         median=float(np.median(f)),
-        spread=_spread(f),
+        spread=_standard_deviation(f),
         temperature=temperature,
         uphill=float(step.uphill.mean()),
         mean_f=float(step.factor.mean()),
@@ -248,7 +248,7 @@ def _result(
         value=float(state.f[winner]),
         evaluations=spent,
         generations=len(track),
-        stopped="converged" if _spread(state.f) < tolerance else "budget",
+        stopped="converged" if _standard_deviation(state.f) < tolerance else "budget",
         history=History(**columns),
         population=_frozen(state.x),
         values=_frozen(state.f),

@@ -68,7 +68,7 @@ def _kept(values: Array) -> Array:
     return found
 
 
-def gain(smoothing: Smoothing | None, interval: float, frequency: Array) -> Array:
+def magnitude_response(smoothing: Smoothing | None, interval: float, frequency: Array) -> Array:
     """Amplitude response of the filter at `frequency` in Hz."""
     if smoothing is None:
         return np.ones_like(frequency)
@@ -89,7 +89,7 @@ def covariance(smoothing: Smoothing | None, interval: float, length: int) -> Arr
 
     size = 8 * length
     frequency: Array = np.asarray(np.fft.rfftfreq(size, interval), dtype=np.float64)
-    power = gain(smoothing, interval, frequency) ** 2
+    power = magnitude_response(smoothing, interval, frequency) ** 2
     return np.asarray(toeplitz(np.fft.irfft(power, size)[:length]))
 
 

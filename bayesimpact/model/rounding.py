@@ -36,7 +36,7 @@ from bayesimpact.model.jit.compiled import compiled
 Array = NDArray[np.float64]
 
 TERMS = 5  # of the series: the next one is below 1e-8 of the step at the least noise
-# Noise ahead of rounding, in steps. With less the average is a staircase, that no climb can follow;
+# Noise ahead of rounding, in steps. With less the average is a staircase, that no ascent follows;
 # with more the sum has below a thousandth of the noise's variance.
 LEAST, MOST = 0.15, 0.45
 FAR = 1e9  # steps: no instrument counts as many, and beyond 1e15 a number knows no part of one

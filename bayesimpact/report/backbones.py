@@ -26,7 +26,7 @@ def backbone_summary(posterior: Posterior, rng: np.random.Generator) -> Backbone
     Damping ratios are those of Eq. 5, as in Fig. 13 of Tian et al. The p-values of the recordings
     of a case are combined by Fisher's method.
     """
-    oscillator = posterior.fit.target.oscillator
+    oscillator = posterior.fit.density.oscillator
     free = [r for r, one in enumerate(oscillator.campaign.recordings) if one.input is None]
     if not free:
         return None
@@ -64,7 +64,7 @@ def _checked(posterior: Posterior, r: int, draws: Array) -> BackboneCheck:
     """Bands of one recording; of a velocity or an acceleration, and of all simulated ones alike,
     of the displacement behind it.
     """
-    recording = posterior.fit.target.oscillator.campaign.recordings[r]
+    recording = posterior.fit.density.oscillator.campaign.recordings[r]
     interval, order = recording.interval, recording.order
     if order == 0:
         rest = float(np.median(posterior.column(f"offset[{recording.name}]")))
@@ -82,7 +82,7 @@ def simulated(posterior: Posterior, r: int, count: int, rng: np.random.Generator
     The level in the draws would not do: where a model fits badly it has swallowed the misfit, and
     recordings so noisy are like anything.
     """
-    likelihood = posterior.fit.target.likelihood
+    likelihood = posterior.fit.density.likelihood
     noise, recording = likelihood.noise, likelihood.oscillator.campaign.recordings[r]
     motion = likelihood.oscillator.predict_recording(r, posterior.thinned(count, rng))
     raw = [noise.drawn(rng, recording, noise.level) for _ in motion]

@@ -18,16 +18,16 @@ from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification
 from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.inference.posterior import Posterior
-from bayesimpact.model.measurement import gain
+from bayesimpact.model.measurement import magnitude_response
 from bayesimpact.report import checks
 from bayesimpact.report.backbones import backbone_summary
 from bayesimpact.report.published import references
 from bayesimpact.report.results import (
     Array,
     BackboneSummary,
-    ChainSummary,
     Draws,
     EffectSummary,
+    MeasuringChainSummary,
     NoiseSummary,
     Provenance,
     RecordingResult,
@@ -93,7 +93,7 @@ def results_from_posterior(
     rng = np.random.default_rng([posterior.seed, 2])
     return _results(
         fit,
-        fit.target.likelihood.noise,
+        fit.density.likelihood.noise,
         search=None if identification is None else _search(identification),
         context=replace(context, seed=posterior.seed),
         posterior=posterior,
@@ -114,10 +114,12 @@ def _results(
     before: Posterior | None = None,
     before_backbone: BackboneSummary | None = None,
 ) -> Results:
-    oscillator = fit.target.oscillator
+    oscillator = fit.density.oscillator
     campaign = oscillator.campaign
     m = campaign.measurement
-    chain = ChainSummary(_smoothing(oscillator.smoothing), m.mass_sd, m.clock_sd, m.gain_sd)
+    chain = MeasuringChainSummary(
+        _smoothing(oscillator.smoothing), m.mass_sd, m.clock_sd, m.gain_sd
+    )
     draws = None if posterior is None else posterior.draws
     told = context.diagnosis or {}
     left = told.get("remainder")
@@ -168,8 +170,8 @@ def _results(
 
 def recording_results(fit: Fit) -> tuple[RecordingResult, ...]:
     """Every recording and what a fit makes of it."""
-    likelihood = fit.target.likelihood
-    recordings = fit.target.oscillator.campaign.recordings
+    likelihood = fit.density.likelihood
+    recordings = fit.density.oscillator.campaign.recordings
     states = keepers(recordings)
     shared = (fit.mode.size - 1) / len(recordings)  # parameters per recording
     found = []
@@ -203,13 +205,13 @@ def _noise_rms(noise: Noise, interval: float) -> float:
     if noise.smoothing is None:
         return noise.level
     frequency = np.linspace(0.0, 0.5 / interval, 4001)
-    passed = gain(noise.smoothing, interval, frequency) ** 2
+    passed = magnitude_response(noise.smoothing, interval, frequency) ** 2
     return noise.level * float(np.sqrt(np.mean(passed * noise.spectrum(frequency, interval))))
 
 
 def _chi2_z(fit: Fit) -> float:
     """Distance of the reduced chi2 from 1 in standard errors, those of the noise level included."""
-    likelihood = fit.target.likelihood
+    likelihood = fit.density.likelihood
     freedom = float(likelihood.sizes.sum()) - (fit.mode.size - 1)
     error = likelihood.noise.level_error
     level = error if np.isfinite(error) else 0.0
@@ -236,12 +238,12 @@ def _search(identification: Identification) -> SearchSummary | None:
 
 def _of_interest(fit: Fit) -> list[int]:
     """Positions of the parameters that pictures show: no coefficients of a learned force."""
-    positions = fit.target.oscillator.layout.roles("physical", "effect")
+    positions = fit.density.oscillator.layout.roles("physical", "effect")
     return [int(i) for i in positions if not fit.names[i].startswith(LEARNED)]
 
 
 def _draws(posterior: Posterior, label: str) -> Draws:
-    parameters = posterior.fit.target.oscillator.layout.parameters
+    parameters = posterior.fit.density.oscillator.layout.parameters
     columns = _of_interest(posterior.fit)
     step = max(1, posterior.draws.shape[0] // DRAWS_KEPT)
     return Draws(
@@ -254,7 +256,7 @@ def _draws(posterior: Posterior, label: str) -> Draws:
 
 def _sampler(posterior: Posterior) -> SamplerSummary:
     chains, record = posterior.chains, posterior.chains.convergence
-    parameters = posterior.fit.target.oscillator.layout.parameters
+    parameters = posterior.fit.density.oscillator.layout.parameters
     columns = _of_interest(posterior.fit)
     ensembles, stored, walkers, _ = chains.draws.shape
     every = max(1, -(-stored // TRACE_STEPS))

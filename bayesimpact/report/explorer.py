@@ -82,7 +82,7 @@ def explorer_data(results: Results) -> str:
     for r in shown:
         recording, size = results.recordings[r], min(results.recordings[r].samples.size, most)
         level = stop_level(results, recording)
-        motion, touched = contacts(results, recording)
+        motion, in_contact = contacts(results, recording)
         old = None if before is None else before[r]
         unit = display(recording.unit, _residual_size(recording, old))
         item: dict[str, Any] = {
@@ -96,7 +96,7 @@ def explorer_data(results: Results) -> str:
                 typeset(response(results, recording).unit),
                 typeset(unit.unit),
             ],
-            "impacts": [] if touched is None else contact_onsets(motion, touched).tolist(),
+            "impacts": [] if in_contact is None else contact_onsets(motion, in_contact).tolist(),
             "best": best.first if best is not None and best.recording == r else None,
             "samples": _floats(recording.samples[:size] * response(results, recording).scale),
             "residuals": [

@@ -34,7 +34,7 @@ def normal_corner(fit: Fit, before: Fit | None = None) -> Figure:
     from bayesimpact.report.figures.inline import inline
 
     def law(label: str, one: Fit) -> NormalLaw:
-        layout = one.target.oscillator.layout
+        layout = one.density.oscillator.layout
         columns = [
             int(i)
             for i in layout.roles("physical", "effect")

@@ -219,7 +219,7 @@ class NoiseSummary:
 
 
 @dataclass(frozen=True)
-class ChainSummary:
+class MeasuringChainSummary:
     """What campaign.toml says of the measuring chain; uncertainties are relative standard ones."""
 
     smoothing: str
@@ -278,7 +278,7 @@ class Results:
     rows: tuple[Row, ...]
     effects: tuple[EffectSummary, ...]
     noise: NoiseSummary
-    chain: ChainSummary
+    chain: MeasuringChainSummary
     verdict: str
     headline: str
     reduced_chi2: float

@@ -12,7 +12,7 @@ from bayesimpact.inference.fit import Z90, Fit
 from bayesimpact.inference.prior import Prior
 from bayesimpact.model.parameters import Parameter
 from bayesimpact.model.units import dimensions, per_mass_unit, significant
-from bayesimpact.report.results import Array, ChainSummary, Row
+from bayesimpact.report.results import Array, MeasuringChainSummary, Row
 
 LEARNED = "learned_force."
 """How the names of a learned force's coefficients begin: they mean nothing one by one."""
@@ -35,7 +35,7 @@ _MEANINGS = {
 def build_rows(
     fit: Fit,
     draws: Array | None,
-    chain: ChainSummary,
+    chain: MeasuringChainSummary,
     references: Mapping[str, Mapping[str, float]],
     told: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> tuple[Row, ...]:
@@ -47,11 +47,11 @@ def build_rows(
     told : medians and intervals that a diagnosis gives: they carry what stays unexplained, which
         neither draws nor curvature know of
     """
-    campaign = fit.target.oscillator.campaign
+    campaign = fit.density.oscillator.campaign
     angle = campaign.angular
-    titles = {e.id: e.title for e in fit.target.oscillator.acting}
+    titles = {e.id: e.title for e in fit.density.oscillator.acting}
     rows = []
-    for i, parameter in enumerate(fit.target.oscillator.layout.parameters):
+    for i, parameter in enumerate(fit.density.oscillator.layout.parameters):
         mode, sd = float(fit.mode[i]), float(fit.sd[i])
         if draws is None:
             low, high = max(mode - Z90 * sd, parameter.lower), min(mode + Z90 * sd, parameter.upper)
@@ -84,7 +84,7 @@ def build_rows(
                     for label, values in references.items()
                     if parameter.name in values
                 },
-                prior=prior_text(fit.target.priors.parameters[i]),
+                prior=prior_text(fit.density.priors.parameters[i]),
                 posterior_sd=posterior_sd,
             )
         )
@@ -97,7 +97,12 @@ def scaling_unit(parameter: Parameter) -> str:
 
 
 def widened(
-    median: float, ci90: tuple[float, float], unit: str, chain: ChainSummary, *, angle: bool
+    median: float,
+    ci90: tuple[float, float],
+    unit: str,
+    chain: MeasuringChainSummary,
+    *,
+    angle: bool,
 ) -> tuple[float, float]:
     """A 90 % interval widened by the uncertainties of mass, clock and gain, in quadrature.
 

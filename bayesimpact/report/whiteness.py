@@ -34,9 +34,9 @@ def whiteness(fit: Fit, r: int) -> float:
 
     Behind a filter the numbers are Fourier coefficients: their powers must be of one level.
     """
-    white, noise = fit.linearisation[r].residual, fit.target.likelihood.noise
+    white, noise = fit.linearisation[r].residual, fit.density.likelihood.noise
     if noise.smoothing is None:
         return ljung_box(white)
-    recording = fit.target.oscillator.campaign.recordings[r]
+    recording = fit.density.oscillator.campaign.recordings[r]
     n, interval = recording.samples.size, recording.interval
     return flat_spectrum(noise.ordinates(white, n, interval, recording.used)[1])

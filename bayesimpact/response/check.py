@@ -86,7 +86,7 @@ def check_backbone(
     """Compare the backbone of a recording with those of simulated recordings.
 
     The discrepancy of a curve is the mean square of its deviations from the median curve, each in
-    units of the spread (1.4826 x median absolute deviation) at its place; median and spread are
+    units of the scale (1.4826 x median absolute deviation) at its place; median and scale are
     taken over recording and simulations together. The p-value is the share of them with at least
     the recording's discrepancy. If the recording is one more draw from the same distribution, it is
     uniform exactly, whatever the extractor does; for draws from a posterior fitted to this very
@@ -157,8 +157,8 @@ def _discrepancy(table: Floats) -> Floats:
     if table.shape[1] == 0:
         return np.full(table.shape[0], np.nan)
     away = table - np.median(table, axis=0)
-    spread = 1.4826 * np.median(np.abs(away), axis=0)
-    safe = np.where(spread > 0, spread, np.abs(away).max(axis=0))
+    scale = 1.4826 * np.median(np.abs(away), axis=0)
+    safe = np.where(scale > 0, scale, np.abs(away).max(axis=0))
     safe = np.where(safe > 0, safe, 1.0)
     return np.asarray(np.mean((away / safe) ** 2, axis=1))
 
@@ -170,8 +170,8 @@ def _worst(scores: Floats) -> Floats:
         return np.full(scores.shape[1], np.nan)
     logs = np.log(known + 1e-300)
     away = logs - np.median(logs, axis=1, keepdims=True)
-    spread = np.median(np.abs(away), axis=1, keepdims=True)
-    return np.asarray((away / np.where(spread > 0, spread, 1.0)).max(axis=0))
+    scale = np.median(np.abs(away), axis=1, keepdims=True)
+    return np.asarray((away / np.where(scale > 0, scale, 1.0)).max(axis=0))
 
 
 def _p_value(scores: Floats) -> float:

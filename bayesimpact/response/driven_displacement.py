@@ -31,7 +31,7 @@ CORNER = (0.0, 0.15, 0.3)  # of the natural frequency: slower than that is trend
 BLOCKS = 30  # per radian of it, so that the smoother stays well conditioned at any sampling rate
 WIDTH, ROUNDS = 0.6, 3  # half width of the bumps for a first guess, natural periods
 SMALL = 0.4  # quantile of a force that is the spring's alone
-SETTLED = 0.01  # relative change in a round
+CONVERGED = 0.01  # relative change in a round
 SLOPE = 1 / 16  # of a period: half of the window in which a velocity is differentiated
 
 
@@ -55,12 +55,12 @@ class Guess:
     k2: float = 0.0
     both: bool = False
 
-    def settled(self, before: Guess) -> bool:
+    def has_converged(self, before: Guess) -> bool:
         """True where a round has changed little."""
         own, other = np.array([(g.k1, g.gain, g.gap, g.k2) for g in (self, before)])
         known = np.isfinite(own) & np.isfinite(other)
         changed = np.abs(own[known] - other[known])
-        return bool(np.all(changed <= SETTLED * np.abs(other[known])))
+        return bool(np.all(changed <= CONVERGED * np.abs(other[known])))
 
 
 def first_guess(

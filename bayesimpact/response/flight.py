@@ -159,7 +159,7 @@ def solve_flight(
     variance = float(np.sum(found.residuals**2)) / freedom
     rms = float(np.sqrt(variance)) * unit
     sd_omega, sd_decay = found.standard_errors(variance)
-    offsets, waves, spread = blocks.solve(w, b)
+    offsets, waves, offset_sd = blocks.solve(w, b)
     step = 1e-4
     slope = (blocks.solve(w * (1 + step), b)[0] - blocks.solve(w * (1 - step), b)[0]) / (2 * step)
     return Flight(
@@ -169,7 +169,7 @@ def solve_flight(
         rms=rms,
         sd_omega=float(sd_omega) * w,
         sd_decay=float(sd_decay) * start,
-        sd_offset=float(np.hypot(rms * spread, sd_omega * np.abs(slope).max())),
+        sd_offset=float(np.hypot(rms * offset_sd, sd_omega * np.abs(slope).max())),
         offset_slope=slope,
         waves=waves,
     )
@@ -261,7 +261,7 @@ class _Blocks:
         first, second, upper, r22 = self._project(w, b)
         left = self._without(self.values, first, second)
         ones = self._without(np.ones_like(self.values), first, second)
-        offsets, spread = self._offsets(left, ones)
+        offsets, offset_sd = self._offsets(left, ones)
         signal = self.values - self._per_sample(offsets[self.owner])
         z1, z2 = self._sum(first * signal), self._sum(second * signal)
         q = z2 / r22
@@ -269,4 +269,4 @@ class _Blocks:
         scale = np.exp(-abs(b) * self.reach)
         table = np.column_stack([self.middles, p * scale, q * scale])
         waves = tuple(table[self.owner == r] for r in range(self.recordings))
-        return offsets, waves, spread
+        return offsets, waves, offset_sd

@@ -57,13 +57,13 @@ def spectral_period(samples: Floats, order: int = 0) -> float:
 
     `order` says which time derivative of the displacement the samples are.
     """
-    settled = rest_at_end(samples)
+    rest_reading = rest_at_end(samples)
     active = with_motion(samples)
     fade = np.cos(0.5 * np.pi * np.arange(active.size) / active.size) ** 2
     if order > 0:  # a derivative averages to zero, and its median may lie off that
-        settled = float(np.average(active, weights=fade))
+        rest_reading = float(np.average(active, weights=fade))
     points = 1 << int(np.ceil(np.log2(4 * active.size)))
-    power = np.abs(np.fft.rfft((active - settled) * fade, points)) ** 2
+    power = np.abs(np.fft.rfft((active - rest_reading) * fade, points)) ** 2
     # A stop moves the middle of the cycles as they decay: in the velocity this drift counts little,
     # but white noise would count more than the motion, so its floor goes first.
     floor = float(np.median(power[power.size // 2 :]))

@@ -11,7 +11,7 @@ import numpy as np
 
 from bayesimpact.data.campaign import Beam, Campaign
 from bayesimpact.trial.rig.files import TRUTH_FILE, write_campaign
-from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 from bayesimpact.trial.rig.recordings import Effects, Release, Rig, make_campaign
 
 PAPER_RIG = Rig(
@@ -70,7 +70,7 @@ def _recorded(words: str, seed: int, effects: Effects | None = None) -> Campaign
         PAPER_RIG,
         releases,
         effects,
-        chain=Chain(noise=5e-6, offsets=offsets),
+        chain=MeasuringChain(noise=5e-6, offsets=offsets),
         rate=1000.0,
         duration=6.0,
         rng=rng,

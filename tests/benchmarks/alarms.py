@@ -18,7 +18,7 @@ from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import base_candidate
 from bayesimpact.diagnosis.residual_force.gaussian_process import missing_drift, missing_force
 from bayesimpact.diagnosis.score_test.scan import scan
-from bayesimpact.diagnosis.selection.outcome import State
+from bayesimpact.diagnosis.selection.outcome import ExaminedModel
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects import SEARCHED
 from bayesimpact.trial.draw.one_trial import draw
@@ -38,7 +38,7 @@ def alarm(settings: Settings, seed: int) -> dict[str, Any]:
     scanned = scan(fit, SEARCHED, scales, rng=rng)
     force = missing_force(fit, scales, rng=rng)
     drift = missing_drift(fit, scales, rng=rng)
-    alone = State(base_candidate(fit), scanned, force, drift)
+    alone = ExaminedModel(base_candidate(fit), scanned, force, drift)
     filtered = proved_smoothing(drawn.campaign) is not None
     return {
         "seed": seed,

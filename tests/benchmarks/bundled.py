@@ -81,7 +81,7 @@ class Problem:
 def problem(recording: int = 0) -> Problem:
     """One recording of the bundled campaign at the mode."""
     found = fit()
-    oscillator = found.target.oscillator
+    oscillator = found.density.oscillator
     q = oscillator.layout.slots(found.mode[None])[0, recording, : len(BASE_SLOTS)]
     interval, n = oscillator.intervals[recording], oscillator.counts[recording]
     return Problem(np.ascontiguousarray(q), oscillator.campaign.mass, float(interval), int(n))

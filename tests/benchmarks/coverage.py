@@ -39,7 +39,7 @@ from bayesimpact.data.quantity import Quantity
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.posterior import sample
 from bayesimpact.trial.bundle import PAPER_RIG, paper_releases
-from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 from bayesimpact.trial.rig.recordings import Release, Rig, make_campaign
 from bayesimpact.trial.run.stamp import origin
 from bayesimpact.trial.score.rates import rate_in_groups
@@ -80,7 +80,8 @@ def recorded(
     releases, noise = paper_releases(rng)[:recordings], NOISE[quantity]
     offsets = {r.name: float(2 * noise * rng.standard_normal()) for r in releases}
     campaign = make_campaign(
-        "coverage", PAPER_RIG, releases, chain=Chain(noise=noise, offsets=offsets), rate=1000.0,
+        "coverage", PAPER_RIG, releases, chain=MeasuringChain(noise=noise, offsets=offsets),
+        rate=1000.0,
         duration=duration, rng=rng, quantity=quantity,
     )  # fmt: skip
     return campaign, truth_of(PAPER_RIG, releases, offsets) | {"sigma": noise}

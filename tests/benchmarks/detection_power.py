@@ -28,7 +28,7 @@ from bayesimpact.trial.draw.designs import DrawnRig
 from bayesimpact.trial.draw.planted_effects import PLANTED_EFFECTS
 from bayesimpact.trial.draw.sensitivity import Sensitivity, clean_readings, misfit
 from bayesimpact.trial.draw.sizing import LIMIT, Unsuitable, sized
-from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 from bayesimpact.trial.rig.recordings import Release
 from bayesimpact.trial.score.summary import rate
 
@@ -82,7 +82,9 @@ def bundled_design(recordings: int = 9) -> DrawnRig:
         case = list(PAPER_RIG.k2)[i % 3]
         height = PAPER_HEIGHTS[i // 3 % 3][1] * (1 - 0.02 * (i // 9))
         releases.append(Release(f"case{case}_{i // 3 + 1}", case, height, 1e-3 * (-1) ** i))
-    chain = Chain(noise=5e-6, offsets={r.name: 1e-5 * (-1) ** i for i, r in enumerate(releases)})
+    chain = MeasuringChain(
+        noise=5e-6, offsets={r.name: 1e-5 * (-1) ** i for i, r in enumerate(releases)}
+    )
     return DrawnRig("paper", "white", PAPER_RIG, tuple(releases), 1000.0, 6.0, chain, Measurement())
 
 

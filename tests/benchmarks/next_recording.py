@@ -39,7 +39,7 @@ from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.inference.fit import Fit
 from bayesimpact.trial.draw.one_trial import draw
 from bayesimpact.trial.draw.settings import Settings
-from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 from bayesimpact.trial.rig.recordings import Release, Rig, record
 from bayesimpact.trial.run.stamp import origin
 
@@ -78,7 +78,9 @@ def recorded(
     v0 = design.v0 + 4e-3 * speed * rng.standard_normal()
     offsets = {"new": float(2 * noise * rng.standard_normal())}
     white = truth.get("noise_white_share", 0.0)
-    chain = Chain(noise, truth["noise_correlation"], offsets, None, truth["rounding_m"], white)
+    chain = MeasuringChain(
+        noise, truth["noise_correlation"], offsets, None, truth["rounding_m"], white
+    )
     samples = record(
         rig, Release("new", design.case, y0, v0), effects, chain,
         rate=1 / design.interval, duration=design.samples * design.interval, rng=rng,
@@ -94,8 +96,8 @@ def diagnosed(campaign: Campaign, seed: int) -> Diagnosis:
 
 def outcome(p: Proposal, found: Diagnosis, rivals: Rivalry) -> Row:
     """What a recording was expected to bring, and what it brought."""
-    tried = {frozenset(c.ids): c for c in found.naming.tried}
-    odds = {ids: found.naming.log_odds(c) for ids, c in tried.items()}
+    tried = {frozenset(c.ids): c for c in found.selection.tried}
+    odds = {ids: found.selection.log_odds(c) for ids, c in tried.items()}
     first = tried.get(frozenset(rivals.hypotheses[0].ids))
     return {
         "halves": {

@@ -37,7 +37,7 @@ KNOWN: Mapping[str, Known] = {
 
 def residual_percent(found: Diagnosis, recording: str) -> float:
     """Root mean square of what is left of a recording, % of its standard deviation."""
-    recordings = found.after.target.oscillator.campaign.recordings
+    recordings = found.after.density.oscillator.campaign.recordings
     r = [x.name for x in recordings].index(recording)
     left = np.sqrt(np.mean(found.after.residuals[r] ** 2))
     return float(100 * left / np.std(recordings[r].samples))

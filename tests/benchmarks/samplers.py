@@ -76,7 +76,7 @@ def row(found: Sampled, reference: Sampled, rival: Sampled) -> dict[str, Any]:
 def measure() -> dict[str, Any]:
     """Run all that are installed."""
     given = fit()
-    given.target(np.tile(given.mode, (64, 1)))  # compiled before anything is measured,
+    given.density(np.tile(given.mode, (64, 1)))  # compiled before anything is measured,
     quiet_arviz()  # and imported
     sampling.with_gradient(given)(given.mode)
     together = sampling.ours(given, SEED)

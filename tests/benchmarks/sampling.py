@@ -61,7 +61,7 @@ class Sampled:
 
 def whitened(fit: Fit) -> WhitenedDensity:
     """The log posterior as a function of u."""
-    target = fit.target
+    target = fit.density
     bounds = np.array([(p.lower, p.upper) for p in target.oscillator.layout.parameters])
     lower = np.maximum(bounds[:, 0], target.priors.lower)
     upper = np.minimum(bounds[:, 1], target.priors.upper)
@@ -135,7 +135,7 @@ def dynesty(fit: Fit, seed: int, *, live: int = 100, limit: int = 3_000_000) -> 
     from dynesty.utils import resample_run
 
     target, dimension = whitened(fit), fit.mode.size
-    prior, likelihood = quick_prior(fit), fit.target.likelihood
+    prior, likelihood = quick_prior(fit), fit.density.likelihood
 
     def log_density(u: Array) -> float:
         theta = target.theta(u[None])
@@ -168,7 +168,7 @@ def quick_prior(fit: Fit) -> Callable[[Array], tuple[float, Array]]:
     The package computes them for batches; one point at a time, which is what dynesty and NUTS ask
     for, its loop over priors would take longer than the likelihood.
     """
-    priors, mode = fit.target.priors, fit.mode
+    priors, mode = fit.density.priors, fit.mode
     assert {type(prior) for prior in priors.parameters} <= {Uniform, LogUniform}
     inverse = np.array([isinstance(prior, LogUniform) for prior in priors.parameters])
     constant = float(priors.log_density(mode[None])[0] + np.sum(np.log(mode[inverse])))
@@ -183,7 +183,7 @@ def quick_prior(fit: Fit) -> Callable[[Array], tuple[float, Array]]:
 
 def with_gradient(fit: Fit) -> Callable[[Array], tuple[float, Array]]:
     """Log posterior and exact gradient at theta (d,), of a plain oscillator under white noise."""
-    likelihood, o = fit.target.likelihood, fit.target.oscillator
+    likelihood, o = fit.density.likelihood, fit.density.oscillator
     prior = quick_prior(fit)
     assert o.is_plain and likelihood.noise.is_white
     columns = np.ascontiguousarray(o.layout.columns[:, : len(BASE_SLOTS)])

@@ -18,7 +18,7 @@ from benchmarks.uniformity import critical_tail, smallest_tail
 from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
-from bayesimpact.inference.fit import Fit, Target
+from bayesimpact.inference.fit import Fit, PosteriorDensity
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.inference.noise.whitening import Noise
@@ -26,7 +26,7 @@ from bayesimpact.inference.posterior import sample
 from bayesimpact.inference.priors import Priors, prior_from_table
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.oscillator import Oscillator, build_oscillator
-from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 from bayesimpact.trial.rig.recordings import Effects, Release, Rig, make_campaign
 
 Array = NDArray[np.float64]
@@ -97,14 +97,14 @@ def replicate(model: str, seed: int, method: Method = "weighted") -> Replicate:
     table = {**BASE_PRIORS, **MODELS[model]}
     truth = {name: float(prior_from_table(name, row).sample(rng)) for name, row in table.items()}
     campaign = _record(model, truth, table, rng)
-    target = _target(model, campaign, table)
-    names = target.oscillator.layout.names
+    density = _target(model, campaign, table)
+    names = density.oscillator.layout.names
     start = np.array([_centre(table[name]) for name in names])
     steps = 0.05 * np.array([_width(table[name]) for name in names])
-    fit = find_mode(target, start, steps=steps)
+    fit = find_mode(density, start, steps=steps)
     draws, weights = _posterior(fit, method, seed, rng)
     true = np.array([truth[name] for name in names])
-    likelihood = target.likelihood
+    likelihood = density.likelihood
     values = np.column_stack([draws, likelihood(draws)])
     own = np.append(true, likelihood(true[None]))
     ranks = (weights @ (values < own) + rng.random(own.size)) / (weights.sum() + 1)
@@ -118,7 +118,7 @@ def _record(
     rig = Rig(MASS, truth["c1"], truth["k1"], truth["c2"], truth["g"], k2)
     releases = [Release(r, c, truth[f"y0[{r}]"], truth[f"v0[{r}]"]) for r, c in CASES.items()]
     offsets = {r: truth[f"offset[{r}]"] for r in CASES}
-    chain = Chain(noise=truth["sigma"], offsets=offsets)
+    chain = MeasuringChain(noise=truth["sigma"], offsets=offsets)
     numbers = {n.split(".")[1]: v for n, v in truth.items() if "." in n}
     effects: Effects = {} if model == "base" else {model: numbers}
     return make_campaign(
@@ -126,11 +126,11 @@ def _record(
     )
 
 
-def _target(model: str, campaign: Campaign, table: Table) -> Target:
+def _target(model: str, campaign: Campaign, table: Table) -> PosteriorDensity:
     added = [effect for effect in EFFECTS if effect.id == model]
     oscillator: Oscillator = build_oscillator(campaign, added)
     priors = tuple(prior_from_table(n, table[n]) for n in oscillator.layout.names)
-    return Target(Likelihood(oscillator, Noise(level=NOISE)), Priors(priors))
+    return PosteriorDensity(Likelihood(oscillator, Noise(level=NOISE)), Priors(priors))
 
 
 def _centre(row: Mapping[str, Any]) -> float:
@@ -155,9 +155,9 @@ def _posterior(
     unit = rng.standard_normal((count, fit.mode.size))
     draws = fit.mode + unit @ root.T
     if method == "normal":
-        draws = draws[np.isfinite(fit.target.priors.log_density(draws))]
+        draws = draws[np.isfinite(fit.density.priors.log_density(draws))]
         return draws, np.ones(draws.shape[0])
-    log_weight = fit.target(draws) + 0.5 * np.sum(unit**2, axis=1)
+    log_weight = fit.density(draws) + 0.5 * np.sum(unit**2, axis=1)
     weight = np.exp(log_weight - log_weight.max())
     return draws, weight * weight.sum() / np.sum(weight**2)
 

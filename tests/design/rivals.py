@@ -30,7 +30,7 @@ def fitted(small: Identification, *ids: str) -> list[Candidate]:
 
 def rivalry_of(models: list[Candidate], verdict: str = "ambiguous") -> Rivalry:
     """Fitted models as rivals of equal odds."""
-    first = models[0].fit.target
+    first = models[0].fit.density
     campaign = first.oscillator.campaign
     made = Rivalry(
         "ambiguous",

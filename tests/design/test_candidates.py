@@ -24,7 +24,7 @@ def test_releases_against_every_obstacle_and_without(small: Identification) -> N
 
 def test_repeats_are_the_recordings_themselves(small: Identification) -> None:
     found = repeats(base_rivalry(small))
-    recordings = small.fit.target.oscillator.campaign.recordings
+    recordings = small.fit.density.oscillator.campaign.recordings
     assert [d.repeats for d in found] == [r.name for r in recordings]
     assert [d.samples for d in found] == [r.samples.size for r in recordings]
 

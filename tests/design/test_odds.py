@@ -50,7 +50,7 @@ def test_the_mean_is_that_of_simulated_recordings(seed: int) -> None:
     assert abs(obtained.mean() - expected) < 4 * obtained.std() / np.sqrt(obtained.size)
 
 
-def test_each_draw_has_its_own_mean_and_spread() -> None:
+def test_each_draw_has_its_own_mean_and_standard_deviation() -> None:
     right, other = models(4)
     rng = np.random.default_rng(104)
     draws = rng.standard_normal((5, SHARED))

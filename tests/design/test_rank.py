@@ -11,7 +11,7 @@ from scipy.stats import norm
 
 from bayesimpact.design.hypotheses import Rivalry
 from bayesimpact.design.odds import Odds
-from bayesimpact.design.rank import box_hill, proposals, settled
+from bayesimpact.design.rank import box_hill, decisive, proposals
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.inference.identify import Identification
 
@@ -45,7 +45,7 @@ def test_the_nearest_rival_decides_whether_it_settles(damped: Rivalry) -> None:
         for x in (9.0, 3.0):  # over the draws; of these the second depends on the rival
             leads = [now[i] - now[j] + x + j * (x < 9.0) for j in range(3) if j != i]
             expected += 0.5 * p[i] / p.sum() * norm.cdf((min(leads) - DECISIVE) / 2)
-    assert settled(three, pairs) == pytest.approx(expected)
+    assert decisive(three, pairs) == pytest.approx(expected)
 
 
 def test_odds_beyond_the_decisive_ones_count_as_these(damped: Rivalry) -> None:

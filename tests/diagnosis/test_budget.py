@@ -25,7 +25,7 @@ from bayesimpact.diagnosis.budget import (
 from bayesimpact.diagnosis.faults.simpler import may_be_simpler
 from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.diagnosis.refits.refit import Candidate, Enough
-from bayesimpact.diagnosis.selection.outcome import Naming
+from bayesimpact.diagnosis.selection.outcome import Selection
 from bayesimpact.diagnosis.selection.remaining import Remaining
 from bayesimpact.report.diagnosis.document import document
 
@@ -43,7 +43,7 @@ class Clock:
 
 
 @dataclass(frozen=True)
-class MadeUpNaming:
+class MadeUpSelection:
     finished: bool = True
 
 
@@ -52,7 +52,7 @@ class MadeUp:
     """As much of a diagnosis as is compared."""
 
     verdict: str
-    naming: MadeUpNaming = MadeUpNaming()
+    selection: MadeUpSelection = MadeUpSelection()
 
 
 def test_a_budget_is_used_up_by_its_clock_alone() -> None:
@@ -110,7 +110,7 @@ def test_a_search_for_which_too_little_is_left_is_not_begun(monkeypatch, verdict
     asked, given = searches(monkeypatch, clock, MadeUp("named"))
     clock.now = PATIENCE - ANOTHER + 1.0
     found = asked.again(MadeUp(verdict), pytest.fail, better(True))
-    assert given == [] and found == MadeUp(told, MadeUpNaming(finished=False))
+    assert given == [] and found == MadeUp(told, MadeUpSelection(finished=False))
 
 
 def test_searches_share_one_budget(monkeypatch) -> None:
@@ -119,7 +119,7 @@ def test_searches_share_one_budget(monkeypatch) -> None:
     found = asked.search(None)
     for turn in range(4):
         found = asked.again(found, lambda: None, better(False))
-        assert found.naming.finished == (turn < 2)
+        assert found.selection.finished == (turn < 2)
     assert len(given) == 3 and all(one is asked.budget for one in given)
 
 
@@ -128,13 +128,15 @@ def test_searches_share_one_budget(monkeypatch) -> None:
 def test_an_answer_is_final_only_where_the_other_search_came_to_its_end(
     monkeypatch, is_better, finished
 ) -> None:
-    first, other = MadeUp("named"), MadeUp("ambiguous", MadeUpNaming(finished))
+    first, other = MadeUp("named"), MadeUp("ambiguous", MadeUpSelection(finished))
     asked, _ = searches(monkeypatch, Clock(), other)
     found = asked.again(first, lambda: None, better(is_better))
     if is_better:
         assert found is other
     else:
-        assert found == (first if finished else MadeUp("ambiguous", MadeUpNaming(finished=False)))
+        assert found == (
+            first if finished else MadeUp("ambiguous", MadeUpSelection(finished=False))
+        )
 
 
 def test_a_diagnosis_without_time_for_a_second_search_says_so(monkeypatch) -> None:
@@ -152,7 +154,7 @@ def test_a_diagnosis_without_time_for_a_second_search_says_so(monkeypatch) -> No
     def doubtful(before: Any, *others: Any) -> Any:
         clock.now += 2 * PATIENCE
         fit = before.identification.fit
-        campaign = fit.target.oscillator.campaign
+        campaign = fit.density.oscillator.campaign
         return ((SimpleNamespace(campaign=campaign, after=fit.reduced_chi2),),)
 
     monkeypatch.setattr(whole, "_of_corrected", slow)
@@ -163,7 +165,7 @@ def test_a_diagnosis_without_time_for_a_second_search_says_so(monkeypatch) -> No
     rng, effects = np.random.default_rng(0), (BY_ID["coulomb_friction"],)
     found = whole.diagnose(campaign, rng=rng, effects=effects, search=False, clock=clock)
     assert begun == [(2 * PATIENCE, PATIENCE)]
-    assert found.verdict == "partly" and not found.naming.finished
+    assert found.verdict == "partly" and not found.selection.finished
     content = document(found, seed=0, seconds=1.0, versions={})
     assert "The search ended by its limit" in content["summary"]
 
@@ -177,13 +179,13 @@ def test_exchanges_beside_a_force_of_time_that_the_budget_cut_short_are_not_fini
         Candidate(effects, SimpleNamespace(), 0.0) for effects in ((), (BY_ID["coulomb_friction"],))
     )
     search.tried = {frozenset(c.ids): c for c in (base, other)}
-    states: Any = {c.ids: SimpleNamespace(candidate=c) for c in (base, other)}
+    examined_models: Any = {c.ids: SimpleNamespace(candidate=c) for c in (base, other)}
     exchanged = []
-    search.examine = lambda candidate: states[candidate.ids]
+    search.examine = lambda candidate: examined_models[candidate.ids]
     search.drop = lambda candidate, effect: base
     search.exchange = exchanged.append
-    left: Any = SimpleNamespace(gain=lambda fit, alone: 90.0 * (fit is other.fit))
-    before = Naming(states[()], states[()], (base, other), 1.0)
+    left: Any = SimpleNamespace(log_evidence_gain=lambda fit, alone: 90.0 * (fit is other.fit))
+    before = Selection(examined_models[()], examined_models[()], (base, other), 1.0)
     found = search.beside_a_force(before, left)
     assert found.chosen.candidate is other and found.beside is left
     assert exchanged == ([] if late else [other]) and found.finished == (not late)
@@ -197,9 +199,9 @@ def test_a_search_keeps_time_for_what_its_answer_is_compared_with() -> None:
     assert not search.may_go_on()
     base = Candidate((), SimpleNamespace(), 0.0)
     search.examine = lambda candidate: SimpleNamespace(candidate=candidate)
-    search.with_residual = lambda state: state.candidate
-    state = search.examine(base)
-    found = search.with_forces(Naming(state, state, (base,), 1.0), [base])
+    search.with_residual = lambda examined: examined.candidate
+    examined = search.examine(base)
+    found = search.with_forces(Selection(examined, examined, (base,), 1.0), [base])
     assert list(found.residual.values()) == [base]
 
 
@@ -215,15 +217,15 @@ def test_no_residual_force_is_fitted_once_the_time_is_up(look: float) -> None:
         Candidate(effects, SimpleNamespace(), 0.0) for effects in ((), (BY_ID["coulomb_friction"],))
     )
 
-    def fitted(state: Any) -> Candidate:
+    def fitted(examined: Any) -> Candidate:
         clock.now += PATIENCE
-        return state.candidate
+        return examined.candidate
 
     search.examine = lambda candidate: SimpleNamespace(candidate=candidate)
     search.with_residual = fitted
-    state = search.examine(first)
-    naming = Naming(state, state, (first, second), 1.0)
-    found = search.with_forces(naming, [first])
+    examined = search.examine(first)
+    selection = Selection(examined, examined, (first, second), 1.0)
+    found = search.with_forces(selection, [first])
     assert list(found.residual.values()) == [first] and found.finished
     found = search.with_forces(found, [first, second])
     assert list(found.residual.values()) == [first, second][: 1 + (look > 0.0)]
@@ -246,8 +248,10 @@ def test_a_residual_force_is_said_to_stand_beside_a_model(effects, named, monkey
     said: list[str] = []
     search = Remaining((), None, np.random.default_rng(0), said.append, Budget(Clock(), 0.0))
     monkeypatch.setattr(search, "enough", lambda: Enough(least_gain=2.0))
-    state: Any = SimpleNamespace(candidate=Candidate(effects, SimpleNamespace(), 0.0), unknown=None)
-    search.with_residual(state)
+    examined: Any = SimpleNamespace(
+        candidate=Candidate(effects, SimpleNamespace(), 0.0), unknown=None
+    )
+    search.with_residual(examined)
     assert said == [f"fitting a residual force beside {named}"]
     assert least == [2.0]  # no farther than other climbs of the search
 

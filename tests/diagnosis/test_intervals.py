@@ -101,8 +101,8 @@ def test_the_force_of_time_of_the_chosen_model_is_built_once(monkeypatch) -> Non
         monkeypatch.setattr(module, "discrepancy", counted)
     monkeypatch.setattr(loop, "with_formulas", lambda answer, *_, **__: answer)
     found = leaving_something()
-    assert found.verdict == "partly" and found.after is found.naming.chosen.candidate.fit
+    assert found.verdict == "partly" and found.after is found.selection.chosen.candidate.fit
     assert len({id(fit) for fit in built}) == len(built) > 0
     assert any(fit is found.after for fit in built)
     assert not any(fit is found.before for fit in built)  # its misfit tells enough
-    assert found.naming.own is None
+    assert found.selection.own is None

@@ -13,7 +13,7 @@ import bayesimpact as bi
 from bayesimpact.diagnosis.candidates.promising import families
 from bayesimpact.diagnosis.diagnose import is_doubtful
 from bayesimpact.diagnosis.faults.recording_faults import shared_effects
-from bayesimpact.diagnosis.refits.evidence import common_spread, structure
+from bayesimpact.diagnosis.refits.evidence import shared_sd_evidence, structure
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.score_test.directions import directions
 from bayesimpact.diagnosis.score_test.scan import Scan
@@ -64,9 +64,9 @@ def test_starts_that_recordings_share_cost_little() -> None:
     sd, prior = np.full(9, 1e-3), Normal(0.0, 1.0)
     covariance = np.diag(1 / (1 / sd**2 + 1 / prior.sd**2))
     alone = -float(np.sum(np.log(prior.sd / sd)))
-    assert -4.0 < alone + common_spread(np.zeros(9), covariance, prior, None) < 0.0
+    assert -4.0 < alone + shared_sd_evidence(np.zeros(9), covariance, prior, None) < 0.0
     apart = np.array([1.0, -1.0, 0.5, -0.5, 0.8, -0.8, 1.0, -1.0, 0.6])
-    assert -4.0 < common_spread(apart, covariance, prior, None) < 0.0
+    assert -4.0 < shared_sd_evidence(apart, covariance, prior, None) < 0.0
 
 
 def score(effect: Effect) -> Score:
@@ -93,7 +93,7 @@ def test_one_law_has_the_name_of_its_range(law: Effect, numbers: dict[str, float
         assert abs(found.after.mode[at] - true) < 4 * found.after.sd[at]
     one = frozenset([law.id])
     assert not any(
-        one < frozenset(c.ids) and {LOOP.id, DAHL.id} <= {*c.ids} for c in found.naming.tried
+        one < frozenset(c.ids) and {LOOP.id, DAHL.id} <= {*c.ids} for c in found.selection.tried
     )
 
 

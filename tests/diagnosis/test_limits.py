@@ -81,7 +81,7 @@ def test_hidden_bias_is_what_the_limit_would_do(found):
     friction = next(x for x in rows if x.effect_id == "coulomb_friction")
     at = [s.effect.id for s in result.scores].index("coulomb_friction")
     shift = result.projection.absorbed[:, result.groups[at][0]] * friction.upper95
-    physical = fit.target.oscillator.layout.roles("physical")
+    physical = fit.density.oscillator.layout.roles("physical")
     sizes = np.abs(shift / fit.sd)[physical]
     assert friction.bias == pytest.approx(sizes.max())
     assert friction.biased == fit.names[int(np.argmax(sizes))]
@@ -93,6 +93,6 @@ def test_hidden_bias_is_what_the_limit_would_do(found):
 def test_what_could_hide_moves_a_parameter_that_is_there(stop, told: str) -> None:
     one = Limit("gap_wear", "rate", "m/s", 1.0, 1.0, 1.0, "absent", 3.2, "k1", 0.7)
     oscillator = SimpleNamespace(campaign=SimpleNamespace(stop=stop))
-    before = SimpleNamespace(target=SimpleNamespace(oscillator=oscillator))
+    before = SimpleNamespace(density=SimpleNamespace(oscillator=oscillator))
     words = _detectable(SimpleNamespace(limits=(one,), before=before))
     assert f"moves {told}" in words

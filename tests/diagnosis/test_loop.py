@@ -61,7 +61,7 @@ def physical_z(fit, mean=None, sd=None) -> dict[str, float]:
     mean = fit.mode if mean is None else mean
     sd = fit.sd if sd is None else sd
     truth = small_rig.true_values()
-    roles = fit.target.oscillator.layout.roles("physical")
+    roles = fit.density.oscillator.layout.roles("physical")
     return {fit.names[i]: (mean[i] - truth[fit.names[i]]) / sd[i] for i in roles}
 
 
@@ -83,7 +83,7 @@ def test_a_diagnosis_is_one_line_and_can_be_pickled(kind, request):
 def test_a_search_that_ended_by_its_limit_is_said_whatever_the_verdict(kind, request):
     found = request.getfixturevalue(kind)
     verdict = "ambiguous" if kind == "named" else found.verdict
-    ended = replace(found, verdict=verdict, naming=replace(found.naming, finished=False))
+    ended = replace(found, verdict=verdict, selection=replace(found.selection, finished=False))
     said = "The search ended by its limit: not everything that may be missing was tried."
     assert written(ended)["summary"].endswith(f". {said}")
     assert said not in written(found)["summary"]
@@ -112,7 +112,7 @@ def test_a_concealed_effect_is_named_and_the_parameters_mended(named):
     assert named.location.displacement[0] >= small_rig.RIG.g
     assert named.held_out.improved and named.held_out.wins == 3
     assert "contact_hardening" not in {x.effect_id for x in named.limits}
-    assert named.naming.chosen.is_white and not named.naming.base.is_white
+    assert named.selection.chosen.is_white and not named.selection.base.is_white
 
 
 def test_an_effect_outside_the_catalogue_is_unknown_and_learned(unknown):
@@ -132,7 +132,7 @@ def test_an_effect_outside_the_catalogue_is_unknown_and_learned(unknown):
 
 
 def test_intervals_hold_what_comparable_models_make_of_a_parameter(monkeypatch):
-    def beside(naming, fit):
+    def beside(selection, fit):
         mode = fit.mode.copy()
         mode[fit.names.index("k1")] += 50.0
         return Comparable((replace(fit, mode=mode),), np.full(1, 0.5))
@@ -233,7 +233,7 @@ def test_the_document_takes_intervals_from_draws(named):
 
 
 def test_the_document_of_an_ambiguous_case_lists_the_rivals(named):
-    base = named.naming.base.candidate
+    base = named.selection.base.candidate
     rivals = (
         replace(base, effects=(BY_ID["spring_cubic"],)),
         replace(base, effects=(BY_ID["coulomb_friction"], BY_ID["sensor_drift"])),
@@ -257,12 +257,12 @@ def test_the_document_of_an_ambiguous_case_lists_the_rivals(named):
     ],
 )
 def test_an_unknown_force_may_be_the_probe_s_where_that_is_likeliest(unknown, effects, gain, said):
-    base = unknown.naming.base.candidate
+    base = unknown.selection.base.candidate
     own = tuple(BY_ID[i] for i in effects)
     likely = replace(base, effects=own, log_evidence=base.log_evidence + gain)
     less = replace(base, effects=(BY_ID["quadratic_drag"],), log_evidence=base.log_evidence - 9.0)
-    naming = replace(unknown.naming, tried=(base, less, likely))
-    content = written(replace(unknown, naming=naming, alternatives=()))
+    selection = replace(unknown.selection, tried=(base, less, likely))
+    content = written(replace(unknown, selection=selection, alternatives=()))
     told = f"Of the catalogue {' and '.join(e.title for e in own)} ("
     assert (told in content["summary"]) is (gain > 0.0)
     assert ("Seen as a force it would act" in content["summary"]) is said

@@ -7,7 +7,7 @@ import pytest
 from effect_rigs import BY_ID
 
 from bayesimpact.diagnosis.diagnose import diagnose
-from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 from bayesimpact.trial.rig.recordings import Release, Rig, make_campaign
 
 
@@ -21,7 +21,8 @@ def test_a_sine_is_told_from_its_cubic(amplitude: float, seed: int) -> None:
     """
     releases = [Release(f"swing{i}", "", -amplitude * f) for i, f in enumerate((1, 0.85, 0.7))]
     campaign = make_campaign(
-        "pendulum", Rig(0.024, 7e-4, 0.96), releases, {"pendulum_sine": {}}, Chain(noise=5e-4),
+        "pendulum", Rig(0.024, 7e-4, 0.96), releases, {"pendulum_sine": {}},
+        MeasuringChain(noise=5e-4),
         rate=100.0, duration=30.0, rng=np.random.default_rng(seed), quantity="angle",
     )  # fmt: skip
     names = ("pendulum_sine", "pendulum_with_spring", "spring_cubic", "spring_quintic",
@@ -30,4 +31,4 @@ def test_a_sine_is_told_from_its_cubic(amplitude: float, seed: int) -> None:
     found = diagnose(campaign, rng=np.random.default_rng(0), effects=effects, search=False)
     assert found.before.reduced_chi2 > 9
     assert found.verdict == "named" and [e.id for e in found.effects] == ["pendulum_sine"]
-    assert ("spring_cubic",) in [m.ids for m in found.naming.tried]
+    assert ("spring_cubic",) in [m.ids for m in found.selection.tried]

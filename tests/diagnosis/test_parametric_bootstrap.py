@@ -21,17 +21,17 @@ FEW = [BY_ID[i] for i in ("coulomb_friction", "quadratic_drag", "sensor_drift")]
 
 
 def test_a_simulated_campaign_has_the_design_and_the_noise(small):
-    campaign = small.fit.target.oscillator.campaign
+    campaign = small.fit.density.oscillator.campaign
     again = simulated(small.fit, np.random.default_rng(1))
     assert [r.name for r in again.recordings] == [r.name for r in campaign.recordings]
     left = np.concatenate(
         [r.samples - m for r, m in zip(again.recordings, small.fit.predicted, strict=True)]
     )
-    error = small.fit.target.likelihood.noise.level / np.sqrt(2 * left.size)
-    assert np.std(left) == pytest.approx(small.fit.target.likelihood.noise.level, abs=5 * error)
+    error = small.fit.density.likelihood.noise.level / np.sqrt(2 * left.size)
+    assert np.std(left) == pytest.approx(small.fit.density.likelihood.noise.level, abs=5 * error)
 
 
-def test_a_certificate_of_what_stands_out():
+def test_the_bootstrap_of_what_stands_out():
     campaign = small_rig.record(
         6,
         {"coulomb_friction": {"force": 6e-4}},

@@ -20,6 +20,6 @@ def test_what_is_less_than_a_bound_of_the_noise_remains(
     chi2: float, is_bound: bool, share: float
 ) -> None:
     likelihood = SimpleNamespace(noise=Noise(level=1e-3, is_bound=is_bound))
-    target = SimpleNamespace(likelihood=likelihood)
-    fit: Any = SimpleNamespace(rms=2e-3, reduced_chi2=chi2, target=target)
+    density = SimpleNamespace(likelihood=likelihood)
+    fit: Any = SimpleNamespace(rms=2e-3, reduced_chi2=chi2, density=density)
     assert beyond_noise(fit) == pytest.approx(2e-3 * share)

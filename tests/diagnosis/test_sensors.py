@@ -9,7 +9,7 @@ from effect_rigs import BY_ID
 
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.measurement.smoothing import whole_campaign
-from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 
 pytestmark = pytest.mark.long
 
@@ -30,7 +30,7 @@ def test_a_concealed_effect_is_named(quantity):
     campaign = small_rig.record(
         3,
         {"contact_damping_indentation": {"coefficient": TRUE}},
-        chain=Chain(noise=NOISE[quantity]),
+        chain=MeasuringChain(noise=NOISE[quantity]),
         quantity=quantity,
     )
     found = diagnose(campaign, rng=np.random.default_rng(0), effects=EFFECTS, search=False)

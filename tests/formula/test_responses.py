@@ -71,7 +71,7 @@ def driven() -> Fit:
 
 def simulated(fit: Fit, term: Term, size: float) -> tuple[np.ndarray, ...]:
     """Difference of two simulated motions over the size of the force that makes it, m/unit."""
-    campaign = fit.target.oscillator.campaign
+    campaign = fit.density.oscillator.campaign
     effect = effect_of(term, 1.0, 6.5e-3, 0.3, signed=True)
     assert effect.law is not None  # dry friction as a law too: the motion does not stick here
     with_it = build_oscillator(campaign, (effect,))

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from bayesimpact.inference.fit import Target
+from bayesimpact.inference.fit import PosteriorDensity
 from bayesimpact.inference.likelihood import Linearisation
 from bayesimpact.inference.prior import LogUniform, Uniform
 from bayesimpact.inference.priors import Priors
@@ -68,6 +68,6 @@ class Banana:
         return (Linearisation(self.residuals(theta[None])[0][0], jacobian, np.array([0, 1])),)
 
 
-def banana(**kind: float) -> Target:
+def banana(**kind: float) -> PosteriorDensity:
     priors = Priors((Uniform(-9, 9), Uniform(-9, 9), LogUniform(1e-6, 1e6)))
-    return Target(Banana(**kind), priors)
+    return PosteriorDensity(Banana(**kind), priors)

@@ -98,5 +98,5 @@ def test_several_quantities_with_and_without_an_input() -> None:
     assert fit.converged and len(errors) == 6 and np.abs(errors).max() < 4.0
     assert fit.reduced_chi2 == pytest.approx(1.0, abs=0.15)
     assert fit.value("offset[slow]") == pytest.approx(0.06, abs=0.004)
-    units = {p.name: p.unit for p in fit.target.oscillator.layout.parameters}
+    units = {p.name: p.unit for p in fit.density.oscillator.layout.parameters}
     assert [units[f"offset[{r.name}]"] for r in recordings] == ["m/s", "m/s2", "m", "m/s2"]

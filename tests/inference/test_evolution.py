@@ -33,7 +33,7 @@ def memory(f: float = 0.5, cr: float = 0.5) -> Memory:
 # -- bounds -----------------------------------------------------------------------------------
 
 
-def test_fold_keeps_what_is_inside_and_mirrors_the_rest() -> None:
+def test_reflection_keeps_what_is_inside_and_mirrors_the_rest() -> None:
     box = Box(np.array([-1.0, 100.0]), np.array([1.0, 104.0]))
     inside = np.array([[-1.0, 104.0], [0.1, 101.7], [1.0, 100.0]])
     np.testing.assert_array_equal(box.reflect(inside), inside)

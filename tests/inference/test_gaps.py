@@ -18,7 +18,7 @@ from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.model.measurement import smooth
 from bayesimpact.model.oscillator import build_oscillator
 from bayesimpact.trial.bundle import PAPER_RIG
-from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 from bayesimpact.trial.rig.recordings import Release, make_campaign
 
 INTERVAL = 1e-3
@@ -29,7 +29,14 @@ def simulated(duration: float, noise: float = 5e-6) -> Campaign:
     releases = [Release(f"r{i}", str(1 + i % 3), -5e-3 - 5e-4 * i, 0.0) for i in range(3)]
     rng = np.random.default_rng(5)
     return make_campaign(
-        "gaps", PAPER_RIG, releases, {}, Chain(noise), rate=1000.0, duration=duration, rng=rng
+        "gaps",
+        PAPER_RIG,
+        releases,
+        {},
+        MeasuringChain(noise),
+        rate=1000.0,
+        duration=duration,
+        rng=rng,
     )
 
 

@@ -29,7 +29,7 @@ from bayesimpact.inference.noise.estimate import estimate_noise
 from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.model.oscillator import build_oscillator
 from bayesimpact.trial.bundle import PAPER_RIG
-from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 from bayesimpact.trial.rig.recordings import Release
 
 SAVGOL = Smoothing("savgol", window=15, polyorder=2)
@@ -37,7 +37,7 @@ SAVGOL = Smoothing("savgol", window=15, polyorder=2)
 
 def physical_z(fit: Fit, truth: dict[str, float]) -> np.ndarray:
     """(mode - truth) / sd of the physical parameters."""
-    roles = fit.target.oscillator.layout.roles("physical")
+    roles = fit.density.oscillator.layout.roles("physical")
     return np.array([(fit.mode[i] - truth[fit.names[i]]) / fit.sd[i] for i in roles])
 
 
@@ -47,7 +47,7 @@ def assert_found(result: Identification, truth: dict[str, float]) -> None:
     z = physical_z(fit, truth)
     assert np.abs(z).max() < 4, dict(zip(fit.names, z, strict=False))
     assert abs(fit.reduced_chi2 - 1) < 6 * result.noise.level_error + 6 * np.sqrt(
-        2 / fit.target.likelihood.sizes.sum()
+        2 / fit.density.likelihood.sizes.sum()
     )
 
 
@@ -70,12 +70,12 @@ def test_the_bundled_campaign(paper):
 
 def search_again(found: Identification, seed: int) -> Fit:
     """The whole way again with another seed, bounds a factor of three about the guess."""
-    target = found.fit.target
-    guess = initial_theta(target.oscillator, found.estimates, found.noise)
+    density = found.fit.density
+    guess = initial_theta(density.oscillator, found.estimates, found.noise)
     _, start = global_search(
-        target.oscillator, target.priors, guess, rng=np.random.default_rng(seed)
+        density.oscillator, density.priors, guess, rng=np.random.default_rng(seed)
     )
-    return growing_horizon(target, start)
+    return growing_horizon(density, start)
 
 
 def assert_same(fit: Fit, other: Fit) -> None:
@@ -100,14 +100,16 @@ def test_fifty_of_fifty_seeds_reach_the_global_mode(paper):
 
 def test_a_guess_far_off_is_mended_by_the_search(paper):
     """k1, k2 and c2 wrong by factors of two: no local climb recovers from that, the search does."""
-    target = paper.fit.target
-    guess = initial_theta(target.oscillator, paper.estimates, paper.noise)
-    layout = target.oscillator.layout
+    density = paper.fit.density
+    guess = initial_theta(density.oscillator, paper.estimates, paper.noise)
+    layout = density.oscillator.layout
     for name, factor in {"k1": 1.6, "k2[1]": 0.5, "k2[2]": 2.0, "c2": 0.4}.items():
         guess[layout.index(name)] *= factor
     guess[layout.index("g")] *= 0.7
-    _, start = global_search(target.oscillator, target.priors, guess, rng=np.random.default_rng(0))
-    assert_same(growing_horizon(target, start), paper.fit)
+    _, start = global_search(
+        density.oscillator, density.priors, guess, rng=np.random.default_rng(0)
+    )
+    assert_same(growing_horizon(density, start), paper.fit)
 
 
 CHAIN = {"noise": small_rig.NOISE, "offsets": small_rig.OFFSETS}
@@ -115,8 +117,8 @@ KINDS = {
     "plain noise": {},
     "without the search": {"search": False},
     "a noise level each": {"sigma_per_recording": True},
-    "coloured": {"chain": Chain(**CHAIN, correlation=0.6)},
-    "rounded": {"chain": Chain(**CHAIN, rounding=1e-5)},
+    "coloured": {"chain": MeasuringChain(**CHAIN, correlation=0.6)},
+    "rounded": {"chain": MeasuringChain(**CHAIN, rounding=1e-5)},
     "few samples": {"rate": 200.0, "duration": 5.0},
     "stated noise": {"measurement": Measurement(noise=small_rig.NOISE)},
 }
@@ -133,7 +135,7 @@ def test_the_small_rig(kind):
 
 
 def test_smoothed_recordings():
-    chain = Chain(**CHAIN, smoothing=SAVGOL)
+    chain = MeasuringChain(**CHAIN, smoothing=SAVGOL)
     campaign = small_rig.record(12, chain=chain, measurement=Measurement(smoothing=SAVGOL))
     noise = Noise(smoothing=SAVGOL, level=small_rig.NOISE, level_error=0.01)
     result = identify(campaign, rng=np.random.default_rng(0), noise=noise)

@@ -14,7 +14,7 @@ from scipy.optimize import least_squares, minimize_scalar
 
 from bayesimpact.data.campaign import Smoothing
 from bayesimpact.inference.ascent import best_sigma
-from bayesimpact.inference.fit import Fit, Target, inverse
+from bayesimpact.inference.fit import Fit, PosteriorDensity, inverse
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.inference.noise.whitening import Noise
@@ -37,9 +37,9 @@ WIDE = {
 }  # fmt: skip
 
 
-def target(
+def density(
     campaign, noise=None, effects=(), *, sigma_per_recording=False, **priors: object
-) -> Target:
+) -> PosteriorDensity:
     noise = noise or Noise()
     oscillator = build_oscillator(
         campaign, effects, smoothing=noise.smoothing, sigma_per_recording=sigma_per_recording
@@ -48,17 +48,19 @@ def target(
         priors.get(n) or WIDE.get(n.split("[")[0]) or Normal(0.0, 1e6)
         for n in oscillator.layout.names
     ]
-    return Target(Likelihood(oscillator, noise), Priors(tuple(chosen)))
+    return PosteriorDensity(Likelihood(oscillator, noise), Priors(tuple(chosen)))
 
 
-def near_truth(problem: Target, values: dict[str, float], relative: float = 1e-3) -> np.ndarray:
+def near_truth(
+    problem: PosteriorDensity, values: dict[str, float], relative: float = 1e-3
+) -> np.ndarray:
     layout = problem.oscillator.layout
     rng = np.random.default_rng(5)
     known = {n: values.get(n, 0.0) for n in layout.names} | {"sigma": 1e-3}
     return small_rig.vector(layout, known) * (1 + relative * rng.standard_normal(layout.size))
 
 
-def scipy_mode(problem: Target, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+def scipy_mode(problem: PosteriorDensity, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     """Mode and covariance at the fit's noise levels, by SciPy with its own differences.
 
     Normal priors become further residuals; parameters are counted in the fit's deviations.
@@ -91,7 +93,7 @@ def scipy_mode(problem: Target, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     return mode, np.linalg.pinv(found.jac.T @ found.jac) * np.outer(scale, scale)
 
 
-def assert_same_mode(problem: Target, fit: Fit) -> None:
+def assert_same_mode(problem: PosteriorDensity, fit: Fit) -> None:
     mode, covariance = scipy_mode(problem, fit)
     assert fit.converged
     np.testing.assert_array_less(np.abs(mode - fit.mode) / fit.sd, 0.01)
@@ -111,16 +113,16 @@ PLAIN_TRUTH = small_rig.true_values(small_rig.PLAIN, small_rig.PLAIN_RELEASES)
 @pytest.mark.parametrize("stop", [False, True])
 def test_same_optimum_as_scipy(noise, stop):
     campaign = small_rig.record(3, duration=0.8, **({} if stop else PLAIN))
-    problem = target(campaign, noise)
+    problem = density(campaign, noise)
     truth = small_rig.true_values() if stop else PLAIN_TRUTH
     assert_same_mode(problem, find_mode(problem, near_truth(problem, truth)))
 
 
 def test_same_optimum_as_scipy_with_priors_that_matter():
     campaign = small_rig.record(3, duration=0.8, **PLAIN)
-    plain = find_mode(target(campaign), near_truth(target(campaign), PLAIN_TRUTH))
+    plain = find_mode(density(campaign), near_truth(density(campaign), PLAIN_TRUTH))
     width = 0.5 * plain.sd[plain.names.index("k1")]
-    problem = target(campaign, k1=Normal(plain.value("k1") + 4 * width, width))
+    problem = density(campaign, k1=Normal(plain.value("k1") + 4 * width, width))
     fit = find_mode(problem, near_truth(problem, PLAIN_TRUTH))
     assert_same_mode(problem, fit)
     assert (fit.value("k1") - plain.value("k1")) / width > 1.0  # pulled
@@ -129,7 +131,7 @@ def test_same_optimum_as_scipy_with_priors_that_matter():
 def test_same_optimum_as_scipy_by_differences():
     campaign = small_rig.record(3, {"quadratic_drag": {"coefficient": 0.05}}, duration=0.8)
     effects = (BY_ID["quadratic_drag"], BY_ID["sensor_quadratic"])
-    problem = target(campaign, None, effects)
+    problem = density(campaign, None, effects)
     start = near_truth(problem, small_rig.true_values())
     floor = [1e-2 if n.startswith("v0") else 1e-4 for n in problem.oscillator.layout.names]
     fit = find_mode(problem, start, steps=1e-5 * np.maximum(np.abs(start), floor))
@@ -145,7 +147,7 @@ def test_noise_levels_of_their_own():
     )
     campaign = replace(campaign, recordings=(campaign.recordings[0], second))
     levels = {f"sigma[{n}]": LogUniform(1e-9, 1e-2) for n in "ab"}
-    problem = target(campaign, sigma_per_recording=True, **levels)
+    problem = density(campaign, sigma_per_recording=True, **levels)
     truth = PLAIN_TRUTH | {"sigma[a]": 1e-3, "sigma[b]": 1e-3}
     fit = find_mode(problem, near_truth(problem, truth))
     assert_same_mode(problem, fit)
@@ -160,7 +162,7 @@ def test_a_bound_is_respected_and_the_rest_is_at_its_best():
     at_bound = 0
     for seed in range(6):
         campaign = small_rig.record(seed, rig=rig, releases=small_rig.PLAIN_RELEASES, duration=0.8)
-        problem = target(campaign)
+        problem = density(campaign)
         fit = find_mode(problem, near_truth(problem, PLAIN_TRUTH))
         mode, _ = scipy_mode(problem, fit)
         assert fit.converged and fit.value("c1") >= 0.0
@@ -171,7 +173,7 @@ def test_a_bound_is_respected_and_the_rest_is_at_its_best():
 
 def test_an_upper_bound_from_a_prior():
     campaign = small_rig.record(3, duration=0.8, **PLAIN)
-    problem = target(campaign, k1=Uniform(700.0, 808.0))
+    problem = density(campaign, k1=Uniform(700.0, 808.0))
     fit = find_mode(problem, near_truth(problem, PLAIN_TRUTH, 0.0))
     mode, _ = scipy_mode(problem, fit)
     assert fit.converged and fit.value("k1") == 808.0
@@ -181,7 +183,7 @@ def test_an_upper_bound_from_a_prior():
 def test_mode_of_the_density_itself():
     """No direction of the full posterior, noise level included, goes up; curvature as reported."""
     campaign = small_rig.record(4, duration=0.8)
-    problem = target(campaign, sigma=LogNormal(4e-6, 0.1), k1=Normal(808.0, 0.3))
+    problem = density(campaign, sigma=LogNormal(4e-6, 0.1), k1=Normal(808.0, 0.3))
     fit = find_mode(problem, near_truth(problem, small_rig.true_values()), tolerance=1e-6)
     assert fit.log_posterior == pytest.approx(problem(fit.mode)[0], abs=1e-6)
     step = 0.02 * fit.sd
@@ -232,7 +234,7 @@ def test_best_noise_level(prior, n):
 
 def test_what_a_fit_says_of_itself():
     campaign = small_rig.record(3, duration=0.8, **PLAIN)
-    problem = target(campaign, Noise(level=4e-6))
+    problem = density(campaign, Noise(level=4e-6))
     fit = find_mode(problem, near_truth(problem, PLAIN_TRUTH))
     residual = np.concatenate(
         [r.samples - m for r, m in zip(campaign.recordings, fit.predicted, strict=True)]
@@ -245,7 +247,7 @@ def test_what_a_fit_says_of_itself():
 
 
 def test_a_start_that_cannot_be_simulated_is_no_mode():
-    problem = target(small_rig.record(3, duration=0.3, **PLAIN))
+    problem = density(small_rig.record(3, duration=0.3, **PLAIN))
     start = near_truth(problem, PLAIN_TRUTH)
     start[1] = np.nan
     fit = find_mode(problem, start)
@@ -257,7 +259,7 @@ def test_what_the_recordings_do_not_tell_stays_where_it_was():
     """An obstacle never touched: its stiffness keeps its start and its prior's deviation."""
     releases = (small_rig.RELEASES[0], Release("c", "2", -0.9e-3))
     campaign = small_rig.record(3, releases=releases, duration=0.8)
-    problem = target(campaign)
+    problem = density(campaign)
     start = near_truth(problem, small_rig.true_values(releases=releases), 1e-6)
     fit = find_mode(problem, start)
     k2 = fit.names.index("k2[2]")
@@ -270,7 +272,7 @@ def test_what_the_recordings_do_not_tell_stays_where_it_was():
 
 
 def test_iterations_are_limited():
-    problem = target(small_rig.record(3, duration=0.8))
+    problem = density(small_rig.record(3, duration=0.8))
     start = near_truth(problem, small_rig.true_values(), 1e-2)
     assert find_mode(problem, start).iterations > 2
     fit = find_mode(problem, start, max_iterations=2)
@@ -278,7 +280,7 @@ def test_iterations_are_limited():
 
 
 @pytest.mark.parametrize(("steep", "iterations"), [(10.0, 10), (1e4, 300)])
-def test_a_curved_valley_is_followed_to_its_end(steep, iterations):
+def test_a_curved_profile_is_followed_to_its_end(steep, iterations):
     """Without bent steps it takes 16 and 1742."""
     start = np.array([-1.2, 1.0, 1.0])
     fit = find_mode(banana(steep=steep), start, max_iterations=iterations)
@@ -286,7 +288,7 @@ def test_a_curved_valley_is_followed_to_its_end(steep, iterations):
     np.testing.assert_allclose(fit.mode[:2], 1.0, atol=1e-4)
 
 
-def test_a_climb_that_will_not_reach_its_goal_ends_early():
+def test_an_ascent_that_will_not_reach_its_goal_ends_early():
     """Neither at once nor later where the goal lies within reach."""
     start, options = np.array([-1.2, 1.0, 1.0]), {"max_iterations": 300}
     whole = find_mode(banana(steep=1e4), start, **options)
@@ -298,8 +300,8 @@ def test_a_climb_that_will_not_reach_its_goal_ends_early():
     assert found.converged and found.iterations == whole.iterations
 
 
-def test_rough_derivatives_end_the_climb_where_they_tell_no_more():
-    """Off by a tenth they lead nowhere in a steep banana; the climb neither goes on nor claims."""
+def test_rough_derivatives_end_the_ascent_where_they_tell_no_more():
+    """Off by a tenth they lead nowhere in a steep banana; the ascent neither goes on nor claims."""
     start = np.array([1.01, 1.0201, 1.0])
     fit = find_mode(banana(rough=0.1, steep=1e3), start, max_iterations=300)
     assert fit.iterations < 200 and not fit.converged
@@ -317,7 +319,7 @@ def test_rough_derivatives_lead_near_the_mode_and_finer_ones_to_it():
     assert asked[0] and not asked[-1] and asked == sorted(asked, reverse=True)
 
 
-def test_a_climb_by_differences_that_gains_little_fails():
+def test_an_ascent_by_differences_that_gains_little_fails():
     """Derivatives that promise more than a standard deviation and gain a tenth of a nat."""
     start = np.array([0.5, 0.25, 1.0])
     problem = banana(rough=0.03, steep=1e3)
@@ -326,7 +328,7 @@ def test_a_climb_by_differences_that_gains_little_fails():
     assert find_mode(problem, start, max_iterations=300).iterations == 300
 
 
-def test_a_climb_ends_where_new_derivatives_gain_nothing():
+def test_an_ascent_ends_where_new_derivatives_gain_nothing():
     """Also without more damping; were that asked for, it would take 188 iterations, not 79."""
     start = np.array([1.01, 1.0201, 1.0])
     fit = find_mode(banana(rough=0.4), start, max_iterations=300)

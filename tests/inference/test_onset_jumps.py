@@ -1,4 +1,4 @@
-"""A reading beside a touch: whichever side it is on, a climb gets there."""
+"""A reading beside a touch: whichever side it is on, an ascent gets there."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from bayesimpact.data.recording import Recording
 from bayesimpact.inference import mode
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
-from bayesimpact.inference.onset_jumps import beyond_touch
+from bayesimpact.inference.onset_jumps import beyond_onset
 from bayesimpact.inference.refitted import refitted
 from bayesimpact.model.exact.simulate import simulate
 
@@ -41,31 +41,31 @@ def touched() -> tuple[Fit, int]:
 
 
 def _beside(fit: Fit, by: float) -> Fit:
-    """The fit with another gap, where a climb that takes no step ends."""
+    """The fit with another gap, where an ascent that takes no step ends."""
     start = fit.mode.copy()
     start[fit.names.index("g")] += by
-    return mode.find_mode(fit.target, start, max_iterations=0)
+    return mode.find_mode(fit.density, start, max_iterations=0)
 
 
-def test_a_reading_on_the_wrong_side_of_a_touch_is_set_right(
+def test_a_reading_on_the_wrong_side_of_an_onset_is_set_right(
     touched: tuple[Fit, int], monkeypatch: Any
 ) -> None:
     fit, k = touched
     assert abs(fit.linearisation[0].residual[k]) < 5 * fit.value("sigma")
-    assert beyond_touch(fit) is None
-    late = 3 * BESIDE * 0.2  # m; the speed at the touch is less
+    assert beyond_onset(fit) is None
+    late = 3 * BESIDE * 0.2  # m; the speed at the contact onset is less
     with monkeypatch.context() as without:
-        without.setattr(mode, "TOUCHES", 0)
+        without.setattr(mode, "MOST_ONSETS", 0)
         wrong = _beside(fit, late)
     assert abs(wrong.linearisation[0].residual[k]) > 5 * wrong.value("sigma")
-    beyond = beyond_touch(wrong)
+    beyond = beyond_onset(wrong)
     assert beyond is not None
-    assert fit.target(beyond)[0] > wrong.log_posterior + 30.0
+    assert fit.density(beyond)[0] > wrong.log_posterior + 30.0
     right = _beside(fit, late)
-    assert right.log_posterior > float(fit.target(beyond)[0])  # with a noise level of its own
+    assert right.log_posterior > float(fit.density(beyond)[0])  # with a noise level of its own
 
 
 def test_readings_that_do_not_jump_are_left_alone(touched: tuple[Fit, int]) -> None:
     """Where many readings are off, no single instant is."""
     fit, _ = touched
-    assert beyond_touch(_beside(fit, 2e-4)) is None
+    assert beyond_onset(_beside(fit, 2e-4)) is None

@@ -15,7 +15,7 @@ from scipy.linalg import toeplitz
 from bayesimpact.data.campaign import Campaign, Smoothing
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
-from bayesimpact.inference.fit import Fit, Target
+from bayesimpact.inference.fit import Fit, PosteriorDensity
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.inference.noise.whitening import Noise
@@ -64,7 +64,9 @@ def with_noise(
 
 
 def fitted(oscillator: Oscillator, noise: Noise, start: np.ndarray) -> Fit:
-    return find_mode(Target(Likelihood(oscillator, noise), flat_priors(oscillator)), start)
+    return find_mode(
+        PosteriorDensity(Likelihood(oscillator, noise), flat_priors(oscillator)), start
+    )
 
 
 NOISES = [Noise(), Noise(0.6), Noise(smoothing=SAVGOL), Noise(0.4, LAG)]
@@ -202,28 +204,30 @@ def test_a_chain_belongs_to_its_data_and_model(tmp_path):
     again = sample(fit, resume=True, **settings)
     np.testing.assert_array_equal(first.draws, again.draws)
     other = fitted(with_noise(oscillator, truth, Noise(), np.random.default_rng(4)), Noise(), truth)
-    same_data = fit.target.likelihood
+    same_data = fit.density.likelihood
     heavier = replace(data.campaign, mass=0.504)
     changed = (
         other,
-        replace(fit, target=Target(Likelihood(data, Noise(0.1)), fit.target.priors)),
+        replace(fit, density=PosteriorDensity(Likelihood(data, Noise(0.1)), fit.density.priors)),
         replace(
             fit,
-            target=Target(same_data, Priors((Uniform(0, 21), *fit.target.priors.parameters[1:]))),
-        ),
-        replace(
-            fit,
-            target=Target(
-                Likelihood(Oscillator(heavier, (), data.layout), Noise()), fit.target.priors
+            density=PosteriorDensity(
+                same_data, Priors((Uniform(0, 21), *fit.density.priors.parameters[1:]))
             ),
         ),
         replace(
             fit,
-            target=Target(
+            density=PosteriorDensity(
+                Likelihood(Oscillator(heavier, (), data.layout), Noise()), fit.density.priors
+            ),
+        ),
+        replace(
+            fit,
+            density=PosteriorDensity(
                 Likelihood(
                     Oscillator(data.campaign, (BY_ID["contact_no_tension"],), data.layout), Noise()
                 ),
-                fit.target.priors,
+                fit.density.priors,
             ),
         ),
     )

@@ -17,7 +17,7 @@ from bayesimpact.inference import likelihood
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects import SEARCHED
 from bayesimpact.model.rounding import Rounding
-from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 from bayesimpact.trial.rig.recordings import Release
 
 STEP, DITHER = 2e-4, 0.2
@@ -25,7 +25,7 @@ STEP, DITHER = 2e-4, 0.2
 
 def decays(seed: int, effects=None, releases=small_rig.PLAIN_RELEASES) -> Campaign:
     """Plain decays down to a few steps, read by an encoder."""
-    chain = Chain(noise=DITHER * STEP, offsets=small_rig.OFFSETS, rounding=STEP)
+    chain = MeasuringChain(noise=DITHER * STEP, offsets=small_rig.OFFSETS, rounding=STEP)
     return small_rig.record(
         seed, effects, rig=small_rig.PLAIN, releases=releases, chain=chain,
         duration=30.0, rate=200.0,
@@ -39,7 +39,7 @@ def fitted(campaign: Campaign):
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_what_steps_leave_is_told_by_their_average(seed, monkeypatch):
     fit = fitted(decays(seed))
-    found = fit.target.likelihood.rounding(0, fit.seen[0])
+    found = fit.density.likelihood.rounding(0, fit.seen[0])
     assert found is not None and found.noise == pytest.approx(DITHER * STEP, rel=0.1)
     assert fit.reduced_chi2 == pytest.approx(1.0, abs=0.06)
     monkeypatch.setattr(likelihood, "coarse_step", lambda recording, level: 0.0)
@@ -66,9 +66,9 @@ def test_the_lines_that_steps_make_of_a_steady_motion_are_no_hum(monkeypatch):
 
 
 def test_derivatives_go_through_the_steps():
-    """The slope of what a climb lowers, two standard deviations from the mode."""
+    """The slope of what an ascent lowers, two standard deviations from the mode."""
     fit = fitted(decays(4))
-    own, sign = fit.target.likelihood, np.resize([2.0, -2.0, 2.0], fit.mode.size)
+    own, sign = fit.density.likelihood, np.resize([2.0, -2.0, 2.0], fit.mode.size)
     theta = fit.mode + sign * fit.sd * (fit.sd < 0.5 * np.abs(fit.mode).clip(1e-9))
     assert isinstance(own.rounding(0, fit.seen[0]), Rounding)
 
@@ -99,7 +99,7 @@ def test_a_simulated_campaign_comes_in_the_same_steps():
 
 def encoder(seed: int) -> Campaign:
     """Impacts that pass many steps within a few samples, with a tenth of a step of noise."""
-    chain = Chain(noise=1.2e-6, offsets=small_rig.OFFSETS, rounding=1e-5)
+    chain = MeasuringChain(noise=1.2e-6, offsets=small_rig.OFFSETS, rounding=1e-5)
     return small_rig.record(seed, chain=chain)
 
 

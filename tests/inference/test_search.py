@@ -141,7 +141,7 @@ def test_the_crossover_rate_adapts_to_the_objective() -> None:
     assert min(rotated) > 0.85
 
 
-def test_without_learning_the_valley_takes_longer(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_learning_the_profile_takes_longer(monkeypatch: pytest.MonkeyPatch) -> None:
     settings = {"tolerance": 1e-8, "metropolis": False}
     learned = run(ellipsoid, -5, 5, 12, 3, **settings)
     monkeypatch.setattr("bayesimpact.inference.evolution.learn", lambda memory, *success: memory)
@@ -153,7 +153,7 @@ def test_without_learning_the_valley_takes_longer(monkeypatch: pytest.MonkeyPatc
 # -- cooling ----------------------------------------------------------------------------------
 
 
-def test_temperature_falls_from_the_first_spread_to_the_coldest() -> None:
+def test_temperature_falls_from_the_first_standard_deviation_to_the_coldest() -> None:
     budget, d = 12_000, 6
     first: list[Array] = []
 
@@ -175,7 +175,7 @@ def test_temperature_falls_from_the_first_spread_to_the_coldest() -> None:
     assert history.uphill[before < 0.1].mean() > 0.1
 
 
-def test_greedy_selection_never_climbs() -> None:
+def test_greedy_selection_never_ascent() -> None:
     history = run(rastrigin, -5.12, 5.12, 5, 1, metropolis=False).history
     assert (history.temperature == 0).all()
     assert (history.uphill == 0).all()
@@ -190,7 +190,7 @@ def test_without_cooling_nothing_converges(monkeypatch: pytest.MonkeyPatch) -> N
     assert hot.history.spread[-1] > 10 * cooled.history.spread[-1]
 
 
-def test_a_lower_spread_than_the_coldest_temperature_is_no_trouble() -> None:
+def test_a_lower_standard_deviation_than_the_coldest_temperature_is_no_trouble() -> None:
     result = run(lambda x: 1e-6 * sphere(x), -1, 1, 4, 0, tolerance=1e-12)
     assert result.history.temperature.max() <= 1e-6
     assert result.stopped == "converged"
@@ -268,7 +268,7 @@ def test_budget_is_kept_and_evaluations_are_counted() -> None:
     assert len(result.population) == search.FEWEST
 
 
-def test_the_stop_is_on_the_absolute_spread() -> None:
+def test_the_stop_is_on_the_absolute_standard_deviation() -> None:
     def shifted(x: Array) -> Array:
         return sphere(x) - 31_794.0
 

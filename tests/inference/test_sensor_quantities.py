@@ -17,7 +17,7 @@ NOISE = {"displacement": 5e-6, "velocity": 2e-4, "acceleration": 2e-2}
 def recorded(quantity, seed):
     noise = NOISE[quantity]
     offsets = {"a": 3 * noise, "b": -2 * noise, "c": 0.0}
-    chain = small_rig.Chain(noise=noise, offsets=offsets)
+    chain = small_rig.MeasuringChain(noise=noise, offsets=offsets)
     return small_rig.record(seed, quantity=quantity, chain=chain), offsets
 
 
@@ -47,7 +47,7 @@ def test_all_parameters_are_found(quantity):
 def test_accelerations_beside_a_jump_are_set_aside_and_said():
     campaign, _ = recorded("acceleration", 1)
     fit = identify(campaign, rng=np.random.default_rng(0), search=False).fit
-    kept = fit.target.oscillator.campaign
+    kept = fit.density.oscillator.campaign
     aside = [np.flatnonzero(~r.used) for r in kept.recordings if r.used is not None]
     assert len(aside) == 3 and f"{sum(x.size for x in aside)} accelerations" in kept.notes[-1]
     truth = small_rig.motion_of(0)
@@ -58,7 +58,7 @@ def test_accelerations_beside_a_jump_are_set_aside_and_said():
         r.used is None
         for r in identify(
             again, rng=np.random.default_rng(0), search=False
-        ).fit.target.oscillator.campaign.recordings
+        ).fit.density.oscillator.campaign.recordings
     )
 
 
@@ -78,8 +78,8 @@ def test_several_quantities_in_one_campaign():
     fit = identify(campaign, rng=np.random.default_rng(0), search=False).fit
     assert fit.converged and fit.reduced_chi2 == pytest.approx(1.0, abs=0.1)
     assert np.abs(errors(fit, offsets)).max() < 4.0
-    units = {p.name: p.unit for p in fit.target.oscillator.layout.parameters}
+    units = {p.name: p.unit for p in fit.density.oscillator.layout.parameters}
     assert [units[f"offset[{n}]"] for n in names] == ["m", "m/s", "m/s2"]
-    white = fit.target.likelihood.residuals(fit.mode[None])
+    white = fit.density.likelihood.residuals(fit.mode[None])
     for part in white:  # all in the unit of the first: the likelihood weighs them alike
         assert np.std(part[part != 0.0]) == pytest.approx(NOISE["displacement"], rel=0.1)

@@ -37,7 +37,9 @@ def recorded(
     **effects: dict[str, float],
 ) -> Campaign:
     noise = NOISE[quantity]
-    chain = small_rig.Chain(noise=noise, offsets={"a": 3 * noise, "b": -2 * noise, "c": 0.0})
+    chain = small_rig.MeasuringChain(
+        noise=noise, offsets={"a": 3 * noise, "b": -2 * noise, "c": 0.0}
+    )
     added = {"opposite_stop": second, **effects}
     campaign = small_rig.record(3, added, rig=rig, chain=chain, duration=1.5, quantity=quantity)
     return replace(campaign, declared=(SECOND_STOP,))
@@ -77,7 +79,7 @@ def test_the_mode_is_the_truth(
 def test_the_second_stop_has_a_damper_of_its_own() -> None:
     """Against the independent rig, which knows it as a second spring with damping."""
     second = {**SECOND, "damping": 4.0}
-    chain = small_rig.Chain(noise=5e-6, offsets={"a": 1e-5, "b": 0.0, "c": 0.0})
+    chain = small_rig.MeasuringChain(noise=5e-6, offsets={"a": 1e-5, "b": 0.0, "c": 0.0})
     campaign = small_rig.record(3, {"spring_piecewise": second}, chain=chain, duration=1.5)
     fit = identify(
         replace(campaign, declared=(SECOND_STOP,)), rng=np.random.default_rng(0), search=False
@@ -105,7 +107,7 @@ def test_what_is_missing_is_named_beside_both_stops() -> None:
     effects = tuple(BY_ID[i] for i in ("opposite_stop", "quadratic_drag", "spring_cubic"))
     found = diagnose(campaign, rng=np.random.default_rng(0), effects=effects, search=False)
     assert found.verdict == "named" and [e.id for e in found.effects] == ["quadratic_drag"]
-    assert all("opposite_stop" not in c.ids for c in found.naming.tried)
+    assert all("opposite_stop" not in c.ids for c in found.selection.tried)
     name = "quadratic_drag.coefficient"
     sd = found.after.sd[found.after.names.index(name)]
     assert abs(found.after.value(name) - DRAG) < 4.0 * sd

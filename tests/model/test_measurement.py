@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bayesimpact.data.campaign import Smoothing
-from bayesimpact.model.measurement import edge, gain, smooth
+from bayesimpact.model.measurement import edge, magnitude_response, smooth
 
 INTERVAL = 1e-3
 SAVGOL = Smoothing("savgol", window=21, polyorder=2)
@@ -49,7 +49,7 @@ def test_lag_is_the_exact_response_to_a_staircase():
 def test_no_filter_changes_nothing():
     x = np.random.default_rng(2).standard_normal((2, 30))
     assert smooth(x, None, INTERVAL) is x
-    np.testing.assert_array_equal(gain(None, INTERVAL, np.array([0.0, 50.0])), 1.0)
+    np.testing.assert_array_equal(magnitude_response(None, INTERVAL, np.array([0.0, 50.0])), 1.0)
     assert edge(None, INTERVAL) == 0
 
 
@@ -78,7 +78,7 @@ def test_gain_is_what_a_long_sine_loses(smoothing, frequency):
     wave = np.exp(2j * np.pi * frequency * t)
     passed = smooth(wave.real, smoothing, INTERVAL) + 1j * smooth(wave.imag, smoothing, INTERVAL)
     ratio = np.abs(passed[inside] / wave[inside])
-    expected = gain(smoothing, INTERVAL, np.array([frequency]))[0]
+    expected = magnitude_response(smoothing, INTERVAL, np.array([frequency]))[0]
     np.testing.assert_allclose(ratio, expected, atol=1e-12)
 
 

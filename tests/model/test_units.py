@@ -26,7 +26,7 @@ from bayesimpact.model.units import (
     typeset,
     without_zero,
 )
-from bayesimpact.report.results import ChainSummary
+from bayesimpact.report.results import MeasuringChainSummary
 from bayesimpact.report.rows import scaling_unit, widened
 
 BASE = {"m": "kg", "c1": "N s/m", "k1": "N/m", "c2": "N s/m", "g": "m", "k2": "N/m"}
@@ -121,14 +121,17 @@ def test_unit_over_the_mass(unit: str, expected: str) -> None:
 
 
 def test_uncertainty_of_mass_clock_and_gain_widens_by_dimensions() -> None:
-    chain = ChainSummary("", mass_sd=1e-3, clock_sd=2e-4, gain_sd=5e-3)
+    chain = MeasuringChainSummary("", mass_sd=1e-3, clock_sd=2e-4, gain_sd=5e-3)
     low, high = widened(800.0, (799.9, 800.2), "N/m", chain, angle=False)
     systematic = Z90 * 800 * np.hypot(1e-3, 2 * 2e-4)
     assert low == pytest.approx(800 - np.hypot(0.1, systematic))
     assert high == pytest.approx(800 + np.hypot(0.2, systematic))
     gap = widened(1.1e-3, (1.1e-3 - 1e-9, 1.1e-3 + 1e-9), "m", chain, angle=False)
     assert gap[1] - 1.1e-3 == pytest.approx(np.hypot(1e-9, Z90 * 1.1e-3 * 5e-3))
-    assert widened(2.0, (1.0, 3.0), "N/m", ChainSummary("", 0, 0, 0), angle=False) == (1.0, 3.0)
+    assert widened(2.0, (1.0, 3.0), "N/m", MeasuringChainSummary("", 0, 0, 0), angle=False) == (
+        1.0,
+        3.0,
+    )
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,8 @@ from bayesimpact.report import checks
 from bayesimpact.report.results import (
     BackboneCurve,
     BackboneSummary,
-    ChainSummary,
     Draws,
+    MeasuringChainSummary,
     NoiseSummary,
     Provenance,
     RecordingResult,
@@ -134,7 +134,7 @@ def make_results(
         name="rig <1> & others", mass=MASS, stop=stop, quantity="displacement",
         recordings=recordings, rows=table, effects=(),
         noise=NoiseSummary("white", NOISE, 0.003, 0.0, "polynomial remainders", True),
-        chain=ChainSummary("", 0.0, 0.0, 0.0), verdict="", headline="", reduced_chi2=chi2,
+        chain=MeasuringChainSummary("", 0.0, 0.0, 0.0), verdict="", headline="", reduced_chi2=chi2,
         chi2_z=(chi2 - 1) / np.sqrt(2 / (count * n)), log_posterior=1234.5,
         covariance=np.diag([r.sd**2 for r in table]), fit_converged=True, search=search,
         sampler=sampler, draws=draws, backbone=backbone, checks=(),
@@ -144,7 +144,7 @@ def make_results(
     return checks.assessed(replace(made, **changes))
 
 
-def with_chain(results: Results, chain: ChainSummary) -> Results:
+def with_chain(results: Results, chain: MeasuringChainSummary) -> Results:
     """The same results with stated uncertainties of mass, clock and gain."""
     table = tuple(
         replace(r, total90=widened(r.median, r.ci90, r.unit, chain, angle=False))

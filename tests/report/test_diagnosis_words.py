@@ -91,8 +91,8 @@ def test_what_remains_is_said_in_units():
 def fit_of(rms: float, *inputs: object):
     recordings = tuple(SimpleNamespace(input=i) for i in inputs)
     campaign = SimpleNamespace(recordings=recordings)
-    target = SimpleNamespace(oscillator=SimpleNamespace(campaign=campaign))
-    return SimpleNamespace(rms=rms, signal=1.0, target=target)
+    density = SimpleNamespace(oscillator=SimpleNamespace(campaign=campaign))
+    return SimpleNamespace(rms=rms, signal=1.0, density=density)
 
 
 def test_a_failed_base_fit_says_what_may_be_wrong():

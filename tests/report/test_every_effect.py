@@ -72,14 +72,14 @@ def extended(small: Identification, effect_id: str) -> Fit:
 
 
 def table(fit: Fit) -> dict[str, Any]:
-    units = [p.unit for p in fit.target.oscillator.layout.parameters]
+    units = [p.unit for p in fit.density.oscillator.layout.parameters]
     rows = zip(fit.names, fit.mode, fit.sd, units, strict=True)
     return {name: estimate(float(mode), float(sd), unit) for name, mode, sd, unit in rows}
 
 
 def written(small: Identification, fit: Fit, folder: Path, verdict: str = "named") -> Written:
     """The report of a diagnosis that ends with this fit."""
-    ids = [e.id for e in fit.target.oscillator.effects]
+    ids = [e.id for e in fit.density.oscillator.effects]
     own = {name: row for name, row in table(fit).items() if "." in name}
     content = {
         **DIAGNOSIS,
@@ -120,10 +120,10 @@ def pair(small: Identification) -> Iterator[Fit]:
 
     effects = tuple(BY_ID[i] for i in ("contact_damping_per_case", "gap_per_recording"))
     scales = campaign_scales(small.fit)
-    target = extend(small.fit, effects, scales)
-    mode = transfer(small.fit, target.oscillator.layout, effects, scales, {})
+    density = extend(small.fit, effects, scales)
+    mode = transfer(small.fit, density.oscillator.layout, effects, scales, {})
     covariance = np.diag(np.square(1e-3 * np.abs(mode) + 1e-9))
-    yield replace(small.fit, target=target, mode=mode, covariance=covariance)
+    yield replace(small.fit, density=density, mode=mode, covariance=covariance)
 
 
 @pytest.mark.parametrize("verdict", VERDICTS)

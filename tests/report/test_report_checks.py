@@ -148,11 +148,11 @@ def p_value(x: np.ndarray, smoothing: Smoothing | None, used: np.ndarray | None)
     recording = SimpleNamespace(samples=x, interval=1e-3, used=used)
     seen = x if smoothing is None else smooth(x, smoothing, 1e-3)
     campaign = SimpleNamespace(recordings=[recording])
-    target = SimpleNamespace(
+    density = SimpleNamespace(
         likelihood=SimpleNamespace(noise=noise), oscillator=SimpleNamespace(campaign=campaign)
     )
     part = SimpleNamespace(residual=noise.whiten(seen, 1e-3, used))
-    return whiteness(SimpleNamespace(target=target, linearisation=[part]), 0)
+    return whiteness(SimpleNamespace(density=density, linearisation=[part]), 0)
 
 
 def gap(n: int) -> np.ndarray:

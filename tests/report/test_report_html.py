@@ -15,7 +15,7 @@ from synthetic import NOISE, make_results, row, with_chain
 
 from bayesimpact.report.checks import assessed
 from bayesimpact.report.html import render
-from bayesimpact.report.results import ChainSummary, EffectSummary, Results
+from bayesimpact.report.results import EffectSummary, MeasuringChainSummary, Results
 
 # The smallest PNG: one pixel.
 PNG = base64.b64decode(
@@ -135,7 +135,7 @@ def test_intervals_say_what_they_contain() -> None:
     assert "states no uncertainty of mass, clock or probe gain" in parsed.text
     # 0.1 % of 808.556 over the half-width 0.00493
     assert "for k1 that is 160 times the half-width" in parsed.text
-    stated = with_chain(results, ChainSummary("", 1e-3, 0.0, 2e-3))
+    stated = with_chain(results, MeasuringChainSummary("", 1e-3, 0.0, 2e-3))
     text = page(stated)[1].text
     assert "mass 0.10 %, gain 0.20 %" in text and "clock 0" not in text
     half = 1.645 * 808.556e-3

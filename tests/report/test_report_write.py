@@ -161,19 +161,19 @@ def test_posterior_for_arviz(posterior: Posterior, identification: Identificatio
     assert begins[0] == 0.0 and begins.size == len(parts) and begins.max() < 1.2
     assert told(data)["seed"] == 3 and told(data)["converged"]
     # One draw's log likelihood, from its parameters
-    target = posterior.fit.target
+    density = posterior.fit.density
     theta = posterior.chains.draws[1, 0, 0]
     assert float(drawn["k1"][1, 0]) == theta[posterior.names.index("k1")]
-    expected = target.likelihood.per_recording(theta[None])[0]
+    expected = density.likelihood.per_recording(theta[None])[0]
     whole = [likelihood.values[1, 0][np.array(parts) == n].sum() for n in dict.fromkeys(parts)]
     assert np.allclose(whole, expected, rtol=1e-6)
     predicted = data["posterior_predictive"]["case1_a"].values[0]
-    recorded = identification.fit.target.oscillator.campaign.recordings[0].samples
+    recorded = identification.fit.density.oscillator.campaign.recordings[0].samples
     # Simulated recordings differ from the real one by the noise of both.
     assert np.std(predicted - recorded) == pytest.approx(5e-6 * np.sqrt(2), rel=0.05)
     observed = data["observed_data"]["case1_a"]
     assert np.array_equal(observed.values, recorded)
-    assert float(data["constant_data"]["mass"]) == posterior.fit.target.oscillator.campaign.mass
+    assert float(data["constant_data"]["mass"]) == posterior.fit.density.oscillator.campaign.mass
     assert data["prior"]["k2"].dims == drawn["k2"].dims
     assert float(data["prior"]["k1"].std()) > 100 * float(drawn["k1"].std())
 
@@ -223,7 +223,7 @@ def test_backbones_of_a_model_that_fits(posterior: Posterior) -> None:
     assert np.all(summary.inside > 0.7)
     assert summary.p_values[-1] > 0.01
     curve = next(c for c in summary.curves if c.recording == "case3_b" and c.branch == "upper")
-    recording = posterior.fit.target.oscillator.campaign.recordings[1]
+    recording = posterior.fit.density.oscillator.campaign.recordings[1]
     rest = float(np.median(posterior.column("offset[case3_b]")))
     own = backbone(recording.samples, recording.interval, rest=rest).upper
     index = np.searchsorted(own.times, curve.times)

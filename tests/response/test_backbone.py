@@ -108,7 +108,7 @@ def test_noise_makes_no_double_crossings(interval: float, n: int) -> None:
     assert b.upper.times[:count] == pytest.approx(clean.upper.times[:count], abs=0.02)
 
 
-def test_swings_stop_where_the_noise_takes_over() -> None:
+def test_half_cycles_stop_where_the_noise_takes_over() -> None:
     motion = paper_motion(30_000, k2=0.0, c2=0.0, g=1.0)
     b = backbone(noisy(motion, 2e-4), 1e-3)
     assert 1.0e-3 < b.upper.amplitude[-1] < 1.6e-3
@@ -188,7 +188,7 @@ def test_spectral_period_is_of_the_right_size(changed: dict[str, float]) -> None
     assert max(0.4 * longest, shortest) < spectral_period(samples) < 1.1 * longest
 
 
-def test_no_swing_no_backbone() -> None:
+def test_no_half_cycle_no_backbone() -> None:
     b = backbone(np.linspace(0, 1, 100), 1e-3)
     assert b.upper.times.size == b.lower.times.size == 0
 

@@ -93,7 +93,7 @@ def test_draws_that_end_early_are_left_out(pool: list[Backbone]) -> None:
     assert check.bands["upper frequency"].at.size > 8
 
 
-def test_without_a_swing_there_is_no_verdict() -> None:
+def test_without_a_half_cycle_there_is_no_verdict() -> None:
     flat = NOISE * np.random.default_rng(0).standard_normal((20, 200))
     check = check_backbone(flat[0], flat[1:], INTERVAL, noise=NOISE)
     assert np.isnan(check.p_value)

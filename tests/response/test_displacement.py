@@ -52,7 +52,7 @@ def test_the_period_is_that_of_the_motion_whatever_is_read(rig):
 
 @pytest.mark.parametrize("quantity", ["velocity", "acceleration"])
 def test_start_values(quantity):
-    chain = small_rig.Chain(noise=NOISE[1 if quantity == "velocity" else 2])
+    chain = small_rig.MeasuringChain(noise=NOISE[1 if quantity == "velocity" else 2])
     found = estimate(small_rig.record(quantity=quantity, chain=chain, duration=3.0)).values
     true = small_rig.true_values(offsets=dict.fromkeys("abc", 0.0))
     assert found["k1"] == pytest.approx(true["k1"], rel=0.1)

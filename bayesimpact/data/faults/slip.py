@@ -42,10 +42,11 @@ def find_slips(recording: Recording) -> list[Fault]:
     passed, which is what corners of the motion reach, and what rounding may do to both. A slip is
     of whole samples: its sides are apart by half a sample's way of the motion or more, while an
     impact, or a stop that chatters, bends the motion by less. An acceleration jumps by itself where
-    the mass turns, and friction with it. A velocity towards the stop becomes less at a touch, where
-    the obstacle has a mass; samples lost there show when recordings are compared. Where both sides
-    do meet once a few samples beside the place are left out, those were a spike. The remedy keeps
-    the longest part without a slip: how many samples are missing need then not be known.
+    the mass turns, and friction with it. A velocity towards the stop becomes less at a contact
+    onset, where the obstacle has a mass; samples lost there show when recordings are compared.
+    Where both sides do meet once a few samples beside the place are left out, those were a spike.
+    The remedy keeps the longest part without a slip: how many samples are missing need then not be
+    known.
     """
     x = recording.samples
     period = crossing_period(x, 1.0)
@@ -54,8 +55,8 @@ def find_slips(recording: Recording) -> list[Fault]:
     jump = np.abs(sides.after - sides.before)
     jump = np.where(np.isfinite(jump), jump, 0.0)
     if recording.used is not None:
-        touched = np.convolve(~recording.used, np.ones(2 * form[1] + 1), mode="same") > 0.5
-        jump[touched] = 0.0
+        affected = np.convolve(~recording.used, np.ones(2 * form[1] + 1), mode="same") > 0.5
+        jump[affected] = 0.0
     level = robust_sd(jump[jump > 0.0])
     if level == 0.0:
         return []
@@ -69,7 +70,9 @@ def find_slips(recording: Recording) -> list[Fault]:
     if recording.order == 2 and period is not None:  # friction turns round with the mass
         size = np.abs(x - np.mean(x)) * 2.0 * np.pi / period
         strong &= ~(way < TURNING * size)
-    if recording.order == 1 and recording.case:  # an obstacle's mass takes of it at every touch
+    if (
+        recording.order == 1 and recording.case
+    ):  # an obstacle's mass takes of it at every contact onset
         strong &= ~((sides.before > 0.0) & (np.abs(sides.after) < sides.before))
     places = [
         p

@@ -57,16 +57,16 @@ def find_start(recording: Recording) -> list[Fault]:
     half = int(min(WIDE, NARROW * period) - 1) // 2
     x = median_filter(quiet, 2 * max(half, 0) + 1, mode="nearest")  # blind to spikes
     noise, step = noise_level(quiet), reading_step(recording.samples)
-    settled = float(np.median(x[x.size // 2 :]))
-    largest = peak = int(np.argmax(np.abs(x - settled)))
-    height = abs(float(x[peak] - settled))
+    rest_reading = float(np.median(x[x.size // 2 :]))
+    largest = peak = int(np.argmax(np.abs(x - rest_reading)))
+    height = abs(float(x[peak] - rest_reading))
     band = max(BAND * noise, 2.0 * step, LEAST_BAND * height)
     natural = np.sqrt(2.0 * band / max(height, band)) * period / (2 * np.pi)
     least = max(NATURAL * natural + COARSE, SHORTEST * period, FEWEST)
     moves = order_of(recording.quantity) > 0 and _moves(quiet, band)
-    hand = _grown(x - settled, peak, period)
+    hand = _grown(x - rest_reading, peak, period)
     if not hand:
-        peak = _pushed(x - settled, band, period)
+        peak = _pushed(x - rest_reading, band, period)
         hand = peak > 0
     rest = _leaves(x, peak if hand else 0, band, None if hum is None else hum.frequency)
     if not hand and (
@@ -74,7 +74,7 @@ def find_start(recording: Recording) -> list[Fault]:
     ):
         return []
     soon = not hand and largest < rest + LATE * period and order_of(recording.quantity) == 0
-    moved = soon and _is_moved(x - settled, rest, band)
+    moved = soon and _is_moved(x - rest_reading, rest, band)
     first = max(rest, peak if hand else largest) if hand or moved else rest
     if first > 0.7 * x.size:
         return []
@@ -118,8 +118,8 @@ def _moves_on(x: Array, noise: float, band: float) -> bool:
         return False
     t = np.linspace(-0.5, 0.5, rest.size)
     change = float(t @ rest / (t @ t))
-    spread = max(noise, float(np.sqrt(_left(t[:, None], rest) / (rest.size - 2))))
-    error = spread / float(np.sqrt(t @ t))
+    residual_sd = max(noise, float(np.sqrt(_left(t[:, None], rest) / (rest.size - 2))))
+    error = residual_sd / float(np.sqrt(t @ t))
     if abs(change) < max(DRIFT * band, float(norm.isf(0.5 * FALSE_ALARM)) * error):
         return False
     t = np.linspace(0.0, 1.0, x.size)

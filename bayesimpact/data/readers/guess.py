@@ -125,5 +125,5 @@ def units_by_name(name: str) -> tuple[str, ...]:
 def _variation(channel: Channel) -> float:
     """Standard deviation of a channel's finite readings, SI where its unit is known."""
     finite = channel.samples[np.isfinite(channel.samples)]
-    spread = float(np.std(finite)) if finite.size else 0.0
-    return spread * UNITS.get(channel.unit, ("", 1.0))[1]
+    sd = float(np.std(finite)) if finite.size else 0.0
+    return sd * UNITS.get(channel.unit, ("", 1.0))[1]

@@ -43,8 +43,8 @@ class Asked:
         self.base, self.effects, self.scales = base, effects, scales
         self.of_motion: dict[tuple[object, ...], LikelySets] = {}
         self.of_periods: dict[tuple[object, ...], PeriodSets] = {}
-        self.has_stop = base.target.oscillator.campaign.stop
-        recordings = base.target.oscillator.campaign.recordings
+        self.has_stop = base.density.oscillator.campaign.stop
+        recordings = base.density.oscillator.campaign.recordings
         self.quiet = recordings_without_hums(recordings)
         self.hums = any(a is not b for a, b in zip(self.quiet, recordings, strict=True))
 
@@ -52,8 +52,10 @@ class Asked:
         """The problem about a model's rest and gap, of stretches in `flight` or of all."""
         key = model.ids, model.fit.log_posterior, flight
         if key not in self.of_motion:
-            layout = self.base.target.oscillator.layout
-            mode = transfer(model.fit, layout, self.base.target.oscillator.effects, self.scales, {})
+            layout = self.base.density.oscillator.layout
+            mode = transfer(
+                model.fit, layout, self.base.density.oscillator.effects, self.scales, {}
+            )
             self.of_motion[key] = LikelySets(
                 replace(self.base, mode=mode), self.effects, self.scales,
                 flight=flight, known=known_effects(model), recordings=self.of_the_motion(model),
@@ -66,7 +68,7 @@ class Asked:
         """
         key = model.ids, about.ids, about.fit.log_posterior
         if key not in self.of_periods:
-            layout = model.fit.target.oscillator.layout
+            layout = model.fit.density.oscillator.layout
             mode = transfer(about.fit, layout, model.effects, self.scales, {})
             at = replace(model.fit, mode=mode)
             self.of_periods[key] = PeriodSets(
@@ -83,7 +85,7 @@ class Asked:
         """The recordings less their hums, which no motion makes; None where the model has a line,
         or there are none.
         """
-        acting = (*model.fit.target.oscillator.acting, *model.effects)
+        acting = (*model.fit.density.oscillator.acting, *model.effects)
         return None if not self.hums or any(map(is_periodic, acting)) else self.quiet
 
     def first(
@@ -104,9 +106,9 @@ class Asked:
             every = (self.about(about, flight=False), model.ids)
             problems.append((ahead, ()) if ahead.terms else every)
         gains = [problem.gains(ids) for problem, ids in problems]
-        judges = [g for g in gains if instead in g] or gains
+        judging = [g for g in gains if instead in g] or gains
         first, seen = set[str](), set[str]()
-        for found in judges:
+        for found in judging:
             least = NEAR_BEST * found.get(instead, -np.inf) - NEAR_MARGIN
             kept = {i: g for i, g in found.items() if i not in seen and g >= least}
             first |= set(sorted(kept, key=lambda i: -kept[i])[:ASKED])

@@ -35,7 +35,7 @@ from bayesimpact.diagnosis.score_test.directions import (
     size_steps,
 )
 from bayesimpact.diagnosis.thresholds import DOUBT
-from bayesimpact.inference.fit import Fit, Target
+from bayesimpact.inference.fit import Fit, PosteriorDensity
 from bayesimpact.model.effects.effect import Effect, Scales
 from bayesimpact.model.linear_response.path_forces import add_forces
 from bayesimpact.model.oscillator import Oscillator
@@ -83,7 +83,7 @@ def measured_paths(fit: Fit, *, flight: bool = False) -> list[Path]:
     """Every recording's displacement and velocity from its own readings, about the fit's rest and
     gap; of those in `flight` the stretches do not reach the stop.
     """
-    o, noise = fit.target.oscillator, fit.target.likelihood.noise
+    o, noise = fit.density.oscillator, fit.density.likelihood.noise
     found = []
     for r, q in zip(o.campaign.recordings, o.layout.slots(fit.mode), strict=True):
         period = 2 * np.pi * float(np.sqrt(o.campaign.mass / q[_K1]))
@@ -100,9 +100,9 @@ def measured_paths(fit: Fit, *, flight: bool = False) -> list[Path]:
     return found
 
 
-def _without(rows: Rows, touched: NDArray[np.bool_]) -> Rows:
-    """Stretches less those with a sample in `touched` (n,)."""
-    seen = products(touched.astype(np.float64), rows.hop, np.ones(rows.phi.size))[:, 0]
+def _without(rows: Rows, affected: NDArray[np.bool_]) -> Rows:
+    """Stretches less those with a sample in `affected` (n,)."""
+    seen = products(affected.astype(np.float64), rows.hop, np.ones(rows.phi.size))[:, 0]
     return _only(rows, seen == 0.0)
 
 
@@ -137,7 +137,7 @@ def base_columns(fit: Fit, paths: Sequence[Path]) -> tuple[list[Array], list[Arr
     """Whitened (stretches, b) of the base model's parameters and (stretches,) of what they must
     explain, per recording, and the parameters' names; the rest readings are already taken out.
     """
-    o = fit.target.oscillator
+    o = fit.density.oscillator
     campaign, slots = o.campaign, o.layout.slots(fit.mode)
     names = ["k1", "c1", *([INPUT_GAIN] if INPUT_GAIN in o.layout.names else [])]
     if campaign.stop:
@@ -152,8 +152,8 @@ def base_columns(fit: Fit, paths: Sequence[Path]) -> tuple[list[Array], list[Arr
             target = target + rows.base[:, 2]
         if campaign.stop:
             inside = np.maximum(path.d, 0.0)
-            touched = products(inside, rows.hop, rows.phi, rows.slope) * rows.kept[:, None]
-            found[f"k2[{r.case}]"], found["c2"] = touched.T
+            contact_products = products(inside, rows.hop, rows.phi, rows.slope) * rows.kept[:, None]
+            found[f"k2[{r.case}]"], found["c2"] = contact_products.T
             found["g"] = -q[_K2] * rows.integrals((path.d > 0).astype(np.float64))
         own = np.stack([found.get(name, 0.0 * target) for name in names], axis=1)
         white = without_rest(path, np.column_stack([own, target]))
@@ -180,10 +180,10 @@ def terms_of(
     for effect in effects:
         if is_periodic(effect) or not is_a_force(effect) or not effect.admissible(scales):
             continue
-        target = extend(fit, (effect,), scales)
+        density = extend(fit, (effect,), scales)
         grid = shape_points(effect, scales)
         for shapes in shape_points(effect, scales, FINER):
-            term = term_at(fit, target, effect, scales, shapes, paths)
+            term = term_at(fit, density, effect, scales, shapes, paths)
             if term is not None:
                 found.append(replace(term, on_grid=shapes in grid))
     return found
@@ -201,22 +201,22 @@ def is_a_force(effect: Effect) -> bool:
 
 def term_at(
     fit: Fit,
-    target: Target,
+    density: PosteriorDensity,
     effect: Effect,
     scales: Scales,
     shapes: Mapping[str, float],
     paths: Sequence[Path],
 ) -> EffectColumns | None:
-    """What an effect of `target` adds at one point of its shapes, all others at their null; None
+    """What an effect of `density` adds at one point of its shapes, all others at their null; None
     where that is nothing, or not finite.
     """
-    layout = target.oscillator.layout
-    theta = at_null(target, transfer(fit, layout, (effect,), scales, shapes))
-    sizes = size_parameters(target, effect)
-    points, steps = size_steps(target, effect, theta, scales)
+    layout = density.oscillator.layout
+    theta = at_null(density, transfer(fit, layout, (effect,), scales, shapes))
+    sizes = size_parameters(density, effect)
+    points, steps = size_steps(density, effect, theta, scales)
     columns = []
     for r, path in enumerate(paths):
-        added = _added(target, effect, r, path, points)
+        added = _added(density, effect, r, path, points)
         changes = (added[1:] - added[0]) / steps[:, None]
         own = np.concatenate([added[:1], changes])
         columns.append(without_rest(path, own.T))
@@ -231,9 +231,9 @@ def term_at(
     )  # fmt: skip
 
 
-def _added(target: Target, effect: Effect, r: int, path: Path, points: Array) -> Array:
+def _added(density: PosteriorDensity, effect: Effect, r: int, path: Path, points: Array) -> Array:
     """What an effect adds to the left-hand side, integrated, for parameters (K, d): (K, n)."""
-    o = target.oscillator
+    o = density.oscillator
     q = np.ascontiguousarray(o.layout.slots(points)[:, r])
     force = np.zeros((q.shape[0], path.y.size))
     for law in o.laws:

@@ -63,7 +63,7 @@ class LikelySets(TermSets):
         known: Sequence[Known] = (),
         recordings: Sequence[Recording] | None = None,
     ) -> None:
-        o, cost = fit.target.oscillator, float(np.log(2 * len(effects)))
+        o, cost = fit.density.oscillator, float(np.log(2 * len(effects)))
         self.fit, self.scales, self.paths = fit, scales, list[Path]()
         self.every, self.target = np.zeros((1, 0)), np.zeros(1)
         if not (_tells(o) and all(map(is_a_force, o.acting))):
@@ -72,7 +72,7 @@ class LikelySets(TermSets):
         along = fit if recordings is None else fit.with_recordings(recordings)
         self.paths = measured_paths(along, flight=flight)
         columns, targets, names = base_columns(along, self.paths)
-        base, target = np.concatenate(columns), np.concatenate(targets)
+        base, density = np.concatenate(columns), np.concatenate(targets)
         told = bool(base[:, 0].any())
         declared = self._known([(e, shapes_of(fit, e)) for e in o.acting]) if told else []
         self.known = self._known(known) if told else []
@@ -81,9 +81,9 @@ class LikelySets(TermSets):
             names += term.names
         rows = max(sum(int(p.rows.kept.sum()) - 1 for p in self.paths), 1)
         terms = terms_of(fit, effects if told else (), scales, self.paths)
-        super().__init__(terms, names, base, target, rows, cost)
+        super().__init__(terms, names, base, density, rows, cost)
         blocks = [np.concatenate(term.columns) for term in terms]
-        self.every, self.target = np.column_stack([base, *blocks]), target
+        self.every, self.target = np.column_stack([base, *blocks]), density
 
     def _known(self, effects: Sequence[Known]) -> list[EffectColumns]:
         """Terms of effects with given shapes; those that the campaign declares have them in any
@@ -91,9 +91,9 @@ class LikelySets(TermSets):
         """
         found = []
         for effect, shapes in effects:
-            added = () if effect in self.fit.target.oscillator.acting else (effect,)
-            target = extend(self.fit, added, self.scales)
-            term = term_at(self.fit, target, effect, self.scales, shapes, self.paths)
+            added = () if effect in self.fit.density.oscillator.acting else (effect,)
+            density = extend(self.fit, added, self.scales)
+            term = term_at(self.fit, density, effect, self.scales, shapes, self.paths)
             found += [] if term is None else [term]
         return found
 
@@ -125,7 +125,7 @@ class LikelySets(TermSets):
         values |= {n: v for t in (*self.known, *own) for n, v in t.shapes.items()}
         if "g" in values:
             values["g"] += self.fit.value("g")
-        recordings = self.fit.target.oscillator.campaign.recordings
+        recordings = self.fit.density.oscillator.campaign.recordings
         for recording, path in zip(recordings, self.paths, strict=True):
             values |= {f"y0[{recording.name}]": path.y[0], f"v0[{recording.name}]": path.v[0]}
         return EffectSet(tuple(t.effect for t in (*self.known, *own)), values, odds)

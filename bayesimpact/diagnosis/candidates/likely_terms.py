@@ -127,17 +127,17 @@ def _best(
     problem: LikelySets, chosen: Chosen, terms: Sequence[Term], columns: Array, price: Prices
 ) -> _Beside:
     """The likeliest of some terms, with their `columns` (stretches, K), beside a set."""
-    held = design(problem, chosen)
-    beside = columns - held.basis @ (held.basis.T @ columns)
+    present = design(problem, chosen)
+    beside = columns - present.basis @ (present.basis.T @ columns)
     square = np.einsum("nk,nk->k", beside, beside)
     whole = np.einsum("nk,nk->k", columns, columns)
-    size = beside.T @ held.rest / np.maximum(square, 1e-300)
+    size = beside.T @ present.rest / np.maximum(square, 1e-300)
     told = (square > SEEN * whole) & (whole > 0.0)
     told &= (size > 0.0) | [t.energy != "dissipates" for t in terms]
-    left = np.where(told, held.left - size * size * square, held.left)
+    left = np.where(told, present.left - size * size * square, present.left)
     unknowns = np.array([1 + len(t.shapes) for t in terms])
     cost = 0.5 * unknowns * np.log(problem.rows) + [price[t.kind] for t in terms]
-    before, after = (np.log(np.maximum(x / problem.rows, 1.0)) for x in (held.left, left))
+    before, after = (np.log(np.maximum(x / problem.rows, 1.0)) for x in (present.left, left))
     odds = problem.log_odds(chosen) + 0.5 * problem.rows * (before - after) - cost
     k = int(np.argmax(odds))
     return _Beside(terms[k], chosen, float(odds[k]), float(left[k]))

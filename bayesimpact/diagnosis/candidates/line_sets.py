@@ -128,20 +128,20 @@ def _explained(problem: LikelySets, sets: Sequence[Chosen], frequencies: Array) 
     for first in range(0, frequencies.size, AT_ONCE):
         block = slice(first, first + AT_ONCE)
         waves = [_waves(path, frequencies[block]) for path in problem.paths]
-        for row, held in zip(found, designs, strict=True):
-            row[block] = _explained_beside(held, waves)
+        for row, present in zip(found, designs, strict=True):
+            row[block] = _explained_beside(present, waves)
     return found
 
 
-def _explained_beside(held: Design, waves: Sequence[Array]) -> Array:
+def _explained_beside(present: Design, waves: Sequence[Array]) -> Array:
     """The same beside one set, of `waves` of some frequencies (F,); nothing by what the set's
     columns explain of these.
     """
     ends = np.cumsum([0, *(one.shape[0] for one in waves)])
     pairs = [(w, slice(a, b)) for w, (a, b) in zip(waves, pairwise(ends), strict=True)]
-    score = np.concatenate([np.einsum("nfi,n->fi", w, held.rest[at]) for w, at in pairs], axis=1)
+    score = np.concatenate([np.einsum("nfi,n->fi", w, present.rest[at]) for w, at in pairs], axis=1)
     shared = np.concatenate(
-        [np.einsum("nfi,nb->fbi", w, held.basis[at], optimize=True) for w, at in pairs], axis=2
+        [np.einsum("nfi,nb->fbi", w, present.basis[at], optimize=True) for w, at in pairs], axis=2
     )
     information = -np.einsum("fbi,fbj->fij", shared, shared, optimize=True)
     whole = np.empty(score.shape)
@@ -176,7 +176,7 @@ def _with_line(problem: LikelySets, best: _Line, effect: Effect) -> EffectSet | 
     the recordings by what each tells, and in every one a phase. None where all of it together
     cannot be: a size below zero, or no stiffness.
     """
-    recordings = [r.name for r in problem.fit.target.oscillator.campaign.recordings]
+    recordings = [r.name for r in problem.fit.density.oscillator.campaign.recordings]
     waves = [_waves(path, np.array([best.frequency]))[:, 0] for path in problem.paths]
     columns = []
     for r, one in enumerate(waves):

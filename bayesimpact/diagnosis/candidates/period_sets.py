@@ -58,13 +58,13 @@ class PeriodSets(TermSets):
     ) -> None:
         self.fit, self.scales, cost = fit, scales, float(np.log(2 * len(effects)))
         fit = fit if recordings is None else fit.with_recordings(recordings)
-        o = fit.target.oscillator
-        ahead = multiple_shooting(fit.target.likelihood, fit.mode)
+        o = fit.density.oscillator
+        ahead = multiple_shooting(fit.density.likelihood, fit.mode)
         if ahead is None:
             super().__init__((), (), np.zeros((1, 0)), np.zeros(1), 1, cost)
             return
         sizes = step_sizes(o.layout.names, o.acting, scales, ())
-        parts = ahead.linearise(fit.mode, difference_steps(fit, fit.target, sizes))
+        parts = ahead.linearise(fit.mode, difference_steps(fit, fit.density, sizes))
         moving = np.setdiff1d(np.arange(fit.mode.size), o.layout.roles("noise"))
         columns = [np.zeros((p.residual.size, fit.mode.size)) for p in parts]
         for whole, part in zip(columns, parts, strict=True):
@@ -97,7 +97,7 @@ class PeriodSets(TermSets):
         terms = [self.terms[t] for t in chosen]
         names = [*(self.names[i] for i in self.base), *(n for t in terms for n in t.names)]
         changes = dict(zip(names, map(float, x), strict=True))
-        effects = (*self.fit.target.oscillator.effects, *(t.effect for t in terms))
+        effects = (*self.fit.density.oscillator.effects, *(t.effect for t in terms))
         shapes = {name: value for t in terms for name, value in t.shapes.items()}
         oscillator = extend(self.fit, effects, self.scales).oscillator
         layout = oscillator.layout
@@ -117,7 +117,7 @@ def _terms(
     """What every effect that a fit lacks does to periods ahead, at every point of its shape grid;
     none of a periodic one, whose frequency has no grid.
     """
-    acting = fit.target.oscillator.acting
+    acting = fit.density.oscillator.acting
     missed = ahead.residuals(fit.mode[None])
     found = []
     for effect in effects:
@@ -125,17 +125,17 @@ def _terms(
         beside = lacking and all(map(effect.stands_beside, acting))
         if is_periodic(effect) or not beside or not effect.admissible(scales):
             continue
-        own = (*fit.target.oscillator.effects, effect)
-        target = extend(fit, own, scales)
+        own = (*fit.density.oscillator.effects, effect)
+        density = extend(fit, own, scales)
         for shapes in shape_points(effect, scales):
-            theta = transfer(fit, target.oscillator.layout, own, scales, shapes)
-            points, steps = size_steps(target, effect, theta, scales)
-            left = replace(ahead, oscillator=target.oscillator).residuals(points)
+            theta = transfer(fit, density.oscillator.layout, own, scales, shapes)
+            points, steps = size_steps(density, effect, theta, scales)
+            left = replace(ahead, oscillator=density.oscillator).residuals(points)
             changes = [
                 np.column_stack([before[0] - rest[0], (rest[0] - rest[1:]).T]) / ahead.noise.level
                 for before, rest in zip(missed, left, strict=True)
             ]
-            sizes = size_parameters(target, effect)
+            sizes = size_parameters(density, effect)
             found += _seen(effect, shapes, sizes, changes, np.array([1.0, *steps]))
     return found
 

@@ -40,10 +40,10 @@ def periods_with_terms(
     """The problem of periods ahead about a fit, with all terms of the grammar; without any where
     the recordings are so long that their columns would fill the memory.
     """
-    if fit.target.oscillator.counts.sum() > MOST_SAMPLES:
+    if fit.density.oscillator.counts.sum() > MOST_SAMPLES:
         return PeriodSets(fit, effects, scales, recordings=recordings)
     paths = measured_paths(fit if recordings is None else fit.with_recordings(recordings))
-    acting = fit.target.oscillator.acting
+    acting = fit.density.oscillator.acting
     listed = {e.id for e in (*effects, *acting) if e in acting or e.admissible(scales)}
     terms = unlisted(library(scales, *reach_of(paths)), listed)
     price, cost = prices_by_kind(terms), float(np.log(2 * len(effects)))

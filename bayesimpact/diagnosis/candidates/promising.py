@@ -1,4 +1,4 @@
-"""Which effects are worth a refit, by what their scores promise.
+"""Which effects deserve a refit, by what their scores promise.
 
 The larger the misfit, the less a score tells; a refit decides, and these floors only say which
 refits cannot matter.
@@ -64,12 +64,12 @@ def families(scan: Scan) -> list[list[Score]]:
     by_family: dict[str, list[Score]] = {}
     for score in scan.best():
         effect = score.effect
-        held = by_family.setdefault(effect.family, [])
-        beside = all(effect.stands_beside(s.effect) for s in held)
+        members = by_family.setdefault(effect.family, [])
+        beside = all(effect.stands_beside(s.effect) for s in members)
         shaped = any(p.circular for p in effect.parameters)
         if score.gain > 0 and effect.has_size and not shaped and beside:
-            held.append(score)
-    return [held[:JOINT] for held in by_family.values() if len(held) > 1]
+            members.append(score)
+    return [members[:JOINT] for members in by_family.values() if len(members) > 1]
 
 
 def in_place_of(

@@ -164,11 +164,11 @@ class TermSets:
         """By how much every other effect that has a term would make a set likelier, nats."""
         if not self.terms:
             return {}
-        held = self.shaped(ids)
-        before, found = self.log_odds(held), dict[str, float]()
-        for t in self._beside(held):
+        present = self.shaped(ids)
+        before, found = self.log_odds(present), dict[str, float]()
+        for t in self._beside(present):
             own = self.terms[t].effect.id
-            gain = self.log_odds((*held, t)) - before
+            gain = self.log_odds((*present, t)) - before
             found[own] = max(found.get(own, -np.inf), gain)
         return found
 
@@ -180,16 +180,16 @@ class TermSets:
         own = [t for t in chosen if self.terms[t].effect.id == effect]
         if not own:
             return {}
-        held = [t for t in chosen if t not in own]
-        sizes = self.solve((*held, *own))[0][len(self.columns(held)) :]
+        present = [t for t in chosen if t not in own]
+        sizes = self.solve((*present, *own))[0][len(self.columns(present)) :]
         place = self._places(own[0])
         found = dict[str, float]()
-        for t in self._beside(held):
+        for t in self._beside(present):
             other, key = self._places(t), self.terms[t].effect.id
             if key == effect:
                 continue
             at = [*place, *other]
-            left = self._beside_columns(self.columns(held), at)
+            left = self._beside_columns(self.columns(present), at)
             asked, cross = left[: len(place), : len(place)], left[len(place) :, : len(place)]
             right, whole = cross @ sizes, float(sizes @ asked @ sizes)
             square = left[len(place) :, len(place) :] + 1e-12 * np.eye(len(other))
@@ -204,10 +204,10 @@ class TermSets:
         """Columns of a term."""
         return list(range(self.first[t], self.first[t + 1]))
 
-    def _beside_columns(self, held: Sequence[int], at: Sequence[int]) -> Array:
-        """Products of columns, less what those `held` explain of them."""
-        part = self.matrix[np.ix_(held, held)] + 1e-12 * np.eye(len(held))
-        known = self.matrix[np.ix_(held, at)]
+    def _beside_columns(self, present: Sequence[int], at: Sequence[int]) -> Array:
+        """Products of columns, less what those `present` explain of them."""
+        part = self.matrix[np.ix_(present, present)] + 1e-12 * np.eye(len(present))
+        known = self.matrix[np.ix_(present, at)]
         return np.asarray(self.matrix[np.ix_(at, at)] - known.T @ np.linalg.solve(part, known))
 
     def shaped(self, ids: Collection[str]) -> Chosen:
@@ -230,12 +230,12 @@ class TermSets:
 
     def _beside(self, chosen: Sequence[int]) -> list[int]:
         """Terms that a set may take in."""
-        held = [term.effect for term in (*self.known, *(self.terms[i] for i in chosen))]
-        ids = {e.id for e in held}
+        present = [term.effect for term in (*self.known, *(self.terms[i] for i in chosen))]
+        ids = {e.id for e in present}
         return [
             t
             for t, term in enumerate(self.terms)
             if term.on_grid
             and term.effect.id not in ids
-            and all(term.effect.stands_beside(e) for e in held)
+            and all(term.effect.stands_beside(e) for e in present)
         ]

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.diagnosis.faults.alone import has_own_size
-from bayesimpact.diagnosis.faults.compare import LEAST, Compared, gain
+from bayesimpact.diagnosis.faults.compare import LEAST, Compared, log_likelihood_gain
 from bayesimpact.diagnosis.faults.correct import as_fault, corrected
 from bayesimpact.diagnosis.faults.together import CERTAIN, Hypothesis, Weighed
 from bayesimpact.diagnosis.refits.extend import campaign_scales
@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 
 KINDS = ("recording_gain", "recording_clock")
 ROUNDS = 3  # of a correction and what the mode with it says of its size
-SETTLED = 0.1  # standard errors of the size: less is no correction
+CONVERGED = 0.1  # standard errors of the size: less is no correction
 TRIED = 2  # the likeliest one, and the one that it has to beat
 LOST = 1e-6  # of a direction's size, that parameters leave of it: less is rounding
 SLACK = 2.0  # times the misfit that may stay, that a score may promise: it is of first order
@@ -66,7 +66,7 @@ def fault_beside(base: Fit, found: Fit) -> tuple[Compared, Fit] | None:
     It must leave no large misfit, `EXCESS` times less of it than the model of the same effects, no
     more than `found`, and decisively less than the next one that its score promises as much of.
     """
-    campaign = found.target.oscillator.campaign
+    campaign = found.density.oscillator.campaign
     if campaign.keep_faults or len(campaign.recordings) < LEAST:
         return None
     shared = without_own(base, found)
@@ -80,22 +80,22 @@ def fault_beside(base: Fit, found: Fit) -> tuple[Compared, Fit] | None:
         return None
     best, fit = tried[0]
     before, after = shared.reduced_chi2, fit.reduced_chi2
-    others = [gain(other.reduced_chi2, after, campaign) for _, other in tried[1:]]
-    nats = gain(before, after, campaign)
+    others = [log_likelihood_gain(other.reduced_chi2, after, campaign) for _, other in tried[1:]]
+    nats = log_likelihood_gain(before, after, campaign)
     if nats < CERTAIN or min(others, default=np.inf) < DECISIVE or is_large(fit):
         return None
     if EXCESS * _above(fit) > _above(shared) or _above(fit) > _above(found):
         return None
     recording = campaign.recordings[best.hypothesis.recording]
     fault = as_fault(recording, best.weighed, nats, CERTAIN)
-    return Compared(fault, fit.target.oscillator.campaign, before, after), fit
+    return Compared(fault, fit.density.oscillator.campaign, before, after), fit
 
 
 def without_own(base: Fit, found: Fit) -> Fit | None:
     """The model without effects of which every recording has a size of its own; None where it has
     a formula, or no other effect.
     """
-    effects = found.target.oscillator.effects
+    effects = found.density.oscillator.effects
     rest = [e for e in effects if not has_own_size(e)]
     if not rest or any(map(is_formula, rest)):
         return None
@@ -107,13 +107,13 @@ def without_own(base: Fit, found: Fit) -> Fit | None:
 
 def _above(fit: Fit) -> float:
     """Reduced chi-squared above that of the noise, or what that is uncertain by."""
-    error = fit.target.likelihood.noise.level_error
+    error = fit.density.likelihood.noise.level_error
     return max(fit.reduced_chi2 - 1.0, 2 * DOUBT * (error if np.isfinite(error) else 0.0))
 
 
 def _promises(fit: Fit, guess: _Guess) -> bool:
     """Whether a score promises what a fault must do, or nearly."""
-    independent = float(fit.target.likelihood.sizes.sum())
+    independent = float(fit.density.likelihood.sizes.sum())
     left = fit.reduced_chi2 * (1.0 - 2 * guess.gained / independent)
     most = min(_above(fit) / EXCESS, LARGE**2 - 1.0)
     return guess.gained > CERTAIN and left - 1.0 < SLACK * most
@@ -121,7 +121,7 @@ def _promises(fit: Fit, guess: _Guess) -> bool:
 
 def _guesses(fit: Fit) -> list[_Guess]:
     """Every gain and every clock of one recording, the one that promises most first."""
-    recordings = fit.target.oscillator.campaign.recordings
+    recordings = fit.density.oscillator.campaign.recordings
     kinds = KINDS if all(r.input is None for r in recordings) else KINDS[:1]
     every = [Hypothesis(kind, r) for r in range(len(recordings)) for kind in kinds]
     found = project(fit, _directions(fit, every))
@@ -142,7 +142,7 @@ def _guesses(fit: Fit) -> list[_Guess]:
 def _directions(fit: Fit, faults: Sequence[Hypothesis]) -> list[Array]:
     """What readings change by per unit of every fault, whitened, (n_r, K) per recording."""
     found = []
-    rows = zip(fit.target.oscillator.campaign.recordings, fit.predicted, strict=True)
+    rows = zip(fit.density.oscillator.campaign.recordings, fit.predicted, strict=True)
     for r, (recording, predicted) in enumerate(rows):
         part = np.zeros((len(faults), recording.samples.size))
         for k, fault in enumerate(faults):
@@ -157,7 +157,7 @@ def _directions(fit: Fit, faults: Sequence[Hypothesis]) -> list[Array]:
 
 def _refined(fit: Fit, guess: _Guess) -> tuple[_Guess, Fit]:
     """The fault with the size at which the mode asks for no other one, and that mode."""
-    hypothesis, whole = guess.hypothesis, fit.target.oscillator.campaign
+    hypothesis, whole = guess.hypothesis, fit.density.oscillator.campaign
     value, sd, further, now = guess.value, guess.sd, 0.0, fit
     for _ in range(ROUNDS):
         value += further
@@ -168,6 +168,6 @@ def _refined(fit: Fit, guess: _Guess) -> tuple[_Guess, Fit]:
         if not (np.isfinite(now.reduced_chi2) and information > 0.0):
             break
         further, sd = float(left.score[0]) / information, information**-0.5
-        if abs(further) < SETTLED * sd:
+        if abs(further) < CONVERGED * sd:
             break
     return _Guess(hypothesis, value, sd, guess.gained), now

@@ -78,7 +78,7 @@ def base_failed(fit: Fit) -> bool:
 
 def misfits(fit: Fit) -> bool:
     """Whether the base fit misses any recording by more than chance, so that comparing is due."""
-    likelihood = fit.target.likelihood
+    likelihood = fit.density.likelihood
     chi2 = fit.sums / likelihood.noise.level**2 / likelihood.sizes
     return bool(np.any(chi2 > largest_by_chance(chi2, likelihood.sizes, likelihood.noise)))
 
@@ -101,7 +101,7 @@ def compare_recordings(fit: Fit, model: SharedModel) -> tuple[Compared, ...]:
     """
     if not misfits(fit):
         return ()
-    campaign = fit.target.oscillator.campaign
+    campaign = fit.density.oscillator.campaign
     alone = {r.name: fit_alone(campaign, r, model) for r in campaign.recordings}
     signs, campaign, chi2 = _signs(campaign, alone, model, fit)
     slips, campaign, chi2 = _slips(campaign, alone, model, fit, chi2)
@@ -155,8 +155,8 @@ def _doubted(
     """
     rows = [alone[r.name] for r in campaign.recordings]
     own = np.array([np.inf if one is None else one.reduced_chi2 for one in rows])
-    sums = fit.sums / fit.target.likelihood.sizes
-    together = sums / fit.target.likelihood.noise.level**2
+    sums = fit.sums / fit.density.likelihood.sizes
+    together = sums / fit.density.likelihood.noise.level**2
     doubted = [int(i) for i in np.argsort(-own, kind="stable") if own[i] >= MISFIT]
     usual = float(np.median(own))
     apart = [
@@ -197,7 +197,7 @@ def _slips(
     misfit = np.array(
         [np.inf if (a := alone[r.name]) is None else a.reduced_chi2 for r in recordings]
     )
-    least = largest_by_chance(misfit, fit.target.likelihood.sizes, model.noise)
+    least = largest_by_chance(misfit, fit.density.likelihood.sizes, model.noise)
     for i in np.flatnonzero(misfit > least):
         known = alone[recordings[i].name]
         own = known.fit if known is not None else own_fit(campaign, recordings[i], model)
@@ -241,7 +241,7 @@ def _next(
     number = known[best.hypothesis.recording][0]
     after = corrected(campaign, number, best)
     value = _chi2(after, model)
-    if gain(chi2, value, campaign) <= needed:
+    if log_likelihood_gain(chi2, value, campaign) <= needed:
         return None
     fault = as_fault(campaign.recordings[number], best, odds, needed)
     return Compared(fault, after, chi2, value, _alternatives(ranked, own))
@@ -267,7 +267,7 @@ def _chi2(campaign: Campaign, model: SharedModel) -> float:
     return float("inf") if fit is None else fit.reduced_chi2
 
 
-def gain(before: float, after: float, campaign: Campaign) -> float:
+def log_likelihood_gain(before: float, after: float, campaign: Campaign) -> float:
     """Nats that a correction gains by its reduced chi-squared, at the noise that remains."""
     samples = sum(r.count for r in campaign.recordings)
     found = 0.5 * samples * (before - after) / max(after, 1.0)

@@ -19,7 +19,14 @@ from bayesimpact.diagnosis.candidates.likely_sets import LikelySets
 from bayesimpact.diagnosis.candidates.period_sets import PeriodSets
 from bayesimpact.diagnosis.candidates.term_sets import EffectSet, TermSets
 from bayesimpact.diagnosis.faults.alone import SharedModel, own_fit
-from bayesimpact.diagnosis.faults.compare import LEAST, SHARE, Compared, base_failed, gain, misfits
+from bayesimpact.diagnosis.faults.compare import (
+    LEAST,
+    SHARE,
+    Compared,
+    base_failed,
+    log_likelihood_gain,
+    misfits,
+)
 from bayesimpact.diagnosis.faults.correct import as_fault, corrected
 from bayesimpact.diagnosis.faults.own_stops import (
     share_stops,
@@ -58,7 +65,7 @@ def faults_beside_physics(
     `by_base` model shows leave nothing either.
     """
     fit = before.identification.fit
-    campaign, noise = fit.target.oscillator.campaign, fit.target.likelihood.noise
+    campaign, noise = fit.density.oscillator.campaign, fit.density.likelihood.noise
     told = len(campaign.recordings) >= LEAST and is_large(fit) and not base_failed(fit)
     enough = bool(by_base) and not is_more_than_noise(by_base[-1][-1].after, noise)
     if campaign.keep_faults or not told or enough:
@@ -90,7 +97,7 @@ def _label_beside_physics(
     the likeliest laws, where with the right one these leave `EXCESS` times less.
     """
     fit = before.identification.fit
-    campaign, noise = fit.target.oscillator.campaign, fit.target.likelihood.noise
+    campaign, noise = fit.density.oscillator.campaign, fit.density.likelihood.noise
     if not share_stops(campaign):
         return ()
     scales, own = campaign_scales(fit), with_own_stops(fit)
@@ -106,7 +113,10 @@ def _label_beside_physics(
             _left_by(chosen, layout, labelled, noise) for labelled in (campaign, right)
         )
         if given > EXCESS * put_right:
-            recording, gained = campaign.recordings[place], gain(given, put_right, right)
+            recording, gained = (
+                campaign.recordings[place],
+                log_likelihood_gain(given, put_right, right),
+            )
             fault = as_fault(recording, label, gained, CERTAIN)
             told = fault_as_read(fault, campaign, as_read)
             return ((Compared(told, right, given, put_right),),)

@@ -41,7 +41,7 @@ Freed = tuple[Array, float]
 deviation."""
 
 PASSES = 2  # over the parameters' widths; a third changes no log evidence by 0.1
-SPREAD = 0.02  # standard deviation of the log amplitudes from which on trends can be told
+LEAST_SD = 0.02  # standard deviation of the log amplitudes from which on trends can be told
 MEASURED = 10.0  # variance of a logarithm up to which a recording says anything of it
 FLAT = 1e-9  # precision of what is shared
 NOTHING = 1e-3  # of an error: a trend of no width
@@ -191,7 +191,7 @@ def standardised(amplitudes: Sequence[float]) -> Array:
     """
     x = np.log(np.maximum(amplitudes, 1e-300))
     x -= x.mean()
-    return np.asarray(x / x.std() if x.std() > SPREAD else 0.0 * x)
+    return np.asarray(x / x.std() if x.std() > LEAST_SD else 0.0 * x)
 
 
 def _shared(labels: Sequence[str], size: int) -> Array:

@@ -37,7 +37,7 @@ def residual_spikes(fit: Fit, *, contacts: bool = True) -> tuple[Fault, ...]:
         onsets that it shows count as fitted too: they lie on one side of a jump or the other
     """
     found: list[Fault] = []
-    campaign = fit.target.oscillator.campaign
+    campaign = fit.density.oscillator.campaign
     counted = campaign if contacts else without_onsets(fit)
     rows = zip(campaign.recordings, counted.recordings, fit.residuals, strict=True)
     for recording, other, residual in rows:
@@ -52,7 +52,7 @@ def beside_spikes(fit: Fit) -> tuple[tuple[Fault, ...], Fit] | None:
 
     What the mode without them explains is none: it is counted again, from that mode.
     """
-    campaign = fit.target.oscillator.campaign
+    campaign = fit.density.oscillator.campaign
     if campaign.keep_faults or _misses_most(fit):
         return None
     spikes = residual_spikes(fit, contacts=False)
@@ -70,8 +70,8 @@ def _misses_most(fit: Fit) -> bool:
     """Whether half of the readings are missed by more than a large misfit would: no fit is needed
     to see that spikes are not all.
     """
-    noise, found = fit.target.likelihood.noise, list[Array]()
-    recordings = fit.target.oscillator.campaign.recordings
+    noise, found = fit.density.likelihood.noise, list[Array]()
+    recordings = fit.density.oscillator.campaign.recordings
     for recording, residual in zip(recordings, fit.residuals, strict=True):
         kept = residual if recording.used is None else residual[recording.used]
         found.append(np.abs(kept) / (noise.level * noise.scales[recording.order]))

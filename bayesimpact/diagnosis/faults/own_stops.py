@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
 
 from bayesimpact.data.campaign import Campaign
-from bayesimpact.inference.fit import Fit, Target
+from bayesimpact.inference.fit import Fit, PosteriorDensity
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.inference.priors import Priors
@@ -38,7 +38,7 @@ def share_stops(campaign: Campaign) -> bool:
 
 def with_own_stops(fit: Fit) -> Fit:
     """The mode of a fit's model where every recording has its own stop, from where the fit is."""
-    o = fit.target.oscillator
+    o = fit.density.oscillator
     recordings = tuple(replace(r, case=r.name) for r in o.campaign.recordings)
     own = build_oscillator(
         replace(o.campaign, recordings=recordings),
@@ -47,11 +47,11 @@ def with_own_stops(fit: Fit) -> Fit:
         sigma_per_recording=o.layout.roles("noise").size > 1,
     )
     shared = shared_places(own.layout, o.layout)
-    priors = Priors(tuple(fit.target.priors.parameters[i] for i in shared))
-    likelihood, start = Likelihood(own, fit.target.likelihood.noise), fit.mode[shared]
+    priors = Priors(tuple(fit.density.priors.parameters[i] for i in shared))
+    likelihood, start = Likelihood(own, fit.density.likelihood.noise), fit.mode[shared]
     exact = own.is_base and not own.sensors
     steps = None if exact else np.maximum(STEP * np.abs(start), 1e-9)
-    return find_mode(Target(likelihood, priors, fit.target.replaced), start, steps=steps)
+    return find_mode(PosteriorDensity(likelihood, priors, fit.density.replaced), start, steps=steps)
 
 
 def shared_values(values: Mapping[str, float], own: Layout, shared: Layout) -> dict[str, float]:

@@ -31,9 +31,9 @@ def pushed_starts(fit: Fit, effects: Sequence[Effect], scales: Scales) -> tuple[
 
     What still falls at the last instant is no push: a misfit that decays with the motion.
     """
-    campaign = fit.target.oscillator.campaign
+    campaign = fit.density.oscillator.campaign
     channels = any(r.motion_name for r in campaign.recordings)
-    driven = fit.target.oscillator.inputs is not None
+    driven = fit.density.oscillator.inputs is not None
     if campaign.stop or campaign.keep_faults or driven or channels or scales.stiffness <= 0.0:
         return ()
     period = 2 * np.pi * float(np.sqrt(scales.mass / scales.stiffness))
@@ -60,7 +60,7 @@ def pushed_starts(fit: Fit, effects: Sequence[Effect], scales: Scales) -> tuple[
 
 def _from(fit: Fit, r: int, first: int) -> Fit:
     """The fit, as problems are posed about it, to recordings of which one begins later."""
-    recordings = list(fit.target.oscillator.campaign.recordings)
+    recordings = list(fit.density.oscillator.campaign.recordings)
     recordings[r] = recordings[r].part(first, recordings[r].samples.size)
     return fit.with_recordings(recordings)
 

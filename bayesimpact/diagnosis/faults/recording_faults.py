@@ -57,7 +57,7 @@ class Corrected:
     @property
     def faults(self) -> tuple[Fault, ...]:
         """Faults that were set aside or corrected."""
-        kept = self.identification.fit.target.oscillator.campaign.keep_faults
+        kept = self.identification.fit.density.oscillator.campaign.keep_faults
         own = () if kept else tuple(f for f in self.own if f.action != "notice")
         return (*own, *(c.fault for c in self.told))
 
@@ -115,7 +115,7 @@ def without_faults(
 ) -> Corrected:
     """The same with faults set aside that a fit shows."""
     before = found.identification
-    whole = before.fit.target.oscillator.campaign
+    whole = before.fit.density.oscillator.campaign
     campaign = faults_set_aside(whole, faults)
     again = replace(_identified(campaign, rng=rng, search=False), search=before.search)
     change = before.fit.reduced_chi2, again.fit.reduced_chi2
@@ -133,7 +133,7 @@ def with_faults(
     """The same with faults set aside or corrected that a model showed; `identification` is without
     them.
     """
-    whole = before.identification.fit.target.oscillator.campaign
+    whole = before.identification.fit.density.oscillator.campaign
     told = tuple(replace(one, fault=fault_as_read(one.fault, whole, as_read)) for one in faults)
     return replace(before, identification=identification, compared=(*before.compared, *told))
 
@@ -157,7 +157,7 @@ def comparisons(
     alike, whose fits begin at `values` of parameters.
     """
     base, noise = before.identification.fit, before.identification.noise
-    campaign = base.target.oscillator.campaign
+    campaign = base.density.oscillator.campaign
     if campaign.keep_faults:
         return ()
     effects = shared_effects(beside)
@@ -176,7 +176,7 @@ def fitted_beside(before: Corrected, effects: Sequence[Effect], fit: Fit) -> Fit
     """The campaign's fit with effects, from where those of `fit` stand; None where it has none."""
     base, noise = before.identification.fit, before.identification.noise
     model = SharedModel(noise, tuple(effects), values_of(fit))
-    return model.fitted(base.target.oscillator.campaign)
+    return model.fitted(base.density.oscillator.campaign)
 
 
 def values_of(fit: Fit) -> dict[str, float]:

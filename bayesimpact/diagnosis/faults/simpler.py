@@ -18,7 +18,7 @@ OPEN: Mapping[Verdict, int] = {"adequate": 0, "named": 0, "ambiguous": 1}
 """Verdicts that explain everything, by what they leave open."""
 
 
-def is_settled(found: Diagnosis) -> bool:
+def is_complete(found: Diagnosis) -> bool:
     """Whether nothing remains and nothing is open."""
     return found.verdict in ("adequate", "named")
 
@@ -27,7 +27,7 @@ def may_be_simpler(steps: Sequence[Step], before: Corrected, found: Diagnosis) -
     """Whether an answer with further faults corrected could take the place of one without: not
     where these faults alone are more than all that a settled one names.
     """
-    return not is_settled(found) or len(before.compared) + sum(map(len, steps)) <= _size(found)
+    return not is_complete(found) or len(before.compared) + sum(map(len, steps)) <= _size(found)
 
 
 def is_simpler(again: Diagnosis, found: Diagnosis) -> bool:
@@ -45,13 +45,13 @@ def makes_idle(corrected: Corrected, found: Diagnosis) -> bool:
 
     Where each still is, the faults do not do what any of them does.
     """
-    effects = found.naming.chosen.candidate.effects
-    fit, layout = corrected.identification.fit, found.after.target.oscillator.layout
+    effects = found.selection.chosen.candidate.effects
+    fit, layout = corrected.identification.fit, found.after.density.oscillator.layout
     shared = layout.roles("physical", "effect")
     values = {layout.names[i]: float(found.after.mode[i]) for i in shared}
     scales = campaign_scales(fit)
     whole = fit_from(fit, effects, values, scales)
-    least = whole.log_evidence - found.naming.prior_cost - DECISIVE
+    least = whole.log_evidence - found.selection.prior_cost - DECISIVE
     return any(without(whole, e, scales).log_evidence > least for e in effects)
 
 

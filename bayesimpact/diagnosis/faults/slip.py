@@ -55,8 +55,8 @@ def likeliest_shift(fit: Fit) -> SampleShift | None:
     None where the gain stays below what white noise reaches at one of its samples with a chance of
     `FALSE_ALARM`.
     """
-    likelihood, noise = fit.target.likelihood, fit.target.likelihood.noise
-    (recording,), (near,) = fit.target.oscillator.campaign.recordings, fit.linearisation
+    likelihood, noise = fit.density.likelihood, fit.density.likelihood.noise
+    (recording,), (near,) = fit.density.oscillator.campaign.recordings, fit.linearisation
     motion = np.gradient(fit.seen[0])
     velocity = noise.whitened(recording, motion)
     white = np.vstack([near.residual, velocity, near.jacobian.T])

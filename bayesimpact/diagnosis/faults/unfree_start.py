@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.faults.fault import Fault, file_time
-from bayesimpact.inference.fit import Fit, Target
+from bayesimpact.inference.fit import Fit, PosteriorDensity
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.inference.priors import Priors
@@ -30,7 +30,7 @@ ITERATIONS = 25
 
 def unfree_starts(fit: Fit) -> tuple[Fault, ...]:
     """First instants of recordings that keep a fit with a large misfit from the rest of them."""
-    campaign = fit.target.oscillator.campaign
+    campaign = fit.density.oscillator.campaign
     period = 2 * np.pi * float(np.sqrt(campaign.mass / fit.value("k1")))
     found = []
     for r, recording in enumerate(campaign.recordings):
@@ -47,24 +47,24 @@ def unfree_starts(fit: Fit) -> tuple[Fault, ...]:
 
 def _alone(fit: Fit, r: int, first: int) -> Fit:
     """One recording from a sample on, fitted by itself from where the fit has it then."""
-    o, noise = fit.target.oscillator, fit.target.likelihood.noise
+    o, noise = fit.density.oscillator, fit.density.likelihood.noise
     recording = o.campaign.recordings[r]
     campaign = replace(o.campaign, recordings=(recording.part(first, recording.samples.size),))
     oscillator = build_oscillator(campaign, o.effects, smoothing=o.smoothing)
     names = oscillator.layout.names
     own, whole = oscillator.layout, o.layout
-    at = np.full(own.size, fit.target.likelihood.sigma_columns[r])  # but for the noise:
+    at = np.full(own.size, fit.density.likelihood.sigma_columns[r])  # but for the noise:
     known = own.columns[0] >= 0
     at[own.columns[0, known]] = whole.columns[r, known]  # channels share what has one name
     if oscillator.gains[0] >= 0:
         at[oscillator.gains[0]] = o.gains[r]
-    priors = Priors(tuple(fit.target.priors.parameters[i] for i in at))
+    priors = Priors(tuple(fit.density.priors.parameters[i] for i in at))
     start, sd = fit.mode[at], fit.sd[at]
     y = fit.displacements[r]
     start[names.index(f"y0[{recording.name}]")] = y[first]
     start[names.index(f"v0[{recording.name}]")] = np.gradient(y, recording.interval)[first]
-    target = Target(Likelihood(oscillator, noise), priors, fit.target.replaced)
-    return find_mode(target, start, steps=0.05 * sd, max_iterations=ITERATIONS)
+    density = PosteriorDensity(Likelihood(oscillator, noise), priors, fit.density.replaced)
+    return find_mode(density, start, steps=0.05 * sd, max_iterations=ITERATIONS)
 
 
 def _ratio(whole: Fit, later: Fit, first: int) -> float:
@@ -72,13 +72,13 @@ def _ratio(whole: Fit, later: Fit, first: int) -> float:
     if not np.isfinite(later.log_posterior):
         return 0.0
     before, after = whole.residuals[0][first:], later.residuals[0]
-    level = whole.target.likelihood.noise.level * float(whole.target.likelihood.scales[0])
+    level = whole.density.likelihood.noise.level * float(whole.density.likelihood.scales[0])
     return float(before @ before) / max(float(after @ after), after.size * level**2)
 
 
 def start_fault(fit: Fit, r: int, first: int, ratio: float, threshold: float) -> Fault:
     """A start that is not free before a sample, without which so many times less is left."""
-    recording = fit.target.oscillator.campaign.recordings[r]
+    recording = fit.density.oscillator.campaign.recordings[r]
     seconds = first * recording.interval
     return Fault(
         id="recording_start",

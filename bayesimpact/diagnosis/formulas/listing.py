@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bayesimpact.data.short_repr import short_repr
 from bayesimpact.diagnosis.formulas.refits import Question, effect_for, kind_ids, kinds_of
 from bayesimpact.diagnosis.refits.refit import Candidate
-from bayesimpact.diagnosis.selection.outcome import Naming
+from bayesimpact.diagnosis.selection.outcome import Selection
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.formula.classes import FormulaClass
 from bayesimpact.formula.evidence import Subset
@@ -35,7 +35,7 @@ class Formula:
     Attributes
     ----------
     terms, sizes : its terms, shapes as found, and their sizes as `Term.unit` says
-    log_odds : against the base model, on the scale of `Naming.log_odds`
+    log_odds : against the base model, on the scale of `Selection.log_odds`
     probability : among all hypotheses of the diagnosis
     refitted : fitted in full, or scored only
     alike : other formulas that the recordings do not tell from it, likeliest first, `ALIKE` at most
@@ -80,12 +80,12 @@ class Formulas:
 
 def listed(
     question: Question,
-    naming: Naming,
+    selection: Selection,
     heads: Sequence[FormulaClass],
     fitted: Mapping[Subset, Candidate],
 ) -> tuple[Formula, ...]:
     """The list, likeliest first; scored ones are set off as the fitted ones were, at least."""
-    offset = min(naming.log_odds(c) - s.log_odds for s, c in fitted.items())
+    offset = min(selection.log_odds(c) - s.log_odds for s, c in fitted.items())
     terms = question.scores.terms
     classes = {s: h for h in heads for s in (h.best, *h.alike)}
     rows = []
@@ -96,7 +96,7 @@ def listed(
         found = tuple(fitted_term(t, values) for t in own)
         head = classes.get(subset, FormulaClass(subset, subset.log_odds, ()))
         alike = _alike(question, head, subset)
-        rows.append(_row(question, subset, (found, sizes), naming.log_odds(candidate), alike))
+        rows.append(_row(question, subset, (found, sizes), selection.log_odds(candidate), alike))
     for head in heads[: 2 * LISTED]:
         if head.best.log_odds > 0.0 and not {head.best, *head.alike} & fitted.keys():
             own = [terms[k] for k in head.best.terms]
@@ -106,8 +106,10 @@ def listed(
             rows.append(replace(row, refitted=False))
     rows.sort(key=lambda f: -f.log_odds)
     holding = [kind_ids(c) for c in fitted.values()]
-    others = [c for c in naming.tried if not any(ids <= kind_ids(c) for ids in holding)]
-    known = [naming.log_odds(c) for c in others]  # what holds a formula does not speak against it
+    others = [c for c in selection.tried if not any(ids <= kind_ids(c) for ids in holding)]
+    known = [
+        selection.log_odds(c) for c in others
+    ]  # what holds a formula does not speak against it
     total = float(np.logaddexp.reduce([*known, *(f.log_odds for f in rows)]))
     return tuple(replace(f, probability=float(np.exp(f.log_odds - total))) for f in rows[:LISTED])
 

@@ -30,7 +30,7 @@ from bayesimpact.diagnosis.refits.refit import (
 )
 from bayesimpact.diagnosis.refits.sizes import loss_without
 from bayesimpact.diagnosis.residual_force.learned import LEARNED
-from bayesimpact.diagnosis.selection.outcome import Naming, leaves_something
+from bayesimpact.diagnosis.selection.outcome import Selection, leaves_something
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.formula.classes import FormulaClass, formula_classes, term_classes
 from bayesimpact.formula.evidence import Subset, single_log_odds, subsets
@@ -43,7 +43,7 @@ from bayesimpact.model.effects.effect import Effect, Scales
 Array = NDArray[np.float64]
 
 REFITTED = 6  # formulas of different kinds
-MOST_SHAPES = 3  # of one formula: with more of them a climb takes half a minute, and rarely rests
+MOST_SHAPES = 3  # of one formula: with more of them an ascent takes half a minute, and rarely rests
 SURE = 20.0  # times the decisive odds by which a linear loss is surely no less: set by hand
 BEHIND = 60.0  # nats by which a score may underrate a formula that a refit would put first
 
@@ -97,7 +97,7 @@ class Question:
     @property
     def others(self) -> tuple[Effect, ...]:
         """Effects of the model beside the force that formulas stand for: learned, or a formula."""
-        effects = self.reference.target.oscillator.effects
+        effects = self.reference.density.oscillator.effects
         return tuple(e for e in effects if not (e.id == LEARNED or is_formula(e)))
 
 
@@ -155,44 +155,44 @@ def refitted(question: Question, subset: Subset) -> Candidate | None:
     if not all(e.stands_beside(o) for e in own for o in (*question.others, *own) if e is not o):
         return None
     effects = (*question.others, *own)
-    target = extend(reference, effects, question.scales)
-    names = target.oscillator.layout.names
+    density = extend(reference, effects, question.scales)
+    names = density.oscillator.layout.names
     shapes = {name: value for t in terms for name, value in starts_of(t).items()}
-    unshifted = transfer(reference, target.oscillator.layout, effects, question.scales, shapes)
+    unshifted = transfer(reference, density.oscillator.layout, effects, question.scales, shapes)
     predicted = unshifted.copy()
     at, sizes = list(subset.terms), np.array(subset.sizes)
     shift = scores.shift - scores.absorbed[:, at] @ sizes
     for name, by in zip(scores.names, shift, strict=True):
         predicted[names.index(name)] += by
-    steps = step_sizes(names, target.oscillator.acting, question.scales, ())
+    steps = step_sizes(names, density.oscillator.acting, question.scales, ())
     sd = 1.0 / np.sqrt(np.diag(scores.problem.information)[at])
     for term, size, error in zip(terms, sizes, sd, strict=True):
         predicted[names.index(f"{effect_id(term)}.size")] = size
         steps[f"{effect_id(term)}.size"] = float(error)
-    step = difference_steps(reference, target, steps)
-    start = best_start(target, unshifted, predicted, step)
-    fit = find_mode(target, start, steps=step, tolerance=TOLERANCE, max_iterations=ITERATIONS)
+    step = difference_steps(reference, density, steps)
+    start = best_start(density, unshifted, predicted, step)
+    fit = find_mode(density, start, steps=step, tolerance=TOLERANCE, max_iterations=ITERATIONS)
     return Candidate(effects, fit, model_evidence(fit))
 
 
 def without_idle(
-    question: Question, naming: Naming, fitted: Mapping[Subset, Candidate], budget: Budget
+    question: Question, selection: Selection, fitted: Mapping[Subset, Candidate], budget: Budget
 ) -> dict[Subset, tuple[Subset, Candidate]]:
     """Every fitted formula without the terms and effects that its model needs no more, as far as
     time allows.
 
     What was fitted before may only have imitated the force that a formula is, and terms of a
     formula what the scores, which are linear, did not see of another. All formulas that may come
-    within the decisive odds of the likeliest model of the search `naming` are treated alike.
+    within the decisive odds of the likeliest model of the search `selection` are treated alike.
     """
-    first = naming.log_odds(naming.tried[0])
+    first = selection.log_odds(selection.tried[0])
     idle = max(len(c.effects) for c in fitted.values())
     least = first - DECISIVE - question.cost * idle
     found = {}
     for subset, candidate in fitted.items():
         own = subset
-        while naming.log_odds(candidate) >= least and budget.may_go_on():
-            smaller = _without_one(question, naming, own, candidate)
+        while selection.log_odds(candidate) >= least and budget.may_go_on():
+            smaller = _without_one(question, selection, own, candidate)
             if smaller is None:
                 break
             own, candidate = smaller
@@ -201,25 +201,25 @@ def without_idle(
 
 
 def _without_one(
-    question: Question, naming: Naming, subset: Subset, candidate: Candidate
+    question: Question, selection: Selection, subset: Subset, candidate: Candidate
 ) -> tuple[Subset, Candidate] | None:
     """The likeliest model with a term or an effect less; None where that is decisively worse, or
     leaves more than noise and the candidate does not.
     """
     own = {effect_id(question.scores.terms[k]): i for i, k in enumerate(subset.terms)}
-    enough = Enough(naming.goal(naming.log_odds(candidate) - DECISIVE))
+    enough = Enough(selection.goal(selection.log_odds(candidate) - DECISIVE))
     smaller = []
     for effect in candidate.effects:
         rest = subset
-        if loss_without(candidate.fit, effect) > SURE * DECISIVE * naming.repetition:
+        if loss_without(candidate.fit, effect) > SURE * DECISIVE * selection.repetition:
             continue
         if effect.id in own:
             if len(own) == 1:
                 continue
             rest = _shortened(question, subset, own[effect.id])
         smaller.append((rest, without(candidate, effect, question.scales, enough=enough)))
-    best = max(smaller, key=lambda one: naming.log_odds(one[1]), default=None)
-    if best is None or naming.log_odds(candidate) - naming.log_odds(best[1]) >= DECISIVE:
+    best = max(smaller, key=lambda one: selection.log_odds(one[1]), default=None)
+    if best is None or selection.log_odds(candidate) - selection.log_odds(best[1]) >= DECISIVE:
         return None
     complete = leaves_something(best[1].fit) and not leaves_something(candidate.fit)
     return None if complete else best

@@ -21,7 +21,7 @@ from bayesimpact.diagnosis.formulas.refits import (
 )
 from bayesimpact.diagnosis.measurement.repetition import residual_repetition
 from bayesimpact.diagnosis.refits.refit import Candidate
-from bayesimpact.diagnosis.selection.outcome import Naming
+from bayesimpact.diagnosis.selection.outcome import Selection
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.formula.classes import FormulaClass
 from bayesimpact.formula.evidence import Subset
@@ -38,18 +38,18 @@ class Refits:
     ----------
     begun : as they were begun
     fitted : what is left of them without idle terms and effects, of every kind the likeliest
-    naming : the search with these models
+    selection : the search with these models
     late : whether time left any out
     """
 
     begun: frozenset[Subset]
     fitted: Mapping[Subset, Candidate]
-    naming: Naming
+    selection: Selection
     late: bool
 
 
 def fitted_formulas(
-    question: Question, naming: Naming, progress: Callable[[str], None], budget: Budget
+    question: Question, selection: Selection, progress: Callable[[str], None], budget: Budget
 ) -> Refits:
     """Formulas fitted in full, as far as time allows: what the search has met and those that score
     best, then those whose scores still speak against the likeliest, `ROUNDS` times at most.
@@ -57,7 +57,7 @@ def fitted_formulas(
     terms = question.scores.terms
     begun: set[Subset] = set()
     ends: dict[Subset, tuple[Subset, Candidate]] = {}
-    found = Refits(frozenset(), {}, naming, False)
+    found = Refits(frozenset(), {}, selection, False)
     todo = refit_candidates(question.ranked, terms)
     if question.met is not None:
         kinds = kinds_of(question.met, terms)
@@ -66,25 +66,25 @@ def fitted_formulas(
         fitted, late = _fitted(question, todo, progress, budget)
         begun |= fitted.keys()
         ends |= {s: (s, c) for s, c in fitted.items()}
-        whole = joined(naming, [c for _, c in ends.values()])
+        whole = joined(selection, [c for _, c in ends.values()])
         if fitted and not late:
             progress("leaving out what formulas make idle")
             ends |= without_idle(question, whole, fitted, budget)
             late = not budget.may_go_on()  # and so some may be compared as they were begun
         best = _different(ends.values(), whole, terms)
-        found = Refits(frozenset(begun), best, joined(naming, list(best.values())), late)
-        todo = [] if late or not fitted else _unsettled(question, found)
+        found = Refits(frozenset(begun), best, joined(selection, list(best.values())), late)
+        todo = [] if late or not fitted else _still_open(question, found)
         if not todo:
             break
     return found
 
 
-def _unsettled(question: Question, found: Refits) -> list[Subset]:
+def _still_open(question: Question, found: Refits) -> list[Subset]:
     """Formulas to fit whose scores come within the decisive odds of the likeliest that is fitted,
     though they do not hold it.
     """
     terms = question.scores.terms
-    first = max(found.fitted, key=lambda s: found.naming.log_odds(found.fitted[s]))
+    first = max(found.fitted, key=lambda s: found.selection.log_odds(found.fitted[s]))
     rivals = scored_rivals(question, found, first)
     near = [s for s in rivals if s.log_odds > first.log_odds - DECISIVE]
     return refit_candidates(near, terms)
@@ -127,7 +127,7 @@ def is_told(head: FormulaClass, found: Refits, terms: Sequence[Term]) -> bool:
 
 
 def _different(
-    found: Iterable[tuple[Subset, Candidate]], naming: Naming, terms: Sequence[Term]
+    found: Iterable[tuple[Subset, Candidate]], selection: Selection, terms: Sequence[Term]
 ) -> dict[Subset, Candidate]:
     """The likeliest fit of formulas of one kind, as likely by its scores as the best of them."""
     kinds: dict[tuple[str, ...], list[tuple[Subset, Candidate]]] = {}
@@ -135,18 +135,18 @@ def _different(
         kinds.setdefault(kinds_of(one[0], terms), []).append(one)
     best = {}
     for same in kinds.values():
-        subset, candidate = max(same, key=lambda one: naming.log_odds(one[1]))
+        subset, candidate = max(same, key=lambda one: selection.log_odds(one[1]))
         best[replace(subset, log_odds=max(s.log_odds for s, _ in same))] = candidate
     return best
 
 
-def joined(naming: Naming, candidates: Sequence[Candidate]) -> Naming:
+def joined(selection: Selection, candidates: Sequence[Candidate]) -> Selection:
     """The search with further models, of those of one kind the likeliest; samples are counted by
     the best residual of all, for one of them may leave nothing.
     """
-    tried = (*naming.tried, *candidates)
+    tried = (*selection.tried, *candidates)
     best = min(tried, key=lambda c: c.fit.reduced_chi2)
-    found = replace(naming, repetition=residual_repetition(best.fit), beside=None)
+    found = replace(selection, repetition=residual_repetition(best.fit), beside=None)
     likeliest: dict[frozenset[str], Candidate] = {}
     for candidate in sorted(tried, key=found.log_odds, reverse=True):
         likeliest.setdefault(frozenset(kind_ids(candidate)), candidate)

@@ -77,7 +77,7 @@ def formula_scores(fit: Fit, scales: Scales, *, repetition: float = 1.0) -> Form
     reach = motion_range(fit)
     met = tuple(formulas_met(fit))
     whole = (*library(scales, *reach), *met)
-    counts = fit.target.oscillator.counts
+    counts = fit.density.oscillator.counts
     motions = {r: motion_of(fit, r) for r in range(counts.size) if counts[r] <= LONGEST}
     alone: dict[str, Any] = {"scales": scales, "repetition": repetition, "together": False}
     local = (*(t for t in whole if t.shapes and not t.width), *met, *local_starts(*reach))
@@ -93,7 +93,7 @@ def formula_scores(fit: Fit, scales: Scales, *, repetition: float = 1.0) -> Form
 def formulas_met(fit: Fit) -> dict[Term, float]:
     """The terms of formulas that a fit has, with their shapes, and their sizes."""
     values = dict(zip(fit.names, map(float, fit.mode), strict=True))
-    effects = [e for e in fit.target.oscillator.effects if is_formula(e)]
+    effects = [e for e in fit.density.oscillator.effects if is_formula(e)]
     return {term_of(e, values): values[f"{e.id}.size"] for e in effects}
 
 
@@ -122,10 +122,10 @@ def score_terms(
 
     Without `together` each by itself: `information` is then diagonal.
     """
-    noise = fit.target.oscillator.layout.roles("noise")
+    noise = fit.density.oscillator.layout.roles("noise")
     others = np.setdiff1d(np.flatnonzero(~_of_a_force(fit)), noise)
-    curvature = fit.target.priors.information(fit.mode)[others]
-    slope = np.nan_to_num(fit.target.priors.gradient(fit.mode))[others]
+    curvature = fit.density.priors.information(fit.mode)[others]
+    slope = np.nan_to_num(fit.density.priors.gradient(fit.mode))[others]
     sums = _Sums(fit, others, len(terms), together)
     for r, motion in motions.items():
         sums.add(r, motion, terms)
@@ -170,7 +170,7 @@ def _seen(fit: Fit, sums: _Sums, solve: Array) -> Array:
     learned = sums.learned
     if not learned.size:
         return np.zeros((0, sums.score.size))
-    prior = fit.target.priors.information(fit.mode)[learned]
+    prior = fit.density.priors.information(fit.mode)[learned]
     through = solve @ sums.learned_own
     information = sums.learned_learned - sums.learned_own.T @ through + np.diag(prior)
     score = sums.learned_terms - through.T @ sums.cross
@@ -235,7 +235,7 @@ class _Sums:
         self.largest = np.maximum(self.largest, largest)
         self.power += power
         self.left += float(z @ z)
-        self.samples += float(self.fit.target.likelihood.sizes[r])
+        self.samples += float(self.fit.density.likelihood.sizes[r])
 
 
 def plausible_sizes(terms: Sequence[Term], largest: Array, scales: Scales) -> Array:

@@ -5,7 +5,7 @@ every sum of up to three terms is scored in the linearised problem (`formulas.sc
 `bayesimpact.formula.evidence`); the best few are refitted in full, as effects like any. One is
 named when
 
-- it leaves nothing, by the tests that the catalogue's models pass (`State.is_white`), and
+- it leaves nothing, by the tests that the catalogue's models pass (`ExaminedModel.is_white`), and
 - it leads every other hypothesis by the decisive odds: the models of the search, the learned force,
   and all other formulas that do not contain it, fitted or, where none of their kind was, scored;
   with the price of their lengths and without it, as effects are compared.
@@ -49,7 +49,12 @@ from bayesimpact.diagnosis.residual_force.gaussian_process import missing_drift,
 from bayesimpact.diagnosis.residual_force.learned import LEARNED
 from bayesimpact.diagnosis.score_test.scan import scan
 from bayesimpact.diagnosis.selection.decision import Decision
-from bayesimpact.diagnosis.selection.outcome import Naming, State, is_large, leaves_something
+from bayesimpact.diagnosis.selection.outcome import (
+    ExaminedModel,
+    Selection,
+    is_large,
+    leaves_something,
+)
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.formula.evidence import Subset
 from bayesimpact.formula.grammar import Term
@@ -64,10 +69,10 @@ TURNS = 3  # of scoring formulas, each on the likeliest one before: set by hand
 class Answer:
     """What a diagnosis says: see `loop.Diagnosis`."""
 
-    naming: Naming
+    selection: Selection
     decision: Decision
     after: Fit
-    state: State | None
+    examined: ExaminedModel | None
     formulas: Formulas | None = None
 
 
@@ -87,9 +92,9 @@ def with_formulas(
     """
     means = _Means(effects, scales, rng, progress, budget)
     something = answer.decision.verdict in ("unknown", "partly") or _has_formula(answer.after)
-    if something and answer.naming.finished:
+    if something and answer.selection.finished:
         answer = _compared(answer, means, TURNS)
-    elif answer.decision.effects and not is_large(answer.naming.base.candidate.fit):
+    elif answer.decision.effects and not is_large(answer.selection.base.candidate.fit):
         answer = _or_a_formula(answer, means)
     certain = answer.formulas is not None and answer.formulas.named
     return answer if certain else _uncertain(answer)
@@ -110,11 +115,11 @@ def _or_a_formula(answer: Answer, means: _Means) -> Answer:
     """The answer, or that of formulas where one that has no more terms than it names effects, and
     leaves nothing, is decisively likelier; as far as time allows to compare that with all others.
     """
-    if not (answer.naming.finished and means.budget.may_go_on()):
+    if not (answer.selection.finished and means.budget.may_go_on()):
         return answer
-    naming, base = answer.naming, answer.naming.base.candidate.fit
+    selection, base = answer.selection, answer.selection.base.candidate.fit
     means.progress("scoring formulas in place of the effects")
-    question = asked_about(base, naming.prior_cost, means.scales)
+    question = asked_about(base, selection.prior_cost, means.scales)
     if question is None:
         return answer
     most = len(answer.decision.effects)
@@ -124,12 +129,12 @@ def _or_a_formula(answer: Answer, means: _Means) -> Answer:
         one = refitted(question, subset) if means.budget.may_go_on() else None
         if one is not None and one.fit.converged and not leaves_something(one.fit):
             fitted.append(one)
-    naming = joined(naming, fitted)
-    first = max(fitted, key=naming.log_odds, default=naming.chosen.candidate)
-    if not naming.log_odds(first) > naming.log_odds(naming.chosen.candidate) + DECISIVE:
+    selection = joined(selection, fitted)
+    first = max(fitted, key=selection.log_odds, default=selection.chosen.candidate)
+    if not selection.log_odds(first) > selection.log_odds(selection.chosen.candidate) + DECISIVE:
         return answer
-    found = _compared(replace(answer, naming=naming, after=first.fit), means, TURNS)
-    return found if found.naming.finished else answer
+    found = _compared(replace(answer, selection=selection, after=first.fit), means, TURNS)
+    return found if found.selection.finished else answer
 
 
 def _compared(answer: Answer, means: _Means, turns: int) -> Answer:
@@ -137,56 +142,61 @@ def _compared(answer: Answer, means: _Means, turns: int) -> Answer:
     that was wrong, `turns` times at most.
     """
     if not means.budget.may_go_on():
-        return replace(answer, naming=replace(answer.naming, finished=False))
+        return replace(answer, selection=replace(answer.selection, finished=False))
     means.progress("scoring formulas")
-    question = asked_about(answer.after, answer.naming.prior_cost, means.scales)
+    question = asked_about(answer.after, answer.selection.prior_cost, means.scales)
     if question is None:
         return answer
-    found = fitted_formulas(question, answer.naming, means.progress, means.budget)
-    answer = replace(answer, naming=replace(answer.naming, finished=not found.late))
+    found = fitted_formulas(question, answer.selection, means.progress, means.budget)
+    answer = replace(answer, selection=replace(answer.selection, finished=not found.late))
     if not found.fitted:
         return answer
-    first = max(found.fitted, key=lambda s: found.naming.log_odds(found.fitted[s]))
+    first = max(found.fitted, key=lambda s: found.selection.log_odds(found.fitted[s]))
     if not found.late and turns > 1 and _misled(answer, found, first):
-        answer = replace(answer, naming=found.naming, after=found.fitted[first].fit)
+        answer = replace(answer, selection=found.selection, after=found.fitted[first].fit)
         return _compared(answer, means, turns - 1)
     named = not found.late and _may_be_named(question, found, first)
-    state = None
+    examined = None
     if named:
         means.progress("scoring what the formula lacks")
-        state = _examined(found.fitted[first], means)
-        named = state.is_white
-    return _answered(answer, question, found, first, state if named else None)
+        examined = _examined(found.fitted[first], means)
+        named = examined.is_white
+    return _answered(answer, question, found, first, examined if named else None)
 
 
 def _answered(
-    answer: Answer, question: Question, found: Refits, first: Subset, state: State | None
+    answer: Answer, question: Question, found: Refits, first: Subset, examined: ExaminedModel | None
 ) -> Answer:
-    """The answer with the list of formulas; with the likeliest named where its `state` is given."""
-    scores, naming, candidate = question.scores, found.naming, found.fitted[first]
+    """The answer with the list of formulas; with the likeliest named where it was `examined`."""
+    scores, selection, candidate = question.scores, found.selection, found.fitted[first]
     heads = [h for h in question.heads if not is_told(h, found, scores.terms)]
-    rows = listed(question, naming, heads, found.fitted)
+    rows = listed(question, selection, heads, found.fitted)
     seen = scores.seen[:, list(first.terms)] @ np.array(first.sizes)
-    formulas = Formulas(rows, answer.after, state is not None, seen, candidate.fit)
-    if state is None:
-        return replace(answer, decision=_needed(answer.decision, naming), formulas=formulas)
-    states = {**naming.states, frozenset(candidate.ids): state}
-    naming = replace(naming, chosen=state, states=states, finished=answer.naming.finished)
-    return Answer(naming, _decided(answer, candidate), candidate.fit, None, formulas)
+    formulas = Formulas(rows, answer.after, examined is not None, seen, candidate.fit)
+    if examined is None:
+        return replace(answer, decision=_needed(answer.decision, selection), formulas=formulas)
+    examined_models = {**selection.examined_models, frozenset(candidate.ids): examined}
+    selection = replace(
+        selection,
+        chosen=examined,
+        examined_models=examined_models,
+        finished=answer.selection.finished,
+    )
+    return Answer(selection, _decided(answer, candidate), candidate.fit, None, formulas)
 
 
 def _has_formula(fit: Fit) -> bool:
-    return any(map(is_formula, fit.target.oscillator.effects))
+    return any(map(is_formula, fit.density.oscillator.effects))
 
 
 def _misled(answer: Answer, found: Refits, first: Subset) -> bool:
     """Whether formulas were scored on one that another beats decisively: along a motion that is
     wrong the scores of all others are too.
     """
-    own = [c for c in answer.naming.tried if c.fit is answer.after]
+    own = [c for c in answer.selection.tried if c.fit is answer.after]
     if not (own and _has_formula(answer.after)):
         return False
-    candidate, odds = found.fitted[first], found.naming.log_odds
+    candidate, odds = found.fitted[first], found.selection.log_odds
     return odds(candidate) > odds(own[0]) + DECISIVE and kind_ids(candidate) != kind_ids(own[0])
 
 
@@ -196,7 +206,7 @@ def _may_be_named(question: Question, found: Refits, first: Subset) -> bool:
     With the price of their lengths, which says what is simpler, and with that of effects alone: no
     name rests on being shorter to write.
     """
-    naming, fitted = found.naming, found.fitted
+    selection, fitted = found.selection, found.fitted
     candidate, scores = fitted[first], question.scores
     if not candidate.fit.converged or leaves_something(candidate.fit):
         return False
@@ -205,15 +215,15 @@ def _may_be_named(question: Question, found: Refits, first: Subset) -> bool:
     subset_of = {id(c): s for s, c in fitted.items()}
     kinds = set(kinds_of(first, terms))
     rivals: list[tuple[float, float, float]] = []  # odds, what length costs of them, lead needed
-    for c in naming.tried:
-        if not all(holds(c, i) for i in own):
+    for c in selection.tried:
+        if not all(has_kind(c, i) for i in own):
             lead = needed_lead(kinds, subset_of.get(id(c)), terms)
-            rivals.append((naming.log_odds(c), c.price(0.0), lead))
-    if any(e.id == LEARNED for e in reference.target.oscillator.effects):
+            rivals.append((selection.log_odds(c), c.price(0.0), lead))
+    if any(e.id == LEARNED for e in reference.density.oscillator.effects):
         evidence = model_evidence(reference)
-        learned = Candidate(reference.target.oscillator.effects, reference, evidence)
-        rivals.append((naming.log_odds(learned), 0.0, DECISIVE))
-    reached, length = naming.log_odds(candidate), candidate.price(0.0)
+        learned = Candidate(reference.density.oscillator.effects, reference, evidence)
+        rivals.append((selection.log_odds(learned), 0.0, DECISIVE))
+    reached, length = selection.log_odds(candidate), candidate.price(0.0)
     for s in scored_rivals(question, found, first):
         odds = reached + s.log_odds - first.log_odds
         extra = sum(length_price(question, i) for i in s.terms)
@@ -236,14 +246,14 @@ def needed_lead(kinds: set[str], rival: Subset | None, terms: Sequence[Term]) ->
     return 0.0 if kinds <= wide | set(kinds_of(rival, terms)) else DECISIVE
 
 
-def holds(candidate: Candidate, kind: str) -> bool:
+def has_kind(candidate: Candidate, kind: str) -> bool:
     """Whether a model has an effect of a kind, or one that reduces to it."""
     return kind in kind_ids(candidate) or any(e.prefer == kind for e in candidate.effects)
 
 
-def _examined(candidate: Candidate, means: _Means) -> State:
+def _examined(candidate: Candidate, means: _Means) -> ExaminedModel:
     fit, scales, rng = candidate.fit, means.scales, means.rng
-    return State(
+    return ExaminedModel(
         candidate,
         scan(fit, means.effects, scales, rng=rng),
         missing_force(fit, scales, rng=rng),
@@ -255,23 +265,23 @@ def _uncertain(answer: Answer) -> Answer:
     """The answer without names of formulas: where its model has one, only those effects are named
     that every likely model has.
     """
-    naming, effects = answer.naming, answer.decision.effects
-    if not any(map(is_formula, (*effects, *answer.after.target.oscillator.effects))):
+    selection, effects = answer.selection, answer.decision.effects
+    if not any(map(is_formula, (*effects, *answer.after.density.oscillator.effects))):
         return answer
-    least = max(map(naming.log_odds, naming.tried)) - DECISIVE
-    likely = [c for c in naming.tried if naming.log_odds(c) > least]
+    least = max(map(selection.log_odds, selection.tried)) - DECISIVE
+    likely = [c for c in selection.tried if selection.log_odds(c) > least]
     named = tuple(e for e in effects if not is_formula(e) and all(e.id in c.ids for c in likely))
     decision = replace(answer.decision, verdict="partly" if named else "unknown", effects=named)
-    state = answer.state
-    if state is None:  # what a formula does is what the catalogue leaves
-        rest = frozenset(e.id for e in naming.chosen.candidate.effects if not is_formula(e))
-        state = naming.states.get(rest, naming.base)
-    return replace(answer, decision=decision, state=state)
+    examined = answer.examined
+    if examined is None:  # what a formula does is what the catalogue leaves
+        rest = frozenset(e.id for e in selection.chosen.candidate.effects if not is_formula(e))
+        examined = selection.examined_models.get(rest, selection.base)
+    return replace(answer, decision=decision, examined=examined)
 
 
-def _needed(decision: Decision, naming: Naming) -> Decision:
+def _needed(decision: Decision, selection: Selection) -> Decision:
     """The decision with those of its effects that the likeliest of all models has."""
-    likeliest = set(naming.tried[0].ids)
+    likeliest = set(selection.tried[0].ids)
     effects = tuple(e for e in decision.effects if e.id in likeliest)
     if len(effects) == len(decision.effects):
         return decision

@@ -49,7 +49,7 @@ def fit_without_hums(fit: Fit) -> Fit | None:
     """A model's mode for the recordings less their hums; None where they have none, or where more
     is left without them, as where a force moves a mass that meets a stop.
     """
-    campaign = fit.target.oscillator.campaign
+    campaign = fit.density.oscillator.campaign
     recordings = recordings_without_hums(campaign.recordings)
     if all(a is b for a, b in zip(recordings, campaign.recordings, strict=True)):
         return None

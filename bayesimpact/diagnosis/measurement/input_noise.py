@@ -58,7 +58,7 @@ def input_noise(fit: Fit) -> Noise | None:
     Beside readings of growing or filtered noise, channels of one motion, which it moves together,
     or a base's displacement, whose second derivative is the force, it is not looked for.
     """
-    noise, campaign = fit.target.likelihood.noise, fit.target.oscillator.campaign
+    noise, campaign = fit.density.likelihood.noise, fit.density.oscillator.campaign
     floors = {r.name: _force(fit, r) * _floor(r) for r in campaign.recordings}
     floors = {name: floor for name, floor in floors.items() if floor > 0.0}
     known = noise.forces is not None or noise.grows or noise.smoothing is not None
@@ -84,7 +84,7 @@ def input_noise(fit: Fit) -> Noise | None:
 
 def _of_floors(fit: Fit, floors: Mapping[str, float]) -> RandomForces:
     """Random forces as large as the inputs' floors, N."""
-    noise, recordings = fit.target.likelihood.noise, fit.target.oscillator.campaign.recordings
+    noise, recordings = fit.density.likelihood.noise, fit.density.oscillator.campaign.recordings
     paths, sizes, shares = {}, {}, []
     for r, one in enumerate(recordings):
         if one.name in floors and one.input is not None:
@@ -105,7 +105,7 @@ def _scaled(noise: Noise, forces: RandomForces, by: float) -> Noise:
 
 def _as_read(fit: Fit) -> tuple[Linearisation, ...]:
     """The fit's residuals and derivatives, not whitened."""
-    likelihood = fit.target.likelihood
+    likelihood = fit.density.likelihood
     plain = replace(likelihood, noise=Noise(level=likelihood.noise.level))
     steps = STEP / np.sqrt(np.diag(inverse(fit.covariance)))
     return plain.linearise(fit.mode, steps, roughly=True)
@@ -117,15 +117,15 @@ def _log_likelihood(fit: Fit, linear: tuple[Linearisation, ...], noise: Noise) -
     """
     size, total, volume = fit.mode.size, 0.0, 0.0
     products = np.zeros((size + 1, size + 1))
-    recordings = fit.target.oscillator.campaign.recordings
+    recordings = fit.density.oscillator.campaign.recordings
     for recording, lin in zip(recordings, linear, strict=True):
         at = np.append(lin.columns, size)
         white = noise.whitened(recording, np.column_stack([lin.jacobian, lin.residual]).T)
         products[np.ix_(at, at)] += white @ white.T / noise.level**2
         total += noise.size(recording.samples.size, recording.interval, recording.used)
         volume += noise.volume_of(recording)
-    prior = np.array(fit.target.priors.information(fit.mode))
-    prior[fit.target.oscillator.layout.roles("noise")] = 1.0
+    prior = np.array(fit.density.priors.information(fit.mode))
+    prior[fit.density.oscillator.layout.roles("noise")] = 1.0
     score = products[:-1, -1]
     moved = float(score @ inverse(products[:-1, :-1] + np.diag(prior)) @ score)
     rest = max(float(products[-1, -1]) - moved, 1e-300)
@@ -155,4 +155,4 @@ def _force(fit: Fit, recording: Recording) -> float:
     if given is None:
         return 0.0
     gain = abs(fit.value("input_gain")) if given.free else 1.0
-    return gain * (fit.target.oscillator.campaign.mass if given.kind == "base_m_s2" else 1.0)
+    return gain * (fit.density.oscillator.campaign.mass if given.kind == "base_m_s2" else 1.0)

@@ -23,7 +23,7 @@ def residual_repetition(fit: Fit) -> float:
     steady hum beside the motion: it repeats itself for ever, and hides nothing of what moves.
     """
     total = effective = 0.0
-    recordings = fit.target.oscillator.campaign.recordings
+    recordings = fit.density.oscillator.campaign.recordings
     for part, recording in zip(fit.linearisation, recordings, strict=True):
         x = _without_hum(part.residual, recording)
         x = x - x.mean()

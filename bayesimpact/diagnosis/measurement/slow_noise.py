@@ -27,12 +27,15 @@ def remaining_noise(fit: Fit) -> Noise | None:
     if whiteness_p(fit) >= ALPHA:
         return None
     found = slow_noise(fit)
-    if found is None or found.gain < COLOURED:
+    if found is None or found.log_evidence_gain < COLOURED:
         return None
     if combined([ljung_box(x) for x in found.residuals]) < ALPHA:
         return None
     force = discrepancy(fit)
-    if force is None or found.gain < force.gain(fit, fit.log_posterior) + DECISIVE:
+    if (
+        force is None
+        or found.log_evidence_gain < force.log_evidence_gain(fit, fit.log_posterior) + DECISIVE
+    ):
         return None
     return found.noise
 

@@ -48,11 +48,11 @@ def is_refuted(fit: Fit) -> bool:
     samples' noise correlate by exp(-interval / tau). Without its mark on the noise a long lag is no
     filter, but what else changes a motion's phase, or its first instants.
     """
-    names, noise = fit.names, fit.target.likelihood.noise
+    names, noise = fit.names, fit.density.likelihood.noise
     if LAG not in names or noise.smoothing is not None:
         return False
     most = min(max(noise.correlation, 0.0) + UNSURE, 1.0 - 1e-9)
-    longest = -float(fit.target.oscillator.intervals.min()) / float(np.log(most))
+    longest = -float(fit.density.oscillator.intervals.min()) / float(np.log(most))
     return fit.value(LAG) > longest
 
 
@@ -76,9 +76,9 @@ def filter_parameters(filtered: Fingerprint) -> Mapping[str, Mapping[str, Any]]:
 def whole_campaign(identification: Identification) -> Location:
     """The place of something in the measuring chain: all recordings, throughout."""
     fit = identification.fit
-    campaign = fit.target.oscillator.campaign
+    campaign = fit.density.oscillator.campaign
     recorded = [r.samples for r in campaign.recordings]
-    moved = recorded if fit.target.oscillator.reads_displacements else fit.displacements
+    moved = recorded if fit.density.oscillator.reads_displacements else fit.displacements
     samples = np.concatenate(moved)
     pairs = zip(moved, campaign.recordings, strict=True)
     speed = max(float(np.max(np.abs(np.gradient(y, r.interval)))) for y, r in pairs)

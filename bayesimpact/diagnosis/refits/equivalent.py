@@ -62,9 +62,9 @@ def _forces(old: Effect, new: Effect, fit: Fit, r: int, points: Array) -> Array:
     """
     assert old.law is not None and new.law is not None
     y, v = list(trajectory_points(fit))[r]
-    t = np.asarray(fit.target.oscillator.campaign.recordings[r].times)
+    t = np.asarray(fit.density.oscillator.campaign.recordings[r].times)
     few = slice(0, y.size, max(1, y.size * len(fit.linearisation) // POINTS))
     path = y[few], v[few], t[few]
-    slots = fit.target.oscillator.layout.slots(fit.mode)[r]
+    slots = fit.density.oscillator.layout.slots(fit.mode)[r]
     mine = force_along(old.law, *path, effect_numbers(old, fit, r), slots)
     return np.stack([mine, *(force_along(new.law, *path, p, slots) for p in points)])

@@ -1,6 +1,6 @@
 """Log marginal likelihood of a fit by Laplace's method, with bounds and structured priors.
 
-Values of one kind, one per obstacle or recording, share a spread that is not known beforehand:
+Values of one kind, one per obstacle or recording, share a scatter that is not known beforehand:
 normal about a common mean with a standard deviation between a ten millionth of their priors' and
 all of it (`extend.WIDEST` physical scales), uniform in the logarithm; their mean has the prior of
 the parameter that they replace. So do the states in which recordings begin; their mean is 0 and
@@ -21,7 +21,7 @@ from bayesimpact.model.effects.effect import EffectParameter
 
 Array = NDArray[np.float64]
 
-SPREADS = np.logspace(-7, 0, 15)  # of values of one kind, in their priors' standard deviations
+SHARED_SDS = np.logspace(-7, 0, 15)  # of values of one kind, in their priors' standard deviations
 UNMEASURED = 1e-4  # precision, in that of the prior, from which on nothing was measured
 
 
@@ -32,13 +32,13 @@ def model_evidence(fit: Fit) -> float:
 
 
 def structure(fit: Fit) -> float:
-    """What `log_evidence` must gain for phases, and for values that share a spread, nats."""
+    """What `log_evidence` must gain for phases, and for values that share a scatter, nats."""
     gain = 0.0
-    for effect in fit.target.oscillator.acting:
+    for effect in fit.density.oscillator.acting:
         for parameter in effect.parameters:
             own = f"{effect.id}.{parameter.name}"
             at = np.array([i for i, n in enumerate(fit.names) if n.split("[")[0] == own], np.int64)
-            priors = [fit.target.priors.parameters[i] for i in at]
+            priors = [fit.density.priors.parameters[i] for i in at]
             if parameter.circular:  # the interval of three turns holds the mode three times
                 turns = [(p.upper - p.lower) / (2 * np.pi) for p in priors if type(p) is Uniform]
                 gain += float(np.sum(np.log(np.maximum(turns, 1.0))))
@@ -50,18 +50,20 @@ def structure(fit: Fit) -> float:
 def _of_one_kind(
     fit: Fit, parameter: EffectParameter, at: NDArray[np.int64], prior: Prior
 ) -> float:
-    """What values at these positions, each with this prior, gain by a spread that they share."""
+    """What values at these positions, each with this prior, gain by a scatter that they share."""
     if not isinstance(prior, Normal) or (parameter.replaces and at.size == 1):
         return 0.0
     density = None
     if parameter.replaces:
-        shared = fit.target.replaced.get(parameter.replaces, prior)
+        shared = fit.density.replaced.get(parameter.replaces, prior)
         density = float(shared.log_density(np.array(fit.mode[at].mean())))
-    return common_spread(fit.mode[at], fit.covariance[np.ix_(at, at)], prior, density)
+    return shared_sd_evidence(fit.mode[at], fit.covariance[np.ix_(at, at)], prior, density)
 
 
-def common_spread(mode: Array, covariance: Array, prior: Normal, density: float | None) -> float:
-    """Evidence of a common spread about a common mean over that of independent priors, nats.
+def shared_sd_evidence(
+    mode: Array, covariance: Array, prior: Normal, density: float | None
+) -> float:
+    """Evidence of a common scatter about a common mean over that of independent priors, nats.
 
     Parameters
     ----------
@@ -78,10 +80,10 @@ def common_spread(mode: Array, covariance: Array, prior: Normal, density: float 
     centre = measured @ (posterior @ (mode - prior.mean))
     shared = [
         _log_density(centre, (s * prior.sd) ** 2 * np.eye(size) + measured, density)
-        for s in SPREADS
+        for s in SHARED_SDS
     ]
     each = _log_density(centre, prior.sd**2 * np.eye(size) + measured, None)
-    return float(special.logsumexp(shared) - np.log(SPREADS.size) - each)
+    return float(special.logsumexp(shared) - np.log(SHARED_SDS.size) - each)
 
 
 def _log_density(x: Array, covariance: Array, density: float | None) -> float:
@@ -113,7 +115,7 @@ def log_evidence(fit: Fit) -> float:
     if not np.isfinite(fit.log_posterior) or not np.isfinite(fit.sd).all():
         return -np.inf
     lower = np.maximum(
-        fit.target.priors.lower, [p.lower for p in fit.target.oscillator.layout.parameters]
+        fit.density.priors.lower, [p.lower for p in fit.density.oscillator.layout.parameters]
     )
     sign, log_det = np.linalg.slogdet(_unit(fit.covariance))
     scale = np.log(fit.sd).sum()
@@ -133,8 +135,8 @@ def log_evidence(fit: Fit) -> float:
 
 def _log_normal(fit: Fit) -> NDArray[np.int64]:
     """Positions of parameters, the noise level apart, with log-normal priors."""
-    priors = fit.target.priors.parameters
-    moving = fit.target.oscillator.layout.roles("physical", "effect", "nuisance")
+    priors = fit.density.priors.parameters
+    moving = fit.density.oscillator.layout.roles("physical", "effect", "nuisance")
     return np.array([i for i in moving if isinstance(priors[i], LogNormal)], dtype=np.int64)
 
 
@@ -152,6 +154,6 @@ def _boundary(distance: float, index: int, fit: Fit) -> float:
 
 def gradient(fit: Fit) -> Array:
     """Gradient of the log posterior at a fit, (d,)."""
-    sigma = fit.mode[fit.target.likelihood.sigma_columns]
+    sigma = fit.mode[fit.density.likelihood.sigma_columns]
     slope = likelihood_gradient(fit.linearisation, sigma, fit.mode.size)
-    return np.asarray(slope + fit.target.priors.gradient(fit.mode))
+    return np.asarray(slope + fit.density.priors.gradient(fit.mode))

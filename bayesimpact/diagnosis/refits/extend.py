@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.inference.defaults import effect_prior
-from bayesimpact.inference.fit import Fit, Target
+from bayesimpact.inference.fit import Fit, PosteriorDensity
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.prior import Normal, Prior
 from bayesimpact.inference.priors import Priors
@@ -27,7 +27,7 @@ WIDEST = 100.0
 
 def campaign_scales(fit: Fit) -> Scales:
     """Physical sizes of a campaign from the fit of its base model."""
-    o = fit.target.oscillator
+    o = fit.density.oscillator
     slots = o.layout.slots(fit.mode)
     c1, k1, c2, gap, k2 = slots[:, :5].T
     readings = [r.samples - b for r, b in zip(o.campaign.recordings, slots[:, 10], strict=True)]
@@ -35,7 +35,7 @@ def campaign_scales(fit: Fit) -> Scales:
     reach = np.array([np.max(np.abs(y)) for y in moved])
     depth = np.array([np.max(y) for y in moved]) - gap
     speed = reach * np.sqrt(k1 / o.campaign.mass)
-    touches = [int(np.sum((y[:-1] < g) & (y[1:] >= g))) for y, g in zip(moved, gap, strict=True)]
+    contacts = [int(np.sum((y[:-1] < g) & (y[1:] >= g))) for y, g in zip(moved, gap, strict=True)]
     indentation = float(max(depth.max(), 0.0)) if o.campaign.stop else 0.0
     return Scales(
         mass=o.campaign.mass,
@@ -49,7 +49,7 @@ def campaign_scales(fit: Fit) -> Scales:
         impact_speed=float(speed.max()) if indentation > 0 else 0.0,
         duration=max(r.duration for r in o.campaign.recordings),
         interval=float(o.intervals.min()),
-        impacts=max(touches),
+        impacts=max(contacts),
         gap=float(gap.mean()) if o.campaign.stop else 0.0,
         cases=len(o.campaign.cases),
         recordings=len(o.campaign.recordings),
@@ -77,9 +77,9 @@ def replaced_slot(effect: Effect, parameter: EffectParameter) -> str | None:
     return None
 
 
-def extend(fit: Fit, effects: Sequence[Effect], scales: Scales) -> Target:
+def extend(fit: Fit, effects: Sequence[Effect], scales: Scales) -> PosteriorDensity:
     """Posterior of the fit's campaign with exactly these `effects`; shared priors are kept."""
-    old = fit.target
+    old = fit.density
     per_recording = old.oscillator.layout.roles("noise").size > 1
     oscillator = build_oscillator(
         old.oscillator.campaign,
@@ -91,7 +91,9 @@ def extend(fit: Fit, effects: Sequence[Effect], scales: Scales) -> Target:
     priors = [known.get(n) or _prior(fit, effects, n, scales) for n in oscillator.layout.names]
     names = set(oscillator.layout.names)
     replaced = {n: p for n, p in known.items() if n not in names and not is_added(n)}
-    return Target(Likelihood(oscillator, old.likelihood.noise), Priors(tuple(priors)), replaced)
+    return PosteriorDensity(
+        Likelihood(oscillator, old.likelihood.noise), Priors(tuple(priors)), replaced
+    )
 
 
 def _prior(fit: Fit, effects: Sequence[Effect], name: str, scales: Scales) -> Prior:
@@ -105,7 +107,7 @@ def _prior(fit: Fit, effects: Sequence[Effect], name: str, scales: Scales) -> Pr
 
 def base_value(fit: Fit, slot: str) -> float:
     """Value of a shared base parameter in a fit: itself, or the mean over what replaced it."""
-    layout = fit.target.oscillator.layout
+    layout = fit.density.oscillator.layout
     column = ("c1", "k1", "c2", "g").index(slot)
     return float(layout.slots(fit.mode)[:, column].mean())
 
@@ -141,9 +143,9 @@ def _start(
     return parameter.scale(scales) if parameter.null is None else parameter.null
 
 
-def at_null(target: Target, theta: Array) -> Array:
+def at_null(density: PosteriorDensity, theta: Array) -> Array:
     """Parameters (d,) with the sizes of all effects at their null."""
-    o = target.oscillator
+    o = density.oscillator
     null = theta.copy()
     for i, name in enumerate(o.layout.names):
         if is_added(name):
@@ -153,9 +155,9 @@ def at_null(target: Target, theta: Array) -> Array:
     return null
 
 
-def difference_steps(fit: Fit, target: Target, sizes: Mapping[str, float]) -> Array:
+def difference_steps(fit: Fit, density: PosteriorDensity, sizes: Mapping[str, float]) -> Array:
     """Steps (d,) for differences: a twentieth of the known standard deviations or of `sizes`."""
     known = zip(fit.names, fit.sd, np.abs(fit.mode), strict=True)
     sd = {n: s if s > 0 else 1e-6 * max(m, 1e-6) for n, s, m in known}
-    names = target.oscillator.layout.names
+    names = density.oscillator.layout.names
     return np.array([0.05 * sd[n] if n in sd else 0.05 * sizes[n] for n in names])

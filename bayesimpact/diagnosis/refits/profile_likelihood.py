@@ -2,8 +2,8 @@
 
 A Maxwell branch that relaxes within the contact looks like a dashpot; its stiffness, its time and
 the contact damping then trade against each other along a curve that leaves the response the same to
-a few parts in ten thousand. A climb with all parameters creeps there. With the shape parameter held
-the rest is well determined: the profile of the posterior over the logarithm of the shape is
+a few parts in ten thousand. An ascent with all parameters creeps there. With the shape parameter
+held the rest is well determined: the profile of the posterior over the logarithm of the shape is
 searched in one dimension (Brent 1973).
 """
 
@@ -30,17 +30,18 @@ CLOSE = 0.02  # in that logarithm: how near the mode is found
 ENOUGH = 0.02  # nats: or so little above it
 FARTHEST = 5.0  # that the shape is followed, in its logarithm
 MOST = 12  # moves, and as many more of Brent's method
-ITERATIONS = 20  # of a climb with the shape held
+ITERATIONS = 20  # of an ascent with the shape held
 
 
 def profiled_shape(fit: Fit) -> int | None:
-    """Position of the shape parameter (a time constant, a depth) that an unfinished climb moves on.
+    """Position of the shape parameter (a time constant, a depth) that an unfinished ascent moves
+    on.
 
     The one that the undamped step would change by the largest factor; None without any. Frequencies
     have side minima, no ridge. Only of effects beside the base model: what its own stops are, is
     known from the base fit.
     """
-    effects: Sequence[Effect] = fit.target.oscillator.effects
+    effects: Sequence[Effect] = fit.density.oscillator.effects
     own = {f"{e.id}.{p.name}" for e in effects for p in e.parameters}
     step = np.abs(fit.covariance @ gradient(fit))
     found = {}
@@ -84,10 +85,10 @@ class _Profile:
             before = self.first if near is None else self.fits[near]
             start = self.predicted(before, x)
             self.fits[x] = find_mode(
-                before.target,
+                before.density,
                 start,
-                steps=difference_steps(before, before.target, {}),
-                held=[self.column],
+                steps=difference_steps(before, before.density, {}),
+                fixed=[self.column],
                 tolerance=TOLERANCE,
                 max_iterations=ITERATIONS,
             )
@@ -101,7 +102,7 @@ class _Profile:
         c = self.column
         move = x - float(np.log(before.mode[c]))
         change = before.covariance[:, c] / before.covariance[c, c] * before.mode[c] * move
-        lower = np.array([p.lower for p in before.target.oscillator.layout.parameters])
+        lower = np.array([p.lower for p in before.density.oscillator.layout.parameters])
         positive = (lower == 0.0) & (before.mode > 0.0)
         change[positive] /= before.mode[positive]
         factor = np.exp(np.clip(change[positive], -2 * abs(move), 2 * abs(move)))

@@ -23,8 +23,8 @@ from bayesimpact.diagnosis.refits.extend import (
 from bayesimpact.diagnosis.score_test.scores import Score
 from bayesimpact.diagnosis.thresholds import LARGE
 from bayesimpact.formula.law import is_formula_id
-from bayesimpact.inference.ascent import Climb
-from bayesimpact.inference.fit import Fit, Target
+from bayesimpact.inference.ascent import Ascent
+from bayesimpact.inference.fit import Fit, PosteriorDensity
 from bayesimpact.inference.initial.horizon import by_stretches, growing_horizon
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.model.effects.effect import Effect, Scales
@@ -36,7 +36,7 @@ TOLERANCE = 0.02  # last step of a refit, standard deviations
 ITERATIONS = 40
 SHARES = (0.5, 0.25, 0.125, 0.0625)  # of the predicted shift, where the whole of it goes too far
 GAINED = 1.0  # nats: what gains less than this over a model that it contains begins again
-LITTLE = 0.1  # nats of odds: a climb that gains less by a step decides nothing
+LITTLE = 0.1  # nats of odds: an ascent that gains less by a step decides nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,8 +76,10 @@ class Candidate:
         all parameters but noise levels.
         """
         fit = self.fit
-        moving = np.setdiff1d(np.arange(fit.mode.size), fit.target.oscillator.layout.roles("noise"))
-        known = np.sqrt(fit.target.priors.information(fit.mode)[moving])
+        moving = np.setdiff1d(
+            np.arange(fit.mode.size), fit.density.oscillator.layout.roles("noise")
+        )
+        known = np.sqrt(fit.density.priors.information(fit.mode)[moving])
         shares = fit.covariance[np.ix_(moving, moving)] * np.outer(known, known)
         return np.asarray(np.clip(np.linalg.eigvalsh(shares), 0.0, 1.0))
 
@@ -89,7 +91,7 @@ def in_words(effects: Sequence[Effect]) -> str:
 
 @dataclass(frozen=True)
 class Enough:
-    """When a climb may end early, see `find_mode`.
+    """When an ascent may end early, see `find_mode`.
 
     Attributes
     ----------
@@ -106,7 +108,7 @@ TO_THE_MODE = Enough()
 
 def base_candidate(fit: Fit) -> Candidate:
     """The base model as a candidate."""
-    return Candidate(fit.target.oscillator.effects, fit, model_evidence(fit))
+    return Candidate(fit.density.oscillator.effects, fit, model_evidence(fit))
 
 
 def refit(
@@ -114,35 +116,35 @@ def refit(
 ) -> Candidate:
     """Fit the model of `fit` with the effects of `scores` added.
 
-    The scores are linear predictions. The climb begins at the best point between the unshifted
+    The scores are linear predictions. The ascent begins at the best point between the unshifted
     model and the predicted one; one that gains nothing begins again at either end. Where the misfit
-    is large, predictions point beyond the mode and side minima lie close: there a climb over
+    is large, predictions point beyond the mode and side minima lie close: there an ascent over
     growing stretches of the recordings is taken too.
     """
-    effects = (*fit.target.oscillator.effects, *(s.effect for s in scores))
+    effects = (*fit.density.oscillator.effects, *(s.effect for s in scores))
     shapes = {name: value for s in scores for name, value in s.shapes.items()}
-    target = extend(fit, effects, scales)
-    names = target.oscillator.layout.names
-    unshifted = transfer(fit, target.oscillator.layout, effects, scales, shapes)
+    density = extend(fit, effects, scales)
+    names = density.oscillator.layout.names
+    unshifted = transfer(fit, density.oscillator.layout, effects, scales, shapes)
     predicted = unshifted.copy()
     _shift(fit, names, predicted, scores)
     steps = difference_steps(
-        fit, target, step_sizes(names, target.oscillator.acting, scales, scores)
+        fit, density, step_sizes(names, density.oscillator.acting, scales, scores)
     )
-    start = best_start(target, unshifted, predicted, steps)
-    goal = enough.goal + prior_at(target, unshifted)
+    start = best_start(density, unshifted, predicted, steps)
+    goal = enough.goal + prior_at(density, unshifted)
     options: dict[str, Any] = {
         "steps": steps, "tolerance": TOLERANCE, "max_iterations": ITERATIONS, "goal": goal,
         "least_gain": enough.least_gain,
     }  # fmt: skip
     if fit.reduced_chi2 > LARGE**2:
-        found = of_two_ways(target, start, unshifted, steps, goal)
+        found = of_two_ways(density, start, unshifted, steps, goal)
     else:
-        found = find_mode(target, start, **options)
+        found = find_mode(density, start, **options)
     for other in (predicted, unshifted):
         gained = found.log_likelihood > fit.log_likelihood + GAINED
         if not (np.array_equal(start, other) or gained):
-            found = better(found, find_mode(target, other, **options))
+            found = better(found, find_mode(density, other, **options))
     return Candidate(effects, found, model_evidence(found))
 
 
@@ -157,92 +159,96 @@ def fit_from(
     """Fit a base model with effects from given values of parameters, over growing stretches; to an
     end of use where that reaches a log likelihood of `goal`.
     """
-    target = extend(fit, effects, scales)
-    layout, acting = target.oscillator.layout, target.oscillator.acting
+    density = extend(fit, effects, scales)
+    layout, acting = density.oscillator.layout, density.oscillator.acting
     start = transfer(fit, layout, effects, scales, values)
     for i, parameter in enumerate(layout.parameters):
         if parameter.name in values:
-            low = max(parameter.lower, target.priors.lower[i])
+            low = max(parameter.lower, density.priors.lower[i])
             start[i] = np.clip(
-                values[parameter.name], low, min(parameter.upper, target.priors.upper[i])
+                values[parameter.name], low, min(parameter.upper, density.priors.upper[i])
             )
-    steps = difference_steps(fit, target, step_sizes(layout.names, acting, scales, ()))
+    steps = difference_steps(fit, density, step_sizes(layout.names, acting, scales, ()))
     found = growing_horizon(
-        target, start,
-        steps=steps, held=_shapes(target), tolerance=TOLERANCE, max_iterations=ITERATIONS,
-        goal=goal + prior_at(target, start),
+        density, start,
+        steps=steps, fixed=_shapes(density), tolerance=TOLERANCE, max_iterations=ITERATIONS,
+        goal=goal + prior_at(density, start),
     )  # fmt: skip
     return Candidate(tuple(effects), found, model_evidence(found))
 
 
-def of_two_ways(target: Target, start: Array, first: Array, steps: Array, goal: float) -> Fit:
-    """The likelier end of a climb from `start` and of the one that ever longer stretches lead to
-    from `first`. Either ends early where it will not reach a log posterior of `goal`, the climb
+def of_two_ways(
+    density: PosteriorDensity, start: Array, first: Array, steps: Array, goal: float
+) -> Fit:
+    """The likelier end of an ascent from `start` and of the one that ever longer stretches lead to
+    from `first`. Either ends early where it will not reach a log posterior of `goal`, the ascent
     also where it will not come as far as the stretches did.
     """
-    theta, reached = _stretched(target, first, steps)
+    theta, reached = _stretched(density, first, steps)
     found = find_mode(
-        target, start,
+        density, start,
         steps=steps, tolerance=TOLERANCE, max_iterations=ITERATIONS, goal=max(goal, reached),
     )  # fmt: skip
     return _or_from(found, theta, reached, steps, goal)
 
 
 def or_by_stretches(found: Fit, start: Array, steps: Array | None, goal: float = -np.inf) -> Fit:
-    """The end of a climb, or the one that ever longer stretches lead to from the same start."""
-    return _or_from(found, *_stretched(found.target, start, steps), steps, goal)
+    """The end of an ascent, or the one that ever longer stretches lead to from the same start."""
+    return _or_from(found, *_stretched(found.density, start, steps), steps, goal)
 
 
-def _stretched(target: Target, start: Array, steps: Array | None) -> tuple[Array, float]:
+def _stretched(density: PosteriorDensity, start: Array, steps: Array | None) -> tuple[Array, float]:
     """Where ever longer stretches lead to, and the log posterior of the whole recordings there."""
-    theta = by_stretches(target, start, steps=steps, held=_shapes(target))
-    return theta, -Climb(target, steps, None, ()).evaluate(theta.copy()).value
+    theta = by_stretches(density, start, steps=steps, fixed=_shapes(density))
+    return theta, -Ascent(density, steps, None, ()).evaluate(theta.copy()).value
 
 
 def _or_from(found: Fit, theta: Array, reached: float, steps: Array | None, goal: float) -> Fit:
-    """The end of a climb, or of one from where stretches lead to, if they `reached` more.
+    """The end of an ascent, or of one from where stretches lead to, if they `reached` more.
 
-    They do where they lead to another mode than a climb that ended in a side minimum; from starts
-    some cycles off, no fewer modes are found than by climbing on in any case (by test).
+    They do where they lead to another mode than an ascent that ended in a side minimum; from starts
+    some cycles off, no fewer modes are found than by going on in any case (by test).
     """
     if not reached > found.log_posterior:
         return found
     other = find_mode(
-        found.target, theta,
+        found.density, theta,
         steps=steps, tolerance=TOLERANCE, max_iterations=ITERATIONS, goal=goal,
     )  # fmt: skip
     return better(found, other)
 
 
-def prior_at(target: Target, theta: Array) -> float:
+def prior_at(density: PosteriorDensity, theta: Array) -> float:
     """Log prior density at one point (d,)."""
-    return float(np.ravel(target.priors.log_density(theta[None]))[0])
+    return float(np.ravel(density.priors.log_density(theta[None]))[0])
 
 
-def _shapes(target: Target) -> list[int]:
+def _shapes(density: PosteriorDensity) -> list[int]:
     """Positions of the shapes of effects, which short stretches should not move."""
-    o = target.oscillator
+    o = density.oscillator
     added = [(i, owner(o.acting, n)[1]) for i, n in enumerate(o.layout.names) if is_added(n)]
     return [i for i, parameter in added if parameter.is_shape]
 
 
 def better(one: Fit, other: Fit) -> Fit:
-    """The likelier one of two ends of climbs."""
+    """The likelier one of two ends of ascents."""
     return max(one, other, key=lambda f: np.nan_to_num(f.log_posterior, nan=-np.inf))
 
 
-def best_start(target: Target, unshifted: Array, predicted: Array, steps: Array) -> Array:
+def best_start(
+    density: PosteriorDensity, unshifted: Array, predicted: Array, steps: Array
+) -> Array:
     """The likeliest point on the line from one start to another (d,).
 
     The predicted end is taken where it is no worse than the unshifted one.
     """
-    climb = Climb(target, steps, None, ())
-    least = climb.evaluate(unshifted.copy()).value
+    ascent = Ascent(density, steps, None, ())
+    least = ascent.evaluate(unshifted.copy()).value
     shares = np.array([1.0, *SHARES])
     values = []
     for share in shares:
         point = unshifted + share * (predicted - unshifted)
-        values.append(climb.evaluate(point).value)
+        values.append(ascent.evaluate(point).value)
         if share == 1.0 and values[0] <= least:
             break
     best = int(np.argmin(np.nan_to_num(values, nan=np.inf)))
@@ -269,7 +275,7 @@ def exchanged(
 ) -> Candidate:
     """The candidate's model with an effect in the place of one of its own.
 
-    The climb begins where that one stands: an effect without a size cannot grow from nothing, and
+    The ascent begins where that one stands: an effect without a size cannot grow from nothing, and
     the model without either may be a side minimum from which another one does not. A force begins
     with the size at which it does most of what the other one does (`equivalent`).
     """
@@ -288,23 +294,23 @@ def _refitted(
     """A model fitted from the candidate's mode, effects that it lacks at some `values`, where these
     are likelier, or at their null.
     """
-    target = extend(candidate.fit, effects, scales)
-    layout = target.oscillator.layout
+    density = extend(candidate.fit, effects, scales)
+    layout = density.oscillator.layout
     start = transfer(candidate.fit, layout, effects, scales, {})
-    sizes = step_sizes(layout.names, target.oscillator.acting, scales, ())
-    steps = difference_steps(candidate.fit, target, sizes)
+    sizes = step_sizes(layout.names, density.oscillator.acting, scales, ())
+    steps = difference_steps(candidate.fit, density, sizes)
     if values:
         known = [values.get(name, own) for name, own in zip(layout.names, start, strict=True)]
-        start = best_start(target, start, np.array(known), steps)
-    goal = enough.goal + prior_at(target, start)
+        start = best_start(density, start, np.array(known), steps)
+    goal = enough.goal + prior_at(density, start)
     options: dict[str, Any] = {
         "steps": steps, "tolerance": TOLERANCE, "max_iterations": ITERATIONS, "goal": goal,
         "least_gain": enough.least_gain,
     }  # fmt: skip
-    found = find_mode(target, start, **options)
+    found = find_mode(density, start, **options)
     if not np.isfinite(found.log_posterior):  # an effect that is gone had kept the motion bounded
-        start = at_null(target, start)
-        found = find_mode(target, start, **options)
+        start = at_null(density, start)
+        found = find_mode(density, start, **options)
     if found.reduced_chi2 > LARGE**2:
         found = or_by_stretches(found, start, steps, goal)
     return Candidate(effects, found, model_evidence(found))
@@ -352,5 +358,5 @@ def tempered_evidence(candidate: Candidate, repetition: float) -> float:
     lost = (1.0 - 1.0 / repetition) * fit.log_likelihood
     known = candidate.prior_shares
     gained = -0.5 * np.sum(np.log((1.0 - known) / repetition + known))
-    gained += 0.5 * fit.target.oscillator.layout.roles("noise").size * np.log(repetition)
+    gained += 0.5 * fit.density.oscillator.layout.roles("noise").size * np.log(repetition)
     return candidate.log_evidence - lost + float(gained)

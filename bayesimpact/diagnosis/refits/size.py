@@ -23,7 +23,7 @@ _SHARE = re.compile(r"\{share\} of ([^).]+)")  # in an effect's statement
 def size_in_words(effect: Effect, before: Fit, after: Fit, scales: Scales) -> tuple[str, float]:
     """Size of an effect as text, and relative to what it should be held against."""
     value, unit, share = size(effect, before, after, scales)
-    return two_digits(value, unit_for(after.target.oscillator.campaign, effect, unit)), share
+    return two_digits(value, unit_for(after.density.oscillator.campaign, effect, unit)), share
 
 
 def size(effect: Effect, before: Fit, after: Fit, scales: Scales) -> Size:
@@ -43,7 +43,7 @@ def size(effect: Effect, before: Fit, after: Fit, scales: Scales) -> Size:
     if effect.observe is not None:
         change = largest_change(effect, after)
         return change, "m", change / scales.largest_reading
-    derived = not after.target.oscillator.reads_displacements
+    derived = not after.density.oscillator.reads_displacements
     both = [f.displacements if derived else f.predicted for f in (after, before)]
     change = max(float(np.abs(a - b).max()) for a, b in zip(*both, strict=True))
     return change, "m", change / scales.amplitude
@@ -66,7 +66,7 @@ def yardstick(effect: Effect) -> str:
 
 def effect_numbers(effect: Effect, fit: Fit, r: int) -> list[float]:
     """The effect's parameters in its own order, as recording r has them."""
-    known, recording = _values(fit), fit.target.oscillator.campaign.recordings[r]
+    known, recording = _values(fit), fit.density.oscillator.campaign.recordings[r]
     keys = {"campaign": None, "case": recording.case, "recording": recording.name}
     return [
         x.fixed if x.fixed is not None else known[instance_name(effect, x, keys[x.scope])]
@@ -81,7 +81,7 @@ def largest_change(effect: Effect, fit: Fit) -> float:
     for r, y in enumerate(fit.readings):
         t = (
             np.arange(y.size, dtype=np.float64)
-            * fit.target.oscillator.campaign.recordings[r].interval
+            * fit.density.oscillator.campaign.recordings[r].interval
         )
         p = np.array([effect_numbers(effect, fit, r)])
         largest = max(largest, float(np.abs(effect.observe(y[None], t, p) - y).max()))
@@ -91,10 +91,10 @@ def largest_change(effect: Effect, fit: Fit) -> float:
 def peak_force(effect: Effect, fit: Fit, points: int = 2000) -> float:
     """Largest force of an effect's law along the fitted motion, N."""
     assert effect.law is not None
-    slots = fit.target.oscillator.layout.slots(fit.mode)
+    slots = fit.density.oscillator.layout.slots(fit.mode)
     largest = 0.0
     for r, (y, v) in enumerate(trajectory_points(fit)):
-        times = np.asarray(fit.target.oscillator.campaign.recordings[r].times)
+        times = np.asarray(fit.density.oscillator.campaign.recordings[r].times)
         few = slice(0, y.size, max(1, y.size * len(slots) // points))
         numbers = effect_numbers(effect, fit, r), slots[r]
         force = force_along(effect.law, y[few], v[few], times[few], *numbers)

@@ -14,7 +14,7 @@ def sizes_of(fit: Fit, effect: Effect) -> tuple[list[tuple[int, float]], list[in
 
     No sizes where it has none, or one without a null.
     """
-    names = fit.target.oscillator.layout.names
+    names = fit.density.oscillator.layout.names
     own = [i for i, name in enumerate(names) if name.startswith(f"{effect.id}.")]
     kinds = [(i, effect.parameter(bare_name(names[i]))) for i in own]
     shapes = [i for i, kind in kinds if kind.is_shape]
@@ -40,5 +40,5 @@ def loss_without(fit: Fit, effect: Effect) -> float:
         return 0.0
     scaled = fit.covariance[np.ix_(at, at)] / np.outer(sd, sd)
     grown = float((away / sd) @ np.linalg.lstsq(scaled, away / sd, rcond=1e-12)[0])
-    total = float(fit.target.likelihood.sizes.sum())
+    total = float(fit.density.likelihood.sizes.sum())
     return 0.5 * total * float(np.log1p(max(grown, 0.0) / total))

@@ -24,7 +24,7 @@ from scipy.optimize import minimize_scalar
 from bayesimpact.diagnosis.refits.sizes import sizes_of
 from bayesimpact.diagnosis.residual_force.gaussian_process import whitened_one
 from bayesimpact.diagnosis.residual_force.hidden import about, parameter_forces
-from bayesimpact.diagnosis.residual_force.marginal import Part, gain, products
+from bayesimpact.diagnosis.residual_force.marginal import Part, log_evidence_gain, products
 from bayesimpact.diagnosis.thresholds import DOUBT
 from bayesimpact.formula.responses import motion_of
 from bayesimpact.inference.fit import Fit, inverse
@@ -69,14 +69,14 @@ class Discrepancy:
     values: tuple[Array, ...] = field(repr=False)
     _gains: dict[Fit, tuple[float, float]] = field(default_factory=dict, repr=False)
 
-    def gain(self, fit: Fit, alone: float) -> float:
+    def log_evidence_gain(self, fit: Fit, alone: float) -> float:
         """What a force of time along this fit's motion adds to a model's log evidence, which is
         `alone` without one. To first order where the model lies far behind the likeliest so far.
         """
         if fit not in self._gains:
             reached = max((one + more for one, more in self._gains.values()), default=-np.inf)
             least = reached - UNDERRATED - alone
-            self._gains[fit] = alone, gain(fit, self.parts, least)
+            self._gains[fit] = alone, log_evidence_gain(fit, self.parts, least)
         return self._gains[fit][1]
 
     @property
@@ -84,7 +84,7 @@ class Discrepancy:
         """Whether what is left beside the force is noise of the level estimated: else it is no
         force of time that remains, as where an encoder errs, and odds beside one mean little.
         """
-        error = self.fit.target.likelihood.noise.level_error
+        error = self.fit.density.likelihood.noise.level_error
         return self.level**2 <= 1.0 + 2 * DOUBT * (error if np.isfinite(error) else 0.0)
 
     @property
@@ -122,8 +122,8 @@ class Discrepancy:
         the priors' own. The noise level keeps its own.
         """
         fit, prior = self.fit, _prior_information(self.fit)
-        level = fit.target.likelihood.noise.level
-        sigma = fit.mode[fit.target.likelihood.sigma_columns]
+        level = fit.density.likelihood.noise.level
+        sigma = fit.mode[fit.density.likelihood.sigma_columns]
         scores = np.diag(prior)
         for part, lin, own in zip(self.parts, fit.linearisation, sigma, strict=True):
             jacobian = lin.jacobian / level
@@ -132,7 +132,7 @@ class Discrepancy:
             where = np.ix_(lin.columns, lin.columns)
             scores[where] += noise * (jacobian.T @ jacobian + self.flat * along.T @ along)
         covariance = fit.covariance @ scores @ fit.covariance
-        held = fit.target.oscillator.layout.roles("noise")
+        held = fit.density.oscillator.layout.roles("noise")
         covariance[held], covariance[:, held] = 0.0, 0.0
         covariance[held, held] = fit.sd[held] ** 2
         return np.asarray(covariance)
@@ -170,7 +170,7 @@ def discrepancy(fit: Fit) -> Discrepancy | None:
     stiffness = fit.value("k1")
     if not (stiffness > 0 and all(np.isfinite(y).all() and np.ptp(y) for y in fit.displacements)):
         return None
-    period = 2 * np.pi * float(np.sqrt(fit.target.oscillator.campaign.mass / stiffness))
+    period = 2 * np.pi * float(np.sqrt(fit.density.oscillator.campaign.mass / stiffness))
     try:
         motions = tuple(motion_of(fit, r) for r in range(len(fit.linearisation)))
         parts = tuple(_part(fit, r, motion, period) for r, motion in enumerate(motions))
@@ -182,7 +182,7 @@ def discrepancy(fit: Fit) -> Discrepancy | None:
 def _part(fit: Fit, r: int, motion: Motion, period: float) -> Part:
     duration, n = float(motion.t[-1]), motion.samples
     cycles = duration / period
-    most = max(QUICK, (KNOTS if fit.target.oscillator.campaign.stop else FEWEST) * cycles)
+    most = max(QUICK, (KNOTS if fit.density.oscillator.campaign.stop else FEWEST) * cycles)
     wanted = min(KNOTS * cycles, most)
     count = int(np.clip(np.ceil(wanted), 1, max(ENTRIES // n, 2))) + 1
     knots = np.linspace(0.0, duration, count)
@@ -191,7 +191,7 @@ def _part(fit: Fit, r: int, motion: Motion, period: float) -> Part:
         near = knots[first : first + BLOCK, None]
         tents = np.maximum(1.0 - np.abs(motion.t - near) / knots[1], 0.0)
         raw[first : first + BLOCK] = answers(motion, tents)
-    level = np.full(r + 1, fit.target.likelihood.noise.level)
+    level = np.full(r + 1, fit.density.likelihood.noise.level)
     white = whitened_one(fit, r, raw, level)
     squares, vectors = np.linalg.eigh(white @ white.T)
     return Part(white.T @ vectors, np.maximum(squares, 0.0), vectors)
@@ -199,8 +199,8 @@ def _part(fit: Fit, r: int, motion: Motion, period: float) -> Part:
 
 def _prior_information(fit: Fit) -> Array:
     """Of the priors at the mode, (d,); the noise level is held."""
-    information = fit.target.priors.information(fit.mode)
-    information[fit.target.oscillator.layout.roles("noise")] = 1.0
+    information = fit.density.priors.information(fit.mode)
+    information[fit.density.oscillator.layout.roles("noise")] = 1.0
     return np.asarray(information)
 
 

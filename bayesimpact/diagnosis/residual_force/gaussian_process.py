@@ -101,7 +101,7 @@ class MissingForce:
         basis = self._basis(y)
         return basis @ self.mean[: self.knots], basis @ self.mean[self.knots :]
 
-    def spread(self, y: Array) -> tuple[Array, Array]:
+    def sd(self, y: Array) -> tuple[Array, Array]:
         """Posterior standard deviations of a(y) and b(y) at displacements (n,)."""
         basis, n = self._basis(y), self.knots
         a = np.einsum("ni,ij,nj->n", basis, self.covariance[:n, :n], basis)
@@ -254,7 +254,7 @@ def motion_range(fit: Fit) -> tuple[float, float]:
 
 def basis_responses(fit: Fit, effect: Effect, knots: int, scales: Scales) -> tuple[Array, ...]:
     """Whitened responses (noise = 1) to a unit of each coefficient: per recording (n, 2 knots)."""
-    oscillator, sigma = fit.target.oscillator, sigma_of(fit)
+    oscillator, sigma = fit.density.oscillator, sigma_of(fit)
     head = [p.fixed for p in effect.parameters if p.fixed is not None]
     table = with_law(oscillator, effect)
     slots = oscillator.layout.slots(fit.mode)
@@ -274,7 +274,7 @@ def basis_responses(fit: Fit, effect: Effect, knots: int, scales: Scales) -> tup
 
 def whitened_one(fit: Fit, r: int, values: Array, sigma: Array) -> Array:
     """Filtered, whitened signals (k, n) of one recording in units of the noise."""
-    oscillator, noise = fit.target.oscillator, fit.target.likelihood.noise
+    oscillator, noise = fit.density.oscillator, fit.density.likelihood.noise
     recording = oscillator.campaign.recordings[r]
     filtered = smooth(values, oscillator.smoothing, recording.interval)
     white = noise.whitened(recording, filtered)
@@ -312,7 +312,7 @@ def _change(
 
 def trajectory_points(fit: Fit) -> Sequence[tuple[Array, Array]]:
     """Displacement and velocity of the fitted motion at the samples, per recording, m and m/s."""
-    pairs = zip(fit.displacements, fit.target.oscillator.intervals, strict=True)
+    pairs = zip(fit.displacements, fit.density.oscillator.intervals, strict=True)
     return [(y, np.gradient(y, interval)) for y, interval in pairs]
 
 

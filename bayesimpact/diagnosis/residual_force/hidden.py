@@ -50,7 +50,7 @@ class ParameterForces:
         its parameters, and the rest of that force, N, per recording (n,).
         """
         names, back = self.fit.names, np.eye(self.fit.mode.size)
-        base = np.isin(self.moving, self.fit.target.oscillator.layout.roles("physical"))
+        base = np.isin(self.moving, self.fit.density.oscillator.layout.roles("physical"))
         learned = np.array([names[i].startswith(LEARNED) for i in self.moving])
         if not learned.any():
             return back, tuple(np.zeros(f.shape[1]) for f in self.forces)
@@ -91,7 +91,7 @@ def about(power: Array, y: Array) -> Array:
 
 def parameter_forces(fit: Fit, motions: Sequence[Motion]) -> ParameterForces:
     """Of a fit, along its recordings' motions."""
-    o = fit.target.oscillator
+    o = fit.density.oscillator
     moving = o.layout.roles("physical", "effect")
     steps = STEP * np.maximum(np.abs(fit.mode[moving]), fit.sd[moving])
     theta = np.tile(fit.mode, (1 + moving.size, 1))

@@ -106,7 +106,7 @@ class Products:
 
 def products(fit: Fit, parts: Sequence[Part], linear: Sequence[Linearisation]) -> Products:
     """Of a fit linearised somewhere, with responses along its own motion or a near one."""
-    likelihood, size = fit.target.likelihood, fit.mode.size
+    likelihood, size = fit.density.likelihood, fit.mode.size
     level = likelihood.noise.level
     whole, along = np.zeros((size + 1, size + 1)), []
     for part, lin in zip(parts, linear, strict=True):
@@ -133,12 +133,12 @@ class _Point:
     step: Array
 
 
-def gain(fit: Fit, parts: Sequence[Part], least: float = -np.inf) -> float:
+def log_evidence_gain(fit: Fit, parts: Sequence[Part], least: float = -np.inf) -> float:
     """What the force adds to a model's log evidence, its size and the noise level at their best;
     where that is less than `least` by the derivatives at the fit's mode, what these say.
     """
-    priors, likelihood = fit.target.priors, fit.target.likelihood
-    free = fit.target.oscillator.layout.roles("physical", "effect", "nuisance")
+    priors, likelihood = fit.density.priors, fit.density.likelihood
+    free = fit.density.oscillator.layout.roles("physical", "effect", "nuisance")
     start = _point(fit, fit.mode, products(fit, parts, fit.linearisation))
     level, total = likelihood.noise.level, start.found.total
     unit = float(np.sum(likelihood.log_volume)) - total * np.log(level * np.sqrt(2 * np.pi))
@@ -148,25 +148,25 @@ def gain(fit: Fit, parts: Sequence[Part], least: float = -np.inf) -> float:
     straight = _stepped(fit, start, _by_derivatives(fit))
     if known + straight.value < least:
         return known + straight.value
-    return known + _climbed(fit, start).value
+    return known + _ascended(fit, start).value
 
 
 def _log_likelihood(fit: Fit) -> float:
     """Of a fit's residuals by their squares, as those beside a force count: readings in coarse
     steps have another one (`rounding`).
     """
-    sigma = fit.mode[fit.target.likelihood.sigma_columns]
+    sigma = fit.mode[fit.density.likelihood.sigma_columns]
     squares = np.array([part.residual @ part.residual for part in fit.linearisation])
     return fit.log_likelihood + 0.5 * float(np.sum((fit.sums - squares) / sigma**2))
 
 
-def _climbed(fit: Fit, start: _Point) -> _Point:
+def _ascended(fit: Fit, start: _Point) -> _Point:
     """The mode beside the force, from the fit's own."""
     residuals = _simulated(fit)
     here = _stepped(fit, start, residuals)
     steps = STEP / np.sqrt(np.diag(inverse(fit.covariance)))
     for _ in range(RENEWALS):
-        linear = fit.target.likelihood.linearise(here.theta, steps, roughly=True)
+        linear = fit.density.likelihood.linearise(here.theta, steps, roughly=True)
         if not all(np.isfinite(part.jacobian).all() for part in linear):
             break
         renewed = _point(fit, here.theta, products(fit, start.found.parts, linear), here.log_k)
@@ -192,10 +192,10 @@ def _stepped(fit: Fit, here: _Point, residuals: Residuals) -> _Point:
 
 def _moved(fit: Fit, here: _Point, share: float, residuals: Residuals) -> _Point | None:
     """A share of the step on, with the residuals there; None where the motion runs away."""
-    target = fit.target
-    bounds = np.array([(p.lower, p.upper) for p in target.oscillator.layout.parameters])
-    lower = np.maximum(bounds[:, 0], target.priors.lower)
-    upper = np.minimum(bounds[:, 1], target.priors.upper)
+    density = fit.density
+    bounds = np.array([(p.lower, p.upper) for p in density.oscillator.layout.parameters])
+    lower = np.maximum(bounds[:, 0], density.priors.lower)
+    upper = np.minimum(bounds[:, 1], density.priors.upper)
     theta = np.clip(here.theta + share * here.step, lower, upper)
     left = residuals(theta)
     if not all(np.isfinite(row).all() for row in left):
@@ -205,7 +205,7 @@ def _moved(fit: Fit, here: _Point, share: float, residuals: Residuals) -> _Point
 
 def _simulated(fit: Fit) -> Residuals:
     """The residuals of a model's motion, in units of the noise."""
-    likelihood = fit.target.likelihood
+    likelihood = fit.density.likelihood
 
     def residuals(theta: Array) -> list[Array]:
         return [row[0] / likelihood.noise.level for row in likelihood.residuals(theta[None])]
@@ -215,7 +215,7 @@ def _simulated(fit: Fit) -> Residuals:
 
 def _by_derivatives(fit: Fit) -> Residuals:
     """Residuals as the derivatives at the mode say, in units of the noise."""
-    level = fit.target.likelihood.noise.level
+    level = fit.density.likelihood.noise.level
 
     def residuals(theta: Array) -> list[Array]:
         change = theta - fit.mode
@@ -228,7 +228,7 @@ def _by_derivatives(fit: Fit) -> Residuals:
 
 def _point(fit: Fit, theta: Array, found: Products, near: float | None = None) -> _Point:
     """About theta, of a force whose ln k is sought `near` one first."""
-    layout, priors = fit.target.oscillator.layout, fit.target.priors
+    layout, priors = fit.density.oscillator.layout, fit.density.priors
     free, noise = layout.roles("physical", "effect", "nuisance"), layout.roles("noise")
     information, slope = np.array(priors.information(theta)), np.nan_to_num(priors.gradient(theta))
     information[noise], slope[noise] = 1.0, 0.0  # held

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.data.short_repr import short_repr
 from bayesimpact.diagnosis.refits.extend import extend, replaced_slot, transfer
-from bayesimpact.inference.fit import Fit, Target
+from bayesimpact.inference.fit import Fit, PosteriorDensity
 from bayesimpact.model.effects.effect import Effect, EffectParameter, Scales
 from bayesimpact.model.parameters import instance_name
 
@@ -59,7 +59,7 @@ def directions(fit: Fit, effects: Iterable[Effect], scales: Scales) -> tuple[Dir
 
     Effects with a phase are left to `frequency_scan`, which scans frequencies.
     """
-    acting = fit.target.oscillator.acting
+    acting = fit.density.oscillator.acting
     have = {e.id for e in acting}
     found = []
     for effect in effects:
@@ -96,12 +96,12 @@ def decays_of(effect: Effect, scales: Scales) -> Array:
 
 def sigma_of(fit: Fit) -> Array:
     """Noise level of every recording at the fit's mode, (R,), m."""
-    return fit.mode[fit.target.likelihood.sigma_columns]
+    return fit.mode[fit.density.likelihood.sigma_columns]
 
 
 def whitened(fit: Fit, values: Sequence[Array]) -> tuple[Array, ...]:
     """Changes (..., n_r) of what is seen per recording, whitened and in units of the noise."""
-    recordings, noise = fit.target.oscillator.campaign.recordings, fit.target.likelihood.noise
+    recordings, noise = fit.density.oscillator.campaign.recordings, fit.density.likelihood.noise
     rows = zip(values, recordings, sigma_of(fit), strict=True)
     return tuple(noise.whitened(r, v) / s for v, r, s in rows)
 
@@ -123,9 +123,9 @@ def _finer(axis: Array, times: int) -> Array:
     return np.interp(places, np.arange(axis.size), axis)
 
 
-def size_parameters(target: Target, effect: Effect) -> list[tuple[str, EffectParameter]]:
+def size_parameters(density: PosteriorDensity, effect: Effect) -> list[tuple[str, EffectParameter]]:
     """Names in theta and records of an effect's size parameters."""
-    campaign = target.oscillator.campaign
+    campaign = density.oscillator.campaign
     keys: dict[str, list[str | None]] = {
         "campaign": [None],
         "case": list(campaign.cases),
@@ -135,34 +135,36 @@ def size_parameters(target: Target, effect: Effect) -> list[tuple[str, EffectPar
     return [(instance_name(effect, p, key), p) for p in sizes for key in keys[p.scope]]
 
 
-def size_steps(target: Target, effect: Effect, theta: Array, scales: Scales) -> tuple[Array, Array]:
+def size_steps(
+    density: PosteriorDensity, effect: Effect, theta: Array, scales: Scales
+) -> tuple[Array, Array]:
     """Points (1 + k, d): theta, and with each of an effect's k sizes larger by a small part of what
     is plausible; these steps (k,).
     """
-    sizes = size_parameters(target, effect)
+    sizes = size_parameters(density, effect)
     steps = np.array([SIZE_STEP * parameter.scale(scales) for _, parameter in sizes])
     points = np.repeat(theta[None], 1 + len(sizes), axis=0)
     for i, (name, _) in enumerate(sizes):
-        points[1 + i, target.oscillator.layout.index(name)] += steps[i]
+        points[1 + i, density.oscillator.layout.index(name)] += steps[i]
     return points, steps
 
 
 def _direction(
     fit: Fit, effect: Effect, scales: Scales, shapes: Mapping[str, float]
 ) -> Direction | None:
-    effects = (*fit.target.oscillator.effects, effect)
-    target = extend(fit, effects, scales)
-    layout = target.oscillator.layout
+    effects = (*fit.density.oscillator.effects, effect)
+    density = extend(fit, effects, scales)
+    layout = density.oscillator.layout
     theta = transfer(fit, layout, effects, scales, shapes)
-    sizes = size_parameters(target, effect)
+    sizes = size_parameters(density, effect)
     if not sizes:
-        change = [b - a for a, b in zip(fit.seen, target.oscillator.predict(theta), strict=True)]
+        change = [b - a for a, b in zip(fit.seen, density.oscillator.predict(theta), strict=True)]
         parts = tuple(p[:, None] for p in whitened(fit, change))
         return Direction(effect, dict(shapes), (effect.id,), parts, True)
-    base = whitened(fit, target.oscillator.predict(theta))
+    base = whitened(fit, density.oscillator.predict(theta))
     columns = []
     for name, parameter in sizes:
-        response = _response(fit, target, theta, base, layout.index(name), parameter, scales)
+        response = _response(fit, density, theta, base, layout.index(name), parameter, scales)
         if response is None:
             return None
         columns.append(response)
@@ -175,7 +177,7 @@ def _direction(
 
 def _response(
     fit: Fit,
-    target: Target,
+    density: PosteriorDensity,
     theta: Array,
     base: tuple[Array, ...],
     index: int,
@@ -187,7 +189,7 @@ def _response(
     for _ in range(4):
         moved = theta.copy()
         moved[index] += step
-        values = whitened(fit, target.oscillator.predict(moved))
+        values = whitened(fit, density.oscillator.predict(moved))
         change = [b - a for a, b in zip(base, values, strict=True)]
         with np.errstate(over="ignore", invalid="ignore"):
             norm = float(np.sqrt(sum(float(c.ravel() @ c.ravel()) for c in change)))

@@ -33,7 +33,7 @@ def force_responses(fit: Fit, r: int, grid: Array, scales: Scales) -> Responses 
     superposition; None where that does not agree with the simulation at frequencies all over the
     grid, as behind a law with a state of its own.
     """
-    oscillator, sigma = fit.target.oscillator, sigma_of(fit)
+    oscillator, sigma = fit.density.oscillator, sigma_of(fit)
     slots = oscillator.layout.slots(fit.mode)[r]
     changes = free_changes(oscillator, r, slots, _small(fit, r, scales))
 
@@ -53,7 +53,7 @@ def simulated_responses(fit: Fit, r: int, frequencies: Array, scales: Scales) ->
     own[1:, 0] = size
     own[1:, 1] = np.repeat(frequencies, 2)
     own[1:, 2] = np.tile([0.0, 0.5 * np.pi], frequencies.size)
-    oscillator = fit.target.oscillator
+    oscillator = fit.density.oscillator
     slots = np.tile(oscillator.layout.slots(fit.mode)[r], (own.shape[0], 1))
     laws = with_law(oscillator, HARMONIC_FORCING)
     order = int(oscillator.orders[r])
@@ -63,7 +63,7 @@ def simulated_responses(fit: Fit, r: int, frequencies: Array, scales: Scales) ->
 
 def _small(fit: Fit, r: int, scales: Scales) -> float:
     """A displacement, m, that changes recording r's reading by little."""
-    oscillator = fit.target.oscillator
+    oscillator = fit.density.oscillator
     rate = np.sqrt(scales.stiffness / scales.mass)
-    level = float(sigma_of(fit)[r] * fit.target.likelihood.scales[r])
+    level = float(sigma_of(fit)[r] * fit.density.likelihood.scales[r])
     return float(SIZE * level / rate ** int(oscillator.orders[r]))

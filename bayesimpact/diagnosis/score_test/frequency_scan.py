@@ -34,7 +34,7 @@ from bayesimpact.diagnosis.score_test.harmonics import (
 from bayesimpact.diagnosis.score_test.scores import LIMIT_SD, Score
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
-from bayesimpact.model.measurement import gain
+from bayesimpact.model.measurement import magnitude_response
 
 Array = NDArray[np.float64]
 
@@ -54,7 +54,7 @@ def periodic_scores(fit: Fit, effects: Sequence[Effect], scales: Scales) -> tupl
 
     Their p-values are corrected for the number of frequencies.
     """
-    have = {e.id for e in fit.target.oscillator.acting}
+    have = {e.id for e in fit.density.oscillator.acting}
     found = []
     for effect in effects:
         if effect.id in have or not is_periodic(effect) or not effect.admissible(scales):
@@ -78,7 +78,7 @@ def frequencies(fit: Fit, effect: Effect, scales: Scales) -> Array:
 
 def highest_known(fit: Fit) -> float:
     """Highest frequency that all recordings' whitened numbers know, Hz."""
-    oscillator, noise = fit.target.oscillator, fit.target.likelihood.noise
+    oscillator, noise = fit.density.oscillator, fit.density.likelihood.noise
     pairs = zip(oscillator.counts, oscillator.intervals, strict=True)
     return min(noise.highest(int(n), float(dt)) for n, dt in pairs)
 
@@ -88,12 +88,12 @@ def leaking(fit: Fit, scales: Scales) -> Array:
 
     The whitened numbers end at half power, where a filter still lets a strong hum through.
     """
-    smoothing = fit.target.oscillator.smoothing
+    smoothing = fit.density.oscillator.smoothing
     if smoothing is None:
         return np.zeros(0)
-    interval = float(fit.target.oscillator.intervals.max())
+    interval = float(fit.density.oscillator.intervals.max())
     grid = np.arange(highest_known(fit), 0.5 / interval, 0.5 / scales.duration)
-    stopped = np.flatnonzero(gain(smoothing, interval, grid) < LEAST_GAIN)
+    stopped = np.flatnonzero(magnitude_response(smoothing, interval, grid) < LEAST_GAIN)
     return grid[: stopped[0]] if stopped.size else grid
 
 
@@ -172,7 +172,7 @@ def _amplitudes(
     amplitudes = np.hypot(sizes[0::2], sizes[1::2])
     weight = 0.5 * (np.diag(information)[0::2] + np.diag(information)[1::2])
     if effect.parameter("amplitude").scope == "recording":
-        recordings = fit.target.oscillator.campaign.recordings
+        recordings = fit.density.oscillator.campaign.recordings
         names = tuple(f"{effect.id}.amplitude[{r.name}]" for r in recordings)
         return amplitudes, 1.0 / np.sqrt(np.maximum(weight, 1e-300)), names
     amplitude = float(np.sum(weight * amplitudes) / np.sum(weight))
@@ -180,7 +180,7 @@ def _amplitudes(
 
 
 def _blocks(fit: Fit, r: int, grid: Array, above: Array, decay: float, scales: Scales) -> Blocks:
-    if fit.target.likelihood.noise.is_white and fit.target.oscillator.smoothing is None:
+    if fit.density.likelihood.noise.is_white and fit.density.oscillator.smoothing is None:
         return white_line_blocks(fit, r, grid, decay)
     waves = partial(hums, fit, r, decay=decay)
     slow = grid < NEAR_RESONANCE * scales.natural_frequency
@@ -194,7 +194,7 @@ def _blocks(fit: Fit, r: int, grid: Array, above: Array, decay: float, scales: S
 def _shapes(
     fit: Fit, effect: Effect, frequency: float, decay: float, phases: Array
 ) -> dict[str, float]:
-    recordings = fit.target.oscillator.campaign.recordings
+    recordings = fit.density.oscillator.campaign.recordings
     shapes = {f"{effect.id}.frequency": frequency}
     if not is_steady(effect):
         shapes[f"{effect.id}.decay"] = decay
@@ -222,7 +222,7 @@ def raw_power(fit: Fit, grid: Array) -> Array:
     """
     power = np.zeros(grid.size)
     for recording, residual in zip(
-        fit.target.oscillator.campaign.recordings, fit.residuals, strict=True
+        fit.density.oscillator.campaign.recordings, fit.residuals, strict=True
     ):
         waves = np.exp(-2j * np.pi * grid[:, None] * recording.times)
         power += np.abs(waves @ (residual * np.hanning(residual.size))) ** 2

@@ -70,7 +70,7 @@ def absorbed(fit: Fit, blocks: Sequence[Blocks], at: int, sizes: Array) -> Array
     shift, own = np.zeros(fit.mode.size), blocks[0].score.shape[1]
     for block, mine in zip(blocks, sizes.reshape(-1, own), strict=True):
         shift[block.columns] += block.absorbed[at] @ mine
-    shift[fit.target.oscillator.layout.roles("noise")] = 0.0
+    shift[fit.density.oscillator.layout.roles("noise")] = 0.0
     return np.asarray(fit.covariance @ shift)
 
 
@@ -80,15 +80,15 @@ def line_blocks(fit: Fit, r: int, grid: Array, decay: float = 0.0) -> Blocks:
     By Fourier sums of the whitened residual and derivatives: all but exact where the fitted
     parameters absorb little of it, and where it decays (1/s) slowly beside its period.
     """
-    part, sigma, noise = fit.linearisation[r], sigma_of(fit)[r], fit.target.likelihood.noise
-    oscillator = fit.target.oscillator
+    part, sigma, noise = fit.linearisation[r], sigma_of(fit)[r], fit.density.likelihood.noise
+    oscillator = fit.density.oscillator
     interval, count = float(oscillator.intervals[r]), int(oscillator.counts[r])
     white = np.vstack([part.residual, part.jacobian.T]) / sigma
     used = oscillator.campaign.recordings[r].used
     stacked, start = noise.in_time(white, count, interval, used)
     n = stacked.shape[-1]
     envelope = np.exp(-decay * (start + interval * np.arange(n)))
-    lift = _whitening_gain(fit, grid, interval) / (sigma * fit.target.likelihood.scales[r])
+    lift = _whitening_gain(fit, grid, interval) / (sigma * fit.density.likelihood.scales[r])
     sums = _fourier_sums(stacked * envelope, grid, interval) * np.exp(-2j * np.pi * grid * start)
     pairs = np.stack([-sums.imag, sums.real], axis=-1) * lift[:, None]  # (1 + k, F, 2)
     own = (0.5 * np.sum(envelope**2) * lift**2)[:, None, None] * np.eye(2)
@@ -97,8 +97,8 @@ def line_blocks(fit: Fit, r: int, grid: Array, decay: float = 0.0) -> Blocks:
 
 def white_line_blocks(fit: Fit, r: int, grid: Array, decay: float = 0.0) -> Blocks:
     """The same at any frequencies, exact, where the noise of recording `r` is white."""
-    part, sigma = fit.linearisation[r], float(sigma_of(fit)[r] * fit.target.likelihood.scales[r])
-    recording = fit.target.oscillator.campaign.recordings[r]
+    part, sigma = fit.linearisation[r], float(sigma_of(fit)[r] * fit.density.likelihood.scales[r])
+    recording = fit.density.oscillator.campaign.recordings[r]
     seen = np.exp(-decay * recording.times) / sigma
     if recording.used is not None:
         seen = np.where(recording.used, seen, 0.0)
@@ -119,7 +119,7 @@ def _fourier_sums(signals: Array, grid: Array, interval: float) -> NDArray[np.co
 
 
 def _whitening_gain(fit: Fit, grid: Array, interval: float) -> Array:
-    return np.asarray(1.0 / np.sqrt(fit.target.likelihood.noise.spectrum(grid, interval)))
+    return np.asarray(1.0 / np.sqrt(fit.density.likelihood.noise.spectrum(grid, interval)))
 
 
 def hums(fit: Fit, r: int, lines: Array, decay: float = 0.0) -> Array:
@@ -127,7 +127,7 @@ def hums(fit: Fit, r: int, lines: Array, decay: float = 0.0) -> Array:
 
     From the first sample on they decay, 1/s.
     """
-    times = fit.target.oscillator.campaign.recordings[r].times
+    times = fit.density.oscillator.campaign.recordings[r].times
     turns = rotations(lines, times) * np.exp(-decay * times)
     waves = np.stack([turns.imag, turns.real], axis=1).reshape(2 * lines.size, -1)
     return whitened_one(fit, r, waves, sigma_of(fit))
@@ -155,8 +155,8 @@ def projected(fit: Fit, blocks: Sequence[Blocks]) -> tuple[Array, Array]:
     count, own = blocks[0].score.shape
     width = own * len(blocks)
     sigma = sigma_of(fit)
-    matrix = np.diag(fit.target.priors.information(fit.mode))
-    noise = fit.target.oscillator.layout.roles("noise")
+    matrix = np.diag(fit.density.priors.information(fit.mode))
+    noise = fit.density.oscillator.layout.roles("noise")
     matrix[noise, noise] = 0.0
     parts = fit.linearisation
     matrix += likelihood_information(parts, grams(parts), sigma, fit.mode.size)
@@ -170,7 +170,7 @@ def projected(fit: Fit, blocks: Sequence[Blocks]) -> tuple[Array, Array]:
         score[:, at] = block.score
     solve = inverse(matrix)
     information -= np.einsum("fdi,de,fej->fij", shared, solve, shared, optimize=True)
-    slope = gradient(fit)  # zero at the mode; a climb ends near it
+    slope = gradient(fit)  # zero at the mode; an ascent ends near it
     slope[noise] = 0.0
     score -= np.einsum("fdi,d->fi", shared, solve @ slope)
     return 0.5 * (information + information.transpose(0, 2, 1)), score

@@ -40,7 +40,7 @@ def shakes_in_own_band(fit: Fit, remains: bool) -> bool:
     anew, as what a motion makes does. Where something remains, a line whose mirror image about the
     motion's own is there too may be a sideband of it (`sidebands`).
     """
-    recordings = fit.target.oscillator.campaign.recordings
+    recordings = fit.density.oscillator.campaign.recordings
     longest = max(r.duration for r in recordings)
     if any(frequency * longest < SLOWEST for _, frequency in _lines(fit)):
         return True
@@ -76,7 +76,7 @@ def _is_one_line(frequencies: list[float], longest: float) -> bool:
 def _has_sideband(fit: Fit) -> bool:
     """Whether a line of a model has its mirror image in every recording that nothing drives."""
     frequencies = [f for _, f in _lines(fit)]
-    pairs = zip(fit.target.oscillator.campaign.recordings, fit.residuals, strict=True)
+    pairs = zip(fit.density.oscillator.campaign.recordings, fit.residuals, strict=True)
     free = [(r, x) for r, x in pairs if r.input is None and r.samples.size == x.size]
     own = [_strongest(r) for r, _ in free] if frequencies else []
     return bool(own) and any(
@@ -111,7 +111,7 @@ def _unforced(recording: Recording, frequency: float, steady: bool) -> Recording
 
 def _lines(fit: Fit) -> list[tuple[Effect, float]]:
     """Periodic effects of a model and their frequencies, Hz."""
-    effects = [e for e in fit.target.oscillator.acting if is_periodic(e)]
+    effects = [e for e in fit.density.oscillator.acting if is_periodic(e)]
     return [(e, fit.value(f"{e.id}.frequency")) for e in effects]
 
 

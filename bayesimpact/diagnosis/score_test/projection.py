@@ -73,8 +73,8 @@ def project(fit: Fit, parts: Sequence[Array]) -> Projection:
         (lin.jacobian / s, lin.residual / s, lin.columns, part)
         for lin, s, part in zip(fit.linearisation, sigma, parts, strict=True)
     ]
-    curvature = fit.target.priors.information(fit.mode)
-    noise = fit.target.oscillator.layout.roles("noise")
+    curvature = fit.density.priors.information(fit.mode)
+    noise = fit.density.oscillator.layout.roles("noise")
     curvature[noise] = 0.0
     matrix = np.diag(curvature)
     for jacobian, _, where, _ in rows:
@@ -93,7 +93,7 @@ def project(fit: Fit, parts: Sequence[Array]) -> Projection:
             for (jacobian, _, where, _), part in zip(rows, left, strict=True)
         ]
     information = absorbed.T @ (curvature[:, None] * absorbed)
-    slope = np.nan_to_num(fit.target.priors.gradient(fit.mode))
+    slope = np.nan_to_num(fit.density.priors.gradient(fit.mode))
     slope[noise] = 0.0
     score, norm = -absorbed.T @ slope, np.zeros(columns)  # at the mode J'r balances the priors
     for (_, residual, _, whole), part in zip(rows, left, strict=True):

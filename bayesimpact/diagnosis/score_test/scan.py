@@ -53,8 +53,8 @@ class Scan:
         """The best score of every effect, strongest first."""
         by_id: dict[str, Score] = {}
         for score in self.scores:
-            held = by_id.get(score.effect.id)
-            if held is None or score.gain > held.gain:
+            best_so_far = by_id.get(score.effect.id)
+            if best_so_far is None or score.gain > best_so_far.gain:
                 by_id[score.effect.id] = score
         return tuple(sorted(by_id.values(), key=lambda s: -s.gain))
 

@@ -27,7 +27,7 @@ RANK = 1e-2  # less of a line is what the model's own amplitude and phases leave
 def steadiness(fit: Fit, scales: Scales) -> tuple[float, ...]:
     """p-values that what a model calls periodic is steady, one per periodic effect in it."""
     found = []
-    for effect in fit.target.oscillator.acting:
+    for effect in fit.density.oscillator.acting:
         if is_periodic(effect) and is_steady(effect):
             lines = fit.value(f"{effect.id}.frequency") + SIDEBANDS / scales.duration
             recordings = range(len(fit.linearisation))

@@ -19,7 +19,7 @@ from bayesimpact.diagnosis.refits.extend import owner
 from bayesimpact.diagnosis.refits.refit import Candidate
 from bayesimpact.diagnosis.residual_force.learned import LEARNED
 from bayesimpact.diagnosis.selection.decision import doubtful_misfit, misfit_above_noise
-from bayesimpact.diagnosis.selection.outcome import Naming
+from bayesimpact.diagnosis.selection.outcome import Selection
 from bayesimpact.diagnosis.thresholds import EXCESS
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.parameters import is_added
@@ -42,7 +42,7 @@ class Comparable:
 
     def between(self, fit: Fit) -> Array:
         """Mean products (d, d) of what parameters of `fit` differ by in models that have them."""
-        roles = fit.target.oscillator.layout.roles("physical", "effect", "nuisance")
+        roles = fit.density.oscillator.layout.roles("physical", "effect", "nuisance")
         change, share = np.zeros((len(self.fits), fit.mode.size)), np.zeros(fit.mode.size)
         for m, other in enumerate(self.fits):
             for i in roles:
@@ -55,26 +55,28 @@ class Comparable:
         return np.asarray(scaled.T @ scaled)
 
 
-def alike_in_misfit(naming: Naming, fit: Fit) -> Comparable:
+def alike_in_misfit(selection: Selection, fit: Fit) -> Comparable:
     """Where something remains: models without a free force that leave at most `EXCESS` times the
     misfit of `fit`, or as little as the noise level is uncertain by; all with the same weight.
     """
-    most = EXCESS * max(misfit_above_noise(naming, fit), doubtful_misfit(naming))
+    most = EXCESS * max(misfit_above_noise(selection, fit), doubtful_misfit(selection))
     found = tuple(
         c.fit
-        for c in naming.tried
+        for c in selection.tried
         if c.fit is not fit
         and np.isfinite(c.log_evidence)
         and not any(name.startswith(LEARNED) for name in c.fit.names)
-        and misfit_above_noise(naming, c.fit) <= most
+        and misfit_above_noise(selection, c.fit) <= most
     )
     return Comparable(found, np.full(len(found), 1.0 / (len(found) + 1)))
 
 
-def alike_in_odds(naming: Naming, chosen: Candidate, rivals: Sequence[Candidate]) -> Comparable:
+def alike_in_odds(
+    selection: Selection, chosen: Candidate, rivals: Sequence[Candidate]
+) -> Comparable:
     """Where nothing remains: rivals of the chosen model by their odds."""
-    reached = naming.log_odds(chosen)
-    odds = np.exp([min(naming.log_odds(c) - reached, 0.0) for c in rivals])
+    reached = selection.log_odds(chosen)
+    odds = np.exp([min(selection.log_odds(c) - reached, 0.0) for c in rivals])
     return Comparable(tuple(c.fit for c in rivals), odds / (1.0 + odds.sum()))
 
 
@@ -87,17 +89,17 @@ def value_in(other: Fit, fit: Fit, name: str) -> float | None:
     if name in other.names:
         return other.value(name)
     if not is_added(name):
-        effects = other.target.oscillator.acting
+        effects = other.density.oscillator.acting
         added = [n for n in other.names if is_added(n)]
         parts = [n for n in added if owner(effects, n)[1].replaces == name]
         return float(np.mean([other.value(n) for n in parts])) if parts else None
-    slot = owner(fit.target.oscillator.acting, name)[1].replaces
+    slot = owner(fit.density.oscillator.acting, name)[1].replaces
     return other.value(slot) if slot in other.names else None
 
 
 def _difference(fit: Fit, i: int, value: float) -> float:
     """What a value differs by from that of a fit; of phases modulo a turn."""
     apart, name = value - float(fit.mode[i]), fit.names[i]
-    if is_added(name) and owner(fit.target.oscillator.acting, name)[1].circular:
+    if is_added(name) and owner(fit.density.oscillator.acting, name)[1].circular:
         return float((apart + np.pi) % (2 * np.pi) - np.pi)
     return apart

@@ -2,7 +2,7 @@
 
 Let S be the likeliest set of effects that the search reached.
 
-1. S leaves nothing that stands out from the noise (`State.is_white`):
+1. S leaves nothing that stands out from the noise (`ExaminedModel.is_white`):
    `adequate` when S is empty, or `unknown` where the base model leaves more than half of the signal
    to coloured noise, which the motion may be itself; `unknown` when one free force in the place of
    all effects beats S by the decisive odds; `ambiguous` when another set comes within these odds,
@@ -55,7 +55,7 @@ from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import Candidate
 from bayesimpact.diagnosis.residual_force.learned import may_restate
 from bayesimpact.diagnosis.score_test.directions import is_periodic
-from bayesimpact.diagnosis.selection.outcome import Naming, State
+from bayesimpact.diagnosis.selection.outcome import ExaminedModel, Selection
 from bayesimpact.diagnosis.thresholds import APART, DECISIVE, DOUBT, EXCESS
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect
@@ -84,72 +84,72 @@ class Decision:
     either: tuple[Group, ...] = ()
 
 
-def decide(naming: Naming) -> Decision:
+def decide(selection: Selection) -> Decision:
     """The verdict on a finished search.
 
-    Where something remains, `naming.tried` must hold the chosen model and what it is without each
-    of its effects, and `naming.residual` the chosen model and, where an effect `may_be_needed`, the
-    base model and, unless that shows `is_imitated`, the models without each such effect and with
-    others in its place.
+    Where something remains, `selection.tried` must hold the chosen model and what it is without
+    each of its effects, and `selection.residual` the chosen model and, where an effect
+    `may_be_needed`, the base model and, unless that shows `is_imitated`, the models without each
+    such effect and with others in its place.
     """
-    chosen = naming.chosen
-    effects = ordered(naming, chosen.candidate.effects)
+    chosen = selection.chosen
+    effects = ordered(selection, chosen.candidate.effects)
     if chosen.is_white:
         if not effects:
             fit = chosen.candidate.fit
-            hidden = fit.target.likelihood.noise.is_coloured and base_failed(fit)
+            hidden = fit.density.likelihood.noise.is_coloured and base_failed(fit)
             return Decision("unknown" if hidden else "adequate", ())
-        if naming.prefers_learned_force():
+        if selection.prefers_learned_force():
             return Decision("unknown", ())
-        rivals = naming.rivals()
-        settled = naming.finished and not rivals
-        return Decision("named" if settled else "ambiguous", effects, rivals)
-    if is_imitated(naming):
+        rivals = selection.rivals()
+        decided = selection.finished and not rivals
+        return Decision("named" if decided else "ambiguous", effects, rivals)
+    if is_imitated(selection):
         return Decision("unknown", ())
-    needed = tuple(e for e in effects if is_told_apart(naming, e) and is_needed(naming, (e,)))
-    groups = (group_of(naming, e) for e in effects if e not in needed)
-    either = tuple(g for g in groups if len(g) > 1 and is_needed(naming, g))
+    needed = tuple(e for e in effects if is_told_apart(selection, e) and is_needed(selection, (e,)))
+    groups = (group_of(selection, e) for e in effects if e not in needed)
+    either = tuple(g for g in groups if len(g) > 1 and is_needed(selection, g))
     if not needed:
         return Decision("unknown", (), either=either)
-    return Decision("partly", needed, naming.rivals(), either)
+    return Decision("partly", needed, selection.rivals(), either)
 
 
-def is_needed(naming: Naming, group: Group) -> bool:
+def is_needed(selection: Selection, group: Group) -> bool:
     """Whether every likely hypothesis has an effect of the chosen model, the first of a group, or
     another of the group, although more remains.
     """
-    if not may_be_needed(naming, group):
+    if not may_be_needed(selection, group):
         return False
-    chosen = frozenset(naming.chosen.candidate.ids)
-    if not (naming.finished or is_compared(naming, group)):
+    chosen = frozenset(selection.chosen.candidate.ids)
+    if not (selection.finished or is_compared(selection, group)):
         return False
-    reached = naming.with_residual_force(chosen)
+    reached = selection.with_residual_force(chosen)
     return not any(
-        naming.with_residual_force(ids) > reached + lead(naming, ids, group[0])
-        for ids, candidate in naming.residual.items()
+        selection.with_residual_force(ids) > reached + lead(selection, ids, group[0])
+        for ids, candidate in selection.residual.items()
         if not holds(candidate.effects, group)
     )
 
 
-def is_told_apart(naming: Naming, effect: Effect) -> bool:
+def is_told_apart(selection: Selection, effect: Effect) -> bool:
     """Whether far more is left with the law that an effect refines in its place, if it does, and
     its size is not that at which it does what a law without parameters does.
     """
     return not any(
-        is_of_fixed_size(naming, effect, law, candidate.fit)
-        or (law.id == effect.prefer and not exceeds(naming, candidate.fit))
-        for law, candidate in simpler_laws(naming, effect)
+        is_of_fixed_size(selection, effect, law, candidate.fit)
+        or (law.id == effect.prefer and not exceeds(selection, candidate.fit))
+        for law, candidate in simpler_laws(selection, effect)
     )
 
 
-def simpler_laws(naming: Naming, effect: Effect) -> list[tuple[Effect, Candidate]]:
+def simpler_laws(selection: Selection, effect: Effect) -> list[tuple[Effect, Candidate]]:
     """The law that an effect refines, and those of its family without parameters, with the chosen
     model with them in its place, as far as these were fitted.
     """
-    ids = frozenset(naming.chosen.candidate.ids)
+    ids = frozenset(selection.chosen.candidate.ids)
     rest = ids - {effect.id}
     found = []
-    for candidate in naming.tried:
+    for candidate in selection.tried:
         new = [e for e in candidate.effects if e.id not in ids]
         if len(new) == 1 and frozenset(candidate.ids) == rest | {new[0].id}:
             fixed = new[0].family == effect.family and not new[0].parameters
@@ -158,34 +158,34 @@ def simpler_laws(naming: Naming, effect: Effect) -> list[tuple[Effect, Candidate
     return found
 
 
-def is_of_fixed_size(naming: Naming, effect: Effect, law: Effect, fit: Fit) -> bool:
+def is_of_fixed_size(selection: Selection, effect: Effect, law: Effect, fit: Fit) -> bool:
     """Whether an effect of one size has nearly that at which it does what a law without parameters
     does along a `fit` with that.
     """
     if law.parameters or len(effect.parameters) != 1:
         return False
     name = f"{effect.id}.{effect.parameters[0].name}"
-    at = equivalent(law, effect, fit, campaign_scales(naming.base.candidate.fit))
-    size = naming.chosen.candidate.fit.value(name)
+    at = equivalent(law, effect, fit, campaign_scales(selection.base.candidate.fit))
+    size = selection.chosen.candidate.fit.value(name)
     return bool(at) and EXCESS * abs(at[name] - size) < abs(at[name])
 
 
-def group_of(naming: Naming, effect: Effect) -> Group:
+def group_of(selection: Selection, effect: Effect) -> Group:
     """An effect of the chosen model, a simpler law like it, and those of its family that likely
     sets without it have in its place; without these where one of the sets has none, or there are
     too many.
     """
-    chosen = naming.chosen.candidate
+    chosen = selection.chosen.candidate
     simpler = [
         law
-        for law, candidate in simpler_laws(naming, effect)
-        if law.id == effect.prefer or is_of_fixed_size(naming, effect, law, candidate.fit)
+        for law, candidate in simpler_laws(selection, effect)
+        if law.id == effect.prefer or is_of_fixed_size(selection, effect, law, candidate.fit)
     ]
     alone = (effect, *simpler[:1])
-    least = naming.log_odds(chosen) - DECISIVE
+    least = selection.log_odds(chosen) - DECISIVE
     others = {e.id: e for e in alone[1:]}
-    for candidate in naming.tried:
-        if naming.log_odds(candidate) <= least or holds(candidate.effects, (effect,)):
+    for candidate in selection.tried:
+        if selection.log_odds(candidate) <= least or holds(candidate.effects, (effect,)):
             continue
         same = [e for e in candidate.effects if e.family == effect.family]
         found = [e for e in same if e.id not in chosen.ids]
@@ -195,52 +195,52 @@ def group_of(naming: Naming, effect: Effect) -> Group:
     return (effect, *others.values()) if len(others) < LARGEST_GROUP else alone
 
 
-def is_imitated(naming: Naming) -> bool:
+def is_imitated(selection: Selection) -> bool:
     """Whether a free force in the place of all effects leaves far less of the misfit.
 
     Not where the effects with a free force beside them are decisively likelier than that force
     alone: then they do what it does not.
     """
-    free = naming.residual.get(frozenset())
+    free = selection.residual.get(frozenset())
     if free is None:
         return False
-    left = misfit_above_noise(naming, naming.chosen.candidate.fit)
-    least = max(misfit_above_noise(naming, free.fit), doubtful_misfit(naming))
-    both = naming.residual.get(frozenset(naming.chosen.candidate.ids))
-    if both is not None and naming.log_odds(both) > naming.log_odds(free) + DECISIVE:
+    left = misfit_above_noise(selection, selection.chosen.candidate.fit)
+    least = max(misfit_above_noise(selection, free.fit), doubtful_misfit(selection))
+    both = selection.residual.get(frozenset(selection.chosen.candidate.ids))
+    if both is not None and selection.log_odds(both) > selection.log_odds(free) + DECISIVE:
         return False
     return left > EXCESS * least
 
 
-def is_compared(naming: Naming, group: Group) -> bool:
+def is_compared(selection: Selection, group: Group) -> bool:
     """Whether a search that ended by its limit has still fitted what an effect must beat.
 
     With a residual force: the chosen model, the base model, the one without the effect, and the
     likeliest with another, not of its group, in its place; where none was tried, it was not.
     """
-    chosen = frozenset(naming.chosen.candidate.ids)
-    other = in_its_place(naming, group)
+    chosen = frozenset(selection.chosen.candidate.ids)
+    other = in_its_place(selection, group)
     if other is None:
         return False
     rivals = {chosen, frozenset[str](), chosen - {group[0].id}, frozenset(other.ids)}
-    return rivals <= naming.residual.keys()
+    return rivals <= selection.residual.keys()
 
 
-def lead(naming: Naming, ids: frozenset[str], effect: Effect) -> float:
+def lead(selection: Selection, ids: frozenset[str], effect: Effect) -> float:
     """Odds by which a model with a residual force must lead the chosen one to unseat an effect.
 
     One with fewer effects decisively where the force may be the effect itself (`may_restate`), for
     it then contradicts nothing; else it is another explanation, and so is another effect in a
     place: these may trail as much, or not at all where they have more parameters to fit with.
     """
-    found = naming.residual[ids].effects
-    if len(ids) < len(naming.chosen.candidate.effects):
+    found = selection.residual[ids].effects
+    if len(ids) < len(selection.chosen.candidate.effects):
         return DECISIVE if may_restate(found[-1], effect) else 0.0
     named = tuple(e for e in found if e.id in ids)
-    return 0.0 if is_larger(named, naming.chosen) else -DECISIVE
+    return 0.0 if is_larger(named, selection.chosen) else -DECISIVE
 
 
-def is_larger(effects: Sequence[Effect], chosen: State) -> bool:
+def is_larger(effects: Sequence[Effect], chosen: ExaminedModel) -> bool:
     """Whether a set of effects is larger than the chosen one, or as large with more parameters."""
     return complexity(effects) > complexity(chosen.candidate.effects)
 
@@ -250,33 +250,33 @@ def complexity(effects: Sequence[Effect]) -> tuple[int, int]:
     return len(effects), sum(not p.initial for e in effects for p in e.parameters)
 
 
-def may_be_needed(naming: Naming, group: Group) -> bool:
+def may_be_needed(selection: Selection, group: Group) -> bool:
     """`is_needed` as far as models without a residual force tell."""
     return (
-        leads_without(naming, group)
-        and stands_out(naming, group[0])
-        and naming.apart.get(group[0].id, np.inf) >= APART
+        leads_without(selection, group)
+        and stands_out(selection, group[0])
+        and selection.apart.get(group[0].id, np.inf) >= APART
     )
 
 
-def leads_without(naming: Naming, group: Group) -> bool:
+def leads_without(selection: Selection, group: Group) -> bool:
     """Whether every set without an effect of a group trails the chosen one decisively, or at all
     one that has such an effect and is simpler; where it is larger than the chosen one, no larger.
     """
-    chosen = naming.chosen
-    own = naming.log_odds(chosen.candidate)
-    with_it = [c for c in naming.tried if any(e.id in c.ids for e in group)]
-    sizes = [(complexity(c.effects), naming.log_odds(c)) for c in with_it]
+    chosen = selection.chosen
+    own = selection.log_odds(chosen.candidate)
+    with_it = [c for c in selection.tried if any(e.id in c.ids for e in group)]
+    sizes = [(complexity(c.effects), selection.log_odds(c)) for c in with_it]
 
     def least(rival: Candidate) -> float:
         most, larger = complexity(rival.effects), is_larger(rival.effects, chosen)
         simpler = [odds for size, odds in sizes if size < most or (larger and size == most)]
         return max([own - DECISIVE, *simpler])
 
-    others = [c for c in naming.tried if not holds(c.effects, group)]
+    others = [c for c in selection.tried if not holds(c.effects, group)]
     if is_periodic(group[0]):
         others = [with_its_evidence(c) for c in others]
-    return not any(naming.log_odds(c) > least(c) for c in others)
+    return not any(selection.log_odds(c) > least(c) for c in others)
 
 
 def with_its_evidence(candidate: Candidate) -> Candidate:
@@ -285,41 +285,41 @@ def with_its_evidence(candidate: Candidate) -> Candidate:
     return candidate if refused is None else replace(candidate, log_evidence=refused)
 
 
-def misses(naming: Naming, effect: Effect) -> bool:
+def misses(selection: Selection, effect: Effect) -> bool:
     """Whether `EXCESS` times as much misfit is left without an effect."""
-    smaller = frozenset(naming.chosen.candidate.ids) - {effect.id}
-    return exceeds(naming, next(c.fit for c in naming.tried if frozenset(c.ids) == smaller))
+    smaller = frozenset(selection.chosen.candidate.ids) - {effect.id}
+    return exceeds(selection, next(c.fit for c in selection.tried if frozenset(c.ids) == smaller))
 
 
-def exceeds(naming: Naming, fit: Fit) -> bool:
+def exceeds(selection: Selection, fit: Fit) -> bool:
     """Whether a fit leaves `EXCESS` times as much misfit as the chosen model."""
-    with_it = misfit_above_noise(naming, naming.chosen.candidate.fit)
-    return misfit_above_noise(naming, fit) > EXCESS * with_it
+    with_it = misfit_above_noise(selection, selection.chosen.candidate.fit)
+    return misfit_above_noise(selection, fit) > EXCESS * with_it
 
 
-def stands_out(naming: Naming, effect: Effect) -> bool:
+def stands_out(selection: Selection, effect: Effect) -> bool:
     """Whether `EXCESS` times as much is left without an effect, of misfit or of force."""
-    if misses(naming, effect):
+    if misses(selection, effect):
         return True
-    if naming.own is not None and not naming.own.leaves_noise:
+    if selection.own is not None and not selection.own.leaves_noise:
         return False  # what is left is no force of time: a size of one says nothing
-    ids = frozenset(naming.chosen.candidate.ids)
+    ids = frozenset(selection.chosen.candidate.ids)
     smaller = ids - {effect.id}
-    return naming.power.get(smaller, 0.0) > EXCESS * naming.power.get(ids, np.inf)
+    return selection.power.get(smaller, 0.0) > EXCESS * selection.power.get(ids, np.inf)
 
 
-def in_its_place(naming: Naming, group: Group) -> Candidate | None:
+def in_its_place(selection: Selection, group: Group) -> Candidate | None:
     """The likeliest model with an effect in the place of one of the chosen model's, the first of a
     group, that is not of the group.
     """
-    chosen = frozenset(naming.chosen.candidate.ids)
+    chosen = frozenset(selection.chosen.candidate.ids)
     rest = chosen - {group[0].id}
     others = [
         c
-        for c in naming.tried
+        for c in selection.tried
         if len(c.ids) == len(chosen) and rest < frozenset(c.ids) and not holds(c.effects, group)
     ]
-    return max(others, key=naming.log_odds, default=None)
+    return max(others, key=selection.log_odds, default=None)
 
 
 def holds(effects: Sequence[Effect], group: Group) -> bool:
@@ -329,34 +329,36 @@ def holds(effects: Sequence[Effect], group: Group) -> bool:
     return any(g.id in (e.id, e.prefer) or g.is_same_law(e) for e in effects for g in group)
 
 
-def misfit_above_noise(naming: Naming, fit: Fit) -> float:
+def misfit_above_noise(selection: Selection, fit: Fit) -> float:
     """Sum of squares beyond that of the noise, in units of its variance.
 
     The noise's own sum is what the recordings' noise estimate says, as far as that is certain;
     within its uncertainty it is what the best hypothesis of all leaves.
     """
-    chosen = naming.chosen.candidate.fit
-    level = chosen.target.likelihood.noise.level**2
-    own = float(chosen.target.likelihood.sizes.sum())
+    chosen = selection.chosen.candidate.fit
+    level = chosen.density.likelihood.noise.level**2
+    own = float(chosen.density.likelihood.sizes.sum())
     left = float(chosen.sums.sum()) / level
-    if left - own < doubtful_misfit(naming):  # as small as the estimate of the noise is uncertain
-        own = left - 2 * max(naming.chosen.unknown.gain, 0.0) * chosen.reduced_chi2
+    if left - own < doubtful_misfit(
+        selection
+    ):  # as small as the estimate of the noise is uncertain
+        own = left - 2 * max(selection.chosen.unknown.gain, 0.0) * chosen.reduced_chi2
     return max(float(fit.sums.sum()) / level - own, 1.0)
 
 
-def doubtful_misfit(naming: Naming) -> float:
+def doubtful_misfit(selection: Selection) -> float:
     """A sum of squares, in units of the noise's variance, that its estimate may be wrong by."""
-    likelihood = naming.chosen.candidate.fit.target.likelihood
+    likelihood = selection.chosen.candidate.fit.density.likelihood
     error = likelihood.noise.level_error
     return 2 * DOUBT * (error if np.isfinite(error) else 0.0) * float(likelihood.sizes.sum())
 
 
-def ordered(naming: Naming, effects: tuple[Effect, ...]) -> tuple[Effect, ...]:
+def ordered(selection: Selection, effects: tuple[Effect, ...]) -> tuple[Effect, ...]:
     """Effects by how much evidence the model loses without them."""
     if len(effects) < 2:
         return effects
-    chosen = set(naming.chosen.candidate.ids)
-    left = {frozenset(c.ids): c for c in naming.tried}
+    chosen = set(selection.chosen.candidate.ids)
+    left = {frozenset(c.ids): c for c in selection.tried}
 
     def loss(effect: Effect) -> float:
         smaller = left.get(frozenset(chosen - {effect.id}))

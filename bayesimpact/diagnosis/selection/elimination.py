@@ -16,7 +16,7 @@ from bayesimpact.diagnosis.refits.refit import Candidate
 from bayesimpact.diagnosis.score_test.scan import Scan
 from bayesimpact.diagnosis.score_test.scores import Score
 from bayesimpact.diagnosis.selection.models import NOTHING
-from bayesimpact.diagnosis.selection.outcome import State, is_large
+from bayesimpact.diagnosis.selection.outcome import ExaminedModel, is_large
 from bayesimpact.diagnosis.selection.ranked import Ranked
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.formula.law import is_formula
@@ -24,69 +24,69 @@ from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect
 
 EXCHANGES = 3  # rounds of leaving out and exchanging effects
-END = 1e-3  # of a shape's range, in which it lies at an end: climbs stop there
+END = 1e-3  # of a shape's range, in which it lies at an end: ascents stop there
 
 
-class Settling(Ranked):
-    """How a model settles: effects left out and exchanged."""
+class Elimination(Ranked):
+    """Effects left out and exchanged."""
 
-    def extended(self, state: State) -> list[Candidate]:
+    def extended(self, examined: ExaminedModel) -> list[Candidate]:
         """Models with one more effect."""
         raise NotImplementedError
 
-    def settled(self, state: State) -> State:
+    def exchanged(self, examined: ExaminedModel) -> ExaminedModel:
         """The model that neither leaving out nor exchanging an effect improves."""
         for _ in range(EXCHANGES):
             self.weigh_remainder()
-            state = self.eliminated(state)
-            for candidate in self.near(state):
+            examined = self.eliminated(examined)
+            for candidate in self.near(examined):
                 if self.may_go_on():
                     self.exchange(candidate)
-            best = self.best(len(state.candidate.effects))
-            best = max([best, *self.beside_rival(state)], key=self.log_odds)
-            if best is state.candidate:  # the same set with a better end settles once more
-                return state
-            state = self.examine(best)
-        return self.eliminated(state)  # what the last exchange led to may need less too
+            best = self.best(len(examined.candidate.effects))
+            best = max([best, *self.beside_rival(examined)], key=self.log_odds)
+            if best is examined.candidate:  # the same set with a better end is exchanged once more
+                return examined
+            examined = self.examine(best)
+        return self.eliminated(examined)  # what the last exchange led to may need less too
 
-    def eliminated(self, state: State) -> State:
+    def eliminated(self, examined: ExaminedModel) -> ExaminedModel:
         """Leave out effects, the least useful first, that the recordings do not demand; where
         something remains, put the law that one refines in its place.
 
         An effect stays when the model without it is decisively worse, or leaves something. When
         time is up and something remains, all stay: what is needed is compared then (`decision`).
         """
-        while (state.is_white or self.may_go_on()) and (smaller := self.smaller(state)):
+        while (examined.is_white or self.may_go_on()) and (smaller := self.smaller(examined)):
             best = max(smaller, key=self.log_odds)
-            lost = self.log_odds(state.candidate) - self.log_odds(best)
-            complete = state.is_white and not self.examine(best).is_white
+            lost = self.log_odds(examined.candidate) - self.log_odds(best)
+            complete = examined.is_white and not self.examine(best).is_white
             if lost >= DECISIVE or (lost > 0 and complete):
-                return state
-            state = self.examine(best)
-        return state
+                return examined
+            examined = self.examine(best)
+        return examined
 
-    def smaller(self, state: State) -> list[Candidate]:
+    def smaller(self, examined: ExaminedModel) -> list[Candidate]:
         """Models with one effect less, or with a simpler one where something remains."""
-        chosen = state.candidate
+        chosen = examined.candidate
         found = [self.drop(chosen, e) for e in chosen.effects if len(chosen.effects) > 1]
-        if not state.is_white and self.may_go_on():
+        if not examined.is_white and self.may_go_on():
             found += [c for e in chosen.effects for c in self.simplified(chosen, e)]
         return found
 
-    def near(self, state: State) -> list[Candidate]:
+    def near(self, examined: ExaminedModel) -> list[Candidate]:
         """The chosen model and those of at most its size that it does not beat decisively."""
-        least = self.log_odds(state.candidate) - DECISIVE
+        least = self.log_odds(examined.candidate) - DECISIVE
         return [
             c
             for c in self.ranked(list(self.tried.values()))
-            if self.log_odds(c) >= least and len(c.effects) <= len(state.candidate.effects)
+            if self.log_odds(c) >= least and len(c.effects) <= len(examined.candidate.effects)
         ]
 
-    def beside_rival(self, state: State) -> list[Candidate]:
+    def beside_rival(self, examined: ExaminedModel) -> list[Candidate]:
         """Extensions by one effect of the likeliest model that lacks an effect of one that leaves
         nothing, and comes near it: a law of free shape may have taken the place of two.
         """
-        chosen = state.candidate
+        chosen = examined.candidate
         least = self.log_odds(chosen) - 2 * DECISIVE
         rivals = [
             c
@@ -95,7 +95,7 @@ class Settling(Ranked):
             and len(c.effects) <= min(len(chosen.effects), self.most - 1)
             and not set(chosen.ids) <= set(c.ids)
         ]
-        if not (state.is_white and rivals and self.may_go_on()):
+        if not (examined.is_white and rivals and self.may_go_on()):
             return []
         return self.extended(self.examine(rivals[0]))
 
@@ -139,8 +139,8 @@ class Settling(Ranked):
 
     def leaves_nothing(self, candidate: Candidate) -> bool:
         """Whether a model has been examined, and nothing was missing from it."""
-        state = self.states.get(frozenset(candidate.ids))
-        return state is not None and state.candidate is candidate and state.is_white
+        examined = self.examined_models.get(frozenset(candidate.ids))
+        return examined is not None and examined.candidate is candidate and examined.is_white
 
     def simplified(self, chosen: Candidate, effect: Effect) -> list[Candidate]:
         """What an effect refines in its place, whatever scores on a model without both say."""
@@ -162,8 +162,8 @@ def _is_seen(effect: Effect, found: Scan, rest: Candidate, chosen: Candidate) ->
 
 def is_at_an_end(fit: Fit, effect: Effect) -> bool:
     """Whether a shape of an effect lies at an end of its range: it is not the law that is asked."""
-    parameters, lower = fit.target.oscillator.layout.parameters, fit.target.priors.lower
-    upper = fit.target.priors.upper
+    parameters, lower = fit.density.oscillator.layout.parameters, fit.density.priors.lower
+    upper = fit.density.priors.upper
     shapes = {f"{effect.id}.{p.name}" for p in effect.parameters if p.is_shape and not p.circular}
     for i, parameter in enumerate(parameters):
         low, high = max(parameter.lower, lower[i]), min(parameter.upper, upper[i])

@@ -1,6 +1,6 @@
 """The models of one search: each is fitted once from every start, and scored once.
 
-Of two ends of climbs to one model the better one is kept.
+Of two ends of ascents to one model the better one is kept.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from bayesimpact.diagnosis.residual_force.gaussian_process import missing_drift,
 from bayesimpact.diagnosis.score_test.own_band import shakes_in_own_band
 from bayesimpact.diagnosis.score_test.scan import Scan, scan
 from bayesimpact.diagnosis.score_test.scores import Score
-from bayesimpact.diagnosis.selection.outcome import State, is_large, leaves_something
+from bayesimpact.diagnosis.selection.outcome import ExaminedModel, is_large, leaves_something
 from bayesimpact.diagnosis.thresholds import EXCESS, LARGE
 from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.fit import Fit
@@ -45,7 +45,7 @@ STARTS = 2  # points of an effect's shape grid from which it is fitted
 # large a value finishes more fits, which costs seconds; too small a one loses a model.
 UNCONVERGED_SHORTFALL = 60.0
 MORE = 2.0  # nats by which a score must promise more than a model has reached to fit it again
-SAME = 0.05  # nats; two climbs to one mode differ by less
+SAME = 0.05  # nats; two ascents to one mode differ by less
 
 NOTHING: tuple[set[str], set[str]] = (set(), set())
 """Effects that are asked for first, and all that were asked about: none."""
@@ -54,7 +54,7 @@ Progress = Callable[[str], None]
 
 
 class Models:
-    """Models fitted so far, `tried`, and those examined, `states`, by the ids of their effects."""
+    """Models fitted so far, `tried`, and `examined_models`, by the ids of their effects."""
 
     def __init__(
         self,
@@ -67,12 +67,12 @@ class Models:
         self.effects, self.scales, self.rng, self.progress = effects, scales, rng, progress
         self.budget = budget or begin()
         self.tried: dict[frozenset[str], Candidate] = {}
-        self.states: dict[frozenset[str], State] = {}
+        self.examined_models: dict[frozenset[str], ExaminedModel] = {}
         self.begun: set[tuple[object, ...]] = set()
         self.dropped: set[tuple[frozenset[str], float, str]] = set()
         self.profiled: set[frozenset[str]] = set()
         self.beside_forces: dict[frozenset[str], tuple[Candidate, Candidate]] = {}
-        self.is_shaken = False  # the equation of motion asked for a harmonic force
+        self.is_driven = False  # the equation of motion asked for a harmonic force
         self.refits = 0
         self.look = 0.0  # s, that the last model took to be scored
         self.repeated: tuple[Candidate, float] | None = None
@@ -80,7 +80,7 @@ class Models:
         self.last: tuple[Fit, Discrepancy | None] | None = None  # see `Ranked.remainder`
 
     def keep(self, candidate: Candidate) -> Candidate:
-        """The better end of all climbs to the candidate's model, this one among them."""
+        """The better end of all ascents to the candidate's model, this one among them."""
         key = frozenset(candidate.ids)
         fit = candidate.fit
         lost = not np.isfinite(fit.log_posterior)  # its mode need not be finite either
@@ -89,41 +89,41 @@ class Models:
         elif shakes_in_own_band(fit, leaves_something(fit)):
             refused = candidate.log_evidence
             candidate = replace(candidate, log_evidence=-np.inf, refused=refused)
-        held = self.tried.get(key)
-        sooner = candidate.fit.converged and not (held and held.fit.converged)
+        best_so_far = self.tried.get(key)
+        sooner = candidate.fit.converged and not (best_so_far and best_so_far.fit.converged)
         least = SAME * (-1 if sooner else 1)
-        if held is None or _is_above(candidate, held, least):
+        if best_so_far is None or _is_above(candidate, best_so_far, least):
             self.tried[key] = candidate
         return self.tried[key]
 
-    def examine(self, candidate: Candidate) -> State:
+    def examine(self, candidate: Candidate) -> ExaminedModel:
         """Whether anything is missing from a candidate.
 
         One whose fit ended on a ridge, and may lack no more than its rest, is finished first.
         """
         candidate = self.keep(candidate)
-        held = self.states.get(frozenset(candidate.ids))
-        if held is not None and held.candidate is candidate:
-            return held
+        best_so_far = self.examined_models.get(frozenset(candidate.ids))
+        if best_so_far is not None and best_so_far.candidate is candidate:
+            return best_so_far
         self.progress(f"scoring what {in_words(candidate.effects) or 'the base model'} lacks")
         begun = self.budget.left
         found = scan(candidate.fit, self.effects, self.scales, rng=self.rng)
         force = missing_force(candidate.fit, self.scales, rng=self.rng)
         drift = missing_drift(candidate.fit, self.scales, rng=self.rng)
         self.look = begun - self.budget.left
-        state = State(candidate, found, force, drift)
-        self.states[frozenset(candidate.ids)] = state
+        examined = ExaminedModel(candidate, found, force, drift)
+        self.examined_models[frozenset(candidate.ids)] = examined
         unconverged = candidate.effects and not candidate.fit.converged
         # else more is missing than an unfinished fit explains
-        if unconverged and state.unknown.log_evidence < UNCONVERGED_SHORTFALL:
+        if unconverged and examined.unknown.log_evidence < UNCONVERGED_SHORTFALL:
             return self.examine(self.finished(candidate))
-        return state
+        return examined
 
     def scanned(self, candidate: Candidate, effects: Sequence[Effect]) -> Scan:
         """Scores of effects on a candidate, and of all others where it was examined."""
-        held = self.states.get(frozenset(candidate.ids))
-        if held is not None and held.candidate is candidate:
-            return held.scan
+        best_so_far = self.examined_models.get(frozenset(candidate.ids))
+        if best_so_far is not None and best_so_far.candidate is candidate:
+            return best_so_far.scan
         return scan(candidate.fit, effects, self.scales, rng=self.rng)
 
     def fit_one(
@@ -193,8 +193,8 @@ class Models:
         return self.tried[key]
 
     def no_worse(self, candidate: Candidate) -> Candidate:
-        """A model that has reached no less than what it contains: a climb that began elsewhere and
-        ended lower begins again from there.
+        """A model that has reached no less than what it contains: an ascent that began elsewhere
+        and ended lower begins again from there.
         """
         best = self.contained(frozenset(candidate.ids))
         if not best.fit.log_likelihood > candidate.fit.log_likelihood + SAME:
@@ -210,7 +210,7 @@ class Models:
     @cached_property
     def asked(self) -> Asked:
         """What the equation of motion and periods ahead ask for."""
-        return Asked(self.states[frozenset()].candidate.fit, self.effects, self.scales)
+        return Asked(self.examined_models[frozenset()].candidate.fit, self.effects, self.scales)
 
     def asked_beside(
         self,
@@ -229,7 +229,7 @@ class Models:
         return [s for s in found.best() if s.effect.id in kept]
 
     def enough(self, rival: Candidate | None = None) -> Enough:
-        """When climbs may end early, to models that are to be compared with a `rival`: as long as
+        """When ascents may end early, to models that are to be compared with a `rival`: as long as
         nothing is known, at the mode.
         """
         return TO_THE_MODE
@@ -238,7 +238,7 @@ class Models:
         """Whether the budget allows for more refits: with time for comparisons, as long as no model
         of the catalogue leaves nothing, which is compared with no force.
         """
-        if any(map(_is_settled, self.states.values())):
+        if any(map(_is_complete, self.examined_models.values())):
             return self.budget.may_go_on()
         return self.budget.may_search_on(self.look)
 
@@ -273,7 +273,7 @@ class Models:
             self.keep(exchanged(candidate, old, new, self.scales, enough=enough))
 
     def finished(self, candidate: Candidate) -> Candidate:
-        """A model whose climb did not converge, at the highest point of its profile likelihood."""
+        """A model whose ascent did not converge, at the highest point of its profile likelihood."""
         key = frozenset(candidate.ids)
         if key not in self.profiled:
             self.profiled.add(key)
@@ -283,22 +283,22 @@ class Models:
         return self.tried[key]
 
 
-def _is_above(candidate: Candidate, held: Candidate, least: float) -> bool:
-    """Whether an end of a climb lies above another one of the same model by more than `least`."""
-    if candidate.refused is not None and held.refused is not None:
-        return candidate.refused > held.refused + least
-    return candidate.log_evidence > held.log_evidence + least
+def _is_above(candidate: Candidate, best_so_far: Candidate, least: float) -> bool:
+    """Whether an end of an ascent lies above another one of the same model by more than `least`."""
+    if candidate.refused is not None and best_so_far.refused is not None:
+        return candidate.refused > best_so_far.refused + least
+    return candidate.log_evidence > best_so_far.log_evidence + least
 
 
-def _is_settled(state: State) -> bool:
+def _is_complete(examined: ExaminedModel) -> bool:
     """Whether nothing is missing from effects of the catalogue."""
-    effects = state.candidate.effects
-    return bool(effects) and state.is_white and not any(map(is_formula, effects))
+    effects = examined.candidate.effects
+    return bool(effects) and examined.is_white and not any(map(is_formula, effects))
 
 
 def likelihood_at(fit: Fit, reduced_chi2: float) -> float:
     """Log likelihood of a fit to the same recordings that leaves so much, nats."""
-    count = float(fit.target.likelihood.sizes.sum())
+    count = float(fit.density.likelihood.sizes.sum())
     return fit.log_likelihood - 0.5 * count * float(np.log(reduced_chi2 / fit.reduced_chi2))
 
 

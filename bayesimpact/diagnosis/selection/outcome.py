@@ -1,4 +1,4 @@
-"""What a search for names found: models, their odds, rivals, and whether anything is left.
+"""What a selection found: models, their odds, rivals, and whether anything is left.
 
 A hypothesis is a set of effects of the catalogue and at most one residual force. All are compared
 by the same log posterior odds: log evidence, less the price of multiplicity for every effect and
@@ -35,7 +35,7 @@ from bayesimpact.inference.noise.whitening import Noise
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class ExaminedModel:
     """One model on the way, and whether anything is missing from it.
 
     Attributes
@@ -73,19 +73,19 @@ class State:
 
 
 @dataclass(frozen=True, eq=False)
-class Naming:
-    """The outcome of the search for names.
+class Selection:
+    """The outcome of the selection.
 
     Attributes
     ----------
-    base, chosen : first and last state
+    base, chosen : first and last model
     tried : every model that was fitted, likeliest first
     prior_cost : nats per added effect and per residual force
     repetition : samples per independent one in the best model's residual
     contact : force in contact alone that the base model leaves unexplained, or None
     contact_odds : its log evidence over the base model when it is fitted with the parameters, where
         many chosen effects may imitate it
-    states : every model that was examined, by its ids
+    examined_models : every model that was examined, by its ids
     residual : models with a residual force beside their effects, fitted in full, by the ids of
         these effects; where something remains beside the chosen model
     finished : False when the budget ended the search, or left none for another one that may say
@@ -103,14 +103,14 @@ class Naming:
     band_limited : inputs are taken for that between their samples, as a good model asked for
     """
 
-    base: State
-    chosen: State
+    base: ExaminedModel
+    chosen: ExaminedModel
     tried: tuple[Candidate, ...]
     prior_cost: float
     repetition: float = 1.0
     contact: MissingForce | None = None
     contact_odds: float = -np.inf
-    states: Mapping[frozenset[str], State] = field(default_factory=dict)
+    examined_models: Mapping[frozenset[str], ExaminedModel] = field(default_factory=dict)
     residual: Mapping[frozenset[str], Candidate] = field(default_factory=dict)
     finished: bool = True
     beside: Discrepancy | None = None
@@ -139,7 +139,7 @@ class Naming:
         if not np.isfinite(candidate.log_evidence):
             return candidate.log_evidence
         alone = candidate.log_evidence
-        return alone + self.beside.gain(candidate.fit, alone)
+        return alone + self.beside.log_evidence_gain(candidate.fit, alone)
 
     def goal(self, least: float) -> float:
         """Log likelihood that a model must reach for log odds of `least`: no evidence is above the
@@ -223,7 +223,7 @@ def explains_most(found: Candidate, of: Candidate) -> bool:
 
 def leaves_something(fit: Fit) -> bool:
     """Whether a residual is above the noise by more than the estimate of the noise is uncertain."""
-    return is_more_than_noise(fit.reduced_chi2, fit.target.likelihood.noise)
+    return is_more_than_noise(fit.reduced_chi2, fit.density.likelihood.noise)
 
 
 def is_more_than_noise(reduced_chi2: float, noise: Noise) -> bool:

@@ -1,4 +1,4 @@
-"""What the models of a search are worth, and which effects may still matter."""
+"""Odds of the models of a search, and which effects may still matter."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from bayesimpact.diagnosis.score_test.directions import is_periodic
 from bayesimpact.diagnosis.score_test.scan import Scan
 from bayesimpact.diagnosis.score_test.scores import Score
 from bayesimpact.diagnosis.selection.models import UNCONVERGED_SHORTFALL, Models
-from bayesimpact.diagnosis.selection.outcome import State, is_large, leaves_something
+from bayesimpact.diagnosis.selection.outcome import ExaminedModel, is_large, leaves_something
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect
@@ -45,7 +45,7 @@ class Ranked(Models):
     @property
     def is_large(self) -> bool:
         """Whether the base model's misfit is large."""
-        return is_large(self.states[frozenset()].candidate.fit)
+        return is_large(self.examined_models[frozenset()].candidate.fit)
 
     @property
     def most(self) -> int:
@@ -53,12 +53,12 @@ class Ranked(Models):
         return MOST_LARGE if self.is_large else MOST_EFFECTS
 
     def promise(self, candidate: Candidate) -> float:
-        """What a model is worth on the way: every sample counts, for what remains may yet be
+        """A model's log posterior odds on the way: every sample counts, for what remains may yet be
         explained, and so may a line that is refused as long as something does, where the equation
         of motion asked for it.
         """
         evidence, lines = candidate.log_evidence, [e for e in candidate.effects if is_periodic(e)]
-        asked = self.is_shaken and [e.id for e in lines] == [HARMONIC_FORCING.id]
+        asked = self.is_driven and [e.id for e in lines] == [HARMONIC_FORCING.id]
         if asked and candidate.refused is not None:
             evidence = candidate.refused
         return evidence - candidate.price(self.cost)
@@ -70,7 +70,7 @@ class Ranked(Models):
         if self.left is None or not np.isfinite(candidate.log_evidence):
             return self.tempered_odds(candidate)
         alone = candidate.log_evidence
-        gained = self.left.gain(candidate.fit, alone)
+        gained = self.left.log_evidence_gain(candidate.fit, alone)
         return alone + gained - candidate.price(self.cost)
 
     def tempered_odds(self, candidate: Candidate) -> float:
@@ -99,33 +99,33 @@ class Ranked(Models):
             self.repeated = best, residual_repetition(best.fit)
         return self.repeated[1]
 
-    def leads_on(self, state: State, larger: Candidate) -> bool:
+    def leads_on(self, examined: ExaminedModel, larger: Candidate) -> bool:
         """Whether a larger model is the next one. Of what a large misfit has become, where that is
         no more than the noise, odds must demand more: such an effect would be left out again.
         """
-        if self.is_large and not leaves_something(state.candidate.fit):
-            return self.log_odds(larger) >= self.log_odds(state.candidate) + DECISIVE
-        return self.promise(larger) > self.promise(state.candidate)
+        if self.is_large and not leaves_something(examined.candidate.fit):
+            return self.log_odds(larger) >= self.log_odds(examined.candidate) + DECISIVE
+        return self.promise(larger) > self.promise(examined.candidate)
 
     def force_gain(self) -> float:
-        """What a free force in place of all effects would be worth, as far as scores tell, each
+        """What a free force in place of all effects would gain, as far as scores tell, each
         independent sample counted once.
         """
-        base = self.states[frozenset()]
+        base = self.examined_models[frozenset()]
         return self.log_odds(base.candidate) + base.unknown.log_evidence / self.repetition()
 
     def enough(self, rival: Candidate | None = None) -> Enough:
-        """When climbs may end early. Where the misfit is large, as near to the mode as odds ask
+        """When ascents may end early. Where the misfit is large, as near to the mode as odds ask
         for, which count each repeated sample of a residual once.
         """
         least = LITTLE * self.repetition() if self.is_large else 0.0
         return Enough(self.goal(rival), least)
 
-    def at_its_mode(self, state: State) -> State:
-        """The same model where its climb, which ended early, leads in the end (`enough`)."""
-        candidate = state.candidate
+    def at_its_mode(self, examined: ExaminedModel) -> ExaminedModel:
+        """The same model where its ascent, which ended early, leads in the end (`enough`)."""
+        candidate = examined.candidate
         if candidate.fit.converged or not (candidate.effects and self.is_large):
-            return state
+            return examined
         self.tell(f"fitting {in_words(candidate.effects)} to the end")
         return self.examine(grown(candidate, candidate.effects, self.scales))
 
@@ -134,7 +134,7 @@ class Ranked(Models):
         of one that leaves nothing: no evidence is above the largest likelihood. Minus infinity
         without one.
         """
-        known = [s.candidate for s in self.states.values() if s.is_white]
+        known = [s.candidate for s in self.examined_models.values() if s.is_white]
         known += [] if rival is None else [rival]
         reached = max(map(self.tempered_odds, known), default=-np.inf)
         return self.repetition() * (reached - DECISIVE)
@@ -167,7 +167,7 @@ class Ranked(Models):
 
         One that was refused says nothing of itself beside others.
         """
-        alone, base = self.tried.get(frozenset([effect.id])), self.states[frozenset()]
+        alone, base = self.tried.get(frozenset([effect.id])), self.examined_models[frozenset()]
         if alone is None or alone.log_evidence == -np.inf:
             return False
         lost = self.log_odds(base.candidate) - self.log_odds(alone)

@@ -20,16 +20,21 @@ from bayesimpact.diagnosis.selection.decision import (
     misses,
     ordered,
 )
-from bayesimpact.diagnosis.selection.elimination import EXCHANGES, Settling
-from bayesimpact.diagnosis.selection.outcome import Naming, State, is_large, leaves_something
+from bayesimpact.diagnosis.selection.elimination import EXCHANGES, Elimination
+from bayesimpact.diagnosis.selection.outcome import (
+    ExaminedModel,
+    Selection,
+    is_large,
+    leaves_something,
+)
 from bayesimpact.diagnosis.selection.unknown import with_force
 from bayesimpact.model.effects.effect import Effect
 
 
-class Remaining(Settling):
+class Remaining(Elimination):
     """Models beside a force of time, and beside a residual force."""
 
-    def with_residuals(self, found: Naming) -> Naming:
+    def with_residuals(self, found: Selection) -> Selection:
         """What `decide` compares where something remains: the likeliest model beside a force of
         time, what it is without each of its effects, and models with a residual force, that in the
         place of all effects first.
@@ -50,7 +55,7 @@ class Remaining(Settling):
             if late and in_its_place(found, (effect,)) is None:
                 self.likeliest_in_place(chosen, effect)
         tried = tuple(sorted(self.tried.values(), key=found.log_odds, reverse=True))
-        found = replace(found, tried=tried, states=dict(self.states))
+        found = replace(found, tried=tried, examined_models=dict(self.examined_models))
         alone = [(e,) for e in ordered(found, chosen.effects)]
         groups = [
             g if leads_without(found, g) and is_told_apart(found, g[0]) else group_of(found, g[0])
@@ -98,7 +103,7 @@ class Remaining(Settling):
             self.fit_one(rest, found, best, chosen)
             self.exchange_in_place(chosen, effect, best.effect)
 
-    def with_forces(self, found: Naming, candidates: Sequence[Candidate]) -> Naming:
+    def with_forces(self, found: Selection, candidates: Sequence[Candidate]) -> Selection:
         """With the models of these that have a residual force beside their effects, as far as time
         allows: what is not compared with all of its own is not needed.
         """
@@ -111,14 +116,14 @@ class Remaining(Settling):
         return replace(
             found,
             residual=residual,
-            states=dict(self.states),
+            examined_models=dict(self.examined_models),
             finished=found.finished and not late,
         )
 
-    def beside_a_force(self, found: Naming, left: Discrepancy) -> Naming:
+    def beside_a_force(self, found: Selection, left: Discrepancy) -> Selection:
         """The search with a force of time beside every model, and the likeliest of them chosen.
 
-        A model that the search had not settled on is compared with exchanges of its own.
+        A model that the search had not chosen is compared with exchanges of its own.
         """
         found = replace(found, beside=left)
         for turn in range(EXCHANGES):
@@ -133,18 +138,18 @@ class Remaining(Settling):
             if set(best.candidate.ids) == set(chosen.ids) or not self.may_go_on():
                 break
         finished = found.finished and self.may_go_on()
-        return replace(found, states=dict(self.states), finished=finished)
+        return replace(found, examined_models=dict(self.examined_models), finished=finished)
 
-    def with_residual(self, state: State) -> Candidate:
+    def with_residual(self, examined: ExaminedModel) -> Candidate:
         """A model with the likelier form of a residual force beside its effects, fitted once."""
-        key = frozenset(state.candidate.ids)
-        begun, fitted = self.beside_forces.get(key, (None, state.candidate))
-        if begun is not state.candidate:
-            beside = in_words(state.candidate.effects) or "the base model"
+        key = frozenset(examined.candidate.ids)
+        begun, fitted = self.beside_forces.get(key, (None, examined.candidate))
+        if begun is not examined.candidate:
+            beside = in_words(examined.candidate.effects) or "the base model"
             self.progress(f"fitting a residual force beside {beside}")
             least = self.enough().least_gain
-            fitted = with_force(state.candidate, state.unknown, self.scales, least_gain=least)
-            self.beside_forces[key] = state.candidate, fitted
+            fitted = with_force(examined.candidate, examined.unknown, self.scales, least_gain=least)
+            self.beside_forces[key] = examined.candidate, fitted
         return fitted
 
     def is_no_set(self, candidate: Candidate) -> bool:
@@ -154,10 +159,10 @@ class Remaining(Settling):
         """
         if not (self.is_large and candidate.effects and is_large(candidate.fit)):
             return False
-        return not leaves_something(self.with_residual(self.states[frozenset()]).fit)
+        return not leaves_something(self.with_residual(self.examined_models[frozenset()]).fit)
 
 
-def rivals_in_place(found: Naming, group: Group) -> list[Candidate]:
+def rivals_in_place(found: Selection, group: Group) -> list[Candidate]:
     """The likeliest model with another effect, not of a group, in the place of its first."""
     other = in_its_place(found, group)
     return [] if other is None else [other]

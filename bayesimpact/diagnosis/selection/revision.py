@@ -1,4 +1,4 @@
-"""A search posed anew, on what a model that is nearly good enough has shown of the readings.
+"""A revised search, on what a model that is nearly good enough has shown of the readings.
 
 Spikes beside a contact, the instants at which contacts begin and end, where an acceleration jumps,
 a gain or a clock that is off, noise that is slow, and what an input did between its samples show
@@ -21,7 +21,7 @@ from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import fit_from
 from bayesimpact.diagnosis.score_test.directions import is_periodic, is_steady
 from bayesimpact.diagnosis.selection.models import Progress
-from bayesimpact.diagnosis.selection.outcome import State, is_large
+from bayesimpact.diagnosis.selection.outcome import ExaminedModel, is_large
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.noise.whitening import Noise
@@ -34,8 +34,8 @@ JUMP = 2.0  # of the noise: a reading on the wrong side of one costs 2 nats, hal
 
 
 @dataclass(frozen=True, eq=False)
-class Posed:
-    """A search posed anew: from which base model, from which other one if any, without what; and
+class Revision:
+    """A revised search: from which base model, from which other one if any, without what; and
     whether inputs are taken for band-limited.
     """
 
@@ -49,8 +49,8 @@ class Posed:
         """The model from which it begins."""
         return self.base if self.first is None else self.first
 
-    def followed_by(self, other: Posed) -> Posed:
-        """Another one that was posed on this one's."""
+    def followed_by(self, other: Revision) -> Revision:
+        """Another revision, made on this one's."""
         return replace(
             other,
             faults=(*self.faults, *other.faults),
@@ -58,42 +58,42 @@ class Posed:
         )
 
 
-def posed_anew(base: Fit, state: State, say: Progress) -> Posed | None:
+def revised(base: Fit, examined: ExaminedModel, say: Progress) -> Revision | None:
     """The search without the readings that spoil it, with recordings corrected, with the inputs
     between their samples that a model asks for, under the noise of its inputs and the slow one that
     is all that it leaves; None where there is nothing of these.
 
     Several may be off at once: each is asked of the model with what was told before it.
     """
-    found = state.candidate.fit
-    posed = begun = Posed(base, None if found is base else found)
-    steps = () if state.is_white and found is base else READINGS
-    steps = (*steps, _under_noise_of_inputs, *([] if state.is_white else [_under_slow_noise]))
+    found = examined.candidate.fit
+    revision = begun = Revision(base, None if found is base else found)
+    steps = () if examined.is_white and found is base else READINGS
+    steps = (*steps, _under_noise_of_inputs, *([] if examined.is_white else [_under_slow_noise]))
     while True:
-        told = (step(posed.base, posed.found, say) for step in steps)
+        told = (step(revision.base, revision.found, say) for step in steps)
         other = next((one for one in told if one is not None), None)
         if other is None:
-            return None if posed is begun else posed
-        posed = posed.followed_by(other)
+            return None if revision is begun else revision
+        revision = revision.followed_by(other)
 
 
-def _under_noise_of_inputs(base: Fit, found: Fit, say: Progress) -> Posed | None:
+def _under_noise_of_inputs(base: Fit, found: Fit, say: Progress) -> Revision | None:
     """Under the noise of the inputs that a model tells."""
     return _under(base, found, _of_inputs(base, found), "the noise of the input matters", say)
 
 
-def _under_slow_noise(base: Fit, found: Fit, say: Progress) -> Posed | None:
+def _under_slow_noise(base: Fit, found: Fit, say: Progress) -> Revision | None:
     """Under the slow noise that is all that a model leaves."""
     noise = None if is_large(found) else remaining_noise(found)
     return _under(base, found, noise, "what remains is slow noise", say)
 
 
-def _under(base: Fit, found: Fit, noise: Noise | None, what: str, say: Progress) -> Posed | None:
+def _under(base: Fit, found: Fit, noise: Noise | None, what: str, say: Progress) -> Revision | None:
     if noise is None:
         return None
     say(f"{what}: once more under that")
     first = refitted(found, noise=noise) if found is not base else None
-    return Posed(refitted(base, noise=noise), first)
+    return Revision(refitted(base, noise=noise), first)
 
 
 def _of_inputs(base: Fit, found: Fit) -> Noise | None:
@@ -101,17 +101,17 @@ def _of_inputs(base: Fit, found: Fit) -> Noise | None:
     return input_noise(found) if is_large(base) and not is_large(found) else None
 
 
-def _with_a_recording_corrected(base: Fit, found: Fit, say: Progress) -> Posed | None:
+def _with_a_recording_corrected(base: Fit, found: Fit, say: Progress) -> Revision | None:
     """With the gain or the clock of one recording corrected that the model shows to be off."""
     told = fault_beside(base, found)
     if told is None:
         return None
     compared, first = told
     say(f"{compared.fault.recording}: {compared.fault.statement}: once more with that corrected")
-    return Posed(refitted(base, compared.campaign), first, (compared,))
+    return Revision(refitted(base, compared.campaign), first, (compared,))
 
 
-def _with_band_limited_inputs(base: Fit, found: Fit, say: Progress) -> Posed | None:
+def _with_band_limited_inputs(base: Fit, found: Fit, say: Progress) -> Revision | None:
     """With inputs that are band-limited between their samples, not lines, where that explains
     decisively more, or as much as a steady force: the change is small, and tells nothing beside a
     large misfit.
@@ -124,10 +124,10 @@ def _with_band_limited_inputs(base: Fit, found: Fit, say: Progress) -> Posed | N
     if first is None:
         return None
     say("inputs are band-limited between their samples: once more with these")
-    if not first.target.oscillator.effects:
-        return Posed(first, None, band_limited=True)
-    smooth = refitted(base, first.target.oscillator.campaign)
-    return Posed(smooth, first, band_limited=True)
+    if not first.density.oscillator.effects:
+        return Revision(first, None, band_limited=True)
+    smooth = refitted(base, first.density.oscillator.campaign)
+    return Revision(smooth, first, band_limited=True)
 
 
 def without_lines(base: Fit, found: Fit) -> Fit | None:
@@ -135,7 +135,7 @@ def without_lines(base: Fit, found: Fit) -> Fit | None:
     None where it has none, or fits decisively worse: what lines between samples take from a steady
     input, a force of its frequency would give back.
     """
-    effects = found.target.oscillator.effects
+    effects = found.density.oscillator.effects
     rest = [e for e in effects if not (is_periodic(e) and is_steady(e))]
     if len(rest) == len(effects):
         return None
@@ -151,7 +151,7 @@ def band_limited(fit: Fit) -> Fit | None:
     """The model's mode with inputs that are band-limited between their samples; None where there
     are none that are not, or lines between them are stated.
     """
-    campaign = fit.target.oscillator.campaign
+    campaign = fit.density.oscillator.campaign
     inputs = [r.input for r in campaign.recordings if r.input is not None]
     if all(given.band_limited or given.lines_stated for given in inputs):
         return None
@@ -164,31 +164,31 @@ def band_limited(fit: Fit) -> Fit | None:
     return refitted(fit, replace(campaign, recordings=tuple(recordings)))
 
 
-def _without_readings(base: Fit, found: Fit, say: Progress) -> Posed | None:
+def _without_readings(base: Fit, found: Fit, say: Progress) -> Revision | None:
     """Without spikes that are all that a model leaves, and without accelerations at the onsets that
     it shows, which a base fit with a large misfit has elsewhere. As long as such a reading lies on
     the wrong side of its jump, it may look like a spike.
     """
     spikes, clean = beside_spikes(found) or ((), found)
     change = found.reduced_chi2, clean.reduced_chi2
-    told = tuple(Compared(f, clean.target.oscillator.campaign, *change) for f in spikes)
+    told = tuple(Compared(f, clean.density.oscillator.campaign, *change) for f in spikes)
     gained = not spikes and clean.log_posterior > found.log_posterior + DECISIVE
     if misses_onsets(clean):
         clean = refitted(found, without_onsets(clean), start=clean)
-    campaign = clean.target.oscillator.campaign
-    is_same = campaign is found.target.oscillator.campaign
+    campaign = clean.density.oscillator.campaign
+    is_same = campaign is found.density.oscillator.campaign
     if is_same and not gained:
         return None
     say("readings that only a good model shows to be off: once more without them")
     if found is base:
-        return Posed(clean, None, told)
-    return Posed(base if is_same else refitted(base, campaign), clean, told)
+        return Revision(clean, None, told)
+    return Revision(base if is_same else refitted(base, campaign), clean, told)
 
 
 READINGS = (_without_readings, _with_a_recording_corrected, _with_band_limited_inputs)
 
 
-def is_spoilt(base: Fit, fit: Fit) -> bool:
+def has_bad_readings(base: Fit, fit: Fit) -> bool:
     """Whether readings are off that only a model as good as this one shows, those of an input among
     them: what is fitted to these decides nothing.
     """
@@ -202,9 +202,9 @@ def misses_onsets(fit: Fit) -> bool:
     shows to jump by more than the noise. No residual tells: parameters that such a reading has bent
     until it stands on its side of the jump leave none.
     """
-    campaign = fit.target.oscillator.campaign
+    campaign = fit.density.oscillator.campaign
     cleaned = campaign if is_large(fit) else without_onsets(fit)
-    noise = fit.target.likelihood.noise
+    noise = fit.density.likelihood.noise
     rows = zip(campaign.recordings, cleaned.recordings, fit.predicted, strict=True)
     for before, after, predicted in rows:
         if after.used is not None and after is not before:

@@ -30,8 +30,13 @@ from bayesimpact.diagnosis.refits.refit import (
 from bayesimpact.diagnosis.residual_force.gaussian_process import missing_contact
 from bayesimpact.diagnosis.score_test.pairs import promising_pairs
 from bayesimpact.diagnosis.selection.models import NOTHING, STARTS, UNCONVERGED_SHORTFALL, Progress
-from bayesimpact.diagnosis.selection.outcome import Naming, State, explains_most, is_large
-from bayesimpact.diagnosis.selection.revision import is_spoilt, posed_anew
+from bayesimpact.diagnosis.selection.outcome import (
+    ExaminedModel,
+    Selection,
+    explains_most,
+    is_large,
+)
+from bayesimpact.diagnosis.selection.revision import has_bad_readings, revised
 from bayesimpact.diagnosis.selection.unknown import learn_force
 from bayesimpact.diagnosis.selection.unlisted import Problem, Unlisted
 from bayesimpact.inference.fit import Fit
@@ -45,7 +50,7 @@ BEAM = 3  # models that are extended while the best one is not white
 PAIRS = 4  # refitted at the first step
 
 
-def name(
+def select_model(
     fit: Fit,
     effects: Sequence[Effect],
     scales: Scales,
@@ -54,7 +59,7 @@ def name(
     progress: Progress | None = None,
     budget: Budget | None = None,
     first: Fit | None = None,
-) -> Naming:
+) -> Selection:
     """Find the effects that the base model of `fit` leaves out.
 
     Best first: the likeliest models so far are extended by every effect that scores promise
@@ -64,10 +69,10 @@ def name(
     noise level allows, for what remains may yet be explained; effects that the odds do not demand
     are left out afterwards, and each that stays is exchanged for every other that might do what it
     does. Where the misfit was large, the search begins with what the equation of motion asks for
-    and, with a stop, simulations of one period ahead; it goes on from a model that has settled and
-    still leaves something, but not from one that leaves a large misfit where a free force alone
-    leaves nothing. It begins with the model of `first` instead, a fit to the same campaign, where
-    that is given.
+    and, with a stop, simulations of one period ahead; it goes on from a model that no exchange
+    improves and still leaves something, but not from one that leaves a large misfit where a free
+    force alone leaves nothing. It begins with the model of `first` instead, a fit to the same
+    campaign, where that is given.
 
     Where the misfit is large and the spectra of the recordings show a hum, the search begins with
     what the recordings less that ask for.
@@ -85,22 +90,22 @@ def name(
     search = _Search(effects, scales, rng, say, budget)
     if first is None:
         first = _beside_hums(fit, lambda: _Search(effects, scales, rng, say, search.budget))
-    base, state = search.found(fit, first)
-    goes_on = bool(state.candidate.effects) and search.budget.may_go_on()
+    base, examined = search.found(fit, first)
+    goes_on = bool(examined.candidate.effects) and search.budget.may_go_on()
     asks = goes_on or search.was_cut or search.budget.may_search_again()
-    anew = posed_anew(fit, state, say) if asks else None
-    if anew is not None:
+    revision = revised(fit, examined, say) if asks else None
+    if revision is not None:
         again = _Search(effects, scales, rng, say, search.budget)
         again.is_last = True
-        quiet = again.found(anew.base, anew.first)
+        quiet = again.found(revision.base, revision.first)
         if search.was_cut or quiet[1].is_white:
-            told = again.naming(*quiet)
-            return replace(told, faults=anew.faults, band_limited=anew.band_limited)
+            told = again.selection(*quiet)
+            return replace(told, faults=revision.faults, band_limited=revision.band_limited)
     elif search.was_cut:
         search.is_last = True
-        reached = state.candidate.fit
-        base, state = search.found(fit, first if reached is fit else reached)
-    return search.naming(base, state)
+        reached = examined.candidate.fit
+        base, examined = search.found(fit, first if reached is fit else reached)
+    return search.selection(base, examined)
 
 
 def _beside_hums(fit: Fit, begun: Callable[[], _Search]) -> Fit | None:
@@ -114,15 +119,15 @@ def _beside_hums(fit: Fit, begun: Callable[[], _Search]) -> Fit | None:
     search.progress("a hum is taken out of the recordings first")
     search.is_last = True
     base = search.examine(base_candidate(quiet))
-    state = search.asked_for(base)[0] if search.is_large else base
-    if is_large(state.candidate.fit):
+    examined = search.asked_for(base)[0] if search.is_large else base
+    if is_large(examined.candidate.fit):
         return None
-    found = refitted(state.candidate.fit, fit.target.oscillator.campaign)
+    found = refitted(examined.candidate.fit, fit.density.oscillator.campaign)
     return found if np.isfinite(found.log_posterior) else None
 
 
 class _Search(Unlisted):
-    """Which models to fit next, and what they are worth.
+    """Which models to fit next, and their odds.
 
     is_last : it goes to its end, whatever a model shows of the readings
     was_cut : it ended at a model that readings spoil
@@ -130,7 +135,7 @@ class _Search(Unlisted):
 
     is_last = was_cut = False
 
-    def found(self, fit: Fit, first: Fit | None) -> tuple[State, State]:
+    def found(self, fit: Fit, first: Fit | None) -> tuple[ExaminedModel, ExaminedModel]:
         """The base model of `fit`, and where a search from it, or from `first`, ends."""
         base = self.examine(base_candidate(fit))
         if first is not None:
@@ -139,72 +144,76 @@ class _Search(Unlisted):
             beam = self.asked_for(base) if self.is_large else [base]
         begun = set[frozenset[str]]()
         while True:
-            state = self.grown(beam)
-            if self.is_spoilt(state):
+            examined = self.grown(beam)
+            if self.has_bad_readings(examined):
                 break
-            with_term = self.with_a_term(state, excess=1.0)
-            if with_term is not state:
+            with_term = self.with_a_term(examined, excess=1.0)
+            if with_term is not examined:
                 beam = [with_term]
                 continue
-            if not self.may_be_named(state) or self.is_no_set(state.candidate):
+            if not self.may_be_named(examined) or self.is_no_set(examined.candidate):
                 break
             self.weigh_remainder()
-            smaller = self.eliminated(state)
-            made_room = smaller is not state and frozenset(smaller.candidate.ids) not in begun
+            smaller = self.eliminated(examined)
+            made_room = smaller is not examined and frozenset(smaller.candidate.ids) not in begun
             if not self.is_large or smaller.is_white or not made_room:
-                state = self.settled(smaller)
+                examined = self.exchanged(smaller)
             else:
-                state = smaller
-            key = frozenset(state.candidate.ids)
-            if state.is_white or not self.is_large or key in begun or not self.may_go_on():
+                examined = smaller
+            key = frozenset(examined.candidate.ids)
+            if examined.is_white or not self.is_large or key in begun or not self.may_go_on():
                 break
             begun.add(key)
-            beam = [state]
-        return base, self.at_its_mode(state)
+            beam = [examined]
+        return base, self.at_its_mode(examined)
 
-    def grown(self, beam: list[State]) -> State:
+    def grown(self, beam: list[ExaminedModel]) -> ExaminedModel:
         """The model that ever more effects lead to from the first of a beam, or beside it."""
-        state, self.left = beam[0], None
-        while not (state.is_white or self.is_spoilt(state)) and self.may_go_on():
-            if self.is_no_set(state.candidate):
+        examined, self.left = beam[0], None
+        while not (examined.is_white or self.has_bad_readings(examined)) and self.may_go_on():
+            if self.is_no_set(examined.candidate):
                 break
             found, waiting = self.extensions([s for s in beam if self.may_grow(s)])
-            better = self.best_first(state, found)
-            if not better or not self.leads_on(state, better[0]):
+            better = self.best_first(examined, found)
+            if not better or not self.leads_on(examined, better[0]):
                 break
-            state = self.examine(better[0])
-            if not state.is_white:
-                state = self.restarted(state)
-            if not state.is_white:
-                beside = [self.examine(c) for c in self.beside(state, better)]
-                beam = [state, *waiting, *beside]
-        return state
+            examined = self.examine(better[0])
+            if not examined.is_white:
+                examined = self.restarted(examined)
+            if not examined.is_white:
+                beside = [self.examine(c) for c in self.beside(examined, better)]
+                beam = [examined, *waiting, *beside]
+        return examined
 
-    def is_spoilt(self, state: State) -> bool:
+    def has_bad_readings(self, examined: ExaminedModel) -> bool:
         """Whether readings spoil what follows a model, and time is left to go on without them."""
-        goes_on = bool(state.candidate.effects) and self.may_go_on()  # from that model, not anew
+        goes_on = bool(examined.candidate.effects) and self.may_go_on()  # from that model, not anew
         may_be = goes_on or self.budget.may_search_again()
-        if self.is_last or state.is_white or not may_be:
+        if self.is_last or examined.is_white or not may_be:
             return False
-        self.was_cut = is_spoilt(self.states[frozenset()].candidate.fit, state.candidate.fit)
+        self.was_cut = has_bad_readings(
+            self.examined_models[frozenset()].candidate.fit, examined.candidate.fit
+        )
         return self.was_cut
 
-    def extensions(self, beam: Sequence[State]) -> tuple[list[Candidate], list[State]]:
+    def extensions(
+        self, beam: Sequence[ExaminedModel]
+    ) -> tuple[list[Candidate], list[ExaminedModel]]:
         """Models with one more effect than those of a beam, and what of the beam has to wait: where
         the misfit is large all after the first that one effect explains most of.
         """
         found = list[Candidate]()
-        for i, state in enumerate(beam):
-            found += self.extended(state)
-            if any(explains_most(c, state.candidate) for c in found):
+        for i, examined in enumerate(beam):
+            found += self.extended(examined)
+            if any(explains_most(c, examined.candidate) for c in found):
                 return found, list(beam[i + 1 :])
         return found, []
 
-    def may_grow(self, state: State) -> bool:
+    def may_grow(self, examined: ExaminedModel) -> bool:
         """Whether a model may take in another effect."""
-        return len(state.candidate.effects) < self.most and not self.is_dominated(state)
+        return len(examined.candidate.effects) < self.most and not self.is_dominated(examined)
 
-    def asked_for(self, base: State) -> list[State]:
+    def asked_for(self, base: ExaminedModel) -> list[ExaminedModel]:
         """The likeliest models that are asked for: without a stop by the equation of motion along
         the measured motion; with one by periods ahead, by these about what the equation asks for in
         free flight, and by the equation over all stretches, as long as the misfit stays large.
@@ -213,7 +222,7 @@ class _Search(Unlisted):
         model stays in the beam beside the likeliest.
         """
         base = self.with_a_line(base)
-        if self.is_spoilt(base):
+        if self.has_bad_readings(base):
             return [base]
         ways: list[list[Problem]] = [[self.of_all]]
         if self.asked.has_stop:
@@ -228,14 +237,14 @@ class _Search(Unlisted):
             if not is_large(about.fit) or self.is_no_set(max(begun, key=self.promise)):
                 break
         best = max(begun, key=self.promise)
-        state = self.examine(best)
-        if self.is_spoilt(state):
-            return [state]
-        with_term = self.with_a_term_ahead(base, self.with_a_term(state))
-        if with_term is not state:
+        examined = self.examine(best)
+        if self.has_bad_readings(examined):
+            return [examined]
+        with_term = self.with_a_term_ahead(base, self.with_a_term(examined))
+        if with_term is not examined:
             return [with_term]
         stays = in_flight.effects and in_flight is not best
-        return [state, self.examine(in_flight)] if stays else [state]
+        return [examined, self.examine(in_flight)] if stays else [examined]
 
     def of_flight(self, about: Candidate) -> list[Candidate]:
         """Models that the equation of motion asks for about one, in free flight."""
@@ -252,12 +261,12 @@ class _Search(Unlisted):
         problem = self.asked.ahead(about, about)
         return self.fit_sets(problem.fit, problem.best(self.most - len(about.effects)))
 
-    def best_first(self, state: State, found: Sequence[Candidate]) -> list[Candidate]:
+    def best_first(self, examined: ExaminedModel, found: Sequence[Candidate]) -> list[Candidate]:
         """Extensions of a model, the next one to examine first."""
         ranked = self.ranked(found)
-        if not is_large(state.candidate.fit):
+        if not is_large(examined.candidate.fit):
             return ranked
-        before, size = self.promise(state.candidate), len(state.candidate.effects)
+        before, size = self.promise(examined.candidate), len(examined.candidate.effects)
 
         def gain_per_effect(candidate: Candidate) -> float:
             more = max(len(candidate.effects) - size, 1)
@@ -265,31 +274,31 @@ class _Search(Unlisted):
 
         return sorted(ranked, key=gain_per_effect, reverse=True)
 
-    def extended(self, state: State) -> list[Candidate]:
+    def extended(self, examined: ExaminedModel) -> list[Candidate]:
         """Models with one more effect; from the base model on also the most promising pairs.
 
         Only those that may overtake the best model so far, as far as scores tell; and up to the
         first that explains most of a large misfit: beside that one the others are scored anew, and
         scores tell more there.
         """
-        chosen, found = state.candidate, list[Candidate]()
-        scores = self.refit_candidates(state.scan, self.least_gain(chosen))
+        chosen, found = examined.candidate, list[Candidate]()
+        scores = self.refit_candidates(examined.scan, self.least_gain(chosen))
         asked = self.asked.first(chosen, chosen) if is_large(chosen.fit) else NOTHING
-        for score in self.asked_beside(chosen, asked, state.scan, scores):
+        for score in self.asked_beside(chosen, asked, examined.scan, scores):
             if not self.may_go_on():
                 return found
             if is_redundant(chosen, score.effect):
                 continue
-            found.append(self.fit_one(chosen, state.scan, score))
+            found.append(self.fit_one(chosen, examined.scan, score))
             if explains_most(found[-1], chosen):
                 return found
         if not chosen.effects:
             best_single = max((c.log_evidence for c in found), default=-np.inf)
-            for pair in promising_pairs(state.scan, count=PAIRS):
+            for pair in promising_pairs(examined.scan, count=PAIRS):
                 if chosen.log_evidence + pair.gain > best_single + self.cost:
                     found.append(self.fit_more(chosen, pair.scores))
         if is_large(chosen.fit) and not asked[1]:
-            found += [self.fit_more(chosen, j) for j in families(state.scan)]
+            found += [self.fit_more(chosen, j) for j in families(examined.scan)]
         return found
 
     def least_gain(self, chosen: Candidate) -> float:
@@ -299,7 +308,7 @@ class _Search(Unlisted):
         behind = max(map(self.log_odds, self.tried.values())) - self.log_odds(chosen)
         return behind / SCORE_UNDERESTIMATE
 
-    def beside(self, state: State, found: Sequence[Candidate]) -> list[Candidate]:
+    def beside(self, examined: ExaminedModel, found: Sequence[Candidate]) -> list[Candidate]:
         """Single effects that are extended beside the best model: each may be half of a pair.
 
         Where the misfit is large every step gains much and the last ones repair the first, by
@@ -307,50 +316,50 @@ class _Search(Unlisted):
         """
         if self.is_large:
             return []
-        rest = [c for c in found if set(c.ids) != set(state.candidate.ids)]
+        rest = [c for c in found if set(c.ids) != set(examined.candidate.ids)]
         kept = [c for c in rest if c.log_evidence > -np.inf and len(c.effects) == 1]
         return kept[: BEAM - 1]
 
-    def is_dominated(self, state: State) -> bool:
+    def is_dominated(self, examined: ExaminedModel) -> bool:
         """Whether a free force will explain what the effects still to come cannot, say the scores.
 
         Either one beside the model's effects, or one in the place of all of them. Problems
         linearised about a fit with a large misfit do not tell.
         """
-        if not state.candidate.effects or is_large(state.candidate.fit):
+        if not examined.candidate.effects or is_large(examined.candidate.fit):
             return False
         most = (
-            SCORE_UNDERESTIMATE * max((s.gain for s in state.scan.best()), default=0.0)
+            SCORE_UNDERESTIMATE * max((s.gain for s in examined.scan.best()), default=0.0)
             + NEAR_MARGIN
         )
-        more = self.most - len(state.candidate.effects)
-        if state.unknown.log_evidence > more * most:
+        more = self.most - len(examined.candidate.effects)
+        if examined.unknown.log_evidence > more * most:
             return True
-        return not self.is_large and self.force_gain() - self.log_odds(state.candidate) > most
+        return not self.is_large and self.force_gain() - self.log_odds(examined.candidate) > most
 
-    def may_be_named(self, state: State) -> bool:
+    def may_be_named(self, examined: ExaminedModel) -> bool:
         """Whether a search around a model may end with a name, white or not.
 
         Not where a free force wins anyhow, nor where one beside it still explains a lot.
         """
-        if state.is_white or self.is_large:
+        if examined.is_white or self.is_large:
             return True
         return (
-            self.log_odds(state.candidate) > self.force_gain()
-            and state.unknown.log_evidence < UNCONVERGED_SHORTFALL
+            self.log_odds(examined.candidate) > self.force_gain()
+            and examined.unknown.log_evidence < UNCONVERGED_SHORTFALL
         )
 
-    def restarted(self, state: State) -> State:
+    def restarted(self, examined: ExaminedModel) -> ExaminedModel:
         """The same model with the shapes of its effects sought anew beside all others.
 
         A frequency or a depth that was found while something else was missing may be a side
-        minimum that no climb leaves; where the misfit is large, growing stretches avoid those.
+        minimum that no ascent leaves; where the misfit is large, growing stretches avoid those.
         """
-        chosen = state.candidate
+        chosen = examined.candidate
         if self.is_large or len(chosen.effects) < 2:
-            return state
+            return examined
         if self.force_gain() > self.log_odds(chosen) + UNCONVERGED_SHORTFALL:
-            return state
+            return examined
         for effect in chosen.effects:
             if any(p.is_shape and not p.circular for p in effect.parameters):
                 smaller = frozenset(chosen.ids) - {effect.id}
@@ -362,7 +371,7 @@ class _Search(Unlisted):
                             self.start(rest, [start])
         return self.examine(self.ranked([self.tried[frozenset(chosen.ids)]])[0])
 
-    def naming(self, base: State, chosen: State) -> Naming:
+    def selection(self, base: ExaminedModel, chosen: ExaminedModel) -> Selection:
         if self.may_be_named(chosen):
             best = self.best(len(chosen.candidate.effects))
             if set(best.ids) != set(chosen.candidate.ids):
@@ -376,8 +385,8 @@ class _Search(Unlisted):
             self.progress(f"fitting a force in contact in place of {replaced}")
             fit = learn_force(base.candidate.fit, contact, self.scales)
             odds = model_evidence(fit) - base.candidate.log_evidence
-        found = Naming(
+        found = Selection(
             base, chosen, tried, self.cost, self.repetition(), contact, odds,
-            dict(self.states), {}, self.may_go_on(),
+            dict(self.examined_models), {}, self.may_go_on(),
         )  # fmt: skip
         return found if chosen.is_white else self.with_residuals(found)

@@ -18,7 +18,7 @@ from bayesimpact.diagnosis.refits.refit import (
 from bayesimpact.diagnosis.residual_force.gaussian_process import MissingForce, refinement
 from bayesimpact.diagnosis.residual_force.learned import LEARNED, knots_of, refined_force
 from bayesimpact.diagnosis.selection.outcome import is_large, leaves_something
-from bayesimpact.inference.fit import Fit, Target
+from bayesimpact.inference.fit import Fit, PosteriorDensity
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.model.effects.effect import Effect, Scales
 
@@ -31,13 +31,13 @@ def learn_force(fit: Fit, force: MissingForce, scales: Scales, *, least_gain: fl
     """Fit the parameters and the coefficients of a free force together; `least_gain` as in
     `find_mode`.
 
-    The linearised problem says where to begin; where that is worse than no force, the climb begins
+    The linearised problem says where to begin; where that is worse than no force, the ascent begins
     between both.
     """
-    effects = (*fit.target.oscillator.effects, force.effect)
-    target = extend(fit, effects, scales)
-    names = target.oscillator.layout.names
-    unshifted = transfer(fit, target.oscillator.layout, effects, scales, {})
+    effects = (*fit.density.oscillator.effects, force.effect)
+    density = extend(fit, effects, scales)
+    names = density.oscillator.layout.names
+    unshifted = transfer(fit, density.oscillator.layout, effects, scales, {})
     start = unshifted.copy()
     for coefficient, mean in zip(coefficient_names(force.knots), force.mean, strict=True):
         start[names.index(coefficient)] = mean
@@ -46,18 +46,25 @@ def learn_force(fit: Fit, force: MissingForce, scales: Scales, *, least_gain: fl
     sd = np.sqrt(np.maximum(np.diag(force.covariance), 0.0))
     floor = 1e-9 * np.repeat([scales.force, scales.force / scales.speed], force.knots)
     sizes = dict(zip(coefficient_names(force.knots), np.maximum(sd, floor), strict=True))
-    steps = difference_steps(fit, target, sizes)
-    return _climbed(target, best_start(target, unshifted, start, steps), steps, fit, least_gain)
+    steps = difference_steps(fit, density, sizes)
+    return _ascended(density, best_start(density, unshifted, start, steps), steps, fit, least_gain)
 
 
-def _climbed(target: Target, start: Array, steps: Array, before: Fit, least: float) -> Fit:
+def _ascended(
+    density: PosteriorDensity, start: Array, steps: Array, before: Fit, least: float
+) -> Fit:
     """The mode; where the misfit is large, as near as odds ask for, which count each repeated
     sample of a residual once.
     """
     if is_large(before):
         least = max(least, LITTLE * residual_repetition(before))
     return find_mode(
-        target, start, steps=steps, tolerance=TOLERANCE, max_iterations=ITERATIONS, least_gain=least
+        density,
+        start,
+        steps=steps,
+        tolerance=TOLERANCE,
+        max_iterations=ITERATIONS,
+        least_gain=least,
     )
 
 
@@ -71,10 +78,10 @@ def with_force(
     a finer one is fitted from there, as long as that is likelier.
     """
     fit = learn_force(candidate.fit, force, scales, least_gain=least_gain)
-    best = Candidate(fit.target.oscillator.effects, fit, model_evidence(fit))
+    best = Candidate(fit.density.oscillator.effects, fit, model_evidence(fit))
     while leaves_something(best.fit) and (factors := finer_factors(best.effects[-1])):
         fit = _refined(candidate.fit, best.fit, factors[0], scales, least_gain)
-        finer = Candidate(fit.target.oscillator.effects, fit, model_evidence(fit))
+        finer = Candidate(fit.density.oscillator.effects, fit, model_evidence(fit))
         if not finer.log_evidence > best.log_evidence:
             break
         best = finer
@@ -93,18 +100,18 @@ def _refined(before: Fit, found: Fit, factor: int, scales: Scales, least: float)
 
     Cubic splines on nested knots: the finer one begins as exactly the same force.
     """
-    *others, coarse = found.target.oscillator.effects
+    *others, coarse = found.density.oscillator.effects
     finer = refined_force(coarse, factor)
     effects = (*others, finer)
-    target = extend(before, effects, scales)
+    density = extend(before, effects, scales)
     count, more = knots_of(coarse).count, knots_of(finer).count
     known = dict(zip(found.names, zip(found.mode, found.sd, strict=True), strict=True))
     own = np.array([known[name] for name in coefficient_names(count)]).reshape(2, count, 2)
     values = np.einsum("kc,pcs->pks", refinement(count, factor), own).reshape(-1, 2)
     values[:, 1] = np.repeat(np.median(own[:, :, 1], axis=1), more)
     known |= dict(zip(coefficient_names(more), values, strict=True))
-    start, sd = np.array([known[name] for name in target.oscillator.layout.names]).T
-    return _climbed(target, start, 0.05 * np.maximum(sd, 1e-12 * np.abs(start)), found, least)
+    start, sd = np.array([known[name] for name in density.oscillator.layout.names]).T
+    return _ascended(density, start, 0.05 * np.maximum(sd, 1e-12 * np.abs(start)), found, least)
 
 
 def coefficient_names(knots: int) -> tuple[str, ...]:

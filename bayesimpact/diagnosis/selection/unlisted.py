@@ -21,7 +21,7 @@ from bayesimpact.diagnosis.candidates.period_terms import sets_with_a_term_ahead
 from bayesimpact.diagnosis.candidates.term_sets import EffectSet
 from bayesimpact.diagnosis.refits.refit import Candidate
 from bayesimpact.diagnosis.score_test.directions import is_periodic
-from bayesimpact.diagnosis.selection.outcome import State, is_large
+from bayesimpact.diagnosis.selection.outcome import ExaminedModel, is_large
 from bayesimpact.diagnosis.selection.remaining import Remaining
 from bayesimpact.diagnosis.thresholds import EXCESS
 from bayesimpact.formula.law import is_formula
@@ -37,54 +37,54 @@ SetsBeside = Callable[[LikelySets, int], list[EffectSet]]
 class Unlisted(Remaining):
     """A search that may leave the catalogue."""
 
-    def with_a_line(self, state: State) -> State:
+    def with_a_line(self, examined: ExaminedModel) -> ExaminedModel:
         """A model, or where its misfit is large one with a harmonic force, where the equation of
         motion leaves `EXCESS` times less by it than by effects that are none.
         """
-        about = state.candidate
+        about = examined.candidate
         shaken = [e for e in self.effects if e.id == HARMONIC_FORCING.id]
         if not (shaken and is_large(about.fit)):
-            return state
-        if any(map(is_periodic, (*about.fit.target.oscillator.acting, *about.effects))):
-            return state
+            return examined
+        if any(map(is_periodic, (*about.fit.density.oscillator.acting, *about.effects))):
+            return examined
 
         def sets(problem: LikelySets, most: int) -> list[EffectSet]:
             return sets_with_a_line(problem, shaken[0], most, about.ids)
 
-        self.is_shaken = True
-        found = self.beside_sets(state, ("line",), sets, [self.asked.has_stop])
-        self.is_shaken = found is not state
+        self.is_driven = True
+        found = self.beside_sets(examined, ("line",), sets, [self.asked.has_stop])
+        self.is_driven = found is not examined
         return found
 
-    def with_a_term(self, state: State, *, excess: float = EXCESS) -> State:
+    def with_a_term(self, examined: ExaminedModel, *, excess: float = EXCESS) -> ExaminedModel:
         """A model, or one with a term of the grammar that explains more, where the equation of
         motion leaves `excess` times less by it than by the catalogue.
 
         Of a large misfit only, or of what is left of one; once about every model, and never a
         second term, for sums of terms are compared later.
         """
-        about = state.candidate
-        something = is_large(about.fit) if excess > 1.0 else not state.is_white and self.is_large
+        about = examined.candidate
+        something = is_large(about.fit) if excess > 1.0 else not examined.is_white and self.is_large
         if not something or any(map(is_formula, about.effects)):
-            return state
+            return examined
 
         def sets(problem: LikelySets, most: int) -> list[EffectSet]:
             return sets_with_a_term(problem, most, about.ids, excess)
 
         ways = [True, False] if self.asked.has_stop else [False]
-        return self.beside_sets(state, ("term", excess), sets, ways)
+        return self.beside_sets(examined, ("term", excess), sets, ways)
 
     def beside_sets(
         self,
-        state: State,
+        examined: ExaminedModel,
         kind: tuple[object, ...],
         sets: SetsBeside,
         ways: Sequence[bool],
-    ) -> State:
+    ) -> ExaminedModel:
         """A model, or a likelier one with a force beside sets of effects, by the first of some
         `ways` that leads to one: in flight or in all of the motion; once about every model.
         """
-        about = state.candidate
+        about = examined.candidate
         for flight in ways:
             key = (*kind, about.ids, about.fit.log_posterior, flight)
             if key in self.begun or not self.may_go_on():
@@ -96,7 +96,7 @@ class Unlisted(Remaining):
             best = max(found, key=self.promise)
             if best is not about:
                 return self.examine(best)
-        return state
+        return examined
 
     def fit_up_to_small(
         self, problem: LikelySets, sets: Sequence[EffectSet], about: Candidate
@@ -113,16 +113,16 @@ class Unlisted(Remaining):
                 break
         return found
 
-    def with_a_term_ahead(self, base: State, state: State) -> State:
+    def with_a_term_ahead(self, base: ExaminedModel, examined: ExaminedModel) -> ExaminedModel:
         """A model, or where its misfit is large the one that periods ahead of the base model lead
         to with a term of the grammar, if that leaves `EXCESS` times less.
         """
-        wanted = self.asked.has_stop and is_large(state.candidate.fit)
+        wanted = self.asked.has_stop and is_large(examined.candidate.fit)
         if not (wanted and self.may_go_on()):
-            return state
+            return examined
         found = self.asked_again(base.candidate, self.of_periods_with_a_term)
-        far_less = EXCESS * found.fit.reduced_chi2 < state.candidate.fit.reduced_chi2
-        return self.examine(found) if far_less else state
+        far_less = EXCESS * found.fit.reduced_chi2 < examined.candidate.fit.reduced_chi2
+        return self.examine(found) if far_less else examined
 
     def asked_again(self, about: Candidate, problem: Problem) -> Candidate:
         """The likeliest model that a problem asks for about one, then about that, and so on."""
@@ -148,10 +148,12 @@ class Unlisted(Remaining):
             found += self.fit_sets(problem.fit, sets)
         return found
 
-    def leads_on(self, state: State, larger: Candidate) -> bool:
+    def leads_on(self, examined: ExaminedModel, larger: Candidate) -> bool:
         """Whether a larger model is the next one; beside a formula, where it leaves far less."""
-        chosen = state.candidate
+        chosen = examined.candidate
         if any(map(is_formula, chosen.effects)):
             rest = max(larger.fit.reduced_chi2 - 1.0, 0.0)
-            return EXCESS * rest < chosen.fit.reduced_chi2 - 1.0 and super().leads_on(state, larger)
-        return super().leads_on(state, larger)
+            return EXCESS * rest < chosen.fit.reduced_chi2 - 1.0 and super().leads_on(
+                examined, larger
+            )
+        return super().leads_on(examined, larger)

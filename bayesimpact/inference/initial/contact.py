@@ -79,7 +79,7 @@ class Cycles:
 class Contact:
     """What the cycles say of the stop, with standard errors; (cases,) arrays for `k2`.
 
-    `touched` (cases,): whether any cycle of the case touches. Without, k2 is not known.
+    `had_contact` (cases,): whether any cycle of the case touches. Without, k2 is not known.
     """
 
     g: float
@@ -92,7 +92,7 @@ class Contact:
     sd_k2: Floats
     sd_c1: float
     sd_k1: float
-    touched: NDArray[np.bool_]
+    had_contact: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -260,7 +260,7 @@ def _bounds(cases: int, scale: float, cycles: Cycles, free: Free) -> tuple[Float
 def _contact(best: Minimum, cycles: Cycles, free: Free, cases: int, scale: float) -> Contact:
     g, c2, k2, c1, k1 = _unpack(best.x, free, scale)
     end = cycle(cycles.depth, free.mass, c1, k1, c2, g, k2[cycles.case])
-    touched = np.array([bool(end.impact[cycles.case == case].any()) for case in range(cases)])
+    had_contact = np.array([bool(end.impact[cycles.case == case].any()) for case in range(cases)])
     sd = best.standard_errors(typical_variance(best.residuals), 1e-4)
     return Contact(
         g=g,
@@ -270,8 +270,8 @@ def _contact(best: Minimum, cycles: Cycles, free: Free, cases: int, scale: float
         k1=k1,
         sd_g=scale * float(sd[0]),
         sd_c2=c2 * float(np.expm1(min(sd[1], 20.0))),
-        sd_k2=np.where(touched, k2 * np.expm1(np.minimum(sd[4:], 20.0)), np.inf),
+        sd_k2=np.where(had_contact, k2 * np.expm1(np.minimum(sd[4:], 20.0)), np.inf),
         sd_c1=free.sd_c1 * float(sd[2]),
         sd_k1=free.sd_k1 * float(sd[3]),
-        touched=touched,
+        had_contact=had_contact,
     )

@@ -84,7 +84,7 @@ def estimate_driven(campaign: Campaign) -> Driven:
         stiffness = found.k1 if found.k1 > 0.0 else campaign.mass * (2 * np.pi / natural) ** 2
         natural = 2 * np.pi * float(np.sqrt(campaign.mass / stiffness))
         before, guess = guess, _guess(campaign, found, stiffness, onset)
-        if derived and guess.settled(before):
+        if derived and guess.has_converged(before):
             break
     return _made_usable(seen, rows, found, stiffness)
 
@@ -122,9 +122,9 @@ def _system(
             target = target + own.base[:, 2]
         if np.isfinite(onset[i]):
             inside = np.maximum(recording.samples - onset[i], 0.0)
-            touched = own.of_force(inside)
-            block[:, 3] = touched[:, 1]
-            block[:, 4 + cases.index(recording.case)] = touched[:, 0]
+            contact_products = own.of_force(inside)
+            block[:, 3] = contact_products[:, 1]
+            block[:, 4 + cases.index(recording.case)] = contact_products[:, 0]
         block[:, first + i] = -own.base[:, 3]
         size = 1.0 if alike else max(float(np.linalg.norm(own.target)), 1e-300)
         blocks.append(block / size)

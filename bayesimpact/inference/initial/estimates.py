@@ -197,11 +197,13 @@ def _collect(
         # The joint fit knows more where hardly a cycle is free, and no less elsewhere.
         c1, k1 = contact.c1, contact.k1
         g, c2 = contact.g, contact.c2
-        known = contact.k2[contact.touched]
+        known = contact.k2[contact.had_contact]
         usual = float(np.exp(np.mean(np.log(known)))) if known.size else k1
         k2 = {
             case: float(value) if hit else usual
-            for case, value, hit in zip(campaign.cases, contact.k2, contact.touched, strict=True)
+            for case, value, hit in zip(
+                campaign.cases, contact.k2, contact.had_contact, strict=True
+            )
         }
         sd |= {"c1": contact.sd_c1, "k1": contact.sd_k1, "c2": contact.sd_c2, "g": contact.sd_g}
         sd |= {

@@ -197,8 +197,8 @@ def _cycles_of(observed: Observed, flight: Flight, r: int) -> tuple[Floats, Ints
         observed.samples[r], arcs[k, 1], arcs[k + 1, 0] - 1, np.ones(k.size, int), noise
     )
     # Amplitude and phase of a sine from m samples of it: sd about sqrt(2 / m) of the noise.
-    spread = noise * np.sqrt(2 / (arcs[:, 1] - arcs[:, 0])) / depths
-    error = np.hypot(spread[k], spread[k + 1])
+    relative_sd = noise * np.sqrt(2 / (arcs[:, 1] - arcs[:, 0])) / depths
+    error = np.hypot(relative_sd[k], relative_sd[k + 1])
     # The floors keep small misfits of the model from counting; a coarsely sampled top is uncertain.
     coarse = 3e-3 + 2.0 / between[k] ** 2
     columns = [

@@ -80,7 +80,7 @@ def estimate_preloaded(campaign: Campaign, observed: Observed) -> Preloaded | No
             rests=[-rest for rest in observed.rests],
         )
     )
-    stiffness, damping, spread = [], [], []
+    stiffness, damping, damping_sd = [], [], []
     rests = np.array(mirrored.rests)
     parts: list[tuple[Cycles, Ints]] = []
     for index, case in enumerate(campaign.cases):
@@ -92,13 +92,13 @@ def estimate_preloaded(campaign: Campaign, observed: Observed) -> Preloaded | No
         parts.append((cycles, np.array(rows)[places[:, 0]]))
         stiffness.append(campaign.mass * (flight.omega**2 + flight.decay**2))
         damping.append(2 * campaign.mass * flight.decay)
-        spread.append(2 * campaign.mass * flight.sd_decay)
+        damping_sd.append(2 * campaign.mass * flight.sd_decay)
         rests[rows] = flight.offsets
     cycles = Cycles.joined([part for part, _ in parts])
     owner = np.concatenate([who for _, who in parts])
     if cycles.depth.size == 0:
         return None
-    weight = 1 / np.array(spread) ** 2
+    weight = 1 / np.array(damping_sd) ** 2
     mirror = _Mirror(
         campaign.mass,
         np.array(stiffness),
@@ -180,7 +180,7 @@ def _result(
         sd_k2=np.full(k2.size, sd_k1),
         sd_c1=float(np.hypot(sd_c2, mirror.sd_damping * sd[3])),
         sd_k1=sd_k1,
-        touched=np.ones(k2.size, dtype=bool),
+        had_contact=np.ones(k2.size, dtype=bool),
     )
     case = np.array([campaign.cases.index(r.case) for r in campaign.recordings])
     offsets = rests - (k2 * g / (k1 + k2))[case]

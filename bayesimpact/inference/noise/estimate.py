@@ -235,5 +235,5 @@ def _variance(values: Array, covariance: Array) -> float:
 def _log_likelihood(values: Array, covariance: Array) -> float:
     windows, freedom = values.shape
     _, log_det = np.linalg.slogdet(covariance)
-    spread = freedom * np.log(_variance(values, covariance)) + log_det
-    return float(-0.5 * windows * spread)
+    log_volume = freedom * np.log(_variance(values, covariance)) + log_det
+    return float(-0.5 * windows * log_volume)

@@ -78,7 +78,7 @@ def with_growth(noise: Noise, recordings: Sequence[Recording]) -> Noise:
     ends = bool(np.all(terms < ENDS * found.largest))  # else another law may go on growing
     if gained < GROWS or not (ends and _has_no_colour(found, terms, noise.correlation)):
         return noise
-    left = found.energy / _spread(found, terms)
+    left = found.energy / _relative_variance(found, terms)
     left = left[left <= _limit(found, left)]
     level = float(np.sqrt(np.mean(left) / found.freedom))
     error = float(np.sqrt(0.5 / (left.size * found.freedom)))
@@ -122,7 +122,7 @@ def _may_grow(found: Energies) -> bool:
     return any(p[-quarter:].mean() > (1.0 + error) * p[:quarter].mean() for p in parts)
 
 
-def _spread(found: Energies, terms: Array) -> Array:
+def _relative_variance(found: Energies, terms: Array) -> Array:
     """Variance of the noise in every window over the level's, (W,)."""
     return np.asarray(1.0 + terms[0] * found.size + terms[1] * found.rate)
 
@@ -137,10 +137,10 @@ def _limit(found: Energies, left: Array) -> float:
 
 def _log_likelihood(found: Energies, terms: Array) -> float:
     """Of a growth at its best level; disturbed windows count as if they were at the limit."""
-    spread = _spread(found, terms)
-    left = found.energy / spread
+    variance = _relative_variance(found, terms)
+    left = found.energy / variance
     level = np.mean(np.minimum(left, _limit(found, left))) / found.freedom
-    return float(-0.5 * found.freedom * np.sum(np.log(spread) + np.log(level)))
+    return float(-0.5 * found.freedom * np.sum(np.log(variance) + np.log(level)))
 
 
 def _grown(found: Energies) -> tuple[float, Array]:
@@ -181,8 +181,8 @@ def _has_no_colour(found: Energies, terms: Array, correlation: float) -> bool:
     """Whether what the quarter of the windows with most noise leaves beyond the one with least is
     as correlated as white noise, or as the noise elsewhere, would be between.
     """
-    spread = _spread(found, terms)
-    scaled = found.energy / spread
+    variance = _relative_variance(found, terms)
+    scaled = found.energy / variance
     kept = scaled <= _limit(found, scaled)
     length = found.basis.shape[0]
     project = found.basis @ found.basis.T
@@ -190,7 +190,7 @@ def _has_no_colour(found: Energies, terms: Array, correlation: float) -> bool:
     def left(where: NDArray[np.bool_]) -> Array:
         return np.asarray(found.left[where].T @ found.left[where] / where.sum())
 
-    most, least = (spread >= np.quantile(spread, 0.75)), spread <= np.quantile(spread, 0.25)
+    most, least = (variance >= np.quantile(variance, 0.75)), variance <= np.quantile(variance, 0.25)
     most, least = most & kept, least & kept
     if not (most.any() and least.any()):
         return False

@@ -40,8 +40,8 @@ class Ordinates:
 
     def cost(self, rho: float) -> float:
         """Minus the log likelihood of a correlation at its best variance, nats."""
-        spread = self.power.size * np.log(self.variance(rho))
-        return float(np.sum(np.log(self._shape(rho))) + spread)
+        log_variances = self.power.size * np.log(self.variance(rho))
+        return float(np.sum(np.log(self._shape(rho))) + log_variances)
 
     def correlation(self) -> float:
         """The likeliest one."""

@@ -19,7 +19,7 @@ from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.noise.ordinates import Ordinates
 from bayesimpact.inference.noise.spectrum import without_lines
 from bayesimpact.inference.noise.whitening import Noise
-from bayesimpact.model.measurement import gain
+from bayesimpact.model.measurement import magnitude_response
 
 Array = NDArray[np.float64]
 
@@ -36,17 +36,17 @@ def refined_noise(fit: Fit) -> Noise:
     The same noise when it is white, when the model misses by far or when too little lies above the
     motion.
     """
-    noise = fit.target.likelihood.noise
+    noise = fit.density.likelihood.noise
     if noise.is_bound and fit.reduced_chi2 < 1.0:
-        error = float(np.sqrt(0.5 / fit.target.likelihood.sizes.sum()))
+        error = float(np.sqrt(0.5 / fit.density.likelihood.sizes.sum()))
         # of the noise before a filter; the residual's rms is that behind it
         level = noise.level * float(np.sqrt(fit.reduced_chi2))
         told = replace(noise, level=level, level_error=error, is_independent=False)
         return replace(told, source="residual of the base model")
     plain = noise.correlation == 0.0 and noise.smoothing is None
     # of coarse steps the residual is rounding, which no correlation describes
-    plain = plain or any(fit.target.likelihood.steps)
-    if plain or fit.reduced_chi2 > LARGE_MISFIT or fit.target.oscillator.campaign.mixed:
+    plain = plain or any(fit.density.likelihood.steps)
+    if plain or fit.reduced_chi2 > LARGE_MISFIT or fit.density.oscillator.campaign.mixed:
         return noise
     found = _ordinates(fit, lowest := ABOVE * fastest_frequency(fit))
     if found.power.size < LEAST_ORDINATES:
@@ -70,13 +70,13 @@ def fastest_frequency(fit: Fit) -> float:
     """Natural frequency in contact with the stiffest obstacle, or of the oscillator alone, Hz."""
     values = dict(zip(fit.names, fit.mode, strict=True))
     stiffest = max((v for n, v in values.items() if n.startswith("k2")), default=0.0)
-    mass = fit.target.oscillator.campaign.mass
+    mass = fit.density.oscillator.campaign.mass
     return float(np.sqrt((values["k1"] + stiffest) / mass) / (2 * np.pi))
 
 
 def rounding_variance(fit: Fit) -> float:
     """Mean variance of what rounding adds, m2: a twelfth of the squared last digit."""
-    recordings = fit.target.oscillator.campaign.recordings
+    recordings = fit.density.oscillator.campaign.recordings
     read = [r.samples if r.used is None else r.samples[r.used] for r in recordings]
     digits = [np.diff(np.unique(samples)).min(initial=np.inf) for samples in read]
     return float(np.mean(np.square(digits)) / 12) if np.isfinite(digits).all() else 0.0
@@ -84,17 +84,17 @@ def rounding_variance(fit: Fit) -> float:
 
 def _ordinates(fit: Fit, lowest: float) -> Ordinates:
     """Of all recordings above `lowest` Hz, but for lines and what a filter has suppressed."""
-    found, smoothing = [], fit.target.oscillator.smoothing
-    recordings = fit.target.oscillator.campaign.recordings
+    found, smoothing = [], fit.density.oscillator.smoothing
+    recordings = fit.density.oscillator.campaign.recordings
     for residual, recording in zip(fit.residuals, recordings, strict=True):
         interval = recording.interval
         frequency: Array = np.fft.rfftfreq(residual.size, interval).astype(np.float64)
         kept = (frequency > lowest) & (frequency < 0.5 / interval * (1 - 1e-9))
-        kept &= gain(smoothing, interval, frequency) ** 2 > PASSED
+        kept &= magnitude_response(smoothing, interval, frequency) ** 2 > PASSED
         power = np.abs(np.fft.rfft(residual)) ** 2 / recording.count
         frequency, power, _ = without_lines(frequency[kept], power[kept], interval)
-        passed = gain(smoothing, interval, frequency) ** 2
+        passed = magnitude_response(smoothing, interval, frequency) ** 2
         found.append((2 * np.pi * frequency * interval, power, passed))
     angle, power, passed = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    rounding = rounding_variance(fit) / fit.target.likelihood.noise.level**2
+    rounding = rounding_variance(fit) / fit.density.likelihood.noise.level**2
     return Ordinates(angle, power, passed, rounding)

@@ -46,12 +46,12 @@ class SlowNoise:
     Attributes
     ----------
     noise : its shape, and level
-    gain : log evidence over that of the fit with its own noise, nats
+    log_evidence_gain : log evidence over that of the fit with its own noise, nats
     residuals : per recording, whitened, the parameters at their best, (n,)
     """
 
     noise: Noise
-    gain: float
+    log_evidence_gain: float
     residuals: tuple[Array, ...] = field(repr=False)
 
 
@@ -61,15 +61,15 @@ def slow_noise(fit: Fit) -> SlowNoise | None:
     None behind a filter, for recordings of several quantities, where the noise level is stated, and
     where the fitted motion runs away.
     """
-    likelihood = fit.target.likelihood
+    likelihood = fit.density.likelihood
     noise, known = likelihood.noise, not likelihood.noise.level_error
-    if noise.smoothing is not None or known or fit.target.oscillator.campaign.mixed:
+    if noise.smoothing is not None or known or fit.density.oscillator.campaign.mixed:
         return None
-    as_read = Likelihood(fit.target.oscillator, Noise(level=noise.level))
+    as_read = Likelihood(fit.density.oscillator, Noise(level=noise.level))
     linear = as_read.linearise(fit.mode, STEP * fit.sd)
     if not all(np.isfinite(x).all() for part in linear for x in (part.residual, part.jacobian)):
         return None
-    recordings = fit.target.oscillator.campaign.recordings
+    recordings = fit.density.oscillator.campaign.recordings
     longest = max(r.duration / r.interval for r in recordings)
     most = min(float(np.exp(-TIMES / longest)), MOST)
 
@@ -132,8 +132,8 @@ def _integrated(
     information, score = products[np.ix_(free, free)], products[free, -1]
     step = inverse(information) @ score
     variance = max(float(products[-1, -1] - score @ step) / total, 1e-300)
-    _, spread = np.linalg.slogdet(information / variance)
-    value = volume - 0.5 * (total * np.log(variance) + float(spread))
+    _, log_determinant = np.linalg.slogdet(information / variance)
+    value = volume - 0.5 * (total * np.log(variance) + float(log_determinant))
     return float(value) if np.isfinite(value) else -np.inf, variance, step
 
 
@@ -143,10 +143,10 @@ class _Spectra:
     """
 
     def __init__(self, fit: Fit, linear: tuple[Linearisation, ...]) -> None:
-        recordings = fit.target.oscillator.campaign.recordings
-        noise, size = fit.target.likelihood.noise, fit.mode.size
+        recordings = fit.density.oscillator.campaign.recordings
+        noise, size = fit.density.likelihood.noise, fit.mode.size
         level = noise.level
-        self.free = fit.target.oscillator.layout.roles("physical", "effect", "nuisance")
+        self.free = fit.density.oscillator.layout.roles("physical", "effect", "nuisance")
         self.bands = []
         for part, recording in zip(linear, recordings, strict=True):
             rows = np.vstack([part.jacobian.T, part.residual]) / level
@@ -188,9 +188,9 @@ class _Whole:
 
     def __init__(self, fit: Fit, linear: tuple[Linearisation, ...], noise: Noise) -> None:
         self.noise = noise
-        recordings = fit.target.oscillator.campaign.recordings
-        level, size = fit.target.likelihood.noise.level, fit.mode.size
-        free = fit.target.oscillator.layout.roles("physical", "effect", "nuisance")
+        recordings = fit.density.oscillator.campaign.recordings
+        level, size = fit.density.likelihood.noise.level, fit.mode.size
+        free = fit.density.oscillator.layout.roles("physical", "effect", "nuisance")
         products, volume, total, white = np.zeros((size + 1, size + 1)), 0.0, 0, []
         for part, recording in zip(linear, recordings, strict=True):
             rows = np.vstack([part.jacobian.T, part.residual]) / level

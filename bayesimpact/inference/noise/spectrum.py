@@ -22,7 +22,7 @@ from bayesimpact.data.campaign import Smoothing
 from bayesimpact.data.gaps import runs
 from bayesimpact.data.recording import Recording
 from bayesimpact.inference.noise.whitening import Noise
-from bayesimpact.model.measurement import covariance, gain
+from bayesimpact.model.measurement import covariance, magnitude_response
 from bayesimpact.response.half_cycles import spectral_period
 
 Array = NDArray[np.float64]
@@ -118,7 +118,7 @@ def _above(spectra: Spectra, frequency: float) -> Spectra:
 def nulls(smoothing: Smoothing, interval: float, count: int = 3) -> tuple[float, ...]:
     """First frequencies at which the filter lets nothing pass, Hz."""
     frequency = np.linspace(0, 0.5 / interval, 4000)
-    response = gain(smoothing, interval, frequency)
+    response = magnitude_response(smoothing, interval, frequency)
     inner = (response[1:-1] < response[:-2]) & (response[1:-1] <= response[2:])
     inner &= response[1:-1] < 0.5  # not what rounding leaves in the flat passband
     return tuple(float(f) for f in frequency[1:-1][inner][:count])
@@ -282,7 +282,7 @@ def _power(spectra: Spectra) -> Array:
 def _coloured_shape(spectra: Spectra, smoothing: Smoothing) -> Array:
     """Expected ordinates of filtered AR(1) noise on a white floor, at their most likely."""
     power, angle = _power(spectra), np.concatenate([2 * np.pi * f * dt for f, _, dt in spectra])
-    filtered = np.concatenate([gain(smoothing, dt, f) ** 2 for f, _, dt in spectra])
+    filtered = np.concatenate([magnitude_response(smoothing, dt, f) ** 2 for f, _, dt in spectra])
 
     def expected(x: Array) -> Array:
         rho = np.tanh(x[2])
@@ -302,13 +302,13 @@ def _coloured_shape(spectra: Spectra, smoothing: Smoothing) -> Array:
 def _filtered(spectra: Spectra, smoothing: Smoothing) -> float:
     """Best log likelihood of filtered white noise on a white floor (rounding)."""
     level, floor = _levels(spectra, smoothing)
-    shape = np.concatenate([gain(smoothing, dt, f) ** 2 for f, _, dt in spectra])
+    shape = np.concatenate([magnitude_response(smoothing, dt, f) ** 2 for f, _, dt in spectra])
     return _log_likelihood(_power(spectra), level * shape + floor)
 
 
 def _levels(spectra: Spectra, smoothing: Smoothing) -> Array:
     """Power of the filtered noise and of the floor that fit the ordinates best."""
-    shapes = [gain(smoothing, dt, f) ** 2 for f, _, dt in spectra]
+    shapes = [magnitude_response(smoothing, dt, f) ** 2 for f, _, dt in spectra]
     shape, power = np.concatenate(shapes), np.concatenate([p for _, p, _ in spectra])
 
     def expected(log_floor: float) -> Array:

@@ -32,7 +32,7 @@ from bayesimpact.data.recording import Recording
 from bayesimpact.inference.noise.forces import RandomForces
 from bayesimpact.inference.noise.prediction import Parts, innovations, log_determinant
 from bayesimpact.inference.noise.sd import relative_sd
-from bayesimpact.model.measurement import edge, gain
+from bayesimpact.model.measurement import edge, magnitude_response
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -356,7 +356,7 @@ def _passed(noise: Noise, count: int, interval: float) -> Array:
     Every residual and derivative of a fit asks for it anew.
     """
     frequency: Array = np.fft.rfftfreq(count, interval).astype(np.float64)
-    filtered = gain(noise.smoothing, interval, frequency) ** 2
+    filtered = magnitude_response(noise.smoothing, interval, frequency) ** 2
     beyond = np.flatnonzero(filtered < 0.5)
     frequency = frequency[: beyond[0]] if beyond.size else frequency[:-1]
     found: Array = np.asarray(filtered[: frequency.size] * noise.spectrum(frequency, interval))

@@ -17,9 +17,9 @@ from bayesimpact.model.effects.effect import Effect, EffectParameter, Numbers, S
 
 
 def size(p: Numbers, scales: Scales) -> Size:
-    """Spread of the obstacles' c2, and its share of their mean."""
-    spread, total = max(p) - min(p), sum(p)
-    return spread, "N s/m", spread * len(p) / total if total > 0 else 0.0
+    """Range of the obstacles' c2, and its share of their mean."""
+    difference, total = max(p) - min(p), sum(p)
+    return difference, "N s/m", difference * len(p) / total if total > 0 else 0.0
 
 
 EFFECT = Effect(

@@ -175,7 +175,7 @@ class Drive(NamedTuple):
     """
 
     gain: float
-    pushing: float
+    per_mass: float
     offset: float
     wave: Wave
 
@@ -211,7 +211,7 @@ def glide(
     z is at most the larger of its values at the ends and M / 8, M a bound of z'': with
     e^2 = v^2 + K (z - p / K)^2 the rate of e is at most abs(r) s.
     """
-    gain, pushing, offset, wave = drive
+    gain, per_mass, offset, wave = drive
     beta, K, S, D, B, R, rest, sign, height, _, _ = side
     C, KS, inverse, root = D + beta * S, K * S, 1.0 / K, math.sqrt(K)
     # what v, z - p / K and r add to the bound
@@ -220,11 +220,11 @@ def glide(
     data, out, speeds, held = sink.data, sink.out, sink.speeds, wave.held
     order, compared, written = sink.order, sink.data.size > 0, sink.out.size > 0
     last, total, i = held.size - 1, 0.0, first
-    following = pushing * held[i]
+    following = per_mass * held[i]
     while True:
         if compared or written:
-            pushed = pushing * wave.shown[i] + rest
-            read = reading_driven(order, sink.rate, beta, K, y, v, pushed)
+            forced = per_mass * wave.shown[i] + rest
+            read = reading_driven(order, sink.rate, beta, K, y, v, forced)
             read += offset + gain * wave.carried[i]
             if compared:
                 residual = data[i] - read
@@ -235,7 +235,7 @@ def glide(
                     speeds[i] = v
         if i == last:
             break
-        now, following = following, pushing * held[i + 1]
+        now, following = following, per_mass * held[i + 1]
         p, r = now + rest, following - now
         y_next = C * y + (S * v + (p * B + r * R))
         v_next = D * v - (KS * y - (p * S + r * B))
@@ -328,8 +328,8 @@ def run_driven(
         at = Point(y, v, at.contact, at.events)
         if i == n - 1:
             break
-        p = drive.pushing * held[i]
-        r = drive.pushing * held[i + 1] - p
+        p = drive.per_mass * held[i]
+        r = drive.per_mass * held[i + 1] - p
         at, code = cross(at, sides, i, p, r, sink.events, limit)
         if code != OK:
             return math.inf, at.events, code

@@ -131,21 +131,21 @@ def return_time_prediction(
         j = max(j, 0)
         first_z, first_speed = z, speed
         rise = 0.0
-        settled = False
+        converged = False
         for _ in range(CORRECTIONS):
             z, speed = advance(b, K, first_z, first_speed, tables[side, 0, j], tables[side, 1, j])
             S, D = nearby(series, side, ahead)
             z, speed = advance(b, K, z, speed, S, D)
-            step, rise, settled = correct(b, K, z, speed, level)
+            step, rise, converged = correct(b, K, z, speed, level)
             ahead += step
-            if settled:
+            if converged:
                 break
             if abs(ahead) > 0.75:  # closer to another sample of the table, if not nonsense
                 hop = math.floor(min(max(ahead, -LENGTH), LENGTH) + 0.5)
                 hop = min(max(hop, -j), LENGTH - j)
                 j, ahead = j + hop, ahead - hop
         wait = blocks * LENGTH + j + ahead
-        if not (settled and rise > 0.0 and abs(ahead) <= 1.0 and 0.0 < wait < safe):
+        if not (converged and rise > 0.0 and abs(ahead) <= 1.0 and 0.0 < wait < safe):
             break
         if not t + wait < n - 1.0:
             break

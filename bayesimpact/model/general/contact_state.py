@@ -67,11 +67,11 @@ JOINT = HOP + 8  # matrices of `joint`, in flight and in contact
 STEPS = JOINT + 2 * (3 + 36)
 SIDES = STEPS + 1
 # of steps, on average. The catalogue at its plausible sizes takes up to 36 where a period has three
-# samples, up to 4 at 1 kHz; a climb may ask for motions that take thousands, and minutes.
+# samples, up to 4 at 1 kHz; an ascent may ask for motions that take thousands, and minutes.
 STEPS_AT_LEAST, STEPS_PER_SAMPLE = 20_000, 100
 FREE, TOUCHING, SEPARATED = 0.0, 1.0, 2.0
 NEVER, SOON, ONCE = 0.0, 0.5, 1.0  # the obstacle has pushed in this contact; SOON: in this step
-NONE, TOUCH, LEAVE, TURN, SURFACE = range(-1, 4)  # SURFACE + i: surface of law i
+NONE, ONSET, LEAVE, TURN, SURFACE = range(-1, 4)  # SURFACE + i: surface of law i
 
 
 @inner(forceinline=True)
@@ -122,7 +122,7 @@ def reaction(y: Any, v: Any, t: Any, column: Any, w: Any) -> Any:
 def event_value(event: Any, y: Any, v: Any, t: Any, column: Any, w: Any) -> Any:
     """Smooth function that falls through zero when the event happens."""
     s = w.s
-    if event == TOUCH:
+    if event == ONSET:
         return s[GAP] - y if s[MODE] == FREE else -reaction(y, v, t, column, w)
     if event == LEAVE:
         pushed = one_sided(w.q) and s[PUSHED] != NEVER
@@ -149,8 +149,8 @@ def passed(y: Any, v: Any, t: Any, column: Any, known: Any, flow: Any, w: Any) -
             unpushed = one_sided(w.q) and w.s[PUSHED] == NEVER
             if not unpushed or reaction(y, v, t, column, w) <= 0.0:
                 return LEAVE
-    elif known != TOUCH and event_value(TOUCH, y, v, t, column, w) < 0.0:
-        return TOUCH
+    elif known != ONSET and event_value(ONSET, y, v, t, column, w) < 0.0:
+        return ONSET
     for k in range(flow.count):
         law = w.acting[k]
         if known == SURFACE + law or w.laws[LAW_COLUMNS * law + LAW_SURFACE] == 0:
@@ -200,7 +200,7 @@ def set_contact(y: Any, v: Any, t: Any, w: Any) -> Any:
     if v == 0.0:
         set_sliding(y, t, w)
     if y == s[GAP] and (v > 0.0 or (v == 0.0 and static_force(y, t, NOW, w) > 0.0)):
-        y, v = resolve(TOUCH, y, v, t, w)
+        y, v = resolve(ONSET, y, v, t, w)
     return y, v
 
 
@@ -302,7 +302,7 @@ def set_sides(y: Any, v: Any, t: Any, w: Any) -> Any:
 def resolve(event: Any, y: Any, v: Any, t: Any, w: Any) -> Any:
     """Change what holds between events; returns displacement and velocity after the event."""
     q, s = w.q, w.s
-    if event == TOUCH:
+    if event == ONSET:
         if s[MODE] == FREE:
             y, before = s[GAP], v
             mass = w.mass * (1.0 - share_of_frame(w))

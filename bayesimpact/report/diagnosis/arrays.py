@@ -58,9 +58,9 @@ def diagnosis_arrays(d: Diagnosis) -> dict[str, Array]:
 
 def _impacts(d: Diagnosis) -> dict[str, Array]:
     """Gain from contact onset to contact onset, where residuals have a time and there is a stop."""
-    base, better = d.naming.base.candidate.fit, d.after
-    oscillator = base.target.oscillator
-    banded = base.target.likelihood.noise.smoothing is not None
+    base, better = d.selection.base.candidate.fit, d.after
+    oscillator = base.density.oscillator
+    banded = base.density.likelihood.noise.smoothing is not None
     if banded or better is base or not oscillator.campaign.stop:
         return {}
     gaps = oscillator.layout.slots(base.mode)[:, _GAP]
@@ -96,10 +96,10 @@ def spectrum(before: Fit, after: Fit) -> Array:
 
 def _power(fit: Fit) -> tuple[Array, Array]:
     """Frequencies, Hz, and powers over that of the noise estimated from the recordings alone."""
-    noise = fit.target.likelihood.noise
+    noise = fit.density.likelihood.noise
     frequencies, powers = [], []
     for part, recording in zip(
-        fit.linearisation, fit.target.oscillator.campaign.recordings, strict=True
+        fit.linearisation, fit.density.oscillator.campaign.recordings, strict=True
     ):
         white = part.residual / noise.level
         if noise.smoothing is None:

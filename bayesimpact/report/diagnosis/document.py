@@ -65,9 +65,9 @@ def document(
     """
     d = diagnosis
     noise = d.identification.noise
-    campaign = d.before.target.oscillator.campaign
+    campaign = d.before.density.oscillator.campaign
     angle, reading = campaign.angular, campaign.recordings[0]
-    left = remainder(d.naming, d.after, d.remains, d.formulas)
+    left = remainder(d.selection, d.after, d.remains, d.formulas)
     before = _parameters(d.before, intervals(d.before), draws_before)
     after = _parameters(d.after, d.intervals, draws_after if d.remains is None else None)
     told = {} if d.remains is None else after
@@ -90,13 +90,13 @@ def document(
                 remaining(left, reading.unit),
                 faults=in_words(d.corrected) if d.corrected else "",
                 angle=angle,
-                drifts=d.naming.unknown.reach > 0,
+                drifts=d.selection.unknown.reach > 0,
                 probe=_is_of_the_probe(d),
-                more=len(d.after.target.oscillator.effects) > len(d.effects),
+                more=len(d.after.density.oscillator.effects) > len(d.effects),
                 unproved=_unproved(d),
                 either=d.either,
-                finished=d.naming.finished,
-                band_limited=d.naming.band_limited,
+                finished=d.selection.finished,
+                band_limited=d.selection.band_limited,
             )
         )
         + noise_words(noise)
@@ -140,7 +140,7 @@ def document(
         "seed": seed,
         "seconds": seconds,
         "versions": dict(versions),
-        "data_sha256": d.before.target.oscillator.campaign.sha256,
+        "data_sha256": d.before.density.oscillator.campaign.sha256,
     }
 
 
@@ -150,7 +150,7 @@ def _explained(d: Diagnosis) -> bool:
 
 
 def _evidence(d: Diagnosis) -> dict[str, Any]:
-    base, chosen = d.naming.base, d.naming.chosen
+    base, chosen = d.selection.base, d.selection.chosen
     return {
         "p_catalogue_before": base.scan.p_value,
         "p_unknown_force_before": base.force.p_value,
@@ -158,11 +158,12 @@ def _evidence(d: Diagnosis) -> dict[str, Any]:
         "p_catalogue_after": chosen.scan.p_value,
         "p_unknown_force_after": chosen.force.p_value,
         "p_unknown_drift_after": chosen.drift.p_value,
-        "log_odds": d.naming.log_odds(chosen.candidate),
-        "free_force_log_odds": d.naming.force_log_odds,
+        "log_odds": d.selection.log_odds(chosen.candidate),
+        "free_force_log_odds": d.selection.force_log_odds,
         "decisive": DECISIVE,
         "models": [
-            {"effects": list(c.ids), "log_odds": d.naming.log_odds(c)} for c in d.naming.tried[:20]
+            {"effects": list(c.ids), "log_odds": d.selection.log_odds(c)}
+            for c in d.selection.tried[:20]
         ],
         "scores": [
             {"id": s.effect.id, "z": s.z, "p": s.p_value, "kept": s.kept} for s in base.scan.best()
@@ -172,14 +173,14 @@ def _evidence(d: Diagnosis) -> dict[str, Any]:
 
 def _practical(d: Diagnosis, limit: Limit) -> float:
     """Size of an effect that would matter in practice, in the limit's unit."""
-    scores = d.naming.chosen.scan.scores
+    scores = d.selection.chosen.scan.scores
     effect = next(s.effect for s in scores if s.effect.id == limit.effect_id)
     return PRACTICAL * effect.parameter(limit.parameter).scale(d.scales)
 
 
 def _detectable(d: Diagnosis) -> str:
     """By how much what was not found may move k2; without a stop the parameter that moves most."""
-    stop = d.before.target.oscillator.campaign.stop
+    stop = d.before.density.oscillator.campaign.stop
     told = [x for x in d.limits if x.answer != "cannot tell"]
     moved = [(x.k2_bias if stop else x.bias, "k2" if stop else x.biased, x.effect_id) for x in told]
     if not moved:
@@ -196,12 +197,12 @@ def _unproved(d: Diagnosis) -> tuple[str, ...]:
     a group is.
     """
     told = {LEARNED, *(e.id for e in (*d.effects, *(e for group in d.either for e in group)))}
-    effects = d.after.target.oscillator.effects
+    effects = d.after.density.oscillator.effects
     return tuple(e.title for e in effects if e.id not in told and not is_formula_id(e.id))
 
 
 def _unfinished(d: Diagnosis) -> str:
-    if d.naming.finished:
+    if d.selection.finished:
         return ""
     return " The search ended by its limit: not everything that may be missing was tried."
 
@@ -266,20 +267,20 @@ def _effect(
                 "of": "",
             },
         }
-    model = {e.id for e in d.after.target.oscillator.effects}
-    kept = {frozenset(c.ids): c for c in d.naming.tried}
-    whole = kept.get(frozenset(model), d.naming.chosen.candidate)
-    smaller = kept.get(frozenset(model - {effect.id}), d.naming.base.candidate)
+    model = {e.id for e in d.after.density.oscillator.effects}
+    kept = {frozenset(c.ids): c for c in d.selection.tried}
+    whole = kept.get(frozenset(model), d.selection.chosen.candidate)
+    smaller = kept.get(frozenset(model - {effect.id}), d.selection.base.candidate)
     value, unit, share = size(effect, d.before, d.after, d.scales)
     own = [e.id for e in d.effects if e.id != "smoothing" or d.filtered is None]
     return common | {
-        "probability": d.naming.probability(effect.id),
+        "probability": d.selection.probability(effect.id),
         "delta_log_evidence": whole.log_evidence - smaller.log_evidence,
         "parameters": {n: v for n, v in values.items() if n.startswith(effect.id + ".")},
         "location": _location(d.locations[own.index(effect.id)]),
         "size": {
             "value": value,
-            "unit": unit_for(d.after.target.oscillator.campaign, effect, unit),
+            "unit": unit_for(d.after.density.oscillator.campaign, effect, unit),
             "percent": 100 * share,
             "of": yardstick(effect),
         },
@@ -291,7 +292,7 @@ def _others(d: Diagnosis) -> tuple[Candidate, ...]:
     if d.verdict == "adequate":
         return ()
     named = {e.id for e in d.effects}
-    catalogue = (c for c in d.naming.tried if c.ids and not any(map(is_formula_id, c.ids)))
+    catalogue = (c for c in d.selection.tried if c.ids and not any(map(is_formula_id, c.ids)))
     rest = [c for c in catalogue if set(c.ids) != named]
     if d.verdict in ("named", "ambiguous"):
         rest = [c for c in rest if not named <= set(c.ids)]
@@ -310,20 +311,20 @@ def _is_of_the_probe(d: Diagnosis) -> bool:
     """Whether there is evidence for the likeliest of the other models, and all of it acts in the
     measuring chain.
     """
-    base = d.naming.base.candidate
-    likeliest = max(_others(d), key=d.naming.log_odds, default=base)
+    base = d.selection.base.candidate
+    likeliest = max(_others(d), key=d.selection.log_odds, default=base)
     better = likeliest.log_evidence > base.log_evidence
     return better and all(e.regime == "measurement" for e in likeliest.effects)
 
 
 def _alternative(d: Diagnosis, candidate: Candidate) -> dict[str, Any]:
-    odds = np.array([d.naming.log_odds(c) for c in d.naming.tried])
+    odds = np.array([d.selection.log_odds(c) for c in d.selection.tried])
     weights = np.exp(odds - odds.max())
-    own = np.exp(d.naming.log_odds(candidate) - odds.max())
+    own = np.exp(d.selection.log_odds(candidate) - odds.max())
     return {
         "id": " + ".join(candidate.ids) or "none",
         "probability": float(own / weights.sum()),
-        "delta_log_evidence": candidate.log_evidence - d.naming.base.candidate.log_evidence,
+        "delta_log_evidence": candidate.log_evidence - d.selection.base.candidate.log_evidence,
     }
 
 
@@ -336,16 +337,16 @@ def _fit(d: Diagnosis) -> dict[str, Any]:
             "held_out_log_score": score,
         }
 
-    held = d.held_out
-    before = float(held.before.sum()) if held else float("nan")
-    after = float(held.after.sum()) if held else before
+    held_out = d.held_out
+    before = float(held_out.before.sum()) if held_out else float("nan")
+    after = float(held_out.after.sum()) if held_out else before
     result: dict[str, Any] = {"before": side(d.before, before), "after": side(d.after, after)}
     result["held_out_gain"] = {
-        "value": held.gain if held else 0.0,
-        "se": held.standard_error if held else 0.0,
-        "wins": held.wins if held else 0,
-        "of": len(held.labels) if held else 0,
-        "improved": held.improved if held else False,
+        "value": held_out.gain if held_out else 0.0,
+        "se": held_out.standard_error if held_out else 0.0,
+        "wins": held_out.wins if held_out else 0,
+        "of": len(held_out.labels) if held_out else 0,
+        "improved": held_out.improved if held_out else False,
     }
     if d.held_out_cases is not None:
         cases = d.held_out_cases
@@ -357,7 +358,7 @@ def _parameters(fit: Fit, posterior: Intervals, draws: Array | None) -> dict[str
     """Median and 90 % interval of every parameter: of the draws, else of the posterior given."""
     result: dict[str, dict[str, Any]] = {}
     ordinary = intervals(fit)
-    for i, parameter in enumerate(fit.target.oscillator.layout.parameters):
+    for i, parameter in enumerate(fit.density.oscillator.layout.parameters):
         known = posterior if parameter.name in posterior.names else ordinary
         if draws is None:
             low, median, high = known.quantiles(parameter.name)
@@ -384,7 +385,7 @@ def _means(fit: Fit, posterior: Intervals, draws: Array | None) -> dict[str, dic
             low, high = middle - half, middle + half
         else:
             low, middle, high = np.percentile(draws[:, members].mean(axis=1), [5, 50, 95])
-        unit = fit.target.oscillator.layout.parameters[members[0]].unit
+        unit = fit.density.oscillator.layout.parameters[members[0]].unit
         entry = {"unit": unit, "median": float(middle), "ci90": [float(low), float(high)]}
         result[base] = entry
     return result

@@ -37,7 +37,7 @@ def force_arrays(d: Diagnosis) -> dict[str, Array]:
     learned_a, learned_b : of the force that was learned together with the parameters
     gap : (1,) of the base model, m; absent without a stop
     """
-    force, fit = d.force, d.naming.base.candidate.fit
+    force, fit = d.force, d.selection.base.candidate.fit
     y = np.linspace(force.low, force.low + force.spacing * (force.knots - 3), POINTS)
     slow, fast = _velocities(fit, y)
     rest = Rest(knots_of(force.effect), fit, y)
@@ -47,14 +47,14 @@ def force_arrays(d: Diagnosis) -> dict[str, Array]:
         width = QUIET_WIDTH * np.repeat(unit, force.knots)
         return arrays | rest.gap | rest.parts("force", *_posterior(force, width))
     arrays |= rest.gap | rest.parts("force", force.mean, force.covariance)
-    if d.naming.chosen is not d.naming.base:
-        left = d.naming.chosen.force
+    if d.selection.chosen is not d.selection.base:
+        left = d.selection.chosen.force
         width = np.repeat(
             [force.effect.parameter(n).scale(d.scales) for n in ("a1", "b1")], left.knots
         )
-        beside = Rest(knots_of(left.effect), d.naming.chosen.candidate.fit, y)
+        beside = Rest(knots_of(left.effect), d.selection.chosen.candidate.fit, y)
         arrays |= beside.parts("left", *_posterior(left, width))
-    learned = [e for e in d.after.target.oscillator.effects if e.id == LEARNED]
+    learned = [e for e in d.after.density.oscillator.effects if e.id == LEARNED]
     if learned and (knots := knots_of(learned[0])).reach == 0.0:
         values = dict(zip(d.after.names, d.after.mode, strict=True))
         own = np.array([values[n] for n in coefficient_names(knots.count)])
@@ -85,7 +85,7 @@ class Rest:
     gap: dict[str, Array]
 
     def __init__(self, knots: Knots, fit: Fit, y: Array) -> None:
-        oscillator = fit.target.oscillator
+        oscillator = fit.density.oscillator
         gap = None
         if oscillator.campaign.stop:
             gap = float(np.mean(oscillator.layout.slots(fit.mode)[:, _GAP]))
@@ -109,7 +109,7 @@ class Rest:
         object.__setattr__(self, "gap", {} if gap is None else {"gap": np.array([gap])})
 
     def parts(self, name: str, mean: Array, covariance: Array) -> dict[str, Array]:
-        """Both parts and their spread, from coefficients."""
+        """Both parts and their standard deviations, from coefficients."""
         a, b = self.maps["a"], self.maps["b"]
         return {
             f"{name}_a": a @ mean,

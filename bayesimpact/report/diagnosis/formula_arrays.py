@@ -22,7 +22,7 @@ def formula_arrays(d: Diagnosis) -> dict[str, Array]:
     if d.formulas is None:
         return {}
     fit = d.formulas.reference
-    learned = [e for e in fit.target.oscillator.effects if e.id == LEARNED]
+    learned = [e for e in fit.density.oscillator.effects if e.id == LEARNED]
     if not learned or (knots := knots_of(learned[0])).reach != 0.0:
         return {}
     y = np.linspace(knots.low, knots.low + knots.spacing * (knots.count - 3), POINTS)

@@ -42,5 +42,5 @@ def found_file(formulas: Formulas) -> str:
     first = formulas.ranked[0]
     odds = f"log odds {first.log_odds:.1f}"
     status = f" and named ({odds})" if formulas.named else f" as a guess ({odds}); it is not proved"
-    angle = formulas.reference.target.oscillator.campaign.angular
+    angle = formulas.reference.density.oscillator.campaign.angular
     return effect_file(first.terms, first.effects, first.sizes, status, angle=angle)

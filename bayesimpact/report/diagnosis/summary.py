@@ -18,7 +18,9 @@ from bayesimpact.report.diagnosis.words import (
     together,
 )
 
-FOLD = 10.0  # a change of more than ten times the value is told as a multiple, not in per cent
+AS_MULTIPLE = (
+    10.0  # a change of more than ten times the value is told as a multiple, not in per cent
+)
 TOLD = 2.0  # posterior standard deviations of a force, from which on its size means something
 BAND_LIMITED = (
     " Between its samples the input is taken for band-limited: lines between them leave more "
@@ -198,7 +200,7 @@ def _moved(shifts: Mapping[str, ParameterShift], cause: str) -> str:
     verb = "raises" if shift.share > 0 else "lowers"
     least = "at least " if shift.least else ""
     size = f"by {least}{two_digits(100 * abs(shift.share))} %"
-    if shift.share > FOLD:
+    if shift.share > AS_MULTIPLE:
         size = f"to {least}{two_digits(1 + shift.share)} times its value"
     return f" {cause} {verb} {worst} {size}."
 

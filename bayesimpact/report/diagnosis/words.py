@@ -17,7 +17,7 @@ from bayesimpact.model.units import span_of, two_digits
 
 SHARED = ("k2", "k1", "c1", "c2", "g")
 OPEN = 0.5  # half-width of a 90 % interval over the median: more than 0.5 leaves a size open
-WORTH_TELLING = 0.1  # probability among all sets of effects that were fitted
+LEAST_PROBABILITY = 0.1  # probability among all sets of effects that were fitted
 
 REGIMES = {
     "free": "in the suspension, wherever the mass moves",
@@ -127,7 +127,7 @@ def titles_of(ids: str) -> str:
 
 def nearest(sets: Sequence[tuple[str, float]]) -> str:
     """The likeliest sets of effects where none is enough, ids with probabilities, in a sentence."""
-    told = [f"{titles_of(ids)} ({100 * p:.0f} %)" for ids, p in sets if p >= WORTH_TELLING]
+    told = [f"{titles_of(ids)} ({100 * p:.0f} %)" for ids, p in sets if p >= LEAST_PROBABILITY]
     if not told:
         return ""
     comes = "comes" if len(told) == 1 else "come"
@@ -173,7 +173,7 @@ def failure(fit: Fit, *, explained: bool = False) -> str:
     if explained:
         return "The base model alone leaves more than half of the signal. "
     reasons = ["a wrong sign, unit or clock of the recordings"]
-    inputs = [r.input for r in fit.target.oscillator.campaign.recordings if r.input is not None]
+    inputs = [r.input for r in fit.density.oscillator.campaign.recordings if r.input is not None]
     if inputs:
         wrong = "sign, delay or kind" if all(i.free for i in inputs) else "sign, scale or kind"
         hint = "" if all(i.free for i in inputs) else ' (gain = "free" lets the scale be found)'

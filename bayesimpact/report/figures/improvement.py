@@ -49,14 +49,14 @@ def improvement_figures(results: Results) -> Mapping[str, Figure]:
 @styled
 def _improvement(results: Results, arrays: Mapping[str, Array], fit: Mapping[str, Any]) -> Figure:
     rows = len(results.recordings)
-    held = arrays.get("held_out_recordings")
+    held_out = arrays.get("held_out_recordings")
     figure = new_figure(max(3.3, min(9.0, _ROW * rows + 1.4)))
-    ratios = [1.3, 1.0] if held is None else [1.3, 1.0, 0.8]
+    ratios = [1.3, 1.0] if held_out is None else [1.3, 1.0, 0.8]
     panels = figure.subplots(1, len(ratios), width_ratios=ratios, squeeze=False)[0]
     _spectrum(panels[0], arrays["spectrum"])
     _chi2(panels[1], results, arrays["before_chi2"])
-    if held is not None:
-        _held_out(panels[2], held[:, 1] - held[:, 0], fit.get("held_out_gain") or {})
+    if held_out is not None:
+        _held_out(panels[2], held_out[:, 1] - held_out[:, 0], fit.get("held_out_gain") or {})
     handles = [
         Line2D([], [], color=BEFORE, marker="o", ms=4, label="base model"),
         Line2D([], [], color=AFTER, marker="o", ms=4, label="with what was added"),
@@ -90,8 +90,8 @@ def _chi2(axis: Axes, results: Results, before: Array) -> None:
     rows = np.arange(after.size)
     level = np.nan_to_num(results.noise.level_error)
     counts = np.array([r.samples.size for r in results.recordings])
-    spread = Z90 * np.sqrt(2 / counts + 4 * level**2)
-    axis.barh(rows, 2 * spread, left=1 - spread, height=0.9, color=GREY, alpha=0.3, lw=0)
+    half_width = Z90 * np.sqrt(2 / counts + 4 * level**2)
+    axis.barh(rows, 2 * half_width, left=1 - half_width, height=0.9, color=GREY, alpha=0.3, lw=0)
     axis.hlines(rows, before, after, color="#777777", lw=0.9)
     axis.plot(before, rows, "o", color=BEFORE, ms=5)
     axis.plot(after, rows, "o", color=AFTER, ms=5)

@@ -11,7 +11,8 @@ from bayesimpact.report.results import Array, SearchSummary
 
 @styled
 def search_figure(search: SearchSummary) -> Figure:
-    """Objective above its final best, and spread and temperature, against evaluations."""
+    """Objective above its final best, its standard deviation and temperature,
+    against evaluations."""
     figure = new_figure(3.0)
     left, right = figure.subplots(1, 2)
     n = search.evaluations

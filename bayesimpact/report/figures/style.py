@@ -190,12 +190,12 @@ class LabScale:
 
 def scaled(name: str, unit: str, values: Array) -> LabScale:
     """The axis on which draws of a parameter can be read: from zero, or from their middle."""
-    centre, spread = float(np.median(values)), float(np.ptp(values)) / 4
-    if not spread > 0 or abs(centre) < 50 * spread:
+    centre, extent = float(np.median(values)), float(np.ptp(values)) / 4
+    if not extent > 0 or abs(centre) < 50 * extent:
         shown = readable(unit, float(np.max(np.abs(values))) if values.size else 0.0)
         return LabScale(0.0, shown.scale, symbol(name), shown.unit)
-    about, fine = display(unit, abs(centre)), readable(unit, spread)
-    places = decimals(spread * about.scale, 1)
+    about, fine = display(unit, abs(centre)), readable(unit, extent)
+    places = decimals(extent * about.scale, 1)
     offset = round(centre * about.scale, places) / about.scale
     sign = "\N{MINUS SIGN}" if offset > 0 else "+"
     middle = f"{number(abs(offset) * about.scale, places)} {typeset(about.unit)}"

@@ -17,7 +17,7 @@ import numpy as np
 from bayesimpact.data.campaign import Measurement, Smoothing
 from bayesimpact.data.quantity import Quantity
 from bayesimpact.trial.bundle import PAPER_RIG
-from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 from bayesimpact.trial.rig.recordings import Release, Rig
 
 Range = tuple[float, float]
@@ -129,7 +129,7 @@ class DrawnRig:
     releases: tuple[Release, ...]
     rate: float
     duration: float
-    chain: Chain
+    chain: MeasuringChain
     measurement: Measurement
 
     @property
@@ -237,7 +237,7 @@ def _chain(
     releases: tuple[Release, ...],
     amplitude: float,
     rng: np.random.Generator,
-) -> tuple[Chain, Measurement]:
+) -> tuple[MeasuringChain, Measurement]:
     noise = amplitude * log_uniform(rng, ranges.noise)
     offsets = {r.name: float(2 * noise * rng.standard_normal()) for r in releases}
     correlation = float(rng.uniform(0.2, 0.8))
@@ -246,13 +246,13 @@ def _chain(
         period = 2 * pi * sqrt(rig.mass / rig.k1)
         correlation = exp(-1 / (log_uniform(rng, SLOW) * period * ranges.rate))
         white = float(rng.uniform(0.2, 0.8))
-        return Chain(noise, correlation, offsets, None, rounding, white), Measurement()
+        return MeasuringChain(noise, correlation, offsets, None, rounding, white), Measurement()
     if kind != "smoothed":
         correlation = correlation if kind == "ar1" else 0.0
-        return Chain(noise, correlation, offsets, None, rounding), Measurement()
+        return MeasuringChain(noise, correlation, offsets, None, rounding), Measurement()
     stiffest = rig.k1 + max(rig.k2.values(), default=0.0)
     contact = pi / sqrt(stiffest / rig.mass) * ranges.rate  # samples in half a period of contact
     window = 2 * int(min(10.0, max(2.0, 0.35 * contact))) + 1
     smoothing = Smoothing("savgol", window, 2, declared_window=window)
-    chain = Chain(noise, 0.0, offsets, smoothing, 0.1 * rounding)
+    chain = MeasuringChain(noise, 0.0, offsets, smoothing, 0.1 * rounding)
     return chain, Measurement(smoothing=smoothing)

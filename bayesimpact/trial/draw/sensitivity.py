@@ -21,7 +21,7 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.score_test.directions import directions
-from bayesimpact.inference.fit import Fit, Target
+from bayesimpact.inference.fit import Fit, PosteriorDensity
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.inference.noise.whitening import Noise
@@ -189,8 +189,8 @@ def _fit(design: DrawnRig, readings: Sequence[Array]) -> Fit:
     noise = Noise(chain.correlation, chain.smoothing, chain.noise, others=white)
     truth = true_parameters(design) | {"sigma": design.chain.noise}
     priors = [_wide(name, truth[name], design) for name in oscillator.layout.names]
-    target = Target(Likelihood(oscillator, noise), Priors(tuple(priors)))
-    return find_mode(target, np.array([truth[name] for name in oscillator.layout.names]))
+    density = PosteriorDensity(Likelihood(oscillator, noise), Priors(tuple(priors)))
+    return find_mode(density, np.array([truth[name] for name in oscillator.layout.names]))
 
 
 def _wide(name: str, value: float, design: DrawnRig) -> Prior:

@@ -15,7 +15,7 @@ import numpy as np
 
 from bayesimpact.data.campaign import Measurement
 from bayesimpact.trial.draw.designs import DrawnRig, Range, RigDesign, draw_rig_design
-from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 
 _DAMPING = (2e-3, 2e-2)
 _CONTACT_DAMPING = (0.01, 0.08)
@@ -92,8 +92,8 @@ def with_noise(design: DrawnRig, noise: float) -> DrawnRig:
     offsets = {name: value * noise / old.noise for name, value in old.offsets.items()}
     if is_pendulum(design.rig_kind):
         step = noise / ENCODER_SD
-        chain = Chain(DITHER * step, 0.0, offsets, None, step)
+        chain = MeasuringChain(DITHER * step, 0.0, offsets, None, step)
     else:
         rounding = old.rounding * noise / old.noise
-        chain = Chain(noise, old.correlation, offsets, None, rounding)
+        chain = MeasuringChain(noise, old.correlation, offsets, None, rounding)
     return replace(design, chain=chain, measurement=Measurement())

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from math import pi, sin
 
 from bayesimpact.data.campaign import Smoothing
-from bayesimpact.trial.rig.measuring_chain import Chain, Probe
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain, Probe
 from bayesimpact.trial.rig.modes import base_inertia, base_motion, obstacle_mode, second_mode
 from bayesimpact.trial.rig.parts import Law, Piece, Rates, RigPart, Site, State
 
@@ -43,7 +43,7 @@ class Planted:
     part: Callable[[Site, Numbers, int], RigPart] | None = None
     site: Callable[[Site, Numbers], Site] | None = None
     probe: Callable[[Probe, Numbers], Probe] | None = None
-    chain: Callable[[Chain, Numbers], Chain] | None = None
+    chain: Callable[[MeasuringChain, Numbers], MeasuringChain] | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -256,7 +256,7 @@ def _presliding(site: Site, p: Numbers, slot: int) -> RigPart:
     return RigPart(law, states=(p.get("start", 0.0),), rates=rates)
 
 
-def _smoothing(chain: Chain, p: Numbers) -> Chain:
+def _smoothing(chain: MeasuringChain, p: Numbers) -> MeasuringChain:
     """Savitzky-Golay with window and order, or a first-order lag with time_constant."""
     if "time_constant" in p:
         return replace(chain, smoothing=Smoothing("lag", time_constant=p["time_constant"]))

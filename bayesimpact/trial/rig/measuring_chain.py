@@ -22,7 +22,7 @@ Series = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Chain:
+class MeasuringChain:
     """What lies between the true displacement and the recorded numbers.
 
     Attributes
@@ -88,7 +88,7 @@ def measure(
     displacement: Series,
     times: Series,
     probe: Probe,
-    chain: Chain,
+    chain: MeasuringChain,
     name: str,
     rng: np.random.Generator,
 ) -> Series:

@@ -177,7 +177,7 @@ class _Run:
         sign = self._direction()
         self.slip = 0
         if self.mode == _FLIGHT and sign > 0 and self.state[0] >= self.gap:
-            self._touch()
+            self._impact()
         piece = self._piece_going(sign)
         forces = balance(self.site, self.parts, piece)
         if sign < 0 and self.mode == _CONTACT and self.state[0] <= self.gap and self._pulls(forces):
@@ -289,7 +289,7 @@ class _Run:
         if self.state[0] != self.gap:
             return
         if piece.sign > 0 and self.mode == _FLIGHT:
-            self._touch()
+            self._impact()
         elif piece.sign < 0 and self.mode == _RELEASED:
             self.mode = _FLIGHT
         elif piece.sign < 0 and self.mode == _CONTACT and self._pulls(forces):
@@ -300,7 +300,7 @@ class _Run:
         force = forces.reaction(self.t, self.state) + self.site.adhesion
         return not self.site.unilateral or force <= 0
 
-    def _touch(self) -> None:
+    def _impact(self) -> None:
         self.onsets.append(self.t)
         self.mode = _CONTACT
         before = self.state[1]

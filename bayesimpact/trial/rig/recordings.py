@@ -31,7 +31,7 @@ from bayesimpact.data.quantity import Quantity, order_of
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 from bayesimpact.trial.rig.catalogue import CATALOGUE, Planted
-from bayesimpact.trial.rig.measuring_chain import Chain, Probe, measure
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain, Probe, measure
 from bayesimpact.trial.rig.motion import RigMotion, move, sampling
 from bayesimpact.trial.rig.outside import OUTSIDE
 from bayesimpact.trial.rig.parts import RigPart, Site
@@ -119,7 +119,7 @@ def record(
     rig: Rig,
     release: Release,
     effects: Effects | None = None,
-    chain: Chain | None = None,
+    chain: MeasuringChain | None = None,
     *,
     rate: float,
     duration: float,
@@ -140,7 +140,7 @@ def record(
     ------
     InputError, SimulationError : as `motion`
     """
-    effects, chain = effects or {}, chain or Chain()
+    effects, chain = effects or {}, chain or MeasuringChain()
     truth = motion(rig, release, effects, rate=rate, duration=duration, rtol=rtol, atol=atol)
     probe = Probe()
     for effect, given in effects.items():
@@ -165,7 +165,7 @@ def make_campaign(
     rig: Rig,
     releases: Sequence[Release],
     effects: Effects | None = None,
-    chain: Chain | None = None,
+    chain: MeasuringChain | None = None,
     *,
     rate: float,
     duration: float,

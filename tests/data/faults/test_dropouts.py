@@ -13,7 +13,7 @@ from bayesimpact.data.faults.dropouts import find_dropouts
 from bayesimpact.data.faults.find import recording_faults
 from bayesimpact.data.period import crossing_period
 from bayesimpact.data.recording import Recording
-from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 from bayesimpact.trial.rig.recordings import Effects
 
 N, PERIOD = 6000, 105.0
@@ -109,7 +109,7 @@ def test_friction_and_corners_of_the_motion_are_none(effects: Effects) -> None:
     for quantity, noise in (("displacement", 5e-6), ("velocity", 5e-4), ("acceleration", 0.02)):
         campaign = small_rig.record(
             3, effects, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES, duration=4.0,
-            quantity=quantity, chain=Chain(noise=noise),
+            quantity=quantity, chain=MeasuringChain(noise=noise),
         )  # fmt: skip
         for r in campaign.recordings:
             assert find_dropouts(r, crossing_period(r.samples, 1.0)) == []

@@ -19,8 +19,8 @@ def test_a_mass_that_friction_stops_before_an_encoder_has_no_fault(seed: int) ->
     """
     rng, step = np.random.default_rng(seed), 6e-4
     t = np.arange(3000) * 1e-2
-    swing = 0.2 * np.maximum(1.0 - t / 15.0, 0.0) * np.cos(2 * np.pi * 1.1 * t)
-    x = np.round(swing / step + 0.3 * rng.standard_normal(t.size))
+    free_decay = 0.2 * np.maximum(1.0 - t / 15.0, 0.0) * np.cos(2 * np.pi * 1.1 * t)
+    x = np.round(free_decay / step + 0.3 * rng.standard_normal(t.size))
     x[1500:] = -1.0 * (rng.random(1500) < 0.01)
     x[1496:1500] = -1.0, -1.0, 0.0, -1.0
     x[1500:1640] = 0.0
@@ -32,8 +32,8 @@ def test_a_rest_between_two_steps_is_not_written_twice() -> None:
     """An encoder that flickers repeats itself by chance; one that swings does not."""
     rng, step = np.random.default_rng(3), 3e-4
     t = np.arange(2800) * 1e-2
-    swing = 0.5 * np.maximum(1.0 - t / 20.0, 0.0) * np.cos(2 * np.pi * 0.9 * t)
-    x = np.round(swing / step + 0.2 * rng.standard_normal(t.size))
+    free_decay = 0.5 * np.maximum(1.0 - t / 20.0, 0.0) * np.cos(2 * np.pi * 0.9 * t)
+    x = np.round(free_decay / step + 0.2 * rng.standard_normal(t.size))
     x[2000:] = -4.0
     x[[2703, 2707]] = -3.0
     assert [f.id for f in find_slips(Recording("a", "", x * step, 1e-2))] == []
@@ -56,8 +56,8 @@ def test_friction_that_holds_an_encoder_is_no_fault() -> None:
 def test_the_step_is_found_where_most_readings_are_several_apart() -> None:
     """A large motion passes 3,000 steps in few samples; twice the step was taken for it."""
     t = np.arange(4658) * 1e-2
-    swing = np.where(t < 8.0, 0.9 - 0.1 * t, 0.002) * np.cos(2 * np.pi * 1.1 * t)
-    counts = np.round(swing / 5.33e-4 + 0.2 * np.random.default_rng(0).standard_normal(t.size))
+    free_decay = np.where(t < 8.0, 0.9 - 0.1 * t, 0.002) * np.cos(2 * np.pi * 1.1 * t)
+    counts = np.round(free_decay / 5.33e-4 + 0.2 * np.random.default_rng(0).standard_normal(t.size))
     apart = np.diff(np.unique(counts))
     assert np.median(apart) >= 2.0
     assert reading_step(np.round(counts * 5.33e-4, 7)) == pytest.approx(5.33e-4)

@@ -197,7 +197,7 @@ def scattered(x: np.ndarray, limit: float, scatter: float) -> np.ndarray:
     return np.clip(x, -ends, ends)
 
 
-def swing(case: str) -> Recording:
+def free_decay(case: str) -> Recording:
     t = np.arange(1500) * 1e-3
     noise = np.random.default_rng(2).normal(0.0, 0.005, t.size)
     samples = 10.0 * np.exp(-t) * np.cos(2 * np.pi * 20.0 * t) + noise
@@ -205,7 +205,7 @@ def swing(case: str) -> Recording:
 
 
 def test_clipping_at_ends_that_scatter() -> None:
-    free = swing("")
+    free = free_decay("")
     faults = find_clipped(replace(free, samples=scattered(free.samples, 8.0, 0.01)))
     assert [f.size for f in faults] == pytest.approx([8.0, -8.0], abs=0.01)
     largest = set(np.flatnonzero(free.samples > 8.1))
@@ -214,7 +214,7 @@ def test_clipping_at_ends_that_scatter() -> None:
 
 
 def test_what_an_obstacle_may_have_stopped_is_not_clipped() -> None:
-    free = swing("a")
+    free = free_decay("a")
     assert not find_clipped(replace(free, samples=scattered(free.samples, 8.0, 0.01)))
 
 

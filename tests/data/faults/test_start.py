@@ -10,7 +10,7 @@ from bayesimpact.data.faults.find import recording_faults
 from bayesimpact.data.recording import Recording
 
 
-def swing(phase: float, push: float, noise: float, seed: int) -> Recording:
+def free_decay(phase: float, push: float, noise: float, seed: int) -> Recording:
     """A decay at 30 readings a period that passes cos(phase) first; until it first turns only the
     share `push` of its way there has been gone, slowly at first.
     """
@@ -25,7 +25,7 @@ def swing(phase: float, push: float, noise: float, seed: int) -> Recording:
 @pytest.mark.parametrize("phase", [-1.2, -0.9, np.pi - 1.0])
 @pytest.mark.parametrize("noise", [1e-4, 1e-2])
 def test_a_hand_that_pushes_to_the_first_turning_point(phase: float, noise: float) -> None:
-    found = recording_faults(swing(phase, 2.0, noise, 1))
+    found = recording_faults(free_decay(phase, 2.0, noise, 1))
     assert [f.id for f in found] == ["recording_start"]
     turn = -phase % np.pi / (2 * np.pi)
     assert "not yet free" in found[0].statement

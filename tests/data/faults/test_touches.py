@@ -35,7 +35,7 @@ def test_flights_between_brief_contacts_are_no_spikes(seed: int) -> None:
 
 
 def rebounds(seed: int) -> np.ndarray:
-    """A velocity, m/s, of which an obstacle's mass takes a part at every touch."""
+    """A velocity, m/s, of which an obstacle's mass takes a part at every contact onset."""
     t = np.arange(6000) * 5e-4
     x = 0.2 * np.exp(-0.2 * t) * np.cos(2 * np.pi * 7.0 * t)
     for touch in (551, 837):

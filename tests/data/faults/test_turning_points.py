@@ -31,8 +31,8 @@ def test_readings_that_repeat_where_the_mass_turns_are_not_held() -> None:
     t, step = np.arange(5000) * 2.5e-3, 5e-7
     for seed in range(40):
         white = 6e-7 * np.random.default_rng(seed).standard_normal(t.size)
-        swing = 1.4e-3 * np.exp(-0.02 * t) * np.cos(2 * np.pi * 1.1 * t)
-        samples = np.round((swing + lfilter([1.0], [1.0, -0.9], white)) / step) * step
+        free_decay = 1.4e-3 * np.exp(-0.02 * t) * np.cos(2 * np.pi * 1.1 * t)
+        samples = np.round((free_decay + lfilter([1.0], [1.0, -0.9], white)) / step) * step
         assert find_held(Recording("a", "", samples, 2.5e-3)) == []
         samples[2087:2095] = samples[2087]  # where it moves fast
         assert find_held(Recording("a", "", samples, 2.5e-3))

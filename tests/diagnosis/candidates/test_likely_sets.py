@@ -31,7 +31,7 @@ from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects import EFFECTS, SEARCHED
 from bayesimpact.model.parameters import SLOTS
-from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 from bayesimpact.trial.rig.recordings import Effects
 
 FREE = {
@@ -78,7 +78,7 @@ def test_three_strong_effects_are_asked_for(seed: int) -> None:
 # bias of their sizes: noise that is integrated and inertia's own
 @pytest.mark.parametrize(("quantity", "rel"), [("velocity", 0.1), ("acceleration", 0.3)])
 def test_velocities_and_accelerations_are_integrated(quantity: Quantity, rel: float) -> None:
-    chain = Chain(noise={"velocity": 1e-3, "acceleration": 0.03}[quantity])
+    chain = MeasuringChain(noise={"velocity": 1e-3, "acceleration": 0.03}[quantity])
     campaign = small_rig.record(
         1, FREE, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES, duration=6.0,
         quantity=quantity, chain=chain,
@@ -101,7 +101,7 @@ def test_a_velocity_with_samples_set_aside_is_integrated_over_them() -> None:
     """At an end, and over several periods: what stands in for them goes on as the motion does."""
     campaign = small_rig.record(
         2, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES, duration=4.0,
-        quantity="velocity", chain=Chain(noise=1e-4),
+        quantity="velocity", chain=MeasuringChain(noise=1e-4),
     )  # fmt: skip
     fit = fitted(campaign)
     true = fit.displacements[0]
@@ -150,7 +150,7 @@ def test_nothing_is_asked_for_where_nothing_is_missing() -> None:
 def test_velocities_ask_for_nothing_where_nothing_is_missing() -> None:
     velocity = small_rig.record(
         1, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES, quantity="velocity",
-        chain=Chain(noise=1e-3),
+        chain=MeasuringChain(noise=1e-3),
     )  # fmt: skip
     assert sets_of(fitted(velocity)) == []
 
@@ -178,7 +178,7 @@ def test_columns_are_the_law_along_the_path(effect_id: str) -> None:
     scales, effect = campaign_scales(fit), BY_ID[effect_id]
     paths = measured_paths(fit)
     term = terms_of(fit, [effect], scales, paths)[0]
-    slots = fit.target.oscillator.layout.slots(fit.mode)
+    slots = fit.density.oscillator.layout.slots(fit.mode)
     shapes = [term.shapes[f"{effect_id}.{p.name}"] for p in effect.parameters if p.is_shape]
     assert effect.law is not None
     for path, q, columns in zip(paths, slots, term.columns, strict=True):
@@ -256,7 +256,7 @@ def test_errors_of_stretches_are_white() -> None:
     fit = fitted(replace(campaign, recordings=recordings))
     paths = measured_paths(fit)
     assert not paths[0].rows.kept.all()
-    rng, level = np.random.default_rng(0), fit.target.likelihood.noise.level
+    rng, level = np.random.default_rng(0), fit.density.likelihood.noise.level
     white = np.concatenate([whitened_noise(path, level, rng) for path in paths for _ in range(20)])
     assert white.var() == pytest.approx(1.0, abs=5 * np.sqrt(2 / white.size))
     assert abs(np.mean(white[1:] * white[:-1])) < 5 / np.sqrt(white.size)
@@ -271,7 +271,7 @@ def whitened_noise(path: Path, level: float, rng: np.random.Generator) -> np.nda
 
 def test_velocities_by_local_quartics() -> None:
     fit = fitted(small_rig.record(1))
-    slots = fit.target.oscillator.layout.slots(fit.mode)
+    slots = fit.density.oscillator.layout.slots(fit.mode)
     for path, y, q in zip(measured_paths(fit), fit.displacements, slots, strict=True):
         assert np.abs(path.y - y).max() < 4 * small_rig.NOISE
         speed = np.gradient(y, path.t)

@@ -117,7 +117,7 @@ def test_what_a_model_has_and_no_grid_holds_is_known_to_the_equation(
 
 
 def _recordings(fit: Fit) -> Any:
-    return fit.target.oscillator.campaign.recordings
+    return fit.density.oscillator.campaign.recordings
 
 
 def test_terms_come_back_from_their_effects(detent: Any) -> None:
@@ -142,7 +142,7 @@ def test_an_effect_joins_a_formula_only_where_it_leaves_far_less(
     left: float, leads: bool, monkeypatch: Any
 ) -> None:
     """What a formula leaves may be what tells it from the force that it stands for."""
-    monkeypatch.setattr(unlisted.Remaining, "leads_on", lambda self, state, larger: True)
+    monkeypatch.setattr(unlisted.Remaining, "leads_on", lambda self, examined, larger: True)
     assert EXCESS == 4.0
     law = effect_of(Term("bump", ONE, V, -1, 2e-3, 5e-4), 1.0, 1e-2, 1.0, signed=True)
 
@@ -151,8 +151,8 @@ def test_an_effect_joins_a_formula_only_where_it_leaves_far_less(
 
     search = unlisted.Unlisted((), None, np.random.default_rng(0), print)  # type: ignore[arg-type]
     cubic, drag = BY_ID["spring_cubic"], BY_ID["quadratic_drag"]
-    state = SimpleNamespace(candidate=model(cubic, law, chi2=5.0))
-    assert search.leads_on(state, model(cubic, law, drag, chi2=left)) is leads  # type: ignore[arg-type]
+    examined = SimpleNamespace(candidate=model(cubic, law, chi2=5.0))
+    assert search.leads_on(examined, model(cubic, law, drag, chi2=left)) is leads  # type: ignore[arg-type]
     plain = SimpleNamespace(candidate=model(cubic, chi2=5.0))
     assert search.leads_on(plain, model(cubic, drag, chi2=4.9))  # type: ignore[arg-type]
 
@@ -185,7 +185,7 @@ def test_a_large_force_of_no_effect_is_named_with_all_that_acts_beside_it(whole:
     (law,) = (e for e in found.effects if is_formula(e))
     values = dict(zip(found.after.names, found.after.mode, strict=True))
     assert values[f"{law.id}.place"] == pytest.approx(-DETENT["place"], rel=0.02)
-    assert found.naming.probability(law.id) > 0.99  # at whatever shape it was met
+    assert found.selection.probability(law.id) > 0.99  # at whatever shape it was met
     assert sum("fitting" in one for one in said) < 60
     assert any("force A exp(" in one for one in said)
     assert not any("formula_" in one for one in said)  # an id that no one reads
@@ -195,7 +195,7 @@ def test_what_the_probe_does_is_no_place_where_something_moves_the_mass(whole: A
     found, _ = whole
     hum = next(e for e in found.effects if e.id == "sensor_hum")
     others = tuple(e for e in found.effects if e is not hum)
-    naming = found.naming
-    place = locate(found.before, found.after, naming.unknown, (hum, *others))
+    selection = found.selection
+    place = locate(found.before, found.after, selection.unknown, (hum, *others))
     assert place.regime == "free" and place.displacement[0] < DETENT["place"]
-    assert locate(found.before, found.after, naming.unknown, (hum,)).regime == "measurement"
+    assert locate(found.before, found.after, selection.unknown, (hum,)).regime == "measurement"

@@ -62,7 +62,7 @@ def test_a_force_slower_than_the_motion_is_asked_for_in_flight(shaken: Fit) -> N
     value = first.values
     assert value["harmonic_forcing.frequency"] == pytest.approx(STRONG["frequency"], rel=0.01)
     assert value["harmonic_forcing.amplitude"] == pytest.approx(STRONG["amplitude"], rel=0.05)
-    for r in shaken.target.oscillator.campaign.recordings:
+    for r in shaken.density.oscillator.campaign.recordings:
         away = value[f"harmonic_forcing.phase[{r.name}]"] - STRONG["phase"]
         assert abs(np.angle(np.exp(1j * away))) < 0.1
     found = fit_from(shaken, first.effects, value, campaign_scales(shaken)).fit
@@ -71,7 +71,7 @@ def test_a_force_slower_than_the_motion_is_asked_for_in_flight(shaken: Fit) -> N
 
 def test_a_recording_that_tells_nothing_takes_nothing_from_the_amplitude(shaken: Fit) -> None:
     """In flight a short one may have no stretch at all."""
-    first, second, *others = shaken.target.oscillator.campaign.recordings
+    first, second, *others = shaken.density.oscillator.campaign.recordings
     short = replace(second, used=np.arange(second.samples.size) < 60)
     fit = shaken.with_recordings((first, short, *others))
     value = asked_for(fit, flight=True)[0].values
@@ -116,16 +116,16 @@ def _summed(path: Path, grid: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("is_shaken", [True, False])
-def test_a_refused_line_is_worth_something_on_the_way_where_it_was_asked_for(
+def test_a_refused_line_counts_on_the_way_where_it_was_asked_for(
     is_shaken: bool,
 ) -> None:
     search = Unlisted((FORCE,), None, np.random.default_rng(0), print)  # type: ignore[arg-type]
-    search.is_shaken = is_shaken
+    search.is_driven = is_shaken
     refused: Any = SimpleNamespace(
         effects=(FORCE,), log_evidence=-np.inf, refused=50.0, price=lambda cost: cost
     )
-    worth = 50.0 - search.cost if is_shaken else -np.inf
-    assert search.promise(refused) == worth
+    promise = 50.0 - search.cost if is_shaken else -np.inf
+    assert search.promise(refused) == promise
 
 
 @pytest.mark.long

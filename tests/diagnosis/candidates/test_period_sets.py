@@ -18,12 +18,12 @@ from bayesimpact.diagnosis.candidates.period_sets import PeriodSets
 from bayesimpact.diagnosis.refits.extend import campaign_scales, extend
 from bayesimpact.diagnosis.refits.refit import base_candidate, fit_from
 from bayesimpact.diagnosis.score_test.directions import shape_points
-from bayesimpact.diagnosis.selection.search import name
+from bayesimpact.diagnosis.selection.search import select_model
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.initial.multiple_shooting import multiple_shooting
 from bayesimpact.model.effects import SEARCHED
-from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 
 MASS = {"obstacle_mass": {"mass": 0.01}, "quadratic_drag": {"coefficient": 1.5}}
 
@@ -67,7 +67,7 @@ def test_a_set_leaves_what_its_least_squares_say(heavy: Fit) -> None:
     assert term.shapes in shape_points(term.effect, scales)
     found = problem.set_of((0,), 0.0)
     assert found.values["contact_relaxation.time"] == term.shapes["contact_relaxation.time"]
-    ahead = multiple_shooting(heavy.target.likelihood, heavy.mode)
+    ahead = multiple_shooting(heavy.density.likelihood, heavy.mode)
     assert ahead is not None
     o = extend(heavy, found.effects, scales).oscillator
     theta = np.array([found.values[name] for name in o.layout.names])
@@ -111,7 +111,7 @@ def test_about_a_model_its_own_effects_stay(heavy: Fit) -> None:
 
 @pytest.mark.parametrize("quantity, noise", [("velocity", 3e-4), ("acceleration", 2e-2)])
 def test_other_quantities_ask_for_the_same(quantity: Any, noise: float) -> None:
-    chain = Chain(noise=noise, offsets={})
+    chain = MeasuringChain(noise=noise, offsets={})
     fit = fitted(small_rig.record(1, MASS, duration=4.0, chain=chain, quantity=quantity))
     assert fit.reduced_chi2 > 10
     scales = campaign_scales(fit)
@@ -123,13 +123,13 @@ def test_other_quantities_ask_for_the_same(quantity: Any, noise: float) -> None:
 
 def test_recordings_of_two_quantities_weigh_by_their_own_noise() -> None:
     chains = {
-        "displacement": Chain(noise=5e-6, offsets={}),
-        "velocity": Chain(noise=6e-4, offsets={}),
+        "displacement": MeasuringChain(noise=5e-6, offsets={}),
+        "velocity": MeasuringChain(noise=6e-4, offsets={}),
     }
     kinds: Any = list(chains)
     a, b = (small_rig.record(1, MASS, chain=chains[q], quantity=q) for q in kinds)
     fit = fitted(replace(a, recordings=(*a.recordings[:2], b.recordings[2])))
-    likelihood = fit.target.likelihood
+    likelihood = fit.density.likelihood
     assert likelihood.scales[2] == pytest.approx(120.0, rel=0.3)
     ahead = multiple_shooting(likelihood, fit.mode)
     assert ahead is not None
@@ -149,7 +149,7 @@ def test_a_search_begins_with_them(heavy: Fit) -> None:
     """The obstacle's mass, which no force along the measured motion shows, is in the second fit."""
     said = list[str]()
     others = ("contact_relaxation", "contact_hardening", "coulomb_friction", "spring_cubic")
-    found = name(
+    found = select_model(
         heavy,
         [BY_ID[i] for i in (*others, *MASS)],
         campaign_scales(heavy),
@@ -170,7 +170,7 @@ def test_a_hum_of_the_readings_is_no_speed() -> None:
     problem = asked.ahead(base, base)
     sets = problem.best(3)
     assert {e.id for e in sets[1].effects} == set(MASS)
-    assert problem.fit.target.oscillator.campaign is fit.target.oscillator.campaign
+    assert problem.fit.density.oscillator.campaign is fit.density.oscillator.campaign
     plain = PeriodSets(fit, SEARCHED, campaign_scales(fit)).best(3)
     assert not plain or {e.id for e in plain[min(1, len(plain) - 1)].effects} != set(MASS)
     for effects, kept in ((("sensor_hum",), True), (("quadratic_drag",), False)):

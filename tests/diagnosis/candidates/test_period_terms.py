@@ -75,14 +75,14 @@ def test_a_model_with_a_term_must_leave_far_less(monkeypatch, times: float, take
     with_term = made(left / (times * EXCESS))
     monkeypatch.setattr(search, "asked_again", lambda about, problem: with_term)
     monkeypatch.setattr(search, "examine", lambda c: SimpleNamespace(candidate=c))
-    base, state = (SimpleNamespace(candidate=made(left)) for _ in range(2))
-    found = search.with_a_term_ahead(base, state)
+    base, examined = (SimpleNamespace(candidate=made(left)) for _ in range(2))
+    found = search.with_a_term_ahead(base, examined)
     assert (found.candidate is with_term) is taken
     search.asked.has_stop = False
-    assert search.with_a_term_ahead(base, state) is state
+    assert search.with_a_term_ahead(base, examined) is examined
     search.asked.has_stop = True
     monkeypatch.setattr(search, "may_go_on", lambda: False)
-    assert search.with_a_term_ahead(base, state) is state
+    assert search.with_a_term_ahead(base, examined) is examined
 
 
 @pytest.mark.long

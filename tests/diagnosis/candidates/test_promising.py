@@ -1,4 +1,4 @@
-"""Which effects are worth a refit in the place of another, and which can add nothing."""
+"""Which effects deserve a refit in the place of another, and which can add nothing."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from bayesimpact.diagnosis.faults import beside_model
 from bayesimpact.diagnosis.faults.beside_model import fault_beside
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import fit_from
-from bayesimpact.diagnosis.selection.revision import is_spoilt, posed_anew
+from bayesimpact.diagnosis.selection.revision import has_bad_readings, revised
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects import EFFECTS
@@ -64,12 +64,12 @@ def test_a_fault_is_told_with_its_size(kind: str, more: tuple[str, ...]) -> None
     assert compared.fault.size == pytest.approx(OFF[kind], rel=0.03)
     assert abs(compared.fault.size - OFF[kind]) < 4 * compared.fault.error < 0.2 * abs(OFF[kind])
     assert fit.reduced_chi2 < 1.1 < compared.before
-    assert {e.id for e in fit.target.oscillator.effects} == set(PHYSICS)
-    assert fit.target.oscillator.campaign is compared.campaign
-    assert is_spoilt(base, found)
+    assert {e.id for e in fit.density.oscillator.effects} == set(PHYSICS)
+    assert fit.density.oscillator.campaign is compared.campaign
+    assert has_bad_readings(base, found)
 
 
-def test_a_search_is_posed_anew_without_all_that_is_off() -> None:
+def test_a_search_is_revised_without_all_that_is_off() -> None:
     """A spike shows once the clock is right, and readings with it hardly tell of that."""
     campaign = recorded(CHANGES["recording_clock"])
     spiked, *others = campaign.recordings
@@ -78,13 +78,13 @@ def test_a_search_is_posed_anew_without_all_that_is_off() -> None:
     campaign = replace(campaign, recordings=(replace(spiked, samples=samples), *others))
     base, found = fits(campaign)
     told: list[str] = []
-    anew = posed_anew(base, state_of(found), told.append)
+    anew = revised(base, state_of(found), told.append)
     assert anew is not None and anew.first is not None
     kinds = {(one.fault.id, one.fault.recording) for one in anew.faults}
     assert kinds == {("recording_clock", "b"), ("recording_spikes", "a")}, told
     assert anew.first.reduced_chi2 < 1.1
-    assert anew.base.target.oscillator.campaign is anew.first.target.oscillator.campaign
-    assert posed_anew(anew.base, state_of(anew.first), told.append) is None
+    assert anew.base.density.oscillator.campaign is anew.first.density.oscillator.campaign
+    assert revised(anew.base, state_of(anew.first), told.append) is None
 
 
 def test_physics_that_is_missing_is_no_fault() -> None:
@@ -99,7 +99,7 @@ def test_physics_that_is_missing_is_no_fault() -> None:
 
 def test_recordings_that_agree_have_none() -> None:
     base, found = fits(recorded(None), "gap_per_recording")
-    assert fault_beside(base, found) is None and not is_spoilt(base, found)
+    assert fault_beside(base, found) is None and not has_bad_readings(base, found)
 
 
 def test_gaps_of_every_recordings_own_are_no_gain_of_one() -> None:
@@ -113,10 +113,10 @@ def test_gaps_of_every_recordings_own_are_no_gain_of_one() -> None:
 
 def test_what_is_kept_as_read_is_not_asked() -> None:
     base, found = fits(recorded(CHANGES["recording_gain"]))
-    campaign = found.target.oscillator.campaign
-    oscillator = replace(found.target.oscillator, campaign=replace(campaign, keep_faults=True))
-    likelihood = replace(found.target.likelihood, oscillator=oscillator)
-    kept = replace(found, target=replace(found.target, likelihood=likelihood))
+    campaign = found.density.oscillator.campaign
+    oscillator = replace(found.density.oscillator, campaign=replace(campaign, keep_faults=True))
+    likelihood = replace(found.density.likelihood, oscillator=oscillator)
+    kept = replace(found, density=replace(found.density, likelihood=likelihood))
     assert fault_beside(base, kept) is None
 
 
@@ -134,8 +134,8 @@ def test_directions_are_what_a_fault_changes() -> None:
         (direction,) = beside_model._directions(found, [hypothesis])[1].T
         small = 1e-5
         step = beside_model.Weighed(hypothesis, 0.0, value=small)
-        other = beside_model.corrected(found.target.oscillator.campaign, 1, step)
+        other = beside_model.corrected(found.density.oscillator.campaign, 1, step)
         moved = found.with_recordings(other.recordings)
-        sigma = found.mode[found.target.likelihood.sigma_columns][1]
+        sigma = found.mode[found.density.likelihood.sigma_columns][1]
         change = (found.residuals[1] - moved.residuals[1]) / small / sigma
         assert change == pytest.approx(direction, abs=0.02 * float(np.abs(direction).max()))

@@ -18,7 +18,7 @@ from bayesimpact.diagnosis.faults.alone import SharedModel, fit_alone
 from bayesimpact.diagnosis.faults.compare import Compared, base_failed, compare_recordings
 from bayesimpact.inference.identify import identify
 from bayesimpact.trial.bundle import PAPER_RIG, paper_releases
-from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 from bayesimpact.trial.rig.recordings import Rig, record
 
 SECONDS = 2.0
@@ -125,7 +125,7 @@ def test_a_stop_on_the_other_side_of_all(paper: Campaign) -> None:
 def from_rig(rig: Rig, number: int) -> Change:
     rng = np.random.default_rng(7)
     release = paper_releases(rng)[number]
-    samples = record(rig, release, {}, Chain(5e-6), rate=1000.0, duration=SECONDS, rng=rng)
+    samples = record(rig, release, {}, MeasuringChain(5e-6), rate=1000.0, duration=SECONDS, rng=rng)
     return lambda r: replace(r, samples=samples)
 
 
@@ -186,6 +186,6 @@ def test_which_recordings_the_other_sign_is_tried_of_first(
     names = [r.name for r in campaign.recordings]
     alone = {n: SimpleNamespace(reduced_chi2=x) for n, x in zip(names, own, strict=True)}
     noise, sizes = SimpleNamespace(level=2.0), np.full(3, 10.0)
-    target = SimpleNamespace(likelihood=SimpleNamespace(noise=noise, sizes=sizes))
-    fit = SimpleNamespace(sums=40.0 * np.array(together), target=target)
+    density = SimpleNamespace(likelihood=SimpleNamespace(noise=noise, sizes=sizes))
+    fit = SimpleNamespace(sums=40.0 * np.array(together), density=density)
     assert compare._doubted(campaign, alone, fit) == (first, others)

@@ -62,7 +62,7 @@ def test_a_gain_of_accelerations_shows_beside_what_periods_ahead_ask_for(gain):
     """No displacement is told from them with a stop, and gaps of every recording's own took its
     place, with dampings per obstacle: two wrong names.
     """
-    chain = small_rig.Chain(noise=0.05, offsets=dict.fromkeys("abc", 0.0))
+    chain = small_rig.MeasuringChain(noise=0.05, offsets=dict.fromkeys("abc", 0.0))
     cubic = {"spring_cubic": {"stiffness": 6e6}}
     campaign = small_rig.record(
         5, cubic, chain=chain, quantity="acceleration", rate=2000.0, duration=2.0
@@ -104,7 +104,7 @@ def test_a_fault_beside_which_something_is_left_does_not_count(monkeypatch, reco
     """Of a recording by itself, or of all together once it is corrected."""
 
     def leaves(fit) -> bool:
-        return len(fit.target.oscillator.campaign.recordings) == recordings
+        return len(fit.density.oscillator.campaign.recordings) == recordings
 
     monkeypatch.setattr(first_physics, "leaves_something", leaves)
     assert found(*slow_clock()) == ()

@@ -38,7 +38,7 @@ RELEASES = tuple(
 @pytest.fixture(scope="module")
 def recorded() -> Campaign:
     offsets = {release.name: 0.0 for release in RELEASES}
-    chain = small_rig.Chain(noise=small_rig.NOISE, offsets=offsets)
+    chain = small_rig.MeasuringChain(noise=small_rig.NOISE, offsets=offsets)
     return small_rig.record(7, LAWS, releases=RELEASES, chain=chain)
 
 
@@ -77,7 +77,7 @@ def test_it_is_told_of_the_recording_as_read(recorded: Campaign) -> None:
 
 
 def test_stiffnesses_show_a_label() -> None:
-    campaign = small_rig.record(1, releases=RELEASES, chain=small_rig.Chain(noise=1e-6))
+    campaign = small_rig.record(1, releases=RELEASES, chain=small_rig.MeasuringChain(noise=1e-6))
     right = [5000.0, 5060.0, 3000.0, 2980.0, 3010.0]
 
     def shown(stiffness: list[float]) -> tuple[int, str] | None:
@@ -104,13 +104,13 @@ def test_parameters_find_their_places() -> None:
     own = with_own_stops(fit)
     assert [n for n in own.names if n.startswith("k2")] == ["k2[a]", "k2[b]", "k2[c]"]
     assert own.reduced_chi2 == pytest.approx(fit.reduced_chi2, rel=0.01)
-    layout = fit.target.oscillator.layout
-    places = shared_places(own.target.oscillator.layout, layout)
+    layout = fit.density.oscillator.layout
+    places = shared_places(own.density.oscillator.layout, layout)
     named = dict(zip(own.names, (layout.names[i] for i in places), strict=True))
     assert named.pop("k2[a]") == named.pop("k2[b]") == "k2[1]" and named.pop("k2[c]") == "k2[2]"
     assert all(one == other for one, other in named.items())
     known = dict(zip(own.names, map(float, own.mode), strict=True))
-    values = shared_values(known, own.target.oscillator.layout, layout)
+    values = shared_values(known, own.density.oscillator.layout, layout)
     assert set(values) == set(fit.names)
     assert values["k2[1]"] == pytest.approx((own.value("k2[a]") + own.value("k2[b]")) / 2)
     laws = [BY_ID["contact_damping_per_case"]]

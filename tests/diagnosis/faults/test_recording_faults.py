@@ -135,7 +135,7 @@ def test_spikes_that_show_only_beside_the_physics_are_set_aside_too() -> None:
 def test_spikes_away_from_the_stop_that_physics_hides_are_found_by_the_search() -> None:
     """In accelerations they look like contacts; a contact would have moved all that comes after."""
     cubic = {"spring_cubic": {"stiffness": 2e6}}
-    chain = small_rig.Chain(noise=0.05, offsets=dict.fromkeys("abc", 0.0))
+    chain = small_rig.MeasuringChain(noise=0.05, offsets=dict.fromkeys("abc", 0.0))
     campaign = small_rig.record(63, cubic, chain=chain, quantity="acceleration")
     first, *others = campaign.recordings
     samples, places = first.samples.copy(), (403, 1106, 1750)
@@ -341,7 +341,7 @@ def test_a_formula_is_looked_for_anew_where_a_fault_is_needless(monkeypatch, for
     effect: Any = BY_ID["spring_quadratic"]
     found: Any = SimpleNamespace(
         verdict="named", effects=(effect,), corrected=SimpleNamespace(compared=(1,)),
-        after=SimpleNamespace(target=SimpleNamespace(oscillator=SimpleNamespace(effects=(effect,)))),
+        after=SimpleNamespace(density=SimpleNamespace(oscillator=SimpleNamespace(effects=(effect,)))),
     )  # fmt: skip
     beside, begun = object(), []
     monkeypatch.setattr(module, "is_formula", lambda one: formula)

@@ -34,7 +34,7 @@ def fitted(campaign: Campaign) -> Fit:
 def pushed(campaign: Campaign, until: float) -> Campaign:
     """The first recording pushed by a force that ends at a time, s."""
     fit = fitted(campaign)
-    o, first = fit.target.oscillator, campaign.recordings[0]
+    o, first = fit.density.oscillator, campaign.recordings[0]
     push = np.where(first.times < until, 1.5 * np.sin(25.0 * first.times) + 1.0, 0.0)
     q = o.layout.slots(fit.mode)[[0]]
     moved, still = (
@@ -85,7 +85,7 @@ def test_a_channel_of_free_gain_is_fitted_with_its_own_gain_and_prior() -> None:
     fit = fitted(replace(campaign, recordings=pair))
     alone = _alone(fit, 1, 0)
     assert alone.value("gain[other]") == pytest.approx(1.04, abs=0.1)
-    own, whole = (f.target.priors.parameters[f.names.index("gain[other]")] for f in (alone, fit))
+    own, whole = (f.density.priors.parameters[f.names.index("gain[other]")] for f in (alone, fit))
     assert own == whole
     assert alone.reduced_chi2 == pytest.approx(1.0, abs=0.15)
 

@@ -16,7 +16,7 @@ from bayesimpact.diagnosis.refits.refit import Candidate, base_candidate, grown
 from bayesimpact.diagnosis.residual_force.gaussian_process import missing_drift, missing_force
 from bayesimpact.diagnosis.score_test.scan import score_directions
 from bayesimpact.diagnosis.selection.decision import Decision
-from bayesimpact.diagnosis.selection.outcome import Naming, State
+from bayesimpact.diagnosis.selection.outcome import ExaminedModel, Selection
 from bayesimpact.diagnosis.selection.unknown import with_force
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects.effect import Effect, Scales
@@ -31,22 +31,24 @@ def unknown(effects: dict[str, Any], named: tuple[Effect, ...] = ()) -> tuple[An
     campaign = record(3, effects, rig=PLAIN, releases=PLAIN_RELEASES, duration=4.0, rate=500.0)
     base = base_candidate(identify(campaign, rng=rng, search=False).fit)
     scales = campaign_scales(base.fit)
-    first = state = state_of(base, scales, rng)
+    first = examined = state_of(base, scales, rng)
     if named:
-        state = state_of(grown(base, named, scales), scales, rng)
-    chosen = state.candidate
+        examined = state_of(grown(base, named, scales), scales, rng)
+    chosen = examined.candidate
     repetition = residual_repetition(chosen.fit)
-    naming = Naming(first, state, (chosen, base)[: 1 + len(named)], np.log(50.0), repetition)
-    learned = with_force(chosen, state.force, scales)
+    selection = Selection(
+        first, examined, (chosen, base)[: 1 + len(named)], np.log(50.0), repetition
+    )
+    learned = with_force(chosen, examined.force, scales)
     decision = Decision("partly" if named else "unknown", named)
-    return Answer(naming, decision, learned.fit, state), scales
+    return Answer(selection, decision, learned.fit, examined), scales
 
 
-def state_of(candidate: Candidate, scales: Scales, rng: np.random.Generator) -> State:
+def state_of(candidate: Candidate, scales: Scales, rng: np.random.Generator) -> ExaminedModel:
     fit = candidate.fit
     scored = score_directions(fit, (), rng=rng)
     force, drift = (f(fit, scales, rng=rng) for f in (missing_force, missing_drift))
-    return State(candidate, scored, force, drift)
+    return ExaminedModel(candidate, scored, force, drift)
 
 
 def asked(answer: Answer, scales: Scales, looks: int = 99, said: list[str] | None = None) -> Answer:

@@ -50,17 +50,17 @@ def drag() -> tuple[Answer, Answer, Scales]:
 def test_where_time_ends_no_formula_is_named(detent: Any, looks: int) -> None:
     """One that was not fitted might be the likelier one."""
     before, whole, scales = detent
-    assert whole.naming.finished and before.naming.finished
+    assert whole.selection.finished and before.selection.finished
     found = asked(before, scales, looks)
-    assert not found.naming.finished and found.decision is before.decision
-    assert found.after is before.after and found.naming.tried == before.naming.tried
+    assert not found.selection.finished and found.decision is before.decision
+    assert found.after is before.after and found.selection.tried == before.selection.tried
     listed = found.formulas.ranked if found.formulas else ()
     assert sum(row.refitted for row in listed) == max(looks - 1, 0)
 
 
 def test_a_force_of_no_catalogue_is_named_with_its_numbers(detent: Any) -> None:
     _, found, _ = detent
-    assert found.decision.verdict == "named" and found.state is None
+    assert found.decision.verdict == "named" and found.examined is None
     assert all(map(is_formula, found.decision.effects)) and len(found.decision.effects) == 1
     first = found.formulas.ranked[0]
     (term,) = first.terms
@@ -71,7 +71,7 @@ def test_a_force_of_no_catalogue_is_named_with_its_numbers(detent: Any) -> None:
     for own, true in (("size", "stiffness"), ("place", "place"), ("width", "width")):
         off = (values[names[own]] - abs(DETENT[true])) / sd[names[own]]
         assert abs(off) < 4.0, own
-    assert LEARNED not in {e.id for e in found.after.target.oscillator.effects}
+    assert LEARNED not in {e.id for e in found.after.density.oscillator.effects}
 
 
 @pytest.mark.long
@@ -83,7 +83,7 @@ def test_an_effect_that_imitated_the_force_goes_once_the_formula_is_in(detent: A
     assert found.decision.verdict == "named"
     named = [e.id for e in found.decision.effects]
     assert named == [e.id for e in detent[1].decision.effects]
-    assert found.naming.chosen.candidate.ids == tuple(named)
+    assert found.selection.chosen.candidate.ids == tuple(named)
 
 
 def test_a_formula_takes_the_place_of_effects_that_only_imitate_it(detent: Any) -> None:
@@ -106,14 +106,14 @@ def test_no_formula_takes_the_place_of_the_law_that_acts() -> None:
 def test_where_the_search_did_not_end_no_formula_takes_the_place_of_its_effects() -> None:
     imitating = tuple(BY_ID[i] for i in ("spring_cubic", "spring_quadratic"))
     before, scales = unknown({"detent": DETENT}, named=imitating)
-    late = replace(_said(before), naming=replace(before.naming, finished=False))
+    late = replace(_said(before), selection=replace(before.selection, finished=False))
     assert asked(late, scales) is late and asked(_said(before), scales, 0).decision.effects
 
 
 def _said(answer: Answer) -> Answer:
     """An answer that names the effects of its model, as if nothing were left."""
     decision = replace(answer.decision, verdict="named")
-    return Answer(answer.naming, decision, answer.naming.chosen.candidate.fit, None)
+    return Answer(answer.selection, decision, answer.selection.chosen.candidate.fit, None)
 
 
 def test_a_term_that_says_nothing_beside_another_goes(detent: Any, monkeypatch: Any) -> None:
@@ -136,7 +136,7 @@ def test_a_term_that_says_nothing_beside_another_goes(detent: Any, monkeypatch: 
 def test_a_formula_is_scored_and_asked_for_like_any_effect(detent: Any) -> None:
     """Its fixed numbers are no sizes: they have no place among the unknowns."""
     before, found, scales = detent
-    base, (law,) = before.naming.base.candidate.fit, found.decision.effects
+    base, (law,) = before.selection.base.candidate.fit, found.decision.effects
     (score,) = scan(base, (law,), scales, rng=np.random.default_rng(0)).best()
     assert score.names == (f"{law.id}.size",) and score.gain > 10.0
     model = base_candidate(base)
@@ -170,7 +170,7 @@ def test_of_two_fits_of_one_kind_the_likelier_keeps_its_own_terms(detent: Any) -
     fit = found.after
     good, bad, other = (Candidate((), fit, value) for value in (3.0, 2.0, 1.0))
     ends = [(near, good), (far, bad), (cube, other)]
-    best = formula_rounds._different(ends, found.naming, terms)
+    best = formula_rounds._different(ends, found.selection, terms)
     assert best == {replace(near, log_odds=9.0): good, cube: other}
 
 
@@ -189,7 +189,7 @@ def test_no_effect_is_named_that_the_likeliest_formula_makes_idle(
     assert not found.formulas.named and found.after is before.after
     assert tuple(e.id for e in found.decision.effects) == others
     assert found.decision.verdict == ("partly" if others else "unknown")
-    left = remainder(found.naming, found.after, found.state, found.formulas)
+    left = remainder(found.selection, found.after, found.examined, found.formulas)
     assert left.guess == "a force " + formula_text(found.formulas.ranked[0].terms)
     low, high = (x - DETENT["place"] for x in left.displacement)  # where the formula acts
     assert -2 * DETENT["width"] < low < 0 < high < 2 * DETENT["width"]
@@ -199,10 +199,10 @@ def test_no_effect_is_named_that_the_likeliest_formula_makes_idle(
 
 def test_the_one_named_leads_all_others_by_the_decisive_odds(detent: Any) -> None:
     before, found, _ = detent
-    first, own = found.formulas.ranked[0], set(found.naming.chosen.candidate.ids)
-    rivals = [c for c in found.naming.tried if not own <= set(c.ids)]
-    assert rivals and all(first.log_odds > found.naming.log_odds(c) + DECISIVE for c in rivals)
-    assert found.naming.chosen.is_white and not before.naming.chosen.is_white
+    first, own = found.formulas.ranked[0], set(found.selection.chosen.candidate.ids)
+    rivals = [c for c in found.selection.tried if not own <= set(c.ids)]
+    assert rivals and all(first.log_odds > found.selection.log_odds(c) + DECISIVE for c in rivals)
+    assert found.selection.chosen.is_white and not before.selection.chosen.is_white
     assert sum(f.probability for f in found.formulas.ranked) <= 1.0 + 1e-9
     odds = [f.log_odds for f in found.formulas.ranked]
     assert odds == sorted(odds, reverse=True)
@@ -223,7 +223,7 @@ def test_a_law_that_another_imitates_is_listed_and_not_named(drag: Any) -> None:
 
 def test_what_is_not_unknown_is_left_alone(drag: Any) -> None:
     before, _, scales = drag
-    named = Answer(before.naming, Decision("named", ()), before.after, None)
+    named = Answer(before.selection, Decision("named", ()), before.after, None)
     assert asked(named, scales) is named
 
 
@@ -245,9 +245,9 @@ def test_picture_shows_the_formula_within_the_band_of_the_learned_force(detent: 
 
 def test_samples_are_counted_by_the_best_of_all_models(detent: Any) -> None:
     before, found, _ = detent
-    again = joined(before.naming, [found.naming.chosen.candidate])
-    assert again.repetition < before.naming.repetition
-    assert again.tried[0] is found.naming.chosen.candidate
+    again = joined(before.selection, [found.selection.chosen.candidate])
+    assert again.repetition < before.selection.repetition
+    assert again.tried[0] is found.selection.chosen.candidate
 
 
 def test_text_has_a_letter_for_every_size(detent: Any) -> None:
@@ -267,7 +267,7 @@ def test_places_of_an_angle_are_angles_wherever_they_are_written(
     assert any("fitting the formula" in text and "mrad" in text for text in said)
     assert any("mrad" in text for e in entries for text in e["alike"])
     assert not any(" mm" in text for text in written)
-    campaign = found.formulas.reference.target.oscillator.campaign
+    campaign = found.formulas.reference.density.oscillator.campaign
     assert " mm" in found_file(found.formulas).split('"""')[1]
     monkeypatch.setattr(type(campaign), "angular", True)
     title = found_file(found.formulas).split('"""')[1]
@@ -301,8 +301,8 @@ def test_no_name_rests_on_being_shorter_to_write(
         first: Candidate((own,), fit, length[0]),
         second: Candidate((other,), fit, length[1] - 7.0),
     }
-    naming = replace(found.naming, tried=tuple(fitted.values()))
-    refits = formula_rounds.Refits(frozenset(fitted), fitted, naming, False)
+    selection = replace(found.selection, tried=tuple(fitted.values()))
+    refits = formula_rounds.Refits(frozenset(fitted), fitted, selection, False)
     said = formulas._may_be_named(question, refits, first)  # type: ignore[arg-type]
     assert said is named
 

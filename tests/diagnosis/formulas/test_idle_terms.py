@@ -29,9 +29,9 @@ def test_what_surely_is_needed_is_not_left_out_to_see(monkeypatch, repetition, t
     monkeypatch.setattr(formula_refits, "loss_without", lambda fit, effect: losses[effect.id])
     monkeypatch.setattr(formula_refits, "without", without)
     question = SimpleNamespace(scores=SimpleNamespace(terms=()), scales=None)
-    naming = SimpleNamespace(
+    selection = SimpleNamespace(
         repetition=repetition, log_odds=lambda c: c.log_evidence, goal=lambda least: least
     )
     subset = SimpleNamespace(terms=())
-    found = formula_refits._without_one(question, naming, subset, Candidate(effects, None, 0.0))
+    found = formula_refits._without_one(question, selection, subset, Candidate(effects, None, 0.0))
     assert found is None and left_out == tried

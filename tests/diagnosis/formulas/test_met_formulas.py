@@ -19,7 +19,7 @@ from bayesimpact.diagnosis.measurement.repetition import residual_repetition
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import Candidate, base_candidate, fit_from
 from bayesimpact.diagnosis.selection.decision import Decision
-from bayesimpact.diagnosis.selection.outcome import Naming
+from bayesimpact.diagnosis.selection.outcome import Selection
 from bayesimpact.formula.grammar import ONE, Term
 from bayesimpact.formula.law import effect_of, kind_id, starts_of
 from bayesimpact.formula.library import V
@@ -38,9 +38,11 @@ def met(wrong: Term) -> tuple[Answer, Scales]:
     scales = campaign_scales(base.fit)
     law = effect_of(wrong, 0.1, 1e-2, scales.speed, signed=False)
     chosen = fit_from(base.fit, (law,), starts_of(wrong) | {f"{law.id}.size": 4.0}, scales)
-    first, state = (state_of(c, scales, rng) for c in (base, chosen))
-    naming = Naming(first, state, (chosen, base), np.log(50.0), residual_repetition(chosen.fit))
-    return Answer(naming, Decision("named", (law,)), chosen.fit, None), scales
+    first, examined = (state_of(c, scales, rng) for c in (base, chosen))
+    selection = Selection(
+        first, examined, (chosen, base), np.log(50.0), residual_repetition(chosen.fit)
+    )
+    return Answer(selection, Decision("named", (law,)), chosen.fit, None), scales
 
 
 BOX = Term("box", ONE, V, -1, 2.5e-3, 8e-4)
@@ -53,7 +55,7 @@ def test_formulas_are_scored_again_along_the_motion_of_the_likeliest() -> None:
     said: list[str] = []
     found = asked(before, scales, said=said)
     assert said.count("scoring formulas") > 1
-    kinds = [frozenset(map(kind_id, c.ids)) for c in found.naming.tried]
+    kinds = [frozenset(map(kind_id, c.ids)) for c in found.selection.tried]
     assert len(set(kinds)) == len(kinds)  # no model is its own rival
     assert found.decision.verdict == "named" and found.after.reduced_chi2 < 1.1
     (term,) = found.formulas.ranked[0].terms
@@ -73,7 +75,7 @@ def test_what_is_ambiguous_beside_a_formula_stays_so() -> None:
     """Two effects that do the same are not told apart by what else is named."""
     before, scales = met(replace(BOX, region="bump"))
     (law,) = before.decision.effects
-    rival = before.naming.tried[1]
+    rival = before.selection.tried[1]
     open_ = replace(before, decision=Decision("ambiguous", (law,), (rival,)))
     found = asked(open_, scales)
     assert found.formulas.named
@@ -85,8 +87,8 @@ def test_no_term_that_a_search_has_met_is_a_name_by_itself() -> None:
     """Where time ends before it was compared with others, nor with what is still missing beside."""
     before, scales = met(BOX)
     found = asked(before, scales, 0)
-    assert not found.naming.finished and found.after is before.after
-    assert found.state is before.naming.base  # what the formula does is what is left
+    assert not found.selection.finished and found.after is before.after
+    assert found.examined is before.selection.base  # what the formula does is what is left
     imitation = Decision("named", (BY_ID["spring_cubic"], *before.decision.effects))
     for answer in (found, asked(replace(before, decision=imitation), scales, 0)):
         assert (answer.decision.verdict, answer.decision.effects) == ("unknown", ())
@@ -98,7 +100,7 @@ def test_what_a_formula_that_is_not_named_hides_is_looked_for_without_it(named: 
     law, cubic = effect_of(BOX, 1.0, 1e-2, 1.0, signed=False), BY_ID["spring_cubic"]
 
     def fit(*effects: Effect) -> Any:
-        return SimpleNamespace(target=SimpleNamespace(oscillator=SimpleNamespace(effects=effects)))
+        return SimpleNamespace(density=SimpleNamespace(oscillator=SimpleNamespace(effects=effects)))
 
     whole, alone, base = fit(cubic, law), fit(cubic), fit()
     tried = (Candidate((cubic,), alone, 0.0),)
@@ -106,7 +108,7 @@ def test_what_a_formula_that_is_not_named_hides_is_looked_for_without_it(named: 
     def shown(after: Any, tried: tuple[Candidate, ...]) -> Any:
         found = SimpleNamespace(
             after=after, before=base, formulas=SimpleNamespace(named=named),
-            naming=SimpleNamespace(tried=tried),
+            selection=SimpleNamespace(tried=tried),
         )  # fmt: skip
         return without_uncertain_formulas(found)  # type: ignore[arg-type]
 

@@ -73,16 +73,19 @@ def test_a_search_begins_with_what_quiet_recordings_ask_for(humming: Fit, left: 
     quieter = fit_without_hums(humming)
     assert quieter is not None
     fit = replace(quieter, sums=quieter.sums * left / quieter.reduced_chi2)
-    state = SimpleNamespace(candidate=SimpleNamespace(fit=fit))
+    examined = SimpleNamespace(candidate=SimpleNamespace(fit=fit))
     begun = SimpleNamespace(
-        progress=lambda words: None, examine=lambda c: state, asked_for=lambda s: [s], is_large=True
+        progress=lambda words: None,
+        examine=lambda c: examined,
+        asked_for=lambda s: [s],
+        is_large=True,
     )
     found = search._beside_hums(humming, lambda: begun)
     if left > 1.0:
         assert found is None
     else:
-        own = humming.target.oscillator.campaign
-        assert found is not None and found.target.oscillator.campaign is own
+        own = humming.density.oscillator.campaign
+        assert found is not None and found.density.oscillator.campaign is own
 
 
 def test_hums_of_different_frequencies_are_shared_by_none() -> None:

@@ -19,7 +19,7 @@ from bayesimpact.diagnosis.measurement.input_noise import input_noise, with_inpu
 from bayesimpact.diagnosis.measurement.whiteness import whiteness_p
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import fit_from
-from bayesimpact.diagnosis.selection.revision import posed_anew
+from bayesimpact.diagnosis.selection.revision import revised
 from bayesimpact.diagnosis.thresholds import LARGE
 from bayesimpact.formula.responses import motion_of
 from bayesimpact.inference.fit import Fit
@@ -204,7 +204,7 @@ def test_beside_what_is_missing_it_is_told_by_the_model_that_holds_that() -> Non
     assert found.before.reduced_chi2 > LARGE**2
     assert any("noise of the input matters" in words for words in said)
     assert found.verdict == "named" and [e.id for e in found.effects] == ["spring_cubic"]
-    forces = found.after.target.likelihood.noise.forces
+    forces = found.after.density.likelihood.noise.forces
     assert forces is not None and forces.share == pytest.approx(ERROR, rel=0.25)
     assert np.max(np.abs(deviations(found.after, rig))) < 4.0
 
@@ -224,12 +224,12 @@ def test_slow_noise_of_the_readings_is_told_beside_that_of_the_input() -> None:
     model = fit_from(base, [BY_ID["spring_cubic"]], {}, campaign_scales(base)).fit
     state: Any = SimpleNamespace(candidate=SimpleNamespace(fit=model), is_white=False)
     said: list[str] = []
-    anew = posed_anew(base, state, said.append)
+    anew = revised(base, state, said.append)
     assert anew is not None and anew.first is not None and len(said) == 2
-    noise = anew.first.target.likelihood.noise
+    noise = anew.first.density.likelihood.noise
     assert noise.forces is not None and noise.others
     assert noise.forces.share == pytest.approx(ERROR, rel=0.3)
-    assert noise == anew.base.target.likelihood.noise
+    assert noise == anew.base.density.likelihood.noise
     assert anew.first.reduced_chi2 == pytest.approx(1.0, abs=0.05)
     assert whiteness_p(model) < 1e-6 < 0.01 < whiteness_p(anew.first)
 

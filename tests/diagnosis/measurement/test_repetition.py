@@ -18,9 +18,9 @@ MOTION = 1e-3 * np.exp(-TIMES) * np.cos(2 * np.pi * 28.0 * TIMES)
 def repetition(residual: np.ndarray) -> float:
     recording = Recording("a", "", MOTION, INTERVAL)
     campaign = SimpleNamespace(recordings=(recording,))
-    target = SimpleNamespace(oscillator=SimpleNamespace(campaign=campaign))
+    density = SimpleNamespace(oscillator=SimpleNamespace(campaign=campaign))
     part = SimpleNamespace(residual=residual)
-    return residual_repetition(SimpleNamespace(target=target, linearisation=(part,)))
+    return residual_repetition(SimpleNamespace(density=density, linearisation=(part,)))
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.8])

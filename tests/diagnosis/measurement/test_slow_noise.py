@@ -30,7 +30,7 @@ def test_a_control_with_slow_noise_is_adequate_and_says_so(seed):
     campaign = small_rig.with_slow(small_rig.record(seed), seed, 1.25)
     found = diagnose(campaign, rng=RNG(0), search=False)
     assert found.verdict == "adequate"
-    noise = found.after.target.likelihood.noise
+    noise = found.after.density.likelihood.noise
     assert not noise.is_independent
     (correlation, slow), (_, white) = noise.parts
     assert correlation == pytest.approx(0.95, abs=0.03)
@@ -48,7 +48,7 @@ def test_noise_of_many_correlation_times_is_noise():
         campaign = small_rig.with_slow(campaign, number, 1.0, correlation)
     found = diagnose(campaign, rng=RNG(0), effects=FEW, search=False)
     assert found.verdict == "adequate"
-    assert len(found.after.target.likelihood.noise.parts) > 3
+    assert len(found.after.density.likelihood.noise.parts) > 3
 
 
 DRAG = {"quadratic_drag": {"coefficient": 3.0}}
@@ -60,7 +60,7 @@ def test_physics_beside_slow_noise_is_named_and_the_noise_found_beside_it():
     found = diagnose(campaign, rng=RNG(0), effects=FEW, search=False)
     assert [e.id for e in found.effects] == ["quadratic_drag"]
     assert found.verdict in ("named", "ambiguous")
-    assert found.after.target.likelihood.noise.others
+    assert found.after.density.likelihood.noise.others
     low, _, high = found.intervals.quantiles("quadratic_drag.coefficient")
     assert low < 3.0 < high
 
@@ -82,7 +82,7 @@ def test_a_search_begins_with_slow_noise_whatever_was_corrected_before():
     campaign = small_rig.with_slow(small_rig.record(6), 6, 1.25)
     corrected = cleaned_campaign(campaign, rng=RNG(0), search=False)
     noise = corrected.identification.noise
-    assert noise.others and corrected.identification.fit.target.likelihood.noise is noise
+    assert noise.others and corrected.identification.fit.density.likelihood.noise is noise
     found = whole._of_corrected(
         corrected,
         rng=RNG(0),
@@ -92,7 +92,7 @@ def test_a_search_begins_with_slow_noise_whatever_was_corrected_before():
         first=None,
         as_read=campaign,
     )
-    assert found.verdict == "adequate" and found.after.target.likelihood.noise is noise
+    assert found.verdict == "adequate" and found.after.density.likelihood.noise is noise
 
 
 @pytest.mark.long
@@ -104,4 +104,4 @@ def test_slow_noise_is_found_again_beside_a_fault_of_a_recording():
     found = diagnose(campaign, rng=RNG(0), effects=FEW, search=False)
     assert found.verdict == "named" and not found.effects
     assert [f.id for f in found.corrected.faults] == ["recording_reversed"]
-    assert found.after.target.likelihood.noise.others
+    assert found.after.density.likelihood.noise.others

@@ -15,7 +15,7 @@ from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.diagnosis.measurement.smoothing import LAG, is_refuted, proved_smoothing
 from bayesimpact.diagnosis.refits.extend import campaign_scales, extend, transfer
 from bayesimpact.report.diagnosis.document import document
-from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 
 pytestmark = pytest.mark.usefixtures("catalogue_alone")
 
@@ -25,7 +25,7 @@ CATALOGUE = tuple(
 
 
 def recorded(seed: int, smoothing: Smoothing, measurement: Measurement | None = None):
-    chain = Chain(noise=small_rig.NOISE, offsets=small_rig.OFFSETS, smoothing=smoothing)
+    chain = MeasuringChain(noise=small_rig.NOISE, offsets=small_rig.OFFSETS, smoothing=smoothing)
     return small_rig.record(seed, chain=chain, duration=1.5, measurement=measurement)
 
 
@@ -55,14 +55,14 @@ def test_a_lag_is_named_with_its_time_constant():
 )
 def test_a_lag_needs_its_mark_on_the_noise(small, lag, correlation, refuted):
     scales = campaign_scales(small.fit)
-    target = extend(small.fit, (BY_ID["smoothing"],), scales)
-    layout = target.oscillator.layout
+    density = extend(small.fit, (BY_ID["smoothing"],), scales)
+    layout = density.oscillator.layout
     theta = transfer(small.fit, layout, (BY_ID["smoothing"],), scales, {})
     theta[layout.index(LAG)] = lag
     likelihood = replace(
-        target.likelihood, noise=replace(target.likelihood.noise, correlation=correlation)
+        density.likelihood, noise=replace(density.likelihood.noise, correlation=correlation)
     )
-    fit = replace(small.fit, target=replace(target, likelihood=likelihood), mode=theta)
+    fit = replace(small.fit, density=replace(density, likelihood=likelihood), mode=theta)
     assert is_refuted(fit) is refuted
     assert not is_refuted(small.fit)
 
@@ -97,7 +97,7 @@ def test_another_rig_behind_a_filter_is_found_before_any_physics() -> None:
     filtering = Smoothing("savgol", window=15, polyorder=2)
     sound = recorded(6, filtering)
     stiffer = replace(small_rig.RIG, k1=1.003 * small_rig.RIG.k1)
-    chain = Chain(noise=small_rig.NOISE, offsets=small_rig.OFFSETS, smoothing=filtering)
+    chain = MeasuringChain(noise=small_rig.NOISE, offsets=small_rig.OFFSETS, smoothing=filtering)
     other = small_rig.record(6, chain=chain, rig=stiffer, duration=1.5).recordings[1]
     mixed = replace(sound, recordings=(sound.recordings[0], other, sound.recordings[2]))
     found = run(mixed)
@@ -105,4 +105,4 @@ def test_another_rig_behind_a_filter_is_found_before_any_physics() -> None:
     assert found.corrected is not None
     (fault,) = found.corrected.faults
     assert (fault.id, fault.recording) == ("recording_other_rig", "b")
-    assert not found.naming.tried[0].ids
+    assert not found.selection.tried[0].ids

@@ -14,7 +14,7 @@ from bayesimpact.diagnosis.refits import refit
 from bayesimpact.diagnosis.refits.equivalent import equivalent
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import Candidate, exchanged, fit_from
-from bayesimpact.inference.fit import Fit, Target
+from bayesimpact.inference.fit import Fit, PosteriorDensity
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.model.effects.effect import Scales
@@ -66,11 +66,11 @@ def test_an_exchange_begins_there(
     candidate, scales = dragged
     starts: list[float] = []
 
-    def climb(target: Target, start: np.ndarray, **options: Any) -> Fit:
-        starts.append(float(start[target.oscillator.layout.index("quadratic_drag.coefficient")]))
-        return find_mode(target, start, **options)
+    def ascent(density: PosteriorDensity, start: np.ndarray, **options: Any) -> Fit:
+        starts.append(float(start[density.oscillator.layout.index("quadratic_drag.coefficient")]))
+        return find_mode(density, start, **options)
 
-    monkeypatch.setattr(refit, "find_mode", climb)
+    monkeypatch.setattr(refit, "find_mode", ascent)
     found = exchanged(candidate, POWER, DRAG, scales)
     assert starts[0] == pytest.approx(COEFFICIENT, rel=0.2)
     assert found.fit.log_likelihood > candidate.fit.log_likelihood - 2.0

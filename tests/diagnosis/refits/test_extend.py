@@ -29,17 +29,17 @@ def effects(*ids: str):
 def pretend(small, ids: tuple[str, ...], values: dict[str, float]) -> Fit:
     """A fit of the model with these effects, its values set by hand."""
     scales = campaign_scales(small.fit)
-    target = extend(small.fit, effects(*ids), scales)
-    mode = transfer(small.fit, target.oscillator.layout, effects(*ids), scales, {})
+    density = extend(small.fit, effects(*ids), scales)
+    mode = transfer(small.fit, density.oscillator.layout, effects(*ids), scales, {})
     for name, value in values.items():
-        mode[target.oscillator.layout.index(name)] = value
+        mode[density.oscillator.layout.index(name)] = value
     covariance = np.diag(np.full(mode.size, 1e-8))
-    return replace(small.fit, target=target, mode=mode, covariance=covariance)
+    return replace(small.fit, density=density, mode=mode, covariance=covariance)
 
 
 def test_sizes_of_the_campaign(small):
     scales, rig = campaign_scales(small.fit), small_rig.RIG
-    truth = small.fit.target.oscillator.predict(small.fit.mode)
+    truth = small.fit.density.oscillator.predict(small.fit.mode)
     depth = max(float(m.max()) for m in truth) - rig.g
     assert scales.mass == rig.mass and scales.interval == 1e-3
     assert scales.stiffness == pytest.approx(rig.k1, rel=1e-3)
@@ -59,35 +59,35 @@ def test_sizes_of_the_campaign(small):
 def test_shared_parameters_keep_their_values_and_priors(small):
     scales = campaign_scales(small.fit)
     chosen = effects("coulomb_friction", "contact_relaxation")
-    target = extend(small.fit, chosen, scales)
-    layout = target.oscillator.layout
+    density = extend(small.fit, chosen, scales)
+    layout = density.oscillator.layout
     shapes = {"contact_relaxation.time": 0.02}
     theta = transfer(small.fit, layout, chosen, scales, shapes)
     values = dict(zip(layout.names, theta, strict=True))
     for name, value in zip(small.fit.names, small.fit.mode, strict=True):
         assert values.pop(name) == value
-        old = small.fit.target.priors.parameters[small.fit.names.index(name)]
-        assert target.priors.parameters[layout.index(name)] is old
+        old = small.fit.density.priors.parameters[small.fit.names.index(name)]
+        assert density.priors.parameters[layout.index(name)] is old
     assert values == {
         "coulomb_friction.force": 0.0,
         "contact_relaxation.stiffness": 0.0,
         "contact_relaxation.time": 0.02,
     }
-    friction = target.priors.parameters[layout.index("coulomb_friction.force")]
+    friction = density.priors.parameters[layout.index("coulomb_friction.force")]
     assert friction == HalfCauchy(BY_ID["coulomb_friction"].parameters[0].scale(scales))
     time = BY_ID["contact_relaxation"].parameter("time").scale(scales)
     without = transfer(small.fit, layout, chosen, scales, {})
     assert without[layout.index("contact_relaxation.time")] == time
-    assert target.likelihood.noise is small.fit.target.likelihood.noise
+    assert density.likelihood.noise is small.fit.density.likelihood.noise
 
 
 def test_a_split_parameter_starts_at_the_shared_value(small):
     scales = campaign_scales(small.fit)
     chosen = effects("contact_damping_per_case", "gap_per_recording")
-    target = extend(small.fit, chosen, scales)
-    layout = target.oscillator.layout
+    density = extend(small.fit, chosen, scales)
+    layout = density.oscillator.layout
     theta = transfer(small.fit, layout, chosen, scales, {})
-    for name, value, prior in zip(layout.names, theta, target.priors.parameters, strict=True):
+    for name, value, prior in zip(layout.names, theta, density.priors.parameters, strict=True):
         if "." in name:
             shared = small.fit.value("c2" if ".c2[" in name else "g")
             assert value == pytest.approx(shared)
@@ -101,13 +101,13 @@ def test_a_shared_parameter_comes_back_as_the_mean_of_what_had_replaced_it(small
         "sensor_quadratic.gain": 7.0})  # fmt: skip
     scales = campaign_scales(small.fit)
     chosen = effects("sensor_quadratic")
-    target = extend(fit, chosen, scales)
-    layout = target.oscillator.layout
+    density = extend(fit, chosen, scales)
+    layout = density.oscillator.layout
     theta = transfer(fit, layout, chosen, scales, {})
     assert theta[layout.index("g")] == pytest.approx(1.1e-3) == base_value(fit, "g")
     assert theta[layout.index("sensor_quadratic.gain")] == 7.0
-    before = small.fit.target.priors.parameters[small.fit.names.index("g")]
-    assert target.priors.parameters[layout.index("g")] == before
+    before = small.fit.density.priors.parameters[small.fit.names.index("g")]
+    assert density.priors.parameters[layout.index("g")] == before
 
 
 def test_names_with_dots_are_no_effects():
@@ -123,15 +123,15 @@ def test_names_with_dots_are_no_effects():
     ).fit
     scales = campaign_scales(fit)
     chosen = effects("contact_damping_per_case", "coulomb_friction")
-    target = extend(fit, chosen, scales)
-    layout = target.oscillator.layout
+    density = extend(fit, chosen, scales)
+    layout = density.oscillator.layout
     theta = transfer(fit, layout, chosen, scales, {})
     assert theta[layout.index("k2[1.5 mm]")] == fit.value("k2[1.5 mm]")
     assert theta[layout.index("y0[run 1.5 a]")] == fit.value("y0[run 1.5 a]")
     assert theta[layout.index("contact_damping_per_case.c2[2.5 mm]")] == pytest.approx(
         fit.value("c2")
     )
-    assert isinstance(target.priors.parameters[layout.index("v0[run 1.5 b]")], Uniform)
+    assert isinstance(density.priors.parameters[layout.index("v0[run 1.5 b]")], Uniform)
 
 
 def test_owners_and_slots():
@@ -145,9 +145,9 @@ def test_owners_and_slots():
 
 
 def test_steps_are_a_fraction_of_the_deviations(small):
-    target = extend(small.fit, effects("coulomb_friction"), campaign_scales(small.fit))
-    steps = difference_steps(small.fit, target, {"coulomb_friction.force": 2e-5})
-    names = target.oscillator.layout.names
+    density = extend(small.fit, effects("coulomb_friction"), campaign_scales(small.fit))
+    steps = difference_steps(small.fit, density, {"coulomb_friction.force": 2e-5})
+    names = density.oscillator.layout.names
     for name, step in zip(names, steps, strict=True):
         if "." in name:
             assert step == pytest.approx(1e-6)

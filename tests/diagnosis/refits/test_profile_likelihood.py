@@ -15,7 +15,7 @@ from bayesimpact.diagnosis.refits.profile_likelihood import (
     profiled,
     profiled_shape,
 )
-from bayesimpact.inference.fit import Fit, Target
+from bayesimpact.inference.fit import Fit, PosteriorDensity
 from bayesimpact.inference.likelihood import Linearisation
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.inference.prior import HalfNormal, LogNormal, LogUniform, Uniform
@@ -76,11 +76,11 @@ class Branch:
         return (Linearisation(self.residuals(theta[None])[0][0], jacobian, np.arange(3)),)
 
 
-def problem() -> Target:
+def problem() -> PosteriorDensity:
     priors = Priors(
         (Uniform(-1e3, 1e3), HalfNormal(1e4), LogNormal(0.02, 3.0), LogUniform(1e-9, 1e3))
     )
-    return Target(Branch(), priors)
+    return PosteriorDensity(Branch(), priors)
 
 
 def unfinished() -> Fit:
@@ -90,11 +90,11 @@ def unfinished() -> Fit:
     return find_mode(problem(), start, max_iterations=2)
 
 
-def test_the_valley_is_that_of_the_time_constant():
+def test_the_profile_is_that_of_the_time_constant():
     assert NAMES[profiled_shape(unfinished())] == "contact_relaxation.time"
 
 
-def test_the_lowest_point_of_a_bent_valley_is_found():
+def test_the_lowest_point_of_a_bent_profile_is_found():
     begun = unfinished()
     assert not begun.converged and begun.mode[2] < 0.5 * TIME
     found = profiled(begun)
@@ -109,7 +109,7 @@ def test_the_lowest_point_of_a_bent_valley_is_found():
 
 
 @pytest.mark.parametrize("factor", [0.6, 0.8, 1.25, 1.6])
-def test_a_step_along_the_valley_begins_where_it_passes(factor):
+def test_a_step_along_the_profile_begins_where_it_passes(factor):
     """The branch keeps its inertia and the contact its damping; nothing turns negative."""
     best = find_mode(problem(), np.array([1.0, STIFFNESS, TIME, 1e-3]), max_iterations=500)
     profile = _Profile(2, best)
@@ -118,22 +118,22 @@ def test_a_step_along_the_valley_begins_where_it_passes(factor):
     straight[2] = begun[2]
     assert begun[2] == pytest.approx(factor * best.mode[2])
     assert (begun[1:] > 0).all()
-    lost = [float(best.target.likelihood.misfit(at)[0, 0]) for at in (begun, straight)]
+    lost = [float(best.density.likelihood.misfit(at)[0, 0]) for at in (begun, straight)]
     assert lost[0] < 0.2 * lost[1]
     assert profile(x) == pytest.approx(-find_mode(
-        problem(), begun, held=[2], max_iterations=500
+        problem(), begun, fixed=[2], max_iterations=500
     ).log_posterior, abs=0.01)  # fmt: skip
 
 
-def test_a_model_without_shapes_has_no_valley():
+def test_a_model_without_shapes_has_no_profile():
     fit = unfinished()
-    fit.target.likelihood.oscillator.effects = ()
+    fit.density.likelihood.oscillator.effects = ()
     names = ("c2", "k1", "c1", "sigma")
-    fit.target.likelihood.oscillator.layout.names = names
+    fit.density.likelihood.oscillator.layout.names = names
     assert profiled(fit) is fit
 
 
-def test_a_valley_that_never_rises_has_no_lowest_point(monkeypatch):
+def test_a_profile_that_never_rises_has_no_lowest_point(monkeypatch):
     begun = unfinished()
 
     def forever_down(self, x: float) -> float:

@@ -13,7 +13,7 @@ from scipy import integrate, stats
 from scipy.special import logsumexp
 
 from bayesimpact.diagnosis.refits import refit as refits
-from bayesimpact.diagnosis.refits.evidence import SPREADS, common_spread, log_evidence
+from bayesimpact.diagnosis.refits.evidence import SHARED_SDS, log_evidence, shared_sd_evidence
 from bayesimpact.diagnosis.refits.extend import campaign_scales, extend, transfer
 from bayesimpact.diagnosis.refits.refit import (
     TO_THE_MODE,
@@ -28,7 +28,7 @@ from bayesimpact.diagnosis.refits.refit import (
 )
 from bayesimpact.diagnosis.score_test.directions import directions
 from bayesimpact.diagnosis.score_test.scan import score_directions
-from bayesimpact.inference.fit import Fit, Target
+from bayesimpact.inference.fit import Fit, PosteriorDensity
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.likelihood import Linearisation
 from bayesimpact.inference.mode import find_mode
@@ -87,13 +87,13 @@ def linear_fit(n: int, d: int, priors: list, seed: int = 0, shift: float = 0.0) 
     noise -= projector @ noise  # the estimate is the truth exactly
     beta = np.zeros(d)
     beta[-1] = shift * np.sqrt(np.linalg.inv(x.T @ x)[-1, -1]) * np.linalg.norm(noise) / np.sqrt(n)
-    target = Target(Linear(x, x @ beta + noise), Priors((*priors, SIGMA)))
-    return find_mode(target, np.append(np.zeros(d), 1.0), tolerance=1e-8)
+    density = PosteriorDensity(Linear(x, x @ beta + noise), Priors((*priors, SIGMA)))
+    return find_mode(density, np.append(np.zeros(d), 1.0), tolerance=1e-8)
 
 
 def exact_log_evidence(fit: Fit) -> float:
     """Coefficients in closed form (one of them truncated at zero), the level by quadrature."""
-    problem, priors = fit.target.likelihood, fit.target.priors.parameters[:-1]
+    problem, priors = fit.density.likelihood, fit.density.priors.parameters[:-1]
     x, y = problem.x, problem.y
     mean = np.array([p.mean if isinstance(p, Normal) else 0.0 for p in priors])
     width = np.array([p.sd if isinstance(p, Normal) else p.scale for p in priors])
@@ -133,9 +133,9 @@ def test_evidence_counts_every_repeated_sample_once(known):
     the first coefficient is known beforehand as well as from the samples, or not at all.
     """
     once = linear_fit(400, 2, [Normal(0.0, known), Normal(0.0, 1e3)], shift=3.0)
-    x, y = once.target.likelihood.x, once.target.likelihood.y
-    target = Target(Linear(np.tile(x, (7, 1)), np.tile(y, 7)), once.target.priors)
-    often = find_mode(target, once.mode, tolerance=1e-8)
+    x, y = once.density.likelihood.x, once.density.likelihood.y
+    density = PosteriorDensity(Linear(np.tile(x, (7, 1)), np.tile(y, 7)), once.density.priors)
+    often = find_mode(density, once.mode, tolerance=1e-8)
     tempered = tempered_evidence(Candidate((), often, log_evidence(often)), 7.0)
     assert tempered == pytest.approx(log_evidence(once), abs=0.01)
 
@@ -159,10 +159,10 @@ def test_evidence_with_a_log_normal_prior(known):
     x /= np.linalg.norm(x) * known
     noise = rng.standard_normal(n)
     noise -= x[:, 0] * (x[:, 0] @ noise) / (x[:, 0] @ x[:, 0])
-    target = Target(Linear(x, 2.0 * x[:, 0] + noise), Priors((prior, SIGMA)))
-    fit = find_mode(target, np.array([1.0, 1.0]), tolerance=1e-8)
+    density = PosteriorDensity(Linear(x, 2.0 * x[:, 0] + noise), Priors((prior, SIGMA)))
+    fit = find_mode(density, np.array([1.0, 1.0]), tolerance=1e-8)
     grid = np.exp(np.linspace(-12, 12, 4001))  # the coefficient; the level by its own quadrature
-    sums = target.likelihood.misfit(np.column_stack([grid, grid]))[:, 0]
+    sums = density.likelihood.misfit(np.column_stack([grid, grid]))[:, 0]
     level = np.exp(np.linspace(-0.3, 0.3, 121)) * fit.mode[1]
     table = -n * np.log(level) - sums[:, None] / (2 * level**2) - 0.5 * n * np.log(2 * np.pi)
     table += prior.log_density(grid)[:, None] + np.log(grid)[:, None] - np.log(SIGMA._log_width)
@@ -176,7 +176,7 @@ def importance(fit: Fit, count: int, seed: int = 0, freedom: float = 12.0) -> tu
     rng = np.random.default_rng(seed)
     proposal = stats.multivariate_t(np.zeros(fit.mode.size), _unit(fit), df=freedom)
     z = proposal.rvs(count, random_state=rng)
-    weights = fit.target(fit.mode + z * fit.sd) - proposal.logpdf(z) + np.log(fit.sd).sum()
+    weights = fit.density(fit.mode + z * fit.sd) - proposal.logpdf(z) + np.log(fit.sd).sum()
     value = logsumexp(weights) - np.log(count)
     relative = np.exp(weights - value)
     return float(value), float(relative.std() / np.sqrt(count))
@@ -227,16 +227,16 @@ def test_a_refit_finds_what_was_planted(planted):
     assert found.log_evidence - base.log_evidence == pytest.approx(expected, abs=0.05 * z**2 + 1)
 
 
-def test_climbs_are_told_when_they_are_near_enough(planted, monkeypatch):
+def test_ascents_are_told_when_they_are_near_enough(planted, monkeypatch):
     fit, scales = planted
     scores, asked = [score_of(fit, scales, "coulomb_friction")], []
     found = refit(fit, scores, scales)
 
-    def climbed(target, start, **options):
+    def ascended(density, start, **options):
         asked.append(options["least_gain"])
         return found.fit
 
-    monkeypatch.setattr(refits, "find_mode", climbed)
+    monkeypatch.setattr(refits, "find_mode", ascended)
     for enough, least in ((TO_THE_MODE, 0.0), (Enough(least_gain=2.0), 2.0)):
         refit(fit, scores, scales, enough=enough)
         without(found, BY_ID["coulomb_friction"], scales, enough=enough)
@@ -268,32 +268,32 @@ def off_the_mode(fit, factor):
     return theta, 0.05 * np.where(fit.sd > 0, fit.sd, 1e-9)
 
 
-def test_no_climb_follows_stretches_that_come_out_higher(planted, monkeypatch):
+def test_no_ascent_follows_stretches_that_come_out_higher(planted, monkeypatch):
     fit, _ = planted
     start, steps = off_the_mode(fit, 1.02)
-    climbs = []
+    ascents = []
 
-    def counted(target, *args, **options):
-        climbs.append(target)
-        return find_mode(target, *args, **options)
+    def counted(density, *args, **options):
+        ascents.append(density)
+        return find_mode(density, *args, **options)
 
     monkeypatch.setattr(refits, "find_mode", counted)
     assert or_by_stretches(fit, start, steps) is fit
-    assert not climbs
+    assert not ascents
 
 
 def test_an_effect_that_kept_the_motion_bounded_may_be_left_out(planted):
     """A softening spring that a hardening one outweighs: alone it lets the mass run away."""
     fit, scales = planted
     effects = (BY_ID["spring_cubic"], BY_ID["spring_quintic"])
-    target = extend(fit, effects, scales)
-    theta = transfer(fit, target.oscillator.layout, effects, scales, {})
-    names = target.oscillator.layout.names
+    density = extend(fit, effects, scales)
+    theta = transfer(fit, density.oscillator.layout, effects, scales, {})
+    names = density.oscillator.layout.names
     k1, reach = fit.value("k1"), scales.amplitude
     theta[names.index("spring_cubic.stiffness")] = 3.0 * k1 / reach**2
     theta[names.index("spring_quintic.stiffness")] = -3.0 * k1 / reach**4
     steps = 1e-6 * np.maximum(np.abs(theta), 1e-6)
-    there = find_mode(target, theta, steps=steps, max_iterations=0)
+    there = find_mode(density, theta, steps=steps, max_iterations=0)
     assert np.isfinite(there.log_posterior)
     alone = without(Candidate(effects, there, 0.0), effects[0], scales)
     assert np.isfinite(alone.log_evidence)
@@ -307,7 +307,7 @@ def test_what_was_not_fitted_has_no_evidence(small):
 
 
 @pytest.mark.parametrize(("spread", "away"), [(0.0, 0.3), (0.02, 0.3), (1.0, 0.3), (0.5, 6.0)])
-def test_values_that_share_a_spread(spread, away):
+def test_values_that_share_a_standard_deviation(spread, away):
     """Three gaps, measured to one thousandth of the prior's width: two grids over all three, their
     mean anywhere in an interval of 500.
     """
@@ -328,9 +328,9 @@ def test_values_that_share_a_spread(spread, away):
         return float(logsumexp(found) + np.log(means[1] - means[0]) - np.log(500.0))
 
     prior = Normal(mean, width)
-    found = common_spread(mode, posterior, prior, -np.log(500.0))
-    shared = [over_means(tau) for tau in SPREADS * width]
-    expected = logsumexp(shared) - np.log(SPREADS.size) - exact(mean, width**2 * np.eye(3))
+    found = shared_sd_evidence(mode, posterior, prior, -np.log(500.0))
+    shared = [over_means(tau) for tau in SHARED_SDS * width]
+    expected = logsumexp(shared) - np.log(SHARED_SDS.size) - exact(mean, width**2 * np.eye(3))
     assert found == pytest.approx(expected, abs=0.02)
     # small differences are not punished, nor values that are all far away
     assert (found > 5) == (spread == 0.0 or away > 1.0), found
@@ -345,7 +345,7 @@ def test_the_evidence_of_values_of_one_kind_hardly_depends_on_where_their_priors
         posterior = np.linalg.inv(precision + np.eye(2) / width**2)
         mode = posterior @ (precision @ truth + mean / width**2)
         alone = stats.multivariate_normal([mean] * 2, (width**2 + error**2) * np.eye(2))
-        own = common_spread(mode, posterior, Normal(mean, width), -np.log(20.0))
+        own = shared_sd_evidence(mode, posterior, Normal(mean, width), -np.log(20.0))
         totals.append(alone.logpdf(truth) + own)
     assert np.ptp(totals) < 1.0
 
@@ -371,8 +371,8 @@ def test_dampings_far_from_the_base_fit_s_are_no_less_likely():
 def test_a_value_that_nothing_was_measured_of_changes_nothing():
     """An obstacle that was never touched: its value is its prior."""
     posterior, prior = np.diag([1e-6, 1e-6, 4.0]), Normal(5.0, 2.0)
-    with_it = common_spread(np.array([5.0, 5.001, 5.0]), posterior, prior, -3.0)
-    without_it = common_spread(np.array([5.0, 5.001]), posterior[:2, :2], prior, -3.0)
+    with_it = shared_sd_evidence(np.array([5.0, 5.001, 5.0]), posterior, prior, -3.0)
+    without_it = shared_sd_evidence(np.array([5.0, 5.001]), posterior[:2, :2], prior, -3.0)
     assert with_it == pytest.approx(without_it, abs=0.02)
 
 
@@ -385,12 +385,12 @@ def test_values_of_their_own_gain_nothing_on_a_control(small, effect_id):
     candidate = refit(small.fit, [score], scales)
     assert -4 < candidate.log_evidence - base.log_evidence < 1
     slot = {"gap_per_recording": "g", "contact_damping_per_case": "c2"}[effect_id]
-    assert set(candidate.fit.target.replaced) == {slot}
+    assert set(candidate.fit.density.replaced) == {slot}
     back = without(candidate, BY_ID[effect_id], scales)
     assert back.log_evidence == pytest.approx(base.log_evidence, abs=1e-3)
 
 
-def test_a_climb_from_given_values_ends_where_it_will_not_reach_its_goal(planted):
+def test_an_ascent_from_given_values_ends_where_it_will_not_reach_its_goal(planted):
     fit, scales = planted
     friction, start = (BY_ID["coulomb_friction"],), {"coulomb_friction.force": 4e-3}
     whole = fit_from(fit, friction, start, scales)

@@ -67,7 +67,7 @@ def test_sizes_that_effects_define(small):
     value, unit, share = size(BY_ID["gap_wear"], small.fit, fit, scales)
     assert unit == "m" and value == pytest.approx(2e-7 * scales.impacts)
     assert share == pytest.approx(value / scales.indentation)
-    name = small.fit.target.oscillator.campaign.recordings[1].name
+    name = small.fit.density.oscillator.campaign.recordings[1].name
     fit = with_effect(small, "gap_per_recording", **{f"g[{name}]": small.fit.value("g") + 3e-6})
     value, _, _ = size(BY_ID["gap_per_recording"], small.fit, fit, scales)
     assert value == pytest.approx(3e-6)

@@ -18,10 +18,10 @@ from bayesimpact.diagnosis.residual_force import discrepancy as module
 from bayesimpact.diagnosis.residual_force import marginal
 from bayesimpact.diagnosis.residual_force.discrepancy import UNDERRATED, Discrepancy, discrepancy
 from bayesimpact.diagnosis.residual_force.gaussian_process import missing_force
-from bayesimpact.diagnosis.residual_force.marginal import gain
+from bayesimpact.diagnosis.residual_force.marginal import log_evidence_gain
 from bayesimpact.diagnosis.selection.unknown import learn_force
 from bayesimpact.diagnosis.thresholds import DECISIVE, EXCESS
-from bayesimpact.inference.ascent import Climb
+from bayesimpact.inference.ascent import Ascent
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.linear_response.free_changes import motions_beside
@@ -45,7 +45,7 @@ def shaken(seed: int, size: float, duration: float = 4.0, effects=None) -> Campa
         seed, effects, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES, duration=duration
     )
     fit = plain_fit(clean)
-    o, rng = fit.target.oscillator, np.random.default_rng(1000 + seed)
+    o, rng = fit.density.oscillator, np.random.default_rng(1000 + seed)
     recordings = []
     for r, recording in enumerate(clean.recordings):
         t = recording.times
@@ -67,7 +67,7 @@ def test_the_likelihood_is_that_of_a_dense_covariance():
     found = left_by(plain_fit(campaign))
     fit = found.fit
     lin, part = fit.linearisation[0], found.parts[0]
-    level = fit.target.likelihood.noise.level
+    level = fit.density.likelihood.noise.level
     jacobian, residual = lin.jacobian / level, lin.residual / level
 
     def value(k: float, level: float) -> float:
@@ -89,10 +89,10 @@ def test_the_gain_is_that_of_a_dense_covariance():
     the level is taken where it would be for fixed parameters, which d^2 / N nats may tell.
     """
     fit = plain_fit(shaken(2, 1e-2, duration=1.0))
-    found, target = left_by(fit), fit.target
-    free = target.oscillator.layout.roles("physical", "effect", "nuisance")
-    noise = target.oscillator.layout.roles("noise")
-    level = target.likelihood.noise.level
+    found, density = left_by(fit), fit.density
+    free = density.oscillator.layout.roles("physical", "effect", "nuisance")
+    noise = density.oscillator.layout.roles("noise")
+    level = density.likelihood.noise.level
     size = sum(lin.residual.size for lin in fit.linearisation)
     jacobian, residual, first = np.zeros((size, fit.mode.size)), np.zeros(size), 0
     shape = np.zeros((size, size))
@@ -101,7 +101,7 @@ def test_the_gain_is_that_of_a_dense_covariance():
         jacobian[rows, lin.columns], residual[rows] = lin.jacobian, lin.residual
         shape[rows, rows] = part.responses @ part.responses.T
     jacobian[:, noise] = 0.0
-    information = np.diag(target.priors.information(fit.mode))[np.ix_(free, free)]
+    information = np.diag(density.priors.information(fit.mode))[np.ix_(free, free)]
     principal, axes = np.linalg.eigh(shape)  # one decomposition inverts all these covariances
     jacobian, residual = axes.T @ jacobian, axes.T @ residual
 
@@ -110,20 +110,22 @@ def test_the_gain_is_that_of_a_dense_covariance():
         solved = (jacobian[:, free] / variance[:, None]).T
         precision = solved @ jacobian[:, free] + information
         change = np.zeros(fit.mode.size)
-        slope = np.nan_to_num(target.priors.gradient(fit.mode))[free]
+        slope = np.nan_to_num(density.priors.gradient(fit.mode))[free]
         change[free] = np.linalg.solve(precision, solved @ residual + slope)
         left = residual - jacobian @ change
-        prior = np.ravel(target.priors.log_density((fit.mode + change)[None]))[0]
+        prior = np.ravel(density.priors.log_density((fit.mode + change)[None]))[0]
         chance = left @ (left / variance) + np.log(2 * np.pi * variance).sum()
         return float(prior - 0.5 * (chance + np.linalg.slogdet(precision)[1]))
 
     start = np.log([found.k, found.level])
     best = minimize(lambda x: -evidence(*x), start, method="Nelder-Mead")
-    alone = fit.log_likelihood + np.ravel(target.priors.log_density(fit.mode[None]))[0]
+    alone = fit.log_likelihood + np.ravel(density.priors.log_density(fit.mode[None]))[0]
     alone += 0.5 * np.linalg.slogdet(fit.covariance[np.ix_(free, free)])[1]
-    volume = float(np.sum(target.likelihood.log_volume))
+    volume = float(np.sum(density.likelihood.log_volume))
     expected = -best.fun + volume - alone
-    assert gain(fit, found.parts) == pytest.approx(expected, abs=max(0.1, free.size**2 / size))
+    assert log_evidence_gain(fit, found.parts) == pytest.approx(
+        expected, abs=max(0.1, free.size**2 / size)
+    )
     assert expected > 100.0
 
 
@@ -138,7 +140,7 @@ def test_a_law_that_is_there_leads_a_force_of_time_and_a_false_one_does_not():
         with_it = fit_from(fit, (cubic,), {}, campaign_scales(fit))
         beside = left_by(with_it.fit)
         odds = with_it.log_evidence - base_candidate(fit).log_evidence
-        odds += gain(with_it.fit, beside.parts) - gain(fit, beside.parts)
+        odds += log_evidence_gain(with_it.fit, beside.parts) - log_evidence_gain(fit, beside.parts)
         assert (odds > DECISIVE) == needed, (stiffness, odds)
 
 
@@ -160,10 +162,10 @@ def test_an_error_of_the_readings_is_no_force():
         samples = recording.samples.copy()
         samples[::10] += 10 * NOISE * np.random.default_rng(1).standard_normal(samples[::10].size)
         wrong.append(replace(recording, samples=samples))
-    noise = plain_fit(campaign).target.likelihood.noise
+    noise = plain_fit(campaign).density.likelihood.noise
     fit = plain_fit(replace(campaign, recordings=tuple(wrong)))
-    likelihood = replace(fit.target.likelihood, noise=noise)
-    fit = replace(fit, target=replace(fit.target, likelihood=likelihood))
+    likelihood = replace(fit.density.likelihood, noise=noise)
+    fit = replace(fit, density=replace(fit.density, likelihood=likelihood))
     assert not left_by(fit).leaves_noise
 
 
@@ -261,13 +263,13 @@ def test_a_gain_does_not_depend_on_where_the_fit_ended():
     fit, cubic = plain_fit(campaign), next(e for e in EFFECTS if e.id == "spring_cubic")
     fit = fit_from(fit, (cubic,), {}, campaign_scales(fit)).fit
     found = left_by(fit)
-    climb, away = Climb(fit.target, 0.05 * fit.sd, None, ()), fit.mode.copy()
+    ascent, away = Ascent(fit.density, 0.05 * fit.sd, None, ()), fit.mode.copy()
     at = fit.names.index("spring_cubic.stiffness")
     away[at] += 300.0 * fit.sd[at]
     totals = []
-    for start in (fit, climb.fit(climb.evaluate(away), True)):
+    for start in (fit, ascent.fit(ascent.evaluate(away), True)):
         volume = 0.5 * np.linalg.slogdet(start.covariance)[1]
-        totals.append(start.log_posterior + volume + gain(start, found.parts))
+        totals.append(start.log_posterior + volume + log_evidence_gain(start, found.parts))
     assert totals[1] == pytest.approx(totals[0], abs=0.5)
 
 
@@ -278,21 +280,21 @@ def test_a_model_far_behind_is_weighed_to_first_order(monkeypatch):
     cubic = next(e for e in EFFECTS if e.id == "spring_cubic")
     with_it = fit_from(fit, (cubic,), {}, campaign_scales(fit))
     found, alone = left_by(with_it.fit), base_candidate(fit).log_evidence
-    whole = gain(fit, found.parts)
-    climbed = []
+    whole = log_evidence_gain(fit, found.parts)
+    ascended = []
     monkeypatch.setattr(
-        marginal, "_climbed", lambda of, start: climbed.append(of) or marginal._stepped(
+        marginal, "_ascended", lambda of, start: ascended.append(of) or marginal._stepped(
             of, start, marginal._simulated(of)
         )
     )  # fmt: skip
-    leader = found.gain(with_it.fit, with_it.log_evidence) + with_it.log_evidence
-    assert climbed == [with_it.fit]
+    leader = found.log_evidence_gain(with_it.fit, with_it.log_evidence) + with_it.log_evidence
+    assert ascended == [with_it.fit]
     near = replace(found, _gains={with_it.fit: (alone + whole, 0.0)})
-    near.gain(fit, alone)
-    assert climbed == [with_it.fit, fit]
+    near.log_evidence_gain(fit, alone)
+    assert ascended == [with_it.fit, fit]
     far = replace(found, _gains={with_it.fit: (alone + whole + 2 * UNDERRATED, 0.0)})
-    assert far.gain(fit, alone) == pytest.approx(whole, abs=UNDERRATED)
-    assert climbed == [with_it.fit, fit] and np.isfinite(leader)
+    assert far.log_evidence_gain(fit, alone) == pytest.approx(whole, abs=UNDERRATED)
+    assert ascended == [with_it.fit, fit] and np.isfinite(leader)
 
 
 def test_fewer_knots_in_a_period_of_long_decays_follow_what_is_missing_too(monkeypatch):

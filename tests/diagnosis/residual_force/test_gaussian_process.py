@@ -33,14 +33,14 @@ from bayesimpact.diagnosis.residual_force.learned import (
 )
 from bayesimpact.diagnosis.score_test.directions import sigma_of
 from bayesimpact.diagnosis.score_test.scan import scan
-from bayesimpact.diagnosis.selection.outcome import State, leaves_something
+from bayesimpact.diagnosis.selection.outcome import ExaminedModel, leaves_something
 from bayesimpact.diagnosis.selection.unknown import (
     coefficient_names,
     finer_factors,
     learn_force,
     with_force,
 )
-from bayesimpact.inference.fit import Fit, Target
+from bayesimpact.inference.fit import Fit, PosteriorDensity
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
@@ -132,9 +132,9 @@ def test_responses_in_a_model_that_has_effects_already(small):
     """With another law in the model the coefficients stand behind its parameters."""
     scales = campaign_scales(small.fit)
     effects = (BY_ID["spring_cubic"],)
-    target = extend(small.fit, effects, scales)
-    theta = transfer(small.fit, target.oscillator.layout, effects, scales, {})
-    fit = find_mode(target, theta, steps=0.05 * np.insert(small.fit.sd, 6, 1e3), max_iterations=1)
+    density = extend(small.fit, effects, scales)
+    theta = transfer(small.fit, density.oscillator.layout, effects, scales, {})
+    fit = find_mode(density, theta, steps=0.05 * np.insert(small.fit.sd, 6, 1e3), max_iterations=1)
     low, high = motion_range(fit)
     effect = learned_force(low, high, 1.0, 1.0, KNOTS)
     responses = basis_responses(fit, effect, KNOTS, scales)
@@ -156,17 +156,17 @@ def planted(small, force_of, seed: int = 5) -> Fit:
     values |= {f"learned_force.b{i + 1}": 0.0 for i in range(40)}
     readings = oscillator.predict(small_rig.vector(oscillator.layout, values))
     rng = np.random.default_rng(seed)
-    old = small.fit.target.oscillator
+    old = small.fit.density.oscillator
     recordings = tuple(
         replace(r, samples=m + small_rig.NOISE * rng.standard_normal(m.size))
         for r, m in zip(old.campaign.recordings, readings, strict=True)
     )
     campaign = replace(old.campaign, recordings=recordings)
-    target = Target(
-        Likelihood(Oscillator(campaign, (), old.layout, None), small.fit.target.likelihood.noise),
-        small.fit.target.priors,
+    density = PosteriorDensity(
+        Likelihood(Oscillator(campaign, (), old.layout, None), small.fit.density.likelihood.noise),
+        small.fit.density.priors,
     )
-    return find_mode(target, small.fit.mode)
+    return find_mode(density, small.fit.mode)
 
 
 def bump(y: float) -> float:
@@ -192,7 +192,7 @@ def test_a_local_force_is_found_where_it_acts(detent):
     assert found.p_value == pytest.approx(1 / 1001) and found.log_evidence > 20
     # what the base model can imitate (a constant, a spring) is free: compare without it
     y = np.linspace(-5.5e-3, 0.5e-3, 121)
-    a, sd = found.parts(y)[0], found.spread(y)[0]
+    a, sd = found.parts(y)[0], found.sd(y)[0]
     truth = np.array([bump(x) for x in y])
     absorbed = np.column_stack([np.ones_like(y), y])
     weights = 1 / sd**2
@@ -209,7 +209,7 @@ def test_a_local_force_is_found_where_it_acts(detent):
     assert abs(y[np.argmax(beyond(a))] + 3e-3) < 3e-4
 
 
-def test_force_and_spread_are_those_of_the_coefficients(detent):
+def test_force_and_sd_are_those_of_the_coefficients(detent):
     _, found = detent
     y = np.array([-4e-3, -1e-3, 1.5e-3])
     v = np.array([0.1, -0.2, 0.05])
@@ -219,7 +219,7 @@ def test_force_and_spread_are_those_of_the_coefficients(detent):
     draws = np.random.default_rng(0).multivariate_normal(found.mean, found.covariance, 20_000)
     spread = np.concatenate([(draws[:, : found.knots] @ basis.T).std(axis=0),
                              (draws[:, found.knots :] @ basis.T).std(axis=0)])  # fmt: skip
-    np.testing.assert_allclose(np.concatenate(found.spread(y)), spread, rtol=0.03, atol=1e-9)
+    np.testing.assert_allclose(np.concatenate(found.sd(y)), spread, rtol=0.03, atol=1e-9)
     deviation = found.deviation(y, v, np.zeros_like(y))
     np.testing.assert_allclose(deviation, (draws @ whole.T).std(axis=0), rtol=0.03)
 
@@ -231,7 +231,7 @@ def test_the_learned_force_goes_back_into_the_simulator(detent):
     rng = np.random.default_rng(0)
     drift = missing_drift(fit, scales, rng=rng)
     assert drift.log_evidence < found.log_evidence - 20  # a detent is no drift
-    state = State(base_candidate(fit), scan(fit, [], scales, rng=rng), found, drift)
+    state = ExaminedModel(base_candidate(fit), scan(fit, [], scales, rng=rng), found, drift)
     assert state.unknown is found
     learned = learn_force(state.candidate.fit, state.unknown, scales)
     assert fit.reduced_chi2 > learned.reduced_chi2
@@ -305,7 +305,7 @@ def test_damping_that_drifts_is_a_force_of_time():
     _, damping = drift.parts(times)
     slope = np.polyfit(times, damping, 1)[0]
     assert 0.3 < slope / (0.15 * small_rig.RIG.c1) < 2.0  # c1 (1 + rate t)
-    state = State(base_candidate(fit), scan(fit, [], scales, rng=rng), force, drift)
+    state = ExaminedModel(base_candidate(fit), scan(fit, [], scales, rng=rng), force, drift)
     learned = learn_force(state.candidate.fit, state.unknown, scales)
     assert learned.sums.sum() / small_rig.NOISE**2 < stats.chi2.ppf(1 - 1e-3, 6000)
 
@@ -326,7 +326,7 @@ def test_a_force_in_contact_is_found_in_contact():
     assert found.share_within(-1.0, 1.0) == pytest.approx(1.0)
 
 
-def test_a_preload_is_a_force_in_contact_that_jumps_at_the_touch():
+def test_a_preload_is_a_force_in_contact_that_jumps_at_the_onset():
     """The free force of displacement is too smooth for it; the one in contact learns it."""
     force = 0.05
     campaign = small_rig.record(5, {"contact_preload": {"force": force}})

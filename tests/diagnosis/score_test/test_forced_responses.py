@@ -62,7 +62,7 @@ def superposed(fit: Fit, frequencies: np.ndarray, monkeypatch: pytest.MonkeyPatc
 
 def changes_of(fit: Fit) -> FreeChanges:
     """Of the first recording."""
-    oscillator = fit.target.oscillator
+    oscillator = fit.density.oscillator
     return free_changes(oscillator, 0, oscillator.layout.slots(fit.mode)[0], 1e-9)
 
 

@@ -29,13 +29,13 @@ def test_a_line_near_resonance_is_fitted_from_where_its_score_says(effect_id):
     scales = campaign_scales(fit)
     (score,) = periodic_scores(fit, [effect], scales)
     assert score.gain > 50
-    target = extend(fit, (effect,), scales)
-    layout = target.oscillator.layout
+    density = extend(fit, (effect,), scales)
+    layout = density.oscillator.layout
     alone = transfer(fit, layout, (effect,), scales, score.shapes)
     alone[layout.index(f"{effect_id}.amplitude")] = score.size[0]
     start = transfer(fit, layout, (effect,), scales, score.shapes)
     _shift(fit, layout.names, start, [score])
-    least, reached = (target.likelihood(theta[None])[0] for theta in (alone, start))
+    least, reached = (density.likelihood(theta[None])[0] for theta in (alone, start))
     assert least < reached and reached - fit.log_likelihood > 0.5 * score.gain
     found = refit(fit, [score], scales).fit
     assert found.converged and found.iterations <= 12

@@ -103,7 +103,7 @@ def test_two_steady_lines_that_no_recording_tells_apart_are_none(apart, refused)
         acting=tuple(BY_ID[i] for i in lines),
     )
     values = {f"{i}.frequency": f for i, f in lines.items()}
-    fit = SimpleNamespace(target=SimpleNamespace(oscillator=oscillator), value=values.get)
+    fit = SimpleNamespace(density=SimpleNamespace(oscillator=oscillator), value=values.get)
     assert shakes_in_own_band(fit, remains=False) is refused
 
 
@@ -127,7 +127,7 @@ def test_a_line_far_from_the_motion_is_one_however_strong_it_is(line: str, size:
         acting=(BY_ID[line],),
     )
     values = {f"{line}.frequency": 50.0}
-    fit = SimpleNamespace(target=SimpleNamespace(oscillator=oscillator), value=values.get)
+    fit = SimpleNamespace(density=SimpleNamespace(oscillator=oscillator), value=values.get)
     assert not shakes_in_own_band(fit, remains=False)
 
 
@@ -143,5 +143,5 @@ def test_a_line_that_beats_with_the_motion_is_none_where_both_are_one_line(
         campaign=SimpleNamespace(recordings=(decay(30.0, 30.0),)), acting=(BY_ID[line],)
     )
     values = {f"{line}.frequency": 30.0 + apart * LINE}
-    fit = SimpleNamespace(target=SimpleNamespace(oscillator=oscillator), value=values.get)
+    fit = SimpleNamespace(density=SimpleNamespace(oscillator=oscillator), value=values.get)
     assert shakes_in_own_band(fit, remains=False) is refused

@@ -14,7 +14,7 @@ from bayesimpact.diagnosis.refits.extend import campaign_scales, extend, transfe
 from bayesimpact.diagnosis.score_test.directions import directions, sigma_of
 from bayesimpact.diagnosis.score_test.projection import project
 from bayesimpact.diagnosis.score_test.scan import score_directions
-from bayesimpact.inference.fit import Fit, Target
+from bayesimpact.inference.fit import Fit, PosteriorDensity
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.inference.noise.whitening import Noise
@@ -32,25 +32,25 @@ EFFECTS = (
 
 def refitted(fit: Fit, readings: list[np.ndarray], noise: Noise | None = None) -> Fit:
     """The fit's model fitted to other readings of the same recordings."""
-    old = fit.target.oscillator
+    old = fit.density.oscillator
     recordings = tuple(
         replace(r, samples=x) for r, x in zip(old.campaign.recordings, readings, strict=True)
     )
-    noise = noise or fit.target.likelihood.noise
+    noise = noise or fit.density.likelihood.noise
     campaign = replace(old.campaign, recordings=recordings)
     oscillator = Oscillator(campaign, old.effects, old.layout, noise.smoothing)
-    target = Target(Likelihood(oscillator, noise), fit.target.priors)
-    return find_mode(target, fit.mode, tolerance=1e-5)
+    density = PosteriorDensity(Likelihood(oscillator, noise), fit.density.priors)
+    return find_mode(density, fit.mode, tolerance=1e-5)
 
 
 def with_effect(fit: Fit, effect_id: str, size: float) -> list[np.ndarray]:
     """What the probe would read, without noise, with an effect of that size added to the fit."""
     scales, effects = campaign_scales(fit), (BY_ID[effect_id],)
-    target = extend(fit, effects, scales)
-    theta = transfer(fit, target.oscillator.layout, effects, scales, {})
-    at = [i for i, n in enumerate(target.oscillator.layout.names) if n.startswith(effect_id)]
+    density = extend(fit, effects, scales)
+    theta = transfer(fit, density.oscillator.layout, effects, scales, {})
+    at = [i for i, n in enumerate(density.oscillator.layout.names) if n.startswith(effect_id)]
     theta[at] += size
-    return list(target.oscillator.predict(theta))
+    return list(density.oscillator.predict(theta))
 
 
 def direction_of(fit: Fit, effect_id: str):
@@ -66,7 +66,7 @@ def fit(request, small) -> Fit:
     ]
     rng = np.random.default_rng(0)
     readings = []
-    for mean in small.fit.target.oscillator.predict(small.fit.mode):
+    for mean in small.fit.density.oscillator.predict(small.fit.mode):
         raw = mean + noise.coloured(rng, mean.size, 1e-3, small_rig.NOISE)
         readings.append(smooth(raw, noise.smoothing, 1e-3))
     return refitted(small.fit, readings, noise)
@@ -84,7 +84,7 @@ def test_a_small_effect_scores_as_a_refit_says(fit, effect_id):
     sd = 1 / np.sqrt(before.information[0, 0])
     size = 2 * sd
     clean, moved = with_effect(fit, effect_id, 0.0), with_effect(fit, effect_id, size)
-    samples = [r.samples for r in fit.target.oscillator.campaign.recordings]
+    samples = [r.samples for r in fit.density.oscillator.campaign.recordings]
     planted = [x + b - a for x, a, b in zip(samples, clean, moved, strict=True)]
     ignored = refitted(fit, planted)
     sigma = fit.value("sigma")
@@ -112,8 +112,8 @@ def dense(fit: Fit, parts: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
         rows.append(block)
         right.append(lin.residual / s)
         planted.append(part)
-    prior = np.maximum(-fit.target.priors.hessian(fit.mode), 0.0)
-    prior[fit.target.oscillator.layout.roles("noise")] = 1.0  # no data: any value does
+    prior = np.maximum(-fit.density.priors.hessian(fit.mode), 0.0)
+    prior[fit.density.oscillator.layout.roles("noise")] = 1.0  # no data: any value does
     rows.append(np.diag(np.sqrt(prior)))
     right.append(np.zeros(size))
     planted.append(np.zeros((size, planted[0].shape[1])))
@@ -149,11 +149,11 @@ def test_projection_is_the_dense_one(fit):
 def test_priors_that_matter_are_carried_along(small):
     """A narrow prior on c1 keeps it from absorbing friction: less is hidden, the score is exact."""
     old, names = small.fit, small.fit.names
-    narrow = list(old.target.priors.parameters)
+    narrow = list(old.density.priors.parameters)
     width = old.sd[names.index("c1")]
     narrow[names.index("c1")] = Normal(old.value("c1") + 4 * width, width)
-    target = Target(old.target.likelihood, Priors(tuple(narrow)))
-    fit = find_mode(target, old.mode, tolerance=1e-6)
+    density = PosteriorDensity(old.density.likelihood, Priors(tuple(narrow)))
+    fit = find_mode(density, old.mode, tolerance=1e-6)
     parts = direction_of(fit, "coulomb_friction").parts
     projection = project(fit, parts)
     assert projection.kept[0] > project(old, direction_of(old, "coulomb_friction").parts).kept[0]

@@ -25,7 +25,7 @@ from bayesimpact.diagnosis.score_test.scan import (
     score_directions,
 )
 from bayesimpact.diagnosis.score_test.scores import Score
-from bayesimpact.inference.fit import Target
+from bayesimpact.inference.fit import PosteriorDensity
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
@@ -135,7 +135,7 @@ def test_false_alarms_on_recordings_with_nothing_missing(small, rho, monkeypatch
     monkeypatch.setattr("bayesimpact.diagnosis.score_test.scan.DRAWS", 400)
     count = 20
     fit, noise = small.fit, Noise(rho)
-    old = fit.target.oscillator
+    old = fit.density.oscillator
     rng, found = np.random.default_rng(4), []
     base = None
     for _ in range(count):
@@ -145,7 +145,9 @@ def test_false_alarms_on_recordings_with_nothing_missing(small, rho, monkeypatch
         )
         campaign = replace(old.campaign, recordings=recordings)
         oscillator = Oscillator(campaign, (), old.layout, None)
-        again = find_mode(Target(Likelihood(oscillator, noise), fit.target.priors), fit.mode)
+        again = find_mode(
+            PosteriorDensity(Likelihood(oscillator, noise), fit.density.priors), fit.mode
+        )
         base = base or directions(again, EFFECTS[::3], campaign_scales(fit))
         found.append(score_directions(again, base, rng=rng).p_value)
     assert stats.kstest(found, "uniform").pvalue > 1e-3
@@ -292,5 +294,5 @@ def test_the_whole_catalogue_on_campaigns_that_cannot_show_all_of_it(settings):
     scored = {s.effect.id for s in found.scores}
     assert "coulomb_friction" in scored
     assert not scored & {"contact_damping_per_case", "gap_per_recording"}
-    stop = fit.target.oscillator.campaign.stop
+    stop = fit.density.oscillator.campaign.stop
     assert stop or not any(BY_ID[i].needs_stop for i in scored)

@@ -35,8 +35,8 @@ from bayesimpact.diagnosis.score_test.steady import steadiness
 from bayesimpact.diagnosis.selection.models import Models
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
-from bayesimpact.model.measurement import gain, smooth
-from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.model.measurement import magnitude_response, smooth
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 
 FREQUENCY, AMPLITUDE = 61.3, 2e-6
 Envelope = Callable[[int, np.ndarray], np.ndarray]
@@ -104,7 +104,7 @@ def behind_a_filter(frequency: float, amplitude: float) -> Fit:
     """A base fit of recordings with a hum of phase r in recording r, all behind `FILTERED`."""
     campaign = small_rig.record(
         5,
-        chain=Chain(noise=small_rig.NOISE, offsets=small_rig.OFFSETS, smoothing=FILTERED),
+        chain=MeasuringChain(noise=small_rig.NOISE, offsets=small_rig.OFFSETS, smoothing=FILTERED),
         duration=1.5,
         measurement=Measurement(smoothing=FILTERED),
     )
@@ -120,7 +120,7 @@ def test_a_hum_behind_a_declared_filter_is_found():
     assert score.shapes["sensor_hum.frequency"] == pytest.approx(FREQUENCY, abs=0.3)
     assert score.size[0] == pytest.approx(AMPLITUDE, abs=4 * score.size_sd[0])
     apart = score.shapes["sensor_hum.frequency"] - FREQUENCY  # by half a step of the scan at most
-    for r, x in enumerate(fit.target.oscillator.campaign.recordings):
+    for r, x in enumerate(fit.density.oscillator.campaign.recordings):
         middle = np.pi * apart * x.duration  # where phases are known best
         assert np.cos(score.shapes[f"sensor_hum.phase[{x.name}]"] + middle - r) > 0.9
     lines = np.array([FREQUENCY - 1, FREQUENCY, FREQUENCY + 1])
@@ -135,14 +135,14 @@ def test_in_white_noise_fourier_sums_are_exact(decay: float) -> None:
     """At all frequencies, below the natural one too, where samples are set aside, of a velocity."""
     campaign = small_rig.record(
         1, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES, quantity="velocity",
-        chain=Chain(noise=1e-3),
+        chain=MeasuringChain(noise=1e-3),
     )  # fmt: skip
     used = np.ones(campaign.recordings[0].samples.size, dtype=bool)
     used[300:350] = used[-7:] = False
     first = replace(campaign.recordings[0], used=used)
     campaign = replace(campaign, recordings=(first, *campaign.recordings[1:]))
     fit = identify(campaign, rng=np.random.default_rng(0), search=False).fit
-    assert fit.target.likelihood.noise.is_white
+    assert fit.density.likelihood.noise.is_white
     lines = np.arange(0.7, 12.0, 0.37)
     waves = hums(fit, 0, lines, decay).reshape(lines.size, 2, -1)
     direct, sums = blocks_of(fit, 0, waves), white_line_blocks(fit, 0, lines, decay)
@@ -158,11 +158,13 @@ def test_a_hum_above_the_band_of_a_filter_is_found_by_what_leaks_into_it():
     It is forty times the noise before the filter.
     """
     fit = behind_a_filter(0.0, 0.0)
-    interval = float(fit.target.oscillator.intervals[0])
+    interval = float(fit.density.oscillator.intervals[0])
     above = leaking(fit, campaign_scales(fit))
-    assert np.all(gain(FILTERED, interval, above) >= LEAST_GAIN)
-    assert gain(FILTERED, interval, above[:1])[0] ** 2 == pytest.approx(0.5, abs=0.01)
-    frequency = 0.2 + float(above[np.argmin(np.abs(gain(FILTERED, interval, above) - 0.4))])
+    assert np.all(magnitude_response(FILTERED, interval, above) >= LEAST_GAIN)
+    assert magnitude_response(FILTERED, interval, above[:1])[0] ** 2 == pytest.approx(0.5, abs=0.01)
+    frequency = 0.2 + float(
+        above[np.argmin(np.abs(magnitude_response(FILTERED, interval, above) - 0.4))]
+    )
     (nothing,) = periodic_scores(fit, [BY_ID["sensor_hum"]], campaign_scales(fit))
     assert nothing.p_value > 0.01
     fit = behind_a_filter(frequency, 100 * AMPLITUDE)
@@ -171,13 +173,13 @@ def test_a_hum_above_the_band_of_a_filter_is_found_by_what_leaks_into_it():
     assert score.shapes["sensor_hum.frequency"] == pytest.approx(frequency, abs=0.7)
 
 
-def test_scores_are_those_of_the_mode_although_a_climb_ended_beside_it():
+def test_scores_are_those_of_the_mode_although_an_ascent_ended_beside_it():
     """Half a standard deviation away from the mode the fitted parameters take their part back."""
     fit = identify(small_rig.record(6), rng=np.random.default_rng(0), search=False).fit
-    target, theta = fit.target, fit.mode.copy()
-    away = target.oscillator.layout.roles("physical", "nuisance")
+    density, theta = fit.density, fit.mode.copy()
+    away = density.oscillator.layout.roles("physical", "nuisance")
     theta[away] += 0.5 * fit.sd[away]
-    beside = replace(fit, mode=theta, linearisation=target.likelihood.linearise(theta))
+    beside = replace(fit, mode=theta, linearisation=density.likelihood.linearise(theta))
     scales = campaign_scales(fit)
     lines = np.array([0.9, 1.0, 1.1]) * scales.natural_frequency
 
@@ -209,7 +211,7 @@ def test_a_hum_at_the_motion_s_own_frequency_is_scored_exactly():
 
 def test_what_is_absorbed_but_for_rounding_tells_nothing(small):
     fit = small.fit
-    own = fit.target.oscillator.layout.roles("nuisance")  # every recording's alone
+    own = fit.density.oscillator.layout.roles("nuisance")  # every recording's alone
     columns = [x.jacobian[:, np.isin(x.columns, own)][:, :2].T[None] for x in fit.linearisation]
     blocks = [blocks_of(fit, r, c / np.linalg.norm(c)) for r, c in enumerate(columns)]
     statistic, sizes, _ = _statistics(fit, blocks)
@@ -247,7 +249,7 @@ def test_the_band_ends_where_the_recordings_can_separate_two_lines(side, apart, 
     All recordings are as long as the first, and swing as it does.
     """
     fit = plain_fit()
-    recording = fit.target.oscillator.campaign.recordings[0]
+    recording = fit.density.oscillator.campaign.recordings[0]
     spectrum = np.abs(np.fft.rfft(recording.samples - recording.samples.mean()))
     line = (np.argmax(spectrum) + side * apart) / (recording.samples.size * recording.interval)
     assert shakes_in_own_band(with_line(fit, line), False) is own
@@ -260,11 +262,11 @@ def test_a_hum_beside_the_motion_s_line_is_taken_only_where_nothing_remains(chi2
     scales = campaign_scales(fit)
     beside = np.sqrt(rig.k1 / rig.mass) / (2 * np.pi) + 1.7 / scales.duration
     held = with_line(fit, beside, "sensor_hum")
-    likelihood = held.target.likelihood
+    likelihood = held.density.likelihood
     level = likelihood.noise.level * np.sqrt(held.reduced_chi2 / chi2)
     noise = replace(likelihood.noise, level=level, level_error=0.01)
-    target = replace(held.target, likelihood=replace(likelihood, noise=noise))
-    model = Candidate(target.oscillator.effects, replace(held, target=target), 100.0)
+    density = replace(held.density, likelihood=replace(likelihood, noise=noise))
+    model = Candidate(density.oscillator.effects, replace(held, density=density), 100.0)
     models = Models((), scales, np.random.default_rng(0), lambda message: None)
     assert np.isfinite(models.keep(model).log_evidence) == kept
 
@@ -278,10 +280,10 @@ def plain_fit() -> Fit:
 def with_line(fit: Fit, frequency: float, what: str = "harmonic_forcing") -> Fit:
     """The same with a harmonic force or a hum of a frequency, Hz, in its model."""
     scales, effects = campaign_scales(fit), (BY_ID[what],)
-    target = extend(fit, effects, scales)
+    density = extend(fit, effects, scales)
     shapes = {f"{what}.frequency": frequency}
-    mode = transfer(fit, target.oscillator.layout, effects, scales, shapes)
-    return replace(fit, target=target, mode=mode)
+    mode = transfer(fit, density.oscillator.layout, effects, scales, shapes)
+    return replace(fit, density=density, mode=mode)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 32])

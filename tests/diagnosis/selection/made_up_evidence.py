@@ -11,7 +11,7 @@ from effect_rigs import BY_ID
 from bayesimpact.diagnosis.refits.refit import Candidate
 from bayesimpact.diagnosis.residual_force.learned import learned_drift, learned_force
 from bayesimpact.diagnosis.selection.decision import decide
-from bayesimpact.diagnosis.selection.outcome import Naming, State
+from bayesimpact.diagnosis.selection.outcome import ExaminedModel, Selection
 from bayesimpact.diagnosis.thresholds import (
     ALPHA,
     DECISIVE,
@@ -27,36 +27,36 @@ WHITE = SimpleNamespace(likelihood=SimpleNamespace(noise=SimpleNamespace(is_colo
 def candidate(ids: str, evidence: float, chi2: float = 1.0) -> Candidate:
     """Effects by name, separated by blanks; log evidence over the base model's."""
     likelihood = 2000.0 + evidence + (OCCAM if ids else 0.0)
-    fit = SimpleNamespace(reduced_chi2=chi2, log_likelihood=likelihood, target=WHITE)
+    fit = SimpleNamespace(reduced_chi2=chi2, log_likelihood=likelihood, density=WHITE)
     return Candidate(tuple(BY_ID[i] for i in ids.split()), fit, 1000.0 + evidence)
 
 
-def state(
+def examined(
     model: Candidate, p_catalogue: float = 0.5, p_force: float = 0.5, force_evidence: float = 0.0
-) -> State:
+) -> ExaminedModel:
     force = SimpleNamespace(
         p_value=p_force, log_evidence=force_evidence, gain=force_evidence + 2 * OCCAM
     )
     drift = SimpleNamespace(p_value=0.5, log_evidence=-1.0, gain=0.0)
-    return State(model, SimpleNamespace(p_value=p_catalogue), force, drift)
+    return ExaminedModel(model, SimpleNamespace(p_value=p_catalogue), force, drift)
 
 
-def naming(
-    chosen: State, *others: Candidate, base_p: float = 1e-6, base_chi2: float = 1.0,
+def selection(
+    chosen: ExaminedModel, *others: Candidate, base_p: float = 1e-6, base_chi2: float = 1.0,
     force_evidence: float = 0.0,
-) -> Naming:  # fmt: skip
-    base = state(candidate("", 0.0, base_chi2), base_p, base_p, force_evidence)
+) -> Selection:  # fmt: skip
+    base = examined(candidate("", 0.0, base_chi2), base_p, base_p, force_evidence)
     if not chosen.candidate.effects:
         base = chosen
     every = {c.ids: c for c in (base.candidate, chosen.candidate, *others)}
     worth = lambda c: c.log_evidence - COST * len(c.effects)  # noqa: E731
-    return Naming(base, chosen, tuple(sorted(every.values(), key=worth, reverse=True)), COST)
+    return Selection(base, chosen, tuple(sorted(every.values(), key=worth, reverse=True)), COST)
 
 
 FRICTION, DRAG = "coulomb_friction", "quadratic_drag"
 
 
-def judge(found: Naming) -> str:
+def verdict_of(found: Selection) -> str:
     return decide(found).verdict
 
 
@@ -69,37 +69,37 @@ def beside_force(model: Candidate, evidence: float, force: Effect = OF_MOTION) -
 
 
 def remaining(
-    chosen: State, without: float, chi2: float, *others: Candidate, beside: float = 0.0,
+    chosen: ExaminedModel, without: float, chi2: float, *others: Candidate, beside: float = 0.0,
     instead: float = 0.0, force: Effect = OF_MOTION,
-) -> Naming:  # fmt: skip
+) -> Selection:  # fmt: skip
     """A chosen single effect beside which something remains.
 
     `without`: misfit over the noise without it; `chi2`: with it; log evidences of a residual force
     `beside` the effect and `instead` of it, where above zero, less what a further effect costs.
     """
-    found = naming(chosen, *others, base_chi2=without)
+    found = selection(chosen, *others, base_chi2=without)
     base = found.base
     for model, misfit in ((chosen, chi2), (base, without)):
-        target = SimpleNamespace(
+        density = SimpleNamespace(
             likelihood=SimpleNamespace(
                 noise=SimpleNamespace(level=1.0, level_error=0.01, is_coloured=False),
                 sizes=np.array([1000.0]),
             )
         )
         vars(model.candidate.fit).update(
-            target=target, sums=np.array([1000.0 * misfit]), reduced_chi2=misfit
+            density=density, sums=np.array([1000.0 * misfit]), reduced_chi2=misfit
         )
     residual = {
         frozenset(m.candidate.ids): beside_force(m.candidate, e, force)
         for m, e in ((chosen, beside), (base, instead))
         if e
     }
-    states = {frozenset(m.candidate.ids): m for m in (chosen, base)}
-    return replace(found, states=states, residual=residual)
+    examined_models = {frozenset(m.candidate.ids): m for m in (chosen, base)}
+    return replace(found, examined_models=examined_models, residual=residual)
 
 
-def something_left() -> State:
-    return state(candidate(FRICTION, 100.0), p_force=ALPHA / 2, force_evidence=2 * DECISIVE)
+def something_left() -> ExaminedModel:
+    return examined(candidate(FRICTION, 100.0), p_force=ALPHA / 2, force_evidence=2 * DECISIVE)
 
 
 def with_misfit(model: Candidate, chi2: float) -> Candidate:

@@ -23,12 +23,13 @@ class Table:
     """Stands for the fits: a gain in log evidence over the base model for every set of effects.
 
     `forward` has what a fit reaches from a smaller model, where that ends in a worse place than
-    one from a larger model. `unfinished` has what is gained beyond where a climb did not converge,
-    `once` where a model's first fit ends. `force` is the evidence of a free force in place of all
-    effects, to which `beside` adds where there are effects that it may stand beside. `chi2` is
-    that of every fit but those of `left`. `asked` are the sets that the equation of motion asks
-    for, of all stretches and `asked_in_flight`, or about a model, `asked_about`, and `asked_ahead`
-    those that periods ahead do; `seen` what is gained by an effect, of which `first` are tried.
+    one from a larger model. `unfinished` has what is gained beyond where an ascent did not
+    converge, `once` where a model's first fit ends. `force` is the evidence of a free force in
+    place of all effects, to which `beside` adds where there are effects that it may stand beside.
+    `chi2` is that of every fit but those of `left`. `asked` are the sets that the equation of
+    motion asks for, of all stretches and `asked_in_flight`, or about a model, `asked_about`, and
+    `asked_ahead` those that periods ahead do; `seen` what is gained by an effect, of which `first`
+    are tried.
     """
 
     def __init__(
@@ -73,7 +74,7 @@ class Table:
         fit = SimpleNamespace(
             reduced_chi2=self.left.get(frozenset(ids), self.chi2),
             log_likelihood=gain + 10, log_posterior=gain, rms=1.0, ids=tuple(ids), gain=gain,
-            converged=frozenset(ids) not in self.unfinished, target=TARGET,
+            converged=frozenset(ids) not in self.unfinished, density=TARGET,
         )  # fmt: skip
         return Candidate(tuple(BY_ID[i] for i in ids), fit, gain)
 

@@ -60,7 +60,7 @@ def test_what_an_input_does_between_samples_is_told(lines: bool) -> None:
     """Before this was asked, a force of no effect was learned for it."""
     found = diagnose(shaken(lines), rng=np.random.default_rng(0), search=False)
     assert found.verdict == "adequate" and not found.effects
-    assert found.naming.band_limited is not lines
+    assert found.selection.band_limited is not lines
     assert found.after.reduced_chi2 == pytest.approx(1.0, abs=0.12)
     assert abs(found.after.value("k1") - K1) < 4 * found.after.sd[found.after.names.index("k1")]
 

@@ -89,8 +89,8 @@ def test_models_with_little_more_misfit_are_comparable(small, monkeypatch):
         for label, value in left.items()
     }
     fits["free"] = SimpleNamespace(label="free", names=("learned_force.a1",), left=1.0)
-    monkeypatch.setattr(comparable, "misfit_above_noise", lambda naming, fit: fit.left)
-    monkeypatch.setattr(comparable, "doubtful_misfit", lambda naming: 1.0)
+    monkeypatch.setattr(comparable, "misfit_above_noise", lambda selection, fit: fit.left)
+    monkeypatch.setattr(comparable, "doubtful_misfit", lambda selection: 1.0)
     tried = [Candidate((), f, -np.inf if f.left < 0 else 0.0) for f in fits.values()]
     found = alike_in_misfit(SimpleNamespace(tried=tried), fits["chosen"])
     assert [f.label for f in found.fits] == ["near"]
@@ -100,8 +100,8 @@ def test_models_with_little_more_misfit_are_comparable(small, monkeypatch):
 def test_rivals_weigh_as_much_as_their_odds(small):
     odds = {"chosen": 0.0, "near": -np.log(3.0), "leading": 2.0}
     sets = {label: SimpleNamespace(fit=label) for label in odds}
-    naming = SimpleNamespace(log_odds=lambda c: odds[c.fit])
-    found = alike_in_odds(naming, sets["chosen"], [sets["near"], sets["leading"]])
+    selection = SimpleNamespace(log_odds=lambda c: odds[c.fit])
+    found = alike_in_odds(selection, sets["chosen"], [sets["near"], sets["leading"]])
     assert found.weights == pytest.approx(np.array([1 / 3, 1.0]) / (1 + 1 / 3 + 1))
 
 
@@ -121,7 +121,7 @@ def test_the_mean_of_parts_is_as_uncertain_as_the_posterior_says(split):
 
 def test_what_a_campaign_declares_is_compared_like_what_is_found(small):
     """The opposite stop of a two-sided one: a traceback ended such diagnoses."""
-    campaign = replace(small.fit.target.oscillator.campaign, declared=(SECOND_STOP,))
+    campaign = replace(small.fit.density.oscillator.campaign, declared=(SECOND_STOP,))
     fit = identify(campaign, rng=np.random.default_rng(0), search=False).fit
     other = fit_from(fit, (BY_ID["spring_cubic"],), {}, campaign_scales(fit)).fit
     at = fit.names.index("opposite_stop.stiffness")

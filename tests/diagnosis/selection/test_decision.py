@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from effect_rigs import BY_ID
-from made_up_evidence import COST, DRAG, FRICTION, candidate, judge, naming, state
+from made_up_evidence import COST, DRAG, FRICTION, candidate, examined, selection, verdict_of
 
 from bayesimpact.diagnosis.candidates.promising import refit_candidates
 from bayesimpact.diagnosis.selection.decision import ordered
@@ -21,9 +21,9 @@ from bayesimpact.inference.noise.whitening import Noise
 
 
 def test_nothing_missing_is_adequate_and_an_alarm_without_a_name_is_unknown():
-    assert judge(naming(state(candidate("", 0.0)))) == "adequate"
+    assert verdict_of(selection(examined(candidate("", 0.0)))) == "adequate"
     for alarm in ({"p_force": ALPHA / 2, "force_evidence": DECISIVE + 0.1}, {"p_catalogue": 1e-5}):
-        assert judge(naming(state(candidate("", 0.0), **alarm))) == "unknown"
+        assert verdict_of(selection(examined(candidate("", 0.0), **alarm))) == "unknown"
 
 
 @pytest.mark.parametrize(("correlation", "left"), [(0.8, 0.6), (0.8, 0.4), (0.0, 0.6)])
@@ -32,61 +32,61 @@ def test_coloured_noise_of_half_the_signal_may_be_the_motion(
 ) -> None:
     alone = candidate("", 0.0)
     noise = Noise(correlation, level=1.0)
-    target = SimpleNamespace(likelihood=SimpleNamespace(noise=noise))
-    fit = SimpleNamespace(**{**vars(alone.fit), "target": target, "rms": left, "signal": 1.0})
-    verdict = judge(naming(state(replace(alone, fit=fit))))
+    density = SimpleNamespace(likelihood=SimpleNamespace(noise=noise))
+    fit = SimpleNamespace(**{**vars(alone.fit), "density": density, "rms": left, "signal": 1.0})
+    verdict = verdict_of(selection(examined(replace(alone, fit=fit))))
     assert verdict == ("unknown" if correlation and left > 0.5 else "adequate")
 
 
 def test_a_name_needs_decisive_odds_over_every_rival():
-    chosen = state(candidate(FRICTION, 100.0))
+    chosen = examined(candidate(FRICTION, 100.0))
     far = candidate(DRAG, 100.0 - DECISIVE - 0.1)
     near = candidate(DRAG, 100.0 - DECISIVE + 0.1)
-    assert judge(naming(chosen, far)) == "named"
-    found = naming(chosen, near)
-    assert judge(found) == "ambiguous" and found.rivals() == (near,)
+    assert verdict_of(selection(chosen, far)) == "named"
+    found = selection(chosen, near)
+    assert verdict_of(found) == "ambiguous" and found.rivals() == (near,)
 
 
 def test_the_base_model_itself_is_a_rival():
-    weak = state(candidate(FRICTION, COST + DECISIVE - 0.1))
-    assert judge(naming(weak)) == "ambiguous"
-    assert judge(naming(state(candidate(FRICTION, COST + DECISIVE + 0.1)))) == "named"
+    weak = examined(candidate(FRICTION, COST + DECISIVE - 0.1))
+    assert verdict_of(selection(weak)) == "ambiguous"
+    assert verdict_of(selection(examined(candidate(FRICTION, COST + DECISIVE + 0.1)))) == "named"
 
 
 def test_supersets_and_elaborations_are_no_rivals():
-    chosen = state(candidate("contact_no_tension", 100.0))
+    chosen = examined(candidate("contact_no_tension", 100.0))
     superset = candidate("contact_no_tension spring_cubic", 104.0)
     elaboration = candidate("obstacle_mass", 99.0)  # no tension is its null
-    assert judge(naming(chosen, superset, elaboration)) == "named"
+    assert verdict_of(selection(chosen, superset, elaboration)) == "named"
     # the other way round the simpler model is a rival
-    heavier = state(candidate("obstacle_mass", 100.0))
-    assert judge(naming(heavier, candidate("contact_no_tension", 98.0))) == "ambiguous"
-    assert judge(naming(heavier, candidate("contact_no_tension", 90.0))) == "named"
+    heavier = examined(candidate("obstacle_mass", 100.0))
+    assert verdict_of(selection(heavier, candidate("contact_no_tension", 98.0))) == "ambiguous"
+    assert verdict_of(selection(heavier, candidate("contact_no_tension", 90.0))) == "named"
 
 
 def test_a_pair_is_compared_with_what_lacks_one_of_its_members():
-    chosen = state(candidate(f"{FRICTION} spring_cubic", 200.0))
+    chosen = examined(candidate(f"{FRICTION} spring_cubic", 200.0))
     alone = candidate(FRICTION, 200.0 - COST - DECISIVE + 0.1)
-    assert judge(naming(chosen, alone)) == "ambiguous"
+    assert verdict_of(selection(chosen, alone)) == "ambiguous"
     swapped = candidate(f"{DRAG} spring_cubic", 196.0)
-    found = naming(chosen, swapped)
-    assert judge(found) == "ambiguous" and found.rivals() == (swapped,)
-    single = state(candidate("harmonic_forcing", 200.0))
+    found = selection(chosen, swapped)
+    assert verdict_of(found) == "ambiguous" and found.rivals() == (swapped,)
+    single = examined(candidate("harmonic_forcing", 200.0))
     pair = candidate("gap_wear gap_per_recording", 200.1 + COST)
-    assert naming(single, pair).rivals() == (pair,)  # a rival may be larger
-    assert not naming(single, candidate("gap_wear gap_per_recording", 199.9 + COST)).rivals()
+    assert selection(single, pair).rivals() == (pair,)  # a rival may be larger
+    assert not selection(single, candidate("gap_wear gap_per_recording", 199.9 + COST)).rivals()
 
 
 def test_what_remains_needs_decisive_odds():
     """Beside a name and beside the base model: a small p-value alone is no alarm."""
     for evidence, white in ((DECISIVE - 0.1, True), (DECISIVE + 0.1, False)):
-        chosen = state(candidate(FRICTION, 100.0), p_force=ALPHA / 2, force_evidence=evidence)
+        chosen = examined(candidate(FRICTION, 100.0), p_force=ALPHA / 2, force_evidence=evidence)
         assert chosen.is_white == white
-    by_chance = state(candidate(FRICTION, 2192.0), p_catalogue=0.0026)
-    assert by_chance.is_white and judge(naming(by_chance)) == "named"
-    assert not state(candidate(FRICTION, 2192.0), p_catalogue=1e-5).is_white
+    by_chance = examined(candidate(FRICTION, 2192.0), p_catalogue=0.0026)
+    assert by_chance.is_white and verdict_of(selection(by_chance)) == "named"
+    assert not examined(candidate(FRICTION, 2192.0), p_catalogue=1e-5).is_white
     for alarm in ({"p_force": ALPHA / 2, "force_evidence": DECISIVE - 0.1}, {"p_catalogue": 3e-4}):
-        assert judge(naming(state(candidate("", 0.0), **alarm))) == "adequate"
+        assert verdict_of(selection(examined(candidate("", 0.0), **alarm))) == "adequate"
 
 
 def test_a_p_value_stands_for_odds_of_a_bound():
@@ -98,22 +98,24 @@ def test_a_p_value_stands_for_odds_of_a_bound():
 
 @pytest.mark.parametrize("ids", [FRICTION, f"{FRICTION} spring_cubic"])
 def test_a_free_force_that_beats_the_chosen_effects_is_unknown_physics(ids):
-    imitation = state(candidate(ids, 200.0))
+    imitation = examined(candidate(ids, 200.0))
     object.__setattr__(imitation.candidate.fit, "log_likelihood", 2300.0)  # a heavy prior volume
     odds = 200.0 - COST * (len(ids.split()) - 1)  # a free force costs as much as an effect
-    assert judge(naming(imitation, force_evidence=odds + DECISIVE + 0.1)) == "unknown"
-    assert judge(naming(imitation, force_evidence=odds + DECISIVE - 0.1)) == "named"
+    assert verdict_of(selection(imitation, force_evidence=odds + DECISIVE + 0.1)) == "unknown"
+    assert verdict_of(selection(imitation, force_evidence=odds + DECISIVE - 0.1)) == "named"
 
 
 def test_no_force_can_gain_more_than_a_model_that_leaves_nothing():
     """The linearised problem promises too much where effects are large."""
-    assert judge(naming(state(candidate(FRICTION, 200.0)), force_evidence=300.0)) == "named"
+    assert (
+        verdict_of(selection(examined(candidate(FRICTION, 200.0)), force_evidence=300.0)) == "named"
+    )
 
 
 def test_probabilities_weigh_all_models():
-    chosen = state(candidate(FRICTION, 100.0))
+    chosen = examined(candidate(FRICTION, 100.0))
     rivals = (candidate(DRAG, 98.0), candidate(f"{FRICTION} {DRAG}", 101.0))
-    found = naming(chosen, *rivals)
+    found = selection(chosen, *rivals)
     weights = np.exp([0.0, 100 - COST, 98 - COST, 101 - 2 * COST])
     assert found.probability(FRICTION) == pytest.approx((weights[1] + weights[3]) / weights.sum())
     assert found.probability(DRAG) == pytest.approx((weights[2] + weights[3]) / weights.sum())
@@ -122,8 +124,8 @@ def test_probabilities_weigh_all_models():
 
 
 def test_effects_are_ordered_by_what_the_model_loses_without_them():
-    chosen = state(candidate(f"{FRICTION} spring_cubic", 200.0))
-    found = naming(chosen, candidate(FRICTION, 50.0), candidate("spring_cubic", 150.0))
+    chosen = examined(candidate(f"{FRICTION} spring_cubic", 200.0))
+    found = selection(chosen, candidate(FRICTION, 50.0), candidate("spring_cubic", 150.0))
     effects = chosen.candidate.effects
     assert [e.id for e in ordered(found, effects)] == ["spring_cubic", FRICTION]
     assert ordered(found, effects[:1]) == effects[:1]
@@ -134,7 +136,7 @@ def scores(*gains: float, effect: str = FRICTION):
     return SimpleNamespace(best=lambda: rows)
 
 
-def test_what_is_worth_a_refit():
+def test_what_promises_a_refit():
     def kept(*gains: float) -> list[float]:
         return [s.gain for s in refit_candidates(scores(*gains))]
 
@@ -153,15 +155,15 @@ def test_what_is_on_or_off_is_fitted_wherever_something_is_to_be_gained():
 def test_many_effects_that_imitate_one_force_in_contact_are_unknown():
     """Three effects against the force fitted with the parameters; a decisive lead is needed."""
     three = "contact_damping_per_case contact_no_tension gap_wear"
-    found = naming(state(candidate(three, 500.0)))
-    assert judge(found) == "named"
+    found = selection(examined(candidate(three, 500.0)))
+    assert verdict_of(found) == "named"
     lead = found.log_odds(found.chosen.candidate)
-    assert judge(replace(found, contact_odds=lead + COST + DECISIVE - 0.1)) == "named"
-    assert judge(replace(found, contact_odds=lead + COST + DECISIVE + 0.1)) == "unknown"
+    assert verdict_of(replace(found, contact_odds=lead + COST + DECISIVE - 0.1)) == "named"
+    assert verdict_of(replace(found, contact_odds=lead + COST + DECISIVE + 0.1)) == "unknown"
 
 
 def test_the_unknown_force_is_the_likeliest_of_its_forms():
-    found = naming(state(candidate("", 0.0), force_evidence=20.0))
+    found = selection(examined(candidate("", 0.0), force_evidence=20.0))
     assert found.unknown is found.base.force
     contact = SimpleNamespace(log_evidence=30.0)
     assert replace(found, contact=contact).unknown is contact

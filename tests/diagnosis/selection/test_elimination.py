@@ -12,9 +12,8 @@ from made_up_models import A, B, Table
 
 from bayesimpact.diagnosis.refits.refit import Candidate
 from bayesimpact.diagnosis.score_test.scan import Scan
-from bayesimpact.diagnosis.selection import elimination as settle
-from bayesimpact.diagnosis.selection import ranked
-from bayesimpact.diagnosis.selection.elimination import Settling
+from bayesimpact.diagnosis.selection import elimination, ranked
+from bayesimpact.diagnosis.selection.elimination import Elimination
 
 RNG = np.random.default_rng
 FRICTION, DRAG, SPRING = "coulomb_friction", "quadratic_drag", "spring_cubic"
@@ -27,7 +26,7 @@ def model(ids: str, chi2: float) -> Candidate:
         priors=SimpleNamespace(lower=(), upper=()),
     )
     fit: Any = SimpleNamespace(
-        reduced_chi2=chi2, converged=True, log_likelihood=-500.0 * chi2, target=shapeless
+        reduced_chi2=chi2, converged=True, log_likelihood=-500.0 * chi2, density=shapeless
     )
     return Candidate(tuple(BY_ID[i] for i in ids.split()), fit, 0.0)
 
@@ -37,8 +36,8 @@ def test_laws_that_are_asked_for_take_the_place_where_scores_see_nothing(base, s
     """Where the misfit was large the model without either law may stand in a side minimum; not
     where scores there see what the law that was left out is known to do, 1,450 nats.
     """
-    search: Any = Settling((), None, RNG(0), lambda words: None)
-    search.states = {frozenset(): SimpleNamespace(candidate=model("", base))}
+    search: Any = Elimination((), None, RNG(0), lambda words: None)
+    search.examined_models = {frozenset(): SimpleNamespace(candidate=model("", base))}
     search.asked = SimpleNamespace(first=lambda *about: ({DRAG, HYSTERESIS}, {DRAG}))
     gains = {HYSTERESIS: seen, SPRING: 0.9 * seen, DRAG: 0.0}
     scores = tuple(Table.score(BY_ID[i], gain) for i, gain in gains.items())
@@ -55,9 +54,9 @@ def test_laws_that_are_asked_for_take_the_place_where_scores_see_nothing(base, s
 
 @pytest.mark.parametrize("white", [True, False])
 def test_beside_a_model_that_leaves_nothing_rivals_must_come_near_what_they_replace(white) -> None:
-    search: Any = Settling((), None, RNG(0), lambda words: None)
+    search: Any = Elimination((), None, RNG(0), lambda words: None)
     chosen = model(f"{FRICTION} {SPRING}", 1.0)
-    search.states = {
+    search.examined_models = {
         frozenset(): SimpleNamespace(candidate=model("", 400.0)),
         frozenset(chosen.ids): SimpleNamespace(candidate=chosen, is_white=white),
     }
@@ -70,24 +69,24 @@ def test_beside_a_model_that_leaves_nothing_rivals_must_come_near_what_they_repl
     assert replaced == ([FRICTION, SPRING] if white else ["", ""])
 
 
-def test_a_better_end_of_the_same_set_settles_once_more(monkeypatch):
+def test_a_better_end_of_the_same_set_is_exchanged_once_more(monkeypatch):
     """What its effects contribute was told at the worse end."""
     first, better = (Table({}).candidate((A, B), gain) for gain in (40.0, 90.0))
-    settling, eliminated = object.__new__(Settling), []
+    settling, eliminated = object.__new__(Elimination), []
     stand_ins = {
         "weigh_remainder": lambda: None,
-        "eliminated": lambda state: eliminated.append(state.candidate.fit.gain) or state,
-        "near": lambda state: [state.candidate],
+        "eliminated": lambda examined: eliminated.append(examined.candidate.fit.gain) or examined,
+        "near": lambda examined: [examined.candidate],
         "may_go_on": lambda: True,
         "exchange": lambda candidate: None,
-        "beside_rival": lambda state: [],
+        "beside_rival": lambda examined: [],
         "log_odds": lambda candidate: candidate.fit.gain,
         "best": lambda size: better,
         "examine": lambda candidate: SimpleNamespace(candidate=candidate),
     }
     for name, stand_in in stand_ins.items():
         monkeypatch.setattr(settling, name, stand_in, raising=False)
-    found = settling.settled(SimpleNamespace(candidate=first))
+    found = settling.exchanged(SimpleNamespace(candidate=first))
     assert found.candidate is better and eliminated == [40.0, 90.0]
 
 
@@ -98,15 +97,17 @@ def test_a_better_end_of_the_same_set_settles_once_more(monkeypatch):
 )  # fmt: skip
 def test_models_are_weighed_beside_what_remains(monkeypatch, base, misses, noise, weighed) -> None:
     """Where the misfit was large, something is left and a force of time describes it."""
-    search: Any = Settling((BY_ID[DRAG],), None, RNG(0), lambda words: None)
+    search: Any = Elimination((BY_ID[DRAG],), None, RNG(0), lambda words: None)
     near, far = model(f"{FRICTION} {SPRING}", 2.0), model(FRICTION, 3.0)
-    search.states = {frozenset(): SimpleNamespace(candidate=model("", base))}
+    search.examined_models = {frozenset(): SimpleNamespace(candidate=model("", base))}
     search.tried = {frozenset(c.ids): c for c in (far, near)}
     monkeypatch.setattr(ranked, "residual_repetition", lambda fit: 1.0)
     monkeypatch.setattr(ranked, "leaves_something", lambda fit: misses)
     gains = {near.fit.reduced_chi2: 0.0, far.fit.reduced_chi2: 20.0}
     force = SimpleNamespace(
-        fit=near.fit, leaves_noise=noise, gain=lambda fit, alone: gains[fit.reduced_chi2]
+        fit=near.fit,
+        leaves_noise=noise,
+        log_evidence_gain=lambda fit, alone: gains[fit.reduced_chi2],
     )
     asked: list[Any] = []
     monkeypatch.setattr(ranked, "discrepancy", lambda fit: asked.append(fit) or force)
@@ -126,24 +127,26 @@ def test_a_law_may_have_taken_the_place_of_two(odds: float, white: bool, extende
     chosen, rival = model(f"{FRICTION} {HYSTERESIS}", 1.0), model(f"{FRICTION} {DRAG}", 1.1)
     more, part = model(f"{FRICTION} {DRAG} {SPRING}", 1.0), model(FRICTION, 1.2)
     known = {chosen.ids: 500.0, rival.ids: odds, part.ids: odds - 1.0, more.ids: 600.0}
-    search: Any = Settling((), None, RNG(0), lambda words: None)
-    search.states = {frozenset(): SimpleNamespace(candidate=model("", 400.0))}
+    search: Any = Elimination((), None, RNG(0), lambda words: None)
+    search.examined_models = {frozenset(): SimpleNamespace(candidate=model("", 400.0))}
     search.log_odds = lambda candidate: known[candidate.ids]
     search.ranked = lambda models: sorted(models, key=search.log_odds, reverse=True)
     search.tried = {frozenset(c.ids): c for c in (chosen, rival, part, more)}
     search.may_go_on = lambda: True
     search.examine = lambda candidate: SimpleNamespace(candidate=candidate)
     asked: list[Candidate] = []
-    search.extended = lambda state: asked.append(state.candidate) or [more]
+    search.extended = lambda examined: asked.append(examined.candidate) or [more]
     found = search.beside_rival(SimpleNamespace(candidate=chosen, is_white=white))
     assert (found, asked) == (([more], [rival]) if extended else ([], []))
 
 
 def test_laws_of_a_family_take_the_place_of_one_that_ends_at_its_range(monkeypatch) -> None:
     """However well scores see it: its shape says that the law is another one."""
-    monkeypatch.setattr(settle, "is_at_an_end", lambda fit, effect: effect.id == HYSTERESIS)
-    search: Any = Settling((BY_ID[FRICTION], BY_ID[HYSTERESIS]), None, RNG(0), lambda words: None)
-    search.states = {frozenset(): SimpleNamespace(candidate=model("", 400.0))}
+    monkeypatch.setattr(elimination, "is_at_an_end", lambda fit, effect: effect.id == HYSTERESIS)
+    search: Any = Elimination(
+        (BY_ID[FRICTION], BY_ID[HYSTERESIS]), None, RNG(0), lambda words: None
+    )
+    search.examined_models = {frozenset(): SimpleNamespace(candidate=model("", 400.0))}
     search.asked = SimpleNamespace(first=lambda *about: (set(), set()))
     scores = (Table.score(BY_ID[HYSTERESIS], 1e6), Table.score(BY_ID[FRICTION], 0.0))
     search.drop = lambda chosen, effect: model(SPRING, 3.9)
@@ -158,15 +161,15 @@ def test_laws_of_a_family_take_the_place_of_one_that_ends_at_its_range(monkeypat
 
 
 @pytest.mark.parametrize(("at", "ends"), [(0.5, False), (0.2501, True), (4.9999, True)])
-def test_a_range_ends_where_climbs_stop(at: float, ends: bool) -> None:
+def test_a_range_ends_where_ascents_stop(at: float, ends: bool) -> None:
     power = BY_ID["power_damping"]
     names = [f"power_damping.{p.name}" for p in power.parameters]
     shape = [p.is_shape for p in power.parameters].index(True)
     parameters = [SimpleNamespace(name=n, lower=0.25, upper=5.0) for n in names]
     priors = SimpleNamespace(lower=[-np.inf] * len(names), upper=[np.inf] * len(names))
     layout = SimpleNamespace(parameters=parameters)
-    target = SimpleNamespace(oscillator=SimpleNamespace(layout=layout), priors=priors)
+    density = SimpleNamespace(oscillator=SimpleNamespace(layout=layout), priors=priors)
     mode = np.full(len(names), 1.0)
     mode[shape] = at
-    fit: Any = SimpleNamespace(target=target, mode=mode)
-    assert settle.is_at_an_end(fit, power) is ends
+    fit: Any = SimpleNamespace(density=density, mode=mode)
+    assert elimination.is_at_an_end(fit, power) is ends

@@ -19,7 +19,7 @@ from bayesimpact.formula.law import FAMILY, PREFIX
 def candidate(ids: str, reached: float) -> Candidate:
     fit = SimpleNamespace(
         log_likelihood=reached, log_posterior=reached, converged=True, reduced_chi2=1.0,
-        target=TARGET,
+        density=TARGET,
     )  # fmt: skip
     return Candidate(tuple(BY_ID[i] for i in ids.split()), fit, reached)
 
@@ -127,8 +127,8 @@ def test_what_leaves_nothing_is_compared_with_no_force(monkeypatch, ids, white, 
     now[0] = PATIENCE - 1.0
     formula = SimpleNamespace(id=PREFIX, family=FAMILY)
     effects = tuple(BY_ID.get(i, formula) for i in ids.split())
-    state = SimpleNamespace(candidate=SimpleNamespace(effects=effects), is_white=white)
-    search.states = {frozenset(ids.split()): state}
+    examined = SimpleNamespace(candidate=SimpleNamespace(effects=effects), is_white=white)
+    search.examined_models = {frozenset(ids.split()): examined}
     assert search.may_go_on() is goes_on
 
 

@@ -16,7 +16,7 @@ from bayesimpact.diagnosis.thresholds import DECISIVE, LARGE
 REPETITION = 30.0
 
 
-def state(ids: str, chi2: float, converged: bool = True) -> SimpleNamespace:
+def examined(ids: str, chi2: float, converged: bool = True) -> SimpleNamespace:
     fit = SimpleNamespace(reduced_chi2=chi2, converged=converged)
     found = Candidate(tuple(BY_ID[i] for i in ids.split()), fit, 0.0)
     return SimpleNamespace(candidate=found, is_white=False)
@@ -26,14 +26,14 @@ def searching(monkeypatch, chi2: float) -> Ranked:
     """A search whose base model leaves so much."""
     monkeypatch.setattr(ranked, "residual_repetition", lambda fit: REPETITION)
     search = Ranked((), None, np.random.default_rng(0), lambda words: None)
-    base = state("", chi2)
-    search.states[frozenset()] = base
+    base = examined("", chi2)
+    search.examined_models[frozenset()] = base
     search.tried[frozenset()] = base.candidate
     return search
 
 
 @pytest.mark.parametrize("times", [0.5, 2.0])
-def test_beside_a_large_misfit_climbs_end_where_odds_no_longer_ask(monkeypatch, times):
+def test_beside_a_large_misfit_ascents_end_where_odds_no_longer_ask(monkeypatch, times):
     search = searching(monkeypatch, times * LARGE**2)
     enough = search.enough()
     if times > 1.0:
@@ -45,9 +45,9 @@ def test_beside_a_large_misfit_climbs_end_where_odds_no_longer_ask(monkeypatch, 
 @pytest.mark.parametrize(
     ("times", "converged", "again"), [(2.0, False, True), (2.0, True, False), (0.5, False, False)]
 )
-def test_a_model_that_is_chosen_is_climbed_to_its_mode(monkeypatch, times, converged, again):
+def test_a_model_that_is_chosen_is_fitted_to_its_mode(monkeypatch, times, converged, again):
     search = searching(monkeypatch, times * LARGE**2)
-    chosen = state("spring_cubic power_damping", 1.0, converged)
+    chosen = examined("spring_cubic power_damping", 1.0, converged)
     begun = []
 
     def grown(smaller, effects, scales):
@@ -73,7 +73,7 @@ def test_a_model_that_is_chosen_is_climbed_to_its_mode(monkeypatch, times, conve
 def test_what_odds_would_leave_out_again_is_not_taken_in(monkeypatch, times, chi2, more, leads):
     search = searching(monkeypatch, times * LARGE**2)
     monkeypatch.setattr(ranked, "leaves_something", lambda fit: fit.reduced_chi2 > 1.0)
-    small, large = state("spring_cubic", chi2), state("spring_cubic power_damping", chi2)
+    small, large = examined("spring_cubic", chi2), examined("spring_cubic power_damping", chi2)
     odds = {1: 0.0, 2: more}
     monkeypatch.setattr(search, "log_odds", lambda c: odds[len(c.effects)])
     monkeypatch.setattr(search, "promise", lambda c: 30.0 * odds[len(c.effects)])
@@ -84,7 +84,7 @@ def test_what_odds_would_leave_out_again_is_not_taken_in(monkeypatch, times, chi
 def test_a_larger_model_is_of_no_use_below_the_one_that_it_contains(monkeypatch, ids):
     """But an effect alone may be: beside others it may still be right."""
     search, ends = searching(monkeypatch, 2.0 * LARGE**2), []
-    smaller = state(ids, 1.0).candidate
+    smaller = examined(ids, 1.0).candidate
     smaller.fit.log_posterior = smaller.fit.log_likelihood = 70.0
     monkeypatch.setattr(models, "refit", lambda *_, enough: ends.append(enough.goal))
     monkeypatch.setattr(search, "keep", lambda candidate: candidate)

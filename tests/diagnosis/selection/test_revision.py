@@ -16,7 +16,7 @@ from bayesimpact.diagnosis.faults.outliers import beside_spikes, residual_spikes
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import fit_from
 from bayesimpact.diagnosis.selection import search
-from bayesimpact.diagnosis.selection.revision import is_spoilt, misses_onsets, posed_anew
+from bayesimpact.diagnosis.selection.revision import has_bad_readings, misses_onsets, revised
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.onsets import without_onsets
@@ -30,7 +30,7 @@ CUBIC = {"spring_cubic": {"stiffness": 6e6}}
 @pytest.fixture(scope="module")
 def base() -> Fit:
     """A base fit that misses accelerations by far, its contacts by a sample and more."""
-    chain = small_rig.Chain(noise=0.05, offsets=dict.fromkeys("abc", 0.0))
+    chain = small_rig.MeasuringChain(noise=0.05, offsets=dict.fromkeys("abc", 0.0))
     campaign = small_rig.record(
         5, CUBIC, rig=DAMPED, chain=chain, quantity="acceleration", rate=2000.0, duration=3.0
     )
@@ -45,7 +45,7 @@ def good(base: Fit) -> Fit:
 @pytest.fixture(scope="module")
 def across(good: Fit) -> Fit:
     """The good model, of readings one of which lies across the jump of an onset."""
-    recordings = list(good.target.oscillator.campaign.recordings)
+    recordings = list(good.density.oscillator.campaign.recordings)
     used, before = without_onsets(good).recordings[0].used, recordings[0].used
     assert used is not None
     place = int(np.flatnonzero(~used if before is None else before & ~used)[0])
@@ -58,15 +58,18 @@ def across(good: Fit) -> Fit:
 def test_onsets_are_those_of_the_good_model(base: Fit, good: Fit, across: Fit) -> None:
     """Without them one mode is found from any side: no step lies between."""
     assert base.reduced_chi2 > 30 and good.reduced_chi2 < 2.0
-    assert misses_onsets(good) and not is_spoilt(base, base)
+    assert misses_onsets(good) and not has_bad_readings(base, base)
     assert not misses_onsets(refitted(good, without_onsets(good)))
-    state: Any = SimpleNamespace(candidate=SimpleNamespace(fit=across), is_white=True)
+    examined: Any = SimpleNamespace(candidate=SimpleNamespace(fit=across), is_white=True)
     told: list[str] = []
-    anew = posed_anew(base, state, told.append)
-    assert anew is not None and anew.first is not None and told
-    campaign = anew.first.target.oscillator.campaign
-    assert campaign is anew.base.target.oscillator.campaign
-    assert not is_spoilt(anew.base, anew.first) and 0.9 < anew.first.reduced_chi2 < 1.1
+    revision = revised(base, examined, told.append)
+    assert revision is not None and revision.first is not None and told
+    campaign = revision.first.density.oscillator.campaign
+    assert campaign is revision.base.density.oscillator.campaign
+    assert (
+        not has_bad_readings(revision.base, revision.first)
+        and 0.9 < revision.first.reduced_chi2 < 1.1
+    )
     ends = [
         refitted(good, without_onsets(good), start=replace(good, mode=start)).log_posterior
         for start in good.draws(RNG(2), 6)
@@ -76,16 +79,16 @@ def test_onsets_are_those_of_the_good_model(base: Fit, good: Fit, across: Fit) -
 
 def test_readings_across_a_jump_bend_parameters_and_leave_no_residual(good: Fit) -> None:
     """So that onsets are set aside whether or not a reading beside one stands out."""
-    left = [np.max(np.abs(x)) / good.target.likelihood.noise.level for x in good.residuals]
+    left = [np.max(np.abs(x)) / good.density.likelihood.noise.level for x in good.residuals]
     assert max(left) < 5.0 and misses_onsets(good)
-    smooth = replace(good.target.likelihood.noise, level=1e3)
-    quiet = replace(good.target.likelihood, noise=smooth)
-    assert not misses_onsets(replace(good, target=replace(good.target, likelihood=quiet)))
+    smooth = replace(good.density.likelihood.noise, level=1e3)
+    quiet = replace(good.density.likelihood, noise=smooth)
+    assert not misses_onsets(replace(good, density=replace(good.density, likelihood=quiet)))
 
 
 def test_a_spike_is_one_that_the_fit_without_it_misses(good: Fit) -> None:
     """And one that it explains is counted again."""
-    recordings = list(good.target.oscillator.campaign.recordings)
+    recordings = list(good.density.oscillator.campaign.recordings)
     samples = recordings[1].samples.copy()
     samples[901] -= 1.5
     recordings[1] = replace(recordings[1], samples=samples)
@@ -94,28 +97,29 @@ def test_a_spike_is_one_that_the_fit_without_it_misses(good: Fit) -> None:
     assert found is not None
     ((fault,), clean) = found
     assert (fault.recording, fault.spans) == ("b", ((901, 902),))
-    campaign = spiked.target.oscillator.campaign
+    campaign = spiked.density.oscillator.campaign
     assert outliers._still_off(campaign, clean, [fault]) == (fault,)
-    right = good.target.oscillator.campaign  # the reading as it was
+    right = good.density.oscillator.campaign  # the reading as it was
     assert outliers._still_off(right, clean, [fault]) == ()
     assert beside_spikes(good) is None
     kept = replace(campaign, keep_faults=True)
-    oscillator = replace(spiked.target.oscillator, campaign=kept)
-    likelihood = replace(spiked.target.likelihood, oscillator=oscillator)
+    oscillator = replace(spiked.density.oscillator, campaign=kept)
+    likelihood = replace(spiked.density.likelihood, oscillator=oscillator)
     assert (
-        beside_spikes(replace(spiked, target=replace(spiked.target, likelihood=likelihood))) is None
+        beside_spikes(replace(spiked, density=replace(spiked.density, likelihood=likelihood)))
+        is None
     )
 
 
-def test_of_displacements_there_is_nothing_to_pose_anew() -> None:
+def test_of_displacements_there_is_nothing_to_revise() -> None:
     fit = identify(small_rig.record(5, CUBIC), rng=RNG(0), search=False).fit
     found = fit_from(fit, [BY_ID["spring_cubic"]], {}, campaign_scales(fit)).fit
-    state: Any = SimpleNamespace(candidate=SimpleNamespace(fit=found), is_white=True)
-    assert not is_spoilt(fit, found)
-    assert posed_anew(fit, state, pytest.fail) is None
+    examined: Any = SimpleNamespace(candidate=SimpleNamespace(fit=found), is_white=True)
+    assert not has_bad_readings(fit, found)
+    assert revised(fit, examined, pytest.fail) is None
 
 
-def test_draws_have_the_spread_of_the_approximation_whatever_the_units(good: Fit) -> None:
+def test_draws_have_the_covariance_of_the_approximation_whatever_the_units(good: Fit) -> None:
     """Of scales ten decades apart; standard errors of 2,000 draws."""
     units = np.where(np.arange(good.mode.size) % 2 == 0, 1e6, 1e-6)
     scaled = replace(
@@ -129,7 +133,7 @@ def test_draws_have_the_spread_of_the_approximation_whatever_the_units(good: Fit
 
 
 @dataclass(frozen=True)
-class MadeUpNaming:
+class MadeUpSelection:
     """Which search it is of: the first, the one posed anew, or the first gone on."""
 
     of: str
@@ -162,27 +166,27 @@ def test_which_search_answers(
 
         def found(self, base: Any, first: Any) -> tuple[Any, Any]:
             self.was_cut = cut and not self.is_last
-            state = SimpleNamespace(
+            examined = SimpleNamespace(
                 candidate=SimpleNamespace(fit="reached", effects=()), is_white=white
             )
-            return base, state
+            return base, examined
 
-        def naming(self, base: Any, state: Any) -> MadeUpNaming:
+        def selection(self, base: Any, examined: Any) -> MadeUpSelection:
             first = "first to its end" if self.is_last else "first"
-            return MadeUpNaming(first if self is made[0] else "anew")
+            return MadeUpSelection(first if self is made[0] else "anew")
 
-    anew = (
+    revision = (
         SimpleNamespace(base="clean", first=None, faults=("spike",), band_limited=True)
         if posed
         else None
     )
     monkeypatch.setattr(search, "_Search", Search)
-    monkeypatch.setattr(search, "posed_anew", lambda *about: anew)
+    monkeypatch.setattr(search, "revised", lambda *about: revision)
     monkeypatch.setattr(search, "_beside_hums", lambda *about: None)
     fit: Any = "base"
     scales: Any = None
-    found: Any = search.name(fit, (), scales, rng=RNG(0))
-    assert found == MadeUpNaming(of, *((("spike",), True) if of == "anew" else ()))
+    found: Any = search.select_model(fit, (), scales, rng=RNG(0))
+    assert found == MadeUpSelection(of, *((("spike",), True) if of == "anew" else ()))
 
 
 def test_a_reading_across_the_jump_of_an_onset_is_no_spike(across: Fit) -> None:

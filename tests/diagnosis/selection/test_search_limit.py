@@ -11,7 +11,7 @@ from effect_rigs import BY_ID
 from bayesimpact.diagnosis.budget import PATIENCE, begin
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.selection.decision import decide
-from bayesimpact.diagnosis.selection.search import name
+from bayesimpact.diagnosis.selection.search import select_model
 from bayesimpact.inference.identify import identify
 
 CATALOGUE = [BY_ID[i] for i in ("coulomb_friction", "quadratic_drag", "spring_cubic")]
@@ -27,7 +27,7 @@ def searched(*, looks: int):
     times = itertools.chain([0.0] * (3 + looks), itertools.repeat(PATIENCE + 1.0))
     scales = campaign_scales(fit)
     budget = begin(lambda: next(times))
-    return name(fit, CATALOGUE, scales, rng=np.random.default_rng(0), budget=budget)
+    return select_model(fit, CATALOGUE, scales, rng=np.random.default_rng(0), budget=budget)
 
 
 def test_without_time_nothing_is_fitted_and_nothing_named() -> None:

@@ -15,9 +15,9 @@ from bayesimpact.diagnosis.thresholds import DECISIVE
 
 search = importlib.import_module("bayesimpact.diagnosis.selection.search")
 models = importlib.import_module("bayesimpact.diagnosis.selection.models")
-naming = importlib.import_module("bayesimpact.diagnosis.selection.outcome")
+selection = importlib.import_module("bayesimpact.diagnosis.selection.outcome")
 ranked = importlib.import_module("bayesimpact.diagnosis.selection.ranked")
-settle = importlib.import_module("bayesimpact.diagnosis.selection.elimination")
+elimination = importlib.import_module("bayesimpact.diagnosis.selection.elimination")
 remaining = importlib.import_module("bayesimpact.diagnosis.selection.remaining")
 
 
@@ -50,25 +50,25 @@ def run(monkeypatch):
 
         monkeypatch.setattr(remaining, "with_force", with_force)
         for rule in ("may_be_needed", "is_needed", "is_told_apart"):
-            monkeypatch.setattr(remaining, rule, lambda naming, effect: True)
-        monkeypatch.setattr(remaining, "is_imitated", lambda naming: False)
+            monkeypatch.setattr(remaining, rule, lambda selection, effect: True)
+        monkeypatch.setattr(remaining, "is_imitated", lambda selection: False)
         monkeypatch.setattr(search, "promising_pairs", lambda scan, count: ())
-        monkeypatch.setattr(search, "posed_anew", lambda *about: None)
-        monkeypatch.setattr(search, "is_spoilt", lambda base, fit: False)
-        monkeypatch.setattr(settle, "is_at_an_end", lambda fit, effect: False)
+        monkeypatch.setattr(search, "revised", lambda *about: None)
+        monkeypatch.setattr(search, "has_bad_readings", lambda base, fit: False)
+        monkeypatch.setattr(elimination, "is_at_an_end", lambda fit, effect: False)
         for force in ("missing_force", "missing_drift"):
             monkeypatch.setattr(models, force, table.missing)
         monkeypatch.setattr(
             search, "base_candidate", lambda fit: table.candidate((), table.gain(()))
         )
         fit = SimpleNamespace(reduced_chi2=1.0)
-        return search.name(fit, effects, None, rng=np.random.default_rng(0))
+        return search.select_model(fit, effects, None, rng=np.random.default_rng(0))
 
     return go
 
 
-def chosen(naming) -> set[str]:
-    return set(naming.chosen.candidate.ids)
+def chosen(selection) -> set[str]:
+    return set(selection.chosen.candidate.ids)
 
 
 def test_nothing_is_fitted_where_nothing_is_missing(run):
@@ -85,7 +85,7 @@ def test_where_the_misfit_is_large_what_gains_most_per_effect_comes_first(run):
 
 
 @pytest.mark.parametrize("most", [ENOUGH, 320.0])
-def test_climbs_have_the_goal_to_come_near_what_they_are_compared_with(run, most):
+def test_ascents_have_the_goal_to_come_near_what_they_are_compared_with(run, most):
     """A model that leaves nothing, or the one that is exchanged; effects alone have none."""
     gains = {A: 300.0, B: 20.0, f"{A} {B}": most, f"{A} {C}": 310.0, f"{B} {D}": 310.0}
     table = Table(gains, chi2=100.0)
@@ -202,7 +202,7 @@ def test_what_an_effect_refines_is_tried_in_its_place_whatever_scores_say(run, m
     power = BY_ID["power_damping"]
     table = Table({A: 10.0, f"{A} {power.id}": ENOUGH, f"{A} {B}": ENOUGH + 4.0}, chi2=100.0,
                   asked=(A, f"{A} {power.id}"), seen={C: 1.0}, first=1)  # fmt: skip
-    monkeypatch.setattr(settle, "in_place_of", lambda *known: [])
+    monkeypatch.setattr(elimination, "in_place_of", lambda *known: [])
     assert chosen(run(table, (*EFFECTS, power))) == {A, B}
 
 
@@ -248,7 +248,7 @@ def test_an_exchange_replaces_an_imitation(run):
 
 
 def test_what_the_last_exchange_leads_to_is_rid_of_what_it_does_not_need(run, monkeypatch):
-    monkeypatch.setattr(settle, "EXCHANGES", 1)
+    monkeypatch.setattr(elimination, "EXCHANGES", 1)
     pairs = {f"{A} {C}": 450.0, f"{A} {B}": 440.0, f"{B} {C}": 430.0, f"{B} {D}": 560.0}
     table = Table(
         {A: 400.0, C: 380.0, B: 300.0, D: 100.0, f"{A} {B} {C}": 520.0} | pairs,
@@ -299,7 +299,7 @@ def test_the_search_ends_when_a_free_force_explains_what_is_left(run):
 
 def test_a_force_in_place_of_all_effects_counts_each_independent_sample_once(run, monkeypatch):
     """As the odds of models do: else it ends a search whose next step explains all."""
-    for module in (ranked, naming):
+    for module in (ranked, selection):
         monkeypatch.setattr(module, "tempered_evidence", lambda model, n: model.log_evidence / n)
     table = Table({A: 100.0, f"{A} {B}": ENOUGH}, force=1000.0)
     assert chosen(run(table, repetition=10.0)) == {A, B}
@@ -346,21 +346,21 @@ def test_what_cannot_overtake_the_best_is_not_fitted(run):
     assert frozenset({B, C}) not in table.fitted and frozenset({B, D}) in table.fitted
 
 
-def test_a_climb_that_gave_up_near_the_best_is_finished_before_it_loses(run):
+def test_an_ascent_that_gave_up_near_the_best_is_finished_before_it_loses(run):
     table = Table({A: 480.0, B: 520.0, C: 300.0}, unfinished={A: 60.0, C: 400.0})
     assert chosen(run(table)) == {A}
     assert table.finished == [frozenset({A})]  # once, and none that is far behind
 
 
 @pytest.mark.parametrize(("beside", "finished"), [(0.0, True), (20.0, False)])
-def test_the_best_model_s_valley_is_followed_where_that_may_be_all_it_lacks(run, beside, finished):
+def test_the_best_model_s_profile_is_followed_where_that_may_be_all_it_lacks(run, beside, finished):
     """A free force beside it gains 50 nats, or 70: more than an unconverged climb fell short of."""
     table = Table({A: 470.0}, force=520.0, beside=beside, unfinished={A: 40.0})
     assert run(table).chosen.is_white == finished
     assert table.finished == [frozenset({A})] * finished
 
 
-def test_no_valley_is_followed_where_a_free_force_wins_anyhow(run):
+def test_no_profile_is_followed_where_a_free_force_wins_anyhow(run):
     table = Table({A: 100.0, B: 120.0}, force=900.0, unfinished={A: 60.0})
     assert chosen(run(table)) != {A}
     assert table.finished == []
@@ -411,7 +411,7 @@ def test_where_something_remains_the_law_that_an_effect_refines_is_fitted_in_its
     run, monkeypatch
 ):
     """Though neither scores nor time ask for it: no law is told from one that was not fitted."""
-    monkeypatch.setattr(search._Search, "smaller", lambda self, state: [])
+    monkeypatch.setattr(search._Search, "smaller", lambda self, examined: [])
     power = "power_damping"
     table = Table({power: 300.0, C: 280.0, f"{power} {C}": 450.0}, chi2=4.0)
     found = run(table, effects=(BY_ID[power], BY_ID[B], BY_ID[C]))

@@ -137,7 +137,7 @@ def test_a_preloaded_rig_in_detail(g: float) -> None:
     assert found.y0["b"] == pytest.approx(-5e-3, abs=3e-5)
 
 
-def test_few_noisy_swings() -> None:
+def test_few_noisy_half_cycles() -> None:
     """Flights alone tell k1 to 4 % here, since the rest reading is open; the cycles settle both."""
     off = []
     for seed in range(12):

@@ -30,7 +30,7 @@ def test_a_fit_that_lost_the_stop_finds_it_again(monkeypatch: Any) -> None:
     lost = fit.mode.copy()
     for name, value in (("g", 0.02), ("k2[1]", 1.0), ("k2[2]", 1.0), ("c2", 0.0), ("k1", 950.0)):
         lost[fit.names.index(name)] = value
-    bad = from_periods.find_mode(fit.target, lost)
+    bad = from_periods.find_mode(fit.density, lost)
     assert bad.rms > FAR * bad.signal
     found = or_by_periods(bad)
     assert found.log_posterior == pytest.approx(fit.log_posterior, abs=0.1)
@@ -47,7 +47,7 @@ def test_one_that_explains_most_or_has_no_stop_stays(monkeypatch: Any) -> None:
     fit = fitted()
     assert or_by_periods(fit) is fit
     plain = fitted(rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES)
-    wrong = from_periods.find_mode(plain.target, plain.mode * 1.3, max_iterations=0)
+    wrong = from_periods.find_mode(plain.density, plain.mode * 1.3, max_iterations=0)
     assert wrong.rms > FAR * wrong.signal and or_by_periods(wrong) is wrong
 
 
@@ -66,13 +66,13 @@ def test_a_gap_is_reached_from_rest_and_has_any_name() -> None:
     fit = fitted()
     far = {n: 0.05 for n in fit.names if n.startswith("offset[")}
     recordings = tuple(
-        replace(r, samples=r.samples + 0.05) for r in fit.target.oscillator.campaign.recordings
+        replace(r, samples=r.samples + 0.05) for r in fit.density.oscillator.campaign.recordings
     )
-    oscillator = fit.target.oscillator
+    oscillator = fit.density.oscillator
     oscillator = replace(oscillator, campaign=replace(oscillator.campaign, recordings=recordings))
     mode = fit.mode + np.array([far.get(n, 0.0) for n in fit.names])
-    likelihood = replace(fit.target.likelihood, oscillator=oscillator)
-    moved = replace(fit, target=replace(fit.target, likelihood=likelihood), mode=mode)
+    likelihood = replace(fit.density.likelihood, oscillator=oscillator)
+    moved = replace(fit, density=replace(fit.density, likelihood=likelihood), mode=mode)
     for one in (fit, moved):
         (_, start) = from_periods._starts(one)
         assert 1e-3 < start[one.names.index("g")] < 4e-3

@@ -15,7 +15,7 @@ from bayesimpact.inference.initial.multiple_shooting import MultipleShooting, mu
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.model.oscillator import build_oscillator
-from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 
 TRUE = small_rig.true_values()
 
@@ -128,7 +128,7 @@ def test_another_quantity_begins_anew_where_its_integral_says(
     """
     sums, sizes = np.zeros(2), 0.0
     for seed in range(4):
-        chain = Chain(noise=noise, offsets={})
+        chain = MeasuringChain(noise=noise, offsets={})
         campaign = small_rig.record(seed, chain=chain, quantity=quantity)
         whole = Likelihood(build_oscillator(campaign), Noise(level=noise))
         names = whole.oscillator.layout.names

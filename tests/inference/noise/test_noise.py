@@ -8,7 +8,7 @@ from scipy.linalg import toeplitz
 
 from bayesimpact.data.campaign import Smoothing
 from bayesimpact.inference.noise.whitening import Noise
-from bayesimpact.model.measurement import gain, smooth
+from bayesimpact.model.measurement import magnitude_response, smooth
 
 INTERVAL = 1e-3
 SAVGOL = Smoothing("savgol", window=21, polyorder=2)
@@ -189,7 +189,7 @@ def test_the_highest_frequency_known_is_the_filters_half_power_one(smoothing):
     n = 4000
     highest = Noise(0.3, smoothing).highest(n, INTERVAL)
     near = highest + np.array([0.0, 2.0]) / (n * INTERVAL)
-    kept, lost = gain(smoothing, INTERVAL, near) ** 2
+    kept, lost = magnitude_response(smoothing, INTERVAL, near) ** 2
     assert kept >= 0.5 > lost
     assert Noise(0.3).highest(n, INTERVAL) == 0.5 / INTERVAL
 

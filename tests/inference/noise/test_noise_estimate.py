@@ -15,7 +15,7 @@ from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 from bayesimpact.inference.noise.estimate import estimate_noise, unfiltered_noise
 from bayesimpact.inference.noise.whitening import Noise
-from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 from bayesimpact.trial.rig.recordings import Release, Rig
 
 STIFF = Rig(mass=0.1, c1=0.05, k1=2000.0, c2=1.0, g=5e-4, k2={"1": 60_000.0})
@@ -30,7 +30,9 @@ RIGS = {
 @cache
 def silent(name: str) -> Campaign:
     rig, releases, rate, duration = RIGS[name]
-    return small_rig.record(rig=rig, releases=releases, chain=Chain(), rate=rate, duration=duration)
+    return small_rig.record(
+        rig=rig, releases=releases, chain=MeasuringChain(), rate=rate, duration=duration
+    )
 
 
 def noisy(campaign: Campaign, rho: float, sigma: float, seed: int) -> list[Recording]:

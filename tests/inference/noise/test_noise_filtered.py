@@ -15,7 +15,7 @@ from bayesimpact.inference.identify import identify
 from bayesimpact.inference.noise.estimate import estimate_noise
 from bayesimpact.inference.noise.spectrum import smoothed_noise
 from bayesimpact.model.measurement import smooth
-from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 
 LEVELS = {"displacement": 5e-6, "velocity": 2e-4, "acceleration": 1e-2}
 QUANTITIES = tuple(LEVELS)
@@ -66,7 +66,7 @@ def test_the_level_in_decays(stop, quantity, force):
         effects={"coulomb_friction": {"force": force}} if force else None,
         rig=small_rig.RIG if stop else small_rig.PLAIN,
         releases=small_rig.RELEASES if stop else small_rig.PLAIN_RELEASES,
-        chain=Chain(), duration=4.0, quantity=quantity,
+        chain=MeasuringChain(), duration=4.0, quantity=quantity,
     )  # fmt: skip
     rng, level = np.random.default_rng(0), LEVELS[quantity]
     noisy = [

@@ -12,7 +12,7 @@ from driven_rigs import driven_rig
 from bayesimpact.inference.noise.estimate import estimate_noise, unfiltered_noise
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.oscillator import build_oscillator
-from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 
 LEVELS = {"velocity": 2e-4, "acceleration": 1e-2}
 SEEDS = 6
@@ -27,7 +27,8 @@ def _z(name: str, quantity, rate: float, force: float) -> np.ndarray:
     rig, releases = RIGS[name]
     campaign = small_rig.record(
         effects={"coulomb_friction": {"force": force}} if force else None,
-        rig=rig, releases=releases, chain=Chain(), rate=rate, duration=4.0, quantity=quantity,
+        rig=rig, releases=releases, chain=MeasuringChain(), rate=rate, duration=4.0,
+        quantity=quantity,
     )  # fmt: skip
     level, z = LEVELS[quantity], []
     for seed in range(SEEDS):

@@ -17,7 +17,7 @@ from bayesimpact.inference.noise.refined import (
     rounding_variance,
 )
 from bayesimpact.inference.noise.whitening import Noise
-from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 
 RNG = np.random.default_rng
 RHO = 0.75
@@ -26,21 +26,21 @@ SEEDS = 12
 
 def with_noise(fit: Fit, noise: Noise) -> Fit:
     """The same fit under another description of the noise."""
-    likelihood = replace(fit.target.likelihood, noise=noise)
-    return replace(fit, target=replace(fit.target, likelihood=likelihood))
+    likelihood = replace(fit.density.likelihood, noise=noise)
+    return replace(fit, density=replace(fit.density, likelihood=likelihood))
 
 
 def moved(fit: Fit, name: str, factor: float) -> Fit:
     """The model with one parameter wrong, and what it then leaves."""
     mode = fit.mode.copy()
-    mode[fit.target.oscillator.layout.index(name)] *= factor
-    return replace(fit, mode=mode, sums=fit.target.likelihood.misfit(mode[None])[0])
+    mode[fit.density.oscillator.layout.index(name)] *= factor
+    return replace(fit, mode=mode, sums=fit.density.likelihood.misfit(mode[None])[0])
 
 
 @pytest.fixture(scope="module")
 def coloured():
     """Fits of recordings with planted AR(1) noise, described by a correlation that is too low."""
-    chain = Chain(noise=small_rig.NOISE, correlation=RHO, offsets=small_rig.OFFSETS)
+    chain = MeasuringChain(noise=small_rig.NOISE, correlation=RHO, offsets=small_rig.OFFSETS)
     start = Noise(0.6, level=4e-6, level_error=0.05, correlation_error=0.05)
     return [
         with_noise(
@@ -76,7 +76,9 @@ def test_missing_physics_does_not_colour_the_noise(coloured):
 
 def test_rounding_is_not_taken_for_a_weaker_correlation():
     digit = small_rig.NOISE
-    chain = Chain(noise=small_rig.NOISE, correlation=RHO, offsets=small_rig.OFFSETS, rounding=digit)
+    chain = MeasuringChain(
+        noise=small_rig.NOISE, correlation=RHO, offsets=small_rig.OFFSETS, rounding=digit
+    )
     start = Noise(RHO, level=small_rig.NOISE, level_error=0.05, correlation_error=0.05)
     fit = with_noise(
         identify(small_rig.record(3, chain=chain), noise=start, rng=RNG(0), search=False).fit, start
@@ -90,7 +92,7 @@ def test_rounding_is_not_taken_for_a_weaker_correlation():
 def behind_a_filter(seed: int, rho: float, hum: float = 0.0) -> Noise:
     """What is said of noise that passed a declared filter, beside a hum of 100 Hz."""
     filtered = Smoothing("savgol", window=7, polyorder=2)
-    chain = Chain(
+    chain = MeasuringChain(
         noise=small_rig.NOISE, correlation=rho, offsets=small_rig.OFFSETS, smoothing=filtered
     )
     campaign = small_rig.record(seed, chain=chain, measurement=Measurement(smoothing=filtered))
@@ -99,7 +101,7 @@ def behind_a_filter(seed: int, rho: float, hum: float = 0.0) -> Noise:
         for r in campaign.recordings
     ]
     campaign = replace(campaign, recordings=tuple(recordings))
-    return identify(campaign, rng=RNG(0), search=False).fit.target.likelihood.noise
+    return identify(campaign, rng=RNG(0), search=False).fit.density.likelihood.noise
 
 
 def test_noise_is_coloured_behind_a_filter_too():
@@ -119,15 +121,15 @@ def test_what_a_filter_leaves_of_white_noise_is_not_called_coloured(hum):
 
 def test_noise_that_is_known_stays(small, coloured):
     white = with_noise(small.fit, Noise(0.0, level=small_rig.NOISE))
-    assert refined_noise(white) is white.target.likelihood.noise
+    assert refined_noise(white) is white.density.likelihood.noise
     wrong = moved(coloured[0], "k1", 1.01)
     assert wrong.reduced_chi2 > 4
-    assert refined_noise(wrong) is wrong.target.likelihood.noise
+    assert refined_noise(wrong) is wrong.density.likelihood.noise
 
 
 def test_a_declared_level_stays(coloured):
     fit = coloured[0]
-    declared = replace(fit.target.likelihood.noise, level=4e-6, level_error=0.0)
+    declared = replace(fit.density.likelihood.noise, level=4e-6, level_error=0.0)
     found = refined_noise(with_noise(fit, declared))
     assert found.level == 4e-6 and found.level_error == 0.0
     assert found.correlation != declared.correlation

@@ -57,7 +57,7 @@ def test_what_it_leaves_is_white_and_of_unit_variance(found):
     assert stats.kstest(p_values, "uniform").pvalue > 1e-3
     variances = [float(np.mean(np.concatenate(f.residuals) ** 2)) for f in found]
     np.testing.assert_allclose(variances, 1.0, atol=0.02)
-    assert min(f.gain for f in found) > 100.0
+    assert min(f.log_evidence_gain for f in found) > 100.0
 
 
 def test_its_gain_is_the_log_likelihood_ratio_beside_few_parameters(found):
@@ -75,14 +75,14 @@ def test_its_gain_is_the_log_likelihood_ratio_beside_few_parameters(found):
     total = sum(r.samples.size for r in campaign.recordings)
     ratio = -0.5 * (total * np.log(square / plain) + volume)
     # every parameter is worth a few nats, the sixth of a percent of the whole
-    assert found[0].gain == pytest.approx(ratio, abs=5.0 * fit.mode.size)
+    assert found[0].log_evidence_gain == pytest.approx(ratio, abs=5.0 * fit.mode.size)
     assert ratio > 1000.0
 
 
 def test_white_noise_has_no_slow_part():
     found = [slow_noise(fitted(small_rig.record(seed))) for seed in range(6)]
     # two more parameters: twice the gain is chi-squared with two degrees of freedom, or less
-    assert stats.chi2.sf(2 * max(f.gain for f in found), 2) > 1e-4 / 6
+    assert stats.chi2.sf(2 * max(f.log_evidence_gain for f in found), 2) > 1e-4 / 6
 
 
 @pytest.mark.parametrize(

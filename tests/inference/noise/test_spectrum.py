@@ -13,7 +13,7 @@ from bayesimpact.data.campaign import Smoothing
 from bayesimpact.data.recording import Recording
 from bayesimpact.inference.noise.spectrum import find_smoothing, nulls, smoothed_noise
 from bayesimpact.inference.noise.whitening import Noise
-from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 from bayesimpact.trial.rig.recordings import Release
 
 FILTERS = [(9, 0), (7, 2), (11, 2), (15, 4), (21, 2), (31, 4), (25, 6)]
@@ -21,7 +21,7 @@ FILTERS = [(9, 0), (7, 2), (11, 2), (15, 4), (21, 2), (31, 4), (25, 6)]
 
 @pytest.fixture(scope="module")
 def silent():
-    return small_rig.record(chain=Chain())
+    return small_rig.record(chain=MeasuringChain())
 
 
 def noisy(silent, seed: int, rho: float = 0.0, sigma: float = small_rig.NOISE) -> list[Recording]:
@@ -69,7 +69,7 @@ def test_rounding_and_a_lag_are_no_such_filter(silent):
     rounded = [replace(r, samples=np.round(r.samples / digit) * digit) for r in noisy(silent, 1)]
     assert find_smoothing(rounded) is None
     lag = Smoothing("lag", time_constant=2e-3)
-    chain = Chain(noise=small_rig.NOISE, smoothing=lag, offsets=small_rig.OFFSETS)
+    chain = MeasuringChain(noise=small_rig.NOISE, smoothing=lag, offsets=small_rig.OFFSETS)
     assert find_smoothing(small_rig.record(chain=chain).recordings) is None
 
 
@@ -97,7 +97,7 @@ def test_a_hum_is_no_filter(frequency, seed):
     heights = zip("abcd", (-6.5e-3, -5e-3, 4e-3, 3e-3), strict=True)
     plain = small_rig.record(
         rig=small_rig.PLAIN, releases=[Release(name, "", y) for name, y in heights],
-        chain=Chain(), rate=500.0, duration=7.5,
+        chain=MeasuringChain(), rate=500.0, duration=7.5,
     )  # fmt: skip
     rng = np.random.default_rng(seed)
     hummed = []

@@ -67,7 +67,7 @@ def test_effective_size_of_an_autoregressive_process(rho):
 
 
 @pytest.mark.parametrize(("share", "steps"), [(0.8, 150), (0.2, 300)])
-def test_effective_size_is_honest_for_interacting_walkers(share, steps):
+def test_effective_size_is_unbiased_for_interacting_walkers(share, steps):
     """ESS from one run against the error of the mean over replicated runs of the real move set."""
     dimension, walkers, replicates = 10, 22, 30
     frame = Frame(np.zeros(dimension), np.eye(dimension))

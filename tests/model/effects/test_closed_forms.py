@@ -36,7 +36,7 @@ def one(name: str, rig: TestRig, r: int = 0, **numbers: float) -> np.ndarray:
     return moved([BY_ID[name]], values, rig, r)
 
 
-def test_friction_takes_the_same_from_every_half_swing_and_then_holds():
+def test_friction_takes_the_same_from_every_half_cycle_and_then_holds():
     """|y| falls by 2 F / k1 per half-period (Den Hartog 1931); here a half-period is 0.1 s."""
     force = 0.11
     y = one("coulomb_friction", FREE, force=force)
@@ -94,22 +94,22 @@ def test_unilateral_contact(m2):
     )
     start = np.array([rig.y0[0], rig.v0[0], 1.0])
     touch = brentq(lambda t: (expm(free * t) @ start)[0] - rig.g, 0, 0.02, xtol=1e-16)
-    at_touch = expm(free * touch) @ start
-    at_touch[1] *= rig.mass / total
+    at_onset = expm(free * touch) @ start
+    at_onset[1] *= rig.mass / total
 
     def push(t: float) -> float:
-        state = expm(pressed * t) @ at_touch
+        state = expm(pressed * t) @ at_onset
         return m2 * (pressed @ state)[1] + rig.c2 * state[1] + k2 * (state[0] - rig.g)
 
     release = brentq(push, 0.01, 0.04, xtol=1e-16)
-    at_release = expm(pressed * release) @ at_touch
+    at_release = expm(pressed * release) @ at_onset
     assert at_release[0] > rig.g  # before the gap
     expected = []
     for t in np.arange(rig.count) / rig.rate:
         if t < touch:
             state = expm(free * t) @ start
         elif t < touch + release:
-            state = expm(pressed * (t - touch)) @ at_touch
+            state = expm(pressed * (t - touch)) @ at_onset
         else:
             state = expm(free * (t - touch - release)) @ at_release
         expected.append(state[0])

@@ -115,8 +115,8 @@ def test_dry_friction_of_a_box(place, side):
     term = Term("box", speed=Power(0.0, True), side=side, place=place, width=w)
     pad = effect_of(term, force, a, 10 * np.pi * a, signed=False)
     values = {f"{pad.id}.size": force} | starts_of(term)
-    half_swings = np.abs(moved([pad], values, FREE, 0)[::100])  # k1 is 10 pi: 0.1 s each
-    expected = np.sqrt(a * a - 4 * np.arange(half_swings.size) * w * force / FREE.k1)
+    half_cycles = np.abs(moved([pad], values, FREE, 0)[::100])  # k1 is 10 pi: 0.1 s each
+    expected = np.sqrt(a * a - 4 * np.arange(half_cycles.size) * w * force / FREE.k1)
     through = expected > place + w
     assert np.count_nonzero(through) > 8
-    np.testing.assert_allclose(half_swings[through], expected[through], rtol=1e-5)
+    np.testing.assert_allclose(half_cycles[through], expected[through], rtol=1e-5)

@@ -216,7 +216,7 @@ def test_surfaces_at_one_place():
 
 
 def test_a_motion_that_takes_far_too_many_steps_is_given_up() -> None:
-    """A climb may ask for any size: a body so fast would take minutes for two seconds."""
+    """An ascent may ask for any size: a body so fast would take minutes for two seconds."""
     rig, effect = TestRig(duration=2.0), BY_ID["obstacle_mode"]
     values = {name: 1e4 * value for name, value in typical(effect, rig).items()}
     assert np.isnan(moved([effect], values, rig)).all()

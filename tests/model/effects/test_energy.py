@@ -106,7 +106,7 @@ def lower_turns(y: np.ndarray) -> np.ndarray:
     [e for e in MOVING if e.energy == "dissipates" and e.id not in GIVE_BACK],
     ids=lambda e: e.id,
 )
-def test_swings_become_smaller(effect):
+def test_amplitudes_decrease(effect):
     """Without other damping (but c2 for an obstacle that cannot pull) every swing is smaller."""
     c2 = 2.0 if effect.id == "contact_no_tension" else 0.0
     rig = TestRig(c1=0.0, c2=c2, k2=(5350.0,), y0=(-6.5e-3,), v0=(0.0,), rate=10000.0, duration=1.5)

@@ -144,7 +144,7 @@ def preload_force(y, v, d, t, z, touching, p, q):
     return p[0]
 
 
-def test_a_force_that_sets_in_at_the_touch():
+def test_a_force_that_sets_in_at_the_onset():
     """A preloaded obstacle: its force jumps where contact begins, and where it ends."""
     own, values = effect(Law(preload_force, where="contact"), 0.4)
     touching = lambda y: 0.4 if y > RIG.g else 0.0  # noqa: E731

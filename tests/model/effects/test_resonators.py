@@ -31,7 +31,7 @@ def test_two_contacts_and_the_flights_around_them(frequency, damping):
     pressed[1, [0, 1, 4]] -= np.array([rig.k2[0], rig.c2, -rig.k2[0] * rig.g]) / rig.mass
     pressed[1] += mass / rig.mass * np.array([-W, -drag, W, drag, W * rig.g])
     state, t, rates = np.array([rig.y0[0], rig.v0[0], 0.0, 0.0, 1.0]), 0.0, free
-    times, expected, touches = np.arange(rig.count) / rig.rate, [], 0
+    times, expected, contacts = np.arange(rig.count) / rig.rate, [], 0
     while len(expected) < rig.count:
         later, step, sign = 2e-3, expm(rates * 2e-4), 1.0 if rates is free else -1.0
         ahead = expm(rates * later) @ state
@@ -46,9 +46,9 @@ def test_two_contacts_and_the_flights_around_them(frequency, damping):
         inside = inside[inside < t + wait]
         expected += [(expm(rates * (s - t)) @ state)[0] for s in inside]
         state, t = expm(rates * wait) @ state, t + wait
-        touches += rates is free
+        contacts += rates is free
         rates = pressed if rates is free else free
-    assert touches >= 2
+    assert contacts >= 2
     assert np.abs(state[2]) > 1e-6 or damping > 1
     np.testing.assert_allclose(y, expected, rtol=0, atol=1e-12)
 

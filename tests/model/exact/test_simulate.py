@@ -146,7 +146,7 @@ def test_impacts_between_samples(stop, coarse):
     np.testing.assert_allclose(every.impacts[:, 0], fine.impacts[:, 0], rtol=1e-12)
 
 
-def test_double_touch_within_one_interval():
+def test_two_contacts_within_one_interval():
     """A stiff stop is entered and left twice between two samples."""
     p = RIG | {"k2": 1e8, "c2": 0.0, "g": -6e-3, "y0": -6.2e-3, "interval": 0.04, "n": 2}
     motion = simulate(**p)

@@ -35,11 +35,11 @@ def test_every_way_to_simulate_counts(effects: tuple[Any, ...]) -> None:
     """By the closed form and by the general law, with derivatives and without."""
     campaign = small_rig.record(5, duration=0.5)
     fit = identify(campaign, rng=np.random.default_rng(0), search=False).fit
-    target = extend(fit, effects, campaign_scales(fit)) if effects else fit.target
-    theta = np.concatenate([fit.mode, np.zeros(target.priors.lower.size - fit.mode.size)])
+    density = extend(fit, effects, campaign_scales(fit)) if effects else fit.density
+    theta = np.concatenate([fit.mode, np.zeros(density.priors.lower.size - fit.mode.size)])
     steps = np.full(theta.size, 1e-6) if effects else None
-    likelihood = target.likelihood
-    for work in (target.oscillator.predict, lambda x: likelihood.linearise(x, steps)):
+    likelihood = density.likelihood
+    for work in (density.oscillator.predict, lambda x: likelihood.linearise(x, steps)):
         with workload_counted() as first:
             work(theta)
         with workload_counted() as second:

@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 import bayesimpact.trial
 from bayesimpact.errors import InputError
 from bayesimpact.trial.bundle import PAPER_RIG
-from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 from bayesimpact.trial.rig.recordings import Release, Rig, make_campaign, motion, record
 
 PLAIN = Rig(mass=0.503, c1=0.148, k1=808.556)
@@ -150,7 +150,7 @@ def test_overdamped_contact():
 
 def test_same_generator_state_same_bits_and_order_matters():
     releases = [Release("a", "1", -5e-3), Release("b", "3", -4e-3)]
-    chain = Chain(noise=5e-6, correlation=0.3, offsets={"a": 1e-5})
+    chain = MeasuringChain(noise=5e-6, correlation=0.3, offsets={"a": 1e-5})
 
     def campaign(seed, order):
         rng = np.random.default_rng(seed)

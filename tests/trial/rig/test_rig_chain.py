@@ -8,7 +8,7 @@ import pytest
 from bayesimpact.data.campaign import Smoothing
 from bayesimpact.errors import InputError
 from bayesimpact.trial.bundle import PAPER_RIG
-from bayesimpact.trial.rig.measuring_chain import Chain, Probe, measure, smooth
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain, Probe, measure, smooth
 from bayesimpact.trial.rig.recordings import Release, motion, record
 
 RELEASE = Release("r", "1", -5e-3)
@@ -51,25 +51,28 @@ def test_perfect_chain_returns_the_motion(truth):
 def test_probe_distorts_the_true_displacement_before_the_offset(
     truth, effect, parameters, expected
 ):
-    got = recorded({effect: parameters}, Chain(offsets={"r": 1e-3}))
+    got = recorded({effect: parameters}, MeasuringChain(offsets={"r": 1e-3}))
     want = expected(truth.displacement, truth.times) + 1e-3
     assert np.abs(got - want).max() < 1e-17
     assert np.abs(want - 1e-3 - truth.displacement).max() > 4e-6
 
 
 def test_offset_belongs_to_its_recording(truth):
-    assert np.array_equal(recorded(chain=Chain(offsets={"other": 1e-3})), truth.displacement)
+    assert np.array_equal(
+        recorded(chain=MeasuringChain(offsets={"other": 1e-3})), truth.displacement
+    )
 
 
 @pytest.mark.parametrize("smoothing", [SAVGOL, LAG])
 def test_noise_then_smoothing_then_rounding(smoothing):
-    raw = recorded(chain=Chain(noise=5e-6, offsets={"r": 2e-5}))
+    raw = recorded(chain=MeasuringChain(noise=5e-6, offsets={"r": 2e-5}))
     filtered = smooth(raw, smoothing, 1e-3)
     assert np.array_equal(
-        recorded(chain=Chain(noise=5e-6, offsets={"r": 2e-5}, smoothing=smoothing)), filtered
+        recorded(chain=MeasuringChain(noise=5e-6, offsets={"r": 2e-5}, smoothing=smoothing)),
+        filtered,
     )
     digit = 2.5e-6
-    chain = Chain(noise=5e-6, offsets={"r": 2e-5}, smoothing=smoothing, rounding=digit)
+    chain = MeasuringChain(noise=5e-6, offsets={"r": 2e-5}, smoothing=smoothing, rounding=digit)
     rounded = recorded(chain=chain)
     assert np.abs(rounded / digit - np.round(rounded / digit)).max() < 1e-9
     assert 0.45 * digit < np.abs(rounded - filtered).max() <= 0.5 * digit * (1 + 1e-9)
@@ -94,11 +97,11 @@ def test_lag_is_the_recursion_that_its_docstring_states():
 
 
 def test_concealed_chain_effects_equal_the_open_ones():
-    open_chain = Chain(noise=5e-6, correlation=0.6, smoothing=SAVGOL)
+    open_chain = MeasuringChain(noise=5e-6, correlation=0.6, smoothing=SAVGOL)
     hidden = {"smoothing": {"window": 21, "order": 2}, "noise_correlated": {"correlation": 0.6}}
-    assert np.array_equal(recorded(hidden, Chain(noise=5e-6)), recorded(chain=open_chain))
+    assert np.array_equal(recorded(hidden, MeasuringChain(noise=5e-6)), recorded(chain=open_chain))
     hidden = {"smoothing": {"time_constant": 3e-3}}
-    assert np.array_equal(recorded(hidden), recorded(chain=Chain(smoothing=LAG)))
+    assert np.array_equal(recorded(hidden), recorded(chain=MeasuringChain(smoothing=LAG)))
     with pytest.raises(InputError, match="only one"):
         recorded(hidden, open_chain)
 
@@ -109,7 +112,7 @@ def test_concealed_chain_effects_equal_the_open_ones():
 def test_noise_is_stationary_with_the_stated_correlation(correlation, white):
     times = np.arange(500) / 1000
     rng = np.random.default_rng(5)
-    chain = Chain(noise=5e-6, correlation=correlation, white=white)
+    chain = MeasuringChain(noise=5e-6, correlation=correlation, white=white)
     noise = np.array([measure(0 * times, times, Probe(), chain, "r", rng) for _ in range(400)])
     # 200,000 samples; the effective number is smaller by (1 + phi^2)/(1 - phi^2)
     error = np.sqrt((1 + correlation**2) / (1 - correlation**2) / 2e5)
@@ -133,7 +136,7 @@ def test_noise_is_stationary_with_the_stated_correlation(correlation, white):
 )
 def test_impossible_filters_are_refused(smoothing):
     with pytest.raises(InputError, match="smoothing"):
-        recorded(chain=Chain(smoothing=smoothing))
+        recorded(chain=MeasuringChain(smoothing=smoothing))
 
 
 @pytest.mark.parametrize(
@@ -141,4 +144,4 @@ def test_impossible_filters_are_refused(smoothing):
 )
 def test_impossible_chains_are_refused(bad):
     with pytest.raises(InputError, match=next(iter(bad))):
-        Chain(**bad)
+        MeasuringChain(**bad)

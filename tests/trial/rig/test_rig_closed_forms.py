@@ -19,9 +19,9 @@ def test_gap_of_the_ith_contact_is_g_plus_i_steps():
     run = motion(PAPER_RIG, RELEASE, {"gap_wear": {"step": 2e-5}}, rate=1e5, duration=1)
     gaps = 1.1e-3 + 2e-5 * np.arange(len(run.onsets))
     assert len(run.onsets) > 6
-    at_touch = np.interp(run.onsets, run.times, run.displacement)
+    at_onset = np.interp(run.onsets, run.times, run.displacement)
     at_leave = np.interp(run.ends, run.times, run.displacement)
-    assert np.abs(at_touch - gaps).max() < 1e-9
+    assert np.abs(at_onset - gaps).max() < 1e-9
     assert np.abs(at_leave - gaps[: at_leave.size]).max() < 1e-9
 
 

@@ -12,7 +12,7 @@ from bayesimpact.data.read import load_campaign
 from bayesimpact.data.recording import Recording
 from bayesimpact.trial.bundle import PAPER_BEAMS, PAPER_RIG
 from bayesimpact.trial.rig.files import write_campaign
-from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 from bayesimpact.trial.rig.recordings import Release, make_campaign
 
 
@@ -23,7 +23,7 @@ def campaign():
         'a "quoted" näme',
         PAPER_RIG,
         releases,
-        chain=Chain(noise=5e-6),
+        chain=MeasuringChain(noise=5e-6),
         rate=1024,
         duration=1,
         rng=np.random.default_rng(0),

@@ -8,7 +8,7 @@ from naive_rig import NaiveRig
 from scipy.special import ellipk
 
 from bayesimpact.trial.bundle import PAPER_RIG
-from bayesimpact.trial.rig.measuring_chain import Chain
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 from bayesimpact.trial.rig.recordings import Release, Rig, motion, record
 
 INERTIA, K1 = 0.04, 0.04 * 6.0**2
@@ -61,7 +61,7 @@ def test_a_rest_before_the_release() -> None:
     """
     start = Release("r", "1", -0.5)
     effects = {"pendulum_sine": {"stiffness": K1}, "sensor_drift": {"rate": 1e-2}}
-    chain = Chain(offsets={"r": 0.02})
+    chain = MeasuringChain(offsets={"r": 0.02})
     rng = np.random.default_rng(0)
     plain = record(FAR, start, effects, chain, rate=100, duration=1.0, rng=rng)
     rested = record(FAR, start, effects, chain, rate=100, duration=1.0, rng=rng, rest=0.3)

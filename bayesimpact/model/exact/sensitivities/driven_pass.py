@@ -160,10 +160,10 @@ def driven_sensitivity_pass(
         if contact:
             side, level, beta, K = 1, contact_constant, touching.beta, touching.K
         # of an acceleration the input is a part, and a probe may see the base move
-        pushed = per_mass * wave.shown[i]
-        at_once = wave.carried[i] + (rate * rate * pushed if order == 2 else 0.0)
+        forced = per_mass * wave.shown[i]
+        at_once = wave.carried[i] + (rate * rate * forced if order == 2 else 0.0)
         fill_row(row, order, rate, beta, K, slopes, side, y, v, dy, dv, gain, at_once)
-        read = reading_driven(order, rate, beta, K, y, v, q[A] * pushed + level)
+        read = reading_driven(order, rate, beta, K, y, v, q[A] * forced + level)
         read += q[OFFSET] + q[A] * wave.carried[i]
         # here, not in a function of its own: that would take three times as long
         if data.size == 0:
