@@ -17,9 +17,7 @@ from bayesimpact.data.draft_lines import (
     channel_lines,
     input_lines,
     likely_responses,
-    one_line,
     resample_lines,
-    toml,
 )
 from bayesimpact.data.foreign import file_bytes
 from bayesimpact.data.one_sided import shortened
@@ -29,6 +27,7 @@ from bayesimpact.data.readers.channel import Channel
 from bayesimpact.data.readers.formats import is_instrument_file, read_channels
 from bayesimpact.data.readers.guess import quantity_of
 from bayesimpact.data.table import TIME_COLUMNS
+from bayesimpact.data.toml_text import one_line, toml
 from bayesimpact.errors import InputError
 
 SHORTER = 0.05

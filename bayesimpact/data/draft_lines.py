@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 
 import numpy as np
@@ -24,6 +23,7 @@ from bayesimpact.data.readers.guess import (
     other_responses,
     units_by_name,
 )
+from bayesimpact.data.toml_text import one_line, toml
 from bayesimpact.errors import InputError
 
 ASSUMED = "ASSUMED"
@@ -185,13 +185,3 @@ def _chosen(channels: Sequence[Channel], channel: Channel) -> str:
     if len(same) == 1 and not headless:
         return toml(channel.name)
     return str([c is channel for c in channels].index(True) + 1)
-
-
-def one_line(words: str) -> str:
-    """Words without what would break a comment's line."""
-    return "".join(c if c.isprintable() else " " for c in words)
-
-
-def toml(value: object) -> str:
-    """A text, a number or a truth value as TOML writes it."""
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

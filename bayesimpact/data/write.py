@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import re
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +10,7 @@ from bayesimpact.data.campaign import SECOND_STOP, Beam, Campaign, Measurement, 
 from bayesimpact.data.gaps import excluded, runs
 from bayesimpact.data.input import Input
 from bayesimpact.data.recording import Recording
+from bayesimpact.data.toml_text import one_line, toml
 from bayesimpact.errors import InputError
 
 INPUT_COLUMN = "input"
@@ -32,38 +31,38 @@ def write_campaign(
     """
     folder.mkdir(parents=True, exist_ok=True)
     lines = [f"# {line}".rstrip() for line in comment.splitlines()]
-    lines += [f"# {_one_line(note)}" for note in campaign.notes]
-    lines += [f"name = {_toml(campaign.name)}", f"mass_kg = {_toml(float(campaign.mass))}"]
+    lines += [f"# {one_line(note)}" for note in campaign.notes]
+    lines += [f"name = {toml(campaign.name)}", f"mass_kg = {toml(float(campaign.mass))}"]
     if campaign.measurement.mass_sd:
         sd = float(campaign.measurement.mass_sd * campaign.mass)
-        lines.append(f"mass_uncertainty_kg = {_toml(sd)}")
+        lines.append(f"mass_uncertainty_kg = {toml(sd)}")
     stop = "two-sided" if SECOND_STOP in campaign.declared else campaign.stop
-    lines.append(f"stop = {_toml(stop)}")
+    lines.append(f"stop = {toml(stop)}")
     if campaign.keep_faults:
         lines.append('faults = "keep"')
     for number, recording in enumerate(campaign.recordings, 1):
         file = _file_name(recording.name, number)
         lines += ["", "[[recording]]", *_named(recording.name, file)]
         if campaign.stop:
-            lines.append(f"case = {_toml(recording.case)}")
+            lines.append(f"case = {toml(recording.case)}")
         if recording.motion_name:
-            lines.append(f"motion = {_toml(recording.motion_name)}")
+            lines.append(f"motion = {toml(recording.motion_name)}")
         if recording.free_gain:
             lines.append('gain = "free"')
         if recording.input is not None:
-            lines.append(f"input = {_toml(_input(recording.input))}")
+            lines.append(f"input = {toml(_input(recording.input))}")
         if recording.used is not None:
             lines.append(excluded(recording, runs(~recording.used)))
         (folder / file).write_text(_csv(recording, decimals), encoding="utf-8", newline="\n")
     for number, (name, reason) in enumerate(campaign.skipped.items(), len(campaign.recordings) + 1):
         lines += ["", "[[recording]]", *_named(name, _file_name(name, number))]
-        lines.append(f"skip = {_toml(reason)}")
+        lines.append(f"skip = {toml(reason)}")
     lines += _measurement(campaign.measurement, campaign.recordings[0].quantity)
     if campaign.priors:
         lines += ["", "[priors]"]
-        lines += [f"{_toml(k)} = {_toml(table)}" for k, table in campaign.priors.items()]
+        lines += [f"{toml(k)} = {toml(table)}" for k, table in campaign.priors.items()]
     for case, beam in campaign.beams.items():
-        lines += ["", f"[beam.{_toml(case)}]", *_beam(beam)]
+        lines += ["", f"[beam.{toml(case)}]", *_beam(beam)]
     text = "\n".join(lines) + "\n"
     (folder / "campaign.toml").write_text(text, encoding="utf-8", newline="\n")
 
@@ -75,8 +74,8 @@ def _file_name(name: str, number: int) -> str:
 
 
 def _named(name: str, file: str) -> list[str]:
-    own = [] if Path(file).stem == name else [f"name = {_toml(name)}"]
-    return [f"file = {_toml(file)}", *own]
+    own = [] if Path(file).stem == name else [f"name = {toml(name)}"]
+    return [f"file = {toml(file)}", *own]
 
 
 def _csv(recording: Recording, decimals: int | None) -> str:
@@ -112,7 +111,7 @@ def _measurement(known: Measurement, quantity: str) -> list[str]:
     if known.unfiltered:
         lines.append('smoothing = "none"')
     if known.smoothing is not None:
-        lines.append(f"smoothing = {_toml(_smoothing(known.smoothing))}")
+        lines.append(f"smoothing = {toml(_smoothing(known.smoothing))}")
     if known.clock_sd:
         lines.append(f"clock_uncertainty_ppm = {_short(known.clock_sd * 1e6)}")
     if known.gain_sd:
@@ -155,16 +154,3 @@ def _beam(beam: Beam) -> list[str]:
 def _short(value: float) -> str:
     """A number without the rounding dirt of a change of units."""
     return repr(float(f"{value:.14g}"))
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + " }"
-    if isinstance(value, float):
-        return repr(float(value))  # NumPy's own would say its type
-    # strings, integers and truth values agree, but for a character that JSON leaves as it is
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def _one_line(words: str) -> str:
-    return "".join(c if c.isprintable() else " " for c in words)
