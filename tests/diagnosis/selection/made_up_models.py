@@ -150,3 +150,7 @@ class Table:
     def missing(self, fit, scales, *, rng):
         left = self.force - fit.gain + (self.beside if fit.ids else 0.0)
         return SimpleNamespace(p_value=0.5, log_evidence=left, gain=left + 20)
+
+
+def chosen(selection) -> set[str]:
+    return set(selection.chosen.candidate.ids)

@@ -2,143 +2,18 @@
 
 from __future__ import annotations
 
-import importlib
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from effect_rigs import BY_ID
-from made_up_models import EFFECTS, ENOUGH, A, B, C, D, N, S, Table
+from made_up_models import EFFECTS, ENOUGH, A, B, C, D, N, S, Table, chosen
 
-from bayesimpact.diagnosis.thresholds import DECISIVE
-
-search = importlib.import_module("bayesimpact.diagnosis.selection.search")
-models = importlib.import_module("bayesimpact.diagnosis.selection.models")
-selection = importlib.import_module("bayesimpact.diagnosis.selection.outcome")
-ranked = importlib.import_module("bayesimpact.diagnosis.selection.ranked")
-elimination = importlib.import_module("bayesimpact.diagnosis.selection.elimination")
-remaining = importlib.import_module("bayesimpact.diagnosis.selection.remaining")
-
-
-@pytest.fixture
-def run(monkeypatch):
-    def go(table: Table, effects=EFFECTS, repetition=1.0, refuted=None, free=None):
-        monkeypatch.setattr(models, "refit", table.refit)
-        monkeypatch.setattr(models, "without", table.without)
-        monkeypatch.setattr(models, "exchanged", table.exchanged)
-        monkeypatch.setattr(models, "fit_from", table.fit_from)
-        monkeypatch.setattr(models, "Asked", table.asks)
-        monkeypatch.setattr(models, "shakes_in_own_band", lambda fit, remains: False)
-        monkeypatch.setattr(models, "leaves_something", lambda fit: False)
-        monkeypatch.setattr(ranked, "leaves_something", lambda fit: fit.reduced_chi2 > 1.0)
-        monkeypatch.setattr(models, "is_refuted", lambda fit: fit.ids == refuted)
-        monkeypatch.setattr(models, "scan", table.scan)
-        monkeypatch.setattr(models, "profiled", table.profiled)
-        for module in (search, models):
-            monkeypatch.setattr(module, "model_evidence", lambda fit: fit.gain)
-        for module in (ranked, remaining):
-            monkeypatch.setattr(module, "discrepancy", lambda fit: None)
-        monkeypatch.setattr(search, "missing_contact", table.contact)
-        monkeypatch.setattr(search, "learn_force", lambda fit, force, scales: force.fit)
-        monkeypatch.setattr(ranked, "residual_repetition", lambda fit: repetition)
-        monkeypatch.setattr(remaining, "leaves_something", lambda fit: fit is not free)
-
-        def with_force(candidate, *others, **near):
-            beside_base = free is not None and not candidate.effects
-            return replace(candidate, fit=free) if beside_base else candidate
-
-        monkeypatch.setattr(remaining, "with_force", with_force)
-        for rule in ("may_be_needed", "is_needed", "is_told_apart"):
-            monkeypatch.setattr(remaining, rule, lambda selection, effect: True)
-        monkeypatch.setattr(remaining, "is_imitated", lambda selection: False)
-        monkeypatch.setattr(search, "promising_pairs", lambda scan, count: ())
-        monkeypatch.setattr(search, "revised", lambda *about: None)
-        monkeypatch.setattr(search, "has_bad_readings", lambda base, fit: False)
-        monkeypatch.setattr(elimination, "is_at_an_end", lambda fit, effect: False)
-        for force in ("missing_force", "missing_drift"):
-            monkeypatch.setattr(models, force, table.missing)
-        monkeypatch.setattr(
-            search, "base_candidate", lambda fit: table.candidate((), table.gain(()))
-        )
-        fit = SimpleNamespace(reduced_chi2=1.0)
-        return search.select_model(fit, effects, None, rng=np.random.default_rng(0))
-
-    return go
-
-
-def chosen(selection) -> set[str]:
-    return set(selection.chosen.candidate.ids)
+from bayesimpact.diagnosis.selection import elimination, outcome, ranked, search
 
 
 def test_nothing_is_fitted_where_nothing_is_missing(run):
     assert chosen(run(table := Table({"": ENOUGH}))) == set() and table.fitted == []
-
-
-def test_where_the_misfit_is_large_what_gains_most_per_effect_comes_first(run):
-    """Two damping laws gain more than the cubic spring, but less than twice as much."""
-    gains = {A: 10.0, B: 10.0, f"{A} {B}": 400.0, C: 390.0, f"{A} {C}": 440.0, f"{B} {C}": 440.0}
-    table = Table({**gains, f"{A} {B} {C}": ENOUGH}, chi2=100.0)
-    assert chosen(run(table)) == {A, B, C}
-    first_step = [{A, B}, *({e} for e in (A, B, C, D, S))]
-    assert next(ids for ids in table.fitted if ids not in first_step) in ({A, C}, {B, C})
-
-
-@pytest.mark.parametrize("most", [ENOUGH, 320.0])
-def test_ascents_have_the_goal_to_come_near_what_they_are_compared_with(run, most):
-    """A model that leaves nothing, or the one that is exchanged; effects alone have none."""
-    gains = {A: 300.0, B: 20.0, f"{A} {B}": most, f"{A} {C}": 310.0, f"{B} {D}": 310.0}
-    table = Table(gains, chi2=100.0)
-    assert chosen(run(table)) == {A, B}
-    assert table.goals[table.fitted[0]] == -np.inf
-    expected = most - 2 * np.log(2 * len(EFFECTS)) - DECISIVE
-    assert table.goals[frozenset({B, D})] == pytest.approx(expected)
-
-
-def test_sets_that_a_free_force_leaves_far_behind_are_not_grown(run):
-    """Where it alone leaves nothing, and they a large misfit; else nothing is told by it."""
-    gains = {A: 10.0, B: 20.0, f"{A} {B}": 40.0, f"{A} {B} {C}": 60.0}
-    asked = {"asked": (A, f"{A} {B}"), "chi2": 100.0}
-    free = SimpleNamespace(reduced_chi2=1.0)
-    table = Table(gains, **asked)
-    found = run(table, free=free)
-    assert all(len(ids) <= 2 for ids in table.fitted)
-    assert [c.fit for c in found.residual.values()] == [free] and found.finished
-    grown = Table(gains, **asked)
-    assert len(run(grown).chosen.candidate.ids) == 3
-    right = Table({**gains, f"{A} {B}": ENOUGH}, **asked)
-    assert chosen(run(right, free=free)) == {A, B}
-
-
-def test_where_the_misfit_is_large_the_search_begins_with_what_the_equation_asks_for(run):
-    gains = {A: 10.0, B: 10.0, f"{A} {B}": 400.0, C: 390.0, f"{A} {B} {C}": ENOUGH}
-    table = Table(
-        gains, chi2=100.0, asked=(C, f"{A} {B} {C}"), seen={A: 1.0, B: 2.0, C: 3.0, D: 0.5}
-    )
-    assert chosen(run(table)) == {A, B, C}
-    assert table.fitted[:2] == [{C}, {A, B, C}]
-    small = Table(gains, asked=(f"{A} {B} {C}",))
-    run(small)
-    assert small.fitted[0] != {A, B, C}
-
-
-def test_beside_a_large_misfit_what_the_equation_asks_for_last_is_not_tried(run):
-    gains = {A: 300.0, f"{A} {B}": ENOUGH, f"{A} {C}": 400.0, f"{A} {D}": 400.0}
-    table = Table(gains, chi2=100.0, asked=(A,), seen={B: 9.0, C: 1.0}, first=1)
-    assert chosen(run(table)) == {A, B}
-    assert frozenset({A, C}) not in table.fitted
-    assert {frozenset({A, B}), frozenset({A, D})} <= set(table.fitted)
-
-
-def test_the_equation_is_asked_again_about_a_better_model(run):
-    """About the base model's rest C + D look right; about that of A, it is three others."""
-    gains = {A: 300.0, C: 1.0, f"{C} {D}": 2.0, f"{A} {B} {D}": ENOUGH}
-    table = Table(
-        gains, chi2=100.0, asked=(C, f"{C} {D}", A), asked_about={A: (A, f"{A} {B} {D}")},
-        seen={C: 1.0}, first=1,
-    )  # fmt: skip
-    assert chosen(run(table)) == {A, B, D}
-    assert table.fitted[3] == {A, B, D}
 
 
 def test_what_free_flight_asks_for_is_extended_beside_what_gains_more(run):
@@ -162,17 +37,6 @@ def test_with_a_stop_periods_ahead_are_asked_first(run):
     )  # fmt: skip
     assert chosen(run(table, effects)) == {S, N}
     assert table.fitted[0] == {S, N} and {A} not in table.fitted[:3]
-
-
-@pytest.mark.parametrize(
-    ("before", "left", "ends"), [(35.0, 8.5, True), (33.0, 8.5, False), (100.0, 9.5, False)]
-)
-def test_one_effect_that_explains_most_of_a_large_misfit_ends_the_step(run, before, left, ends):
-    """The others are scored anew beside it: less than a quarter is left, and no large misfit."""
-    gains = {A: 300.0, C: 200.0, f"{A} {B}": ENOUGH}
-    table = Table(gains, chi2=before, left={A: left})
-    assert chosen(run(table)) == {A, B}
-    assert table.fitted[1] == ({A, B} if ends else {C})
 
 
 def test_an_effect_that_is_refused_ends_no_step(run):
@@ -280,26 +144,9 @@ def test_no_exchange_is_tried_beside_which_a_force_explains_a_lot(run, beside, f
     assert chosen(run(table)) == found
 
 
-def test_the_search_ends_when_a_free_force_will_beat_all_names(run):
-    steps = {A: 100.0, f"{A} {B}": 120.0, f"{A} {B} {C}": 140.0}
-    dominated, promising = Table(steps, force=2000.0), Table(steps, force=130.0)
-    run(dominated)
-    run(promising)
-    assert max(map(len, dominated.fitted)) == 1
-    assert max(map(len, promising.fitted)) == 3
-
-
-def test_the_search_ends_when_a_free_force_explains_what_is_left(run):
-    """Beside A it gains 100 nats, two effects promise 20 each."""
-    steps = {A: 100.0, f"{A} {B}": 120.0, f"{A} {B} {C}": 140.0}
-    for beside, reached in ((200.0, 1), (170.0, 2), (150.0, 3)):
-        run(table := Table(steps, beside=beside))
-        assert max(map(len, table.fitted)) == reached
-
-
 def test_a_force_in_place_of_all_effects_counts_each_independent_sample_once(run, monkeypatch):
     """As the odds of models do: else it ends a search whose next step explains all."""
-    for module in (ranked, selection):
+    for module in (ranked, outcome):
         monkeypatch.setattr(module, "tempered_evidence", lambda model, n: model.log_evidence / n)
     table = Table({A: 100.0, f"{A} {B}": ENOUGH}, force=1000.0)
     assert chosen(run(table, repetition=10.0)) == {A, B}
@@ -358,12 +205,6 @@ def test_the_best_model_s_profile_is_followed_where_that_may_be_all_it_lacks(run
     table = Table({A: 470.0}, force=520.0, beside=beside, unfinished={A: 40.0})
     assert run(table).chosen.is_white == finished
     assert table.finished == [frozenset({A})] * finished
-
-
-def test_no_profile_is_followed_where_a_free_force_wins_anyhow(run):
-    table = Table({A: 100.0, B: 120.0}, force=900.0, unfinished={A: 60.0})
-    assert chosen(run(table)) != {A}
-    assert table.finished == []
 
 
 def test_a_force_in_contact_is_fitted_in_place_of_three_effects_only(run):
