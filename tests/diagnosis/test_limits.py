@@ -89,10 +89,22 @@ def test_hidden_bias_is_what_the_limit_would_do(found):
     assert friction.k2_bias == pytest.approx(np.abs(shift / fit.sd)[k2].max())
 
 
-@pytest.mark.parametrize(("stop", "told"), [("one-sided", "k2 by at most 0.7"), (False, "k1")])
+@pytest.mark.parametrize(
+    ("stop", "told"),
+    [
+        ("one-sided", "k2 by at most 2.8 %, 0.7 of its standard deviations"),
+        (False, "k1 by at most 0.64 %, 3.2 of"),
+    ],
+)
 def test_what_could_hide_moves_a_parameter_that_is_there(stop, told: str) -> None:
+    """By so much of it, and of what it is uncertain by; of several obstacles the largest share."""
     one = Limit("gap_wear", "rate", "m/s", 1.0, 1.0, 1.0, "absent", 3.2, "k1", 0.7)
     oscillator = SimpleNamespace(campaign=SimpleNamespace(stop=stop))
-    before = SimpleNamespace(density=SimpleNamespace(oscillator=oscillator))
+    before = SimpleNamespace(
+        density=SimpleNamespace(oscillator=oscillator),
+        names=("k1", "k2[1]", "k2[2]"),
+        mode=np.array([500.0, 1000.0, 2000.0]),
+        sd=np.array([1.0, 40.0, 50.0]),
+    )
     words = _detectable(SimpleNamespace(limits=(one,), before=before))
     assert f"moves {told}" in words

@@ -186,10 +186,18 @@ def _detectable(d: Diagnosis) -> str:
     if not moved:
         return ""
     sd, name, effect_id = max(moved)
-    return (
-        f"What could still hide below its limit moves {name} by at most {sd:.1f} of its standard "
-        f"deviations ({effect_id})."
-    )
+    at_most = f"{sd:.1f} of its standard deviations"
+    share = sd * _relative_sd(d.before, name)
+    if np.isfinite(share):
+        at_most = f"{100 * share:.2g} %, {at_most}"
+    return f"What could still hide below its limit moves {name} by at most {at_most} ({effect_id})."
+
+
+def _relative_sd(fit: Fit, name: str) -> float:
+    """The largest standard deviation over its value, of a parameter or its parts per obstacle."""
+    own = [i for i, known in enumerate(fit.names) if name in (known, bare_name(known))]
+    with np.errstate(divide="ignore"):
+        return float(np.max(fit.sd[own] / np.abs(fit.mode[own]), initial=-np.inf))
 
 
 def _unproved(d: Diagnosis) -> tuple[str, ...]:
