@@ -43,7 +43,8 @@ class Elimination(Ranked):
                 if self.may_go_on():
                     self.exchange(candidate)
             best = self.best(len(examined.candidate.effects))
-            best = max([best, *self.beside_rival(examined)], key=self.log_odds)
+            more = [*self.beside_rival(examined), *self.with_one_without_size(examined)]
+            best = max([best, *more], key=self.log_odds)
             if best is examined.candidate:  # the same set with a better end is exchanged once more
                 return examined
             examined = self.examine(best)
@@ -98,6 +99,20 @@ class Elimination(Ranked):
         if not (examined.is_white and rivals and self.may_go_on()):
             return []
         return self.extended(self.examine(rivals[0]))
+
+    def with_one_without_size(self, examined: ExaminedModel) -> list[Candidate]:
+        """Models with one more effect that is there or not, of one that leaves nothing: no score,
+        which is of first order in a size, tells whether it is missing.
+        """
+        chosen = examined.candidate
+        if not (examined.is_white and chosen.effects) or len(chosen.effects) >= self.most:
+            return []
+        scores = {s.effect.id: s for s in examined.scan.scores if not s.effect.has_size}
+        return [
+            self.fit_one(chosen, examined.scan, score, chosen)
+            for score in scores.values()
+            if self.may_go_on() and not is_redundant(chosen, score.effect)
+        ]
 
     def exchange(self, chosen: Candidate) -> None:
         """Put every other effect in the place of each chosen one.

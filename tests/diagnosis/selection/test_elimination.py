@@ -80,6 +80,7 @@ def test_a_better_end_of_the_same_set_is_exchanged_once_more(monkeypatch):
         "may_go_on": lambda: True,
         "exchange": lambda candidate: None,
         "beside_rival": lambda examined: [],
+        "with_one_without_size": lambda examined: [],
         "log_odds": lambda candidate: candidate.fit.gain,
         "best": lambda size: better,
         "examine": lambda candidate: SimpleNamespace(candidate=candidate),

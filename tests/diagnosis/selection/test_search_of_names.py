@@ -70,6 +70,14 @@ def test_what_an_effect_refines_is_tried_in_its_place_whatever_scores_say(run, m
     assert chosen(run(table, (*EFFECTS, power))) == {A, B}
 
 
+@pytest.mark.parametrize(("gained", "found"), [(30.0, {A, C, N}), (1.0, {A, C})])
+def test_an_effect_without_size_is_tried_beside_what_leaves_nothing(run, gained, found):
+    """No score tells that it is missing; it costs what every effect does."""
+    table = Table({A: 300.0, f"{A} {C}": ENOUGH, f"{A} {C} {N}": ENOUGH + gained})
+    assert chosen(run(table, (*EFFECTS, BY_ID[N]))) == found
+    assert frozenset({A, C, N}) in table.fitted
+
+
 def test_the_best_single_effect_ends_the_search(run):
     table = Table({A: ENOUGH, B: 400.0})
     assert chosen(run(table)) == {A}
