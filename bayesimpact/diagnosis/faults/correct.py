@@ -64,7 +64,7 @@ def as_fault(recording: Recording, found: Weighed, gain: float, threshold: float
         threshold=threshold,
         action=action,
         false_alarm=float(np.exp(-threshold)),
-        error=100 * found.sd if unit == "%" else 0.0,
+        error=(100 + size) * found.sd if unit == "%" else 0.0,  # sd is of the logarithm
     )
 
 

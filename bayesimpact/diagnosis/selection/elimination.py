@@ -107,7 +107,8 @@ class Elimination(Ranked):
         chosen = examined.candidate
         if not (examined.is_white and chosen.effects) or len(chosen.effects) >= self.most:
             return []
-        scores = {s.effect.id: s for s in examined.scan.scores if not s.effect.has_size}
+        ranked = sorted(examined.scan.scores, key=lambda s: s.gain)  # the best shape of each
+        scores = {s.effect.id: s for s in ranked if not s.effect.has_size}
         return [
             self.fit_one(chosen, examined.scan, score, chosen)
             for score in scores.values()

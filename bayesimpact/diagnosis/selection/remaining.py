@@ -39,8 +39,9 @@ class Remaining(Elimination):
         time, what it is without each of its effects, and models with a residual force, that in the
         place of all effects first.
         """
-        if self.is_no_set(found.chosen.candidate):
-            return self.with_forces(found, [found.base.candidate])
+        if self.is_no_set(found.chosen.candidate):  # that force is fitted, time up or not
+            free = self.with_residual(found.base)
+            return replace(found, residual={frozenset(): free})
         nearest = min(self.tried.values(), key=lambda c: c.fit.reduced_chi2)
         left = self.remainder(nearest.fit)
         if left is not None and left.leaves_noise:
@@ -76,7 +77,10 @@ class Remaining(Elimination):
                 power={**power, frozenset(chosen.ids): own.power},
             )
         needed = [g for g in leading if may_be_needed(found, g)]
+        finished = found.finished
         found = self.with_forces(found, [found.base.candidate])
+        if not needed:  # then shown at most, and nothing rests on it
+            found = replace(found, finished=finished)
         if needed or not self.is_large:
             found = self.with_forces(found, [chosen])
         for group in needed if not is_imitated(found) else ():
@@ -158,6 +162,8 @@ class Remaining(Elimination):
         effects that was asked for is it.
         """
         if not (self.is_large and candidate.effects and is_large(candidate.fit)):
+            return False
+        if frozenset() not in self.beside_forces and not self.budget.may_compare_on(self.look):
             return False
         return not leaves_something(self.with_residual(self.examined_models[frozenset()]).fit)
 

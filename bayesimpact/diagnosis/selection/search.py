@@ -169,9 +169,10 @@ class _Search(Unlisted):
 
     def grown(self, beam: list[ExaminedModel]) -> ExaminedModel:
         """The model that ever more effects lead to from the first of a beam, or beside it."""
-        examined, self.left = beam[0], None
+        first = examined = beam[0]
+        self.left = None
         while not (examined.is_white or self.has_bad_readings(examined)) and self.may_go_on():
-            if self.is_no_set(examined.candidate):
+            if examined is not first and self.is_no_set(examined.candidate):
                 break
             found, waiting = self.extensions([s for s in beam if self.may_grow(s)])
             better = self.best_first(examined, found)
@@ -234,8 +235,13 @@ class _Search(Unlisted):
                 about = self.asked_again(about, problem)
                 begun.append(about)
                 in_flight = about if problem == self.of_flight else in_flight
-            if not is_large(about.fit) or self.is_no_set(max(begun, key=self.promise)):
+            if not is_large(about.fit):
                 break
+            best = max(begun, key=self.promise)
+            if self.is_no_set(best):
+                with_term = self.with_a_term(self.examine(best))
+                if not is_large(with_term.candidate.fit):
+                    return [with_term]
         best = max(begun, key=self.promise)
         examined = self.examine(best)
         if self.has_bad_readings(examined):

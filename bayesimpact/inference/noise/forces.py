@@ -57,6 +57,11 @@ class RandomForces(Picklable):
         super().__setstate__(state)
         self.__dict__["_known"] = {}
 
+    def in_other_units(self, by: float) -> RandomForces:
+        """The same forces, over a noise level that is smaller by a factor."""
+        sizes = {name: by * size for name, size in self.sizes.items()}
+        return RandomForces(self.paths, sizes, self.share)
+
     def innovations(self, name: str, x: Array, parts: Parts, used: Mask | None) -> Array:
         """Innovations of a recording's signals (..., n) over their standard deviation, (..., n).
 

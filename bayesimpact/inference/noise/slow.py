@@ -36,6 +36,7 @@ STARTS: tuple[tuple[tuple[float, ...], ...], ...] = (
     ((0.5, 0.9, 0.99), (0.6, 0.98, 0.998)),
 )
 """Correlations over the largest, beside white noise: of one process, of two, of three."""
+PASSES = 2  # of random forces, given over a noise level that is only then known
 TOLERANCE = 0.01  # nats, of the likelihood at its best
 
 
@@ -61,8 +62,20 @@ def slow_noise(fit: Fit) -> SlowNoise | None:
     None behind a filter, for recordings of several quantities, where the noise level is stated, and
     where the fitted motion runs away.
     """
+    noise = fit.density.likelihood.noise
+    found = _slow_noise(fit, noise)
+    for _ in range(0 if noise.forces is None else PASSES):
+        if found is None or noise.forces is None:
+            return None
+        as_large = noise.forces.in_other_units(noise.level / found.noise.level)
+        found = _slow_noise(fit, replace(noise, forces=as_large))
+    return found
+
+
+def _slow_noise(fit: Fit, noise: Noise) -> SlowNoise | None:
+    """The same beside random forces of so many noise levels."""
     likelihood = fit.density.likelihood
-    noise, known = likelihood.noise, not likelihood.noise.level_error
+    known = not noise.level_error
     if noise.smoothing is not None or known or fit.density.oscillator.campaign.mixed:
         return None
     as_read = Likelihood(fit.density.oscillator, Noise(level=noise.level))
@@ -108,7 +121,7 @@ def slow_noise(fit: Fit) -> SlowNoise | None:
         if more.log_evidence <= found.log_evidence + cost:
             break
         found = more
-    before = _Whole(fit, linear, noise)
+    before = _Whole(fit, linear, likelihood.noise)
     level = noise.level * float(np.sqrt(found.variance))
     error = float(np.sqrt(0.5 / likelihood.sizes.sum()))
     told = replace(

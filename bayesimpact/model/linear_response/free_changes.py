@@ -8,7 +8,7 @@ not answer.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -23,6 +23,7 @@ from bayesimpact.model.parameters import SLOTS
 Array = NDArray[np.float64]
 Laws = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+Places = NDArray[np.int64]
 
 FADED = 1e-2  # of its largest size a change keeps four digits: of the noise, rounding is 1e-9
 ALIGNED = 1e-2  # sine between two changes, displacement and velocity in units of their size
@@ -31,6 +32,7 @@ ROUNDS = 4  # of stretches divided where their changes turn parallel
 POINTS = 6  # samples between which a response to impulses is interpolated
 SHORTEST = POINTS + 2  # samples of a stretch
 _Y0, _V0, _GAIN, _K1 = (SLOTS.index(name) for name in ("y0", "v0", "A", "k1"))
+_BODIES = [SLOTS.index(name) for name in ("second_gain", "obstacle_mass", "frame_ratio")]
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,47 +131,66 @@ def free_changes(
     """
     mass, interval = oscillator.campaign.mass, float(oscillator.intervals[r]) / factor
     last, rate = (int(oscillator.counts[r]) - 1) * factor, float(np.sqrt(slots[_K1] / mass))
+    quarter = max(1, round(0.5 * np.pi / (rate * interval)))
     own = int(oscillator.orders[r])
+    waves = np.zeros((3, last + 1))
 
     def motions(q: Array, restarts: Sequence[Array] = ()) -> dict[int, Array]:
         return {
-            n: motions_beside(oscillator, r, q, n, factor=factor, restarts=restarts)
+            n: motions_beside(
+                oscillator, r, q, n, waves=waves[: len(q)], factor=factor, restarts=restarts
+            )
             for n in {0, 1, own}
         }
 
     base = motions(slots[None])
     motion = np.concatenate([base[0], base[1]])
-    held = motion[1] == 0.0  # where the mass stays is not forgotten: no stretch begins there
+    held = motion[1] == 0.0  # where the mass stays is not forgotten, and an impulse moves nothing
     moved = small * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, rate]])
 
-    def run(begins: Array) -> Stretch:
-        """Both changes over the whole recording, anew from some points on."""
-        states = [motion[:, begins].T + move for move in moved]
-        rows = np.tile(slots, (3, 1))
-        rows[:, [_Y0, _V0]] += moved
-        found = motions(rows, [np.column_stack([begins, x]) for x in states])
-        changes = {n: (x[1:] - x[0]).T for n, x in found.items()}
-        return Stretch(0, np.stack([changes[0], changes[1]], axis=1), changes[own])
+    def changes(rows: dict[int, Array], from_rows: dict[int, Array]) -> Stretch:
+        """Two motions less one, over the whole recording."""
+        apart = {n: (x[-2:] - from_rows[n][0]).T for n, x in rows.items()}
+        return Stretch(0, np.stack([apart[0], apart[1]], axis=1), apart[own])
 
-    def stretches(begins: Array) -> tuple[Stretch, ...]:
-        """Of two runs in turn: each ends where the next one begins, in the other run."""
-        runs = [run(begins[first::2]) for first in (2, 1)[: begins.size]]
+    def by_impulses(begins: Places) -> Stretch:
+        """Changes anew before some points, by two short impulses."""
+        waves[:] = 0.0
+        for begin in begins:
+            waves[[0, 1], [begin - quarter - 1, begin - 1]] = small * slots[_K1]
+        found = changes(motions(np.tile(slots, (2, 1))), base)
+        waves[:] = 0.0
+        return found
+
+    def by_restarts(begins: Places) -> Stretch:
+        """Changes anew from some points on, whatever they were before."""
+        states = [np.column_stack([begins, motion[:, begins].T + move]) for move in moved]
+        rows = motions(np.tile(slots, (3, 1)), states)
+        return changes(rows, rows)
+
+    def stretches(begins: Places, anew: Callable[[Places], Stretch]) -> tuple[Stretch, ...]:
+        """Each ends where the next one begins, in the other one of two runs."""
+        runs = [anew(begins[first::2]) for first in (1, 2)[: begins.size - 1]]
         ends = [*(int(b) for b in begins[1:]), last]
-        pairs = enumerate(zip(begins, ends, strict=True))
-        return tuple(_part(runs[i % 2], int(begin), end) for i, (begin, end) in pairs)
+        found = [_part(whole, 0, ends[0])]
+        for i, (begin, end) in enumerate(zip(begins[1:], ends[1:], strict=True)):
+            found.append(_part(runs[i % 2], int(begin), end))
+        return tuple(found)
 
-    def whole(length: int) -> int:
-        """Points; stretches begin on samples."""
-        return -(-max(length, SHORTEST, round(np.pi / (rate * interval))) // factor) * factor
+    def length(points: int) -> int:
+        """Of a stretch; they begin on samples."""
+        return -(-max(points, 2 * quarter + SHORTEST) // factor) * factor
 
-    one = run(np.zeros(0, dtype=np.int64))
-    length = whole(_fading(one.states * [[1.0], [1 / rate]]))
-    begins = np.arange(0, max(last - SHORTEST, 1), length)
-    begins = begins[(begins == 0) | ~held[begins]]
-    found = stretches(begins)
-    for _ in range(ROUNDS):
+    q = np.tile(slots, (2, 1))
+    q[:, [_Y0, _V0]] += moved[1:]
+    whole = changes(motions(q), base)
+    faded = length(_fading(whole.states * [[1.0], [1 / rate]]))
+    begins = np.arange(0, max(last - SHORTEST, 1), faded, dtype=np.int64)
+    begins = begins[[b == 0 or not held[b - quarter - 1 : b + 1].any() for b in begins]]
+    found = stretches(begins, by_impulses)
+    for _ in range(ROUNDS if _may_restart(oscillator, slots) else 0):
         more = [
-            np.arange(part.begin, part.begin + part.states.shape[0] - SHORTEST, whole(at))[1:]
+            np.arange(part.begin, part.begin + part.states.shape[0] - SHORTEST, length(at))[1:]
             for part in found
             if (at := part.parallel_from(held[part.begin :][: part.states.shape[0]])) is not None
         ]
@@ -177,8 +198,16 @@ def free_changes(
         divided = divided[(divided == 0) | ~held[divided]]
         if divided.size == begins.size:
             break
-        begins, found = divided, stretches(divided)
+        begins, found = divided, stretches(divided, by_restarts)
     return FreeChanges(found, motion, mass, interval, own)
+
+
+def _may_restart(oscillator: Oscillator, slots: Array) -> bool:
+    """Whether displacement and velocity are all that a motion is begun anew from: no law remembers
+    a place, no body or mode moves by itself.
+    """
+    laws = [e.law for e in oscillator.acting if e.law is not None]
+    return not (np.any(slots[_BODIES]) or any(law.rate or law.travel for law in laws))
 
 
 def _solved(states: Array, apart: Mask, wanted: Array) -> Array:

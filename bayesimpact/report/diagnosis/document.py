@@ -189,7 +189,7 @@ def _detectable(d: Diagnosis) -> str:
     at_most = f"{sd:.1f} of its standard deviations"
     share = sd * _relative_sd(d.before, name)
     if np.isfinite(share):
-        at_most = f"{100 * share:.2g} %, {at_most}"
+        at_most = f"{100 * share:.3g} %, {at_most}"
     return f"What could still hide below its limit moves {name} by at most {at_most} ({effect_id})."
 
 

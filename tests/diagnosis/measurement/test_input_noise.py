@@ -229,6 +229,11 @@ def test_slow_noise_of_the_readings_is_told_beside_that_of_the_input() -> None:
     noise = anew.first.density.likelihood.noise
     assert noise.forces is not None and noise.others
     assert noise.forces.share == pytest.approx(ERROR, rel=0.3)
+    alone = input_noise(model)
+    assert alone is not None and alone.forces is not None  # as large, N, over another level
+    sizes = [n.forces.sizes["a"] * n.level for n in (noise, alone) if n.forces is not None]
+    assert sizes[0] == pytest.approx(sizes[1], rel=0.01)
+    assert noise.level > 1.05 * alone.level
     assert noise == anew.base.density.likelihood.noise
     assert anew.first.reduced_chi2 == pytest.approx(1.0, abs=0.05)
     assert whiteness_p(model) < 1e-6 < 0.01 < whiteness_p(anew.first)

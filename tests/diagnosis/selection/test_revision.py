@@ -15,7 +15,7 @@ from bayesimpact.diagnosis.faults import outliers
 from bayesimpact.diagnosis.faults.outliers import beside_spikes, residual_spikes
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import fit_from
-from bayesimpact.diagnosis.selection import search
+from bayesimpact.diagnosis.selection import revision, search
 from bayesimpact.diagnosis.selection.revision import has_bad_readings, misses_onsets, revised
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
@@ -84,6 +84,16 @@ def test_readings_across_a_jump_bend_parameters_and_leave_no_residual(good: Fit)
     smooth = replace(good.density.likelihood.noise, level=1e3)
     quiet = replace(good.density.likelihood, noise=smooth)
     assert not misses_onsets(replace(good, density=replace(good.density, likelihood=quiet)))
+
+
+@pytest.mark.parametrize(("jump", "share"), [(0.0, 0.3), (0.0, 0.7), (6.0, 0.3), (6.0, 0.7)])
+def test_a_change_of_slope_is_no_jump(jump: float, share: float) -> None:
+    """As where a stiff obstacle without damping sets in, anywhere between two samples; a jump is
+    told less what the change of slope may be.
+    """
+    t = np.arange(20.0) - 9.0 - share
+    x = 0.1 * t + np.where(t > 0.0, 5.0 * t + jump, 0.0)
+    assert max(jump - 5.0, 0.0) - 1e-9 < np.max(revision._jumps(x)) < jump + 1e-9
 
 
 def test_a_spike_is_one_that_the_fit_without_it_misses(good: Fit) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from made_up_models import EFFECTS, ENOUGH, A, B, C, D, S, Table, chosen
 
+from bayesimpact.diagnosis.budget import Budget
 from bayesimpact.diagnosis.thresholds import DECISIVE
 
 
@@ -31,19 +32,34 @@ def test_ascents_have_the_goal_to_come_near_what_they_are_compared_with(run, mos
     assert table.goals[frozenset({B, D})] == pytest.approx(expected)
 
 
-def test_sets_that_a_free_force_leaves_far_behind_are_not_grown(run):
+def test_sets_that_a_free_force_leaves_far_behind_are_extended_once(run):
     """Where it alone leaves nothing, and they a large misfit; else nothing is told by it."""
-    gains = {A: 10.0, B: 20.0, f"{A} {B}": 40.0, f"{A} {B} {C}": 60.0}
+    gains = {A: 10.0, B: 20.0, f"{A} {B}": 40.0, f"{A} {B} {C}": 60.0, f"{A} {B} {C} {D}": 80.0}
     asked = {"asked": (A, f"{A} {B}"), "chi2": 100.0}
     free = SimpleNamespace(reduced_chi2=1.0)
     table = Table(gains, **asked)
     found = run(table, free=free)
-    assert all(len(ids) <= 2 for ids in table.fitted)
+    assert max(len(ids) for ids in table.fitted) == 3
     assert [c.fit for c in found.residual.values()] == [free] and found.finished
     grown = Table(gains, **asked)
-    assert len(run(grown).chosen.candidate.ids) == 3
-    right = Table({**gains, f"{A} {B}": ENOUGH}, **asked)
-    assert chosen(run(right, free=free)) == {A, B}
+    assert len(run(grown).chosen.candidate.ids) == 4
+
+
+@pytest.mark.parametrize("asked", [f"{A} {B}", f"{A} {C}"])
+def test_a_set_of_the_catalogue_is_found_beside_a_free_force_that_does_the_same(run, asked):
+    """It is asked for, or one effect away from what is."""
+    gains = {A: 10.0, f"{A} {C}": 40.0, f"{A} {B}": ENOUGH}
+    left = {f"{A} {B}": 1.0, f"{A} {B} {C}": 1.0}
+    table = Table(gains, asked=(A, asked), chi2=100.0, left=left)
+    assert chosen(run(table, free=SimpleNamespace(reduced_chi2=1.0))) == {A, B}
+
+
+def test_the_free_force_is_shown_whether_the_time_is_up_or_not(run, monkeypatch):
+    gains = {A: 10.0, f"{A} {B}": 40.0, f"{A} {B} {C}": 60.0}
+    free, left = SimpleNamespace(reduced_chi2=1.0), iter([True] * 1)
+    monkeypatch.setattr(Budget, "may_compare_on", lambda self, look: next(left, False))
+    found = run(Table(gains, asked=(A, f"{A} {B}"), chi2=100.0), free=free)
+    assert [c.fit for c in found.residual.values()] == [free]
 
 
 def test_where_the_misfit_is_large_the_search_begins_with_what_the_equation_asks_for(run):
