@@ -21,13 +21,13 @@ from numpy.typing import NDArray
 
 from bayesimpact.diagnosis.faults.alone import has_own_size
 from bayesimpact.diagnosis.faults.compare import LEAST, Compared, log_likelihood_gain
-from bayesimpact.diagnosis.faults.correct import as_fault, corrected
+from bayesimpact.diagnosis.faults.correct import as_fault, corrected, factor
 from bayesimpact.diagnosis.faults.together import CERTAIN, Hypothesis, Weighed
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import fit_from
 from bayesimpact.diagnosis.score_test.directions import whitened
 from bayesimpact.diagnosis.score_test.projection import project
-from bayesimpact.diagnosis.selection.outcome import is_large, leaves_something
+from bayesimpact.diagnosis.selection.outcome import leaves_something
 from bayesimpact.diagnosis.thresholds import DECISIVE, DOUBT, EXCESS, LARGE
 from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.fit import Fit
@@ -75,16 +75,17 @@ def fault_beside(base: Fit, found: Fit) -> tuple[Compared, Fit] | None:
     guesses = [g for g in _guesses(shared) if _promises(shared, g)][:TRIED]
     tried = [_refined(shared, g) for g in guesses]
     tried = [one for one in tried if np.isfinite(one[1].reduced_chi2)]
-    tried.sort(key=lambda one: one[1].reduced_chi2)
+    tried.sort(key=lambda one: _left(*one))
     if not tried:
         return None
     best, fit = tried[0]
-    before, after = shared.reduced_chi2, fit.reduced_chi2
-    others = [log_likelihood_gain(other.reduced_chi2, after, campaign) for _, other in tried[1:]]
+    before, after = shared.reduced_chi2, _left(best, fit)
+    others = [log_likelihood_gain(_left(*other), after, campaign) for other in tried[1:]]
     nats = log_likelihood_gain(before, after, campaign)
-    if nats < CERTAIN or min(others, default=np.inf) < DECISIVE or is_large(fit):
+    if nats < CERTAIN or min(others, default=np.inf) < DECISIVE or after > LARGE**2:
         return None
-    if EXCESS * _above(fit) > _above(shared) or _above(fit) > _above(found):
+    left = _above(fit, after)
+    if EXCESS * left > _above(shared) or left > _above(found):
         return None
     recording = campaign.recordings[best.hypothesis.recording]
     fault = as_fault(recording, best.weighed, nats, CERTAIN)
@@ -105,10 +106,24 @@ def without_own(base: Fit, found: Fit) -> Fit | None:
     return fit_from(base, rest, values, campaign_scales(base)).fit
 
 
-def _above(fit: Fit) -> float:
-    """Reduced chi-squared above that of the noise, or what that is uncertain by."""
+def _left(guess: _Guess, fit: Fit) -> float:
+    """Reduced chi-squared of the readings as they were: where a gain is corrected, their noise
+    shrinks or grows with them, and a recording that is shrunk to nothing would leave none.
+    """
+    if guess.hypothesis.id != "recording_gain":
+        return fit.reduced_chi2
+    sizes = fit.density.likelihood.sizes
+    share = float(sizes[guess.hypothesis.recording] / sizes.sum())
+    return float(fit.reduced_chi2 * factor(guess.weighed) ** (-2 * share))
+
+
+def _above(fit: Fit, chi2: float | None = None) -> float:
+    """Reduced chi-squared, that of a fit or another one, above that of the noise, or what that is
+    uncertain by.
+    """
     error = fit.density.likelihood.noise.level_error
-    return max(fit.reduced_chi2 - 1.0, 2 * DOUBT * (error if np.isfinite(error) else 0.0))
+    left = fit.reduced_chi2 if chi2 is None else chi2
+    return max(left - 1.0, 2 * DOUBT * (error if np.isfinite(error) else 0.0))
 
 
 def _promises(fit: Fit, guess: _Guess) -> bool:

@@ -15,6 +15,7 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.faults import beside_model
 from bayesimpact.diagnosis.faults.beside_model import fault_beside
+from bayesimpact.diagnosis.faults.together import Hypothesis
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import fit_from
 from bayesimpact.diagnosis.selection.revision import has_bad_readings, revised
@@ -85,6 +86,17 @@ def test_a_search_is_revised_without_all_that_is_off() -> None:
     assert anew.first.reduced_chi2 < 1.1
     assert anew.base.density.oscillator.campaign is anew.first.density.oscillator.campaign
     assert revised(anew.base, state_of(anew.first), told.append) is None
+
+
+def test_a_gain_that_shrinks_a_recording_leaves_what_its_noise_would_be() -> None:
+    """Without that a recording divided by twenty would leave nothing of a third of the misfit."""
+    _, found = fits(recorded(None))
+    gain = beside_model._Guess(Hypothesis("recording_gain", 1), float(np.log(20.0)), 0.1, 90.0)
+    clock = replace(gain, hypothesis=Hypothesis("recording_clock", 1))
+    sizes = found.density.likelihood.sizes
+    expected = 20.0 ** (2 * float(sizes[1] / sizes.sum()))
+    assert beside_model._left(gain, found) == pytest.approx(expected * found.reduced_chi2)
+    assert beside_model._left(clock, found) == found.reduced_chi2
 
 
 def test_physics_that_is_missing_is_no_fault() -> None:
