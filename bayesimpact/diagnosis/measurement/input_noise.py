@@ -97,10 +97,7 @@ def _of_floors(fit: Fit, floors: Mapping[str, float]) -> RandomForces:
 
 def _scaled(noise: Noise, forces: RandomForces, by: float) -> Noise:
     """The noise with forces of another size."""
-    sizes = {name: by * size for name, size in forces.sizes.items()}
-    return replace(
-        noise, forces=RandomForces(forces.paths, MappingProxyType(sizes), by * forces.share)
-    )
+    return replace(noise, forces=replace(forces.in_other_units(by), share=by * forces.share))
 
 
 def _as_read(fit: Fit) -> tuple[Linearisation, ...]:

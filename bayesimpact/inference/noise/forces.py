@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -60,7 +61,7 @@ class RandomForces(Picklable):
     def in_other_units(self, by: float) -> RandomForces:
         """The same forces, over a noise level that is smaller by a factor."""
         sizes = {name: by * size for name, size in self.sizes.items()}
-        return RandomForces(self.paths, sizes, self.share)
+        return RandomForces(self.paths, MappingProxyType(sizes), self.share)
 
     def innovations(self, name: str, x: Array, parts: Parts, used: Mask | None) -> Array:
         """Innovations of a recording's signals (..., n) over their standard deviation, (..., n).

@@ -121,7 +121,8 @@ class FreeChanges:
 def free_changes(
     oscillator: Oscillator, r: int, slots: Array, small: float, *, factor: int = 1
 ) -> FreeChanges:
-    """Changes of recording r's motion by the initial state, later ones by short impulses.
+    """Changes of recording r's motion by the initial state, later ones by short impulses; where
+    these turn parallel, by states begun anew.
 
     Parameters
     ----------

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from effect_rigs import BY_ID, TestRig, typical
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.input import Input
@@ -58,3 +59,19 @@ def test_changes_stay_apart(motion: Motion) -> None:
     joined = [a.begin + a.readings.shape[0] - 1 for a in parts[:-1]]
     assert parts[0].begin == 0 and len(parts) > 2
     assert joined == [b.begin for b in parts[1:]]
+
+
+@pytest.mark.parametrize("law", ["hysteresis_bouc_wen", "base_motion", "second_mode"])
+def test_laws_that_remember_and_bodies_answer_too(law: str) -> None:
+    """A state begun anew would move what they are counted from; of 5 % of the largest answer."""
+    rig = TestRig(duration=3.0, c1=0.6)
+    oscillator = build_oscillator(rig.campaign(), [BY_ID[law]])
+    slots = oscillator.layout.slots(rig.theta(oscillator, typical(BY_ID[law], rig, 0.3)))[0]
+    motion = motion_along(oscillator, 0, slots, REACH)
+    samples = motion.t[:: motion.factor]
+    blip = np.exp(-(((samples - 1.5) / 0.02) ** 2))
+    told = answers(motion, np.interp(motion.t, samples, blip)[None])[0]
+    waves = 1e-6 * np.stack([blip, np.zeros_like(blip)])
+    there, base = motions_beside(oscillator, 0, np.tile(slots, (2, 1)), 0, waves=waves)
+    exact = (base - there) / 1e-6
+    assert np.max(np.abs(told - exact)) < 0.05 * np.max(np.abs(exact))
