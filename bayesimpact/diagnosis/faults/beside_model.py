@@ -84,8 +84,8 @@ def fault_beside(base: Fit, found: Fit) -> tuple[Compared, Fit] | None:
     nats = log_likelihood_gain(before, after, campaign)
     if nats < CERTAIN or min(others, default=np.inf) < DECISIVE or after > LARGE**2:
         return None
-    left = _above(fit, after)
-    if EXCESS * left > _above(shared) or left > _above(found):
+    left = above_noise(fit, after)
+    if EXCESS * left > above_noise(shared) or left > above_noise(found):
         return None
     recording = campaign.recordings[best.hypothesis.recording]
     fault = as_fault(recording, best.weighed, nats, CERTAIN)
@@ -117,7 +117,7 @@ def _left(guess: _Guess, fit: Fit) -> float:
     return float(fit.reduced_chi2 * factor(guess.weighed) ** (-2 * share))
 
 
-def _above(fit: Fit, chi2: float | None = None) -> float:
+def above_noise(fit: Fit, chi2: float | None = None) -> float:
     """Reduced chi-squared, that of a fit or another one, above that of the noise, or what that is
     uncertain by.
     """
@@ -130,7 +130,7 @@ def _promises(fit: Fit, guess: _Guess) -> bool:
     """Whether a score promises what a fault must do, or nearly."""
     independent = float(fit.density.likelihood.sizes.sum())
     left = fit.reduced_chi2 * (1.0 - 2 * guess.gained / independent)
-    most = min(_above(fit) / EXCESS, LARGE**2 - 1.0)
+    most = min(above_noise(fit) / EXCESS, LARGE**2 - 1.0)
     return guess.gained > CERTAIN and left - 1.0 < SLACK * most
 
 

@@ -1,8 +1,9 @@
 """A revised search, on what a model that is nearly good enough has shown of the readings.
 
 Spikes beside a contact, the instants at which contacts begin and end, where an acceleration jumps,
-a gain or a clock that is off, noise that is slow, and what an input did between its samples show
-only against a model that leaves little else. Before they are known, what follows them is fitted.
+a gain or a clock that is off, a knock, noise that is slow, and what an input did between its
+samples show only against a model that leaves little else. Before they are known, what follows them
+is fitted.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.diagnosis.faults.beside_model import fault_beside
 from bayesimpact.diagnosis.faults.compare import Compared
+from bayesimpact.diagnosis.faults.knock import knock_beside
 from bayesimpact.diagnosis.faults.outliers import beside_spikes
 from bayesimpact.diagnosis.measurement.input_noise import input_noise
 from bayesimpact.diagnosis.measurement.slow_noise import remaining_noise
@@ -113,6 +115,16 @@ def _with_a_recording_corrected(base: Fit, found: Fit, say: Progress) -> Revisio
     return Revision(refitted(base, compared.campaign), first, (compared,))
 
 
+def _without_a_knock(base: Fit, found: Fit, say: Progress) -> Revision | None:
+    """Without what lies beyond a knock that the model shows."""
+    told = knock_beside(base, found)
+    if told is None:
+        return None
+    compared, plain, first = told
+    say(f"{compared.fault.recording}: {compared.fault.statement}: once more without that")
+    return Revision(plain, None if found is base else first, (compared,))
+
+
 def _with_band_limited_inputs(base: Fit, found: Fit, say: Progress) -> Revision | None:
     """With inputs that are band-limited between their samples, not lines, where that explains
     decisively more, or as much as a steady force: the change is small, and tells nothing beside a
@@ -187,7 +199,12 @@ def _without_readings(base: Fit, found: Fit, say: Progress) -> Revision | None:
     return Revision(base if is_same else refitted(base, campaign), clean, told)
 
 
-READINGS = (_without_readings, _with_a_recording_corrected, _with_band_limited_inputs)
+READINGS = (
+    _without_readings,
+    _with_a_recording_corrected,
+    _without_a_knock,
+    _with_band_limited_inputs,
+)
 
 
 def has_bad_readings(base: Fit, fit: Fit) -> bool:
@@ -196,7 +213,9 @@ def has_bad_readings(base: Fit, fit: Fit) -> bool:
     """
     if beside_spikes(fit) or misses_onsets(fit) or _of_inputs(base, fit):
         return True
-    return fit is not base and fault_beside(base, fit) is not None
+    if fit is not base and fault_beside(base, fit) is not None:
+        return True
+    return knock_beside(base, fit) is not None
 
 
 def misses_onsets(fit: Fit) -> bool:

@@ -7,6 +7,7 @@ Verdicts against truths:
 | control | quiet (adequate) | false alarm (anything else) |
 | effects of the catalogue | named (all, and no other) | wrong name, missed |
 | a force outside it | unknown, or a formula of its class (`score.formulas`) | wrong name, missed |
+| a knock, outside too | the fault of a recording that it is (`AS_FAULT`), or unknown | as above |
 
 Ambiguous, partly (with no wrong name), and unknown for effects of the catalogue, are abstentions:
 neither. Several effects at once: `score.strong`.
@@ -26,6 +27,8 @@ from bayesimpact.trial.score.strong import inconsistent, quality, score_several
 NORMAL_90 = 1.6448536269514722
 QUIET = ("noise_correlated",)  # reported beside a verdict, never a name
 BASE = ("c1", "k1", "c2", "g", "k2")
+AS_FAULT = {"knock": "recording_knock"}
+"""Forces outside the catalogue that a recording's fault names."""
 RIGHT = ("quiet", "named", "unknown outside", "partly outside", "formula")
 
 
@@ -80,15 +83,20 @@ def _outcome(
     if "fault" in truth:
         named_faults = [f for f in faults if f.get("action") != "notice"]
         physics = [i for i in named if not i.startswith("recording_")]
-        planted = {p["id"] for p in truth["planted"]}
-        if set(physics) - planted and verdict in ("named", "partly"):
+        effects_there = {p["id"] for p in truth["planted"]}
+        if set(physics) - effects_there and verdict in ("named", "partly"):
             return "wrong name"
         outcome = score_fault(truth["fault"], named_faults)
-        return outcome if outcome != "named" or set(physics) == planted else "fault alone"
+        return outcome if outcome != "named" or set(physics) == effects_there else "fault alone"
+    planted = [p["id"] for p in truth["planted"]]
+    told = [AS_FAULT[i] for i in planted if AS_FAULT.get(i) in named]
     if not truth["kind"].startswith("several"):
-        return outcome_of(truth["kind"], [p["id"] for p in truth["planted"]], verdict, named)
-    there = [p["id"] for p in truth["planted"] if not p["outside"]]
-    beyond = [p["id"] for p in truth["planted"] if p["outside"]]
+        if told:
+            return outcome_of("fault", told, verdict, named)
+        return outcome_of(truth["kind"], planted, verdict, named)
+    there = [p["id"] for p in truth["planted"] if not p["outside"]] + told
+    outsiders = [p["id"] for p in truth["planted"] if p["outside"]]
+    beyond = [i for i in outsiders if AS_FAULT.get(i) not in told]
     outside = bool(beyond)
     right = {f["id"] for f in split(effects)[1] if is_right([f], beyond)}
     if right:  # these stand for the force outside the catalogue

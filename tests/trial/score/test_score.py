@@ -79,6 +79,20 @@ def test_outcomes(
     assert outcome_of(kind, planted, verdict, named) == outcome
 
 
+@pytest.mark.parametrize(
+    ("kind", "more", "outcome"),
+    [("outside", [], "named"), ("outside", ["gap_wear"], "wrong name"), ("several", [], "named")],
+)
+def test_a_knock_told_as_the_fault_of_a_recording(kind: str, more: list[str], outcome: str) -> None:
+    """It is outside the catalogue of effects, but not outside what recordings are known to have."""
+    knock = {**TRUTH["planted"][0], "id": "knock", "outside": True}
+    there = [{**p, "outside": False} for p in TRUTH["planted"]] if kind == "several" else []
+    truth = {**TRUTH, "kind": kind, "planted": [*there, knock], "rest_s": {}}
+    names = [*(p["id"] for p in there), *more, "recording_knock"]
+    effects = [{**ANSWER["effects"][0], "id": name} for name in names]
+    assert score(truth, answered(effects=effects))["outcome"] == outcome
+
+
 def test_a_right_name() -> None:
     found = score(TRUTH, ANSWER)
     assert found["right"] and not found["confident_wrong"] and found["place"]

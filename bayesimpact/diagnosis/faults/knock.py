@@ -1,0 +1,264 @@
+"""A knock in mid-record: from one instant on, the motion goes on from another state.
+
+A blow to the table or a hand changes velocity (and, if it lasts, displacement) at once, and all
+that follows is another free motion of the same oscillator. Against a model with the physics in it
+such a jump is two more columns of one recording, what either of two free changes of the motion is
+from a sample on, for every sample at once by sums over what follows: the score test of a change
+point (Rao 1948). What the score proposes is then done: the recording is taken as two, one before
+and one after, which share all physics, and has to fit. Missing physics does not end with a new
+start.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.faults.fault import FALSE_ALARM, Fault, file_time
+from bayesimpact.data.recording import Recording
+from bayesimpact.diagnosis.faults.alone import SharedModel
+from bayesimpact.diagnosis.faults.beside_model import above_noise
+from bayesimpact.diagnosis.faults.compare import Compared, log_likelihood_gain
+from bayesimpact.diagnosis.faults.recording_faults import values_of
+from bayesimpact.diagnosis.faults.together import CERTAIN
+from bayesimpact.diagnosis.thresholds import EXCESS, LARGE
+from bayesimpact.inference.fit import Fit
+from bayesimpact.model.effects.effect import Effect
+from bayesimpact.model.linear_response.free_changes import FreeChanges, free_changes
+from bayesimpact.model.measurement import smooth
+
+Array = NDArray[np.float64]
+
+STEP = 1e-6  # of the largest displacement: free changes so small are linear
+PLACE = 0.5 * float(chi2.isf(1e-3, 2))  # nats: less likely places than this are no candidates
+NEAR = 2  # samples beside these: the blow takes its time
+EDGE = 16  # samples at either end, after which a jump is told from the start values
+LEAST_FREE = 1e-3  # of a column squared, that parameters leave of it: less is error of derivatives
+SLACK = 2.0  # times the misfit that may stay, that a score may promise: it is of first order
+SECOND = " after the knock"  # the name of a recording's second part
+
+
+@dataclass(frozen=True)
+class StateJump:
+    """From a sample on, a recording goes on from another state.
+
+    Attributes
+    ----------
+    recording : its position in the campaign
+    place : first sample after the jump, the likeliest
+    earliest, latest : between which it lies
+    gain : nats, in the linear approximation
+    share : of what all recordings leave, that it and parameters explain
+    """
+
+    recording: int
+    place: int
+    earliest: int
+    latest: int
+    gain: float
+    share: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Sums:
+    """Products (n, ...) of the two columns of a jump at every sample of a stretch: with the
+    residual, with each other, with an orthonormal basis of what parameters do.
+    """
+
+    slope: Array
+    size: Array
+    shared: Array
+
+
+def knock_beside(base: Fit, found: Fit) -> tuple[Compared, Fit, Fit] | None:
+    """The knock that explains what a model leaves; the base model's and the model's mode of the
+    recordings without what follows it, or what was before, whichever is shorter. None where there
+    is none.
+
+    The model of the two parts must leave no large misfit, and `EXCESS` times less than without.
+    """
+    campaign = found.density.oscillator.campaign
+    recordings = campaign.recordings
+    if campaign.keep_faults or any(r.motion_name for r in recordings):
+        return None
+    jumps = [j for r in range(len(recordings)) if (j := likeliest_jump(found, r)) is not None]
+    jump = max(jumps, key=lambda j: j.gain, default=None)
+    if jump is None or not _promises(found, jump):
+        return None
+    model = _model(found, found.density.oscillator.effects, {})
+    split = model.fitted(_apart(campaign, jump))
+    if split is None or split.reduced_chi2 > LARGE**2:
+        return None
+    nats = log_likelihood_gain(found.reduced_chi2, split.reduced_chi2, campaign)
+    if nats < CERTAIN or EXCESS * above_noise(split) > above_noise(found):
+        return None
+    return _without(base, found, split, jump, nats)
+
+
+def _promises(found: Fit, jump: StateJump) -> bool:
+    """Whether a score promises what a knock must do, or nearly."""
+    left = above_noise(found, found.reduced_chi2 * max(1.0 - jump.share, 0.0))
+    return EXCESS * left <= SLACK * above_noise(found)
+
+
+def _without(
+    base: Fit, found: Fit, split: Fit, jump: StateJump, nats: float
+) -> tuple[Compared, Fit, Fit] | None:
+    """The fault and both modes, with the longer part of the recording alone."""
+    campaign = found.density.oscillator.campaign
+    recording = campaign.recordings[jump.recording]
+    fault, kept = _fault(recording, jump, nats)
+    cut = _with(campaign, jump.recording, (recording.part(*kept),))
+    own = {n.replace(f"{recording.name}{SECOND}]", f"{recording.name}]"): v for n, v in
+           values_of(split).items() if SECOND in n}  # fmt: skip
+    again = _model(split, found.density.oscillator.effects, own if kept[0] > 0 else {}).fitted(cut)
+    plain = _model(base, base.density.oscillator.effects, {}).fitted(cut)
+    if again is None or plain is None:
+        return None
+    return Compared(fault, cut, found.reduced_chi2, again.reduced_chi2), plain, again
+
+
+def _model(fit: Fit, effects: tuple[Effect, ...], values: dict[str, float]) -> SharedModel:
+    """A fit's model with effects, as campaigns of other recordings are fitted with it."""
+    return SharedModel(fit.density.likelihood.noise, effects, values_of(fit) | values)
+
+
+def _apart(campaign: Campaign, jump: StateJump) -> Campaign:
+    """The campaign with the recording as two, without the readings where the jump may lie."""
+    recording = campaign.recordings[jump.recording]
+    first, second = _parts(recording, jump)
+    after = replace(recording.part(*second), name=recording.name + SECOND)
+    return _with(campaign, jump.recording, (recording.part(*first), after))
+
+
+def _parts(recording: Recording, jump: StateJump) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Samples before and after a jump, firsts and last-plus-ones."""
+    return (0, jump.earliest - NEAR), (jump.latest + NEAR, recording.samples.size)
+
+
+def _with(campaign: Campaign, r: int, parts: tuple[Recording, ...]) -> Campaign:
+    """The campaign with others in the place of a recording."""
+    recordings = campaign.recordings
+    return replace(campaign, recordings=(*recordings[:r], *parts, *recordings[r + 1 :]))
+
+
+def _fault(recording: Recording, jump: StateJump, nats: float) -> tuple[Fault, tuple[int, int]]:
+    """The knock as a record, whose remedy keeps the longer part; and which part that is."""
+    size = recording.samples.size
+    first, second = _parts(recording, jump)
+    if first[1] >= size - second[0]:
+        kept, span, remedy = first, (first[1], size), "end_s"
+        edge = file_time(recording, first[1] - 0.6)
+    else:
+        kept, span, remedy = second, (0, second[0]), "start_s"
+        edge = file_time(recording, second[0] - 0.4)
+    when = file_time(recording, jump.place)
+    fault = Fault(
+        id="recording_knock",
+        recording=recording.name,
+        spans=(span,),
+        start_s=file_time(recording, first[1]),
+        end_s=file_time(recording, second[0]),
+        size=float("nan"),
+        unit="-",
+        statement=f"a knock at {when:.4g} s: the motion goes on from another state",
+        remedy=f"{remedy} = {edge:.9g}",
+        strength=nats,
+        threshold=CERTAIN,
+        action="cut",
+    )
+    return fault, kept
+
+
+def likeliest_jump(fit: Fit, r: int) -> StateJump | None:
+    """The jump of displacement and velocity that explains most of what a fit leaves of recording
+    `r`; None where its gain stays below what white noise reaches at one of the samples with a
+    chance of `FALSE_ALARM`.
+    """
+    noise, recording = (
+        fit.density.likelihood.noise,
+        fit.density.oscillator.campaign.recordings[r],
+    )
+    if recording.samples.size < 4 * EDGE:
+        return None
+    signals, start = noise.in_time(
+        np.column_stack([_basis(fit)[r], fit.linearisation[r].residual]).T,
+        recording.samples.size, recording.interval, recording.used,
+    )  # fmt: skip
+    first = round(start / recording.interval)
+    score = _score(_sums(fit, r, signals, first))
+    score[:EDGE] = score[-EDGE:] = 0.0
+    best = int(np.argmax(score))
+    power, count = float(fit.sums.sum()), float(fit.density.likelihood.sizes.sum())
+    nats = 0.5 * score / max(noise.level**2, (power - score[best]) / count)
+    if not nats[best] > 0.5 * chi2.isf(FALSE_ALARM / score.size, 2):
+        return None
+    near_best = np.flatnonzero(nats > nats[best] - PLACE)
+    earliest, place, latest = (first + int(i) for i in (near_best[0], best, near_best[-1]))
+    return StateJump(r, place, earliest, latest, float(nats[best]), float(score[best] / power))
+
+
+def _basis(fit: Fit) -> list[Array]:
+    """Orthonormal columns of what the parameters do to all recordings, rows (n_r, p) of each."""
+    sizes = [part.residual.size for part in fit.linearisation]
+    whole = np.zeros((sum(sizes), fit.mode.size))
+    ends = np.cumsum(sizes)
+    for part, end in zip(fit.linearisation, ends, strict=True):
+        whole[end - part.residual.size : end, part.columns] = part.jacobian
+    size = np.linalg.norm(whole, axis=0)
+    basis = np.linalg.qr(whole[:, size > 0.0] / size[size > 0.0])[0]
+    return np.split(basis, ends[:-1])
+
+
+def _sums(fit: Fit, r: int, signals: Array, first: int) -> _Sums:
+    """Products of the columns of a jump at every sample from `first` on, (m, ...), with `signals`
+    (p + 1, m), an orthonormal basis and the residual.
+    """
+    oscillator, noise = fit.density.oscillator, fit.density.likelihood.noise
+    recording, count = oscillator.campaign.recordings[r], signals.shape[1]
+    reach = float(np.abs(fit.displacements[r]).max())
+    changes = free_changes(oscillator, r, oscillator.layout.slots(fit.mode)[r], STEP * reach)
+    columns = np.zeros((2, changes.points))
+    for part in changes.stretches:
+        columns[:, part.begin : part.begin + part.readings.shape[0]] = part.readings.T
+    seen = smooth(columns, oscillator.smoothing, recording.interval)
+    white = noise.whitened(recording, seen)
+    moved = noise.in_time(white, columns.shape[1], recording.interval, recording.used)[0].T
+    products = np.concatenate(
+        [moved[:, :, None] * signals.T[:, None, :], moved[:, :, None] * moved[:, None, :]], axis=2
+    )
+    sums = _from_here_on(products, changes, first)[:count]
+    return _Sums(sums[..., signals.shape[0] - 1], sums[..., -2:], sums[..., : signals.shape[0] - 1])
+
+
+def _from_here_on(products: Array, changes: FreeChanges, first: int) -> Array:
+    """Sums of products (m, 2, k) from every row to the last, stretch by stretch: what is carried
+    into the next one counts as its own changes do. The last two of k are of the changes themselves.
+    """
+    sums, ahead = np.zeros_like(products), np.zeros(products.shape[1:])
+    begins = [max(part.begin - first, 0) for part in changes.stretches]
+    ends = [*begins[1:], products.shape[0]]
+    for i in reversed(range(len(begins))):
+        own = slice(begins[i], ends[i])
+        if begins[i] >= ends[i]:
+            continue
+        sums[own] = np.cumsum(products[own][::-1], axis=0)[::-1] + ahead
+        carried = changes.carried[i].T  # of the stretch before, in this one's terms
+        ahead = carried @ sums[begins[i]]
+        ahead[:, -2:] = ahead[:, -2:] @ carried.T
+    return sums
+
+
+def _score(sums: _Sums) -> Array:
+    """Twice the gain of a jump at every sample (n,), by what no parameter does of it."""
+    free = sums.size - np.einsum("nip,njp->nij", sums.shared, sums.shared)
+    scale = np.sqrt(np.maximum(np.einsum("nii->ni", sums.size), 1e-300))
+    scaled = free / (scale[:, :, None] * scale[:, None, :])
+    values, vectors = np.linalg.eigh(scaled)
+    along = np.einsum("nij,ni->nj", vectors, sums.slope / scale)
+    told = values > LEAST_FREE
+    return np.asarray(np.sum(np.where(told, along**2 / np.where(told, values, 1.0), 0.0), axis=1))

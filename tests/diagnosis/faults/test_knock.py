@@ -1,0 +1,125 @@
+"""A knock in mid-record, told by a model with the physics that is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import small_rig
+
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.diagnosis.faults.knock import _basis, _score, _sums, knock_beside, likeliest_jump
+from bayesimpact.diagnosis.refits.extend import campaign_scales
+from bayesimpact.diagnosis.refits.refit import fit_from
+from bayesimpact.diagnosis.selection.revision import has_bad_readings, revised
+from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.identify import identify
+from bayesimpact.model.effects import EFFECTS
+
+BY_ID = {e.id: e for e in EFFECTS}
+PHYSICS: Mapping[str, Mapping[str, Any]] = {
+    "spring_cubic": {"stiffness": 6e6},
+    "coulomb_friction": {"force": 0.02},
+}
+MISSING: Mapping[str, Mapping[str, Any]] = {
+    "spring_cubic": {"stiffness": 2e6},
+    "quadratic_drag": {"coefficient": 0.3},
+    "stiffness_drift": {"rate": -4e-3},
+    "contact_damping_indentation": {"coefficient": 4e4},
+}
+IMPULSE, WIDTH = 0.004, 0.01  # N s, s
+
+
+def recorded(effects: Mapping[str, Any], time: float | None = None, **how: Any) -> Campaign:
+    """A campaign of which the second recording gets a knock."""
+    campaign = small_rig.record(5, effects, **how)
+    if time is None:
+        return campaign
+    knock = {"impulse": IMPULSE, "time": time, "width": WIDTH}
+    knocked = small_rig.record(5, {**effects, "knock": knock}, **how)
+    recordings = list(campaign.recordings)
+    recordings[1] = knocked.recordings[1]
+    return replace(campaign, recordings=tuple(recordings))
+
+
+def fits(campaign: Campaign, *names: str) -> tuple[Fit, Fit]:
+    """Of the base model, and with effects."""
+    base = identify(campaign, rng=np.random.default_rng(0), search=False).fit
+    if not names:
+        return base, base
+    effects = [BY_ID[name] for name in names]
+    return base, fit_from(base, effects, {}, campaign_scales(base)).fit
+
+
+@pytest.mark.parametrize(
+    ("stop", "time", "kept"), [(True, 0.71, "start_s"), (False, 1.36, "end_s")]
+)
+def test_a_knock_is_told_and_what_follows_it_left_out(stop: bool, time: float, kept: str) -> None:
+    """The longer part stays, and the model fits it."""
+    how = {} if stop else {"rig": small_rig.PLAIN, "releases": small_rig.PLAIN_RELEASES}
+    base, found = fits(recorded(PHYSICS, time, **how), *PHYSICS)
+    told = knock_beside(base, found)
+    assert told is not None
+    compared, plain, first = told
+    fault = compared.fault
+    assert (fault.id, fault.recording) == ("recording_knock", "b")
+    assert fault.remedy.startswith(kept)
+    assert fault.start_s - 0.03 < time < fault.end_s + 0.03
+    assert first.reduced_chi2 < 1.1 < found.reduced_chi2
+    assert plain.density.oscillator.campaign is compared.campaign
+    campaign = found.density.oscillator.campaign
+    sizes = [r.samples.size for r in campaign.recordings]
+    after = [r.samples.size for r in compared.campaign.recordings]
+    assert [a == b for a, b in zip(sizes, after, strict=True)].count(False) == 1
+    assert after[1] > 0.6 * sizes[1]
+
+
+def test_revised_search_begins_without_it() -> None:
+    base, found = fits(recorded(PHYSICS, 0.71), *PHYSICS)
+    assert has_bad_readings(base, found)
+    state: Any = SimpleNamespace(candidate=SimpleNamespace(fit=found), is_white=False)
+    revision = revised(base, state, lambda message: None)
+    assert revision is not None and revision.first is not None
+    assert [one.fault.id for one in revision.faults] == ["recording_knock"]
+    assert revision.first.names == found.names
+
+
+@pytest.mark.parametrize("effect", MISSING)
+def test_missing_physics_is_no_knock(effect: str) -> None:
+    """It does not end with a new start."""
+    base, _ = fits(recorded({effect: MISSING[effect]}))
+    assert base.reduced_chi2 > 2.0
+    assert knock_beside(base, base) is None
+
+
+def test_adequate_model_shows_no_jump() -> None:
+    _, found = fits(recorded(PHYSICS), *PHYSICS)
+    assert all(likeliest_jump(found, r) is None for r in range(3))
+
+
+def test_score_is_that_of_a_simulated_jump() -> None:
+    """Against the explicit column of a jump at one sample, stretches of free changes included."""
+    _, found = fits(recorded(PHYSICS, 0.71), *PHYSICS)
+    r, at = 1, 900
+    signals = np.column_stack([_basis(found)[r], found.linearisation[r].residual]).T
+    score = _score(_sums(found, r, signals, 0))[at]
+    oscillator, sigma = found.density.oscillator, found.density.likelihood.noise
+    y = oscillator.displacements(found.mode)[r]
+    (v,) = oscillator.motions_of(
+        np.array([r]), oscillator.layout.slots(found.mode)[[r]], np.array([1])
+    )
+    columns = []
+    for change in ([1e-9, 0.0], [0.0, 1e-8]):
+        states = [np.array([[at, y[at] + s * change[0], v[at] + s * change[1]]]) for s in (-1, 1)]
+        low, high = (oscillator.predict_restarted(r, found.mode[None], s)[0] for s in states)
+        columns.append((high - low) / np.abs(change).max())
+    recording = oscillator.campaign.recordings[r]
+    moved = sigma.whitened(recording, np.array(columns))
+    basis = _basis(found)[r]
+    slope = moved @ found.linearisation[r].residual
+    size = moved @ moved.T - (moved @ basis) @ (moved @ basis).T
+    assert score == pytest.approx(slope @ np.linalg.solve(size, slope), rel=0.02)
