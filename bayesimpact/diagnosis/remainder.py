@@ -11,6 +11,8 @@ from bayesimpact.diagnosis.location import locate
 from bayesimpact.diagnosis.selection.outcome import ExaminedModel, Selection
 from bayesimpact.inference.fit import Fit
 
+MOST = 0.9  # of what is left beyond the noise: the recordings that hold it are named
+
 
 @dataclass(frozen=True)
 class Remainder:
@@ -21,8 +23,9 @@ class Remainder:
     rms : of the residual less the noise, m; of all of it where of the noise only a bound is known
     share : the same over the rms of the signal about its mean
     over_noise : rms residual over the noise
-    regime, displacement, recordings : where, from the force of the guess where that has effects,
-        else from the free force that would explain it
+    regime, displacement : where, from the force of the guess where that has effects, else from the
+        free force that would explain it
+    recordings : those that together hold most of it, most first
     guess : a formula, ids that the likeliest larger model adds, or a form of force; "" for none
     """
 
@@ -53,7 +56,7 @@ def remainder(
     more = tuple(e for e in effects if e.id not in have) if explains else ()
     place = locate(left.candidate.fit, better, left.unknown, more)
     return Remainder(
-        rms, rms / signal, over, place.regime, place.displacement, place.recordings,
+        rms, rms / signal, over, place.regime, place.displacement, recordings_of(after),
         guess or next_guess(selection, left),
     )  # fmt: skip
 
@@ -63,6 +66,15 @@ def beyond_noise(fit: Fit) -> float:
     if fit.density.likelihood.noise.is_bound:
         return fit.rms
     return fit.rms * float(np.sqrt(max(1.0 - 1.0 / max(fit.reduced_chi2, 1.0), 0.0)))
+
+
+def recordings_of(fit: Fit) -> tuple[str, ...]:
+    """Recordings that together hold `MOST` of what a fit leaves beyond the noise, most first."""
+    likelihood, recordings = fit.density.likelihood, fit.density.oscillator.campaign.recordings
+    beyond = np.maximum(fit.sums / likelihood.noise.level**2 - likelihood.sizes, 0.0)
+    order = np.argsort(-beyond, kind="stable")
+    share = np.cumsum(beyond[order]) / max(float(beyond.sum()), 1e-300)
+    return tuple(recordings[i].name for i in order[: int(np.searchsorted(share, MOST)) + 1])
 
 
 def likeliest_formula(formulas: Formulas | None) -> str:

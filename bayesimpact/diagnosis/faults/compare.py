@@ -46,6 +46,7 @@ MISFIT = 4.0  # reduced chi-squared of a recording alone from which on the other
 # than alone, is a reason to try it.
 REVERSED = 0.25
 WORST = 1.5  # times a recording's misfit, that the worst one has at most: set by hand
+FEW = 3  # of such recordings: what is missing from all of them is no sign
 SIGNIFICANT = 4.0  # standard errors of a reduced chi-squared that call for a comparison
 SHARE = 1 / 3  # of the recordings, at most, that may be faulty: the others are the majority
 LEAST = 3  # recordings: of two that differ neither is the faulty one
@@ -151,7 +152,7 @@ def _doubted(
     """Recordings that the other sign is tried of first, and those only where one of these has it.
 
     What fits alone about as well as the others, and together with them about as well as alone, has
-    their sign; of such recordings those that are nearly as bad as the worst one stand for all.
+    their sign; of such recordings a few that are nearly as bad as the worst one stand for all.
     """
     rows = [alone[r.name] for r in campaign.recordings]
     own = np.array([np.inf if one is None else one.reduced_chi2 for one in rows])
@@ -162,7 +163,7 @@ def _doubted(
     apart = [
         i for i in doubted if not (own[i] * REVERSED <= usual and together[i] * REVERSED <= own[i])
     ]
-    first = apart or [i for i in doubted if own[i] * WORST >= own[doubted[0]]]
+    first = apart or [i for i in doubted if own[i] * WORST >= own[doubted[0]]][:FEW]
     return first, [i for i in doubted if i not in first]
 
 

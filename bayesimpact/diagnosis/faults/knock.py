@@ -36,7 +36,8 @@ Array = NDArray[np.float64]
 STEP = 1e-6  # of the largest displacement: free changes so small are linear
 PLACE = 0.5 * float(chi2.isf(1e-3, 2))  # nats: less likely places than this are no candidates
 NEAR = 2  # samples beside these: the blow takes its time
-EDGE = 16  # samples at either end, after which a jump is told from the start values
+EDGE = 1.0  # free periods before and after: a shorter part is no free motion, but a start or end
+FEWEST = 16  # samples of these at least, of a motion that is hardly sampled
 LEAST_FREE = 1e-3  # of a column squared, that parameters leave of it: less is error of derivatives
 SLACK = 2.0  # times the misfit that may stay, that a score may promise: it is of first order
 SECOND = " after the knock"  # the name of a recording's second part
@@ -183,7 +184,10 @@ def likeliest_jump(fit: Fit, r: int) -> StateJump | None:
         fit.density.likelihood.noise,
         fit.density.oscillator.campaign.recordings[r],
     )
-    if recording.samples.size < 4 * EDGE:
+    stiffness = max(fit.value("k1"), 1e-300)
+    period = 2 * np.pi * float(np.sqrt(fit.density.oscillator.campaign.mass / stiffness))
+    edge = max(FEWEST, round(EDGE * period / recording.interval))
+    if recording.samples.size < 4 * edge:
         return None
     signals, start = noise.in_time(
         np.column_stack([_basis(fit)[r], fit.linearisation[r].residual]).T,
@@ -191,7 +195,8 @@ def likeliest_jump(fit: Fit, r: int) -> StateJump | None:
     )  # fmt: skip
     first = round(start / recording.interval)
     score = _score(_sums(fit, r, signals, first))
-    score[:EDGE] = score[-EDGE:] = 0.0
+    score[: max(edge - first, 0)] = 0.0
+    score[recording.samples.size - edge - first :] = 0.0
     best = int(np.argmax(score))
     power, count = float(fit.sums.sum()), float(fit.density.likelihood.sizes.sum())
     nats = 0.5 * score / max(noise.level**2, (power - score[best]) / count)

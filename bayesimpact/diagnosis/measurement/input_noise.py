@@ -36,9 +36,22 @@ QUIETEST = 0.1  # of an input's bands: the loudest one of these is its floor
 # ... but for what the median of a band of m ordinates errs by, 1 / (ln 2 m^(1/2)) of itself: the
 # quietest tenth of equal ones lies 1.28 of that too low
 ERROR = 1.28 / np.log(2.0)
+MANY = 0.5  # of the bands: the loudest one of these is still the floor, beside a large misfit
+# standard deviations of a band's median over the root of the number of bands: three of the
+# difference of two quantiles, the median of all bands (1.25) and the quietest tenth (1.7)
+CHANCE = 3.0 * (1.25**2 + 1.7**2) ** 0.5
 SMALLEST = 1e-3  # of the floor: a size that is sought down to there
 CLOSE = 0.02  # of ln size
 STEP = 0.05  # of a standard deviation, other parameters as they are: for differences
+
+
+def under_input_noise(fit: Fit) -> Fit | None:
+    """A model's mode under the noise of its inputs, where that leaves no large misfit; None where
+    it leaves one, or nothing is told of it.
+    """
+    noise = input_noise(fit)
+    found = None if noise is None else refitted(fit, noise=noise)
+    return None if found is None or is_large(found) else found
 
 
 def with_input_noise(before: Identification) -> Identification:
@@ -56,10 +69,13 @@ def input_noise(fit: Fit) -> Noise | None:
     cannot be told from the input, or is known already.
 
     Beside readings of growing or filtered noise, channels of one motion, which it moves together,
-    or a base's displacement, whose second derivative is the force, it is not looked for.
+    or a base's displacement, whose second derivative is the force, it is not looked for. Beside a
+    large misfit, which asks for all that a floor allows, half of an input's bands must be its
+    floor: that of an input with content at all frequencies is no noise.
     """
     noise, campaign = fit.density.likelihood.noise, fit.density.oscillator.campaign
-    floors = {r.name: _force(fit, r) * _floor(r) for r in campaign.recordings}
+    share = MANY if is_large(fit) else QUIETEST
+    floors = {r.name: _force(fit, r) * _floor(r, share) for r in campaign.recordings}
     floors = {name: floor for name, floor in floors.items() if floor > 0.0}
     known = noise.forces is not None or noise.grows or noise.smoothing is not None
     if known or not floors or any(r.motion_name for r in campaign.recordings):
@@ -129,9 +145,10 @@ def _log_likelihood(fit: Fit, linear: tuple[Linearisation, ...], noise: Noise) -
     return volume - 0.5 * total * float(np.log(rest / total))
 
 
-def _floor(recording: Recording) -> float:
+def _floor(recording: Recording, share: float = QUIETEST) -> float:
     """Standard deviation of white noise as loud as an input's quietest bands, in its own unit; 0
-    where these are not far below its loudest, or there is no input of a force.
+    where these are not far below its loudest, a `share` of its bands is louder than they are by
+    more than chance, or there is no input of a force.
     """
     if recording.input is None or recording.input.kind == "base_m":
         return 0.0
@@ -142,8 +159,10 @@ def _floor(recording: Recording) -> float:
     count = int(TOP * driving.size) // width
     bands = np.median(driving[: count * width].reshape(count, width), axis=1) / MEDIAN
     floor = float(np.quantile(bands, QUIETEST)) / (1.0 - ERROR / width**0.5)
+    most = floor * (1.0 + CHANCE / np.log(2.0) / (width * bands.size) ** 0.5)
     loudest = float(driving.max())
-    return float(np.sqrt(floor)) if floor < SILENT * loudest else 0.0
+    is_floor = share <= QUIETEST or float(np.quantile(bands, share)) < most
+    return float(np.sqrt(floor)) if is_floor and floor < SILENT * loudest else 0.0
 
 
 def _force(fit: Fit, recording: Recording) -> float:

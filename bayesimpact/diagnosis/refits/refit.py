@@ -159,15 +159,8 @@ def fit_from(
     """Fit a base model with effects from given values of parameters, over growing stretches; to an
     end of use where that reaches a log likelihood of `goal`.
     """
-    density = extend(fit, effects, scales)
+    density, start = start_of_set(fit, effects, values, scales)
     layout, acting = density.oscillator.layout, density.oscillator.acting
-    start = transfer(fit, layout, effects, scales, values)
-    for i, parameter in enumerate(layout.parameters):
-        if parameter.name in values:
-            low = max(parameter.lower, density.priors.lower[i])
-            start[i] = np.clip(
-                values[parameter.name], low, min(parameter.upper, density.priors.upper[i])
-            )
     steps = difference_steps(fit, density, step_sizes(layout.names, acting, scales, ()))
     found = growing_horizon(
         density, start,
@@ -175,6 +168,22 @@ def fit_from(
         goal=goal + prior_at(density, start),
     )  # fmt: skip
     return Candidate(tuple(effects), found, model_evidence(found))
+
+
+def start_of_set(
+    fit: Fit, effects: Sequence[Effect], values: Mapping[str, float], scales: Scales
+) -> tuple[PosteriorDensity, Array]:
+    """The posterior of a base model with effects, and where its parameters (d,) have given values,
+    inside their bounds.
+    """
+    density = extend(fit, effects, scales)
+    layout, priors = density.oscillator.layout, density.priors
+    start = transfer(fit, layout, effects, scales, values)
+    for i, parameter in enumerate(layout.parameters):
+        if parameter.name in values:
+            low, high = max(parameter.lower, priors.lower[i]), min(parameter.upper, priors.upper[i])
+            start[i] = np.clip(values[parameter.name], low, high)
+    return density, start
 
 
 def of_two_ways(

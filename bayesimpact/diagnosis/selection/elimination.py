@@ -51,8 +51,8 @@ class Elimination(Ranked):
         return self.eliminated(examined)  # what the last exchange led to may need less too
 
     def eliminated(self, examined: ExaminedModel) -> ExaminedModel:
-        """Leave out effects, the least useful first, that the recordings do not demand; where
-        something remains, put the law that one refines in its place.
+        """Leave out effects, the least useful first, that the recordings do not demand, and put the
+        law that one refines in its place.
 
         An effect stays when the model without it is decisively worse, or leaves something. When
         time is up and something remains, all stay: what is needed is compared then (`decision`).
@@ -67,10 +67,12 @@ class Elimination(Ranked):
         return examined
 
     def smaller(self, examined: ExaminedModel) -> list[Candidate]:
-        """Models with one effect less, or with a simpler one where something remains."""
+        """Models with one effect less, or with a simpler one: at the end of its range, a law is the
+        one that it refines.
+        """
         chosen = examined.candidate
         found = [self.drop(chosen, e) for e in chosen.effects if len(chosen.effects) > 1]
-        if not examined.is_white and self.may_go_on():
+        if self.may_go_on():
             found += [c for e in chosen.effects for c in self.simplified(chosen, e)]
         return found
 

@@ -61,20 +61,23 @@ class Revision:
         )
 
 
-def revised(base: Fit, examined: ExaminedModel, say: Progress) -> Revision | None:
+def revised(
+    base: Fit, examined: ExaminedModel, say: Progress, told: Revision | None = None
+) -> Revision | None:
     """The search without the readings that spoil it, with recordings corrected, with the inputs
     between their samples that a model asks for, under the noise of its inputs and the slow one that
     is all that it leaves; None where there is nothing of these.
 
-    Several may be off at once: each is asked of the model with what was told before it.
+    Several may be off at once: each is asked of the model with what was `told` before it.
     """
     found = examined.candidate.fit
-    revision = begun = Revision(base, None if found is base else found)
+    begun = Revision(base, None if found is base else found)
+    revision = told or begun
     steps = () if examined.is_white and found is base else READINGS
     steps = (*steps, _under_noise_of_inputs, *([] if examined.is_white else [_under_slow_noise]))
     for _ in range(MOST):
-        told = (step(revision.base, revision.found, say) for step in steps)
-        other = next((one for one in told if one is not None), None)
+        asked = (step(revision.base, revision.found, say) for step in steps)
+        other = next((one for one in asked if one is not None), None)
         if other is None:
             break
         revision = revision.followed_by(other)
@@ -207,15 +210,15 @@ READINGS = (
 )
 
 
-def has_bad_readings(base: Fit, fit: Fit) -> bool:
-    """Whether readings are off that only a model as good as this one shows, those of an input among
-    them: what is fitted to these decides nothing.
+def first_revision(base: Fit, found: Fit, say: Progress) -> Revision | None:
+    """The first thing that is off and only a model as good as this one shows, of readings or of an
+    input's: what is fitted to these decides nothing. None where there is none.
     """
-    if beside_spikes(fit) or misses_onsets(fit) or _of_inputs(base, fit):
-        return True
-    if fit is not base and fault_beside(base, fit) is not None:
-        return True
-    return knock_beside(base, fit) is not None
+    steps = [_without_readings, _under_noise_of_inputs, _without_a_knock]
+    if found is not base:
+        steps.append(_with_a_recording_corrected)
+    told = (step(base, found, say) for step in steps)
+    return next((one for one in told if one is not None), None)
 
 
 def misses_onsets(fit: Fit) -> bool:

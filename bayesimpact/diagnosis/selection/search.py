@@ -29,6 +29,7 @@ from bayesimpact.diagnosis.refits.refit import (
 )
 from bayesimpact.diagnosis.residual_force.gaussian_process import missing_contact
 from bayesimpact.diagnosis.score_test.pairs import promising_pairs
+from bayesimpact.diagnosis.selection.asking import Asking
 from bayesimpact.diagnosis.selection.models import NOTHING, STARTS, UNCONVERGED_SHORTFALL, Progress
 from bayesimpact.diagnosis.selection.outcome import (
     ExaminedModel,
@@ -36,9 +37,8 @@ from bayesimpact.diagnosis.selection.outcome import (
     explains_most,
     is_large,
 )
-from bayesimpact.diagnosis.selection.revision import has_bad_readings, revised
+from bayesimpact.diagnosis.selection.revision import revised
 from bayesimpact.diagnosis.selection.unknown import learn_force
-from bayesimpact.diagnosis.selection.unlisted import Problem, Unlisted
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.refitted import refitted
 from bayesimpact.model.effects.effect import Effect, Scales
@@ -92,19 +92,16 @@ def select_model(
         first = _beside_hums(fit, lambda: _Search(effects, scales, rng, say, search.budget))
     base, examined = search.found(fit, first)
     goes_on = bool(examined.candidate.effects) and search.budget.may_go_on()
-    asks = goes_on or search.was_cut or search.budget.may_search_again()
-    revision = revised(fit, examined, say) if asks else None
+    was_cut = search.revision is not None
+    asks = goes_on or was_cut or search.budget.may_search_again()
+    revision = revised(fit, examined, say, search.revision) if asks else None
     if revision is not None:
         again = _Search(effects, scales, rng, say, search.budget)
         again.is_last = True
         quiet = again.found(revision.base, revision.first)
-        if search.was_cut or quiet[1].is_white:
+        if was_cut or quiet[1].is_white:
             told = again.selection(*quiet)
             return replace(told, faults=revision.faults, band_limited=revision.band_limited)
-    elif search.was_cut:
-        search.is_last = True
-        reached = examined.candidate.fit
-        base, examined = search.found(fit, first if reached is fit else reached)
     return search.selection(base, examined)
 
 
@@ -126,14 +123,8 @@ def _beside_hums(fit: Fit, begun: Callable[[], _Search]) -> Fit | None:
     return found if np.isfinite(found.log_posterior) else None
 
 
-class _Search(Unlisted):
-    """Which models to fit next, and their odds.
-
-    is_last : it goes to its end, whatever a model shows of the readings
-    was_cut : it ended at a model that readings spoil
-    """
-
-    is_last = was_cut = False
+class _Search(Asking):
+    """Which models to fit next, and their odds."""
 
     def found(self, fit: Fit, first: Fit | None) -> tuple[ExaminedModel, ExaminedModel]:
         """The base model of `fit`, and where a search from it, or from `first`, ends."""
@@ -186,17 +177,6 @@ class _Search(Unlisted):
                 beam = [examined, *waiting, *beside]
         return examined
 
-    def has_bad_readings(self, examined: ExaminedModel) -> bool:
-        """Whether readings spoil what follows a model, and time is left to go on without them."""
-        goes_on = bool(examined.candidate.effects) and self.may_go_on()  # from that model, not anew
-        may_be = goes_on or self.budget.may_search_again()
-        if self.is_last or examined.is_white or not may_be:
-            return False
-        self.was_cut = has_bad_readings(
-            self.examined_models[frozenset()].candidate.fit, examined.candidate.fit
-        )
-        return self.was_cut
-
     def extensions(
         self, beam: Sequence[ExaminedModel]
     ) -> tuple[list[Candidate], list[ExaminedModel]]:
@@ -213,59 +193,6 @@ class _Search(Unlisted):
     def may_grow(self, examined: ExaminedModel) -> bool:
         """Whether a model may take in another effect."""
         return len(examined.candidate.effects) < self.most and not self.is_dominated(examined)
-
-    def asked_for(self, base: ExaminedModel) -> list[ExaminedModel]:
-        """The likeliest models that are asked for: without a stop by the equation of motion along
-        the measured motion; with one by periods ahead, by these about what the equation asks for in
-        free flight, and by the equation over all stretches, as long as the misfit stays large.
-
-        What the stop does may be still to come after flight, and so where that is not all, this
-        model stays in the beam beside the likeliest.
-        """
-        base = self.with_a_line(base)
-        if self.has_bad_readings(base):
-            return [base]
-        ways: list[list[Problem]] = [[self.of_all]]
-        if self.asked.has_stop:
-            ways = [[self.of_periods], [self.of_flight, self.of_periods], *ways]
-        begun, in_flight = [base.candidate], base.candidate
-        for way in ways:
-            about = base.candidate
-            for problem in way:
-                about = self.asked_again(about, problem)
-                begun.append(about)
-                in_flight = about if problem == self.of_flight else in_flight
-            if not is_large(about.fit):
-                break
-            best = max(begun, key=self.promise)
-            if self.is_no_set(best):
-                with_term = self.with_a_term(self.examine(best))
-                if not is_large(with_term.candidate.fit):
-                    return [with_term]
-        best = max(begun, key=self.promise)
-        examined = self.examine(best)
-        if self.has_bad_readings(examined):
-            return [examined]
-        with_term = self.with_a_term_ahead(base, self.with_a_term(examined))
-        if with_term is not examined:
-            return [with_term]
-        stays = in_flight.effects and in_flight is not best
-        return [examined, self.examine(in_flight)] if stays else [examined]
-
-    def of_flight(self, about: Candidate) -> list[Candidate]:
-        """Models that the equation of motion asks for about one, in free flight."""
-        problem = self.asked.about(about, flight=True)
-        return self.fit_sets(problem.fit, problem.best(self.most - len(problem.known)))
-
-    def of_all(self, about: Candidate) -> list[Candidate]:
-        """Models that the equation of motion asks for about one."""
-        problem = self.asked.about(about, flight=False)
-        return self.fit_sets(problem.fit, problem.best(self.most - len(problem.known)))
-
-    def of_periods(self, about: Candidate) -> list[Candidate]:
-        """Models that periods ahead ask for about one."""
-        problem = self.asked.ahead(about, about)
-        return self.fit_sets(problem.fit, problem.best(self.most - len(about.effects)))
 
     def best_first(self, examined: ExaminedModel, found: Sequence[Candidate]) -> list[Candidate]:
         """Extensions of a model, the next one to examine first."""

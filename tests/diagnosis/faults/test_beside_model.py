@@ -18,7 +18,7 @@ from bayesimpact.diagnosis.faults.beside_model import fault_beside
 from bayesimpact.diagnosis.faults.together import Hypothesis
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import fit_from
-from bayesimpact.diagnosis.selection.revision import has_bad_readings, revised
+from bayesimpact.diagnosis.selection.revision import first_revision, revised
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects import EFFECTS
@@ -67,7 +67,7 @@ def test_a_fault_is_told_with_its_size(kind: str, more: tuple[str, ...]) -> None
     assert fit.reduced_chi2 < 1.1 < compared.before
     assert {e.id for e in fit.density.oscillator.effects} == set(PHYSICS)
     assert fit.density.oscillator.campaign is compared.campaign
-    assert has_bad_readings(base, found)
+    assert first_revision(base, found, print) is not None
 
 
 def test_a_search_is_revised_without_all_that_is_off() -> None:
@@ -111,7 +111,7 @@ def test_physics_that_is_missing_is_no_fault() -> None:
 
 def test_recordings_that_agree_have_none() -> None:
     base, found = fits(recorded(None), "gap_per_recording")
-    assert fault_beside(base, found) is None and not has_bad_readings(base, found)
+    assert fault_beside(base, found) is None and first_revision(base, found, print) is None
 
 
 def test_gaps_of_every_recordings_own_are_no_gain_of_one() -> None:

@@ -15,7 +15,7 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.diagnosis.faults.knock import _basis, _score, _sums, knock_beside, likeliest_jump
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import fit_from
-from bayesimpact.diagnosis.selection.revision import has_bad_readings, revised
+from bayesimpact.diagnosis.selection.revision import first_revision, revised
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects import EFFECTS
@@ -80,7 +80,7 @@ def test_a_knock_is_told_and_what_follows_it_left_out(stop: bool, time: float, k
 
 def test_revised_search_begins_without_it() -> None:
     base, found = fits(recorded(PHYSICS, 0.71), *PHYSICS)
-    assert has_bad_readings(base, found)
+    assert first_revision(base, found, print) is not None
     state: Any = SimpleNamespace(candidate=SimpleNamespace(fit=found), is_white=False)
     revision = revised(base, state, lambda message: None)
     assert revision is not None and revision.first is not None

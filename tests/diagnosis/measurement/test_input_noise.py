@@ -15,7 +15,11 @@ from effect_rigs import BY_ID
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.input import Input
 from bayesimpact.diagnosis.diagnose import diagnose
-from bayesimpact.diagnosis.measurement.input_noise import input_noise, with_input_noise
+from bayesimpact.diagnosis.measurement.input_noise import (
+    input_noise,
+    under_input_noise,
+    with_input_noise,
+)
 from bayesimpact.diagnosis.measurement.whiteness import whiteness_p
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import fit_from
@@ -207,6 +211,31 @@ def test_beside_what_is_missing_it_is_told_by_the_model_that_holds_that() -> Non
     forces = found.after.density.likelihood.noise.forces
     assert forces is not None and forces.share == pytest.approx(ERROR, rel=0.25)
     assert np.max(np.abs(deviations(found.after, rig))) < 4.0
+
+
+def test_a_large_misfit_that_is_the_inputs_noise_alone_is_told_before_any_search() -> None:
+    """Half of the input's bands are its floor, and no law is as likely."""
+    rig = driven_rig(4, "displacement", kind="sweep")
+    effects = [BY_ID[i] for i in ("spring_cubic", "quadratic_drag", "stiffness_drift")]
+    campaign, said = with_noisy_input(rig, 1, error=0.15), list[str]()
+    found = diagnose(
+        campaign, rng=np.random.default_rng(0), effects=effects, search=False,
+        progress=lambda words: said.append(str(words)),
+    )  # fmt: skip
+    assert identified(campaign).fit.reduced_chi2 > LARGE**2
+    assert found.verdict == "adequate"
+    assert not any(words.startswith("fitting spring_cubic") for words in said)
+    assert np.max(np.abs(deviations(found.after, rig))) < 4.0
+
+
+def test_beside_a_large_misfit_an_input_without_a_floor_tells_no_noise() -> None:
+    """One that falls with frequency: its quietest bands would take what a missing law leaves."""
+    rig = driven_rig(6, "displacement", stiff, kind="noise")
+    (recording,) = rig.campaign.recordings
+    assert recording.input is not None
+    fit = identified(rig.campaign).fit
+    assert fit.reduced_chi2 > LARGE**2
+    assert under_input_noise(fit) is None
 
 
 def with_slow_noise_of_its_own(rig: DrivenRig, campaign: Campaign, seed: int) -> Campaign:

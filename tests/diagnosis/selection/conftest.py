@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 from made_up_models import EFFECTS, Table
 
-from bayesimpact.diagnosis.selection import elimination, models, ranked, remaining, search
+from bayesimpact.diagnosis.selection import (
+    asking,
+    elimination,
+    models,
+    ranked,
+    remaining,
+    search,
+)
 
 
 @pytest.fixture
@@ -22,7 +29,8 @@ def run(monkeypatch):
         monkeypatch.setattr(models, "Asked", table.asks)
         monkeypatch.setattr(models, "shakes_in_own_band", lambda fit, remains: False)
         monkeypatch.setattr(models, "leaves_something", lambda fit: False)
-        monkeypatch.setattr(ranked, "leaves_something", lambda fit: fit.reduced_chi2 > 1.0)
+        for module in (asking, ranked):
+            monkeypatch.setattr(module, "leaves_something", lambda fit: fit.reduced_chi2 > 1.0)
         monkeypatch.setattr(models, "is_refuted", lambda fit: fit.ids == refuted)
         monkeypatch.setattr(models, "scan", table.scan)
         monkeypatch.setattr(models, "profiled", table.profiled)
@@ -45,7 +53,12 @@ def run(monkeypatch):
         monkeypatch.setattr(remaining, "is_imitated", lambda selection: False)
         monkeypatch.setattr(search, "promising_pairs", lambda scan, count: ())
         monkeypatch.setattr(search, "revised", lambda *about: None)
-        monkeypatch.setattr(search, "has_bad_readings", lambda base, fit: False)
+        monkeypatch.setattr(asking, "first_revision", lambda base, fit, say: None)
+        monkeypatch.setattr(asking, "under_input_noise", lambda fit: None)
+        monkeypatch.setattr(
+            asking, "criterion_after_a_step",
+            lambda base, chosen, scales: -table.gain([e.id for e in chosen.effects]),
+        )  # fmt: skip
         monkeypatch.setattr(elimination, "is_at_an_end", lambda fit, effect: False)
         for force in ("missing_force", "missing_drift"):
             monkeypatch.setattr(models, force, table.missing)

@@ -16,7 +16,7 @@ from bayesimpact.diagnosis.faults.outliers import beside_spikes, residual_spikes
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import fit_from
 from bayesimpact.diagnosis.selection import revision, search
-from bayesimpact.diagnosis.selection.revision import has_bad_readings, misses_onsets, revised
+from bayesimpact.diagnosis.selection.revision import first_revision, misses_onsets, revised
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.onsets import without_onsets
@@ -58,7 +58,7 @@ def across(good: Fit) -> Fit:
 def test_onsets_are_those_of_the_good_model(base: Fit, good: Fit, across: Fit) -> None:
     """Without them one mode is found from any side: no step lies between."""
     assert base.reduced_chi2 > 30 and good.reduced_chi2 < 2.0
-    assert misses_onsets(good) and not has_bad_readings(base, base)
+    assert misses_onsets(good) and first_revision(base, base, print) is None
     assert not misses_onsets(refitted(good, without_onsets(good)))
     examined: Any = SimpleNamespace(candidate=SimpleNamespace(fit=across), is_white=True)
     told: list[str] = []
@@ -67,7 +67,7 @@ def test_onsets_are_those_of_the_good_model(base: Fit, good: Fit, across: Fit) -
     campaign = revision.first.density.oscillator.campaign
     assert campaign is revision.base.density.oscillator.campaign
     assert (
-        not has_bad_readings(revision.base, revision.first)
+        first_revision(revision.base, revision.first, print) is None
         and 0.9 < revision.first.reduced_chi2 < 1.1
     )
     ends = [
@@ -125,7 +125,7 @@ def test_of_displacements_there_is_nothing_to_revise() -> None:
     fit = identify(small_rig.record(5, CUBIC), rng=RNG(0), search=False).fit
     found = fit_from(fit, [BY_ID["spring_cubic"]], {}, campaign_scales(fit)).fit
     examined: Any = SimpleNamespace(candidate=SimpleNamespace(fit=found), is_white=True)
-    assert not has_bad_readings(fit, found)
+    assert first_revision(fit, found, print) is None
     assert revised(fit, examined, pytest.fail) is None
 
 
@@ -144,7 +144,7 @@ def test_draws_have_the_covariance_of_the_approximation_whatever_the_units(good:
 
 @dataclass(frozen=True)
 class MadeUpSelection:
-    """Which search it is of: the first, the one posed anew, or the first gone on."""
+    """Which search it is of: the first, or the revised one."""
 
     of: str
     faults: tuple[Any, ...] = ()
@@ -157,33 +157,31 @@ class MadeUpSelection:
         (True, True, False, "anew"),
         (False, True, False, "first"),
         (False, True, True, "anew"),
-        (True, False, False, "first to its end"),
         (False, False, False, "first"),
     ],
 )
 def test_which_search_answers(
     monkeypatch: pytest.MonkeyPatch, cut: bool, posed: bool, white: bool, of: str
 ) -> None:
-    """One that was cut short is no answer, whatever the one posed anew leaves."""
+    """One that was cut short is no answer, whatever the revised one leaves."""
     made: list[Any] = []
 
     class Search:
-        is_last = was_cut = False
+        is_last, revision = False, None
 
         def __init__(self, *about: Any) -> None:
             self.budget = SimpleNamespace(may_search_again=lambda: True)
             made.append(self)
 
         def found(self, base: Any, first: Any) -> tuple[Any, Any]:
-            self.was_cut = cut and not self.is_last
+            self.revision = "told" if cut and not self.is_last else None
             examined = SimpleNamespace(
                 candidate=SimpleNamespace(fit="reached", effects=()), is_white=white
             )
             return base, examined
 
         def selection(self, base: Any, examined: Any) -> MadeUpSelection:
-            first = "first to its end" if self.is_last else "first"
-            return MadeUpSelection(first if self is made[0] else "anew")
+            return MadeUpSelection("first" if self is made[0] else "anew")
 
     revision = (
         SimpleNamespace(base="clean", first=None, faults=("spike",), band_limited=True)
@@ -191,12 +189,14 @@ def test_which_search_answers(
         else None
     )
     monkeypatch.setattr(search, "_Search", Search)
-    monkeypatch.setattr(search, "revised", lambda *about: revision)
+    asked: list[Any] = []
+    monkeypatch.setattr(search, "revised", lambda *about: asked.append(about[-1]) or revision)
     monkeypatch.setattr(search, "_beside_hums", lambda *about: None)
     fit: Any = "base"
     scales: Any = None
     found: Any = search.select_model(fit, (), scales, rng=RNG(0))
     assert found == MadeUpSelection(of, *((("spike",), True) if of == "anew" else ()))
+    assert asked == ["told" if cut else None]  # what cut it is not told twice
 
 
 def test_a_reading_across_the_jump_of_an_onset_is_no_spike(across: Fit) -> None:

@@ -1,0 +1,120 @@
+"""What a search begins with where the misfit is large: sets that whole problems ask for.
+
+Scores are linear about a fit that is far from the recordings, and tell little. The equation of
+motion along the measured motion is linear in the sizes of all forces, wherever the fit is; with a
+stop, where the motion in contact is hardly measured, so are simulations of one period ahead. Each
+proposes sets of effects with their values (`candidates`).
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+from bayesimpact.diagnosis.candidates.one_step import criterion_after_a_step
+from bayesimpact.diagnosis.candidates.term_sets import EffectSet
+from bayesimpact.diagnosis.measurement.input_noise import under_input_noise
+from bayesimpact.diagnosis.refits.refit import Candidate
+from bayesimpact.diagnosis.selection.outcome import ExaminedModel, is_large, leaves_something
+from bayesimpact.diagnosis.selection.revision import Revision, first_revision
+from bayesimpact.diagnosis.selection.unlisted import Unlisted
+from bayesimpact.diagnosis.thresholds import DECISIVE
+from bayesimpact.inference.fit import Fit
+
+FITTED = 2  # of the sets that are asked for about a model, the most promising
+
+
+class Asking(Unlisted):
+    """A search that begins with what is asked for, unless readings are off.
+
+    is_last : it goes to its end, whatever a model shows of the readings
+    revision : without what spoils them, where it ended at a model that shows that
+    """
+
+    is_last = False
+    revision: Revision | None = None
+
+    def asked_for(self, base: ExaminedModel) -> list[ExaminedModel]:
+        """The likeliest model that is asked for: without a stop by the equation of motion along the
+        measured motion, with one by periods ahead as well (`of_problems`).
+        """
+        base = self.with_a_line(base)
+        if self.has_bad_readings(base):
+            return [base]
+        if self.asked.has_stop:
+            best = self.of_problems(base)
+        else:
+            best = self.asked_again(base.candidate, self.of_motion)
+        if self.is_no_set(best):
+            with_term = self.with_a_term(self.examine(best))
+            if not is_large(with_term.candidate.fit):
+                return [with_term]
+        examined = self.examine(best)
+        if self.has_bad_readings(examined):
+            return [examined]
+        return [self.with_a_term_ahead(base, self.with_a_term(examined))]
+
+    def of_problems(self, base: ExaminedModel) -> Candidate:
+        """The likeliest model that any problem asks for about the base model, then about that, and
+        so on: the sets that one step of their fit promises most of are fitted.
+        """
+        best = base.candidate
+        while self.may_go_on() and leaves_something(best.fit):
+            was = best
+            for fit, chosen in self.promising_sets(best)[:FITTED]:
+                found = self.no_worse(self.fit_set(fit, chosen))
+                best = max(best, found, key=self.promise)
+                if not is_large(best.fit) or not self.may_go_on():
+                    break
+            if best is was:
+                break
+        return best
+
+    def promising_sets(self, about: Candidate) -> list[tuple[Fit, EffectSet]]:
+        """Sets that the equation of motion, in flight and over all stretches, and periods ahead ask
+        for about a model, each with the fit it extends, those that promise most first; in this
+        order where no period is told.
+        """
+        ahead = self.asked.ahead(about, about)
+        sets = [
+            (problem.fit, chosen)
+            for flight in (True, False)
+            for problem in [self.asked.about(about, flight=flight)]
+            for chosen in problem.best(self.most - len(problem.known))
+        ]
+        sets += [(ahead.fit, chosen) for chosen in ahead.best(self.most - len(about.effects))]
+        cost = {
+            i: criterion_after_a_step(fit, chosen, self.scales) + self.cost * len(chosen.effects)
+            for i, (fit, chosen) in enumerate(sets)
+        }
+        return [sets[i] for i in sorted(cost, key=lambda i: cost[i])]
+
+    def of_motion(self, about: Candidate) -> list[Candidate]:
+        """Models that the equation of motion asks for about one."""
+        problem = self.asked.about(about, flight=False)
+        return self.fit_sets(problem.fit, problem.best(self.most - len(problem.known)))
+
+    def has_bad_readings(self, examined: ExaminedModel) -> bool:
+        """Whether readings spoil what follows a model, and time is left to go on without them."""
+        goes_on = bool(examined.candidate.effects) and self.may_go_on()  # from that model, not anew
+        may_be = goes_on or self.budget.may_search_again()
+        if self.is_last or examined.is_white or not may_be:
+            return False
+        base = self.examined_models[frozenset()].candidate.fit
+        noise = self.noise_of_inputs(examined)
+        self.revision = noise or first_revision(base, examined.candidate.fit, self.progress)
+        return self.revision is not None
+
+    def noise_of_inputs(self, examined: ExaminedModel) -> Revision | None:
+        """The search under the noise of the inputs, where that makes the base model's large misfit
+        decisively likelier than a model does that leaves one.
+        """
+        found = examined.candidate.fit
+        noisy = self.under_input_noise if is_large(found) else None
+        if noisy is None or not noisy.log_likelihood > found.log_likelihood + DECISIVE:
+            return None
+        return Revision(noisy, None)
+
+    @cached_property
+    def under_input_noise(self) -> Fit | None:
+        """The base model's mode under the noise of its inputs."""
+        return under_input_noise(self.examined_models[frozenset()].candidate.fit)
