@@ -27,7 +27,7 @@ from bayesimpact.data.hum import Hum, find_hum
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 from bayesimpact.inference.noise.driven import driven_noise
-from bayesimpact.inference.noise.fast import fast_noise, floor_noise
+from bayesimpact.inference.noise.fast import UNTOLD, fast_noise, floor_noise
 from bayesimpact.inference.noise.filtered import filtered_noise, lower
 from bayesimpact.inference.noise.growth import with_growth
 from bayesimpact.inference.noise.remainders import (
@@ -103,6 +103,8 @@ def unfiltered_noise(recordings: Sequence[Recording]) -> Noise:
         found = floor_noise(free, fast_noise(free, found))
     if found is None:
         raise _too_short(told)
+    if found.level_error >= UNTOLD:
+        found = _white(told) or found
     found = _with_step(found, told)
     return found if free else driven_noise(recordings, found)
 
@@ -148,6 +150,21 @@ def _longest(
             break  # the oscillation itself begins to show
         chosen, numbers = found, remainder.values.size
     return chosen
+
+
+def _white(recordings: Sequence[Recording]) -> Noise | None:
+    """White noise of what the shortest windows leave, for readings that tell no level of coloured
+    noise: a correlation at the end of its range makes any level of the same remainders.
+    """
+    hums = [find_hum(r.samples, r.interval) for r in recordings]
+    remainder = remainder_of(recordings, hums, SMALLEST, True)
+    if remainder is None:
+        return None
+    white = np.eye(remainder.values.shape[1])
+    kept = remainder.values[_undisturbed(remainder.values, white)]
+    level, error = float(np.sqrt(_variance(kept, white))), float(np.sqrt(0.5 / kept.size))
+    source = "polynomial remainders, whose colour is not told"
+    return Noise(0.0, None, level, error, 0.0, source, is_bound=True)
 
 
 def _with_step(noise: Noise, recordings: Sequence[Recording]) -> Noise:

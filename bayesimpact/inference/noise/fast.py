@@ -3,14 +3,16 @@
 Polynomials over short windows follow a motion of many samples a period. Of fewer, part of a period
 is left in a window of the fewest samples, and passes for noise of the motion's own correlation. The
 spectrum tells the noise between the lines above the motion: medians of bands do not see lines, and
-their slope is the noise's colour. What a law makes of the motion there may fill it, so that white
-noise is no more than this either, and the lower one counts. Of coloured noise, which is strongest
-below where it is seen, the level may be less than it is.
+their slope is the noise's colour; of a recording so short that it leaves hardly any band, one
+median tells the level of white noise. What a law makes of the motion there may fill it, so that
+white noise is no more than this either, and the lower one counts. Of coloured noise, which is
+strongest below where it is seen, the level may be less than it is.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -20,6 +22,7 @@ from bayesimpact.data.gaps import runs
 from bayesimpact.data.recording import Recording
 from bayesimpact.inference.noise.driven import MEDIAN, SHORTEST_PERIOD, TOP, powers
 from bayesimpact.inference.noise.ordinates import Ordinates
+from bayesimpact.inference.noise.remainders import SMALLEST
 from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.response.half_cycles import spectral_period
 
@@ -42,8 +45,8 @@ def fast_noise(recordings: Sequence[Recording], remainders: Noise | None) -> Noi
     """The polynomial `remainders`, or what the spectra of free recordings of one quantity without a
     stop say, where that is less and their motion is fast; whatever it is where there are none.
     """
-    fast = [r for r in recordings if spectral_period(r.samples, r.order) < SHORTEST_PERIOD]
-    if len(fast) < len(recordings) or any(r.case for r in recordings):
+    longest = max(spectral_period(r.samples, r.order) for r in recordings)
+    if longest >= SHORTEST_PERIOD or any(r.case for r in recordings):
         return remainders
     bands = [own for r in recordings if (own := _bands(r)) is not None]
     if not bands:
@@ -51,12 +54,14 @@ def fast_noise(recordings: Sequence[Recording], remainders: Noise | None) -> Noi
     angle, power, weight = (np.concatenate(parts) for parts in zip(*bands, strict=True))
     ordinates = Ordinates(angle, power, np.ones(power.size), 0.0)
     each = EFFICIENCY * float(weight.mean())  # independent ordinates of a band
-    rho = _correlation(ordinates, each)
+    rho = _correlation(ordinates, each) if power.size >= LEAST_BANDS else 0.0
     level = float(np.sqrt(ordinates.variance(rho)))
     error = float(np.sqrt(0.5 / (each * power.size)))
     errors = np.array(ordinates.errors(rho) if rho else (0.0, 0.0)) / np.sqrt(each)
     if remainders is not None and remainders.level < level * (1.0 + 3.0 * error):
-        return remainders
+        # what windows of a period and more leave is motion too
+        whole = longest <= SMALLEST and not remainders.correlation
+        return replace(remainders, is_bound=True) if whole else remainders
     return Noise(
         rho,
         level=level,
@@ -120,8 +125,9 @@ def _correlation(ordinates: Ordinates, each: float) -> float:
 
 def _bands(recording: Recording) -> tuple[Array, Array, Array] | None:
     """Angular frequencies per sample of bands above the motion, their mean powers per sample as
-    medians tell them, and their numbers of ordinates; None where there are few. Of a recording with
-    gaps the longest stretch between two.
+    medians tell them, and their numbers of ordinates: one of all ordinates where there are few, by
+    test of the error that their number says; None where these are fewer than a band's. Of a
+    recording with gaps the longest stretch between two.
     """
     samples = _longest_stretch(recording)
     if samples.size <= BANDS[-1]:
@@ -129,11 +135,12 @@ def _bands(recording: Recording) -> tuple[Array, Array, Array] | None:
     own = powers(samples)
     last = int(TOP * own.size)
     first = int(np.ceil(ABOVE * samples.size / spectral_period(recording.samples, recording.order)))
-    for width in BANDS:
-        count = (last - first) // width
-        if count >= LEAST_BANDS:
-            some = own[first : first + count * width].reshape(count, width)
-            middle = first + width * (np.arange(count) + 0.5)
-            angle = 2 * np.pi * middle / samples.size
-            return angle, np.median(some, axis=1) / MEDIAN, np.full(count, float(width))
-    return None
+    left = last - first
+    if left < BANDS[-1]:
+        return None
+    width = next((w for w in BANDS if left // w >= LEAST_BANDS), left)
+    count = left // width
+    some = own[first : first + count * width].reshape(count, width)
+    middle = first + width * (np.arange(count) + 0.5)
+    angle = 2 * np.pi * middle / samples.size
+    return angle, np.median(some, axis=1) / MEDIAN, np.full(count, float(width))

@@ -12,7 +12,7 @@ from scipy.stats import binom
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 from bayesimpact.inference.noise.estimate import unfiltered_noise
-from bayesimpact.inference.noise.fast import fast_noise, floor_noise
+from bayesimpact.inference.noise.fast import UNTOLD, fast_noise, floor_noise
 from bayesimpact.inference.noise.whitening import Noise
 
 SIGMA, INTERVAL, COUNT = 1e-3, 0.05, 400
@@ -79,9 +79,36 @@ def test_polynomials_tell_the_noise_of_a_slow_motion() -> None:
 def test_of_two_bounds_the_lower_one_counts() -> None:
     fast = recordings(decay(12.0), 0.0, 0)
     low, high = Noise(level=0.5 * SIGMA), Noise(level=2 * SIGMA)
-    assert fast_noise(fast, low) is low
+    assert fast_noise(fast, low) == low
     found = fast_noise(fast, high)
     assert found is not None and found.level == pytest.approx(SIGMA, rel=0.15)
+
+
+@pytest.mark.parametrize("count", [97, 117])
+def test_one_median_tells_the_level_where_there_are_hardly_any_bands(count: int) -> None:
+    """Of windows of twelve samples, two periods, some level with any correlation is as likely."""
+    clean = 1.2 * np.exp(-0.03 * np.arange(count)) * np.cos(np.arange(count) + 1.0)
+    ratios, errors = [], []
+    for seed in range(30):
+        noise = 0.04 * np.random.default_rng(seed).standard_normal(count)
+        found = unfiltered_noise([Recording("a", "", clean + noise, INTERVAL)])
+        assert found.is_bound and found.correlation == 0.0 and found.level_error < UNTOLD
+        ratios.append(found.level / 0.04)
+        errors.append(found.level_error)
+    ratio, error = np.array(ratios), float(np.mean(errors))
+    assert ratio.mean() == pytest.approx(1.0, abs=4 * error / np.sqrt(30) + 0.05)
+    # remainders count up to three errors above, if they are no higher
+    assert np.all((ratio > 1.0 - 3 * error) & (ratio < 1.0 + 5 * error))
+
+
+def test_noise_whose_windows_tell_no_level_counts_as_white() -> None:
+    """At the end of the correlation's range a level of many times the noise's is as likely."""
+    clean = 1.2 * np.cos(2 * np.pi * np.arange(200) / 60.0 + 1.0)
+    for seed in range(12):
+        noise = Noise(0.5).coloured(np.random.default_rng(seed), 200, INTERVAL, 0.04)
+        found = unfiltered_noise([Recording("a", "", clean + noise, INTERVAL)])
+        assert found.level_error < UNTOLD
+        assert 0.5 < found.level / 0.04 < 1.5
 
 
 def test_of_a_recording_with_gaps_the_longest_stretch_tells() -> None:
