@@ -3,13 +3,17 @@
 A force reaches the reading through the oscillator: its answer is largest about the oscillator's own
 frequencies and small above. Noise that drifts does not pass through it. Both are compared on one
 residual: white and AR(1) noise with a force of time (`discrepancy`), which any missing law of the
-motion resembles more.
+motion resembles more. Nor is a jump of the readings noise, though AR(1) noise follows it: what is
+new in one reading is then far more than in all others.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
+from bayesimpact.data.faults.fault import gaussian_threshold
 from bayesimpact.diagnosis.faults.compare import base_failed
 from bayesimpact.diagnosis.measurement.whiteness import combined, ljung_box, whiteness_p
 from bayesimpact.diagnosis.residual_force.discrepancy import discrepancy
@@ -17,7 +21,7 @@ from bayesimpact.diagnosis.thresholds import ALPHA, DECISIVE
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import Identification
 from bayesimpact.inference.noise.refined import COLOURED
-from bayesimpact.inference.noise.slow import slow_noise
+from bayesimpact.inference.noise.slow import SlowNoise, slow_noise
 from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.inference.refitted import refitted
 
@@ -29,7 +33,7 @@ def remaining_noise(fit: Fit) -> Noise | None:
     found = slow_noise(fit)
     if found is None or found.log_evidence_gain < COLOURED:
         return None
-    if combined([ljung_box(x) for x in found.residuals]) < ALPHA:
+    if combined([ljung_box(x) for x in found.residuals]) < ALPHA or _jumps(found):
         return None
     force = discrepancy(fit)
     if (
@@ -38,6 +42,12 @@ def remaining_noise(fit: Fit) -> Noise | None:
     ):
         return None
     return found.noise
+
+
+def _jumps(found: SlowNoise) -> bool:
+    """Whether a reading is farther from what those before it predict than noise would be."""
+    new = np.abs(np.concatenate(found.residuals))
+    return bool(new.max() > gaussian_threshold(new.size))
 
 
 def with_slow_noise(before: Identification) -> Identification:

@@ -9,12 +9,15 @@ import pytest
 import small_rig
 from effect_rigs import BY_ID
 
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis import diagnose as whole
 from bayesimpact.diagnosis.budget import begin
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.faults.recording_faults import cleaned_campaign
 from bayesimpact.diagnosis.measurement.slow_noise import remaining_noise
 from bayesimpact.inference.identify import identify
+from bayesimpact.inference.noise.whitening import Noise
 
 pytestmark = pytest.mark.usefixtures("catalogue_alone")
 
@@ -76,6 +79,19 @@ def test_a_law_in_contact_that_no_force_of_time_follows_is_no_slow_noise():
     """Its kinks are finer than the force's knots; what slow noise leaves of it is not white."""
     campaign = small_rig.record(4, {"obstacle_restitution": {"coefficient": 0.8}})
     assert remaining_noise(identify(campaign, rng=RNG(0), search=False).fit) is None
+
+
+@pytest.mark.parametrize("size", [0.0, 90.0])
+def test_a_jump_of_the_readings_is_no_slow_noise(size: float) -> None:
+    """AR(1) noise of a long memory follows one, and nothing is left but at the jump."""
+    rng, t = RNG(1), np.arange(271) / 60.0
+    clean = 0.0847 + 0.038 * np.exp(-0.0166 * t) * np.cos(6.084 * t + 1.2)
+    noise = 3.3e-5 * rng.standard_normal(t.size)
+    slow = 0.0 if size else Noise(0.97).coloured(rng, t.size, t[1], 3e-4)
+    samples = clean + noise + slow + size * 3.3e-5 * (t >= 0.845)
+    campaign = Campaign("decay", 0.1, (Recording("a", "", samples, t[1]),), stop=False)
+    found = remaining_noise(identify(campaign, rng=RNG(0), search=False).fit)
+    assert (found is None) is (size > 0.0)
 
 
 def test_a_search_begins_with_slow_noise_whatever_was_corrected_before():
