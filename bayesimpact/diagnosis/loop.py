@@ -166,7 +166,7 @@ def diagnose_fit(
             held_out = held_out_recordings(base, after)
         if len(base.density.oscillator.campaign.cases) > 1:
             cases = held_out_cases(base, after)
-    chosen = selection.chosen
+    chosen = shown(selection, decision)
     return Diagnosis(
         decision.verdict,
         identification,
@@ -209,6 +209,12 @@ def _beside(
     return alike_in_odds(selection, selection.chosen.candidate, decision.rivals)
 
 
+def shown(selection: Selection, decision: Decision) -> ExaminedModel:
+    """The chosen model; where nothing is missing, the base model, whatever was chosen."""
+    nothing = decision.verdict == "adequate" and selection.chosen.candidate.effects
+    return selection.base if nothing else selection.chosen
+
+
 def extension(
     selection: Selection, decision: Decision, scales: Scales, say: Progress
 ) -> tuple[Fit, ExaminedModel | None]:
@@ -221,7 +227,7 @@ def extension(
     """
     base, chosen = selection.base, selection.chosen
     if decision.verdict in ("adequate", "named", "ambiguous"):
-        return chosen.candidate.fit, None
+        return shown(selection, decision).candidate.fit, None
     least = base.candidate.fit.reduced_chi2
     if decision.verdict == "partly" and chosen.candidate.fit.reduced_chi2 <= least:
         beside = selection.residual.get(frozenset(chosen.candidate.ids), chosen.candidate)

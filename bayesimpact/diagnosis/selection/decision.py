@@ -4,9 +4,11 @@ Let S be the likeliest set of effects that the search reached.
 
 1. S leaves nothing that stands out from the noise (`ExaminedModel.is_white`):
    `adequate` when S is empty, or `unknown` where the base model leaves more than half of the signal
-   to coloured noise, which the motion may be itself; `unknown` when one free force in the place of
-   all effects beats S by the decisive odds; `ambiguous` when another set comes within these odds,
-   or the search ended by its limit before all that might were fitted; else `named`.
+   to coloured noise, which the motion may be itself; where the base model beats S by the decisive
+   odds, nothing is proved: `adequate` if it leaves no more than the noise, else `unknown`;
+   `unknown` when one free force in the place of all effects beats S by the decisive odds;
+   `ambiguous` when another set comes within these odds, or the search ended by its limit before
+   all that might were fitted; else `named`.
 2. Something remains beside S. All odds are those with a force of time beside every hypothesis,
    where what the model nearest to the recordings leaves beside one is noise.
    Nothing is needed where a free force in the place of all effects leaves `EXCESS` times less of
@@ -55,7 +57,7 @@ from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import Candidate
 from bayesimpact.diagnosis.residual_force.learned import may_restate
 from bayesimpact.diagnosis.score_test.directions import is_periodic
-from bayesimpact.diagnosis.selection.outcome import ExaminedModel, Selection
+from bayesimpact.diagnosis.selection.outcome import ExaminedModel, Selection, leaves_something
 from bayesimpact.diagnosis.thresholds import APART, DECISIVE, DOUBT, EXCESS
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect
@@ -99,6 +101,9 @@ def decide(selection: Selection) -> Decision:
             fit = chosen.candidate.fit
             hidden = fit.density.likelihood.noise.is_coloured and base_failed(fit)
             return Decision("unknown" if hidden else "adequate", ())
+        if loses_to_nothing(selection):
+            left = leaves_something(selection.base.candidate.fit)
+            return Decision("unknown" if left else "adequate", ())
         if selection.prefers_learned_force():
             return Decision("unknown", ())
         rivals = selection.rivals()
@@ -112,6 +117,12 @@ def decide(selection: Selection) -> Decision:
     if not needed:
         return Decision("unknown", (), either=either)
     return Decision("partly", needed, selection.rivals(), either)
+
+
+def loses_to_nothing(selection: Selection) -> bool:
+    """Whether the base model is decisively likelier than the chosen one."""
+    base, chosen = selection.base.candidate, selection.chosen.candidate
+    return selection.log_odds(base) > selection.log_odds(chosen) + DECISIVE
 
 
 def is_needed(selection: Selection, group: Group) -> bool:

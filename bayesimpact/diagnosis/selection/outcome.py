@@ -152,20 +152,21 @@ class Selection:
         return candidate.log_evidence - candidate.price(self.prior_cost)
 
     def rivals(self) -> tuple[Candidate, ...]:
-        """Models that lack a chosen effect and come within the decisive odds.
+        """Models that lack a chosen effect and come within the decisive odds, likeliest first.
 
         One with more effects must be the likelier one: two effects imitate a third more often than
         the price of an effect allows for.
         """
         chosen = self.chosen.candidate
         reached = self.log_odds(chosen)
-        return tuple(
+        found = (
             c
             for c in self.tried
             if self.log_odds(c) > reached - DECISIVE * (len(c.effects) <= len(chosen.effects))
             and not set(chosen.ids) <= set(c.ids)
             and not _is_elaboration(c, chosen)
         )
+        return tuple(sorted(found, key=self.log_odds, reverse=True))
 
     @property
     def force_log_odds(self) -> float:

@@ -48,7 +48,7 @@ class Remaining(Elimination):
             found = self.beside_a_force(found, left)
         chosen = found.chosen.candidate
         if found.chosen.is_white:
-            return replace(found, beside=None)
+            return without_a_force(found)
         smaller = {e.id: self.drop(chosen, e) for e in chosen.effects}
         for effect in chosen.effects:  # whether time is up or not: no law is told without
             self.simplified(chosen, effect)
@@ -166,6 +166,16 @@ class Remaining(Elimination):
         if frozenset() not in self.beside_forces and not self.budget.may_compare_on(self.look):
             return False
         return not leaves_something(self.with_residual(self.examined_models[frozenset()]).fit)
+
+
+def without_a_force(found: Selection) -> Selection:
+    """A search that ends with a model that leaves nothing: no force of time stands beside models
+    then, unless it is by one alone that this model is the likeliest.
+    """
+    alone = replace(found, beside=None)
+    alone = replace(alone, tried=tuple(sorted(found.tried, key=alone.log_odds, reverse=True)))
+    own = alone.log_odds(found.chosen.candidate)
+    return found if any(alone.log_odds(c) > own for c in alone.rivals()) else alone
 
 
 def rivals_in_place(found: Selection, group: Group) -> list[Candidate]:

@@ -11,7 +11,7 @@ from effect_rigs import BY_ID
 from made_up_evidence import COST, DRAG, FRICTION, candidate, examined, selection, verdict_of
 
 from bayesimpact.diagnosis.candidates.promising import refit_candidates
-from bayesimpact.diagnosis.selection.decision import ordered
+from bayesimpact.diagnosis.selection.decision import decide, ordered
 from bayesimpact.diagnosis.thresholds import (
     ALPHA,
     DECISIVE,
@@ -51,6 +51,27 @@ def test_the_base_model_itself_is_a_rival():
     weak = examined(candidate(FRICTION, COST + DECISIVE - 0.1))
     assert verdict_of(selection(weak)) == "ambiguous"
     assert verdict_of(selection(examined(candidate(FRICTION, COST + DECISIVE + 0.1)))) == "named"
+
+
+@pytest.mark.parametrize(("left", "verdict"), [(1.0, "adequate"), (1.5, "unknown")])
+def test_a_model_that_loses_to_nothing_is_no_name(left: float, verdict: str) -> None:
+    """Whatever a search ends with: it leaves nothing, but is decisively less likely."""
+    noise = Noise(level=1.0, level_error=0.05)  # chi2 of 1.3 is within three of these errors
+    density = SimpleNamespace(likelihood=SimpleNamespace(noise=noise))
+    behind = examined(candidate(FRICTION, COST - DECISIVE - 0.1))
+    found = selection(behind, candidate(DRAG, COST + 1.0), base_chi2=left)
+    vars(found.base.candidate.fit).update(density=density)
+    decision = decide(found)
+    assert (decision.verdict, decision.effects, decision.rivals) == (verdict, (), ())
+    near = selection(examined(candidate(FRICTION, COST - DECISIVE + 0.1)))
+    assert verdict_of(near) == "ambiguous"
+
+
+def test_rivals_are_told_likeliest_first() -> None:
+    near, nearer = candidate(DRAG, 97.0), candidate("spring_cubic", 99.0)
+    found = selection(examined(candidate(FRICTION, 100.0)), near, nearer)
+    found = replace(found, tried=found.tried[::-1])
+    assert found.rivals() == (nearer, near)
 
 
 def test_supersets_and_elaborations_are_no_rivals():
