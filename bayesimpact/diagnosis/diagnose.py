@@ -34,6 +34,7 @@ from bayesimpact.diagnosis.budget import Budget, begin
 from bayesimpact.diagnosis.candidates.promising import NEAR_MARGIN, SCORE_UNDERESTIMATE
 from bayesimpact.diagnosis.faults.compare import base_failed, log_likelihood_gain, misfits
 from bayesimpact.diagnosis.faults.first_physics import faults_beside_physics
+from bayesimpact.diagnosis.faults.forced_start import forced_starts
 from bayesimpact.diagnosis.faults.pushed_start import pushed_starts
 from bayesimpact.diagnosis.faults.recording_faults import (
     Corrected,
@@ -182,6 +183,8 @@ def _diagnosed(
     pushed = pushed_starts(first, effects, campaign_scales(first)) if is_large(first) else ()
     if pushed:
         cleaned = without_faults(cleaned, pushed, campaign, rng=rng)
+    elif base_failed(first):
+        cleaned = _by_a_free_rest(cleaned, campaign, rng)
     say("comparing the recordings")
     certain, doubtful, proved = cleaned, list(comparisons(cleaned, campaign)), False
     beside_physics = faults_beside_physics(cleaned, campaign, effects, doubtful)
@@ -209,6 +212,17 @@ def _diagnosed(
     found = _without_unfree_start(found, campaign, searches)
     undecided = found.corrected is not None and found.corrected.is_open
     return replace(found, verdict="ambiguous") if undecided and is_complete(found) else found
+
+
+def _by_a_free_rest(cleaned: Corrected, as_read: Campaign, rng: np.random.Generator) -> Corrected:
+    """A base fit that failed, or one without a forced start that does not: no search of physics
+    about the former would mean anything.
+    """
+    starts = forced_starts(cleaned.identification.fit)
+    if not starts:
+        return cleaned
+    rest = without_faults(cleaned, starts, as_read, rng=rng)
+    return cleaned if base_failed(rest.identification.fit) else rest
 
 
 def promised_gains(fit: Fit, effects: Sequence[Effect], *, rng: np.random.Generator) -> Array:
@@ -281,21 +295,24 @@ def _without_needless_faults(found: Diagnosis, before: Corrected, searches: Sear
 
 
 def _without_unfree_start(found: Diagnosis, as_read: Campaign, searches: Searches) -> Diagnosis:
-    """Where a large misfit remains: the answer without first instants that keep a model from the
-    rest, if that leaves less of it.
+    """Where much remains unexplained: the answer without first instants that keep a model from the
+    rest, or that a force moved, if that leaves far less of it, or less open.
     """
     corrected, left = found.corrected, without_uncertain_formulas(found)
-    if as_read.keep_faults or corrected is None or not is_large(left):
+    if as_read.keep_faults or corrected is None:
         return found
-    starts = unfree_starts(left)
+    starts = unfree_starts(left) if is_large(left) else ()
+    if not starts and found.verdict not in OPEN:
+        starts = forced_starts(left)
     if not starts:
         return found
+
+    def is_better(other: Diagnosis, found: Diagnosis) -> bool:
+        far_less = BETTER * without_uncertain_formulas(other).reduced_chi2 < left.reduced_chi2
+        return far_less or (found.verdict not in OPEN and is_simpler(other, found))
+
     return searches.again(
-        found,
-        lambda: without_faults(corrected, starts, as_read, rng=searches.rng),
-        lambda other, _: (
-            BETTER * without_uncertain_formulas(other).reduced_chi2 < left.reduced_chi2
-        ),
+        found, lambda: without_faults(corrected, starts, as_read, rng=searches.rng), is_better
     )
 
 
