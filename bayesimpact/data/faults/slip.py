@@ -23,6 +23,8 @@ from bayesimpact.data.recording import Recording
 USUAL = 99.0  # percentile of the statistic that the motion alone may reach
 BEYOND = 3.0  # times that percentile
 WHOLE = 0.5  # of the motion's way from sample to sample: halfway between none lost and one
+RESOLVED = 5.0  # times the samples of one side's polynomial: a motion whose period is shorter bends
+# within them by about as much as it moves, and its own largest misses have to count
 BENDS = 3.0  # samples: how far a corner of the motion within a few samples may displace both sides
 MOST = 3  # slips: more jumps than this are the signal
 WIDEST = 5  # samples of a spike
@@ -41,9 +43,11 @@ def find_slips(recording: Recording) -> list[Fault]:
     slope times a few samples; besides, three times the 99th percentile over the recording has to be
     passed, which is what corners of the motion reach, and what rounding may do to both. A slip is
     of whole samples: its sides are apart by half a sample's way of the motion or more, while an
-    impact, or a stop that chatters, bends the motion by less. An acceleration jumps by itself where
-    the mass turns, and friction with it. A velocity towards the stop becomes less at a contact
-    onset, where the obstacle has a mass; samples lost there show when recordings are compared.
+    impact, or a stop that chatters, bends the motion by less; without a stop, a displacement may
+    jump by any amount, as where a probe slips or a tracked marker is found beside itself. An
+    acceleration jumps by itself where the mass turns, and friction with it. A velocity towards the
+    stop becomes less at a contact onset, where the obstacle has a mass; samples lost there show
+    when recordings are compared.
     Where both sides do meet once a few samples beside the place are left out, those were a spike.
     The remedy keeps the longest part without a slip: how many samples are missing need then not be
     known.
@@ -62,11 +66,14 @@ def find_slips(recording: Recording) -> list[Fault]:
         return []
     least = gaussian_threshold(x.size)
     bend = np.abs(sides.slope_after - sides.slope_before)
-    usual = float(np.percentile(jump, USUAL))
+    resolved = period is not None and period > RESOLVED * form[1]
+    usual = _usual(jump, form[1] if resolved else 0)
     rounded = 2.0 * rounding_error(form, -0.5, last_digit(x))
     least_jump = max(least * level, BEYOND * usual, rounded)
     way = 0.5 * np.abs(sides.slope_after + sides.slope_before)
-    strong = jump > np.maximum(least_jump, np.nan_to_num(np.maximum(BENDS * bend, WHOLE * way)))
+    # of a displacement that meets no obstacle a zero may move by any amount
+    share = 0.0 if resolved and recording.order == 0 and not recording.case else WHOLE
+    strong = jump > np.maximum(least_jump, np.nan_to_num(np.maximum(BENDS * bend, share * way)))
     if recording.order == 2 and period is not None:  # friction turns round with the mass
         size = np.abs(x - np.mean(x)) * 2.0 * np.pi / period
         strong &= ~(way < TURNING * size)
@@ -77,7 +84,9 @@ def find_slips(recording: Recording) -> list[Fault]:
     places = [
         p
         for p in _peaks(jump, strong, form[1])
-        if _both_sides_hold(x, p, form, level, least) and not _meet_across(x, p, form)
+        if _stands_out(jump, p, form[1])
+        and _both_sides_hold(x, p, form, level, least)
+        and not _meet_across(x, p, form)
     ]
     places = _apart([*places, *_written_twice(x)], form[1])
     if not places or len(places) > MOST:
@@ -118,6 +127,18 @@ def _apart(places: list[int], reach: int) -> list[int]:
     return kept
 
 
+def _usual(jump: Array, reach: int) -> float:
+    """What the motion reaches anywhere but within a reach of the `MOST` largest jumps: a few slips
+    spoil more than a hundredth of a short recording, and would be taken for its motion.
+    """
+    rest, near = jump.copy(), np.zeros(jump.size, bool)
+    for _ in range(MOST if reach else 0):
+        place = int(np.argmax(rest))
+        near[max(place - reach, 0) : place + reach + 1] = True
+        rest[near] = 0.0
+    return float(np.percentile(jump[~near], USUAL)) if not near.all() else np.inf
+
+
 def _peaks(jump: Array, strong: np.ndarray, reach: int) -> list[int]:
     """The largest of every group of strong jumps closer than twice the reach."""
     places: list[int] = []
@@ -128,6 +149,16 @@ def _peaks(jump: Array, strong: np.ndarray, reach: int) -> list[int]:
         else:
             places.append(int(i))
     return places
+
+
+def _stands_out(jump: Array, place: int, reach: int) -> bool:
+    """Whether a jump is that much larger than most beside it, out of its own reach: where the
+    polynomials are too long for the motion, both sides part nearly as far everywhere about.
+    """
+    around = np.arange(reach + 1, 3 * reach + 1)
+    beside = np.concatenate([place - around, place + around])
+    beside = jump[beside[(beside >= 0) & (beside < jump.size)]]
+    return bool(jump[place] > BEYOND * np.median(beside[beside > 0.0])) if beside.any() else True
 
 
 def _both_sides_hold(
