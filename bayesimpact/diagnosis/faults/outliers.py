@@ -19,6 +19,7 @@ from bayesimpact.data.faults.fault import Fault, gaussian_threshold
 from bayesimpact.data.faults.find import applied
 from bayesimpact.data.faults.local import robust_sd
 from bayesimpact.data.faults.spikes import lone_spikes
+from bayesimpact.data.gaps import Mask
 from bayesimpact.diagnosis.selection.outcome import leaves_something
 from bayesimpact.diagnosis.thresholds import LARGE
 from bayesimpact.inference.fit import Fit
@@ -31,7 +32,8 @@ HALF_WITHIN = 0.6745  # standard deviations of Gaussian noise
 
 
 def residual_spikes(fit: Fit, *, contacts: bool = True) -> tuple[Fault, ...]:
-    """Spikes in the residuals of a fit; samples that are set aside count as fitted.
+    """Spikes in the residuals of a fit; samples that are set aside count as missed by as much as
+    those beside them: a fit that misses all by a slow error misses none there by a spike.
 
     contacts : whether the fit may have missed brief ones; where it has not, accelerations at the
         onsets that it shows count as fitted too: they lie on one side of a jump or the other
@@ -41,9 +43,15 @@ def residual_spikes(fit: Fit, *, contacts: bool = True) -> tuple[Fault, ...]:
     counted = campaign if contacts else without_onsets(fit)
     rows = zip(campaign.recordings, counted.recordings, fit.residuals, strict=True)
     for recording, other, residual in rows:
-        kept = residual if other.used is None else np.where(other.used, residual, 0.0)
+        kept = residual if other.used is None else _bridged(residual, other.used)
         found += lone_spikes(replace(recording, samples=kept), contacts=contacts)
     return tuple(found)
+
+
+def _bridged(residual: Array, used: Mask) -> Array:
+    """A residual (n,) with straight lines across what is not used."""
+    place = np.arange(residual.size)
+    return np.interp(place, place[used], residual[used])
 
 
 def beside_spikes(fit: Fit) -> tuple[tuple[Fault, ...], Fit] | None:

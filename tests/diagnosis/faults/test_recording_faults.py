@@ -22,6 +22,7 @@ from bayesimpact.diagnosis.budget import begin
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.faults import recording_faults as faults
 from bayesimpact.diagnosis.faults.compare import Compared
+from bayesimpact.diagnosis.faults.outliers import residual_spikes
 from bayesimpact.diagnosis.faults.recording_faults import Corrected, Step, cleaned_campaign
 from bayesimpact.diagnosis.faults.simpler import makes_idle
 from bayesimpact.diagnosis.loop import Diagnosis
@@ -367,3 +368,17 @@ def test_a_start_that_was_cut_twice_is_told_once() -> None:
     )  # fmt: skip
     found = Corrected(cast(Any, None), compared=(first, other, gain, again, second))
     assert found.told == (other, gain, again, second)
+
+
+def test_a_spike_that_is_set_aside_is_not_told_again_of_a_slow_error() -> None:
+    """Where it lies a fit misses the readings beside it alike, all by the same slow error."""
+    campaign = small_rig.record(3, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES)
+    first, other = campaign.recordings
+    slow = 40 * small_rig.NOISE * np.cos(2.0 * first.times)
+    used = np.ones(first.samples.size, bool)
+    used[150:152] = False
+    wandering = replace(first, samples=first.samples + slow, used=used)
+    campaign = replace(campaign, recordings=(wandering, other))
+    fit = identify(campaign, rng=np.random.default_rng(0), search=False).fit
+    assert abs(fit.residuals[0][149]) > 10 * small_rig.NOISE
+    assert residual_spikes(fit) == ()
