@@ -102,28 +102,29 @@ def set_aside(campaign: Campaign) -> tuple[Campaign, tuple[Fault, ...]]:
     """The campaign without the faults found in its recordings, and the faults.
 
     With `faults = "keep"` in campaign.toml the campaign stays as it is; faults are told all the
-    same. What was done stands in `Campaign.notes`, which reports print; repeated readings of a
-    motion that has died away (`tail`) are no fault.
+    same. What was done stands in `Campaign.notes`, which reports print; of repeated readings of a
+    motion that has died away (`tail`) there is a notice, too.
     """
     faults = find_faults(campaign)
     if campaign.keep_faults:
         return campaign, faults
-    kept, tails = [], []
+    kept, tails = list[Recording](), list[Fault]()
     for recording in campaign.recordings:
         own = [f for f in faults if f.recording == recording.name]
         if not any(f.action == "skip" for f in own):
-            rest, note = without_tail(applied(recording, own)[0])
+            moving, lost = applied(recording, own)
+            rest, tail = without_tail(moving)
             kept.append(rest)
-            tails += [note] if note else []
+            tails += [_shifted(tail, lost)] if tail else []
     hard = [f for f in faults if f.action != "notice"]
     if not (hard or tails):
         return campaign, faults
     skipped = {f.recording: f.statement for f in hard if f.action == "skip"}
-    notes = tuple(f"{f.recording}, {f.statement}" for f in hard)
+    notes = tuple(f"{f.recording}, {f.statement}" for f in (*hard, *tails))
     cleaned = replace(
         campaign,
         recordings=tuple(kept),
         skipped={**campaign.skipped, **skipped},
-        notes=(*campaign.notes, *notes, *tails),
+        notes=(*campaign.notes, *notes),
     )
-    return cleaned, faults
+    return cleaned, (*faults, *tails)

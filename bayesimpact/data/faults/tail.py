@@ -2,8 +2,8 @@
 
 The error of a rounded reading changes from sample to sample while the motion crosses several steps.
 At rest it is the same in all of them, up to half a step, and a likelihood that took them as
-independent would be the surer of it the longer the recording goes on. It is no fault: nothing is
-said but a note.
+independent would be the surer of it the longer the recording goes on. It is no fault: a
+notice says how many readings count once.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from bayesimpact.data.faults.fault import Fault, file_time
 from bayesimpact.data.faults.flat import reading_step
 from bayesimpact.data.period import crossing_period
 from bayesimpact.data.recording import Recording
@@ -20,21 +21,40 @@ WITHIN = 1.5  # steps about the last readings: noise may cross the edge of a ste
 REPEATED = 0.5  # of neighbours equal: noise below a third of a step, which rounds nothing evenly
 
 
-def without_tail(recording: Recording) -> tuple[Recording, str]:
-    """A free decay with all but the first reading of such a tail set aside, and a note; as it is,
-    and "", where the tail is shorter than a free period.
+def without_tail(recording: Recording) -> tuple[Recording, Fault | None]:
+    """A free decay with all but the first reading of such a tail set aside, and the notice of it;
+    as it is, and None, where the tail is shorter than a free period.
     """
     x, step = recording.samples, reading_step(recording.samples)
     period = crossing_period(x, 1.0)
     if recording.input is not None or step == 0.0 or period is None:
-        return recording, ""
+        return recording, None
     last = float(np.median(x[-max(int(period), 1) :]))
     moving = np.flatnonzero(np.abs(x - last) > WITHIN * step)
     first = int(moving[-1]) + 2 if moving.size else x.size
-    if first > x.size - period or np.mean(np.diff(x[first:]) == 0.0) < REPEATED:
-        return recording, ""
+    repeated = float(np.mean(np.diff(x[first:]) == 0.0)) if first <= x.size - period else 0.0
+    if repeated < REPEATED:
+        return recording, None
     used = np.ones(x.size, dtype=bool) if recording.used is None else recording.used.copy()
     used[first:] = False
-    at = recording.start + first * recording.interval
-    note = f"{recording.name}, at rest from {at:.4g} s on: readings in one step count once"
-    return replace(recording, used=used), note
+    return replace(recording, used=used), _notice(recording, first, repeated)
+
+
+def _notice(recording: Recording, first: int, repeated: float) -> Fault:
+    """The rest from a sample on as a record; nothing is to be done about it."""
+    at, count = file_time(recording, first), recording.samples.size
+    return Fault(
+        id="recording_rest",
+        recording=recording.name,
+        spans=((first, count),),
+        start_s=at,
+        end_s=file_time(recording, count - 1),
+        size=float(count - first),
+        unit="samples",
+        statement=f"at rest from {at:.4g} s on: readings in one step, {count - first} of {count}, "
+        "count once",
+        remedy="",
+        strength=repeated,
+        threshold=REPEATED,
+        action="notice",
+    )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -25,9 +27,10 @@ def decay(step: float, noise: float, seed: int = 0, duration: float = 40.0) -> R
 
 def test_the_tail_in_one_step_counts_once():
     whole = decay(STEP, 1e-4)
-    kept, note = without_tail(whole)
-    assert kept.used is not None and "at rest from" in note
+    kept, notice = without_tail(whole)
+    assert kept.used is not None and notice is not None
     first = int(np.argmin(kept.used))
+    assert notice.spans == ((first, 4000),) and f"{4000 - first} of 4000" in notice.statement
     assert not kept.used[first:].any() and kept.used[:first].all()
     assert 15.0 < first * 0.01 < 25.0
     np.testing.assert_array_equal(kept.samples, whole.samples)
@@ -40,14 +43,27 @@ def test_the_tail_in_one_step_counts_once():
 )
 def test_other_recordings_stay_as_they_are(step, noise, duration):
     whole = decay(step, noise, duration=duration)
-    assert without_tail(whole) == (whole, "")
+    assert without_tail(whole) == (whole, None)
 
 
-def test_the_campaign_says_so_and_has_no_fault():
+def test_the_campaign_says_so_among_its_notices_and_has_no_fault():
     campaign = Campaign("swing", 1.0, (decay(STEP, 1e-4),), stop=False)
     cleaned, faults = set_aside(campaign)
     assert cleaned.recordings[0].used is not None and len(cleaned.notes) == 1
     assert all(f.action == "notice" for f in faults)
+    assert [f.id for f in faults if f.size > 1000] == ["recording_rest"]
+
+
+def test_samples_are_counted_as_read_where_the_start_is_cut():
+    moving = decay(STEP, 1e-4)
+    held = np.concatenate([np.full(150, moving.samples[0]), moving.samples])
+    cleaned, faults = set_aside(
+        Campaign("swing", 1.0, (replace(moving, samples=held),), stop=False)
+    )
+    (rest,) = (f for f in faults if f.id == "recording_rest")
+    used = cleaned.recordings[0].used
+    assert any(f.id == "recording_start" for f in faults) and used is not None
+    assert rest.spans[0][0] == held.size - used.size + int(np.argmin(used))
 
 
 def test_rounding_at_rest_does_not_make_a_fit_sure_of_itself():
