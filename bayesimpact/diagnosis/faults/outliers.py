@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.faults.fault import Fault, gaussian_threshold
@@ -28,6 +29,7 @@ from bayesimpact.inference.refitted import refitted
 
 Array = NDArray[np.float64]
 
+WIDE = 11  # samples of a running median: spikes of five do not show in it
 HALF_WITHIN = 0.6745  # standard deviations of Gaussian noise
 
 
@@ -43,15 +45,21 @@ def residual_spikes(fit: Fit, *, contacts: bool = True) -> tuple[Fault, ...]:
     counted = campaign if contacts else without_onsets(fit)
     rows = zip(campaign.recordings, counted.recordings, fit.residuals, strict=True)
     for recording, other, residual in rows:
-        kept = residual if other.used is None else _bridged(residual, other.used)
+        kept = residual if recording.used is None else _bridged(residual, recording.used)
+        if other is not recording and other.used is not None:
+            at_onset = ~other.used if recording.used is None else recording.used & ~other.used
+            kept = np.where(at_onset, 0.0, kept)
         found += lone_spikes(replace(recording, samples=kept), contacts=contacts)
     return tuple(found)
 
 
 def _bridged(residual: Array, used: Mask) -> Array:
-    """A residual (n,) with straight lines across what is not used."""
+    """A residual (n,) that follows the median of what is used near by across what is not: one bad
+    reading beside it does not count.
+    """
     place = np.arange(residual.size)
-    return np.interp(place, place[used], residual[used])
+    slow = median_filter(residual[used], WIDE, mode="nearest")
+    return np.where(used, residual, np.interp(place, place[used], slow))
 
 
 def beside_spikes(fit: Fit) -> tuple[tuple[Fault, ...], Fit] | None:
