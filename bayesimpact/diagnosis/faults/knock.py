@@ -36,8 +36,9 @@ Array = NDArray[np.float64]
 STEP = 1e-6  # of the largest displacement: free changes so small are linear
 PLACE = 0.5 * float(chi2.isf(1e-3, 2))  # nats: less likely places than this are no candidates
 NEAR = 2  # samples beside these: the blow takes its time
-EDGE = 1.0  # free periods before and after: a shorter part is no free motion, but a start or end
-FEWEST = 16  # samples of these at least, of a motion that is hardly sampled
+BEFORE = 3.0  # free periods: what ends sooner is a start that is not free (`forced_start`)
+AFTER = 1.0  # free periods, of which the model has something to say
+FEWEST = 16  # samples of either at least, of a motion that is hardly sampled
 LEAST_FREE = 1e-3  # of a column squared, that parameters leave of it: less is error of derivatives
 SLACK = 2.0  # times the misfit that may stay, that a score may promise: it is of first order
 SECOND = " after the knock"  # the name of a recording's second part
@@ -186,8 +187,10 @@ def likeliest_jump(fit: Fit, r: int) -> StateJump | None:
     )
     stiffness = max(fit.value("k1"), 1e-300)
     period = 2 * np.pi * float(np.sqrt(fit.density.oscillator.campaign.mass / stiffness))
-    edge = max(FEWEST, round(EDGE * period / recording.interval))
-    if recording.samples.size < 4 * edge:
+    before, after = (
+        max(FEWEST, round(periods * period / recording.interval)) for periods in (BEFORE, AFTER)
+    )
+    if recording.samples.size < 2 * (before + after):
         return None
     signals, start = noise.in_time(
         np.column_stack([_basis(fit)[r], fit.linearisation[r].residual]).T,
@@ -195,8 +198,8 @@ def likeliest_jump(fit: Fit, r: int) -> StateJump | None:
     )  # fmt: skip
     first = round(start / recording.interval)
     score = _score(_sums(fit, r, signals, first))
-    score[: max(edge - first, 0)] = 0.0
-    score[recording.samples.size - edge - first :] = 0.0
+    score[: max(before - first, 0)] = 0.0
+    score[max(recording.samples.size - after - first, 0) :] = 0.0
     best = int(np.argmax(score))
     power, count = float(fit.sums.sum()), float(fit.density.likelihood.sizes.sum())
     nats = 0.5 * score / max(noise.level**2, (power - score[best]) / count)

@@ -13,7 +13,6 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.faults.forced_start import start_of_free
-from bayesimpact.diagnosis.selection import revision
 
 pytestmark = pytest.mark.usefixtures("catalogue_alone")
 
@@ -87,11 +86,10 @@ def test_noise_alone_and_short_recordings_are_none() -> None:
     assert start_of_free(decay().part(0, 30), 1.0) is None
 
 
-def test_a_diagnosis_tells_the_start_and_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whole, the recording asks for a drift and a mode that are not there. A knock where the push
-    ends is another explanation, which is not asked for here.
+def test_a_diagnosis_tells_the_start_and_nothing_else() -> None:
+    """Whole, the recording asks for a drift and a mode that are not there; the end of a push is no
+    knock.
     """
-    monkeypatch.setattr(revision, "knock_beside", lambda base, found: None)
     campaign = Campaign("push", 1.0, (decay(0.6, 2.0, interval=0.05),), stop=False)
     laws = tuple(BY_ID[i] for i in ("sensor_drift", "released_mode"))
     found = diagnose(campaign, rng=np.random.default_rng(0), effects=laws, search=False)
