@@ -19,6 +19,8 @@ Let S be the likeliest set of effects that the search reached.
      more: more to fit with makes imitation easy, and the rest of the truth may be among it. Where
      the effect is a line, sets whose own line may be the motion's (`own_band`) are among these:
      they are refused as names, and still are another explanation,
+   - the likeliest set without it is not decisively likelier, no force of time beside either, than
+     the likeliest one with it,
    - `EXCESS` times as much is left without it, other effects refitted: of the misfit above the
      noise, or, where a force of time is all that S leaves, of that force about the motion's own
      frequencies. An effect that imitates what the catalogue lacks may put the phase right, but
@@ -134,12 +136,25 @@ def is_needed(selection: Selection, group: Group) -> bool:
     chosen = frozenset(selection.chosen.candidate.ids)
     if not (selection.finished or is_compared(selection, group)):
         return False
+    if is_surpassed(selection, group):
+        return False
     reached = selection.with_residual_force(chosen)
     return not any(
         selection.with_residual_force(ids) > reached + lead(selection, ids, group[0])
         for ids, candidate in selection.residual.items()
         if not holds(candidate.effects, group)
     )
+
+
+def is_surpassed(selection: Selection, group: Group) -> bool:
+    """Whether the likeliest model without any of a group is decisively likelier than all with one,
+    no force of time beside either: what that force takes of a misfit is then no reason.
+    """
+    alone = replace(selection, beside=None)
+    with_one = [c for c in selection.tried if holds(c.effects, group)]
+    without = [c for c in selection.tried if not holds(c.effects, group)]
+    most = max(map(alone.log_odds, with_one), default=-np.inf)
+    return max(map(alone.log_odds, without), default=-np.inf) > most + DECISIVE
 
 
 def is_told_apart(selection: Selection, effect: Effect) -> bool:

@@ -227,6 +227,20 @@ def test_odds_are_those_beside_a_force_of_time_where_one_remains():
         assert verdict_of(seen) == verdict
 
 
+def test_a_set_without_it_that_is_likelier_by_itself_unseats_an_effect():
+    """Beside a force of time, which takes what that set explains, it trails."""
+    found = remaining(something_left(), 100.0, 10.0)
+    other = candidate(f"{DRAG} spring_cubic", 0.0)
+    reached = found.log_odds(found.chosen.candidate) + other.price(COST)
+    for ahead, verdict in ((DECISIVE + 0.1, "unknown"), (DECISIVE - 0.1, "partly")):
+        other = candidate(f"{DRAG} spring_cubic", reached + ahead)
+        beside = SimpleNamespace(
+            log_evidence_gain=lambda fit, _, own=other: 0.0 if fit is own.fit else 100.0
+        )
+        tried = (*found.tried, other)
+        assert verdict_of(replace(found, tried=tried, beside=beside)) == verdict
+
+
 def test_nothing_is_needed_where_a_free_force_leaves_far_less():
     """What the noise level is uncertain by (six per cent of a thousand samples) is the least."""
     for free, verdict in (
