@@ -35,6 +35,7 @@ from bayesimpact.diagnosis.candidates.promising import NEAR_MARGIN, SCORE_UNDERE
 from bayesimpact.diagnosis.faults.compare import base_failed, log_likelihood_gain, misfits
 from bayesimpact.diagnosis.faults.first_physics import faults_beside_physics
 from bayesimpact.diagnosis.faults.forced_start import forced_starts
+from bayesimpact.diagnosis.faults.knock import knock_instead
 from bayesimpact.diagnosis.faults.pushed_start import pushed_starts
 from bayesimpact.diagnosis.faults.recording_faults import (
     Corrected,
@@ -186,7 +187,12 @@ def _diagnosed(
     elif base_failed(first):
         cleaned = _by_a_free_rest(cleaned, campaign, rng)
     say("comparing the recordings")
-    certain, doubtful, proved = cleaned, list(comparisons(cleaned, campaign)), False
+    doubtful = list(comparisons(cleaned, campaign))
+    fit = cleaned.identification.fit
+    if knock := knock_instead(doubtful, fit, fit, campaign):
+        cleaned = with_steps(cleaned, [knock], rng=rng, search=search)
+        doubtful = list(comparisons(cleaned, campaign))
+    certain, proved = cleaned, False
     beside_physics = faults_beside_physics(cleaned, campaign, effects, doubtful)
     if beside_physics:
         certain = with_steps(cleaned, beside_physics, rng=rng, search=search)

@@ -170,7 +170,7 @@ def diagnose_fit(
     return Diagnosis(
         decision.verdict,
         identification,
-        replace(selection, own=None),  # large, and of use for the intervals alone
+        replace(selection, chosen=chosen, own=None),  # large, of use for the intervals alone
         base,
         after,
         decision.effects,

@@ -72,8 +72,10 @@ def recordings_of(fit: Fit) -> tuple[str, ...]:
     """Recordings that together hold `MOST` of what a fit leaves beyond the noise, most first."""
     likelihood, recordings = fit.density.likelihood, fit.density.oscillator.campaign.recordings
     beyond = np.maximum(fit.sums / likelihood.noise.level**2 - likelihood.sizes, 0.0)
+    if not beyond.any():
+        return ()
     order = np.argsort(-beyond, kind="stable")
-    share = np.cumsum(beyond[order]) / max(float(beyond.sum()), 1e-300)
+    share = np.cumsum(beyond[order]) / beyond.sum()
     return tuple(recordings[i].name for i in order[: int(np.searchsorted(share, MOST)) + 1])
 
 

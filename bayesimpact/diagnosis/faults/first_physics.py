@@ -28,6 +28,7 @@ from bayesimpact.diagnosis.faults.compare import (
     misfits,
 )
 from bayesimpact.diagnosis.faults.correct import as_fault, corrected
+from bayesimpact.diagnosis.faults.knock import knock_instead
 from bayesimpact.diagnosis.faults.own_stops import (
     share_stops,
     shared_values,
@@ -86,7 +87,8 @@ def faults_beside_physics(
             continue
         steps = comparisons(before, as_read, chosen.effects, values)
         if steps and _leaves_nothing(model.fitted(steps[-1][-1].campaign)):
-            return steps
+            knock = knock_instead(steps, fit, whole, as_read)
+            return (knock,) if knock else steps
     return _label_beside_physics(before, as_read, effects)
 
 

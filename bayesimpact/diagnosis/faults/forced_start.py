@@ -49,7 +49,8 @@ class StartOfFreeMotion:
     Attributes
     ----------
     first : sample from which on the motion is free
-    drop : rms that the law leaves before over that of the period after it
+    drop : what the law leaves before over that of the period after it, the root mean square or the
+        median, whichever drops less: a spike is no start
     amplitudes : ratio of the amplitudes there, 1 at least
     chance : of so much more before than in all that follows, by noise alone
     """
@@ -68,9 +69,10 @@ class StartOfFreeMotion:
 def forced_starts(fit: Fit) -> tuple[Fault, ...]:
     """First instants of free recordings without a stop and with one channel, that a force moved."""
     campaign = fit.density.oscillator.campaign
-    if campaign.stop or campaign.keep_faults or any(r.motion_name for r in campaign.recordings):
+    channels, stiffness = any(r.motion_name for r in campaign.recordings), fit.value("k1")
+    if campaign.stop or campaign.keep_faults or channels or not stiffness > 0.0:
         return ()
-    period = 2 * np.pi * float(np.sqrt(campaign.mass / fit.value("k1")))
+    period = 2 * np.pi * float(np.sqrt(campaign.mass / stiffness))
     found = []
     for r, recording in enumerate(campaign.recordings):
         start = None if recording.input is not None else start_of_free(recording, period)
@@ -128,7 +130,10 @@ class _Rows:
         free = self.begin >= first
         near = free & (self.begin < first + self.cycle)
         before, after = self._left(np.ones(free.size, bool))[~free], self._left(free)
-        drop = np.sqrt(np.mean(before**2) / max(np.mean(after[near] ** 2), 1e-300))
+        drop = min(
+            np.sqrt(size(before**2) / max(size(after[near] ** 2), 1e-300))
+            for size in (np.mean, np.median)
+        )
         amplitudes = np.sqrt(np.mean(self.power[~free]) / np.mean(self.power[near]))
         ratio = np.mean(before**2) / max(np.mean(after[free] ** 2), 1e-300)
         # a reading stands in three rows: half of them are taken to be independent

@@ -11,6 +11,7 @@ start.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,8 +24,9 @@ from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.faults.alone import SharedModel
 from bayesimpact.diagnosis.faults.beside_model import above_noise
 from bayesimpact.diagnosis.faults.compare import Compared, log_likelihood_gain
-from bayesimpact.diagnosis.faults.recording_faults import values_of
+from bayesimpact.diagnosis.faults.recording_faults import Step, fault_as_read, values_of
 from bayesimpact.diagnosis.faults.together import CERTAIN
+from bayesimpact.diagnosis.selection.outcome import leaves_something
 from bayesimpact.diagnosis.thresholds import EXCESS, LARGE
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect
@@ -41,6 +43,8 @@ AFTER = 1.0  # free periods, of which the model has something to say
 FEWEST = 16  # samples of either at least, of a motion that is hardly sampled
 LEAST_FREE = 1e-3  # of a column squared, that parameters leave of it: less is error of derivatives
 SLACK = 2.0  # times the misfit that may stay, that a score may promise: it is of first order
+DIFFER = ("recording_other_rig", "recording_gain", "recording_clock")
+"""Faults of a whole recording that differs, as one does that goes on from another state."""
 SECOND = " after the knock"  # the name of a recording's second part
 
 
@@ -81,11 +85,13 @@ def knock_beside(base: Fit, found: Fit) -> tuple[Compared, Fit, Fit] | None:
     recordings without what follows it, or what was before, whichever is shorter. None where there
     is none.
 
-    The model of the two parts must leave no large misfit, and `EXCESS` times less than without.
+    The model of the two parts must leave no large misfit, and `EXCESS` times less than without; the
+    base model, from which physics may be missing, no more than the noise.
     """
     campaign = found.density.oscillator.campaign
     recordings = campaign.recordings
-    if campaign.keep_faults or any(r.motion_name for r in recordings):
+    forces = found.density.likelihood.noise.forces  # along whole recordings
+    if campaign.keep_faults or any(r.motion_name for r in recordings) or forces is not None:
         return None
     jumps = [j for r in range(len(recordings)) if (j := likeliest_jump(found, r)) is not None]
     jump = max(jumps, key=lambda j: j.gain, default=None)
@@ -95,10 +101,24 @@ def knock_beside(base: Fit, found: Fit) -> tuple[Compared, Fit, Fit] | None:
     split = model.fitted(_apart(campaign, jump))
     if split is None or split.reduced_chi2 > LARGE**2:
         return None
+    if not found.density.oscillator.effects and leaves_something(split):
+        return None  # a law of the stop that is missing may seem to act once
     nats = log_likelihood_gain(found.reduced_chi2, split.reduced_chi2, campaign)
     if nats < CERTAIN or EXCESS * above_noise(split) > above_noise(found):
         return None
     return _without(base, found, split, jump, nats)
+
+
+def knock_instead(steps: Sequence[Step], base: Fit, found: Fit, as_read: Campaign) -> Step:
+    """The knock that, beside a model, explains why a recording differs from the others; () where
+    none does, or no step says that one differs.
+    """
+    differing = {one.fault.recording for step in steps for one in step if one.fault.id in DIFFER}
+    told = knock_beside(base, found) if differing else None
+    if told is None or told[0].fault.recording not in differing:
+        return ()
+    fault = fault_as_read(told[0].fault, found.density.oscillator.campaign, as_read)
+    return (replace(told[0], fault=fault),)
 
 
 def _promises(found: Fit, jump: StateJump) -> bool:
@@ -152,7 +172,7 @@ def _fault(recording: Recording, jump: StateJump, nats: float) -> tuple[Fault, t
     """The knock as a record, whose remedy keeps the longer part; and which part that is."""
     size = recording.samples.size
     first, second = _parts(recording, jump)
-    if first[1] >= size - second[0]:
+    if recording.part(*first).count >= recording.part(*second).count:
         kept, span, remedy = first, (first[1], size), "end_s"
         edge = file_time(recording, first[1] - 0.6)
     else:
@@ -167,7 +187,8 @@ def _fault(recording: Recording, jump: StateJump, nats: float) -> tuple[Fault, t
         end_s=file_time(recording, second[0]),
         size=float("nan"),
         unit="-",
-        statement=f"a knock at {when:.4g} s: the motion goes on from another state",
+        statement=f"a knock at {when:.4g} s, or a change of the probe: the motion goes on from "
+        "another state",
         remedy=f"{remedy} = {edge:.9g}",
         strength=nats,
         threshold=CERTAIN,

@@ -133,8 +133,10 @@ def with_faults(
     """The same with faults set aside or corrected that a model showed; `identification` is without
     them.
     """
-    whole = before.identification.fit.density.oscillator.campaign
-    told = tuple(replace(one, fault=fault_as_read(one.fault, whole, as_read)) for one in faults)
+    whole, told = before.identification.fit.density.oscillator.campaign, list[Compared]()
+    for one in faults:  # each is told of the recordings without those before it
+        told.append(replace(one, fault=fault_as_read(one.fault, whole, as_read)))
+        whole = one.campaign
     return replace(before, identification=identification, compared=(*before.compared, *told))
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.faults.fault import Fault, file_time
+from bayesimpact.data.recording import Recording
 from bayesimpact.inference.fit import Fit, PosteriorDensity
 from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
@@ -34,8 +35,10 @@ ITERATIONS = 25
 
 def unfree_starts(fit: Fit) -> tuple[Fault, ...]:
     """First instants of recordings that keep a fit with a large misfit from the rest of them."""
-    campaign = fit.density.oscillator.campaign
-    period = 2 * np.pi * float(np.sqrt(campaign.mass / fit.value("k1")))
+    campaign, stiffness = fit.density.oscillator.campaign, fit.value("k1")
+    if not stiffness > 0.0:
+        return ()
+    period = 2 * np.pi * float(np.sqrt(campaign.mass / stiffness))
     found = []
     for r, recording in enumerate(campaign.recordings):
         firsts = [round(share * period / recording.interval) for share in INSTANTS]
@@ -44,7 +47,7 @@ def unfree_starts(fit: Fit) -> tuple[Fault, ...]:
             continue
         whole = _alone(fit, r, 0)
         ratios = [
-            _ratio(whole, _alone(fit, r, first), first) / _decayed(recording.samples, first)
+            _ratio(whole, _alone(fit, r, first), first) / _decayed(recording, first)
             for first in firsts
         ]
         if max(ratios) > BETTER:
@@ -84,14 +87,19 @@ def _ratio(whole: Fit, later: Fit, first: int) -> float:
     return float(before @ before) / max(float(after @ after), after.size * level**2)
 
 
-def _decayed(samples: Array, first: int) -> float:
+def _decayed(recording: Recording, first: int) -> float:
     """How many times less a missing force leaves of the rest, whose amplitude is less.
 
     Of 160 simulated decays beside a stop that a model missed by much (damping ratios of 0.005 to
     0.1; alone, with a cubic spring, drag or dry friction) three quarters reached `BETTER` at three
     periods without this, and none with it.
     """
-    return float((np.ptp(samples) / max(np.ptp(samples[first:]), 1e-300)) ** (2 * POWER))
+    used = np.ones(recording.samples.size, bool) if recording.used is None else recording.used
+    rest = recording.samples[first:][used[first:]]
+    if rest.size == 0:
+        return np.inf
+    whole = np.ptp(recording.samples[used])
+    return float((whole / max(np.ptp(rest), 1e-300)) ** (2 * POWER))
 
 
 def start_fault(fit: Fit, r: int, first: int, ratio: float, threshold: float) -> Fault:

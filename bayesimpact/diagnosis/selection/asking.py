@@ -28,10 +28,12 @@ class Asking(Unlisted):
 
     is_last : it goes to its end, whatever a model shows of the readings
     revision : without what spoils them, where it ended at a model that shows that
+    asked_of : the model of which that was asked last
     """
 
     is_last = False
     revision: Revision | None = None
+    asked_of: Candidate | None = None
 
     def asked_for(self, base: ExaminedModel) -> list[ExaminedModel]:
         """The likeliest model that is asked for: without a stop by the equation of motion along the
@@ -99,9 +101,11 @@ class Asking(Unlisted):
         may_be = goes_on or self.budget.may_search_again()
         if self.is_last or examined.is_white or not may_be:
             return False
-        base = self.examined_models[frozenset()].candidate.fit
-        noise = self.noise_of_inputs(examined)
-        self.revision = noise or first_revision(base, examined.candidate.fit, self.progress)
+        if examined.candidate is not self.asked_of:
+            base = self.examined_models[frozenset()].candidate.fit
+            noise = self.noise_of_inputs(examined)
+            self.revision = noise or first_revision(base, examined.candidate.fit, self.progress)
+            self.asked_of = examined.candidate
         return self.revision is not None
 
     def noise_of_inputs(self, examined: ExaminedModel) -> Revision | None:

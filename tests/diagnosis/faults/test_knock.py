@@ -12,13 +12,15 @@ import pytest
 import small_rig
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.diagnosis.faults.first_physics import faults_beside_physics
 from bayesimpact.diagnosis.faults.knock import _basis, _score, _sums, knock_beside, likeliest_jump
+from bayesimpact.diagnosis.faults.recording_faults import cleaned_campaign
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import fit_from
 from bayesimpact.diagnosis.selection.revision import first_revision, revised
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
-from bayesimpact.model.effects import EFFECTS
+from bayesimpact.model.effects import EFFECTS, SEARCHED
 
 BY_ID = {e.id: e for e in EFFECTS}
 PHYSICS: Mapping[str, Mapping[str, Any]] = {
@@ -86,6 +88,19 @@ def test_revised_search_begins_without_it() -> None:
     assert revision is not None and revision.first is not None
     assert [one.fault.id for one in revision.faults] == ["recording_knock"]
     assert revision.first.names == found.names
+
+
+@pytest.mark.parametrize("names", [(), ("spring_cubic",)])
+def test_a_recording_with_a_knock_is_of_no_other_rig(names: tuple[str, ...]) -> None:
+    """By its own parameters, beside the law that is asked for first, it would be."""
+    plain: dict[str, Any] = {"rig": small_rig.PLAIN, "releases": [*small_rig.PLAIN_RELEASES]}
+    plain["releases"].append(replace(small_rig.PLAIN_RELEASES[0], name="c", y0=5.5e-3, v0=0.0))
+    campaign = recorded({name: PHYSICS[name] for name in names}, 0.9, **plain)
+    cleaned = cleaned_campaign(campaign, rng=np.random.default_rng(0), search=False)
+    steps = faults_beside_physics(cleaned, campaign, SEARCHED)
+    assert [(one.fault.id, one.fault.recording) for step in steps for one in step] == [
+        ("recording_knock", "b")
+    ]
 
 
 @pytest.mark.parametrize("effect", MISSING)
