@@ -14,9 +14,11 @@ from effect_rigs import BY_ID
 from scipy import stats
 
 from bayesimpact.data.strict_json import strict
+from bayesimpact.diagnosis import loop
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.diagnosis.selection.comparable import Comparable
+from bayesimpact.diagnosis.selection.decision import Decision
 from bayesimpact.report.diagnosis.document import document
 
 CATALOGUE = tuple(
@@ -55,6 +57,16 @@ def unknown() -> Diagnosis:
 def written(diagnosis: Diagnosis, **draws) -> dict:
     content = document(diagnosis, seed=3, seconds=1.5, versions={"numpy": "2"}, **draws)
     return json.loads(json.dumps(strict(content), allow_nan=False))
+
+
+def test_where_nothing_is_proved_the_base_model_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A search may have chosen effects that lose to nothing: document and limits know of none."""
+    monkeypatch.setattr(loop, "decide", lambda selection: Decision("adequate", ()))
+    found = run(44, HARDENING, releases=small_rig.RELEASES[:2])
+    assert found.verdict == "adequate" and found.effects == ()
+    assert found.after is found.before
+    assert {limit.effect_id for limit in found.limits} >= {"contact_hardening"}
+    assert written(found)["verdict"] == "adequate"
 
 
 def physical_z(fit, mean=None, sd=None) -> dict[str, float]:
