@@ -214,9 +214,10 @@ def first_revision(base: Fit, found: Fit, say: Progress) -> Revision | None:
     """The first thing that is off and only a model as good as this one shows, of readings or of an
     input's: what is fitted to these decides nothing. None where there is none.
     """
-    steps = [_without_readings, _under_noise_of_inputs, _without_a_knock]
+    steps = [_without_readings, _under_noise_of_inputs]
     if found is not base:
-        steps.append(_with_a_recording_corrected)
+        steps.append(_with_a_recording_corrected)  # before a knock, which halves a clock's misfit
+    steps.append(_without_a_knock)
     told = (step(base, found, say) for step in steps)
     return next((one for one in told if one is not None), None)
 
