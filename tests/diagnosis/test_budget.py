@@ -155,7 +155,8 @@ def test_a_diagnosis_without_time_for_a_second_search_says_so(monkeypatch) -> No
         clock.now += 2 * PATIENCE
         fit = before.identification.fit
         campaign = fit.density.oscillator.campaign
-        return ((SimpleNamespace(campaign=campaign, after=fit.reduced_chi2),),)
+        fault = SimpleNamespace(id="recording_other_rig", recording="a")
+        return ((SimpleNamespace(fault=fault, campaign=campaign, after=fit.reduced_chi2),),)
 
     monkeypatch.setattr(whole, "_of_corrected", slow)
     monkeypatch.setattr(whole, "comparisons", doubtful)
