@@ -65,6 +65,12 @@ class Linearisation:
 
     __repr__ = short_repr
 
+    def whole(self, size: int) -> Array:
+        """The derivative with respect to all of `size` parameters, (n, size)."""
+        found = np.zeros((self.residual.size, size))
+        found[:, self.columns] = self.jacobian
+        return found
+
 
 @dataclass(frozen=True, eq=False)
 class Likelihood:

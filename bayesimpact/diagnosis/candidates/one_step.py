@@ -9,8 +9,6 @@ Schwarz's criterion (Schwarz 1978, Annals of Statistics 6:461).
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -33,14 +31,13 @@ def criterion_after_a_step(base: Fit, chosen: EffectSet, scales: Scales) -> floa
     period is told, or the motion runs away.
     """
     density, start = start_of_set(base, chosen.effects, chosen.values, scales)
-    fit = replace(base, density=density, mode=start)
     with np.errstate(over="ignore", invalid="ignore"):
         ahead = multiple_shooting(density.likelihood, start)
         if ahead is None:
             return np.inf
         layout = density.oscillator.layout
         sizes = step_sizes(layout.names, density.oscillator.acting, scales, ())
-        steps = difference_steps(base, fit.density, sizes)
+        steps = difference_steps(base, density, sizes)
         parts = ahead.linearise(start, steps, roughly=True)
         moving = np.setdiff1d(np.arange(start.size), layout.roles("noise"))
         left = _after_a_step(parts, moving, start.size)
@@ -55,13 +52,8 @@ def _after_a_step(parts: tuple[Linearisation, ...], moving: NDArray[np.int64], s
     """Sum of squares that is left of whitened residuals when the `moving` ones of `size` parameters
     have taken what is linear in them.
     """
-    columns, residuals = [], []
-    for part in parts:
-        whole = np.zeros((part.residual.size, size))
-        whole[:, part.columns] = part.jacobian
-        columns.append(whole[:, moving])
-        residuals.append(part.residual)
-    jacobian, residual = np.concatenate(columns), np.concatenate(residuals)
+    jacobian = np.concatenate([part.whole(size)[:, moving] for part in parts])
+    residual = np.concatenate([part.residual for part in parts])
     if not (np.isfinite(jacobian).all() and np.isfinite(residual).all()):
         return np.inf
     norm = np.linalg.norm(jacobian, axis=0)

@@ -66,9 +66,7 @@ class PeriodSets(TermSets):
         sizes = step_sizes(o.layout.names, o.acting, scales, ())
         parts = ahead.linearise(fit.mode, difference_steps(fit, fit.density, sizes))
         moving = np.setdiff1d(np.arange(fit.mode.size), o.layout.roles("noise"))
-        columns = [np.zeros((p.residual.size, fit.mode.size)) for p in parts]
-        for whole, part in zip(columns, parts, strict=True):
-            whole[:, part.columns] = part.jacobian
+        columns = [part.whole(fit.mode.size) for part in parts]
         level = ahead.noise.level
         super().__init__(
             [

@@ -233,11 +233,8 @@ def likeliest_jump(fit: Fit, r: int) -> StateJump | None:
 
 def _basis(fit: Fit) -> list[Array]:
     """Orthonormal columns of what the parameters do to all recordings, rows (n_r, p) of each."""
-    sizes = [part.residual.size for part in fit.linearisation]
-    whole = np.zeros((sum(sizes), fit.mode.size))
-    ends = np.cumsum(sizes)
-    for part, end in zip(fit.linearisation, ends, strict=True):
-        whole[end - part.residual.size : end, part.columns] = part.jacobian
+    ends = np.cumsum([part.residual.size for part in fit.linearisation])
+    whole = np.concatenate([part.whole(fit.mode.size) for part in fit.linearisation])
     size = np.linalg.norm(whole, axis=0)
     basis = np.linalg.qr(whole[:, size > 0.0] / size[size > 0.0])[0]
     return np.split(basis, ends[:-1])

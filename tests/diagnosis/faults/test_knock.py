@@ -32,6 +32,7 @@ MISSING: Mapping[str, Mapping[str, Any]] = {
     "quadratic_drag": {"coefficient": 0.3},
     "stiffness_drift": {"rate": -4e-3},
     "contact_damping_indentation": {"coefficient": 4e4},
+    "obstacle_mass": {"mass": 7.5e-3},  # the end of one contact would be taken for one
 }
 IMPULSE, WIDTH = 0.004, 0.01  # N s, s
 

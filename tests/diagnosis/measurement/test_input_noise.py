@@ -15,6 +15,7 @@ from effect_rigs import BY_ID
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.input import Input
 from bayesimpact.diagnosis.diagnose import diagnose
+from bayesimpact.diagnosis.measurement import input_noise as module
 from bayesimpact.diagnosis.measurement.input_noise import (
     input_noise,
     under_input_noise,
@@ -235,7 +236,8 @@ def test_beside_a_large_misfit_an_input_without_a_floor_tells_no_noise() -> None
     assert recording.input is not None
     fit = identified(rig.campaign).fit
     assert fit.reduced_chi2 > LARGE**2
-    assert under_input_noise(fit) is None
+    assert input_noise(fit) is None and under_input_noise(fit) is None
+    assert module._floor(recording, module.MANY) == 0.0 < module._floor(recording)
 
 
 def with_slow_noise_of_its_own(rig: DrivenRig, campaign: Campaign, seed: int) -> Campaign:
