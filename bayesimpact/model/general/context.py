@@ -60,7 +60,8 @@ class Flow(NamedTuple):
     K: Any  # 1/s2
     rest: Any  # m
     slope: Any  # stiffness of laws that is counted into K, N/m
-    level: Any  # and their force at y = 0, counted into rest, N
+    level: Any  # and their force at y = v = 0, counted into rest, N
+    drag: Any  # damping of laws that is counted into b, N s/m
     gap: Any  # m
     touching: Any  # 1.0 or 0.0
     count: Any  # number of acting laws
@@ -71,6 +72,7 @@ class Flow(NamedTuple):
     turns: Any  # True when a force has a kink or jump at v = 0
     rough: Any  # True when a force is not smooth at impact
     first_at_turn: Any  # shortest step where the motion turns, over the usual one
+    folds: Any  # True when the damping of a creeping mass may be counted into b
     bodies: Any  # True when a body of `resonator` acts
     joint: Any  # True when nothing else is added, so that `joint` is exact
     hop: Any  # usual length of its steps, s

@@ -82,8 +82,9 @@ FIRST, SINCE, UNTIL = 1.0 / 80.0, 0.46, 0.27
 SINCE_TURN, UNTIL_TURN, MOST_SINCE, MOST_UNTIL = 0.8, 0.46, 1.0, 0.5
 ENDS_ON_TURNS = KINK_AT_TURN | JUMP_AT_TURN
 # a mass that creeps under a root of its speed: longest step times the rate at which its speed
-# settles, by the difference of the force over that share of the speed
-STIFF, NEARBY = 1.5, 1.0 / 16.0
+# settles, by the difference of the force over that share of the speed (of a mass nearly AT_REST,
+# m/s, over that). Beyond it that damping is counted into the flow, until it has CHANGED by a share
+STIFF, NEARBY, AT_REST, CHANGED = 1.5, 1.0 / 16.0, 1e-11, 0.25
 # a force without features admits longer steps the weaker it is: share of the linear force at which
 # they are the usual ones, and by how much they are shortened and lengthened at most
 SLIGHT, LEAST_LENGTHENING, MOST_LENGTHENING = 0.07, 0.4, 3.2
@@ -124,8 +125,8 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
         mass -= share_of_frame(w) * w.mass
         for which in range(BODIES):
             if acts(which, touching, w):
-                m2, W, drag = body(which, w)
-                damping, stiffness = damping + m2 * drag, stiffness + m2 * W
+                m2, W, own = body(which, w)
+                damping, stiffness = damping + m2 * own, stiffness + m2 * W
                 force += m2 * W * s[GAP] if which == OBSTACLE else 0.0
     slope, level, time_rate = 0.0, 0.0, abs(q[OMEGA]) if q[FORCE] != 0.0 else 0.0
     time_rate, feature_length = max(time_rate, FINER * bodies), np.inf
@@ -147,7 +148,7 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
                 first_at_turn = min(first_at_turn, share)
     stiffness += slope
     b, K = 0.5 * damping / mass, stiffness / mass
-    forced = q[FORCE] != 0.0
+    forced, drag = q[FORCE] != 0.0, 0.0
     plain = count == 0 and not memory and not forced
     longest = MAX_ANGLE_PLAIN / np.sqrt(K) if plain else MAX_ANGLE / np.sqrt(K + b * b)
     if time_rate > 0.0:
@@ -164,10 +165,18 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
             longest = min(longest, MAX_ANGLE_OF_TIME / time_rate)
         longest = max(longest, w.interval / MOST_HOPS)
         longest = w.interval / np.ceil(w.interval / longest)
+    folds = first_at_turn < 1.0 and not (placed or memory or forced) and time_rate == 0.0
+    if folds:  # the method is none for a force that changes faster than such a speed settles
+        rate = rooted_damping(y, v, t, count, w) / mass
+        pull = damping * v + (stiffness - slope) * y - force
+        pull += sum_of_laws(y, v, t, count, False, w)
+        if rate * graded(v, pull / mass, longest, first_at_turn) > STIFF:
+            b, drag = b + 0.5 * rate, mass * rate
+            level += sum_of_laws(y, v, t, count, True, w) - drag * v
     flow = Flow(
-        1.0 / mass, b, K, (force - level) / stiffness, slope, level, s[GAP],
+        1.0 / mass, b, K, (force - level) / stiffness, slope, level, drag, s[GAP],
         1.0 if touching else 0.0, count, memory, plain, placed, forced, turns, rough, first_at_turn,
-        bodies > 0.0, joint, longest,
+        folds, bodies > 0.0, joint, longest,
     )  # fmt: skip
     if tame and not plain:
         longest *= lengthening(y, v, t, time_rate, longest, flow, w)
@@ -230,7 +239,7 @@ def left_out(y: Any, v: Any, t: Any, flow: Any, w: Any) -> Any:
 
     A law beyond a surface of its own does not count: the motion does not get there within a step.
     """
-    total = flow.level + flow.slope * y
+    total = flow.level + flow.slope * y + flow.drag * v
     for k in range(flow.count):
         law = w.acting[k]
         if beyond_surface(law, y, v, t, w):
@@ -315,14 +324,87 @@ def not_beyond(left: Any, h: Any, w: Any) -> Any:
     return (left, True) if w.driven and h >= left else (h, False)
 
 
+@inner()
+def sum_of_laws(y: Any, v: Any, t: Any, count: Any, rooted: Any, w: Any) -> Any:
+    """Force of the laws that act, or of those that are not smooth where the motion turns, N."""
+    total, touching = 0.0, 1.0 if w.s[MODE] == TOUCHING else 0.0
+    for k in range(count):
+        law = w.acting[k]
+        if not rooted or w.laws[LAW_COLUMNS * law + LAW_TURN] != 0:
+            z = w.work[WORK_COLUMNS * law + NOW]
+            total += law_value(law, LAW_FORCE, y, v, t, z, w.s[GAP], touching, w)
+    return total
+
+
+@inner(forceinline=True)
+def small_change(v: Any) -> Any:
+    """Of a speed, for a difference of forces, m/s."""
+    return NEARBY * v if abs(v) > AT_REST else AT_REST
+
+
+@inner()
+def rooted_damping(y: Any, v: Any, t: Any, count: Any, w: Any) -> Any:
+    """Damping at this speed of the laws that are not smooth where the motion turns, N s/m; 0 where
+    they drive the motion.
+    """
+    change = small_change(v)
+    faster = sum_of_laws(y, v + change, t, count, True, w)
+    return max(0.0, (faster - sum_of_laws(y, v, t, count, True, w)) / change)
+
+
+@inner(forceinline=True)
+def graded(v: Any, pull: Any, longest: Any, first_at_turn: Any) -> Any:
+    """Longest step near a turning point at which a force is not smooth.
+
+    `pull` is minus the acceleration: v / pull is the time since the turning point, or minus that to
+    the next.
+    """
+    if pull == 0.0:
+        return longest
+    away = abs(v / (pull * longest))
+    root = np.sqrt(away)
+    share, most = (SINCE_TURN, MOST_SINCE) if v * pull < 0.0 else (UNTIL_TURN, MOST_UNTIL)
+    return longest * min(1.0, max(first_at_turn, min(share * root * np.sqrt(root), most * away)))
+
+
+@inner(forceinline=True)
+def settling_rate(y: Any, v: Any, t: Any, n0: Any, flow: Any, w: Any) -> Any:
+    """Rate at which the forces that the flow leaves out make the speed settle, or drive it, 1/s."""
+    if flow.first_at_turn >= 1.0 or flow.placed:
+        return 0.0
+    change = small_change(v)
+    return abs(flow.inverse * (n0 - added_force(y, v + change, t, NOW, flow, w)) / change)
+
+
+@inner(forceinline=True)
+def is_outdated(rate: Any, y: Any, v: Any, n0: Any, longest: Any, flow: Any) -> Any:
+    """Whether a mass creeps that the flow lets swing, or its damping is no longer the flow's."""
+    if not flow.folds:
+        return False
+    if flow.drag > 0.0:
+        return rate > CHANGED * flow.inverse * flow.drag
+    return (
+        rate * longest > STIFF
+        and rate * graded(v, pull_at(y, v, n0, flow), longest, flow.first_at_turn) > 2.0 * STIFF
+    )
+
+
+@inner(forceinline=True)
+def pull_at(y: Any, v: Any, n0: Any, flow: Any) -> Any:
+    """Minus the acceleration, m/s2; n0 is `added_force`."""
+    return 2.0 * flow.b * v + flow.K * (y - flow.rest) - flow.inverse * n0
+
+
 @inner(forceinline=True)
 def next_step(
-    y: Any, v: Any, t: Any, n0: Any, j: Any, aligned: Any, longest: Any, flow: Any, w: Any
-) -> Any:
-    """Length of the next step, and whether it ends on a sample; n0 is `added_force` at its start.
+    y: Any, v: Any, t: Any, n0: Any, j: Any, aligned: Any, longest: Any, rate: Any, flow: Any,
+    w: Any,
+) -> Any:  # fmt: skip
+    """Length of the next step, and whether it ends on a sample.
 
-    Near a contact onset that is not smooth the steps follow from the motion alone, not from
-    the samples, so that they change smoothly with the parameters.
+    n0 is `added_force` at its start, `rate` the `settling_rate`. Near a contact onset that is not
+    smooth the steps follow from the motion alone, not from the samples, so that they change
+    smoothly with the parameters.
     """
     least = w.interval / MOST_CUTS
     left = j * w.interval - t
@@ -334,16 +416,8 @@ def next_step(
             longest *= min(1.0, max(FIRST, share * root * np.sqrt(root)))
         return not_beyond(left, max(longest, least), w)
     if flow.first_at_turn < 1.0:
-        pull = 2.0 * flow.b * v + flow.K * (y - flow.rest) - flow.inverse * n0
-        if pull != 0.0:  # v / pull is the time since the turning point, or minus that to the next
-            away = abs(v / (pull * longest))
-            root = np.sqrt(away)
-            share, most = (SINCE_TURN, MOST_SINCE) if v * pull < 0.0 else (UNTIL_TURN, MOST_UNTIL)
-            graded = min(share * root * np.sqrt(root), most * away)
-            longest *= min(1.0, max(flow.first_at_turn, graded))
-        if v != 0.0 and not flow.placed:
-            lost = n0 - added_force(y, (1.0 + NEARBY) * v, t, NOW, flow, w)
-            rate = abs(flow.inverse * lost / (NEARBY * v))
+        longest = graded(v, pull_at(y, v, n0, flow), longest, flow.first_at_turn)
+        if flow.drag == 0.0:
             longest = min(longest, STIFF / max(rate, STIFF / longest))
         return not_beyond(left, max(longest, least), w)
     longest = max(longest, least)

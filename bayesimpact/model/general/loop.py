@@ -52,7 +52,15 @@ from bayesimpact.model.general.context import (
 )
 from bayesimpact.model.general.crossing import first_event, suspicious
 from bayesimpact.model.general.dense import LONGEST_STRIDE, fill_in, input_reading, reading
-from bayesimpact.model.general.flows import RENEWED, first_step, flow_from, next_step, stride_of
+from bayesimpact.model.general.flows import (
+    RENEWED,
+    first_step,
+    flow_from,
+    is_outdated,
+    next_step,
+    settling_rate,
+    stride_of,
+)
 from bayesimpact.model.general.memory import keep_memory, relax
 from bayesimpact.model.general.method import quarters
 from bayesimpact.model.general.resonator import ROWS
@@ -121,7 +129,7 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
     """Motion to the next event, or to where its flow is renewed: (y, v, t, next sample)."""
     set_directions(y, v, t, w)
     flow, longest = flow_from(y, v, t, w)
-    start, event, second = t, typed(NONE), listens(w)
+    start, event, second, stepped = t, typed(NONE), listens(w), False
     ramp = first_step(y, v, t, longest, flow, w)
     n0 = 0.0 if flow.plain else added_force(y, v, t, NOW, flow, w)
     y1, v1, n1 = y, v, n0
@@ -138,7 +146,10 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
                 break
         h, lands = stride * w.interval, True
         if not expected:
-            h, lands = next_step(y, v, t, n0, j, aligned, min(longest, ramp), flow, w)
+            rate = settling_rate(y, v, t, n0, flow, w)
+            if stepped and is_outdated(rate, y, v, n0, min(longest, ramp), flow):
+                break
+            h, lands = next_step(y, v, t, n0, j, aligned, min(longest, ramp), rate, flow, w)
             if not h > 0.0:  # an event on the sample itself
                 w.out[j] = reading(y, v, n0, flow, w) + added_reading(y, v, t, w)
                 w.out[j] += input_reading(j, flow.inverse, w)
@@ -166,7 +177,7 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
             respond(y, v, t, n0, y1, v1, n1, length, j, reached, flow, w)
         t = (reached - 1) * w.interval if lands else t + length
         y, v, n0, j = y1, v1, n1, reached
-        ramp *= 2.0
+        ramp, stepped = 2.0 * ramp, True
         if flow.memory:
             keep_memory(w)
         if event != LEAVE:

@@ -28,7 +28,7 @@ from bayesimpact.model.jit.compiled import inner
 @inner(forceinline=True)
 def added_force(y: Any, v: Any, t: Any, column: Any, flow: Any, w: Any) -> Any:
     """Force that the linear flow leaves out, N; the laws' states stand in `column`."""
-    force = flow.level + flow.slope * y
+    force = flow.level + flow.slope * y + flow.drag * v
     if flow.count > 0:  # most often there is one: kept out of the loop's chain of dependences
         law = w.acting[0]
         z = w.work[WORK_COLUMNS * law + column]
