@@ -12,6 +12,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -115,6 +116,7 @@ def _above(spectra: Spectra, frequency: float) -> Spectra:
     return [(f[f > frequency], p[f > frequency], dt) for f, p, dt in spectra]
 
 
+@lru_cache(maxsize=4 * len(WINDOWS) * len(ORDERS))
 def nulls(smoothing: Smoothing, interval: float, count: int = 3) -> tuple[float, ...]:
     """First frequencies at which the filter lets nothing pass, Hz."""
     frequency = np.linspace(0, 0.5 / interval, 4000)
@@ -282,14 +284,14 @@ def _power(spectra: Spectra) -> Array:
 def _coloured_shape(spectra: Spectra, smoothing: Smoothing) -> Array:
     """Expected ordinates of filtered AR(1) noise on a white floor, at their most likely."""
     power, angle = _power(spectra), np.concatenate([2 * np.pi * f * dt for f, _, dt in spectra])
-    filtered = np.concatenate([magnitude_response(smoothing, dt, f) ** 2 for f, _, dt in spectra])
+    filtered = _passed(spectra, smoothing)
 
     def expected(x: Array) -> Array:
         rho = np.tanh(x[2])
         shape = filtered * (1 - rho) ** 2 / (1 - 2 * rho * np.cos(angle) + rho**2)
         return np.asarray(np.exp(x[0]) * shape + np.exp(x[1]))
 
-    start = np.append(np.log(_levels(spectra, smoothing)), 0.1)
+    start = np.append(np.log(_levels(power, filtered)), 0.1)
     found = _minimize(
         lambda x: -_log_likelihood(power, expected(x)),
         start,
@@ -301,15 +303,18 @@ def _coloured_shape(spectra: Spectra, smoothing: Smoothing) -> Array:
 
 def _filtered(spectra: Spectra, smoothing: Smoothing) -> float:
     """Best log likelihood of filtered white noise on a white floor (rounding)."""
-    level, floor = _levels(spectra, smoothing)
-    shape = np.concatenate([magnitude_response(smoothing, dt, f) ** 2 for f, _, dt in spectra])
-    return _log_likelihood(_power(spectra), level * shape + floor)
+    power, shape = _power(spectra), _passed(spectra, smoothing)
+    level, floor = _levels(power, shape)
+    return _log_likelihood(power, level * shape + floor)
 
 
-def _levels(spectra: Spectra, smoothing: Smoothing) -> Array:
+def _passed(spectra: Spectra, smoothing: Smoothing) -> Array:
+    """Share of the power that the filter lets pass, of every ordinate."""
+    return np.concatenate([magnitude_response(smoothing, dt, f) ** 2 for f, _, dt in spectra])
+
+
+def _levels(power: Array, shape: Array) -> Array:
     """Power of the filtered noise and of the floor that fit the ordinates best."""
-    shapes = [magnitude_response(smoothing, dt, f) ** 2 for f, _, dt in spectra]
-    shape, power = np.concatenate(shapes), np.concatenate([p for _, p, _ in spectra])
 
     def expected(log_floor: float) -> Array:
         relative = shape + np.exp(log_floor)
