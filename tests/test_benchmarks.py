@@ -38,10 +38,12 @@ def problem() -> bundled.Problem:
     return bundled.problem()
 
 
+@pytest.mark.long
 def test_the_kernels_subjects_agree() -> None:
     check(*campaign(3, 500))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("recording", range(9))
 def test_the_plain_recurrence_is_exact(recording: int) -> None:
     given = bundled.problem(recording)
@@ -189,6 +191,7 @@ def test_figures_show_every_row(name: str) -> None:
     assert all(any(text.startswith(row) for text in texts) for row in rows)
 
 
+@pytest.mark.long
 def test_timed_diagnoses_are_of_nine_recordings_of_6000_samples(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

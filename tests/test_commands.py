@@ -61,6 +61,7 @@ def test_sample_leaves_what_the_contract_names(sampled: Path) -> None:
     assert {"posterior.nc", "report.html", "figures", "fit.json"} <= names
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("coarse_figures")
 def test_resume_gives_the_same_posterior(run: Run, campaign: Path, sampled: Path) -> None:
     before = (sampled / "fit.json").read_text()

@@ -12,6 +12,8 @@ from benchmarks import coverage
 
 from bayesimpact.inference.identify import identify
 
+pytestmark = pytest.mark.long
+
 BASE = ("c1", "k1", "c2", "g", "k2[1]")
 SENSORS: tuple[Any, ...] = ("velocity", "acceleration")
 

@@ -58,6 +58,7 @@ def test_check_fit_and_report(
     assert "With a measured input" in page and "gain of the measured input" in page
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("coarse_figures")
 def test_a_quick_diagnosis(
     campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -45,6 +45,7 @@ def ended(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, 
     return int(end.value.code or 0), capsys.readouterr().err
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("size", "code"), [(0, 2), (60_000, 1)])
 def test_a_full_disk_ends_in_one_message(
     size: int, code: int, campaign: Path, tmp_path: Path
@@ -107,6 +108,7 @@ def test_a_chain_that_is_a_file(
     assert code == 2 and error.count("\n") == 1 and "chain" in error
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("coarse_figures")
 def test_a_figure_that_fails_costs_nothing_else_and_report_finishes_it(
     capsys: pytest.CaptureFixture[str],
@@ -132,6 +134,7 @@ def test_a_figure_that_fails_costs_nothing_else_and_report_finishes_it(
     assert (tmp_path / "report.html").read_text().count("<img") == 3
 
 
+@pytest.mark.long
 def test_sigterm_is_like_ctrl_c_and_says_how_to_go_on(campaign: Path, tmp_path: Path) -> None:
     process = subprocess.Popen(
         [COMMAND, "sample", str(campaign), "--out", str(tmp_path)],

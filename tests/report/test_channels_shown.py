@@ -16,7 +16,7 @@ from bayesimpact.report.archive import load_results
 from bayesimpact.report.tables import release_columns, release_views
 from bayesimpact.workflow import diagnose_campaign, fit_campaign
 
-pytestmark = pytest.mark.usefixtures("coarse_figures", "catalogue_alone")
+pytestmark = [pytest.mark.long, pytest.mark.usefixtures("coarse_figures", "catalogue_alone")]
 
 
 def number(text: str) -> float:
@@ -55,7 +55,6 @@ def test_a_report_shows_a_gain_where_it_is_free(tmp_path: Path) -> None:
     assert "gain of the probe" in page
 
 
-@pytest.mark.long
 def test_what_both_channels_feel_is_named(tmp_path: Path) -> None:
     campaign: Campaign = channels(1, {"spring_cubic": {"stiffness": 3e6}})
     read = tuple(  # accelerometers read too much, and say that they may

@@ -194,6 +194,7 @@ def test_any_number_of_recordings(count: int, cases: int) -> None:
         assert png(figure).startswith(b"\x89PNG")
 
 
+@pytest.mark.long
 def test_report_is_drawn_again_from_stored_results(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -184,6 +184,7 @@ def shown(tab: Tab) -> tuple[float, float]:
     return float(found[1]), float(found[2])
 
 
+@pytest.mark.long
 def test_choose_zoom_and_switch_in_a_browser(tab: Tab, report: Path) -> None:
     results = compared()
     tab.open(report, 1280)
@@ -212,6 +213,7 @@ def test_choose_zoom_and_switch_in_a_browser(tab: Tab, report: Path) -> None:
     assert tab.errors == []
 
 
+@pytest.mark.long
 def test_values_under_the_pointer_are_the_recordings(tab: Tab, report: Path) -> None:
     tab.open(report, 1280)
     tab.drag("#explore .u-over", 0.5, 0.5)
@@ -230,6 +232,7 @@ def test_values_under_the_pointer_are_the_recordings(tab: Tab, report: Path) -> 
     assert tab.errors == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("width", [390, 768, 1280])
 def test_no_sideways_scroll_and_no_requests(tab: Tab, report: Path, width: int) -> None:
     tab.requests.clear()
@@ -240,6 +243,7 @@ def test_no_sideways_scroll_and_no_requests(tab: Tab, report: Path, width: int) 
     assert outside == [] and tab.errors == []
 
 
+@pytest.mark.long
 def test_prints_on_a4_without_the_explorer(tab: Tab, report: Path) -> None:
     tab.open(report, 1280)
     data = tab.pdf()

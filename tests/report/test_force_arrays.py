@@ -15,6 +15,8 @@ from bayesimpact.report.diagnosis.arrays import diagnosis_arrays, spectrum
 from bayesimpact.report.diagnosis.force_arrays import POINTS, force_arrays
 from bayesimpact.report.results import Array
 
+pytestmark = pytest.mark.long
+
 STIFFNESS = 1.5e7  # N/m3
 Z90 = 1.6449
 

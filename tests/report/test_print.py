@@ -17,7 +17,7 @@ from bayesimpact.report.figures import save
 from bayesimpact.report.results import Results
 from bayesimpact.report.write import rewrite_report
 
-pytestmark = pytest.mark.skipif(chromium() is None, reason="no Chromium here")
+pytestmark = [pytest.mark.long, pytest.mark.skipif(chromium() is None, reason="no Chromium here")]
 
 HEADS = ("H1", "H2", "H3")
 REPORTS = {

@@ -98,7 +98,8 @@ def test_fifty_recordings_show_the_worst_of_every_case() -> None:
     assert len({r.name for r in shown}) == MOST
 
 
-@pytest.mark.parametrize("count", [1, pytest.param(9, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("count", [1, 9])
 def test_nothing_overlaps(count: int) -> None:
     """Titles and labels keep clear of one another, of other panels and of the edge."""
     results = make_results(count, 3 if count > 1 else 1, n=300)
@@ -249,6 +250,7 @@ def test_files(tmp_path: Path) -> None:
     assert len(f".{file_name('ß' * 300)}.png.12345678.png".encode()) < 255
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("coarse_figures")
 def test_all_are_saved_in_the_order_of_the_page(tmp_path: Path) -> None:
     told = replace(diagnosed(1, 1), sampler=None, backbone=None)
@@ -257,6 +259,7 @@ def test_all_are_saved_in_the_order_of_the_page(tmp_path: Path) -> None:
     assert {f.stem for f in (tmp_path / "figures").iterdir()} == set(pictures)
 
 
+@pytest.mark.long
 def test_every_file_is_drawn_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     drawn: list[str] = []
     draw = Figure.draw

@@ -30,6 +30,7 @@ def pool() -> list[Backbone]:
     return [extracted(recorded(seed)) for seed in range(360)]
 
 
+@pytest.mark.long
 def test_calibrated_under_the_truth(pool: list[Backbone]) -> None:
     """Every recording in turn against 60 others: p uniform, 90 % of the points in the band."""
     rng = np.random.default_rng(1)
@@ -44,6 +45,7 @@ def test_calibrated_under_the_truth(pool: list[Backbone]) -> None:
     assert np.mean([c.inside for c in checks]) == pytest.approx(0.9, abs=0.015)
 
 
+@pytest.mark.long
 def test_through_the_front_door(pool: list[Backbone]) -> None:
     draws = np.array([recorded(1000 + i) for i in range(40)])
     check = check_backbone(recorded(0), draws, INTERVAL, noise=NOISE)
@@ -57,6 +59,7 @@ def test_through_the_front_door(pool: list[Backbone]) -> None:
     assert check.inside > 0.7
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("changed", "curve"),
     [
@@ -75,6 +78,7 @@ def test_a_wrong_parameter_shows(
     assert check.bands[curve].inside < 0.7
 
 
+@pytest.mark.long
 def test_the_extractors_bias_cancels(pool: list[Backbone]) -> None:
     """A rest position 0.1 mm off bends every curve alike: the check does not mind."""
     draws = np.array([recorded(2000 + i) for i in range(30)])
@@ -86,6 +90,7 @@ def test_the_extractors_bias_cancels(pool: list[Backbone]) -> None:
     assert biased.p_value > 0.03
 
 
+@pytest.mark.long
 def test_draws_that_end_early_are_left_out(pool: list[Backbone]) -> None:
     short = extracted(recorded(5)[:100])
     check = compare(pool[0], [*pool[1:60], short])

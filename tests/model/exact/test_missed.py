@@ -70,6 +70,7 @@ def check(draw: Callable[[np.random.Generator], systems.System], count: int, see
     return sum(row[1] for row in found)
 
 
+@pytest.mark.long
 def test_no_impact_missed_sample() -> None:
     assert check(systems.draw, 700, 20) > 3_000
     assert check(systems.draw_fine, 300, 22) > 2_000

@@ -16,6 +16,7 @@ def check(count: int, seed: int) -> dict[str, float]:
     return found
 
 
+@pytest.mark.long
 def test_accuracy_sample() -> None:
     assert check(30, 1)["events"] > 150
 

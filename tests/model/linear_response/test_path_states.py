@@ -13,6 +13,8 @@ from small_rig import RIG, record, vector
 from bayesimpact.model.linear_response.path_forces import add_forces
 from bayesimpact.model.oscillator import build_oscillator
 
+pytestmark = pytest.mark.long
+
 OMEGA, REACH, GAP = 40.0, 6e-3, 2e-3
 TIMES = np.arange(1000) * 1e-3
 
