@@ -72,14 +72,13 @@ def magnitude_response(smoothing: Smoothing | None, interval: float, frequency: 
     """Amplitude response of the filter at `frequency` in Hz."""
     if smoothing is None:
         return np.ones_like(frequency)
-    from scipy import signal
-
     angle = 2 * np.pi * frequency * interval
-    if smoothing.kind == "savgol":
-        _, response = signal.freqz(_taps(smoothing.window, smoothing.polyorder), worN=angle)
+    if smoothing.kind == "savgol":  # the weights are the same on both sides
+        middle, *side = _taps(smoothing.window, smoothing.polyorder)[smoothing.window // 2 :]
+        response = np.polynomial.chebyshev.chebval(np.cos(angle), [middle, *2 * np.array(side)])
     else:
         decay = np.exp(-interval / smoothing.time_constant)
-        _, response = signal.freqz([1.0 - decay], [1.0, -decay], worN=angle)
+        response = (1.0 - decay) / (1.0 - decay * np.exp(-1j * angle))
     return np.asarray(np.abs(response), dtype=np.float64)
 
 

@@ -60,8 +60,10 @@ def cycle(
     -------
     CycleEnd of (n,) arrays.
     """
-    rows = np.broadcast_arrays(depth, float(mass), c1, k1, c2, g, k2)
-    ends, impact = _ends(*(np.ascontiguousarray(row, dtype=np.float64) for row in rows))
+    rows = np.empty((7, depth.size))
+    for row, values in zip(rows, (depth, mass, c1, k1, c2, g, k2), strict=True):
+        row[:] = values
+    ends, impact = _ends(*rows)
     return CycleEnd(ends[0], ends[1], ends[2], impact)
 
 
