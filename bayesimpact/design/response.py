@@ -101,9 +101,8 @@ class Response:
     def linearised(self, theta: Array) -> tuple[Array, Array]:
         """The same and its derivatives (n, k) with respect to the `moving` parameters."""
         (part,) = self.likelihood.linearise(theta, self.steps)
-        jacobian = np.zeros((part.residual.size, theta.size))
-        jacobian[:, part.columns] = part.jacobian / self.sigma
-        return -part.residual / self.sigma, jacobian[:, self.moving]
+        jacobian = part.whole(theta.size)[:, self.moving]
+        return -part.residual / self.sigma, jacobian / self.sigma
 
     @cached_property
     def at_mean(self) -> tuple[Array, Array]:

@@ -99,8 +99,3 @@ def cycles(results: Results) -> list[Cycle]:
                 Cycle(r, k + 1, int(first), int(last), leave, float(total[last] - total[first]))
             )
     return found
-
-
-def telling_cycle(results: Results) -> Cycle | None:
-    """The cycle in which the extended model gains most; None where none gains."""
-    return max((c for c in cycles(results) if c.gain > 0), key=lambda c: c.gain, default=None)

@@ -202,10 +202,7 @@ def _wide(name: str, value: float, design: DrawnRig) -> Prior:
 
 def _basis(fit: Fit) -> Array:
     """Orthonormal basis (N, d) of everything that the base model can change."""
-    rows = [part.residual.size for part in fit.linearisation]
-    matrix = np.zeros((sum(rows), fit.mode.size))
-    for part, end in zip(fit.linearisation, np.cumsum(rows), strict=True):
-        matrix[end - part.residual.size : end, part.columns] = part.jacobian
+    matrix = np.vstack([part.whole(fit.mode.size) for part in fit.linearisation])
     used = np.linalg.norm(matrix, axis=0) > 0
     return np.linalg.qr(_unit(matrix[:, used]))[0]
 
