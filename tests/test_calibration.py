@@ -73,10 +73,8 @@ def test_verdicts_on_made_up_ranks() -> None:
 
 @pytest.mark.parametrize("model", MODELS)
 def test_ranks_of_a_model(model: str) -> None:
-    """Truths of other seeds, the same every time, and never absurdly far from their posterior."""
+    """Truths of other seeds, never absurdly far from their posterior."""
     found = [replicate(model, seed) for seed in range(4)]
-    again = replicate(model, 2)
-    assert again.names == found[2].names and np.array_equal(again.ranks, found[2].ranks)
     assert found[0].names[-1] == "log_likelihood"
     assert any("." in name for name in found[0].names) == (model != "base")
     errors = np.array([r.errors for r in found])
@@ -87,8 +85,12 @@ def test_ranks_of_a_model(model: str) -> None:
 
 
 def test_methods_agree() -> None:
-    """Weighted draws are the posterior, emcee's too; the normal approximation nearly so."""
-    ranks = {m: replicate("base", 5, m).ranks[:-1] for m in ("normal", "weighted", "emcee")}
+    """Weighted draws are the posterior, emcee's too; the normal approximation nearly so. One method
+    gives the same ranks every time.
+    """
+    whole = {m: replicate("base", 5, m).ranks for m in ("normal", "weighted", "emcee")}
+    assert np.array_equal(replicate("base", 5, "weighted").ranks, whole["weighted"])
+    ranks = {m: found[:-1] for m, found in whole.items()}
     # 400 draws at least: a share of them is known within 0.025
     assert np.max(np.abs(ranks["weighted"] - ranks["emcee"])) < 0.11
     assert np.max(np.abs(ranks["weighted"] - ranks["normal"])) < 0.3
@@ -109,10 +111,10 @@ def test_a_wrong_model_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_alarms_of_controls() -> None:
     settings = Settings(kinds=("control",), rig_kinds=("small",), noises=("white",))
-    rows = [alarm(settings, seed) for seed in range(3)]
+    rows = [alarm(settings, seed) for seed in range(2)]
     assert rows[1] == alarm(settings, 1)
     table = false_alarms(rows, np.random.default_rng(0))
-    assert table["controls"] == 3 and table["alarms"]["of"] == 3
+    assert table["controls"] == 2 and table["alarms"]["of"] == 2
     assert table["by_noise"]["white"]["hits"] == sum(r["alarm"] for r in rows)
     loud = [{**rows[0], "scan_p": 1e-4, "alarm": True, "seed": i} for i in range(40)]
     table = false_alarms(loud, np.random.default_rng(0))

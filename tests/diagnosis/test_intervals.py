@@ -86,7 +86,7 @@ def leaving_something() -> Diagnosis:
     return diagnose(campaign, rng=rng, effects=(BY_ID["coulomb_friction"],), search=False)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_force_of_time_of_the_chosen_model_is_built_once(monkeypatch) -> None:
     """Its intervals rest on the one that the search compared, which is not kept beyond that."""
     names = ("selection.ranked", "selection.remaining", "intervals", "loop")

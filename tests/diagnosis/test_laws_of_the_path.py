@@ -34,7 +34,7 @@ OTHERS = tuple(
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("cut", [0, pytest.param(37, marks=pytest.mark.long), 120])
+@pytest.mark.parametrize("cut", [0, 120])
 def test_a_memory_is_found_where_a_recording_was_cut(cut: int) -> None:
     """The state at the first sample is an unknown of every recording, at a release and later."""
     truth = {"stiffness": 120.0, "decay": 200.0}
@@ -78,8 +78,8 @@ def score(effect: Effect) -> Score:
     ("law", "numbers"),
     [
         (LOOP, {"stiffness": 8.0, "decay": 1 / 6e-3}),
-        pytest.param(DAHL, {"force": 3e-3, "displacement": 3e-4}, marks=pytest.mark.long),
-        pytest.param(LOOP, {"stiffness": 100.0, "decay": 2 / 6e-3}, marks=pytest.mark.long),
+        pytest.param(DAHL, {"force": 3e-3, "displacement": 3e-4}, marks=pytest.mark.slow),
+        pytest.param(LOOP, {"stiffness": 100.0, "decay": 2 / 6e-3}, marks=pytest.mark.slow),
         (DAHL, {"force": 0.05, "displacement": 3e-4}),
     ],
 )

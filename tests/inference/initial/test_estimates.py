@@ -53,7 +53,7 @@ def failures(found: Found) -> dict[str, int]:
 
 @pytest.fixture(scope="module")
 def many() -> Found:
-    return all_of([random_rig(seed) for seed in range(30)])
+    return all_of([random_rig(seed) for seed in range(20)])
 
 
 def paper_campaign(
