@@ -6,7 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from bayesimpact.formula.law import is_formula_id
+from bayesimpact.model.effects import EFFECTS
 from bayesimpact.report.diagnosis.words import title_of
+
+_INITIAL = {f"{e.id}.{p.name}" for e in EFFECTS for p in e.parameters if p.initial}
 
 
 def split(name: str) -> tuple[str, str, str]:
@@ -28,8 +31,13 @@ def in_words(name: str) -> str:
 
 
 def own_parameters(effect: Mapping[str, Any]) -> list[tuple[str, Mapping[str, Any]]]:
-    """Parameters of an effect of diagnosis.json; none of a fault, whose size is told as such."""
-    return [] if is_fault(effect) else list(effect.get("parameters", {}).items())
+    """Parameters of an effect of diagnosis.json that tell what it is: not its states at the start
+    of recordings. None of a fault, whose size is told as such.
+    """
+    if is_fault(effect):
+        return []
+    parameters = effect.get("parameters", {}).items()
+    return [(n, p) for n, p in parameters if n.partition("[")[0] not in _INITIAL]
 
 
 def of_recordings(effect: Mapping[str, Any]) -> str:

@@ -16,6 +16,7 @@ from bayesimpact.model.units import (
     display,
     number,
     p_value,
+    readable,
     reading,
     signed,
     significant,
@@ -92,8 +93,9 @@ def reference_labels(rows: tuple[Row, ...]) -> list[str]:
 
 def _view(row: Row, labels: list[str], shown: Digits) -> ParameterView:
     total_places = places(row.median * shown.scale, [end * shown.scale for end in row.total90])
-    ratio, ratio_low, ratio_high = row.ratio
-    ratio_places = places(ratio, (ratio_low, ratio_high))
+    over_mass = readable(row.ratio_unit, abs(row.ratio[0]))
+    ratio, *ends = (over_mass.scale * x for x in row.ratio)
+    ratio_places = places(ratio, ends)
     return ParameterView(
         symbol=own_symbol(row.name),
         meaning=written(_meaning(row)),
@@ -102,8 +104,8 @@ def _view(row: Row, labels: list[str], shown: Digits) -> ParameterView:
         interval=shown.interval(row.ci90),
         total=span(*row.total90, shown.scale, total_places),
         ratio=number(ratio, ratio_places) if row.ratio_unit else "",
-        ratio_interval=span(ratio_low, ratio_high, 1.0, ratio_places) if row.ratio_unit else "",
-        ratio_unit=typeset(row.ratio_unit),
+        ratio_interval=span(ends[0], ends[1], 1.0, ratio_places) if row.ratio_unit else "",
+        ratio_unit=typeset(over_mass.unit),
         references=tuple(_reference(row, label, shown) for label in labels),
         prior=row.prior,
     )

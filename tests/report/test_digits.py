@@ -86,3 +86,10 @@ def corner_title(results: Results) -> str:
     )
     assert isinstance(figure, Figure)
     return " ".join(axis.get_title(loc="left") for axis in figure.axes)
+
+
+def test_a_large_ratio_to_the_mass_is_written_with_a_power_of_ten() -> None:
+    row = replace(diagnosed().row("k1"), ratio=(3.423e8, 3.409e8, 3.436e8), ratio_unit="1/(m2 s2)")
+    (view,) = parameter_views(diagnosed(), (row,))
+    assert (view.ratio, view.ratio_interval) == ("3.423", "3.409 to 3.436")
+    assert view.ratio_unit.replace("\xa0", " ") == "× 10⁸ 1/(m² s²)"

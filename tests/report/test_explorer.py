@@ -188,6 +188,23 @@ def shown(tab: Tab) -> tuple[float, float]:
     return float(found[1]), float(found[2])
 
 
+def height_of_residuals(tab: Tab) -> float:
+    """Share of the second panel's height that its line takes."""
+    return tab.run("""(() => {
+        const c = document.querySelectorAll('#explore canvas')[1];
+        const p = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
+        const of = [[0, 114, 178], [194, 87, 10]].map(([r, g, b]) => {
+            const rows = [];
+            for (let i = 0; i < p.length; i += 4) {
+                const near = Math.abs(p[i] - r) + Math.abs(p[i + 1] - g) + Math.abs(p[i + 2] - b);
+                if (p[i + 3] > 200 && near < 30) rows.push(Math.floor(i / 4 / c.width));
+            }
+            return rows.length ? (rows[rows.length - 1] - rows[0]) / c.height : 0;
+        });
+        return Math.max(...of);
+    })()""")
+
+
 @pytest.mark.long
 def test_choose_zoom_and_switch_in_a_browser(tab: Tab, report: Path) -> None:
     results = compared()
@@ -208,8 +225,10 @@ def test_choose_zoom_and_switch_in_a_browser(tab: Tab, report: Path) -> None:
         "[...document.querySelectorAll('#explore .u-legend th')].map(e => e.textContent).join()"
     )
     assert "recorded \N{MINUS SIGN} with what was added" in tab.run(labels)
+    assert height_of_residuals(tab) > 0.4
     tab.run("document.querySelector('input[value=\"0\"]').click()")
     assert "recorded \N{MINUS SIGN} base model" in tab.run(labels)
+    assert height_of_residuals(tab) > 0.4
     choose = "(s => { s.value = '1'; s.dispatchEvent(new Event('change')); })"
     tab.run(f"{choose}({PART.format('recording')})")
     assert tab.run(PART.format("recording") + ".selectedOptions[0].textContent") == "run_1, case 2"

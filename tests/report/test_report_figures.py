@@ -14,6 +14,7 @@ from diagnosed import diagnosed, diagnosis_figures
 from matplotlib.figure import Figure
 from synthetic import make_results
 
+from bayesimpact.report.digits import Digits
 from bayesimpact.report.figures.backbone import backbone_figures, deviation
 from bayesimpact.report.figures.corner import NormalLaw, corner_figure
 from bayesimpact.report.figures.recordings import (
@@ -168,6 +169,9 @@ def test_corner_tells_the_numbers_it_is_given() -> None:
     after, _ = two_posteriors()
     figure = corner_figure(after, estimates={"k1": (808.5006, 808.496, 808.505)})
     assert "808.501 ± 0.005 N/m" in figure.axes[0].get_title(loc="left").replace("\xa0", " ")
+    coarse = {"k1": Digits(1.0, "N/m", 2)}  # as the widest of several intervals allows
+    figure = corner_figure(after, estimates={"k1": (808.5, 808.496, 808.504)}, shown=coarse)
+    assert "808.50 ± 0.004 N/m" in figure.axes[0].get_title(loc="left").replace("\xa0", " ")
 
 
 def test_corner_of_normal_laws_is_drawn_in_closed_form() -> None:

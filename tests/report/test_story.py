@@ -121,6 +121,18 @@ def test_parameters_stand_under_words_and_not_under_ids() -> None:
         assert "gap_wear" not in text and "gap wear" not in text
 
 
+def test_states_at_the_start_of_recordings_are_no_sizes() -> None:
+    own = {"force": estimate(2.2e-3, 2e-4, "N"), "start[r1]": estimate(0.0, 0.9, "-")}
+    friction = {
+        **DIAGNOSIS["effects"][0],  # type: ignore[dict-item, index]
+        "id": "presliding_friction",
+        "parameters": {f"presliding_friction.{name}": e for name, e in own.items()},
+    }
+    results = diagnosed(effects=[friction])
+    assert "force = 2.20 (2.00 to 2.40) mN" in told(results)["size"]
+    assert "start" not in told(results)["size"] and "start[r1]" not in page(results)[1].text
+
+
 def test_unknown_physics_is_not_given_a_name() -> None:
     story = told(diagnosed(verdict="unknown", effects=[]))
     assert "no effect of the catalogue" in story["physics"]

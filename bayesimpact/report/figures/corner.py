@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from bayesimpact.model.units import typeset
+from bayesimpact.model.units import number, typeset, without_zero
 from bayesimpact.report.digits import Digits, digits
 from bayesimpact.report.figures.clouds import LEVELS, Cloud, Law, NormalLaw, plotted
 from bayesimpact.report.figures.style import (
@@ -172,8 +172,9 @@ def _panel(
 def _title(axis: Axes, name: str, estimate: Estimate, shown: Digits) -> None:
     """Symbol, median and half of the 90 % interval above a marginal, into the empty corner."""
     median, low, high = estimate
-    half = shown.value(0.5 * (high - low))
-    text = f"{shown.value(median)} ± {half} {typeset(shown.unit)}"
+    half = 0.5 * (high - low) * shown.scale
+    around = number(half, without_zero(shown.places, half))
+    text = f"{shown.value(median)} ± {around} {typeset(shown.unit)}"
     axis.set_title(f"{full_symbol(name, _TITLE_COLUMNS)}\n{text}", loc="left", fontsize=8.5)
 
 

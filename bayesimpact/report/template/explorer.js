@@ -99,7 +99,7 @@
       motion.push(constant(r.level));
       lines.push(Object.assign({ label: "stop" }, gap));
     }
-    const limit = 1.05 * Math.max(reach(data.residuals), 2.2 * r.noise);
+    const limit = 1.05 * Math.max(reach([data.residuals[k]]), 2.2 * r.noise);
     const band = Object.assign({}, gap, { stroke: colours.band });
     const panels = [
       [options(word + " (" + unit + ")", 230, digits(reach([data.samples])), lines), motion],

@@ -16,6 +16,8 @@ from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.faults import compare
 from bayesimpact.diagnosis.faults.alone import SharedModel, fit_alone
 from bayesimpact.diagnosis.faults.compare import Compared, base_failed, compare_recordings
+from bayesimpact.diagnosis.faults.correct import _words
+from bayesimpact.diagnosis.faults.together import Hypothesis, Weighed
 from bayesimpact.inference.identify import identify
 from bayesimpact.trial.bundle import PAPER_RIG, paper_releases
 from bayesimpact.trial.rig.measuring_chain import MeasuringChain
@@ -189,3 +191,10 @@ def test_which_recordings_the_other_sign_is_tried_of_first(
     density = SimpleNamespace(likelihood=SimpleNamespace(noise=noise, sizes=sizes))
     fit = SimpleNamespace(sums=40.0 * np.array(together), density=density)
     assert compare._doubted(campaign, alone, fit) == (first, others)
+
+
+def test_a_difference_has_the_digits_of_its_error() -> None:
+    gain = Weighed(Hypothesis("recording_gain", 0), 0.0, value=np.log(1.0199), sd=1.5e-4)
+    clock = Weighed(Hypothesis("recording_clock", 0), 0.0, value=np.log(0.998), sd=6.1e-6)
+    assert "+1.990 % ± 0.015 % off" in _words(gain)[0]
+    assert "\N{MINUS SIGN}0.20000 % ± 0.00061 % off" in _words(clock)[0]
