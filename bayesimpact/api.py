@@ -10,38 +10,20 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.diagnosis import loop
-from bayesimpact.errors import InputError
 from bayesimpact.found import Diagnosis, Identification, Posterior
 from bayesimpact.inference import identify as identification
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.inference.progress import compilation_shown, progress_bar, refit_bar
+from bayesimpact.inference.randomness import Random, generator
 from bayesimpact.inference.search import Generation
 
 if TYPE_CHECKING:
     from bayesimpact.model.effects import Effect
     from bayesimpact.report.results import Results
-
-Random = int | np.random.Generator | None
-
-
-def generator(seed: int | None, rng: Random) -> np.random.Generator:
-    """The random generator of `seed=` or `rng=`; InputError when both are given."""
-    if seed is not None and rng is not None:
-        raise InputError("seed and rng", "both", "one of the two")
-    if isinstance(rng, np.random.Generator):
-        return rng
-    chosen = rng if rng is not None else seed if seed is not None else 0
-    if isinstance(chosen, bool) or not isinstance(chosen, (int, np.integer)) or chosen < 0:
-        raise InputError(
-            "seed" if rng is None else "rng", repr(chosen), "an integer from 0, or a generator"
-        )
-    return np.random.default_rng(int(chosen))
 
 
 def fit(
@@ -118,7 +100,8 @@ def sample(
 
     mode = found.after if isinstance(found, loop.Diagnosis) else found
     mode = mode.fit if isinstance(mode, identification.Identification) else mode
-    number = int(generator(seed, rng).integers(2**31)) if rng is not None else seed or 0
+    source = generator(seed, rng)
+    number = seed or 0 if rng is None else int(source.integers(2**31))
     place = None if folder is None else Path(folder)
     with compilation_shown(progress), progress_bar(progress) as callback:
         drawn = posterior.sample(

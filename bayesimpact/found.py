@@ -17,6 +17,7 @@ from bayesimpact.diagnosis.intervals import Intervals, intervals
 from bayesimpact.diagnosis.residual_force.learned import LEARNED
 from bayesimpact.errors import InputError
 from bayesimpact.inference import identify, posterior
+from bayesimpact.inference.randomness import Random
 from bayesimpact.model.units import readable
 
 if TYPE_CHECKING:
@@ -149,10 +150,12 @@ class Diagnosis(_Shown, loop.Diagnosis):
         before = None if self.before is self.after else self.before
         return normal_corner(self.after, before)
 
-    def to_arviz(self, *, lab_units: bool = False, seed: int = 0) -> Any:
+    def to_arviz(
+        self, *, lab_units: bool = False, seed: int | None = None, rng: Random = None
+    ) -> Any:
         """Draws of the normal law at the extended model's mode, as `Identification.to_arviz`."""
         extended = replace(self.identification, fit=self.after)
-        return extended.to_arviz(lab_units=lab_units, seed=seed)
+        return extended.to_arviz(lab_units=lab_units, seed=seed, rng=rng)
 
     def _repr_html_(self) -> str:
         """Effects with their probabilities, and parameters before and after as in the report."""

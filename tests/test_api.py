@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import bayesimpact as bi
-from bayesimpact.api import generator
 from bayesimpact.errors import InputError
+from bayesimpact.inference.randomness import generator
 
 
 def test_version() -> None:

@@ -15,7 +15,7 @@ from effect_rigs import BY_ID
 
 import bayesimpact as bi
 from bayesimpact import errors as bi_errors
-from bayesimpact.data.html import html_table, resolved
+from bayesimpact.data.html import HEIGHT, html_table, resolved, sketch
 from bayesimpact.data.short_repr import short_repr
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.loop import Diagnosis
@@ -58,8 +58,23 @@ def test_a_figure_shows_itself(found: Diagnosis) -> None:
 def test_a_campaign_lists_its_recordings(found: Diagnosis) -> None:
     campaign = found.before.density.oscillator.campaign
     shown = cells(campaign._repr_html_())
-    assert [r.name for r in campaign.recordings] == shown[::6]
+    assert [r.name for r in campaign.recordings] == shown[::7]
     assert shown[2] == str(campaign.recordings[0].samples.size) and shown[3] == "1000"
+
+
+def test_readings_are_sketched_from_the_lowest_to_the_highest() -> None:
+    """Of every column of pixels; what is not there is left out."""
+    samples = np.zeros(160 * 5)
+    samples[3], samples[-1], samples[400:405] = 2.0, -1.0, np.nan
+    root = ET.fromstring(sketch(samples))
+    lines = root[0].attrib["d"].split("M")[1:]
+    assert len(lines) == 159 and not any(line.startswith("80.5,") for line in lines)
+    high, low = HEIGHT - 1, 1 + (HEIGHT - 2) * 2 / 3
+    assert lines[0] == f"0.5,1.0v{low - 1:.1f}" and lines[1] == f"1.5,{low:.1f}v1.0"
+    assert lines[-1] == f"159.5,{low:.1f}v{high - low:.1f}"
+    assert len(ET.fromstring(sketch(np.full(7, 3.0)))[0].attrib["d"].split("M")) == 8
+    table = html_table("", ["a"], [("<b>",), (sketch(samples),)])
+    assert "&lt;b&gt;" in table and table.count("<svg") == 1
 
 
 def test_a_fit_shows_what_recordings_share(found: Diagnosis) -> None:

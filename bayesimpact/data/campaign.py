@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from bayesimpact.data.frozen import Picklable
-from bayesimpact.data.html import html_table
+from bayesimpact.data.html import html_table, sketch
 from bayesimpact.data.recording import Recording
 
 SECOND_STOP = "opposite_stop"
@@ -120,11 +120,12 @@ class Campaign(Picklable):
 
     def _repr_html_(self) -> str:
         """Its recordings, for a notebook."""
-        columns = ("recording", "case", "samples", "rate, Hz", "duration, s", "quantity")
+        columns = ("recording", "case", "samples", "rate, Hz", "duration, s", "quantity", "")
         rows = [
-            (r.name, r.case, r.samples.size, 1.0 / r.interval, r.duration, r.quantity)
+            (r.name, r.case, r.samples.size, 1.0 / r.interval, r.duration, r.quantity,
+             sketch(r.samples))
             for r in self.recordings
-        ]
+        ]  # fmt: skip
         return html_table(f"{self.name}: {self.mass:g} kg", columns, rows)
 
     @property

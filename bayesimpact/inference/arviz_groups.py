@@ -128,14 +128,14 @@ def arviz_groups(fit: Fit, draws: ArvizDraws, *, lab_units: bool = False) -> dic
     return datasets(groups, coords | times, model | dict(draws.attrs))
 
 
-def laplace_draws(fit: Fit, *, seed: int = 0, chains: int = 4, draws: int = 250) -> ArvizDraws:
+def laplace_draws(
+    fit: Fit, rng: np.random.Generator, *, chains: int = 4, draws: int = 250
+) -> ArvizDraws:
     """Independent draws of the Laplace approximation, kept inside the parameters' bounds."""
     parameters = fit.density.oscillator.layout.parameters
-    rng = np.random.default_rng(seed)
     drawn = fit.draws(rng, chains * draws).reshape(chains, draws, -1)
     bounds = np.array([(p.lower, p.upper) for p in parameters]).T
-    attrs = {"seed": seed, "approximation": "Laplace, at the mode"}
-    return ArvizDraws(np.clip(drawn, *bounds), attrs=attrs)
+    return ArvizDraws(np.clip(drawn, *bounds), attrs={"approximation": "Laplace, at the mode"})
 
 
 def pack_parameters(

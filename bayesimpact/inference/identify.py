@@ -33,6 +33,7 @@ from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.inference.nuisances import nuisance_step
 from bayesimpact.inference.onsets import without_onsets
 from bayesimpact.inference.priors import Priors
+from bayesimpact.inference.randomness import Random, generator
 from bayesimpact.inference.search import Generation, SearchResult, metropolis_differential_evolution
 from bayesimpact.model.exact.sensitivities.derivatives import grams
 from bayesimpact.model.exact.simulate import sums_of_squares
@@ -85,14 +86,15 @@ class Identification:
         """True when guess and search ended within 0.1 standard deviations of each other."""
         return self.from_search is None or is_same_mode(self.from_search, self.from_guess)
 
-    def to_arviz(self, *, lab_units: bool = False, seed: int = 0) -> Any:
+    def to_arviz(
+        self, *, lab_units: bool = False, seed: int | None = None, rng: Random = None
+    ) -> Any:
         """Draws of the Laplace approximation at the mode, as ArviZ takes them; nothing is sampled.
 
         Groups and units as of `Posterior.to_arviz`, without sample_stats and predictions.
         """
-        return as_arviz(
-            arviz_groups(self.fit, laplace_draws(self.fit, seed=seed), lab_units=lab_units)
-        )
+        draws = laplace_draws(self.fit, generator(seed, rng))
+        return as_arviz(arviz_groups(self.fit, draws, lab_units=lab_units))
 
 
 @linear_algebra_alone()

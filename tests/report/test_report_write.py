@@ -214,6 +214,9 @@ def test_a_fit_for_arviz(identification: Identification) -> None:
     assert k1.std() == pytest.approx(fit.sd[at], rel=0.1)
     sigma = data["posterior"]["sigma"].values
     assert (sigma > 0).all() and np.array_equal(k1, identification.to_arviz()["posterior"]["k1"])
+    seeded, drawn = identification.to_arviz(seed=1), identification.to_arviz(rng=1)
+    assert np.array_equal(seeded["posterior"]["k1"], drawn["posterior"]["k1"])
+    assert not np.array_equal(k1, seeded["posterior"]["k1"])
 
 
 def test_backbones_of_a_model_that_fits(posterior: Posterior) -> None:
