@@ -9,6 +9,8 @@ from scipy import integrate, stats
 from bayesimpact.fleet.population import population
 from bayesimpact.fleet.trend import FALSE_ALARM, Trend, find_trend
 
+pytestmark = pytest.mark.long
+
 NAMES = ("g", "date")
 GAP, ERROR = 1.1e-3, 2e-6
 

@@ -19,6 +19,8 @@ from bayesimpact.response.driven_displacement import (
     without_base,
 )
 
+pytestmark = pytest.mark.long
+
 QUANTITIES = ("displacement", "velocity", "acceleration")
 
 

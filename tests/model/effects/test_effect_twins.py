@@ -24,7 +24,6 @@ OTHERS = {
     "overdamped stop": TestRig(c2=200.0, duration=1.0),
     "starts in contact": TestRig(y0=(2.5e-3, 3e-3), v0=(0.1, -0.2), duration=1.0),
 }  # fmt: skip
-QUICK = ("paper, long", "stiff")  # on every Python
 COMBINATIONS = (
     ("coulomb_friction", "obstacle_mass"),
     ("coulomb_friction", "quadratic_drag"),
@@ -72,9 +71,8 @@ def test_naive_twin(effect):
         assert np.abs(ours - moved([], {}, PAPER)).max() > 1e3 * TOLERANCE
 
 
-@pytest.mark.parametrize(
-    "name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.long) for n in OTHERS]
-)
+@pytest.mark.long
+@pytest.mark.parametrize("name", OTHERS)
 @pytest.mark.parametrize("effect", MOVING, ids=lambda e: e.id)
 def test_independent_rig(effect, name):
     rig = OTHERS[name]
@@ -84,6 +82,7 @@ def test_independent_rig(effect, name):
         assert np.abs(difference).max() < max(TOLERANCE, RELATIVE * abs(rig.y0[r]))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("names", COMBINATIONS, ids="+".join)
 def test_combinations(names):
     for rig in (OTHERS["paper, long"], SLOW):

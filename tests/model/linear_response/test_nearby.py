@@ -19,6 +19,8 @@ from bayesimpact.model.effects.effect import Effect
 from bayesimpact.model.linear_response import nearby
 from bayesimpact.model.oscillator import Oscillator, build_oscillator
 
+pytestmark = pytest.mark.long
+
 MASS, STIFFNESS, KNOTS = 1.0, 190e3, 24
 BY_ID = {e.id: e for e in EFFECTS}
 VALUES = {
