@@ -69,8 +69,9 @@ def directions(fit: Fit, effects: Iterable[Effect], scales: Scales) -> tuple[Dir
             continue
         if not effect.admissible(scales):
             continue
+        steps = dict[str, float]()
         for shapes in shape_points(effect, scales):
-            direction = _direction(fit, effect, scales, shapes)
+            direction = _direction(fit, effect, scales, shapes, steps)
             if direction is not None:
                 found.append(direction)
     return tuple(found)
@@ -150,8 +151,11 @@ def size_steps(
 
 
 def _direction(
-    fit: Fit, effect: Effect, scales: Scales, shapes: Mapping[str, float]
+    fit: Fit, effect: Effect, scales: Scales, shapes: Mapping[str, float], steps: dict[str, float]
 ) -> Direction | None:
+    """A direction, None where a size changes nothing; `steps` are the sizes' last difference steps,
+    from which those at the next shape begin.
+    """
     effects = (*fit.density.oscillator.effects, effect)
     density = extend(fit, effects, scales)
     layout = density.oscillator.layout
@@ -164,10 +168,13 @@ def _direction(
     base = whitened(fit, density.oscillator.predict(theta))
     columns = []
     for name, parameter in sizes:
-        response = _response(fit, density, theta, base, layout.index(name), parameter, scales)
+        first = steps.get(name, FIRST_STEP * parameter.scale(scales))
+        ends = (first, parameter.scale(scales))
+        response = _response(fit, density, theta, base, layout.index(name), ends)
         if response is None:
             return None
-        columns.append(response)
+        columns.append(response[0])
+        steps[name] = response[1]
     parts = tuple(np.stack(part, axis=1) for part in zip(*columns, strict=True))
     names = tuple(name for name, _ in sizes)
     replaces = replaced_slot(effect, sizes[0][1]) is not None
@@ -181,11 +188,12 @@ def _response(
     theta: Array,
     base: tuple[Array, ...],
     index: int,
-    parameter: EffectParameter,
-    scales: Scales,
-) -> tuple[Array, ...] | None:
-    """Whitened change per unit of parameter `index`; None when it changes nothing."""
-    step, seen = FIRST_STEP * parameter.scale(scales), None
+    steps: tuple[float, float],
+) -> tuple[tuple[Array, ...], float] | None:
+    """Whitened change per unit of parameter `index`, and the difference step that showed it, of
+    `steps`, the first and the largest one; None when it changes nothing.
+    """
+    (step, largest), found = steps, None
     for _ in range(4):
         moved = theta.copy()
         moved[index] += step
@@ -196,12 +204,12 @@ def _response(
         if not np.isfinite(norm):
             return None
         if norm < INVISIBLE:  # such as a lag far below the sampling interval
-            if seen is not None or step == parameter.scale(scales):
+            if found is not None or step == largest:
                 break
-            step = parameter.scale(scales)
+            step = largest
             continue
-        seen = tuple(c / step for c in change)
+        found = tuple(c / step for c in change), step
         if 0.1 * CHANGE < norm < 10 * CHANGE:
             break
-        step = min(step * CHANGE / norm, parameter.scale(scales))
-    return seen
+        step = min(step * CHANGE / norm, largest)
+    return found
