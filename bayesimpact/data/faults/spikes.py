@@ -9,6 +9,7 @@ import numpy as np
 
 from bayesimpact.data.faults.bursts import Spike, find_bursts
 from bayesimpact.data.faults.dropouts import find_dropouts
+from bayesimpact.data.faults.ends import unpredicted_ends
 from bayesimpact.data.faults.fault import (
     Array,
     Fault,
@@ -46,7 +47,8 @@ def find_spikes(recording: Recording) -> list[Fault]:
 
 
 def lone_spikes(recording: Recording, *, contacts: bool = True) -> list[Fault]:
-    """Up to five samples in a row far off what both sides predict alike; impacts are none.
+    """Up to five samples in a row far off what both sides predict alike, or a few at an end far off
+    what the one side there predicts (`ends`); impacts are none.
 
     A brief contact is a spike of the acceleration away from the stop, and the flight between two of
     them one towards it, back to what flights have: such ones do not count, as long as there may be
@@ -75,6 +77,10 @@ def _unpredicted(recording: Recording, contacts: bool = True) -> list[Spike]:
     for strength, size, (first, end) in sorted(found, reverse=True):
         if all(end + 1 < one.span[0] or first > one.span[1] + 1 for one in chosen):
             chosen.append(Spike((first, end), size, strength, least))
+    inside = tuple(chosen)
+    for one in unpredicted_ends(x):
+        if all(one.span[1] < other.span[0] or one.span[0] > other.span[1] for other in inside):
+            chosen.append(one)
     count = sum(one.span[1] - one.span[0] for one in chosen)
     return chosen if count <= max(MOST * x.size, LONGEST) else []
 
