@@ -4,8 +4,9 @@ About its rest a spring is left for as long on one side as on the other. An obst
 turns the mass back sooner: deep in it the mass swings at sqrt((k1 + k2) / m) instead of
 sqrt(k1 / m), so the half cycle on its side lasts r = sqrt(k1 / (k1 + k2)) of the other. That holds
 for displacements and accelerations. A velocity is as long positive as negative, whatever is hit.
-Rest is taken for the median of whole cycles in the second half. Where the obstacle is hit there as
-well, that is not rest but what halves the time, and about half of the difference is left.
+Rest is taken for the median over time of whole cycles in the second half: of the readings
+themselves hardly any lie near rest, through which the motion is fastest. Where the obstacle is hit
+there as well, that is not rest but what halves the time, and about half of the difference is left.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from numpy.typing import NDArray
 CYCLES = 3
 """At the beginning of a recording, where swings are largest; so many one by one alike are no
 chance of noise, nor of a hand that lets go."""
+
+BETWEEN = 16  # places on a line from one reading to the next
 
 
 def shortened(samples: NDArray[np.float64]) -> float | None:
@@ -30,13 +33,13 @@ def shortened(samples: NDArray[np.float64]) -> float | None:
     x = samples[np.isfinite(samples)]
     if x.size < 3 or x.max() == x.min():
         return None
-    rough = _crossings(x, float(np.median(x[x.size // 2 :])))
+    rough = _crossings(x, _median_over_time(x, x.size // 2, x.size - 1))
     if rough.size < 2 * CYCLES + 1:
         return None
     # a part of a cycle draws the median to its side
     late = rough[rough >= x.size / 2.0]
     whole = late[: 2 * ((late.size - 1) // 2) + 1] if late.size > 2 else rough[: 2 * CYCLES + 1]
-    halves = np.diff(_crossings(x, float(np.median(x[int(whole[0]) : int(whole[-1])]))))
+    halves = np.diff(_crossings(x, _median_over_time(x, whole[0], whole[-1])))
     if halves.size < 2 * CYCLES:
         return None
     first, second = halves[: 2 * CYCLES].reshape(CYCLES, 2).T
@@ -44,6 +47,14 @@ def shortened(samples: NDArray[np.float64]) -> float | None:
     if abs(np.sign(difference).sum()) < CYCLES:
         return 0.0
     return float(np.min(np.abs(difference) / np.maximum(first, second)))
+
+
+def _median_over_time(x: NDArray[np.float64], first: float, last: float) -> float:
+    """What readings (n,) with lines between them are above for as long as below, from one place, in
+    samples, to another.
+    """
+    place = np.linspace(first, last, BETWEEN * int(np.ceil(last - first)) + 1)
+    return float(np.median(np.interp(place, np.arange(x.size), x)))
 
 
 def _crossings(x: NDArray[np.float64], rest: float) -> NDArray[np.float64]:
