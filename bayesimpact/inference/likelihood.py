@@ -330,7 +330,7 @@ def _with_gain(
 
     The rest reading is added behind the gain.
     """
-    offset = layout.slots(theta)[r, _OFFSET]
+    offset = layout.offsets(r, theta)
     motion = rows[0] - offset
     scaled = rows * theta[gain]
     scaled[0] = motion * theta[gain] + offset

@@ -194,7 +194,7 @@ class Oscillator:
 
         What moves as the first one does, and differs in the measurement alone, is simulated once.
         """
-        q = self.layout.slots(theta)[:, r]
+        q = self.layout.slots_of(r, theta)
         other = (np.delete(q, _OFFSET, axis=1) != np.delete(q[0], _OFFSET)).any(axis=1)
         simulated = np.concatenate([[0], np.flatnonzero(other)])
         motions = self.motions_of(np.full(simulated.size, r), q[simulated])
@@ -204,7 +204,7 @@ class Oscillator:
         """Readings of recording `r`, (B, n), for parameter vectors (B, d), of a motion that begins
         anew where `restarts` (m, 3) say, see `integrate_many`.
         """
-        q = np.ascontiguousarray(self.layout.slots(theta)[:, r])
+        q = self.layout.slots_of(r, theta)
         rows = np.full(q.shape[0], r)
         motions = general_motions(
             q, self.campaign.mass, self.counts[rows], self.intervals[rows], self.laws,
@@ -222,7 +222,7 @@ class Oscillator:
         if self.gains[r] >= 0:
             motion = motion * theta[:, self.gains[r], None]
         times = np.arange(motion.shape[1]) * self.intervals[r]
-        reading = motion + self.layout.slots(theta)[:, r, _OFFSET, None]
+        reading = motion + self.layout.offsets(r, theta)[:, None]
         for effect, positions in self.sensors:
             assert effect.observe is not None
             reading += effect.observe(motion, times, theta[:, positions[r]]) - motion

@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -33,6 +34,7 @@ ADDED_SLOTS = (
     "frame_ratio", "frame_frequency", "frame_damping", "adhesion", "restitution",
 )  # fmt: skip
 SLOTS = BASE_SLOTS + ADDED_SLOTS
+_OFFSET = SLOTS.index("offset")
 WITHOUT = {"restitution": 1.0}
 """Values of added slots that nothing feeds, where that is not 0."""
 
@@ -72,7 +74,7 @@ class Layout:
 
     __repr__ = short_repr
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the elements of theta."""
         return tuple(p.name for p in self.parameters)
@@ -99,6 +101,17 @@ class Layout:
         """Slot vectors (..., R, Q) of parameter vectors (..., d)."""
         values: NDArray[np.float64] = theta[..., np.maximum(self.columns, 0)]
         return np.where(self.columns >= 0, values, self.constants)
+
+    def slots_of(self, r: int, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Slot vectors (..., Q) of recording `r`, contiguous."""
+        own = self.columns[r]
+        values = np.where(own >= 0, theta[..., np.maximum(own, 0)], self.constants[r])
+        return np.ascontiguousarray(values)
+
+    def offsets(self, r: int, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Rest offset (...) of recording `r`."""
+        own, constant = self.columns[r, _OFFSET], self.constants[r, _OFFSET]
+        return theta[..., own] if own >= 0 else np.full(theta.shape[:-1], constant)
 
 
 def declared_effects(campaign: Campaign) -> tuple[Effect, ...]:

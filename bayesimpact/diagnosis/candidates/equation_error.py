@@ -234,7 +234,7 @@ def term_at(
 def _added(density: PosteriorDensity, effect: Effect, r: int, path: Path, points: Array) -> Array:
     """What an effect adds to the left-hand side, integrated, for parameters (K, d): (K, n)."""
     o = density.oscillator
-    q = np.ascontiguousarray(o.layout.slots(points)[:, r])
+    q = o.layout.slots_of(r, points)
     force = np.zeros((q.shape[0], path.y.size))
     for law in o.laws:
         add_forces(law, path.y, path.v, path.d, path.t, q, np.arange(q.shape[0]), force)

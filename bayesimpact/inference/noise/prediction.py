@@ -39,7 +39,10 @@ def _of_neighbours(x: Array, correlation: float) -> Array:
     """Of one process, every sample of which is predicted by the one before it."""
     white = np.empty_like(x)
     white[..., 0] = x[..., 0]
-    white[..., 1:] = (x[..., 1:] - correlation * x[..., :-1]) / np.sqrt(1.0 - correlation**2)
+    later = white[..., 1:]
+    np.multiply(x[..., :-1], -correlation, out=later)
+    later += x[..., 1:]
+    later /= np.sqrt(1.0 - correlation**2)
     return white
 
 

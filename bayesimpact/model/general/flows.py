@@ -57,7 +57,13 @@ from bayesimpact.model.general.resonator import (
     share_of_frame,
 )
 from bayesimpact.model.general.second_mode import listens
-from bayesimpact.model.general.step import added_force
+from bayesimpact.model.general.turning import (
+    STIFF,
+    graded,
+    pull_at,
+    rooted_damping,
+    sum_of_laws,
+)
 from bayesimpact.model.jit.compiled import inner
 
 MAX_ANGLE = 0.125  # longest step times natural frequency, rad
@@ -78,13 +84,7 @@ RAMP = 0.3  # first step of a contact over the time constant of a law's state
 # where a force is not smooth at impact: shortest step over the longest; then, for times in units
 # of the longest step, step over the 3/4th power of the time since the impact, or to the release
 FIRST, SINCE, UNTIL = 1.0 / 80.0, 0.46, 0.27
-# the same where it is not smooth at a turning point; not much longer there than the time itself
-SINCE_TURN, UNTIL_TURN, MOST_SINCE, MOST_UNTIL = 0.8, 0.46, 1.0, 0.5
 ENDS_ON_TURNS = KINK_AT_TURN | JUMP_AT_TURN
-# a mass that creeps under a root of its speed: longest step times the rate at which its speed
-# settles, by the difference of the force over that share of the speed (of a mass nearly AT_REST,
-# m/s, over that). Beyond it that damping is counted into the flow, until it has CHANGED by a share
-STIFF, NEARBY, AT_REST, CHANGED = 1.5, 1.0 / 16.0, 1e-11, 0.25
 # a force without features admits longer steps the weaker it is: share of the linear force at which
 # they are the usual ones, and by how much they are shortened and lengthened at most
 SLIGHT, LEAST_LENGTHENING, MOST_LENGTHENING = 0.07, 0.4, 3.2
@@ -322,77 +322,6 @@ def stride_of(longest: Any, w: Any) -> Any:
 def not_beyond(left: Any, h: Any, w: Any) -> Any:
     """A step of length h, ended on the next sample, `left` away, where the input has its kink."""
     return (left, True) if w.driven and h >= left else (h, False)
-
-
-@inner()
-def sum_of_laws(y: Any, v: Any, t: Any, count: Any, rooted: Any, w: Any) -> Any:
-    """Force of the laws that act, or of those that are not smooth where the motion turns, N."""
-    total, touching = 0.0, 1.0 if w.s[MODE] == TOUCHING else 0.0
-    for k in range(count):
-        law = w.acting[k]
-        if not rooted or w.laws[LAW_COLUMNS * law + LAW_TURN] != 0:
-            z = w.work[WORK_COLUMNS * law + NOW]
-            total += law_value(law, LAW_FORCE, y, v, t, z, w.s[GAP], touching, w)
-    return total
-
-
-@inner(forceinline=True)
-def small_change(v: Any) -> Any:
-    """Of a speed, for a difference of forces, m/s."""
-    return NEARBY * v if abs(v) > AT_REST else AT_REST
-
-
-@inner()
-def rooted_damping(y: Any, v: Any, t: Any, count: Any, w: Any) -> Any:
-    """Damping at this speed of the laws that are not smooth where the motion turns, N s/m; 0 where
-    they drive the motion.
-    """
-    change = small_change(v)
-    faster = sum_of_laws(y, v + change, t, count, True, w)
-    return max(0.0, (faster - sum_of_laws(y, v, t, count, True, w)) / change)
-
-
-@inner(forceinline=True)
-def graded(v: Any, pull: Any, longest: Any, first_at_turn: Any) -> Any:
-    """Longest step near a turning point at which a force is not smooth.
-
-    `pull` is minus the acceleration: v / pull is the time since the turning point, or minus that to
-    the next.
-    """
-    if pull == 0.0:
-        return longest
-    away = abs(v / (pull * longest))
-    root = np.sqrt(away)
-    share, most = (SINCE_TURN, MOST_SINCE) if v * pull < 0.0 else (UNTIL_TURN, MOST_UNTIL)
-    return longest * min(1.0, max(first_at_turn, min(share * root * np.sqrt(root), most * away)))
-
-
-@inner(forceinline=True)
-def settling_rate(y: Any, v: Any, t: Any, n0: Any, flow: Any, w: Any) -> Any:
-    """Rate at which the forces that the flow leaves out make the speed settle, or drive it, 1/s."""
-    if flow.first_at_turn >= 1.0 or flow.placed:
-        return 0.0
-    change = small_change(v)
-    return abs(flow.inverse * (n0 - added_force(y, v + change, t, NOW, flow, w)) / change)
-
-
-@inner(forceinline=True)
-def is_outdated(rate: Any, y: Any, v: Any, n0: Any, longest: Any, flow: Any) -> Any:
-    """Whether a mass creeps that the flow lets swing, or its damping is no longer the flow's."""
-    if not flow.folds:
-        return False
-    if flow.drag > 0.0:
-        return rate > CHANGED * flow.inverse * flow.drag
-    return (
-        rate * longest > STIFF
-        and rate * graded(v, pull_at(y, v, n0, flow), longest, flow.first_at_turn) > 2.0 * STIFF
-    )
-
-
-@inner(forceinline=True)
-def pull_at(y: Any, v: Any, n0: Any, flow: Any) -> Any:
-    """Minus the acceleration, m/s2; n0 is `added_force`."""
-    return 2.0 * flow.b * v + flow.K * (y - flow.rest) - flow.inverse * n0
 
 
 @inner(forceinline=True)

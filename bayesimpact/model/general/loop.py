@@ -4,7 +4,8 @@ Between two events the motion runs in steps that span as many samples as the acc
 part of one. An event (contact onset or end, turning point, surface of a law) ends a step; it is
 located on the integrator's own trajectory, so that the state there is as accurate as anywhere. The
 parts: `general.context` (arrays, laws), `general.flows` (between events), `general.step` and
-`general.method` (how), `general.crossing` (when), `general.contact_state` (what then),
+`general.method` (how), `general.turning` (where a force has a root of the speed),
+`general.crossing` (when), `general.contact_state` (what then),
 `general.memory`, `general.stiction`, `general.dense`, `general.second_mode`, `general.resonator`.
 """
 
@@ -56,9 +57,7 @@ from bayesimpact.model.general.flows import (
     RENEWED,
     first_step,
     flow_from,
-    is_outdated,
     next_step,
-    settling_rate,
     stride_of,
 )
 from bayesimpact.model.general.memory import keep_memory, relax
@@ -67,6 +66,7 @@ from bayesimpact.model.general.resonator import ROWS
 from bayesimpact.model.general.second_mode import added_reading, listens, respond
 from bayesimpact.model.general.step import added_force, step
 from bayesimpact.model.general.stiction import stick
+from bayesimpact.model.general.turning import is_outdated, settling_rate
 from bayesimpact.model.jit.callback import floats_at, integers_at
 from bayesimpact.model.jit.compiled import compiled, inner, typed
 from bayesimpact.model.jit.threads import in_shares

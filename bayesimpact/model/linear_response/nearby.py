@@ -46,7 +46,7 @@ def readings_near(oscillator: Oscillator, r: int, theta: Array, error: float) ->
 
     error : root of the sum of squares by which a motion may be wrong, in the recording's unit
     """
-    q = oscillator.layout.slots(theta)[:, r]
+    q = oscillator.layout.slots_of(r, theta)
     q[:, _OFFSET] = 0.0
     superposable = _apart_by_forces(q, oscillator.laws)
     if superposable.size < PAYS or oscillator.campaign.stop:
