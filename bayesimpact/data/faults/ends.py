@@ -4,6 +4,10 @@ A spike is told by both sides (`spikes`); the first and the last readings have o
 predicts of them is off by as much wherever the motion has a corner, so that a reading at an end has
 to be off by far more than any between the ends is, and those next to it must not be: a motion that
 begins with a blow, or with a mode that dies out, is off for longer.
+
+Of drawn decays 0 of 3,000 had such an end, with a fast mode beside it 5 of 3,000, with impacts 0 of
+1,600, with quadratic drag and time stamps that jitter 0 of 150. Of single readings that were 12, 20
+and 40 deviations of the noise off, 22, 59 and 87 % were found.
 """
 
 from __future__ import annotations
@@ -17,10 +21,10 @@ from bayesimpact.data.faults.local import best_form, predict_sides, robust_sd, r
 from bayesimpact.data.period import crossing_period
 
 REACH = 3  # readings at an end
-FARTHER = 2.0
-"""Times the farthest one between the ends: a decay's first corner is its largest. Of drawn decays 0
-of 3,000 had such an end, with a fast mode beside it 11 of 3,000, with impacts 0 of 1,600; of single
-readings 12, 20 and 40 deviations of the noise off, 44, 70 and 90 % were found."""
+USUAL = 97.0  # percentile of such deviations that the motion alone may reach
+BEYOND = 4.0  # times that percentile
+NEAR = 24  # readings beside an end, where what begins there and dies out is
+FARTHER = 2.0  # times the farthest of those
 
 
 def unpredicted_ends(x: Array) -> list[Spike]:
@@ -63,6 +67,8 @@ def _off(
         return 0.0, 0.0
     step = last_digit(x)
     rounded = 0.5 * step + rounding_error(form, gap - 1.0, step)
-    limit = max(least * level, FARTHER * float(np.nanmax(np.abs(between))), rounded)
+    usual = float(np.nanpercentile(np.abs(between), USUAL))
+    near = float(np.nanmax(np.abs(between[:NEAR])))
+    limit = max(least * level, BEYOND * usual, FARTHER * near, rounded)
     size = float(deviation[place])
     return (size, abs(size) / level) if abs(size) > limit else (0.0, 0.0)
