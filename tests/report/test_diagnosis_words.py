@@ -113,6 +113,15 @@ def test_slow_noise_is_said_where_a_model_s_residual_showed_it():
     assert "60 % AR(1), correlation 0.96, 40 % white" in said
 
 
+def test_noise_that_grows_is_said_where_a_model_s_residual_showed_it():
+    """What windows of the recordings tell beforehand is no surprise of the model's."""
+    assert noise_words(Noise(level=2e-3, growth=(0.0, 9.5))) == ""
+    said = noise_words(Noise(level=2e-3, growth=(0.0, 9.5), is_independent=False))
+    assert "time stamps that jitter by 19 ms" in said and "% of it" not in said
+    said = noise_words(Noise(level=2e-3, growth=(10.0, 0.0), is_independent=False))
+    assert "is larger, by 2 % of it" in said and "jitter" not in said
+
+
 @pytest.mark.parametrize(
     ("verdict", "effects", "left", "explained"),
     [

@@ -17,6 +17,7 @@ from bayesimpact.diagnosis.faults.beside_model import fault_beside
 from bayesimpact.diagnosis.faults.compare import Compared
 from bayesimpact.diagnosis.faults.knock import knock_beside
 from bayesimpact.diagnosis.faults.outliers import beside_spikes
+from bayesimpact.diagnosis.measurement.growing_noise import growing_noise
 from bayesimpact.diagnosis.measurement.input_noise import input_noise
 from bayesimpact.diagnosis.measurement.slow_noise import remaining_noise
 from bayesimpact.diagnosis.refits.extend import campaign_scales
@@ -93,6 +94,12 @@ def _under_slow_noise(base: Fit, found: Fit, say: Progress) -> Revision | None:
     """Under the slow noise that is all that a model leaves."""
     noise = None if is_large(found) else remaining_noise(found)
     return _under(base, found, noise, "what remains is slow noise", say)
+
+
+def _under_growing_noise(base: Fit, found: Fit, say: Progress) -> Revision | None:
+    """Under noise that grows with the motion, which is all that a model leaves."""
+    noise = None if is_large(found) else growing_noise(found)
+    return _under(base, found, noise, "what remains is noise that grows with the motion", say)
 
 
 def _under(base: Fit, found: Fit, noise: Noise | None, what: str, say: Progress) -> Revision | None:
@@ -203,6 +210,7 @@ def _without_readings(base: Fit, found: Fit, say: Progress) -> Revision | None:
 
 
 READINGS = (
+    _under_growing_noise,
     _without_readings,
     _with_a_recording_corrected,
     _without_a_knock,
@@ -214,7 +222,7 @@ def first_revision(base: Fit, found: Fit, say: Progress) -> Revision | None:
     """The first thing that is off and only a model as good as this one shows, of readings or of an
     input's: what is fitted to these decides nothing. None where there is none.
     """
-    steps = [_without_readings, _under_noise_of_inputs]
+    steps = [_under_growing_noise, _without_readings, _under_noise_of_inputs]
     if found is not base:
         steps.append(_with_a_recording_corrected)  # before a knock, which halves a clock's misfit
     steps.append(_without_a_knock)

@@ -152,10 +152,20 @@ def remaining(left: Remainder | None, unit: str = "m") -> str:
 
 
 def noise_words(noise: Noise) -> str:
-    """A sentence where what a model leaves was taken for slow noise, or an input's; else empty."""
+    """A sentence where what a model leaves was taken for slow noise, for one that grows with the
+    motion, or an input's; else empty.
+    """
     if noise.forces is not None:
         size = f"{100 * noise.forces.share:.2g} % of it"
         return f" The noise of the measured input ({size}) moves the model: intervals allow for it."
+    if noise.grows and not noise.is_independent:
+        share, jitter = (term * noise.level for term in noise.growth)
+        rate = f"changes faster, as by time stamps that jitter by {1e3 * jitter:.2g} ms"
+        size = f"is larger, by {100 * share:.2g} % of it"
+        where = " and ".join(words for words, term in ((rate, jitter), (size, share)) if term)
+        return (
+            f" What the model leaves is taken for noise that is larger where the reading {where}."
+        )
     if noise.is_independent or not noise.others:
         return ""
     return (
