@@ -5,8 +5,10 @@ that follows is another free motion of the same oscillator. Against a model with
 such a jump is two more columns of one recording, what either of two free changes of the motion is
 from a sample on, for every sample at once by sums over what follows: the score test of a change
 point (Rao 1948). What the score proposes is then done: the recording is taken as two, one before
-and one after, which share all physics, and has to fit. Missing physics does not end with a new
-start.
+and one after, which share all physics, and has to fit. Where that leaves something, what remains
+may tell the next knock, of this recording or another. Missing physics does not end with a new
+start: what an error of the physics adds up to in a stretch grows with its length squared, so that n
+new starts leave 1 / (n + 1)^2 of it, more than the 1 / `EXCESS`^n that is asked for.
 """
 
 from __future__ import annotations
@@ -41,11 +43,12 @@ NEAR = 2  # samples beside these: the blow takes its time
 BEFORE = 3.0  # free periods: what ends sooner is a start that is not free (`forced_start`)
 AFTER = 1.0  # free periods, of which the model has something to say
 FEWEST = 16  # samples of either at least, of a motion that is hardly sampled
+MOST = 4  # knocks that are told together: set by hand
 LEAST_FREE = 1e-3  # of a column squared, that parameters leave of it: less is error of derivatives
-SLACK = 2.0  # times the misfit that may stay, that a score may promise: it is of first order
+SLACK = 2.0  # times less than a knock must explain, that a score may promise: of first order
 DIFFER = ("recording_other_rig", "recording_gain", "recording_clock")
 """Faults of a whole recording that differs, as one does that goes on from another state."""
-SECOND = " after the knock"  # the name of a recording's second part
+LATER = " from sample "  # in the name of a recording's later parts
 
 
 @dataclass(frozen=True)
@@ -80,68 +83,111 @@ class _Sums:
     shared: Array
 
 
-def knock_beside(base: Fit, found: Fit) -> tuple[Compared, Fit, Fit] | None:
-    """The knock that explains what a model leaves; the base model's and the model's mode of the
-    recordings without what follows it, or what was before, whichever is shorter. None where there
-    is none.
+@dataclass(frozen=True, eq=False)
+class _Split:
+    """A campaign whose recordings are taken as several, and a model's fit to it.
 
-    The model of the two parts must leave no large misfit, and `EXCESS` times less than without; the
-    base model, from which physics may be missing, no more than the noise.
+    Attributes
+    ----------
+    fit : of the model to all parts
+    jumps : between the parts, in samples of the recordings as they were
+    nats : that each of these gained
+    """
+
+    fit: Fit
+    jumps: tuple[StateJump, ...] = ()
+    nats: tuple[float, ...] = ()
+
+
+def knocks_beside(base: Fit, found: Fit) -> tuple[tuple[Compared, ...], Fit, Fit] | None:
+    """The knocks that explain what a model leaves; the base model's and the model's mode of the
+    recordings without what lies beyond them: of each its longest part stays. None where there are
+    none.
+
+    The model of all parts must leave no large misfit, and `EXCESS` times less for every knock than
+    without; the base model, from which physics may be missing, no more than the noise.
     """
     campaign = found.density.oscillator.campaign
     recordings = campaign.recordings
     forces = found.density.likelihood.noise.forces  # along whole recordings
     if campaign.keep_faults or any(r.motion_name for r in recordings) or forces is not None:
         return None
-    jumps = [j for r in range(len(recordings)) if (j := likeliest_jump(found, r)) is not None]
-    jump = max(jumps, key=lambda j: j.gain, default=None)
-    if jump is None or not _promises(found, jump):
-        return None
-    model = _model(found, found.density.oscillator.effects, {})
-    split = model.fitted(_apart(campaign, jump))
-    if split is None or split.reduced_chi2 > LARGE**2:
-        return None
-    if not found.density.oscillator.effects and leaves_something(split):
-        return None  # a law of the stop that is missing may seem to act once
-    nats = log_likelihood_gain(found.reduced_chi2, split.reduced_chi2, campaign)
-    if nats < CERTAIN or EXCESS * above_noise(split) > above_noise(found):
-        return None
-    return _without(base, found, split, jump, nats)
+    split = _Split(found)
+    while len(split.jumps) < MOST:
+        step = _next(found, split)
+        if step is None:
+            return None
+        split = step
+        if _is_enough(found, split):
+            return _without(base, found, split)
+    return None
 
 
 def knock_instead(steps: Sequence[Step], base: Fit, found: Fit, as_read: Campaign) -> Step:
-    """The knock that, beside a model, explains why a recording differs from the others; () where
-    none does, or no step says that one differs.
+    """The knocks that, beside a model, explain why a recording differs from the others; () where
+    none do, or no step says that one differs.
     """
     differing = {one.fault.recording for step in steps for one in step if one.fault.id in DIFFER}
-    told = knock_beside(base, found) if differing else None
-    if told is None or told[0].fault.recording not in differing:
+    told = knocks_beside(base, found) if differing else None
+    if told is None or differing.isdisjoint(one.fault.recording for one in told[0]):
         return ()
-    fault = fault_as_read(told[0].fault, found.density.oscillator.campaign, as_read)
-    return (replace(told[0], fault=fault),)
-
-
-def _promises(found: Fit, jump: StateJump) -> bool:
-    """Whether a score promises what a knock must do, or nearly."""
-    left = above_noise(found, found.reduced_chi2 * max(1.0 - jump.share, 0.0))
-    return EXCESS * left <= SLACK * above_noise(found)
-
-
-def _without(
-    base: Fit, found: Fit, split: Fit, jump: StateJump, nats: float
-) -> tuple[Compared, Fit, Fit] | None:
-    """The fault and both modes, with the longer part of the recording alone."""
     campaign = found.density.oscillator.campaign
-    recording = campaign.recordings[jump.recording]
-    fault, kept = _fault(recording, jump, nats)
-    cut = _with(campaign, jump.recording, (recording.part(*kept),))
-    own = {n.replace(f"{recording.name}{SECOND}]", f"{recording.name}]"): v for n, v in
-           values_of(split).items() if SECOND in n}  # fmt: skip
-    again = _model(split, found.density.oscillator.effects, own if kept[0] > 0 else {}).fitted(cut)
+    return tuple(replace(one, fault=fault_as_read(one.fault, campaign, as_read)) for one in told[0])
+
+
+def _next(found: Fit, split: _Split) -> _Split | None:
+    """With one more jump, the likeliest, where that explains a part of 1 / `EXCESS` at least of
+    what is left above the noise; else None.
+    """
+    campaign, left = found.density.oscillator.campaign, split.fit
+    origins = _apart(campaign, split.jumps)[1]
+    jumps = [j for part in range(len(origins)) if (j := likeliest_jump(left, part)) is not None]
+    jump = max(jumps, key=lambda j: j.gain, default=None)
+    if jump is None or EXCESS * SLACK * jump.share < 1.0:
+        return None
+    r, first = origins[jump.recording]
+    own = replace(
+        jump, recording=r, place=jump.place + first,
+        earliest=jump.earliest + first, latest=jump.latest + first,
+    )  # fmt: skip
+    more = (*split.jumps, own)
+    model = _model(left, found.density.oscillator.effects, {})
+    fit = model.fitted(_apart(campaign, more)[0])
+    if fit is None or above_noise(fit) > (1.0 - 1.0 / EXCESS) * above_noise(left):
+        return None
+    nats = log_likelihood_gain(left.reduced_chi2, fit.reduced_chi2, campaign)
+    return _Split(fit, more, (*split.nats, nats)) if nats >= CERTAIN else None
+
+
+def _is_enough(found: Fit, split: _Split) -> bool:
+    """Whether new starts leave as little as knocks must."""
+    if split.fit.reduced_chi2 > LARGE**2:
+        return False
+    if not found.density.oscillator.effects and leaves_something(split.fit):
+        return False  # a law of the stop that is missing may seem to act once
+    return EXCESS ** len(split.jumps) * above_noise(split.fit) <= above_noise(found)
+
+
+def _without(base: Fit, found: Fit, split: _Split) -> tuple[tuple[Compared, ...], Fit, Fit] | None:
+    """The faults and both modes, with the longest part of every recording alone."""
+    campaign, own = found.density.oscillator.campaign, dict[str, float]()
+    faults, kept, values = list[Fault](), list(campaign.recordings), values_of(split.fit)
+    for r in sorted({jump.recording for jump in split.jumps}):
+        recording = campaign.recordings[r]
+        parts = _parts(recording, [j for j in split.jumps if j.recording == r])
+        longest = max(parts, key=lambda part: recording.part(*part).count)
+        kept[r] = recording.part(*longest)
+        told = [(j, n) for j, n in zip(split.jumps, split.nats, strict=True) if j.recording == r]
+        faults += [_fault(recording, jump, nats, longest) for jump, nats in told]
+        name = f"[{_part_name(recording, longest[0])}]"
+        own |= {n.replace(name, f"[{recording.name}]"): values[n] for n in values if name in n}
+    cut = replace(campaign, recordings=tuple(kept))
+    again = _model(split.fit, found.density.oscillator.effects, own).fitted(cut)
     plain = _model(base, base.density.oscillator.effects, {}).fitted(cut)
     if again is None or plain is None:
         return None
-    return Compared(fault, cut, found.reduced_chi2, again.reduced_chi2), plain, again
+    change = found.reduced_chi2, again.reduced_chi2
+    return tuple(Compared(fault, cut, *change) for fault in faults), plain, again
 
 
 def _model(fit: Fit, effects: tuple[Effect, ...], values: dict[str, float]) -> SharedModel:
@@ -149,37 +195,48 @@ def _model(fit: Fit, effects: tuple[Effect, ...], values: dict[str, float]) -> S
     return SharedModel(fit.density.likelihood.noise, effects, values_of(fit) | values)
 
 
-def _apart(campaign: Campaign, jump: StateJump) -> Campaign:
-    """The campaign with the recording as two, without the readings where the jump may lie."""
-    recording = campaign.recordings[jump.recording]
-    first, second = _parts(recording, jump)
-    after = replace(recording.part(*second), name=recording.name + SECOND)
-    return _with(campaign, jump.recording, (recording.part(*first), after))
+def _apart(
+    campaign: Campaign, jumps: Sequence[StateJump]
+) -> tuple[Campaign, list[tuple[int, int]]]:
+    """The campaign with its recordings as several, without the readings where jumps may lie; and of
+    every part whose it is and its first sample there.
+    """
+    origins, recordings = list[tuple[int, int]](), list[Recording]()
+    for r, recording in enumerate(campaign.recordings):
+        for first, end in _parts(recording, [j for j in jumps if j.recording == r]):
+            name = _part_name(recording, first)
+            recordings.append(replace(recording.part(first, end), name=name))
+            origins.append((r, first))
+    return replace(campaign, recordings=tuple(recordings)), origins
 
 
-def _parts(recording: Recording, jump: StateJump) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Samples before and after a jump, firsts and last-plus-ones."""
-    return (0, jump.earliest - NEAR), (jump.latest + NEAR, recording.samples.size)
+def _part_name(recording: Recording, first: int) -> str:
+    """The name of a part, the same whatever else is taken apart."""
+    return f"{recording.name}{LATER}{first}" if first else recording.name
 
 
-def _with(campaign: Campaign, r: int, parts: tuple[Recording, ...]) -> Campaign:
-    """The campaign with others in the place of a recording."""
-    recordings = campaign.recordings
-    return replace(campaign, recordings=(*recordings[:r], *parts, *recordings[r + 1 :]))
+def _parts(recording: Recording, jumps: Sequence[StateJump]) -> list[tuple[int, int]]:
+    """Samples between the jumps of a recording, firsts and last-plus-ones."""
+    ordered = sorted(jumps, key=lambda j: j.place)
+    firsts = [0, *(j.latest + NEAR for j in ordered)]
+    ends = [*(j.earliest - NEAR for j in ordered), recording.samples.size]
+    return list(zip(firsts, ends, strict=True))
 
 
-def _fault(recording: Recording, jump: StateJump, nats: float) -> tuple[Fault, tuple[int, int]]:
-    """The knock as a record, whose remedy keeps the longer part; and which part that is."""
+def _fault(recording: Recording, jump: StateJump, nats: float, kept: tuple[int, int]) -> Fault:
+    """The knock as a record, whose remedy leaves out what lies beyond it, seen from what is
+    `kept`.
+    """
     size = recording.samples.size
-    first, second = _parts(recording, jump)
-    if recording.part(*first).count >= recording.part(*second).count:
-        kept, span, remedy = first, (first[1], size), "end_s"
+    first, second = _parts(recording, [jump])
+    if kept[0] < jump.place:
+        span, remedy = (first[1], size), "end_s"
         edge = file_time(recording, first[1] - 0.6)
     else:
-        kept, span, remedy = second, (0, second[0]), "start_s"
+        span, remedy = (0, second[0]), "start_s"
         edge = file_time(recording, second[0] - 0.4)
     when = file_time(recording, jump.place)
-    fault = Fault(
+    return Fault(
         id="recording_knock",
         recording=recording.name,
         spans=(span,),
@@ -194,7 +251,6 @@ def _fault(recording: Recording, jump: StateJump, nats: float) -> tuple[Fault, t
         threshold=CERTAIN,
         action="cut",
     )
-    return fault, kept
 
 
 def likeliest_jump(fit: Fit, r: int) -> StateJump | None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.diagnosis.faults.beside_model import fault_beside
 from bayesimpact.diagnosis.faults.compare import Compared
-from bayesimpact.diagnosis.faults.knock import knock_beside
+from bayesimpact.diagnosis.faults.knock import knocks_beside
 from bayesimpact.diagnosis.faults.outliers import beside_spikes
 from bayesimpact.diagnosis.measurement.growing_noise import growing_noise
 from bayesimpact.diagnosis.measurement.input_noise import input_noise
@@ -126,13 +126,14 @@ def _with_a_recording_corrected(base: Fit, found: Fit, say: Progress) -> Revisio
 
 
 def _without_a_knock(base: Fit, found: Fit, say: Progress) -> Revision | None:
-    """Without what lies beyond a knock that the model shows."""
-    told = knock_beside(base, found)
+    """Without what lies beyond knocks that the model shows."""
+    told = knocks_beside(base, found)
     if told is None:
         return None
     compared, plain, first = told
-    say(f"{compared.fault.recording}: {compared.fault.statement}: once more without that")
-    return Revision(plain, None if found is base else first, (compared,))
+    for one in compared:
+        say(f"{one.fault.recording}: {one.fault.statement}: once more without that")
+    return Revision(plain, None if found is base else first, compared)
 
 
 def _with_band_limited_inputs(base: Fit, found: Fit, say: Progress) -> Revision | None:

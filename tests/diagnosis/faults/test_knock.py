@@ -13,7 +13,7 @@ import small_rig
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.diagnosis.faults.first_physics import faults_beside_physics
-from bayesimpact.diagnosis.faults.knock import _basis, _score, _sums, knock_beside, likeliest_jump
+from bayesimpact.diagnosis.faults.knock import _basis, _score, _sums, knocks_beside, likeliest_jump
 from bayesimpact.diagnosis.faults.recording_faults import cleaned_campaign
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import fit_from
@@ -21,6 +21,7 @@ from bayesimpact.diagnosis.selection.revision import first_revision, revised
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects import EFFECTS, SEARCHED
+from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 
 BY_ID = {e.id: e for e in EFFECTS}
 PHYSICS: Mapping[str, Mapping[str, Any]] = {
@@ -35,6 +36,9 @@ MISSING: Mapping[str, Mapping[str, Any]] = {
     "obstacle_mass": {"mass": 7.5e-3},  # the end of one contact would be taken for one
 }
 IMPULSE, WIDTH = 0.004, 0.01  # N s, s
+OTHER_STATES = (("second", -4.3e-3, 4e-3), ("third", -4.8e-3, -6e-3))  # m, m/s
+BREAKS = (900, 2200)  # samples
+WITHOUT = MeasuringChain(noise=small_rig.NOISE)
 
 
 def recorded(effects: Mapping[str, Any], time: float | None = None, **how: Any) -> Campaign:
@@ -65,9 +69,9 @@ def test_a_knock_is_told_and_what_follows_it_left_out(stop: bool, time: float, k
     """The longer part stays, and the model fits it."""
     how = {} if stop else {"rig": small_rig.PLAIN, "releases": small_rig.PLAIN_RELEASES}
     base, found = fits(recorded(PHYSICS, time, **how), *PHYSICS)
-    told = knock_beside(base, found)
+    told = knocks_beside(base, found)
     assert told is not None
-    compared, plain, first = told
+    (compared,), plain, first = told
     fault = compared.fault
     assert (fault.id, fault.recording) == ("recording_knock", "b")
     assert fault.remedy.startswith(kept)
@@ -79,6 +83,45 @@ def test_a_knock_is_told_and_what_follows_it_left_out(stop: bool, time: float, k
     after = [r.samples.size for r in compared.campaign.recordings]
     assert [a == b for a, b in zip(sizes, after, strict=True)].count(False) == 1
     assert after[1] > 0.6 * sizes[1]
+
+
+def knocked_about() -> Campaign:
+    """A recording that goes on from another state twice, and another one that does once."""
+    releases = (*small_rig.RELEASES[:2], replace(small_rig.RELEASES[2], y0=-4e-3))
+    more = [replace(releases[1], name=n, y0=y, v0=v) for n, y, v in OTHER_STATES]
+    whole = small_rig.record(5, PHYSICS, releases=(*releases, *more), duration=4.0, chain=WITHOUT)
+    _, b, _, second, third = (r.samples for r in whole.recordings)
+    first, last = BREAKS
+    glued = np.concatenate([b[:first], second[first:last], third[last:]])
+    knock = {"impulse": IMPULSE, "time": 1.7, "width": WIDTH}
+    again = small_rig.record(
+        6, {**PHYSICS, "knock": knock}, releases=releases, duration=4.0, chain=WITHOUT
+    )
+    recordings = list(whole.recordings[:3])
+    recordings[1] = replace(recordings[1], samples=glued)
+    recordings[2] = again.recordings[2]
+    return replace(whole, recordings=tuple(recordings))
+
+
+def test_several_knocks_are_told_together() -> None:
+    """No single new start leaves far less; of every recording its longest part stays."""
+    base, found = fits(knocked_about(), *PHYSICS)
+    told = knocks_beside(base, found)
+    assert told is not None
+    compared, plain, first = told
+    edges = [(c.fault.recording, c.fault.start_s, c.fault.end_s) for c in compared]
+    wanted = [("b", 1e-3 * at) for at in BREAKS] + [("c", 1.705)]
+    assert len(edges) == len(wanted)
+    for (name, start, end), (own, at) in zip(sorted(edges), wanted, strict=True):
+        assert name == own
+        assert start - 0.03 < at < end + 0.03
+    sizes = [r.samples.size for r in first.density.oscillator.campaign.recordings]
+    assert sizes == [r.samples.size for r in plain.density.oscillator.campaign.recordings]
+    assert sizes[0] == 4000
+    assert sizes[1] == pytest.approx(4000 - BREAKS[1], abs=30)
+    assert sizes[2] == pytest.approx(4000 - 1705, abs=30)
+    assert first.reduced_chi2 < 1.1
+    assert first.names == found.names
 
 
 def test_revised_search_begins_without_it() -> None:
@@ -109,7 +152,7 @@ def test_missing_physics_is_no_knock(effect: str) -> None:
     """It does not end with a new start."""
     base, _ = fits(recorded({effect: MISSING[effect]}))
     assert base.reduced_chi2 > 2.0
-    assert knock_beside(base, base) is None
+    assert knocks_beside(base, base) is None
 
 
 def test_adequate_model_shows_no_jump() -> None:
