@@ -138,6 +138,12 @@ class TermSets:
             found.append(self.set_of(best, reached - none))
         return found
 
+    def alone(self) -> list[EffectSet]:
+        """Every effect that may be alone, at its likeliest shape, likeliest first."""
+        none = self.log_odds(()) if self.terms else 0.0
+        single = (self.refined(chosen) for level in self.levels(1) for chosen in level)
+        return [self.set_of(chosen, self.log_odds(chosen) - none) for chosen in single]
+
     def set_of(self, chosen: Sequence[int], odds: float) -> EffectSet:
         """The effects of some terms with the values of all unknowns."""
         raise NotImplementedError

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from functools import cached_property
 
+import numpy as np
+
 from bayesimpact.diagnosis.candidates.one_step import criterion_after_a_step
 from bayesimpact.diagnosis.candidates.term_sets import EffectSet
 from bayesimpact.diagnosis.measurement.input_noise import under_input_noise
@@ -62,7 +64,7 @@ class Asking(Unlisted):
         best = base.candidate
         while self.may_go_on() and leaves_something(best.fit):
             was = best
-            for fit, chosen in self.promising_sets(best)[:FITTED]:
+            for _, fit, chosen in self.promising_sets(best)[:FITTED]:
                 found = self.no_worse(self.fit_set(fit, chosen))
                 best = max(best, found, key=self.promise)
                 if not is_large(best.fit) or not self.may_go_on():
@@ -71,24 +73,41 @@ class Asking(Unlisted):
                 break
         return best
 
-    def promising_sets(self, about: Candidate) -> list[tuple[Fit, EffectSet]]:
+    def promising_sets(self, about: Candidate) -> list[tuple[float, Fit, EffectSet]]:
         """Sets that the equation of motion, in flight and over all stretches, and periods ahead ask
-        for about a model, each with the fit it extends, those that promise most first; in this
-        order where no period is told.
+        for about a model, each with what it costs after one step and the fit it extends, those that
+        promise most first; in this order where no period is told. Of periods ahead every effect by
+        itself, too: where the fit is far off, another may lead further than the one of which a
+        linear problem promises most.
         """
-        ahead = self.asked.ahead(about, about)
-        sets = [
-            (problem.fit, chosen)
-            for flight in (True, False)
-            for problem in [self.asked.about(about, flight=flight)]
-            for chosen in problem.best(self.most - len(problem.known))
-        ]
-        sets += [(ahead.fit, chosen) for chosen in ahead.best(self.most - len(about.effects))]
-        cost = {
-            i: criterion_after_a_step(fit, chosen, self.scales) + self.cost * len(chosen.effects)
-            for i, (fit, chosen) in enumerate(sets)
-        }
-        return [sets[i] for i in sorted(cost, key=lambda i: cost[i])]
+        key = about.ids, about.fit.log_posterior
+        if key not in self.promised:
+            ahead, room = self.asked.ahead(about, about), self.most - len(about.effects)
+            sets = [
+                (problem.fit, chosen)
+                for flight in (True, False)
+                for problem in [self.asked.about(about, flight=flight)]
+                for chosen in problem.best(self.most - len(problem.known))
+            ]
+            every = [*ahead.best(room), *(ahead.alone() if room > 0 else ())]
+            sets += [(ahead.fit, chosen) for chosen in every]
+            cost = [self.after_a_step(fit, chosen) for fit, chosen in sets]
+            order = sorted(range(len(sets)), key=lambda i: cost[i])
+            self.promised[key] = [(cost[i], *sets[i]) for i in order]
+        return self.promised[key]
+
+    def after_a_step(self, fit: Fit, chosen: EffectSet) -> float:
+        """What a set costs by one step over periods ahead, nats (`criterion_after_a_step`)."""
+        return criterion_after_a_step(fit, chosen, self.scales) + self.cost * len(chosen.effects)
+
+    def leads_by_a_step(self, fit: Fit, chosen: EffectSet, about: Candidate) -> bool:
+        """Whether one step promises more of a set than of all that are asked for; without a stop
+        these are not weighed.
+        """
+        if not self.asked.has_stop:
+            return True
+        least = min((cost for cost, *_ in self.promising_sets(about)), default=np.inf)
+        return not np.isfinite(least) or self.after_a_step(fit, chosen) < least
 
     def of_motion(self, about: Candidate) -> list[Candidate]:
         """Models that the equation of motion asks for about one."""

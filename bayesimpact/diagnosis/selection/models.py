@@ -72,6 +72,7 @@ class Models:
         self.dropped: set[tuple[frozenset[str], float, str]] = set()
         self.profiled: set[frozenset[str]] = set()
         self.beside_forces: dict[frozenset[str], tuple[Candidate, Candidate]] = {}
+        self.promised: dict[tuple[object, ...], list[tuple[float, Fit, EffectSet]]] = {}
         self.is_driven = False  # the equation of motion asked for a harmonic force
         self.refits = 0
         self.look = 0.0  # s, that the last model took to be scored

@@ -25,6 +25,7 @@ from bayesimpact.diagnosis.selection.outcome import ExaminedModel, is_large
 from bayesimpact.diagnosis.selection.remaining import Remaining
 from bayesimpact.diagnosis.thresholds import EXCESS
 from bayesimpact.formula.law import is_formula
+from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.harmonic_forcing import EFFECT as HARMONIC_FORCING
 
 Problem = Callable[[Candidate], list[Candidate]]
@@ -39,7 +40,9 @@ class Unlisted(Remaining):
 
     def with_a_line(self, examined: ExaminedModel) -> ExaminedModel:
         """A model, or where its misfit is large one with a harmonic force, where the equation of
-        motion leaves `EXCESS` times less by it than by effects that are none.
+        motion leaves `EXCESS` times less by it than by effects that are none; with a stop, where
+        one step over periods ahead promises more of it than of every set without one, too: a mode
+        near the motion's own frequency is a line to the equation of motion, which knows no mode.
         """
         about = examined.candidate
         shaken = [e for e in self.effects if e.id == HARMONIC_FORCING.id]
@@ -49,12 +52,17 @@ class Unlisted(Remaining):
             return examined
 
         def sets(problem: LikelySets, most: int) -> list[EffectSet]:
-            return sets_with_a_line(problem, shaken[0], most, about.ids)
+            found = sets_with_a_line(problem, shaken[0], most, about.ids)
+            return [s for s in found if self.leads_by_a_step(problem.fit, s, about)]
 
         self.is_driven = True
         found = self.beside_sets(examined, ("line",), sets, [self.asked.has_stop])
         self.is_driven = found is not examined
         return found
+
+    def leads_by_a_step(self, fit: Fit, chosen: EffectSet, about: Candidate) -> bool:
+        """Whether a set that a problem posed about a model asks for is the most promising one."""
+        raise NotImplementedError
 
     def with_a_term(self, examined: ExaminedModel, *, excess: float = EXCESS) -> ExaminedModel:
         """A model, or one with a term of the grammar that explains more, where the equation of

@@ -18,7 +18,8 @@ from bayesimpact.diagnosis.candidates.likely_sets import EffectSet, LikelySets
 from bayesimpact.diagnosis.candidates.line_sets import _waves, sets_with_a_line
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.refits.extend import campaign_scales
-from bayesimpact.diagnosis.refits.refit import fit_from
+from bayesimpact.diagnosis.refits.refit import base_candidate, fit_from
+from bayesimpact.diagnosis.selection.asking import Asking
 from bayesimpact.diagnosis.selection.unlisted import Unlisted
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
@@ -28,6 +29,7 @@ from bayesimpact.trial.rig.recordings import Effects
 FORCE = BY_ID["harmonic_forcing"]
 STRONG = {"amplitude": 0.15, "frequency": 2.3, "phase": 1.0}  # below the motion's own frequency
 SECOND_STAGE = {"depth": 4e-4, "stiffness": 4000.0}
+NEAR_MODE = {"base_motion": {"frequency": 6.9, "damping": 0.005, "mass_ratio": 0.006}}
 
 
 def stopped(effects: Effects) -> Campaign:
@@ -147,3 +149,20 @@ def test_a_force_slower_than_the_motion_is_named_beside_what_the_stop_does() -> 
     assert found.verdict == "named"
     assert {e.id for e in found.effects} == {"harmonic_forcing", "contact_second_stage"}
     assert next(one for one in said if one.startswith("fitting h")) == "fitting harmonic_forcing"
+
+
+def test_a_mode_near_the_motions_own_frequency_is_no_force(shaken: Fit) -> None:
+    """The equation of motion, which knows no mode, has a line for it; a step over periods ahead
+    promises more of the mode, and of a force where there is one.
+    """
+    ringing = fitted(small_rig.record(3, NEAR_MODE, duration=6.0))
+    assert ringing.reduced_chi2 > 100
+    assert asked_for(ringing, flight=True)
+    assert _begins_with_a_line(shaken)
+    assert not _begins_with_a_line(ringing)
+
+
+def _begins_with_a_line(fit: Fit) -> bool:
+    search = Asking(SEARCHED, campaign_scales(fit), np.random.default_rng(0), lambda words: None)
+    base = search.examine(base_candidate(fit))
+    return search.with_a_line(base) is not base

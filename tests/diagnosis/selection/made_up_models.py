@@ -28,8 +28,8 @@ class Table:
     place of all effects, to which `beside` adds where there are effects that it may stand beside.
     `chi2` is that of every fit but those of `left`. `asked` are the sets that the equation of
     motion asks for, of all stretches and `asked_in_flight`, or about a model, `asked_about`, and
-    `asked_ahead` those that periods ahead do; `seen` what is gained by an effect, of which `first`
-    are tried.
+    `asked_ahead` those that periods ahead do, and `alone` effects that may be; `seen` what is
+    gained by an effect, of which `first` are tried.
     """
 
     def __init__(
@@ -49,7 +49,9 @@ class Table:
         first: int = 4,
         asked_ahead: tuple[str, ...] = (),
         left: dict[str, float] | None = None,
+        alone: tuple[str, ...] = (),
     ) -> None:
+        self.alone = alone
         self.left = {frozenset(k.split()): v for k, v in (left or {}).items()}
         self.asked_in_flight, self.first = asked_in_flight, first
         self.asked_ahead = asked_ahead
@@ -103,7 +105,10 @@ class Table:
             return SimpleNamespace(fit=base, known=(), terms=(), best=lambda most: best(names))
 
         def ahead(model, about):
-            return SimpleNamespace(fit=model.fit, best=lambda most: best(self.asked_ahead))
+            return SimpleNamespace(
+                fit=model.fit, best=lambda most: best(self.asked_ahead),
+                alone=lambda: best(self.alone),
+            )  # fmt: skip
 
         def first(model, about, instead=""):
             left = [i for i in self.seen if i not in model.ids]

@@ -93,6 +93,15 @@ def test_the_equation_is_asked_again_about_a_better_model(run):
     assert table.fitted[3] == {A, B, D}
 
 
+def test_an_effect_by_itself_may_begin_a_search_with_a_stop(run):
+    """A step leads further with it than with what linear problems promise most of."""
+    gains = {A: 300.0, B: 30.0, C: 20.0, f"{B} {C}": 40.0, f"{A} {D}": ENOUGH}
+    asked = {"asked_in_flight": (B,), "asked_ahead": (C, f"{B} {C}"), "first": 1}
+    table = Table(gains, chi2=100.0, alone=(C, A), seen={D: 2.0}, **asked)
+    assert chosen(run(table)) == {A, D}
+    assert table.fitted[0] == {A}
+
+
 @pytest.mark.parametrize(
     ("before", "left", "ends"), [(35.0, 8.5, True), (33.0, 8.5, False), (100.0, 9.5, False)]
 )
