@@ -23,6 +23,20 @@ def sizes_of(fit: Fit, effect: Effect) -> tuple[list[tuple[int, float]], list[in
     return (known if len(known) == len(sizes) else []), shapes
 
 
+def shapes_in_base(fit: Fit, effect: Effect) -> list[tuple[int, float]]:
+    """Positions of an effect's shapes in a fit's mode that have a value at which the law is one of
+    the base model's, with that value.
+    """
+    names = fit.density.oscillator.layout.names
+    return [
+        (i, p.in_base)
+        for p in effect.parameters
+        if p.in_base is not None
+        for i, name in enumerate(names)
+        if name.startswith(f"{effect.id}.") and bare_name(name) == p.name
+    ]
+
+
 def loss_without(fit: Fit, effect: Effect) -> float:
     """Log likelihood that a fit loses without an effect as far as it is linear, nats; 0 for one
     without a size.

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from bayesimpact.diagnosis.refits.sizes import sizes_of
+from bayesimpact.diagnosis.refits.sizes import shapes_in_base, sizes_of
 from bayesimpact.diagnosis.residual_force.gaussian_process import whitened_one
 from bayesimpact.diagnosis.residual_force.hidden import about, parameter_forces
 from bayesimpact.diagnosis.residual_force.marginal import Part, log_evidence_gain, products
@@ -152,15 +152,21 @@ class Discrepancy:
         return mean, scatter + alike * ALIGNED**2 * sum(np.outer(h, h) for h in hidden)
 
     def apart(self, effect: Effect) -> float:
-        """Standard deviations of an effect's size, its shape as fitted, from none at all: of the
-        largest one; infinite where it has no size.
+        """Standard deviations of an effect from none at all: of its largest size, the shape as
+        fitted, for without a size no other shape does more; or of a shape, the size as it may be,
+        from where the law is one of the base model's (`EffectParameter.in_base`), whichever is
+        less. Infinite where it has no size.
         """
         sizes, shapes = sizes_of(self.fit, effect)
         found = [] if sizes else [np.inf]
         for i, null in sizes:
             part = inverse(self.posterior[1][np.ix_([i, *shapes], [i, *shapes])])
             found.append(abs(float(self.fit.mode[i]) - null) * part[0, 0] ** 0.5)
-        return float(max(found))
+        beside = [
+            abs(float(self.fit.mode[i]) - value) / self.posterior[1][i, i] ** 0.5
+            for i, value in shapes_in_base(self.fit, effect)
+        ]
+        return float(min([max(found), *beside]))
 
 
 def discrepancy(fit: Fit) -> Discrepancy | None:

@@ -50,6 +50,7 @@ EFFECT = Effect(
             scale=lambda s: 0.5 * s.indentation,
             lower=0.0,
             null=None,
+            in_base=0.0,
             grid=lambda s: np.linspace(0.1, 0.9, 9) * s.indentation,
         ),
     ),

@@ -110,6 +110,8 @@ class EffectParameter:
     grid : for a shape parameter, the values that a scan tries, from the scales
     within : for a shape parameter, the range outside which the law goes by another name, from the
         scales: the prior is log-uniform in it
+    in_base : for a shape parameter, the value at which the law is a force that the base model has,
+        of whatever size: there it is nothing that is missing
     circular : a phase, rad
     fixed : a constant of the law, not an unknown
     spectral : a frequency, Hz; a scan should try the peaks of the residual's periodogram as well
@@ -130,6 +132,7 @@ class EffectParameter:
     scope: Scope = "campaign"
     grid: Callable[[Scales], NDArray[np.float64]] | None = None
     within: Callable[[Scales], tuple[float, float]] | None = None
+    in_base: float | None = None
     circular: bool = False
     fixed: float | None = None
     spectral: bool = False

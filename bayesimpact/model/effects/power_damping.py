@@ -72,6 +72,7 @@ EFFECT = Effect(
             lower=0.25,
             upper=5.0,
             null=None,
+            in_base=1.0,
             # next to 0, 1 and 2 stand dry friction, c1 and quadratic drag
             grid=lambda s: np.array([0.3, 0.5, 0.7, 1.5, 2.5, 3.0, 4.0]),
         ),

@@ -249,6 +249,21 @@ def test_an_effect_that_is_not_there_is_not_apart():
     assert abs(false.mode[at]) / false.sd[at] > 3.0  # as far as independent samples tell
 
 
+def test_a_law_whose_shape_may_be_one_of_the_base_model_is_not_apart():
+    """A power of the speed that may be one is a part of c1, however sure its size."""
+    fit = plain_fit(shaken(4, 1e-2))
+    power = next(e for e in EFFECTS if e.id == "power_damping")
+    start = {"power_damping.coefficient": 0.05, "power_damping.exponent": 2.0}
+    left = left_by(fit_from(fit, (power,), start, campaign_scales(fit)).fit)
+    names = list(left.fit.names)
+    at = [names.index(f"power_damping.{name}") for name in ("coefficient", "exponent")]
+    known = left.posterior[1][np.ix_(at, at)]
+    size, shape = left.fit.mode[at]
+    by_shape = abs(shape - 1.0) / known[1, 1] ** 0.5
+    assert by_shape < 0.2 * size * np.linalg.inv(known)[0, 0] ** 0.5
+    assert left.apart(power) == pytest.approx(by_shape)
+
+
 def test_a_motion_that_ran_away_has_none(small):
     """Intervals are then those of the fit, each independent sample counted once."""
     away = replace(small.fit, mode=np.where(np.isin(small.fit.names, "k1"), -1.0, small.fit.mode))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from effect_rigs import BY_ID, TestRig, null_values
@@ -36,6 +38,25 @@ def test_null_without_a_stop(effect):
     added = PLAIN.readings([effect], null_values(effect, PLAIN))
     for a, b in zip(added, base, strict=True):
         np.testing.assert_allclose(a, b, rtol=0, atol=5e-13)
+
+
+@pytest.mark.parametrize(
+    ("effect_id", "size", "shape", "slot", "share"),
+    [
+        ("power_damping", "coefficient", "exponent", "c1", 0.3),
+        ("contact_second_stage", "stiffness", "depth", "k2", 0.1),
+    ],
+)
+def test_where_a_shape_is_one_of_the_base_model_the_law_adds_to_a_parameter(
+    effect_id, size, shape, slot, share
+):
+    effect, own = BY_ID[effect_id], getattr(RIG, slot)
+    more = share * float(np.mean(own))
+    larger = replace(RIG, **{slot: tuple(np.add(own, more)) if slot == "k2" else own + more})
+    at = effect.parameter(shape).in_base
+    added = RIG.readings([effect], {f"{effect_id}.{size}": more, f"{effect_id}.{shape}": at})
+    for a, b in zip(added, larger.readings([], {}), strict=True):
+        np.testing.assert_allclose(a, b, rtol=0, atol=1e-9)
 
 
 def test_what_has_no_null_has_no_size():
