@@ -71,6 +71,11 @@ class StateJump:
     gain: float
     share: float
 
+    def moved(self, by: int) -> StateJump:
+        """The same in samples that are counted from elsewhere."""
+        places = (self.place + by, self.earliest + by, self.latest + by)
+        return StateJump(self.recording, *places, self.gain, self.share)
+
 
 @dataclass(frozen=True, eq=False)
 class _Sums:
@@ -131,8 +136,11 @@ def knock_instead(steps: Sequence[Step], base: Fit, found: Fit, as_read: Campaig
     told = knocks_beside(base, found) if differing else None
     if told is None or differing.isdisjoint(one.fault.recording for one in told[0]):
         return ()
-    campaign = found.density.oscillator.campaign
-    return tuple(replace(one, fault=fault_as_read(one.fault, campaign, as_read)) for one in told[0])
+    before = [found.density.oscillator.campaign, *(one.campaign for one in told[0])]
+    return tuple(
+        replace(one, fault=fault_as_read(one.fault, campaign, as_read))
+        for one, campaign in zip(told[0], before, strict=False)
+    )
 
 
 def _next(found: Fit, split: _Split) -> _Split | None:
@@ -146,11 +154,7 @@ def _next(found: Fit, split: _Split) -> _Split | None:
     if jump is None or EXCESS * SLACK * jump.share < 1.0:
         return None
     r, first = origins[jump.recording]
-    own = replace(
-        jump, recording=r, place=jump.place + first,
-        earliest=jump.earliest + first, latest=jump.latest + first,
-    )  # fmt: skip
-    more = (*split.jumps, own)
+    more = (*split.jumps, replace(jump.moved(first), recording=r))
     model = _model(left, found.density.oscillator.effects, {})
     fit = model.fitted(_apart(campaign, more)[0])
     if fit is None or above_noise(fit) > (1.0 - 1.0 / EXCESS) * above_noise(left):
@@ -171,23 +175,40 @@ def _is_enough(found: Fit, split: _Split) -> bool:
 def _without(base: Fit, found: Fit, split: _Split) -> tuple[tuple[Compared, ...], Fit, Fit] | None:
     """The faults and both modes, with the longest part of every recording alone."""
     campaign, own = found.density.oscillator.campaign, dict[str, float]()
-    faults, kept, values = list[Fault](), list(campaign.recordings), values_of(split.fit)
+    told, kept, values = list[tuple[Fault, Campaign]](), campaign, values_of(split.fit)
     for r in sorted({jump.recording for jump in split.jumps}):
         recording = campaign.recordings[r]
         parts = _parts(recording, [j for j in split.jumps if j.recording == r])
         longest = max(parts, key=lambda part: recording.part(*part).count)
-        kept[r] = recording.part(*longest)
-        told = [(j, n) for j, n in zip(split.jumps, split.nats, strict=True) if j.recording == r]
-        faults += [_fault(recording, jump, nats, longest) for jump, nats in told]
+        cut, gained = 0, zip(split.jumps, split.nats, strict=True)
+        for jump, nats in _inwards([(j, n) for j, n in gained if j.recording == r], longest):
+            now = kept.recordings[r]
+            fault, part = _fault(now, jump.moved(-cut), nats, is_before=jump.place < longest[0])
+            kept, cut = _with(kept, r, now.part(*part)), cut + part[0]
+            told.append((fault, kept))
         name = f"[{_part_name(recording, longest[0])}]"
         own |= {n.replace(name, f"[{recording.name}]"): values[n] for n in values if name in n}
-    cut = replace(campaign, recordings=tuple(kept))
-    again = _model(split.fit, found.density.oscillator.effects, own).fitted(cut)
-    plain = _model(base, base.density.oscillator.effects, {}).fitted(cut)
+    again = _model(split.fit, found.density.oscillator.effects, own).fitted(kept)
+    plain = _model(base, base.density.oscillator.effects, {}).fitted(kept)
     if again is None or plain is None:
         return None
     change = found.reduced_chi2, again.reduced_chi2
-    return tuple(Compared(fault, cut, *change) for fault in faults), plain, again
+    return tuple(Compared(fault, after, *change) for fault, after in told), plain, again
+
+
+def _inwards(
+    jumps: list[tuple[StateJump, float]], kept: tuple[int, int]
+) -> list[tuple[StateJump, float]]:
+    """Jumps of a recording, those farther from the part that is kept first on either side of it."""
+    ordered = sorted(jumps, key=lambda one: one[0].place)
+    before = [one for one in ordered if one[0].place < kept[0]]
+    return [*before, *ordered[len(before) :][::-1]]
+
+
+def _with(campaign: Campaign, r: int, recording: Recording) -> Campaign:
+    """The campaign with another recording in the place of one."""
+    recordings = campaign.recordings
+    return replace(campaign, recordings=(*recordings[:r], recording, *recordings[r + 1 :]))
 
 
 def _model(fit: Fit, effects: tuple[Effect, ...], values: dict[str, float]) -> SharedModel:
@@ -223,20 +244,22 @@ def _parts(recording: Recording, jumps: Sequence[StateJump]) -> list[tuple[int, 
     return list(zip(firsts, ends, strict=True))
 
 
-def _fault(recording: Recording, jump: StateJump, nats: float, kept: tuple[int, int]) -> Fault:
-    """The knock as a record, whose remedy leaves out what lies beyond it, seen from what is
-    `kept`.
+def _fault(
+    recording: Recording, jump: StateJump, nats: float, *, is_before: bool
+) -> tuple[Fault, tuple[int, int]]:
+    """The knock as a record, whose remedy leaves out what lies before it or after it; and the part
+    that stays.
     """
     size = recording.samples.size
     first, second = _parts(recording, [jump])
-    if kept[0] < jump.place:
-        span, remedy = (first[1], size), "end_s"
-        edge = file_time(recording, first[1] - 0.6)
-    else:
-        span, remedy = (0, second[0]), "start_s"
+    if is_before:
+        kept, span, remedy = second, (0, second[0]), "start_s"
         edge = file_time(recording, second[0] - 0.4)
+    else:
+        kept, span, remedy = first, (first[1], size), "end_s"
+        edge = file_time(recording, first[1] - 0.6)
     when = file_time(recording, jump.place)
-    return Fault(
+    fault = Fault(
         id="recording_knock",
         recording=recording.name,
         spans=(span,),
@@ -251,6 +274,7 @@ def _fault(recording: Recording, jump: StateJump, nats: float, kept: tuple[int, 
         threshold=CERTAIN,
         action="cut",
     )
+    return fault, kept
 
 
 def likeliest_jump(fit: Fit, r: int) -> StateJump | None:

@@ -14,7 +14,7 @@ import small_rig
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.diagnosis.faults.first_physics import faults_beside_physics
 from bayesimpact.diagnosis.faults.knock import _basis, _score, _sums, knocks_beside, likeliest_jump
-from bayesimpact.diagnosis.faults.recording_faults import cleaned_campaign
+from bayesimpact.diagnosis.faults.recording_faults import cleaned_campaign, fault_as_read
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import fit_from
 from bayesimpact.diagnosis.selection.revision import first_revision, revised
@@ -122,6 +122,16 @@ def test_several_knocks_are_told_together() -> None:
     assert sizes[2] == pytest.approx(4000 - 1705, abs=30)
     assert first.reduced_chi2 < 1.1
     assert first.names == found.names
+    campaign = found.density.oscillator.campaign
+    before = [campaign, *(c.campaign for c in compared)]
+    for name, size in (("b", sizes[1]), ("c", sizes[2])):
+        spans = [
+            fault_as_read(c.fault, now, campaign).spans[0]
+            for c, now in zip(compared, before, strict=False)
+            if c.fault.recording == name
+        ]
+        beyond = np.concatenate([np.arange(*span) for span in spans])
+        assert sorted(beyond) == list(range(4000 - size))  # each reading once
 
 
 def test_revised_search_begins_without_it() -> None:
