@@ -21,6 +21,13 @@ FEW_STEPS = 5
 # Units that the stamps of a slow clock differ by from even ones, and a little for the fit of a line
 EVENLY = 1.2
 FINE = 0.2  # of an interval: a coarser unit may hide that a clock is not even
+ON_THE_WHOLE = 0.1  # relative: of a few batches the last may be short
+LEAST_TAKEN = 60  # readings that tell it
+SMOOTHER = 1.25
+"""Times less that readings are off a cubic over their numbers than over their stamps. Of 8,000
+drawn decays that were taken at their uneven stamps (4 to 50 a period, noise of 1e-4 to .1) the
+ratio never was above 1.17; of as many that were taken evenly it was above this in 12 to 96 %,
+fewest where stamps jitter by little and a period has 4 readings."""
 
 
 def even_interval(
@@ -119,3 +126,39 @@ def check_rate(path: Path | str, interval: float, rate: float | None) -> None:
         found = f"sample_rate_hz = {rate:g}, and a clock at {1 / interval:g} Hz"
         accepted = "the recording's clock, or sample_rate_hz, or both agreeing"
         raise InputError(str(path), found, accepted)
+
+
+def check_mean_rate(path: Path | str, times: NDArray[np.float64], rate: float) -> None:
+    """Refuse a stated rate that stamps of when readings arrived contradict on the whole."""
+    span = float(times[-1] - times[0])
+    mean = (times.size - 1) / span if span > 0.0 else 0.0
+    if abs(mean - rate) > ON_THE_WHOLE * rate:
+        found = f"sample_rate_hz = {rate:g}, and {mean:.4g} rows a second by the time column"
+        raise InputError(str(path), found, "a rate that agrees with the rows on the whole")
+
+
+def taken_evenly(times: NDArray[np.float64], samples: NDArray[np.float64]) -> bool:
+    """Whether readings (n,) follow one another evenly although their time stamps (n,) do not: those
+    of when they arrived, behind a buffer, do not tell when they were taken.
+    """
+    if times.size < LEAST_TAKEN or not np.all(np.diff(times) > 0.0):
+        return False
+    numbers = np.arange(times.size, dtype=np.float64)
+    return _off_a_cubic(times, samples) > SMOOTHER * _off_a_cubic(numbers, samples)
+
+
+def _off_a_cubic(places: NDArray[np.float64], samples: NDArray[np.float64]) -> float:
+    """How far samples (n,) are off the cubic through two neighbours on either side, on average,
+    over what independent noise would be.
+    """
+    beside = (slice(None, -4), slice(1, -3), slice(3, -1), slice(4, None))
+    at, off = places[2:-2], samples[2:-2].copy()
+    variance = np.ones_like(off)
+    for one in beside:
+        weight = np.ones_like(off)
+        for other in beside:
+            if other is not one:
+                weight *= (at - places[other]) / (places[one] - places[other])
+        off -= weight * samples[one]
+        variance += weight**2
+    return float(np.mean(np.abs(off) / np.sqrt(variance)))

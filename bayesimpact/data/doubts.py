@@ -35,6 +35,8 @@ def doubts_of(entry: RecordingTable, table: Table, recording: Recording) -> list
     """What a user should look at in how an entry of campaign.toml was read, in words."""
     found = [_clock(recording)] if table.assumed_seconds else []
     found.append(_hole(entry, table, recording))
+    if table.stamped_late:
+        found.append(_late(recording))
     found.append(_scale("its readings are", entry.scale, table.unit, units_like(table.unit)))
     given = entry.input
     if given is not None:
@@ -87,6 +89,15 @@ def _hole(entry: RecordingTable, table: Table, recording: Recording) -> str:
     if recording.start > table.start + (begun + 0.5) * table.interval:
         text += f"; it is read from {recording.start:.4g} s on, for few readings lie before"
     return text
+
+
+def _late(recording: Recording) -> str:
+    """Doubt of time stamps that are uneven where the readings are not."""
+    return (
+        "its time stamps are uneven, and its readings follow one another evenly, as behind a "
+        "buffer: leave out resample and time_column, and state the rate in campaign.toml, "
+        f"sample_rate_hz = {1.0 / recording.interval:.4g}"
+    )
 
 
 def _clock(recording: Recording) -> str:

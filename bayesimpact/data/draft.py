@@ -16,6 +16,7 @@ from bayesimpact.data.draft_lines import (
     SHOWN,
     channel_lines,
     input_lines,
+    late_lines,
     likely_responses,
     resample_lines,
 )
@@ -193,7 +194,8 @@ def _recording_lines(one: Look, rig: DraftedRig) -> list[str]:
     lines = [f"encoding = {toml(one.encoding)}"] if one.encoding else []
     if one.own_kind:
         clock = next(c for c in one.channels if c.name in TIME_COLUMNS)
-        lines += resample_lines(clock)
+        late = [line for c in likely_responses(one.channels)[:1] for line in late_lines(clock, c)]
+        lines += late or resample_lines(clock)
     else:
         lines += channel_lines(one.channels, rig.unit, rig.rate)
     return lines + input_lines(one.channels)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bayesimpact.data.clock import even_interval
+from bayesimpact.data.clock import even_interval, taken_evenly
 from bayesimpact.data.doubts import SLOWEST, likely_unit
 from bayesimpact.data.input import UNITS as INPUT_UNITS
 from bayesimpact.data.input import Kind
@@ -115,6 +115,8 @@ def _clock_lines(inside: Sequence[Channel], response: Channel, rate: float | Non
         return [f"sample_rate_hz = {rate!r}"]
     if clock is None:
         return [f"# sample_rate_hz = 1000.0  # {NEEDED}: the file has no clock"]
+    if late := late_lines(clock, response):
+        return late
     even = is_even(clock)
     why = [f"it rises{' evenly' if even else ''}"] if guessed else []
     if len(clocks) > 1:
@@ -129,6 +131,18 @@ def _clock_lines(inside: Sequence[Channel], response: Channel, rate: float | Non
         needed = f"{NEEDED}: read in s a period would last {period:.4g} s; {', '.join(TIME_UNITS)}"
         lines.append(f"# time_unit = {toml(likely_unit(period))}  # {needed}")
     return lines + resample_lines(clock)
+
+
+def late_lines(clock: Channel, response: Channel) -> list[str]:
+    """The mean rate of readings that follow one another evenly although their times do not."""
+    times = clock.seconds()
+    if times.size != response.samples.size or is_even(clock):
+        return []
+    if not taken_evenly(times, response.samples):
+        return []
+    rate = (times.size - 1) / float(times[-1] - times[0])
+    why = f"the readings follow one another evenly, the times of {one_line(clock.label)} do not"
+    return [f"sample_rate_hz = {rate:.6g}  # {ASSUMED}: {why}: those of a buffer"]
 
 
 def resample_lines(clock: Channel) -> list[str]:

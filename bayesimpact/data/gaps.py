@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.data.clock import JITTER, even_interval, rounded_interval
+from bayesimpact.data.clock import JITTER, even_interval, rounded_interval, taken_evenly
 from bayesimpact.data.period import crossing_period
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
@@ -32,11 +32,14 @@ GAP = 2.5  # typical intervals between two stamps: more is a gap
 
 @dataclass(frozen=True, eq=False)
 class Even:
-    """Readings on an even clock: samples (n,), interval s, used (n,) or None."""
+    """Readings on an even clock: samples (n,), interval s, used (n,) or None; whether they follow
+    one another evenly as they were, and their stamps are of when they arrived.
+    """
 
     samples: Array
     interval: float
     used: Mask | None
+    stamped_late: bool = False
 
 
 def runs(mask: Mask) -> list[tuple[int, int]]:
@@ -264,9 +267,10 @@ def on_even_clock(
     distance = np.minimum(np.abs(even - times[before]), np.abs(even - times[before + 1]))
     used = (steps[before] <= GAP * typical) | (distance < 0.1 * typical)
     values = np.asarray(CubicSpline(times, samples)(even), dtype=np.float64)
+    late = taken_evenly(times, samples)
     if used.all():
-        return Even(values, float(even[1] - even[0]), None)
-    return Even(bridged(values, used), float(even[1] - even[0]), used)
+        return Even(values, float(even[1] - even[0]), None, late)
+    return Even(bridged(values, used), float(even[1] - even[0]), used, late)
 
 
 def _missing_rows(times: Array, samples: Array, steps: Array) -> Even | None:

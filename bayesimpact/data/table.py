@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.data.clock import check_rate
+from bayesimpact.data.clock import check_mean_rate, check_rate, taken_evenly
 from bayesimpact.data.fields import fields, unquoted
 from bayesimpact.data.gaps import on_clock
 from bayesimpact.data.quantity import RESPONSE_COLUMNS, UNITS, Quantity
@@ -38,6 +38,7 @@ class Table:
     unit, input_unit : that the readings and the input were taken for, in the file; "" where nothing
         said one
     assumed_seconds : nothing said the unit of the time stamps, and they were taken for s
+    stamped_late : readings taken over to an even clock follow one another evenly as they are
     """
 
     samples: NDArray[np.float64]
@@ -49,6 +50,7 @@ class Table:
     unit: str = ""
     input_unit: str = ""
     assumed_seconds: bool = False
+    stamped_late: bool = False
 
 
 @dataclass(frozen=True)
@@ -117,10 +119,16 @@ def read_table(
         first, last = unbroken(times, samples, first, last)
     times, samples, rows = times[first:last], samples[first:last], rows[first:last]
     _check_finite(path, lines, layout, samples, rows)
+    if sample_rate is not None and not resample and taken_evenly(times, samples):
+        check_mean_rate(path, times, sample_rate)
+        return Table(samples, 1.0 / sample_rate, float(times[0]), quantity, unit=layout.unit)
     even = on_clock(path, times, samples, rows, resample=resample)
     check_rate(path, even.interval, sample_rate)
     start = float(times[0])
-    return Table(even.samples, even.interval, start, quantity, even.used, unit=layout.unit)
+    return Table(
+        even.samples, even.interval, start, quantity, even.used,
+        unit=layout.unit, stamped_late=even.stamped_late,
+    )  # fmt: skip
 
 
 def squeezed(name: str) -> str:

@@ -247,3 +247,46 @@ def test_time_that_runs_backwards_names_its_place(tmp_path: Path, name: str) -> 
     place = "sample 8" if name == "a.mat" else "line 9"
     with pytest.raises(InputError, match=f"{name}, {place}: found time that does not increase"):
         _read(tmp_path, name)
+
+
+def _log(path: Path, head: str, late: bool) -> None:
+    """A decay of 1 Hz read 20 times a second, stamped when a buffer was sent, or as it was read."""
+    rng = np.random.default_rng(3)
+    even = 0.05 * np.arange(300)
+    stamps = 0.05 * np.cumsum(np.maximum(1.0 + 0.4 * rng.standard_normal(300), 0.1))
+    taken = even if late else stamps
+    mm = 20.0 * np.exp(-0.05 * taken) * np.cos(2 * np.pi * taken) + rng.normal(0.0, 0.05, 300)
+    rows = (f"{t:.4f},{x:.4f}" for t, x in zip(stamps, mm, strict=True))
+    path.write_text("\n".join([head, *rows]) + "\n")
+
+
+@pytest.mark.parametrize("head", ["time_s,displacement_mm", "t,laser_mm"])
+@pytest.mark.parametrize("late", [True, False])
+def test_stamps_of_when_readings_arrived_are_no_clock(
+    tmp_path: Path, head: str, late: bool
+) -> None:
+    _log(tmp_path / "log.csv", head, late)
+    result = CliRunner().invoke(main, ["new", str(tmp_path / "c"), str(tmp_path / "log.csv")])
+    assert result.exit_code == 0, result.output
+    draft = (tmp_path / "c" / "campaign.toml").read_text()
+    assert ("sample_rate_hz = " in draft, "resample = true" in draft) == (late, not late)
+    read = bi.load(tmp_path / "c").recordings[0]
+    t = read.interval * np.arange(read.samples.size)
+    fit = 0.02 * np.exp(-0.05 * t) * np.cos(2 * np.pi * t * 0.05 / read.interval)
+    as_written = bool(np.abs(read.samples - fit).max() < 3e-4)
+    assert as_written is late
+
+
+def test_readings_that_are_moved_to_stamps_of_a_buffer_are_doubted(tmp_path: Path) -> None:
+    for late in (True, False):
+        _log(tmp_path / "log.csv", "time_s,displacement_mm", late)
+        folder = write(tmp_path, HEAD.format("log.csv") + "resample = true\n", a=None, b=None)
+        doubts = " ".join(bi.load(folder).doubts)
+        assert ("sample_rate_hz = " in doubts) is late
+
+
+def test_a_rate_that_such_stamps_contradict_is_refused(tmp_path: Path) -> None:
+    _log(tmp_path / "log.csv", "time_s,displacement_mm", True)
+    keys = HEAD.format("log.csv") + "sample_rate_hz = 25\n"
+    with pytest.raises(InputError, match="agrees with the rows on the whole"):
+        bi.load(write(tmp_path, keys, a=None, b=None))

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.data.clock import check_rate
+from bayesimpact.data.clock import check_mean_rate, check_rate, taken_evenly
 from bayesimpact.data.gaps import on_clock
 from bayesimpact.data.input import Kind, unit_factor
 from bayesimpact.data.quantity import UNITS, Quantity, units_of
@@ -26,7 +26,6 @@ from bayesimpact.data.window import unbroken, window
 from bayesimpact.errors import InputError
 
 Floats = NDArray[np.float64]
-ON_THE_WHOLE = 0.1  # relative: of a few batches the last may be short
 SHOWN = 12
 """Channels that a message lists."""
 
@@ -88,7 +87,7 @@ def choose(path: Path, channels: Sequence[Channel], wanted: Wanted) -> Table:
     check_rate(path, even.interval, wanted.sample_rate)
     return Table(
         even.samples, even.interval, float(stamps[0]), quantity, even.used,
-        unit=unit, assumed_seconds=assumed,
+        unit=unit, assumed_seconds=assumed, stamped_late=even.stamped_late,
     )  # fmt: skip
 
 
@@ -204,9 +203,9 @@ def _clock(
     stated = clocks_of(channels, channel)
     if wanted.sample_rate is not None:  # what is stated comes before what is guessed
         stated = [c for c in stated if c.is_called_time]
-        if len(stated) == 1 and stated[0].in_batches:
-            times = stated[0].seconds(wanted.time_unit)
-            _check_mean_rate(path, times, wanted.sample_rate)
+        times = stated[0].seconds(wanted.time_unit) if len(stated) == 1 else None
+        if times is not None and (stated[0].in_batches or taken_evenly(times, channel.samples)):
+            check_mean_rate(path, times, wanted.sample_rate)
             return 1.0 / wanted.sample_rate, float(times[0])
     if len(stated) > 1:  # a time of day beside a clock with a unit
         with_unit = [c for c in stated if c.unit]
@@ -223,15 +222,6 @@ def _clock(
         raise InputError(str(path), found, f'time_column = "...", one of {listed(stated)}')
     found = f"no clock for channel {channel.name} among {listed(channels)}"
     raise InputError(str(path), found, "time_column, or sample_rate_hz in campaign.toml")
-
-
-def _check_mean_rate(path: Path, times: Floats, rate: float) -> None:
-    """Refuse a stated rate that stamps of batches contradict on the whole."""
-    span = float(times[-1] - times[0])
-    mean = (times.size - 1) / span if span > 0.0 else 0.0
-    if abs(mean - rate) > ON_THE_WHOLE * rate:
-        found = f"sample_rate_hz = {rate:g}, and {mean:.4g} rows a second by the time column"
-        raise InputError(str(path), found, "a rate that agrees with the rows on the whole")
 
 
 def _times(
