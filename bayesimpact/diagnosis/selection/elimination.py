@@ -21,7 +21,9 @@ from bayesimpact.diagnosis.selection.ranked import Ranked
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.fit import Fit
+from bayesimpact.model.effects import EFFECTS, UNTRIED
 from bayesimpact.model.effects.effect import Effect
+from bayesimpact.model.effects.obstacle_mass import EFFECT as OBSTACLE_MASS
 
 EXCHANGES = 3  # rounds of leaving out and exchanging effects
 END = 1e-3  # of a shape's range, in which it lies at an end: ascents stop there
@@ -123,6 +125,8 @@ class Elimination(Ranked):
         Where the misfit was large, several of its own family together too: two damping laws make a
         third one. Where it was not, all single effects have been fitted beside the base model.
         """
+        for effect in chosen.effects:
+            self.beside_untried(chosen, effect)
         if len(chosen.effects) < 2 and not self.is_large:
             return
         for effect in chosen.effects:
@@ -154,6 +158,17 @@ class Elimination(Ranked):
             for new in _unseen(found, wanted - {effect.id}, promising):
                 if self.may_go_on() and not is_redundant(rest, new):
                     self.exchange_in_place(chosen, effect, new)
+
+    def beside_untried(self, chosen: Candidate, effect: Effect) -> None:
+        """Put what is not looked for by itself in the place of what else an obstacle does: a name
+        is none while what is so much like it was not compared.
+        """
+        if not effect.needs_stop or OBSTACLE_MASS not in self.effects:  # of another catalogue
+            return
+        for other in EFFECTS:
+            known = other.id in chosen.ids or is_redundant(chosen, other)
+            if other.id in UNTRIED and not known and self.may_go_on():
+                self.exchange_in_place(chosen, effect, other)
 
     def leaves_nothing(self, candidate: Candidate) -> bool:
         """Whether a model has been examined, and nothing was missing from it."""

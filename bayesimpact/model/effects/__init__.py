@@ -86,8 +86,8 @@ EFFECTS: tuple[Effect, ...] = (
 )
 
 UNTRIED = ("obstacle_mode", "obstacle_restitution")
-"""Simulated and fitted like any, but not looked for unless asked: in trials they were not told from
-other modes and losses of the contact.
+"""Simulated and fitted like any, but not looked for by themselves: in trials they were not told
+from other modes and losses of the contact, in the place of which a diagnosis tries them.
 """
 
 SEARCHED: tuple[Effect, ...] = tuple(e for e in EFFECTS if e.id not in UNTRIED)

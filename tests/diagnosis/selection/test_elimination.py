@@ -14,6 +14,7 @@ from bayesimpact.diagnosis.refits.refit import Candidate
 from bayesimpact.diagnosis.score_test.scan import Scan
 from bayesimpact.diagnosis.selection import elimination, ranked
 from bayesimpact.diagnosis.selection.elimination import Elimination
+from bayesimpact.model.effects import SEARCHED, UNTRIED
 
 RNG = np.random.default_rng
 FRICTION, DRAG, SPRING = "coulomb_friction", "quadratic_drag", "spring_cubic"
@@ -174,3 +175,19 @@ def test_a_range_ends_where_ascents_stop(at: float, ends: bool) -> None:
     mode[shape] = at
     fit: Any = SimpleNamespace(density=density, mode=mode)
     assert elimination.is_at_an_end(fit, power) is ends
+
+
+@pytest.mark.parametrize("whole", [True, False])
+def test_what_is_not_looked_for_is_compared_with_what_else_an_obstacle_does(whole: bool) -> None:
+    """A loss in the instant of impact was called a mass of the obstacle, with certainty; a search
+    among other effects than the catalogue's asks for none of it.
+    """
+    effects = SEARCHED if whole else (BY_ID["contact_hardening"],)
+    search: Any = Elimination(effects, None, RNG(0), lambda words: None)
+    search.examined_models = {frozenset(): SimpleNamespace(candidate=model("", 4.0))}
+    in_place = []
+    search.exchange_in_place = lambda chosen, old, new: in_place.append((old.id, new.id))
+    for ids in ("obstacle_mass", FRICTION, UNTRIED[0]):  # alone, so that nothing else is exchanged
+        search.exchange(model(ids, 1.0))
+    told = [("obstacle_mass", other) for other in UNTRIED] + [(UNTRIED[0], UNTRIED[1])]
+    assert sorted(in_place) == (sorted(told) if whole else [])
