@@ -21,9 +21,7 @@ from bayesimpact.diagnosis.selection.ranked import Ranked
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.fit import Fit
-from bayesimpact.model.effects import EFFECTS, UNTRIED
 from bayesimpact.model.effects.effect import Effect
-from bayesimpact.model.effects.obstacle_mass import EFFECT as OBSTACLE_MASS
 
 EXCHANGES = 3  # rounds of leaving out and exchanging effects
 END = 1e-3  # of a shape's range, in which it lies at an end: ascents stop there
@@ -163,11 +161,9 @@ class Elimination(Ranked):
         """Put what is not looked for by itself in the place of what else an obstacle does: a name
         is none while what is so much like it was not compared.
         """
-        if not effect.needs_stop or OBSTACLE_MASS not in self.effects:  # of another catalogue
-            return
-        for other in EFFECTS:
+        for other in self.untried if effect.needs_stop else ():
             known = other.id in chosen.ids or is_redundant(chosen, other)
-            if other.id in UNTRIED and not known and self.may_go_on():
+            if not known and self.may_go_on():
                 self.exchange_in_place(chosen, effect, other)
 
     def leaves_nothing(self, candidate: Candidate) -> bool:

@@ -38,7 +38,9 @@ from bayesimpact.diagnosis.thresholds import EXCESS, LARGE
 from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.progress import Refit
+from bayesimpact.model.effects import EFFECTS, UNTRIED
 from bayesimpact.model.effects.effect import Effect, Scales
+from bayesimpact.model.effects.obstacle_mass import EFFECT as OBSTACLE_MASS
 
 STARTS = 2  # points of an effect's shape grid from which it is fitted
 # Nats by which a fit that ended unconverged may lie below its mode. Set by hand and generous: too
@@ -209,9 +211,19 @@ class Models:
         return max(parts, key=lambda c: c.fit.log_likelihood)
 
     @cached_property
+    def untried(self) -> tuple[Effect, ...]:
+        """What is not looked for by itself (`UNTRIED`), in a search of the catalogue."""
+        if OBSTACLE_MASS not in self.effects:
+            return ()
+        return tuple(e for e in EFFECTS if e.id in UNTRIED and e not in self.effects)
+
+    @cached_property
     def asked(self) -> Asked:
-        """What the equation of motion and periods ahead ask for."""
-        return Asked(self.examined_models[frozenset()].candidate.fit, self.effects, self.scales)
+        """What the equation of motion and periods ahead ask for, where the misfit is large: there
+        all of the catalogue is told apart.
+        """
+        base = self.examined_models[frozenset()].candidate.fit
+        return Asked(base, (*self.effects, *self.untried), self.scales)
 
     def asked_beside(
         self,

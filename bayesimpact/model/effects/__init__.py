@@ -86,8 +86,9 @@ EFFECTS: tuple[Effect, ...] = (
 )
 
 UNTRIED = ("obstacle_mode", "obstacle_restitution")
-"""Simulated and fitted like any, but not looked for by themselves: in trials they were not told
-from other modes and losses of the contact, in the place of which a diagnosis tries them.
+"""Simulated and fitted like any, but not scored: near the limit they were not told from other modes
+and losses of the contact in trials. A diagnosis tries them in the place of these, and asks for them
+where the misfit is large.
 """
 
 SEARCHED: tuple[Effect, ...] = tuple(e for e in EFFECTS if e.id not in UNTRIED)

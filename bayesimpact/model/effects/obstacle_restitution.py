@@ -10,7 +10,7 @@ Its absence shows as a constant restitution: the same relative loss at every imp
 speed and the obstacle.
 Source: Newton 1687, Principia, scholium to the laws of motion; Goldsmith 1960, Impact, chapter 1.
 Status: speed after an impact checked in closed form; compiled against two independent integrators.
-Tried in the place of what else an obstacle does: no trials yet.
+Asked for by large misfits and in the place of what else an obstacle does: no trials yet.
 """
 
 from __future__ import annotations

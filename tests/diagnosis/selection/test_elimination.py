@@ -12,7 +12,7 @@ from made_up_models import A, B, Table
 
 from bayesimpact.diagnosis.refits.refit import Candidate
 from bayesimpact.diagnosis.score_test.scan import Scan
-from bayesimpact.diagnosis.selection import elimination, ranked
+from bayesimpact.diagnosis.selection import elimination, models, ranked
 from bayesimpact.diagnosis.selection.elimination import Elimination
 from bayesimpact.model.effects import SEARCHED, UNTRIED
 
@@ -191,3 +191,14 @@ def test_what_is_not_looked_for_is_compared_with_what_else_an_obstacle_does(whol
         search.exchange(model(ids, 1.0))
     told = [("obstacle_mass", other) for other in UNTRIED] + [(UNTRIED[0], UNTRIED[1])]
     assert sorted(in_place) == (sorted(told) if whole else [])
+
+
+@pytest.mark.parametrize("whole", [True, False])
+def test_a_large_misfit_is_asked_of_the_whole_catalogue(monkeypatch, whole: bool) -> None:
+    """There even a mode of the obstacle is told from the others."""
+    effects = SEARCHED if whole else (BY_ID["contact_hardening"],)
+    search: Any = Elimination(effects, None, RNG(0), lambda words: None)
+    search.examined_models = {frozenset(): SimpleNamespace(candidate=model("", 400.0))}
+    monkeypatch.setattr(models, "Asked", lambda fit, effects, scales: {e.id for e in effects})
+    asked = {e.id for e in SEARCHED} | set(UNTRIED) if whole else {"contact_hardening"}
+    assert search.asked == asked
