@@ -10,7 +10,7 @@ def listing(effect: Effect) -> list[str]:
     """Id, title with equation and family, and the parameters that would be estimated."""
     lines = [effect.id, f"    {effect.title}: {effect.equation}   [{effect.family}]"]
     if effect.id in UNTRIED:
-        lines.append("    not looked for but by a large misfit, or in the place of what else an obstacle does")
+        lines.append("    not looked for but where much is missing, or in the place of its like")
     return lines + [f"    {_words(effect, p)}" for p in effect.parameters if p.fixed is None]
 
 
