@@ -2,8 +2,8 @@
 
 Under a root of the speed a mass that has no more inertia creeps home: its speed settles so fast
 that steps of an explicit method would have to be thousands of times shorter than the motion needs.
-There the damping of the laws at that speed is counted into the linear flow, as exponential
-Rosenbrock methods do (Hochbruck and Ostermann 2010, Acta Numerica 19:209).
+There the damping of the laws at that speed is counted into the linear flow, anew for every step, as
+exponential Rosenbrock methods do (Hochbruck and Ostermann 2010, Acta Numerica 19:209).
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from bayesimpact.model.jit.compiled import inner
 SINCE_TURN, UNTIL_TURN, MOST_SINCE, MOST_UNTIL = 0.8, 0.46, 1.0, 0.5
 # a mass that creeps under a root of its speed: longest step times the rate at which its speed
 # settles, by the difference of the force over that share of the speed (of a mass nearly AT_REST,
-# m/s, over that). Beyond it that damping is counted into the flow, until it has CHANGED by a share
-STIFF, NEARBY, AT_REST, CHANGED = 1.5, 1.0 / 16.0, 1e-11, 0.25
+# m/s, over that). Beyond it that damping is counted into the flow, anew for every step
+STIFF, NEARBY, AT_REST = 1.5, 1.0 / 16.0, 1e-11
 
 
 @inner()
@@ -87,11 +87,15 @@ def settling_rate(y: Any, v: Any, t: Any, n0: Any, flow: Any, w: Any) -> Any:
 
 @inner(forceinline=True)
 def is_outdated(rate: Any, y: Any, v: Any, n0: Any, longest: Any, flow: Any) -> Any:
-    """Whether a mass creeps that the flow lets swing, or its damping is no longer the flow's."""
-    if not flow.folds:
-        return False
-    if flow.drag > 0.0:
-        return rate > CHANGED * flow.inverse * flow.drag
+    """Whether a step has ended of a flow with the damping of a speed, or a mass creeps that its
+    flow lets swing.
+
+    What is left out of a flow that settles faster than a step lasts has to be nothing: of a force
+    that stays, the method would make many times what it does. At the speed that a flow is chosen
+    for it is.
+    """
+    if not flow.folds or flow.drag > 0.0:
+        return flow.folds
     return (
         rate * longest > STIFF
         and rate * graded(v, pull_at(y, v, n0, flow), longest, flow.first_at_turn) > 2.0 * STIFF

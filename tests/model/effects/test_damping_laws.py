@@ -8,6 +8,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from effect_rigs import BY_ID, TestRig, by_rig, moved
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 from scipy.special import gamma
 
 from bayesimpact.formula.grammar import Power, Term
@@ -62,6 +64,23 @@ def test_creep_to_rest(n):
     assert np.ptp(np.sign(y[first:])) == 0.0
     more, most = (power_law(c * (1.0 + k * 1e-4), n, rig) for k in (1, 2))
     assert np.abs(most - 2 * more + y).max() < 0.01 * np.abs(more - y).max()
+
+
+@pytest.mark.parametrize("c", [40.0, 80.0])
+def test_creep_from_the_release_on(c):
+    """No inertia: c (v^2 + s^2)^((n - 1) / 2) v = k y is solved for v by itself, s the law's
+    slowest speed. The speed settles in microseconds, for which explicit steps would be too many.
+    """
+    rig = TestRig(**{**FREE.__dict__, "duration": 10.0})
+
+    def speed(t, y):
+        force = [lambda v, y=y: c * (v * v + 1e-14) ** -0.375 * v - rig.k1 * y for y in y]
+        return [-brentq(f, 0.0, 1.0, xtol=1e-18, rtol=1e-13) for f in force]
+
+    t = np.arange(rig.count) / rig.rate
+    crept = solve_ivp(speed, (0.0, t[-1]), [-rig.y0[0]], t_eval=t, rtol=1e-10, atol=1e-15).y[0]
+    assert -rig.y0[0] - crept[-1] > 1e-5
+    assert np.abs(power_law(c, 0.25, rig) + crept).max() < 2e-9
 
 
 def test_one_and_two_are_the_simpler_laws():
