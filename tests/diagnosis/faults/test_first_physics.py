@@ -54,7 +54,7 @@ def found(campaign: Campaign, before: Corrected | None = None) -> tuple[Step, ..
 def test_a_clock_shows_beside_the_law_that_is_asked_for_first():
     ((fault,),) = found(*slow_clock())
     assert fault.fault.id == "recording_clock" and fault.fault.recording == "b"
-    assert "-0.4" in fault.fault.statement or "-0.39" in fault.fault.statement
+    assert "−0.4" in fault.fault.statement or "−0.39" in fault.fault.statement
 
 
 @pytest.mark.parametrize("gain", [1.03, 1.0])
