@@ -115,8 +115,6 @@ def _clock_lines(inside: Sequence[Channel], response: Channel, rate: float | Non
         return [f"sample_rate_hz = {rate!r}"]
     if clock is None:
         return [f"# sample_rate_hz = 1000.0  # {NEEDED}: the file has no clock"]
-    if late := late_lines(clock, response):
-        return late
     even = is_even(clock)
     why = [f"it rises{' evenly' if even else ''}"] if guessed else []
     if len(clocks) > 1:
@@ -124,6 +122,8 @@ def _clock_lines(inside: Sequence[Channel], response: Channel, rate: float | Non
         why.append(f"it is next to the response; others: {one_line(rest)}")
     period = _period(clock, response)
     slow = not clock.unit and period > SLOWEST
+    if not slow and (late := late_lines(clock, response)):
+        return late
     why += [] if clock.unit or slow else ["in s"]
     note = f"  # {ASSUMED}: {', '.join(why)}" if why else ""
     lines = [f"time_column = {_chosen(inside, clock)}{note}"]
@@ -142,7 +142,8 @@ def late_lines(clock: Channel, response: Channel) -> list[str]:
         return []
     rate = (times.size - 1) / float(times[-1] - times[0])
     why = f"the readings follow one another evenly, the times of {one_line(clock.label)} do not"
-    return [f"sample_rate_hz = {rate:.6g}  # {ASSUMED}: {why}: those of a buffer"]
+    unit = "" if clock.unit else "; in s"
+    return [f"sample_rate_hz = {rate:.6g}  # {ASSUMED}: {why}: those of a buffer{unit}"]
 
 
 def resample_lines(clock: Channel) -> list[str]:

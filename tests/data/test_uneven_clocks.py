@@ -19,7 +19,7 @@ from scipy.io import savemat
 
 import bayesimpact as bi
 from bayesimpact.cli import main
-from bayesimpact.data.clock import FEW_STEPS, rounded_interval
+from bayesimpact.data.clock import FEW_STEPS, rounded_interval, taken_evenly
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 
@@ -290,3 +290,25 @@ def test_a_rate_that_such_stamps_contradict_is_refused(tmp_path: Path) -> None:
     keys = HEAD.format("log.csv") + "sample_rate_hz = 25\n"
     with pytest.raises(InputError, match="agrees with the rows on the whole"):
         bi.load(write(tmp_path, keys, a=None, b=None))
+
+
+def _intervals(rng: np.random.Generator, kind: str, count: int) -> np.ndarray:
+    if kind == "jitter":
+        return np.maximum(1.0 + rng.uniform(0.02, 0.4) * rng.standard_normal(count), 0.05)
+    return 0.02 + rng.exponential(1.0, count)
+
+
+@pytest.mark.parametrize("kind", ["jitter", "exponential"])
+def test_a_clock_that_is_right_is_never_called_late(kind: str) -> None:
+    """Of decays at 4 to 50 readings a period none that was read at its stamps; many that were not."""
+    rng, told = np.random.default_rng(7), {True: 0, False: 0}
+    for draw in range(150):
+        per_period, count = (4, 6, 10, 20, 50)[draw % 5], int(rng.integers(60, 400))
+        stamps = np.cumsum(_intervals(rng, kind, count))
+        stamps *= count / per_period / stamps[-1]
+        for late, taken in ((False, stamps), (True, np.arange(count) / per_period)):
+            decay = np.exp(-0.1 * taken) * np.cos(2 * np.pi * taken)
+            noise = 10.0 ** rng.uniform(-4.0, -1.0) * rng.standard_normal(count)
+            told[late] += taken_evenly(stamps, decay + noise)
+    assert told[False] == 0
+    assert told[True] > (40 if kind == "jitter" else 110)

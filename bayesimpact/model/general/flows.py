@@ -346,8 +346,7 @@ def next_step(
         return not_beyond(left, max(longest, least), w)
     if flow.first_at_turn < 1.0:
         longest = graded(v, pull_at(y, v, n0, flow), longest, flow.first_at_turn)
-        if flow.drag == 0.0:
-            longest = min(longest, STIFF / max(rate, STIFF / longest))
+        longest = min(longest, STIFF / max(rate, STIFF / longest))
         return not_beyond(left, max(longest, least), w)
     longest = max(longest, least)
     stride = stride_of(longest, w)

@@ -78,8 +78,10 @@ def graded(v: Any, pull: Any, longest: Any, first_at_turn: Any) -> Any:
 
 @inner(forceinline=True)
 def settling_rate(y: Any, v: Any, t: Any, n0: Any, flow: Any, w: Any) -> Any:
-    """Rate at which the forces that the flow leaves out make the speed settle, or drive it, 1/s."""
-    if flow.first_at_turn >= 1.0 or flow.placed:
+    """Rate at which the forces that the flow leaves out make the speed settle, or drive it, 1/s; 0
+    where the flow has their damping.
+    """
+    if flow.first_at_turn >= 1.0 or flow.placed or flow.drag > 0.0:
         return 0.0
     change = small_change(v)
     return abs(flow.inverse * (n0 - added_force(y, v + change, t, NOW, flow, w)) / change)
