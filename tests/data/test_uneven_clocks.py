@@ -300,7 +300,7 @@ def _intervals(rng: np.random.Generator, kind: str, count: int) -> np.ndarray:
 
 @pytest.mark.parametrize("kind", ["jitter", "exponential"])
 def test_a_clock_that_is_right_is_never_called_late(kind: str) -> None:
-    """Of decays at 4 to 50 readings a period none that was read at its stamps; many that were not."""
+    """At 4 to 50 readings a period, of decays read at their stamps none; of others many."""
     rng, told = np.random.default_rng(7), {True: 0, False: 0}
     for draw in range(150):
         per_period, count = (4, 6, 10, 20, 50)[draw % 5], int(rng.integers(60, 400))
