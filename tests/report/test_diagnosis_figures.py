@@ -92,6 +92,17 @@ def test_ranking_marks_the_chosen_model_even_where_it_is_not_the_best() -> None:
     assert colours[-1] == BLACK  # the base model
 
 
+def test_ranking_calls_effects_as_the_report_does() -> None:
+    (axis, *_) = diagnosis_figures(diagnosed())["ranking"].axes
+    labels = [label.get_text() for label in axis.get_yticklabels()]
+    both = "quadratic drag\n+ cubic stiffness of the suspension"
+    assert labels[:3] == ["dry friction", "mass of the obstacle", both]
+    assert "sensor cubic" not in words(diagnosis_figures(diagnosed())["ranking"])
+    places = axis.get_yticks()
+    assert places[2] - places[1] == pytest.approx(1.3)  # further apart: it has two lines
+    assert axis.get_ylim()[0] == pytest.approx(places[-1] + 0.6)
+
+
 @pytest.mark.parametrize(("odds", "row"), [(900.0, 0), (790.0, 2)])
 def test_a_free_force_stands_among_the_models_where_the_verdict_is_unknown(odds, row) -> None:
     evidence = {"models": MODELS, "decisive": 5.5, "free_force_log_odds": odds}

@@ -7,7 +7,7 @@ from diagnosed import diagnosed
 
 from bayesimpact.formula.grammar import Power, Term
 from bayesimpact.formula.law import effect_of
-from bayesimpact.report.diagnosis.formula_text import LETTERS, in_words, letter, written
+from bayesimpact.report.diagnosis.formula_text import LETTERS, letter, written
 from bayesimpact.report.diagnosis.view import FORMULAS, diagnosis_view
 from bayesimpact.report.figures.style import full_symbol
 from bayesimpact.report.latex import symbol as latex_symbol
@@ -38,7 +38,6 @@ def test_letters_are_those_of_the_formula() -> None:
     assert symbol(name).striptags() == "formula: p"
     assert full_symbol(name, 24) == "formula: $p$" and latex_symbol(name) == "formula: $p$"
     assert letter("gap_wear.step") is None and letter("k2[1]") is None
-    assert in_words(f"{effect.id} + gap_wear") == "formula + gap wear"
 
 
 def test_unlikely_formulas_are_counted_not_shown() -> None:

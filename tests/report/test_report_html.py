@@ -212,7 +212,7 @@ def test_diagnosis_tells_its_story_first() -> None:
         "displacement \N{MINUS SIGN}6.0 to 3.0 mm",
         "Probability > 0.999; it changes the log evidence by +812.3.",
         "force = 160 (150 to 170) µN",
-        "mass of the obstacle obstacle mass 0.010 +770.0",
+        "mass of the obstacle 0.010 +770.0",
         "reduced χ² 1.170 1.002",
         "residual rms 5.40 µm 5.00 µm",
         "whiteness p < 0.001 0.40",

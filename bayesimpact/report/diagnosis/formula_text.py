@@ -56,11 +56,3 @@ def letter(name: str) -> str | None:
     """The letter that stands for a parameter of a formula; None for other parameters."""
     effect, _, own = name.partition(".")
     return LETTERS.get(own) if is_formula_id(effect) else None
-
-
-def in_words(ids: str) -> str:
-    """Ids of effects, joined by " + ", as a label: titles are too long for one. A formula's id is
-    left out, for it is no name.
-    """
-    parts = ids.split(" + ")
-    return " + ".join("formula" if is_formula_id(p) else p.replace("_", " ") for p in parts)

@@ -47,7 +47,6 @@ def limit_row(limit: Mapping[str, Any], *, remains: bool) -> dict[str, str | Mar
     upper, detection = limit.get("upper95"), limit.get("detection_limit")
     bias = hidden.get("sd")
     return {
-        "id": str(limit["id"]),
         "title": title_of(str(limit["id"])),
         "parameter": _own_name(str(limit.get("parameter", ""))),
         "upper": "–" if upper is None else quantity(float(upper), unit),

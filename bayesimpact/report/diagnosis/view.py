@@ -21,7 +21,7 @@ from bayesimpact.model.units import (
     typeset,
 )
 from bayesimpact.report.diagnosis.change_view import NUISANCES, change_row, estimate
-from bayesimpact.report.diagnosis.formula_text import effect_title, in_words
+from bayesimpact.report.diagnosis.formula_text import effect_title
 from bayesimpact.report.diagnosis.limit_view import limit_row, not_found, seen
 from bayesimpact.report.diagnosis.next_words import next_view
 from bayesimpact.report.diagnosis.words import titles_of
@@ -75,9 +75,7 @@ def diagnosis_view(results: Results) -> dict[str, Any] | None:
         "effects": [_effect(effect) for effect in diagnosis.get("effects", [])],
         "alternatives": [
             {
-                "id": other["id"],
                 "titles": titles_of(other["id"]),
-                "name": in_words(other["id"]),  # as the figure of the models has it
                 "probability": probability(other["probability"]),
                 "evidence": _plain(other["delta_log_evidence"], 1),
             }
@@ -205,7 +203,6 @@ def _formula(formula: Mapping[str, Any], force: str) -> dict[str, str]:
 
 def _effect(effect: Mapping[str, Any]) -> dict[str, Any]:
     return {
-        "id": effect["id"],
         "title": effect_title(effect["id"], effect.get("title", "")) + of_recordings(effect),
         "family": effect.get("family", ""),
         "size": size_words(effect.get("size")),

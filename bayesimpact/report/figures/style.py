@@ -114,10 +114,20 @@ def label(words: str, unit: str) -> str:
     return f"{words} ({shown})" if shown else words
 
 
-def rows_axis(axis: Axes, names: Sequence[str], *, above: float = 0.6) -> None:
-    """One row per name from the top down, `above` rows of margin over the first; grid behind."""
-    axis.set_yticks(range(len(names)), names)
-    axis.set_ylim(len(names) - 0.4, -above)
+def rows_axis(
+    axis: Axes,
+    names: Sequence[str],
+    *,
+    above: float = 0.6,
+    at: Array | None = None,
+    below: float | None = None,
+) -> None:
+    """One row per name from the top down, `above` rows of margin over the first; grid behind.
+
+    Rows are one apart, or `at` places of which the last ends at `below`.
+    """
+    axis.set_yticks(np.arange(len(names)) if at is None else at, names)
+    axis.set_ylim(len(names) - 0.4 if below is None else below, -above)
     axis.grid(axis="x")
     axis.set_axisbelow(True)
 
