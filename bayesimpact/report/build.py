@@ -121,8 +121,9 @@ def _results(
         _smoothing(oscillator.smoothing), m.mass_sd, m.clock_sd, m.gain_sd
     )
     draws = None if posterior is None else posterior.draws
-    told = context.diagnosis or {}
-    left = told.get("remainder")
+    told = context.diagnosis
+    if told is not None and draws is not None and told.get("remainder") is None:
+        told = None  # its numbers are of these draws
     summary = Results(
         name=campaign.name,
         mass=campaign.mass,
@@ -130,7 +131,7 @@ def _results(
         quantity=campaign.recordings[0].quantity,
         recordings=recording_results(fit),
         rows=build_rows(
-            fit, draws, chain, references(campaign), told["parameters"]["after"] if left else None
+            fit, draws, chain, references(campaign), told["parameters"]["after"] if told else None
         ),
         effects=tuple(
             EffectSummary(e.id, e.title, e.equation, e.statement) for e in oscillator.acting

@@ -336,7 +336,7 @@ class Results:
     @property
     def centre(self) -> str:
         """What an interval stands about: "median" or "mode"."""
-        return "median" if self.draws is not None or self.remains else "mode"
+        return "mode" if self.draws is None and self.diagnosis is None else "median"
 
     @property
     def unit(self) -> str:

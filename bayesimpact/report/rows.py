@@ -44,8 +44,8 @@ def build_rows(
     Parameters
     ----------
     draws : (S, d), or None for the Laplace approximation
-    told : medians and intervals that a diagnosis gives: they carry what stays unexplained, which
-        neither draws nor curvature know of
+    told : medians and intervals that a diagnosis gives, which are told everywhere: they end at
+        physical bounds, and carry what stays unexplained, of which draws know nothing
     """
     campaign = fit.density.oscillator.campaign
     angle = campaign.angular

@@ -57,6 +57,12 @@ def parameter_words(results: Results) -> str:
         )
     if results.kind == "posterior":
         words = "Medians and central 90 % intervals of the posterior."
+    elif results.diagnosis is not None:
+        words = (
+            "Medians and central 90 % intervals of the Gaussian that has the posterior's curvature "
+            "at the mode, cut at physical bounds (bayesimpact diagnose without --quick draws from "
+            "the posterior itself)."
+        )
     else:
         words = (
             "The mode, and 90 % intervals of the Gaussian that has the posterior's curvature there "

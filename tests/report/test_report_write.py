@@ -26,6 +26,7 @@ from bayesimpact.report.archive import load_results
 from bayesimpact.report.backbones import backbone_summary
 from bayesimpact.report.build import ReportContext, results_from_fit, results_from_posterior
 from bayesimpact.report.figures.gaussian import gaussian_figures
+from bayesimpact.report.words import parameter_words
 from bayesimpact.report.write import (
     POSTERIOR_FILE,
     REPORT_FILE,
@@ -83,10 +84,23 @@ def test_what_remains_is_in_every_table(identification: Identification) -> None:
     assert row.mode == identification.fit.mode[0] and results.row("k1").ci90[0] > 800
     arrays = {"before_chi2": np.ones(2)}
     assert gaussian_figures(replace(results, diagnosis_arrays=arrays)) == {}
-    certain = results_from_fit(
-        identification, ReportContext(diagnosis=diagnosis | {"remainder": None})
-    )
-    assert certain.row("c1").median == row.mode and certain.centre == "mode"
+
+
+def test_without_draws_the_tables_tell_what_the_diagnosis_tells(
+    identification: Identification,
+) -> None:
+    """Once page one told 0.025 (0.002 to 0.068), the median of a law cut at 0, and the table of
+    parameters the mode, 0.007.
+    """
+    told = {"c1": {"unit": "N s/m", "median": 0.2, "ci90": [0.1, 0.4]}}
+    diagnosis = {"remainder": None, "parameters": {"before": {}, "after": told}}
+    results = results_from_fit(identification, ReportContext(diagnosis=diagnosis))
+    row = results.row("c1")
+    assert (row.median, row.ci90, results.centre) == (0.2, (0.1, 0.4), "median")
+    assert "Medians" in parameter_words(results) and "--quick" in parameter_words(results)
+    undiagnosed = results_from_fit(identification)
+    assert undiagnosed.row("c1").median == row.mode and undiagnosed.centre == "mode"
+    assert "The mode" in parameter_words(undiagnosed)
 
 
 def test_mass_widens_stiffness_and_not_lengths(identification: Identification) -> None:
