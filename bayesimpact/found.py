@@ -6,19 +6,22 @@ The methods call functions that stand by themselves too (`bi.summary`, `bi.save`
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, cast
 
-from bayesimpact.data.html import html_table
+import numpy as np
+
+from bayesimpact.data.html import html_table, sketch
 from bayesimpact.diagnosis import loop
 from bayesimpact.diagnosis.intervals import Intervals, intervals
 from bayesimpact.diagnosis.residual_force.learned import LEARNED
 from bayesimpact.errors import InputError
 from bayesimpact.inference import identify, posterior
+from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.randomness import Random
-from bayesimpact.model.units import readable
+from bayesimpact.model.units import quantity, readable
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -107,9 +110,13 @@ class _Shown:
         return plot(fit.density.oscillator.campaign)
 
     def _repr_html_(self) -> str:
-        """Parameters that all recordings share, in the units and digits of the report."""
+        """Parameters that all recordings share, in the units and digits of the report; recordings
+        and residuals as small pictures.
+        """
         found: Any = self
-        return html_table(repr(self), *_table(found))
+        return (
+            f"<div>{html_table(repr(self), *_table(found))}{_left({'residual': found.fit})}</div>"
+        )
 
 
 class Identification(_Shown, identify.Identification):
@@ -165,7 +172,10 @@ class Diagnosis(_Shown, loop.Diagnosis):
         ]
         found += _changes(self)
         columns = ("", "base model, median (90 %)", "with what was added, median (90 %)")
-        return html_table(repr(self), columns, found)
+        fits = {"residual of the base model": self.before, "with what was added": self.after}
+        if self.before is self.after:
+            fits = {"residual": self.before}
+        return f"<div>{html_table(repr(self), columns, found)}{_left(fits)}</div>"
 
 
 def _table(
@@ -179,6 +189,21 @@ def _table(
     else:
         results = results_from_fit(found)
     return results.table
+
+
+def _left(fits: Mapping[str, Fit]) -> str:
+    """Every recording, and what fits leave of it, as small pictures with their size."""
+    first = next(iter(fits.values()))
+    rows = []
+    for r, recording in enumerate(first.density.oscillator.campaign.recordings):
+        cells: list[str] = [recording.name, sketch(recording.samples)]
+        for fit in fits.values():
+            left = fit.residuals[r]
+            rms = quantity(float(np.sqrt(np.mean(left**2))), recording.unit, 2)
+            cells += sketch(left), f"{rms} rms"
+        rows.append(cells)
+    columns = ("recording", "readings", *(head for name in fits for head in (name, "")))
+    return html_table("", columns, rows)
 
 
 def _changes(found: loop.Diagnosis) -> Iterable[tuple[str, ...]]:

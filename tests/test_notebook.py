@@ -15,7 +15,7 @@ from effect_rigs import BY_ID
 
 import bayesimpact as bi
 from bayesimpact import errors as bi_errors
-from bayesimpact.data.html import HEIGHT, html_table, resolved, sketch
+from bayesimpact.data.html import HEIGHT, html_table, sketch
 from bayesimpact.data.short_repr import short_repr
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.loop import Diagnosis
@@ -40,13 +40,6 @@ def test_a_table_is_escaped() -> None:
     html = html_table("<b>", ["a & b"], [("<script>", 1234.5678, 3)])
     assert cells(html) == ["<script>", "1235", "3"]
     assert "<script>" not in html and "<b>" not in html and "a &amp; b" in html
-
-
-def test_a_number_has_two_digits_of_its_uncertainty() -> None:
-    assert resolved(0.14800996, 1.1e-5) == "0.14801"
-    assert resolved(5350.38, 0.28) == "5350.38"
-    assert resolved(5350.38, 280.0) == "5350"
-    assert resolved(0.0, 1.0) == "0" and resolved(float("nan"), 1.0) == "nan"
 
 
 def test_a_figure_shows_itself(found: Diagnosis) -> None:
@@ -79,16 +72,32 @@ def test_readings_are_sketched_from_the_lowest_to_the_highest() -> None:
 
 def test_a_fit_shows_what_recordings_share(found: Diagnosis) -> None:
     assert repr(found.identification).endswith("at rest>, not searched>")
-    shown = cells(found.identification._repr_html_())
-    assert shown[::4] == ["c1", "k1", "c2", "g", "k2[1]", "k2[2]"]
-    assert float(shown[5]) == pytest.approx(found.before.value("k1"), rel=1e-3)
+    shown = cells(bi.Identification.of(found.identification)._repr_html_())
+    assert shown[:30:5] == ["c1", "k1", "c2", "g", "k2[1]", "k2[2]"]
+    assert float(shown[6]) == pytest.approx(found.before.value("k1"), rel=1e-3)
+
+
+def test_what_is_found_shows_what_it_leaves_of_every_recording(
+    found: Diagnosis, posterior: bi.Posterior
+) -> None:
+    """Fits and posteriors once showed tables only."""
+    recordings = found.before.density.oscillator.campaign.recordings
+    for one in (bi.Identification.of(found.identification), posterior):
+        html = one._repr_html_()
+        assert html.count("<svg") == 2 * len(recordings)
+        assert all(str(sketch(x)) in html for x in one.fit.residuals)
+        rms = 1e6 * float(np.sqrt(np.mean(one.fit.residuals[0] ** 2)))
+        assert f"{rms:.2g}\N{NO-BREAK SPACE}µm rms" in cells(html)
+    html = bi.Diagnosis.of(found)._repr_html_()
+    assert html.count("<svg") == 3 * len(recordings)
+    assert all(str(sketch(x)) in html for x in (*found.before.residuals, *found.after.residuals))
 
 
 def test_a_diagnosis_shows_effects_and_extended_parameters(found: Diagnosis) -> None:
-    html = found._repr_html_()
+    html = bi.Diagnosis.of(found)._repr_html_()
     shown = cells(html)
     assert found.verdict == "named" and "named: coulomb_friction" in html
-    assert shown[0] == BY_ID["coulomb_friction"].title and shown[1].startswith("probability")
+    assert shown[0] == BY_ID["coulomb_friction"].title and shown[2].startswith("probability")
     assert "coulomb_friction.force" in shown
 
 

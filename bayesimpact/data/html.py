@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from html import escape
-from math import floor, isfinite, log10
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +36,7 @@ def sketch(samples: NDArray[np.float64]) -> Sketch:
         for x, bottom, top in ends
     )
     return Sketch(
-        f'<svg width="{WIDTH}" height="{HEIGHT}" role="img" aria-label="readings">'
+        f'<svg width="{WIDTH}" height="{HEIGHT}" role="img" aria-label="samples in time">'
         f'<path d="{lines}" stroke="currentColor" fill="none"/></svg>'
     )
 
@@ -47,11 +46,3 @@ def _cell(value: object) -> str:
         return f"<td>{value}</td>"
     text = f"{value:.4g}" if isinstance(value, float) else str(value)
     return f"<td>{escape(text)}</td>"
-
-
-def resolved(value: float, width: float) -> str:
-    """A number with two digits of its uncertainty, and four at least."""
-    if not (isfinite(value) and isfinite(width) and value and width > 0.0):
-        return f"{value:.4g}"
-    beyond = floor(log10(abs(value))) - floor(log10(width))
-    return f"{value:.{min(max(beyond + 2, 4), 15)}g}"

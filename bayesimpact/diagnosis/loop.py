@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.data.html import html_table
 from bayesimpact.diagnosis.budget import Budget, begin
 from bayesimpact.diagnosis.faults.recording_faults import Corrected
 from bayesimpact.diagnosis.formulas.listing import Formulas
@@ -21,7 +20,6 @@ from bayesimpact.diagnosis.measurement.smoothing import SAVITZKY_GOLAY
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import Candidate
 from bayesimpact.diagnosis.residual_force.gaussian_process import MissingForce
-from bayesimpact.diagnosis.residual_force.learned import LEARNED
 from bayesimpact.diagnosis.selection.comparable import Comparable, alike_in_misfit, alike_in_odds
 from bayesimpact.diagnosis.selection.decision import Decision, Verdict, decide
 from bayesimpact.diagnosis.selection.outcome import ExaminedModel, Selection, is_large
@@ -94,19 +92,6 @@ class Diagnosis:
         names = ", ".join(effect.id for effect in self.effects) or "no effect"
         change = f"{self.before.reduced_chi2:.4g} to {self.after.reduced_chi2:.4g}"
         return f"<Diagnosis {self.verdict}: {names}, reduced chi2 {change}>"
-
-    def _repr_html_(self) -> str:
-        """Effects with their probabilities, and parameters before and after, for a notebook."""
-        found = [
-            (e.title, f"probability {self.selection.probability(e.id):.3g}") for e in self.effects
-        ]
-        layout = self.after.density.oscillator.layout
-        for i in layout.roles("physical", "effect"):
-            name, unit = layout.names[i], layout.parameters[i].unit
-            if not name.startswith(LEARNED):
-                low, middle, high = self.intervals.quantiles(name)
-                found.append((name, f"{middle:.4g} ({low:.4g} to {high:.4g}) {unit}"))
-        return html_table(repr(self), ("", "median (90 %)"), found)
 
 
 @linear_algebra_alone()

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from bayesimpact.data.html import html_table, resolved
 from bayesimpact.data.recording import Recording
 from bayesimpact.data.short_repr import short_repr
 from bayesimpact.inference.likelihood import Likelihood, Linearisation
@@ -85,16 +84,6 @@ class Fit:
         state = "at rest" if self.converged else "not converged"
         campaign = self.density.oscillator.campaign.name
         return f"<Fit of {campaign!r}: {self.mode.size} parameters, {state}>"
-
-    def _repr_html_(self) -> str:
-        """Parameters that all recordings share, SI, for a notebook."""
-        layout = self.density.oscillator.layout
-        rows = []
-        for i in layout.roles("physical", "effect"):
-            mode, sd = float(self.mode[i]), float(self.sd[i])
-            rows.append((layout.names[i], resolved(mode, sd), sd, layout.parameters[i].unit))
-        caption = f"{self!r}, reduced chi2 {self.reduced_chi2:.4g}"
-        return html_table(caption, ("parameter", "mode", "sd", "unit"), rows)
 
     @property
     def names(self) -> tuple[str, ...]:

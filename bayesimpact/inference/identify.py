@@ -77,10 +77,6 @@ class Identification:
         ends = "not searched" if self.from_search is None else ends
         return f"<Identification: {self.fit!r}, {ends}>"
 
-    def _repr_html_(self) -> str:
-        """Its fit, for a notebook."""
-        return self.fit._repr_html_()
-
     @property
     def agree(self) -> bool:
         """True when guess and search ended within 0.1 standard deviations of each other."""

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.data.html import html_table, resolved
 from bayesimpact.errors import InputError
 from bayesimpact.inference.arviz_groups import ArvizDraws, arviz_groups, as_arviz, by_chain
 from bayesimpact.inference.fit import Fit
@@ -81,16 +80,6 @@ class Posterior:
         state = "converged" if self.chains.converged else "not converged"
         campaign = self.fit.density.oscillator.campaign.name
         return f"<Posterior of {campaign!r}: {self.draws.shape[0]} draws, {state}>"
-
-    def _repr_html_(self) -> str:
-        """Medians and 90 % intervals of shared parameters, SI, for a notebook."""
-        layout = self.fit.density.oscillator.layout
-        rows = []
-        for i in layout.roles("physical", "effect"):
-            low, middle, high = np.percentile(self.draws[:, i], [5, 50, 95]).tolist()
-            shown = (resolved(x, high - low) for x in (middle, low, high))
-            rows.append((layout.names[i], *shown, layout.parameters[i].unit))
-        return html_table(repr(self), ("parameter", "median", "5 %", "95 %", "unit"), rows)
 
     def thinned(self, count: int, rng: np.random.Generator) -> Array:
         """`count` draws (count, d), without replacement where there are enough."""
