@@ -13,14 +13,14 @@ from bayesimpact.inference.fit import Fit
 LAGS = 20
 
 
-def ljung_box(x: NDArray[np.float64], lags: int = LAGS) -> float:
+def ljung_box(x: NDArray[np.float64]) -> float:
     """p-value of the Ljung-Box portmanteau test of a whitened residual (Ljung and Box 1978)."""
     n = x.size
     centred = x - x.mean()
     power = float(centred @ centred)
-    rho = np.array([centred[:-k] @ centred[k:] / power for k in range(1, lags + 1)])
-    statistic = n * (n + 2) * np.sum(rho**2 / (n - np.arange(1, lags + 1)))
-    return float(stats.chi2.sf(statistic, lags))
+    rho = np.array([centred[:-k] @ centred[k:] / power for k in range(1, LAGS + 1)])
+    statistic = n * (n + 2) * np.sum(rho**2 / (n - np.arange(1, LAGS + 1)))
+    return float(stats.chi2.sf(statistic, LAGS))
 
 
 def whiteness_p(fit: Fit) -> float:

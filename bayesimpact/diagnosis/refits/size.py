@@ -17,6 +17,7 @@ from bayesimpact.model.units import two_digits
 Array = NDArray[np.float64]
 _GAP = SLOTS.index("g")
 IN_CONTACT = ("contact", "entry", "exit")
+POINTS = 2000  # of all recordings, at which a force is looked at
 _SHARE = re.compile(r"\{share\} of ([^).]+)")  # in an effect's statement
 
 
@@ -88,14 +89,14 @@ def largest_change(effect: Effect, fit: Fit) -> float:
     return largest
 
 
-def peak_force(effect: Effect, fit: Fit, points: int = 2000) -> float:
+def peak_force(effect: Effect, fit: Fit) -> float:
     """Largest force of an effect's law along the fitted motion, N."""
     assert effect.law is not None
     slots = fit.density.oscillator.layout.slots(fit.mode)
     largest = 0.0
     for r, (y, v) in enumerate(trajectory_points(fit)):
         times = np.asarray(fit.density.oscillator.campaign.recordings[r].times)
-        few = slice(0, y.size, max(1, y.size * len(slots) // points))
+        few = slice(0, y.size, max(1, y.size * len(slots) // POINTS))
         numbers = effect_numbers(effect, fit, r), slots[r]
         force = force_along(effect.law, y[few], v[few], times[few], *numbers)
         largest = max(largest, float(np.abs(force).max()))

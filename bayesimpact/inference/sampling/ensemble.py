@@ -189,9 +189,9 @@ def advance(snapshot: Snapshot, target: WhitenedDensity, steps: int) -> tuple[Sn
     return later, DrawBlock(sampler.get_chain(), sampler.get_log_prob(), tally)
 
 
-def acceptance(tally: NDArray[np.int64], move: str = "independence") -> float:
-    """Accepted share of a move's proposals; a move never used counts as one half of two."""
-    proposed, accepted = tally[MOVE_NAMES.index(move)]
+def acceptance(tally: NDArray[np.int64]) -> float:
+    """Accepted share of independent proposals; where there were none, one half of two."""
+    proposed, accepted = tally[MOVE_NAMES.index("independence")]
     return float((accepted + 1.0) / (proposed + 2.0))
 
 
