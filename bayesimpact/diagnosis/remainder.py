@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,9 @@ import numpy as np
 from bayesimpact.diagnosis.formulas.listing import Formulas, formula_text
 from bayesimpact.diagnosis.location import locate
 from bayesimpact.diagnosis.selection.outcome import ExaminedModel, Selection
+from bayesimpact.formula.law import is_formula, term_of
 from bayesimpact.inference.fit import Fit
+from bayesimpact.model.effects.effect import Effect
 
 MOST = 0.9  # of what is left beyond the noise: the recordings that hold it are named
 
@@ -26,7 +29,8 @@ class Remainder:
     regime, displacement : where, from the force of the guess where that has effects, else from the
         free force that would explain it
     recordings : those that together hold most of it, most first
-    guess : a formula, ids that the likeliest larger model adds, or a form of force; "" for none
+    guess : a formula, alone or with effects, ids that the likeliest larger model adds, or a form of
+        force; "" for none
     """
 
     rms: float
@@ -90,13 +94,27 @@ def likeliest_formula(formulas: Formulas | None) -> str:
 
 
 def next_guess(selection: Selection, left: ExaminedModel) -> str:
-    """What the likeliest model tried has beyond `left`; else the likelier form of a free force."""
+    """What the likeliest model tried has beyond `left`, a formula written out with the place and
+    width that were fitted; else the likelier form of a free force.
+    """
     have = set(left.candidate.ids)
     larger = [c for c in selection.tried if have < set(c.ids)]
     if larger and selection.log_odds(larger[0]) > selection.log_odds(left.candidate):
-        return " + ".join(i for i in larger[0].ids if i not in have)
+        more = [e for e in larger[0].effects if e.id not in have]
+        return _in_formulas(more, larger[0].fit) or " + ".join(e.id for e in more)
     return (
         "a stiffness or damping that changes with time"
         if left.unknown.reach
         else "a force of displacement and velocity"
     )
+
+
+def _in_formulas(effects: Sequence[Effect], fit: Fit) -> str:
+    """Effects in words, those that are formulas first, as `fit` has them; "" where none is one."""
+    values = dict(zip(fit.names, map(float, fit.mode), strict=True))
+    terms = [term_of(e, values) for e in effects if is_formula(e)]
+    if not terms:
+        return ""
+    text = formula_text(terms, angle=fit.density.oscillator.campaign.angular)
+    others = [e.title for e in effects if not is_formula(e)]
+    return f"a force {text}" + (f", with {' and '.join(others)}" if others else "")
