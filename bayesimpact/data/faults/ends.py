@@ -8,9 +8,14 @@ begins with a blow, or with a mode that dies out, is off for longer.
 Of drawn decays 0 of 3,000 had such an end, with a fast mode beside it 5 of 3,000, with impacts 0 of
 1,600, with quadratic drag and time stamps that jitter 0 of 150. Of single readings that were 12, 20
 and 40 deviations of the noise off, 22, 59 and 87 % were found.
+
+A fit predicts an end from all readings, and what it leaves has no corners of the motion: there a
+reading need be beyond chance only, and beyond those near it.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 
@@ -32,20 +37,35 @@ def unpredicted_ends(x: Array) -> list[Spike]:
     of them; none where the next one is as well: that is the motion.
     """
     form = best_form(x, crossing_period(x, 1.0))
-    found = _first_off(x, form)
-    for one in _first_off(x[::-1], form):
+    return _of_both_ends(x, lambda turned, place, gap: _off(turned, form, place, gap))
+
+
+def missed_ends(residual: Array) -> list[Spike]:
+    """Those of the first and the last `REACH` readings that a fit misses beyond chance and by far
+    more than the ones near; none where the next one is missed so as well.
+
+    What dies out by less than a half from one reading to the next is missed near the end too.
+    """
+    return _of_both_ends(residual, _missed)
+
+
+def _of_both_ends(x: Array, off: Callable[[Array, int, int], tuple[float, float]]) -> list[Spike]:
+    """Those of the first readings that are off, and of the last ones, which are the first of what
+    is turned round.
+    """
+    found = _first_off(x, off)
+    for one in _first_off(x[::-1], off):
         first, end = one.span
         found.append(Spike((x.size - end, x.size - first), one.size, one.strength, one.threshold))
     return found
 
 
-def _first_off(x: Array, form: tuple[int, int]) -> list[Spike]:
+def _first_off(x: Array, off: Callable[[Array, int, int], tuple[float, float]]) -> list[Spike]:
     """Those of the first readings that are off, from the inside outwards."""
-    least = gaussian_threshold(x.size * 2 * (REACH + 1))
+    least = _least(x)
     found, inside = list[Spike](), None
     for place in range(REACH, -1, -1):
-        gap = 1 if inside is None else inside - place
-        size, strength = _off(x, form, place, gap, least)
+        size, strength = off(x, place, 1 if inside is None else inside - place)
         if strength > least:
             if place == REACH:
                 return []
@@ -54,9 +74,24 @@ def _first_off(x: Array, form: tuple[int, int]) -> list[Spike]:
     return found
 
 
-def _off(
-    x: Array, form: tuple[int, int], place: int, gap: int, least: float
-) -> tuple[float, float]:
+def _least(x: Array) -> float:
+    """Standard deviations beyond which no reading at either end is by chance."""
+    return gaussian_threshold(x.size * 2 * (REACH + 1))
+
+
+def _missed(residual: Array, place: int, gap: int) -> tuple[float, float]:
+    """By how much a fit misses one of the first readings, and that over its noise; 0 where it
+    misses others near by nearly as much.
+    """
+    level, near = robust_sd(residual), np.abs(residual[place + gap : place + gap + NEAR])
+    if level == 0.0 or not near.size:
+        return 0.0, 0.0
+    size = float(residual[place])
+    limit = max(_least(residual) * level, FARTHER * float(near.max()))
+    return (size, abs(size) / level) if abs(size) > limit else (0.0, 0.0)
+
+
+def _off(x: Array, form: tuple[int, int], place: int, gap: int) -> tuple[float, float]:
     """By how much one of the first readings is off what follows it after a gap, and that over what
     is usual between the ends; 0 where others there are off by nearly as much.
     """
@@ -69,6 +104,6 @@ def _off(
     rounded = 0.5 * step + rounding_error(form, gap - 1.0, step)
     usual = float(np.nanpercentile(np.abs(between), USUAL))
     near = float(np.nanmax(np.abs(between[:NEAR])))
-    limit = max(least * level, BEYOND * usual, FARTHER * near, rounded)
+    limit = max(_least(x) * level, BEYOND * usual, FARTHER * near, rounded)
     size = float(deviation[place])
     return (size, abs(size) / level) if abs(size) > limit else (0.0, 0.0)

@@ -9,7 +9,7 @@ import numpy as np
 
 from bayesimpact.data.faults.bursts import Spike, find_bursts
 from bayesimpact.data.faults.dropouts import find_dropouts
-from bayesimpact.data.faults.ends import unpredicted_ends
+from bayesimpact.data.faults.ends import missed_ends, unpredicted_ends
 from bayesimpact.data.faults.fault import (
     Array,
     Fault,
@@ -46,9 +46,12 @@ def find_spikes(recording: Recording) -> list[Fault]:
     return _fault(recording, [*close, *lost, *_unpredicted(rest)])
 
 
-def lone_spikes(recording: Recording, *, contacts: bool = True) -> list[Fault]:
+def lone_spikes(
+    recording: Recording, *, contacts: bool = True, residual: bool = False
+) -> list[Fault]:
     """Up to five samples in a row far off what both sides predict alike, or a few at an end far off
-    what the one side there predicts (`ends`); impacts are none.
+    what the one side there predicts (`ends`), or a fit where samples are its `residual`; impacts
+    are none.
 
     A brief contact is a spike of the acceleration away from the stop, and the flight between two of
     them one towards it, back to what flights have: such ones do not count, as long as there may be
@@ -58,10 +61,12 @@ def lone_spikes(recording: Recording, *, contacts: bool = True) -> list[Fault]:
     deviations. It has to pass the Gaussian threshold and four times the 97th percentile over the
     recording, which is what the corners of the motion itself reach.
     """
-    return _fault(recording, _unpredicted(recording, contacts))
+    return _fault(recording, _unpredicted(recording, contacts, residual))
 
 
-def _unpredicted(recording: Recording, contacts: bool = True) -> list[Spike]:
+def _unpredicted(
+    recording: Recording, contacts: bool = True, residual: bool = False
+) -> list[Spike]:
     """What `lone_spikes` finds, none touching another."""
     x = recording.samples
     brief = contacts and recording.order == 2 and bool(recording.case)
@@ -78,7 +83,8 @@ def _unpredicted(recording: Recording, contacts: bool = True) -> list[Spike]:
         if all(end + 1 < one.span[0] or first > one.span[1] + 1 for one in chosen):
             chosen.append(Spike((first, end), size, strength, least))
     inside = tuple(chosen)
-    for one in unpredicted_ends(x):
+    missed = missed_ends(x) if residual else []
+    for one in missed or unpredicted_ends(x):
         if all(one.span[1] < other.span[0] or one.span[0] > other.span[1] for other in inside):
             chosen.append(one)
     count = sum(one.span[1] - one.span[0] for one in chosen)

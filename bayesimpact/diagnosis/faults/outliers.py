@@ -49,7 +49,8 @@ def residual_spikes(fit: Fit, *, contacts: bool = True) -> tuple[Fault, ...]:
         if other is not recording and other.used is not None:
             at_onset = ~other.used if recording.used is None else recording.used & ~other.used
             kept = np.where(at_onset, 0.0, kept)
-        found += lone_spikes(replace(recording, samples=kept), contacts=contacts)
+        missed = replace(recording, samples=kept)
+        found += lone_spikes(missed, contacts=contacts, residual=True)
     return tuple(found)
 
 

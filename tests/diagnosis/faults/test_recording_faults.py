@@ -382,3 +382,16 @@ def test_a_spike_that_is_set_aside_is_not_told_again_of_a_slow_error() -> None:
     fit = identify(campaign, rng=np.random.default_rng(0), search=False).fit
     assert abs(fit.residuals[0][149]) > 10 * small_rig.NOISE
     assert residual_spikes(fit) == ()
+
+
+def test_a_first_reading_that_only_a_fit_shows_to_be_off_is_set_aside() -> None:
+    """Eight deviations of the noise; for ten a second mode was named."""
+    campaign = small_rig.record(3, rig=small_rig.PLAIN, releases=small_rig.PLAIN_RELEASES)
+    first, other = campaign.recordings
+    samples = first.samples.copy()
+    samples[0] += 8 * small_rig.NOISE
+    campaign = replace(campaign, recordings=(replace(first, samples=samples), other))
+    assert not find_spikes(campaign.recordings[0])
+    found = cleaned_campaign(campaign, rng=np.random.default_rng(0), search=False)
+    (one,) = found.compared
+    assert (one.fault.recording, one.fault.spans) == (first.name, ((0, 1),))
