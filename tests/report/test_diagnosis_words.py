@@ -181,6 +181,12 @@ def test_the_paragraph():
     head = "Faults of recordings are set aside or corrected. A spike. The rest is unknown."
     assert said.startswith(head)
     assert said.count("A spike.") == 1 and "catalogue does not hold" not in said
+    said = told("partly", friction, ("It rubs.",), place("free"), finished=False)
+    assert said.startswith("Dry friction is needed by every likely model that was tried, but")
+    said = told("named", friction, ("It rubs.",), place("free"))
+    assert said.startswith("The base model leaves out dry friction")
+    said = told("ambiguous", friction, ("It rubs.",), place("free"), finished=False)
+    assert said.startswith("Likeliest of what was compared, the base model leaves out dry friction")
     wide = SimpleNamespace(
         regime="free", displacement=(-0.3, 0.31), force_rms=0.012, force_sd=0.001
     )

@@ -75,6 +75,11 @@ class Findings:
         cause = "Adding it" if len(self.effects) == 1 else "Adding them"
         return _moved(self.shifts, "The fitted model" if self.more else cause)
 
+    @property
+    def every(self) -> str:
+        """The models of which all that is told to be needed has to be a part."""
+        return "every likely model" if self.finished else "every likely model that was tried"
+
 
 def summary(found: Findings) -> str:
     """One paragraph on what was found."""
@@ -96,7 +101,7 @@ def _found(found: Findings) -> str:
     if found.verdict == "partly":
         needed = "is needed" if len(found.effects) == 1 else "are needed"
         return (
-            f"{_capital(titles)} {needed} by every likely model, but something else "
+            f"{_capital(titles)} {needed} by {found.every}, but something else "
             f"is missing too. {statements}{_groups(found)}{found.cost}{_unproved(found)}"
             f"{found.remains}{found.faults}"
         )
@@ -106,7 +111,9 @@ def _found(found: Findings) -> str:
     modes = all(e.family == "modes" for e in found.effects)
     if found.location.regime == "measurement" and modes:  # mechanics, but no force on the mass
         place = "which the probe sees beside the oscillator's motion"
-    return f"The base model leaves out {titles}, {place}. {statements}{found.cost}{found.faults}"
+    head = "The" if found.verdict == "named" else "Likeliest of what was compared, the"
+    told = f"base model leaves out {titles}, {place}. {statements}{found.cost}"
+    return f"{head} {told}{found.faults}"
 
 
 def _unknown(found: Findings, location: Location) -> str:
@@ -146,7 +153,7 @@ def _groups(found: Findings) -> str:
         *some, last = (e.title for e in group)
         which = f"{'either ' if len(some) == 1 else ''}{', '.join(some)} or {last}"
         told.append(
-            f" {_capital(which)} is needed by every likely model; the recordings cannot tell which."
+            f" {_capital(which)} is needed by {found.every}; the recordings cannot tell which."
         )
     return "".join(told)
 
@@ -162,7 +169,7 @@ def _ambiguous(found: Findings, location: Location) -> str:
     if common:
         needed = "is needed" if len(common) == 1 else "are needed"
         return (
-            f"{_capital(listed(map(title_of, common)))} {needed} by every likely model. Beside "
+            f"{_capital(listed(map(title_of, common)))} {needed} by {found.every}. Beside "
             f"{'it' if len(common) == 1 else 'them'} the likeliest is {rest}, but the recordings "
             f"cannot tell that from {apart}."
         )
