@@ -76,7 +76,7 @@ class Findings:
         return _moved(self.shifts, "The fitted model" if self.more else cause)
 
     @property
-    def every(self) -> str:
+    def likely_models(self) -> str:
         """The models of which all that is told to be needed has to be a part."""
         return "every likely model" if self.finished else "every likely model that was tried"
 
@@ -101,7 +101,7 @@ def _found(found: Findings) -> str:
     if found.verdict == "partly":
         needed = "is needed" if len(found.effects) == 1 else "are needed"
         return (
-            f"{_capital(titles)} {needed} by {found.every}, but something else "
+            f"{_capital(titles)} {needed} by {found.likely_models}, but something else "
             f"is missing too. {statements}{_groups(found)}{found.cost}{_unproved(found)}"
             f"{found.remains}{found.faults}"
         )
@@ -153,7 +153,7 @@ def _groups(found: Findings) -> str:
         *some, last = (e.title for e in group)
         which = f"{'either ' if len(some) == 1 else ''}{', '.join(some)} or {last}"
         told.append(
-            f" {_capital(which)} is needed by {found.every}; the recordings cannot tell which."
+            f" {_capital(which)} is needed by {found.likely_models}; the recordings cannot tell which."
         )
     return "".join(told)
 
@@ -169,7 +169,7 @@ def _ambiguous(found: Findings, location: Location) -> str:
     if common:
         needed = "is needed" if len(common) == 1 else "are needed"
         return (
-            f"{_capital(listed(map(title_of, common)))} {needed} by {found.every}. Beside "
+            f"{_capital(listed(map(title_of, common)))} {needed} by {found.likely_models}. Beside "
             f"{'it' if len(common) == 1 else 'them'} the likeliest is {rest}, but the recordings "
             f"cannot tell that from {apart}."
         )

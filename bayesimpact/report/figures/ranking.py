@@ -19,8 +19,8 @@ from bayesimpact.report.figures.style import (
     GREY,
     ORANGE,
     RED,
-    Array,
     new_figure,
+    row_places,
     rows_axis,
     styled,
 )
@@ -30,7 +30,6 @@ MOST = 12
 """Models shown; the base model always is."""
 FREE_FORCE = "one free force"
 _ROW, _FRAME = 0.24, 1.05  # in
-_LINE = 0.6  # of a row: every further effect of a model has a line of its own
 _LINEAR = 10.0  # nats; beyond that the axis is logarithmic
 _ANSWERS = {"negligible": GREY, "absent": AFTER, "cannot tell": ORANGE}
 
@@ -82,12 +81,12 @@ def chosen(diagnosis: Mapping[str, Any]) -> frozenset[str]:
 def _ranking(
     models: Sequence[tuple[tuple[str, ...], float]], picked: frozenset[str], decisive: float | None
 ) -> Figure:
-    sizes = np.array([1.0 + _LINE * max(len(effects) - 1, 0) for effects, _ in models])
-    figure = new_figure(_ROW * float(sizes.sum()) + _FRAME)
+    labels = ["\n+ ".join(map(title_of, effects)) or "base model" for effects, _ in models]
+    rows, end = row_places(labels)
+    figure = new_figure(_ROW * (end + 0.5) + _FRAME)
     axis = figure.subplots()
     behind = np.array([b for _, b in models])
     weight = np.exp(-behind) / np.exp(-behind).sum()
-    rows = np.cumsum(sizes) - 0.5 * (sizes + 1.0)
     colours = [
         BLACK if not effects else AFTER if picked == set(effects) else GREY for effects, _ in models
     ]
@@ -99,18 +98,17 @@ def _ranking(
     axis.set_xscale("symlog", linthresh=_LINEAR)
     axis.set_xlim(-0.4, max(float(behind.max()), _LINEAR) * 1.4)
     axis.xaxis.set_major_formatter("{x:g}")
-    labels = ["\n+ ".join(map(title_of, effects)) or "base model" for effects, _ in models]
-    rows_axis(axis, labels, at=rows, below=float(sizes.sum()) - 0.4, above=1.1)
+    rows_axis(axis, labels, above=1.1)
     axis.set_xlabel("log odds behind the best model (nats)")
     axis.set_title("models tried, best first", loc="left")
-    _beside(axis, "probability", [probability(float(w)) for w in weight], rows)
+    _beside(axis, "probability", [probability(float(w)) for w in weight])
     return figure
 
 
-def _beside(axis: Axes, title: str, cells: Sequence[str], rows: Array) -> None:
+def _beside(axis: Axes, title: str, cells: Sequence[str]) -> None:
     """A column of text on the right, a cell at every row."""
     side = axis.secondary_yaxis("right")
-    side.set_yticks(rows, cells)
+    side.set_yticks(axis.get_yticks(), cells)
     side.tick_params(length=0, pad=8)
     side.spines["right"].set_visible(False)
     axis.annotate(
@@ -126,7 +124,7 @@ def _known(limit: Mapping[str, Any]) -> bool:
 @styled
 def _limits(limits: Sequence[Mapping[str, Any]]) -> Figure:
     """Upper limit and detection limit of every effect over the size that would matter."""
-    rows = np.arange(len(limits), dtype=float)
+    rows = np.arange(len(limits))
     figure = new_figure(_ROW * len(limits) + _FRAME + 0.3)
     axis = figure.subplots()
     size = np.array([x["practical_size"] for x in limits])
@@ -149,8 +147,7 @@ def _frame(axis: Axes, limits: Sequence[Mapping[str, Any]]) -> None:
     rows_axis(axis, [title_of(x["id"]) for x in limits])
     axis.set_xlabel("size over the size that would matter in practice")
     axis.set_title("effects that were not found", loc="left")
-    rows = np.arange(len(limits), dtype=float)
-    _beside(axis, "95 % upper limit", [_size(x) for x in limits], rows)
+    _beside(axis, "95 % upper limit", [_size(x) for x in limits])
 
 
 def _size(limit: Mapping[str, Any]) -> str:

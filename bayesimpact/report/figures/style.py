@@ -33,6 +33,7 @@ CYCLE = (BLUE, ORANGE, GREEN, PURPLE, RED, SKY, BLACK)
 
 WIDTH = 10.0
 """Width of a figure, in."""
+LINE = 0.6  # of a row: every further line of a name
 
 # Only these of matplotlib's settings belong to a process, not to a figure.
 _OF_THE_PROCESS = ("backend", "backend_fallback", "interactive", "toolbar", "timezone", "webagg")
@@ -114,20 +115,19 @@ def label(words: str, unit: str) -> str:
     return f"{words} ({shown})" if shown else words
 
 
-def rows_axis(
-    axis: Axes,
-    names: Sequence[str],
-    *,
-    above: float = 0.6,
-    at: Array | None = None,
-    below: float | None = None,
-) -> None:
-    """One row per name from the top down, `above` rows of margin over the first; grid behind.
-
-    Rows are one apart, or `at` places of which the last ends at `below`.
+def row_places(names: Sequence[str]) -> tuple[Array, float]:
+    """Where rows stand, (N,), and where the last one ends: one apart, further where a name has
+    several lines.
     """
-    axis.set_yticks(np.arange(len(names)) if at is None else at, names)
-    axis.set_ylim(len(names) - 0.4 if below is None else below, -above)
+    sizes = np.array([1.0 + LINE * name.count("\n") for name in names])
+    return np.cumsum(sizes) - 0.5 * (sizes + 1.0), float(sizes.sum()) - 0.5
+
+
+def rows_axis(axis: Axes, names: Sequence[str], *, above: float = 0.6) -> None:
+    """One row per name from the top down, `above` rows of margin over the first; grid behind."""
+    places, end = row_places(names)
+    axis.set_yticks(places, names)
+    axis.set_ylim(end + 0.1, -above)
     axis.grid(axis="x")
     axis.set_axisbelow(True)
 

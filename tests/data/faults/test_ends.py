@@ -65,9 +65,7 @@ def test_bounces_are_none() -> None:
 
 @pytest.mark.parametrize("place", [0, 2, 599])
 def test_one_end_that_a_fit_misses_is_told(place: int) -> None:
-    """Of such ones 8 and 10 deviations off, those beside them told 0 and 2 % and a fit 86 and
-    100 %; what the fit left else was named a second mode.
-    """
+    """Ten deviations off, where the readings beside it tell nothing."""
     residual = NOISE * np.random.default_rng(place).standard_normal(600)
     residual[place] += 10 * NOISE
     recording = Recording("a", "", residual, 0.01)
@@ -76,8 +74,20 @@ def test_one_end_that_a_fit_misses_is_told(place: int) -> None:
     assert fault.spans == ((place, place + 1),)
 
 
+def test_ends_from_eight_deviations_on_are_told_by_what_a_fit_leaves() -> None:
+    """Of 300 white residuals; the readings beside tell next to none of them."""
+    rng = np.random.default_rng(7)
+    beside = left = 0
+    for _ in range(300):
+        residual = rng.standard_normal(600)
+        residual[0] += 8.0
+        beside += bool(unpredicted_ends(residual))
+        left += bool(missed_ends(residual))
+    assert beside <= 6 and left >= 240
+
+
 def test_noise_and_what_dies_out_slowly_are_no_ends_that_a_fit_misses() -> None:
-    """Of 1,000 residuals of decays none was, white or slow; of 600 with quadratic drag 4."""
+    """None of 200 white residuals, with and without what dies out over four readings."""
     rng = np.random.default_rng(6)
     draws = [rng.standard_normal(rng.integers(100, 1500)) for _ in range(200)]
     assert not any(missed_ends(x) for x in draws)
