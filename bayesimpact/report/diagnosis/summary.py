@@ -153,7 +153,8 @@ def _groups(found: Findings) -> str:
         *some, last = (e.title for e in group)
         which = f"{'either ' if len(some) == 1 else ''}{', '.join(some)} or {last}"
         told.append(
-            f" {_capital(which)} is needed by {found.likely_models}; the recordings cannot tell which."
+            f" {_capital(which)} is needed by {found.likely_models}; "
+            "the recordings cannot tell which."
         )
     return "".join(told)
 
