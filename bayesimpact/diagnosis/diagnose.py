@@ -32,10 +32,10 @@ from numpy.typing import NDArray
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.diagnosis.budget import Budget, begin
 from bayesimpact.diagnosis.candidates.promising import NEAR_MARGIN, SCORE_UNDERESTIMATE
+from bayesimpact.diagnosis.faults.changes import change_instead
 from bayesimpact.diagnosis.faults.compare import base_failed, log_likelihood_gain, misfits
 from bayesimpact.diagnosis.faults.first_physics import faults_beside_physics
 from bayesimpact.diagnosis.faults.forced_start import forced_starts
-from bayesimpact.diagnosis.faults.knock import knock_instead
 from bayesimpact.diagnosis.faults.pushed_start import pushed_starts
 from bayesimpact.diagnosis.faults.recording_faults import (
     Corrected,
@@ -189,8 +189,8 @@ def _diagnosed(
     say("comparing the recordings")
     doubtful = list(comparisons(cleaned, campaign))
     fit = cleaned.identification.fit
-    if knock := knock_instead(doubtful, fit, fit, campaign):
-        cleaned = with_steps(cleaned, [knock], rng=rng, search=search)
+    if changed := change_instead(doubtful, fit, fit, campaign):
+        cleaned = with_steps(cleaned, [changed], rng=rng, search=search)
         doubtful = list(comparisons(cleaned, campaign))
     certain, proved = cleaned, False
     beside_physics = faults_beside_physics(cleaned, campaign, effects, doubtful)

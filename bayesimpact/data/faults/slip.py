@@ -215,7 +215,7 @@ def _fault(
         size=float(jump[worst]),
         unit=recording.unit,
         statement=f"the motion jumps by {amount(float(jump[worst]), recording.unit)} at {named}: "
-        "samples lost or written twice, or the probe's zero moved",
+        "samples lost or written twice, or the probe's zero or gain changed",
         remedy="\n".join(keys),
         strength=float(jump[worst] / level),
         threshold=least,

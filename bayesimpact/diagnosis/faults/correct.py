@@ -87,25 +87,25 @@ def _words(found: Weighed) -> tuple[str, str, float, str]:
                 "-",
             )
         words = (
-            f"its readings are {_off(1 / by - 1, sd)} off those of the others: the gain of the "
-            "probe, or a gap of its own by as much, which one recording cannot tell apart"
+            f"its readings are {percent_off(1 / by - 1, sd)} off those of the others: the gain of "
+            "the probe, or a gap of its own by as much, which one recording cannot tell apart"
         )
         return words, f"scale = {by:.6g}", 100 * (1 / by - 1), "%"
     if kind == "recording_clock":
         by = ratio(found)
-        words = f"its clock runs {_off(1 / by - 1, sd)} off the others'"
+        words = f"its clock runs {percent_off(1 / by - 1, sd)} off the others'"
         return words, f"clock_ratio = {by:.8g}", 100 * (1 / by - 1), "%"
     off = 100 * float(np.expm1(found.value))
     what = found.hypothesis.what
     return (
-        f"comes from another rig: its {what} is {_off(0.01 * off, sd)} off the others'",
+        f"comes from another rig: its {what} is {percent_off(0.01 * off, sd)} off the others'",
         f'skip = "another rig: {what} {off:+.3g} %"',
         off,
         "%",
     )
 
 
-def _off(part: float, sd: float) -> str:
+def percent_off(part: float, sd: float) -> str:
     """A difference in per cent with its standard error, to two digits of this."""
     places = decimals(100 * sd, 2)
     return f"{signed(100 * part, places)} % ± {number(100 * sd, places)} %"

@@ -19,6 +19,7 @@ from bayesimpact.diagnosis.candidates.likely_sets import LikelySets
 from bayesimpact.diagnosis.candidates.period_sets import PeriodSets
 from bayesimpact.diagnosis.candidates.term_sets import EffectSet, TermSets
 from bayesimpact.diagnosis.faults.alone import SharedModel, own_fit
+from bayesimpact.diagnosis.faults.changes import change_instead
 from bayesimpact.diagnosis.faults.compare import (
     LEAST,
     SHARE,
@@ -28,7 +29,6 @@ from bayesimpact.diagnosis.faults.compare import (
     misfits,
 )
 from bayesimpact.diagnosis.faults.correct import as_fault, corrected
-from bayesimpact.diagnosis.faults.knock import knock_instead
 from bayesimpact.diagnosis.faults.own_stops import (
     share_stops,
     shared_values,
@@ -87,8 +87,8 @@ def faults_beside_physics(
             continue
         steps = comparisons(before, as_read, chosen.effects, values)
         if steps and _leaves_nothing(model.fitted(steps[-1][-1].campaign)):
-            knock = knock_instead(steps, fit, whole, as_read)
-            return (knock,) if knock else steps
+            changed = change_instead(steps, fit, whole, as_read)
+            return (changed,) if changed else steps
     return _label_beside_physics(before, as_read, effects)
 
 

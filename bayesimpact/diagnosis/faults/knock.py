@@ -25,8 +25,9 @@ from bayesimpact.data.faults.fault import FALSE_ALARM, Fault, file_time
 from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.faults.alone import SharedModel
 from bayesimpact.diagnosis.faults.beside_model import above_noise
+from bayesimpact.diagnosis.faults.change_point import change_window, parameter_basis
 from bayesimpact.diagnosis.faults.compare import Compared, log_likelihood_gain
-from bayesimpact.diagnosis.faults.recording_faults import Step, fault_as_read, values_of
+from bayesimpact.diagnosis.faults.recording_faults import values_of
 from bayesimpact.diagnosis.faults.together import CERTAIN
 from bayesimpact.diagnosis.selection.outcome import leaves_something
 from bayesimpact.diagnosis.thresholds import EXCESS, LARGE
@@ -40,14 +41,9 @@ Array = NDArray[np.float64]
 STEP = 1e-6  # of the largest displacement: free changes so small are linear
 PLACE = 0.5 * float(chi2.isf(1e-3, 2))  # nats: less likely places than this are no candidates
 NEAR = 2  # samples beside these: the blow takes its time
-BEFORE = 3.0  # free periods: what ends sooner is a start that is not free (`forced_start`)
-AFTER = 1.0  # free periods, of which the model has something to say
-FEWEST = 16  # samples of either at least, of a motion that is hardly sampled
 MOST = 4  # knocks that are told together: set by hand
 LEAST_FREE = 1e-3  # of a column squared, that parameters leave of it: less is error of derivatives
 SLACK = 2.0  # times less than a knock must explain, that a score may promise: of first order
-DIFFER = ("recording_other_rig", "recording_gain", "recording_clock")
-"""Faults of a whole recording that differs, as one does that goes on from another state."""
 LATER = " from sample "  # in the name of a recording's later parts
 
 
@@ -126,21 +122,6 @@ def knocks_beside(base: Fit, found: Fit) -> tuple[tuple[Compared, ...], Fit, Fit
         if _is_enough(found, split):
             return _without(base, found, split)
     return None
-
-
-def knock_instead(steps: Sequence[Step], base: Fit, found: Fit, as_read: Campaign) -> Step:
-    """The knocks that, beside a model, explain why a recording differs from the others; () where
-    none do, or no step says that one differs.
-    """
-    differing = {one.fault.recording for step in steps for one in step if one.fault.id in DIFFER}
-    told = knocks_beside(base, found) if differing else None
-    if told is None or differing.isdisjoint(one.fault.recording for one in told[0]):
-        return ()
-    before = [found.density.oscillator.campaign, *(one.campaign for one in told[0])]
-    return tuple(
-        replace(one, fault=fault_as_read(one.fault, campaign, as_read))
-        for one, campaign in zip(told[0], before, strict=False)
-    )
 
 
 def _next(found: Fit, split: _Split) -> _Split | None:
@@ -286,21 +267,17 @@ def likeliest_jump(fit: Fit, r: int) -> StateJump | None:
         fit.density.likelihood.noise,
         fit.density.oscillator.campaign.recordings[r],
     )
-    stiffness = max(fit.value("k1"), 1e-300)
-    period = 2 * np.pi * float(np.sqrt(fit.density.oscillator.campaign.mass / stiffness))
-    before, after = (
-        max(FEWEST, round(periods * period / recording.interval)) for periods in (BEFORE, AFTER)
-    )
-    if recording.samples.size < 2 * (before + after):
+    begin, end = change_window(fit, r)
+    if begin >= end:
         return None
     signals, start = noise.in_time(
-        np.column_stack([_basis(fit)[r], fit.linearisation[r].residual]).T,
+        np.column_stack([parameter_basis(fit)[r], fit.linearisation[r].residual]).T,
         recording.samples.size, recording.interval, recording.used,
     )  # fmt: skip
     first = round(start / recording.interval)
     score = _score(_sums(fit, r, signals, first))
-    score[: max(before - first, 0)] = 0.0
-    score[max(recording.samples.size - after - first, 0) :] = 0.0
+    score[: max(begin - first, 0)] = 0.0
+    score[max(end - first, 0) :] = 0.0
     best = int(np.argmax(score))
     power, count = float(fit.sums.sum()), float(fit.density.likelihood.sizes.sum())
     nats = 0.5 * score / max(noise.level**2, (power - score[best]) / count)
@@ -309,15 +286,6 @@ def likeliest_jump(fit: Fit, r: int) -> StateJump | None:
     near_best = np.flatnonzero(nats > nats[best] - PLACE)
     earliest, place, latest = (first + int(i) for i in (near_best[0], best, near_best[-1]))
     return StateJump(r, place, earliest, latest, float(nats[best]), float(score[best] / power))
-
-
-def _basis(fit: Fit) -> list[Array]:
-    """Orthonormal columns of what the parameters do to all recordings, rows (n_r, p) of each."""
-    ends = np.cumsum([part.residual.size for part in fit.linearisation])
-    whole = np.concatenate([part.whole(fit.mode.size) for part in fit.linearisation])
-    size = np.linalg.norm(whole, axis=0)
-    basis = np.linalg.qr(whole[:, size > 0.0] / size[size > 0.0])[0]
-    return np.split(basis, ends[:-1])
 
 
 def _sums(fit: Fit, r: int, signals: Array, first: int) -> _Sums:

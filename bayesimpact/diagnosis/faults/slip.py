@@ -2,9 +2,8 @@
 
 Samples lost near a turning point displace the motion by hardly more than the noise, but all that
 follows is out of phase. Against the fit of the recording alone such a shift is one more column of
-the linear model, v(t) from a sample on, for every sample at once by cumulative sums: the score test
-of a change point (Rao 1948). What the score proposes is then done: the readings are put where they
-belong, and have to fit.
+the linear model, v(t) from a sample on (see `change_point`). What the score proposes is then done:
+the readings are put where they belong, and have to fit.
 """
 
 from __future__ import annotations
@@ -20,6 +19,7 @@ from bayesimpact.data.faults.fault import FALSE_ALARM, Fault, file_time
 from bayesimpact.data.gaps import without
 from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.faults.alone import SharedModel, own_fit
+from bayesimpact.diagnosis.faults.change_point import change_scores, parameter_basis
 from bayesimpact.inference.fit import Fit
 
 Array = NDArray[np.float64]
@@ -55,36 +55,19 @@ def likeliest_shift(fit: Fit) -> SampleShift | None:
     None where the gain stays below what white noise reaches at one of its samples with a chance of
     `FALSE_ALARM`.
     """
-    likelihood, noise = fit.density.likelihood, fit.density.likelihood.noise
-    (recording,), (near,) = fit.density.oscillator.campaign.recordings, fit.linearisation
-    motion = np.gradient(fit.seen[0])
-    velocity = noise.whitened(recording, motion)
-    white = np.vstack([near.residual, velocity, near.jacobian.T])
-    count = recording.samples.size
-    signals, start = noise.in_time(white, count, recording.interval, recording.used)
-    residual, moved, columns = signals[0], signals[1], signals[2:].T
-    basis = np.linalg.qr(columns / np.linalg.norm(columns, axis=0).clip(1e-300))[0]
-    residual = residual - basis @ (basis.T @ residual)
-    slope = _from_here_on(moved * residual)
-    shared = _from_here_on(moved[:, None] * basis)
-    size = _from_here_on(moved**2) - np.einsum("np,np->n", shared, shared)
-    free = size > 1e-6 * float(np.sum(moved**2))
-    score = np.where(free, slope**2 / np.where(free, size, 1.0), 0.0)
+    likelihood = fit.density.likelihood
+    scores = change_scores(fit, 0, np.gradient(fit.seen[0]), parameter_basis(fit))
+    score = scores.explained
     score[:EDGE] = score[-EDGE:] = 0.0
     best = int(np.argmax(score))
-    left = float(residual @ residual - score[best]) / float(likelihood.sizes[0])
-    nats = 0.5 * score / max(noise.level**2, left)
+    left = float(fit.sums[0] - score[best]) / float(likelihood.sizes[0])
+    nats = 0.5 * score / max(likelihood.noise.level**2, left)
     if nats[best] < 0.5 * chi2.isf(FALSE_ALARM / score.size, 1):
         return None
     near_best = np.flatnonzero(nats > nats[best] - PLACE)
-    first = round(start / recording.interval)
-    earliest, place, latest = (first + int(i) for i in (near_best[0], best, near_best[-1]))
-    return SampleShift(place, earliest, latest, float(slope[best] / size[best]), float(nats[best]))
-
-
-def _from_here_on(x: Array) -> Array:
-    """Sums of (n, ...) from every row to the last."""
-    return np.asarray(np.cumsum(x[::-1], axis=0)[::-1])
+    earliest, place, latest = (int(i) + scores.first for i in (near_best[0], best, near_best[-1]))
+    samples = float(scores.slope[best] / scores.size[best])
+    return SampleShift(place, earliest, latest, samples, float(nats[best]))
 
 
 def put_right(recording: Recording, between: tuple[int, int], samples: int) -> Recording:

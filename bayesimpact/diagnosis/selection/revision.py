@@ -1,9 +1,9 @@
 """A revised search, on what a model that is nearly good enough has shown of the readings.
 
 Spikes beside a contact, the instants at which contacts begin and end, where an acceleration jumps,
-a gain or a clock that is off, a knock, noise that is slow, and what an input did between its
-samples show only against a model that leaves little else. Before they are known, what follows them
-is fitted.
+a gain or a clock that is off, a gain that changes, a knock, noise that is slow, and what an input
+did between its samples show only against a model that leaves little else. Before they are known,
+what follows them is fitted.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.diagnosis.faults.beside_model import fault_beside
+from bayesimpact.diagnosis.faults.changes import changes_beside
 from bayesimpact.diagnosis.faults.compare import Compared
-from bayesimpact.diagnosis.faults.knock import knocks_beside
 from bayesimpact.diagnosis.faults.outliers import beside_spikes
 from bayesimpact.diagnosis.measurement.growing_noise import growing_noise
 from bayesimpact.diagnosis.measurement.input_noise import input_noise
@@ -125,14 +125,16 @@ def _with_a_recording_corrected(base: Fit, found: Fit, say: Progress) -> Revisio
     return Revision(refitted(base, compared.campaign), first, (compared,))
 
 
-def _without_a_knock(base: Fit, found: Fit, say: Progress) -> Revision | None:
-    """Without what lies beyond knocks that the model shows."""
-    told = knocks_beside(base, found)
+def _without_a_change(base: Fit, found: Fit, say: Progress) -> Revision | None:
+    """With the change of a gain in mid-record corrected that the model shows, or without what lies
+    beyond knocks.
+    """
+    told = changes_beside(base, found)
     if told is None:
         return None
     compared, plain, first = told
     for one in compared:
-        say(f"{one.fault.recording}: {one.fault.statement}: once more without that")
+        say(f"{one.fault.recording}: {one.fault.statement}: once more with that put right")
     return Revision(plain, None if found is base else first, compared)
 
 
@@ -214,7 +216,7 @@ READINGS = (
     _under_growing_noise,
     _without_readings,
     _with_a_recording_corrected,
-    _without_a_knock,
+    _without_a_change,
     _with_band_limited_inputs,
 )
 
@@ -226,7 +228,7 @@ def first_revision(base: Fit, found: Fit, say: Progress) -> Revision | None:
     steps = [_under_growing_noise, _without_readings, _under_noise_of_inputs]
     if found is not base:
         steps.append(_with_a_recording_corrected)  # before a knock, which halves a clock's misfit
-    steps.append(_without_a_knock)
+    steps.append(_without_a_change)
     told = (step(base, found, say) for step in steps)
     return next((one for one in told if one is not None), None)
 

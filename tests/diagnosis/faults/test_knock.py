@@ -12,8 +12,9 @@ import pytest
 import small_rig
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.diagnosis.faults.change_point import parameter_basis
 from bayesimpact.diagnosis.faults.first_physics import faults_beside_physics
-from bayesimpact.diagnosis.faults.knock import _basis, _score, _sums, knocks_beside, likeliest_jump
+from bayesimpact.diagnosis.faults.knock import _score, _sums, knocks_beside, likeliest_jump
 from bayesimpact.diagnosis.faults.recording_faults import cleaned_campaign, fault_as_read
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import fit_from
@@ -174,7 +175,7 @@ def test_score_is_that_of_a_simulated_jump() -> None:
     """Against the explicit column of a jump at one sample, stretches of free changes included."""
     _, found = fits(recorded(PHYSICS, 0.71), *PHYSICS)
     r, at = 1, 900
-    signals = np.column_stack([_basis(found)[r], found.linearisation[r].residual]).T
+    signals = np.column_stack([parameter_basis(found)[r], found.linearisation[r].residual]).T
     score = _score(_sums(found, r, signals, 0))[at]
     oscillator, sigma = found.density.oscillator, found.density.likelihood.noise
     y = oscillator.displacements(found.mode)[r]
@@ -188,7 +189,7 @@ def test_score_is_that_of_a_simulated_jump() -> None:
         columns.append((high - low) / np.abs(change).max())
     recording = oscillator.campaign.recordings[r]
     moved = sigma.whitened(recording, np.array(columns))
-    basis = _basis(found)[r]
+    basis = parameter_basis(found)[r]
     slope = moved @ found.linearisation[r].residual
     size = moved @ moved.T - (moved @ basis) @ (moved @ basis).T
     assert score == pytest.approx(slope @ np.linalg.solve(size, slope), rel=0.02)
