@@ -72,7 +72,7 @@ def fault_beside(base: Fit, found: Fit) -> tuple[Compared, Fit] | None:
     shared = without_own(base, found)
     if shared is None or not leaves_something(shared):
         return None
-    guesses = [g for g in _guesses(shared) if _promises(shared, g)][:TRIED]
+    guesses = [g for g in _guesses(shared) if is_promised(shared, g.gained)][:TRIED]
     tried = [_refined(shared, g) for g in guesses]
     tried = [one for one in tried if np.isfinite(one[1].reduced_chi2)]
     tried.sort(key=lambda one: _left(*one))
@@ -126,12 +126,14 @@ def above_noise(fit: Fit, chi2: float | None = None) -> float:
     return max(left - 1.0, 2 * DOUBT * (error if np.isfinite(error) else 0.0))
 
 
-def _promises(fit: Fit, guess: _Guess) -> bool:
-    """Whether a score promises what a fault must do, or nearly."""
+def is_promised(fit: Fit, gained: float) -> bool:
+    """Whether nats that a score promises at the noise that a fit leaves, are what a fault must
+    gain, or nearly.
+    """
     independent = float(fit.density.likelihood.sizes.sum())
-    left = fit.reduced_chi2 * (1.0 - 2 * guess.gained / independent)
+    left = fit.reduced_chi2 * (1.0 - 2 * gained / independent)
     most = min(above_noise(fit) / EXCESS, LARGE**2 - 1.0)
-    return guess.gained > CERTAIN and left - 1.0 < SLACK * most
+    return gained > CERTAIN and left - 1.0 < SLACK * most
 
 
 def _guesses(fit: Fit) -> list[_Guess]:

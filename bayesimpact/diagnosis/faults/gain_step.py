@@ -19,7 +19,7 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.faults.fault import FALSE_ALARM, Fault, file_time
 from bayesimpact.data.gaps import without
 from bayesimpact.data.recording import Recording
-from bayesimpact.diagnosis.faults.beside_model import above_noise
+from bayesimpact.diagnosis.faults.beside_model import above_noise, is_promised
 from bayesimpact.diagnosis.faults.change_point import (
     change_scores,
     change_window,
@@ -51,6 +51,7 @@ class GainStep:
     place : first sample after the step, the likeliest
     earliest, latest : between which it lies
     value, sd : logarithm of the step, with its standard error
+    promised : nats, by its score at the noise that is left without it
     """
 
     recording: int
@@ -59,6 +60,7 @@ class GainStep:
     latest: int
     value: float
     sd: float
+    promised: float
 
 
 def gain_step_beside(found: Fit) -> tuple[Compared, Fit] | None:
@@ -71,7 +73,9 @@ def gain_step_beside(found: Fit) -> tuple[Compared, Fit] | None:
     if campaign.keep_faults or not leaves_something(found):
         return None
     step = _likeliest(found)
-    refined = None if step is None else _refined(found, step)
+    if step is None or not is_promised(found, step.promised):
+        return None
+    refined = _refined(found, step)
     if refined is None:
         return None
     step, fit = refined
@@ -102,8 +106,10 @@ def _likeliest(fit: Fit) -> GainStep | None:
         if nats <= max(most, 0.5 * chi2.isf(FALSE_ALARM / recording.samples.size, 1)):
             continue
         size, at = float(scores.size[place]), place + scores.first
+        value = float(scores.slope[place]) / size
         sd = float(np.sqrt((power - explained[place]) / count / size))
-        best, most = GainStep(r, at, at, at, float(scores.slope[place]) / size, sd), float(nats)
+        promised = float(0.5 * count * explained[place] / power)
+        best, most = GainStep(r, at, at, at, value, sd, promised), float(nats)
     return best
 
 
