@@ -60,6 +60,7 @@ class PeriodSets(TermSets):
         fit = fit if recordings is None else fit.with_recordings(recordings)
         o = fit.density.oscillator
         ahead = multiple_shooting(fit.density.likelihood, fit.mode)
+        self.starts = ahead.starts if ahead is not None else ()
         if ahead is None:
             super().__init__((), (), np.zeros((1, 0)), np.zeros(1), 1, cost)
             return

@@ -14,21 +14,17 @@ import numpy as np
 from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.candidates.equation_error import measured_paths
 from bayesimpact.diagnosis.candidates.likely_terms import (
-    LIKELY,
     as_effects,
     prices_by_kind,
     reach_of,
     unlisted,
 )
 from bayesimpact.diagnosis.candidates.period_sets import PeriodSets
-from bayesimpact.diagnosis.candidates.term_sets import Chosen, EffectSet
-from bayesimpact.formula.law import is_formula, kind_id
 from bayesimpact.formula.library import library
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
 
 MOST_SAMPLES = 400_000  # of all recordings: their columns then take 2 x 1.7 GB
-KINDS = 3  # of terms that are fitted beside as many effects: set by hand
 
 
 def periods_with_terms(
@@ -50,27 +46,3 @@ def periods_with_terms(
     beyond = [max(price[t.kind] - cost, 0.0) for t in terms]
     grammar = as_effects(paths, scales, terms, beyond)
     return PeriodSets(fit, effects, scales, grammar, recordings)
-
-
-def sets_with_a_term_ahead(problem: PeriodSets, most: int) -> list[list[EffectSet]]:
-    """For none, one, ... and `most` - 1 effects the likeliest sets of these and a term, with terms
-    of different kinds; the first is likelier than all smaller ones.
-    """
-    terms = [t for t, term in enumerate(problem.terms) if is_formula(term.effect)]
-    if not terms or most < 1:
-        return []
-    none = problem.log_odds(())
-    found, reached = list[list[EffectSet]](), none
-    levels: list[list[Chosen]] = [[()], *problem.levels(most - 1)]
-    for level in levels:
-        likely = [problem.refined(chosen) for chosen in level[:LIKELY]]
-        odds = {(*s, t): problem.log_odds((*s, t)) for s in likely for t in terms}
-        kinds: dict[str, Chosen] = {}
-        for chosen in sorted(odds, key=lambda one: -odds[one]):
-            kinds.setdefault(kind_id(problem.terms[chosen[-1]].effect.id), chosen)
-        best = list(kinds.values())[:KINDS]
-        if odds[best[0]] <= reached:
-            break
-        reached = odds[best[0]]
-        found.append([problem.set_of(one, odds[one] - none) for one in best])
-    return found

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.formula.law import is_formula
 from bayesimpact.model.effects.effect import Effect
 
 Array = NDArray[np.float64]
@@ -138,12 +139,6 @@ class TermSets:
             found.append(self.set_of(best, reached - none))
         return found
 
-    def alone(self) -> list[EffectSet]:
-        """Every effect that may be alone, at its likeliest shape, likeliest first."""
-        none = self.log_odds(()) if self.terms else 0.0
-        single = (self.refined(chosen) for level in self.levels(1) for chosen in level)
-        return [self.set_of(chosen, self.log_odds(chosen) - none) for chosen in single]
-
     def set_of(self, chosen: Sequence[int], odds: float) -> EffectSet:
         """The effects of some terms with the values of all unknowns."""
         raise NotImplementedError
@@ -166,13 +161,15 @@ class TermSets:
                 return
             yield beam
 
-    def gains(self, ids: Collection[str] = ()) -> dict[str, float]:
-        """By how much every other effect that has a term would make a set likelier, nats."""
+    def gains(self, ids: Collection[str] = (), *, with_terms: bool = False) -> dict[str, float]:
+        """By how much every other effect that has a term would make a set likelier, nats; with
+        terms of the grammar, or without.
+        """
         if not self.terms:
             return {}
         present = self.shaped(ids)
         before, found = self.log_odds(present), dict[str, float]()
-        for t in self._beside(present):
+        for t in self._beside(present, with_terms):
             own = self.terms[t].effect.id
             gain = self.log_odds((*present, t)) - before
             found[own] = max(found.get(own, -np.inf), gain)
@@ -234,14 +231,14 @@ class TermSets:
             found[k] = max(own, key=lambda t: self.log_odds((*rest, t)))
         return tuple(sorted(found))  # in one order, whichever way the search came by
 
-    def _beside(self, chosen: Sequence[int]) -> list[int]:
-        """Terms that a set may take in."""
+    def _beside(self, chosen: Sequence[int], with_terms: bool = False) -> list[int]:
+        """Terms that a set may take in, of the grammar as well or not."""
         present = [term.effect for term in (*self.known, *(self.terms[i] for i in chosen))]
         ids = {e.id for e in present}
         return [
             t
             for t, term in enumerate(self.terms)
-            if term.on_grid
+            if (term.on_grid or (with_terms and is_formula(term.effect)))
             and term.effect.id not in ids
             and all(term.effect.stands_beside(e) for e in present)
         ]

@@ -27,8 +27,8 @@ from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import fit_from
 from bayesimpact.diagnosis.score_test.directions import whitened
 from bayesimpact.diagnosis.score_test.projection import project
-from bayesimpact.diagnosis.selection.outcome import leaves_something
-from bayesimpact.diagnosis.thresholds import DECISIVE, DOUBT, EXCESS, LARGE
+from bayesimpact.diagnosis.selection.outcome import above_noise, leaves_something
+from bayesimpact.diagnosis.thresholds import DECISIVE, EXCESS, LARGE
 from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.refitted import refitted
@@ -115,15 +115,6 @@ def _left(guess: _Guess, fit: Fit) -> float:
     sizes = fit.density.likelihood.sizes
     share = float(sizes[guess.hypothesis.recording] / sizes.sum())
     return float(fit.reduced_chi2 * factor(guess.weighed) ** (-2 * share))
-
-
-def above_noise(fit: Fit, chi2: float | None = None) -> float:
-    """Reduced chi-squared, that of a fit or another one, above that of the noise, or what that is
-    uncertain by.
-    """
-    error = fit.density.likelihood.noise.level_error
-    left = fit.reduced_chi2 if chi2 is None else chi2
-    return max(left - 1.0, 2 * DOUBT * (error if np.isfinite(error) else 0.0))
 
 
 def is_promised(fit: Fit, gained: float) -> bool:

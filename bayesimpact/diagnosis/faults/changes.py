@@ -11,11 +11,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from bayesimpact.data.campaign import Campaign
-from bayesimpact.diagnosis.faults.beside_model import above_noise
 from bayesimpact.diagnosis.faults.compare import Compared
 from bayesimpact.diagnosis.faults.gain_step import gain_step_beside
 from bayesimpact.diagnosis.faults.knock import knocks_beside
 from bayesimpact.diagnosis.faults.recording_faults import Step, fault_as_read
+from bayesimpact.diagnosis.selection.outcome import above_noise
 from bayesimpact.diagnosis.thresholds import EXCESS
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.refitted import refitted

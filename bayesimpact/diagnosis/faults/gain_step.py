@@ -19,7 +19,7 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.faults.fault import FALSE_ALARM, Fault, file_time
 from bayesimpact.data.gaps import without
 from bayesimpact.data.recording import Recording
-from bayesimpact.diagnosis.faults.beside_model import above_noise, is_promised
+from bayesimpact.diagnosis.faults.beside_model import is_promised
 from bayesimpact.diagnosis.faults.change_point import (
     change_scores,
     change_window,
@@ -28,7 +28,7 @@ from bayesimpact.diagnosis.faults.change_point import (
 from bayesimpact.diagnosis.faults.compare import Compared, log_likelihood_gain
 from bayesimpact.diagnosis.faults.correct import percent_off
 from bayesimpact.diagnosis.faults.together import CERTAIN
-from bayesimpact.diagnosis.selection.outcome import leaves_something
+from bayesimpact.diagnosis.selection.outcome import above_noise, leaves_something
 from bayesimpact.diagnosis.thresholds import EXCESS, LARGE
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.refitted import refitted

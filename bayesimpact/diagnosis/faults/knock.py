@@ -24,12 +24,11 @@ from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.faults.fault import FALSE_ALARM, Fault, file_time
 from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.faults.alone import SharedModel
-from bayesimpact.diagnosis.faults.beside_model import above_noise
 from bayesimpact.diagnosis.faults.change_point import change_window, parameter_basis
 from bayesimpact.diagnosis.faults.compare import Compared, log_likelihood_gain
 from bayesimpact.diagnosis.faults.recording_faults import values_of
 from bayesimpact.diagnosis.faults.together import CERTAIN
-from bayesimpact.diagnosis.selection.outcome import leaves_something
+from bayesimpact.diagnosis.selection.outcome import above_noise, leaves_something
 from bayesimpact.diagnosis.thresholds import EXCESS, LARGE
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect

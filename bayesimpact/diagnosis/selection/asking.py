@@ -8,21 +8,23 @@ proposes sets of effects with their values (`candidates`).
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
-from bayesimpact.diagnosis.candidates.one_step import criterion_after_a_step
+from bayesimpact.diagnosis.candidates.one_step import SteppedSet, after_steps
+from bayesimpact.diagnosis.candidates.period_sets import PeriodSets
+from bayesimpact.diagnosis.candidates.stepwise_sets import stepwise_sets
 from bayesimpact.diagnosis.candidates.term_sets import EffectSet
 from bayesimpact.diagnosis.measurement.input_noise import under_input_noise
 from bayesimpact.diagnosis.refits.refit import Candidate
 from bayesimpact.diagnosis.selection.outcome import ExaminedModel, is_large, leaves_something
 from bayesimpact.diagnosis.selection.revision import Revision, first_revision
-from bayesimpact.diagnosis.selection.unlisted import Unlisted
+from bayesimpact.diagnosis.selection.unlisted import FITTED, Unlisted
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.inference.fit import Fit
-
-FITTED = 2  # of the sets that are asked for about a model, the most promising
+from bayesimpact.inference.initial.multiple_shooting import Starts
 
 
 class Asking(Unlisted):
@@ -89,16 +91,32 @@ class Asking(Unlisted):
                 for problem in [self.asked.about(about, flight=flight)]
                 for chosen in problem.best(self.most - len(problem.known))
             ]
-            every = [*ahead.best(room), *(ahead.alone() if room > 0 else ())]
-            sets += [(ahead.fit, chosen) for chosen in every]
-            cost = [self.after_a_step(fit, chosen) for fit, chosen in sets]
-            order = sorted(range(len(sets)), key=lambda i: cost[i])
-            self.promised[key] = [(cost[i], *sets[i]) for i in order]
+            sets += [(ahead.fit, chosen) for chosen in ahead.best(room)]
+            found = [(self.after_steps(fit, chosen).cost, fit, chosen) for fit, chosen in sets]
+            stepwise = self.stepwise(ahead, room)
+            found += [(one.cost, ahead.fit, one.chosen) for one in stepwise]
+            self.promised[key] = sorted(found, key=lambda one: one[0])
         return self.promised[key]
 
-    def after_a_step(self, fit: Fit, chosen: EffectSet) -> float:
-        """What a set costs by one step over periods ahead, nats (`criterion_after_a_step`)."""
-        return criterion_after_a_step(fit, chosen, self.scales) + self.cost * len(chosen.effects)
+    def stepwise(
+        self, problem: PeriodSets, most: int, *, with_terms: bool = False
+    ) -> list[SteppedSet]:
+        """Sets beside a problem's model that steps of each lead to, those that cost least first."""
+
+        def stepped(chosen: EffectSet, steps: int) -> SteppedSet:
+            return self.after_steps(
+                problem.fit, chosen, steps, problem.starts if steps == 1 else ()
+            )
+
+        return stepwise_sets(problem, stepped, most, self.may_go_on, with_terms=with_terms)
+
+    def after_steps(
+        self, fit: Fit, chosen: EffectSet, steps: int = 1, starts: tuple[Starts, ...] = ()
+    ) -> SteppedSet:
+        """A set by steps over periods ahead (`one_step`), with the price of its effects."""
+        found = after_steps(fit, chosen, self.scales, steps, starts)
+        prices = sum(self.cost + effect.price for effect in chosen.effects)
+        return replace(found, price=found.price + prices)
 
     def leads_by_a_step(self, fit: Fit, chosen: EffectSet, about: Candidate) -> bool:
         """Whether one step promises more of a set than of all that are asked for; without a stop
@@ -107,7 +125,7 @@ class Asking(Unlisted):
         if not self.asked.has_stop:
             return True
         least = min((cost for cost, *_ in self.promising_sets(about)), default=np.inf)
-        return not np.isfinite(least) or self.after_a_step(fit, chosen) < least
+        return not np.isfinite(least) or self.after_steps(fit, chosen).cost < least
 
     def of_motion(self, about: Candidate) -> list[Candidate]:
         """Models that the equation of motion asks for about one."""

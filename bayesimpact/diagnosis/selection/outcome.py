@@ -227,6 +227,15 @@ def leaves_something(fit: Fit) -> bool:
     return is_more_than_noise(fit.reduced_chi2, fit.density.likelihood.noise)
 
 
+def above_noise(fit: Fit, chi2: float | None = None) -> float:
+    """Reduced chi-squared, that of a fit or another one, above that of the noise, or what that is
+    uncertain by.
+    """
+    error = fit.density.likelihood.noise.level_error
+    left = fit.reduced_chi2 if chi2 is None else chi2
+    return max(left - 1.0, 2 * DOUBT * (error if np.isfinite(error) else 0.0))
+
+
 def is_more_than_noise(reduced_chi2: float, noise: Noise) -> bool:
     """Whether a misfit is above the noise by more than the estimate of that is uncertain."""
     error = noise.level_error

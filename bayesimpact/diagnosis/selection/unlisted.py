@@ -17,11 +17,17 @@ from collections.abc import Callable, Sequence
 from bayesimpact.diagnosis.candidates.likely_sets import LikelySets
 from bayesimpact.diagnosis.candidates.likely_terms import sets_with_a_term
 from bayesimpact.diagnosis.candidates.line_sets import sets_with_a_line
-from bayesimpact.diagnosis.candidates.period_terms import sets_with_a_term_ahead
+from bayesimpact.diagnosis.candidates.one_step import SteppedSet
+from bayesimpact.diagnosis.candidates.period_sets import PeriodSets
 from bayesimpact.diagnosis.candidates.term_sets import EffectSet
 from bayesimpact.diagnosis.refits.refit import Candidate
 from bayesimpact.diagnosis.score_test.directions import is_periodic
-from bayesimpact.diagnosis.selection.outcome import ExaminedModel, is_large
+from bayesimpact.diagnosis.selection.outcome import (
+    ExaminedModel,
+    above_noise,
+    is_large,
+    leaves_something,
+)
 from bayesimpact.diagnosis.selection.remaining import Remaining
 from bayesimpact.diagnosis.thresholds import EXCESS
 from bayesimpact.formula.law import is_formula
@@ -30,6 +36,8 @@ from bayesimpact.model.effects.harmonic_forcing import EFFECT as HARMONIC_FORCIN
 
 Problem = Callable[[Candidate], list[Candidate]]
 """Models that a problem posed about one asks for."""
+
+FITTED = 2  # of the sets that periods ahead ask for about a model, the most promising
 
 SetsBeside = Callable[[LikelySets, int], list[EffectSet]]
 """Sets with one more force that a problem asks for, of so many effects at most."""
@@ -122,14 +130,14 @@ class Unlisted(Remaining):
         return found
 
     def with_a_term_ahead(self, base: ExaminedModel, examined: ExaminedModel) -> ExaminedModel:
-        """A model, or where its misfit is large the one that periods ahead of the base model lead
-        to with a term of the grammar, if that leaves `EXCESS` times less.
+        """A model, or where it leaves something of a large misfit the one that periods ahead of the
+        base model lead to with a term of the grammar, if that leaves `EXCESS` times less.
         """
-        wanted = self.asked.has_stop and is_large(examined.candidate.fit)
+        wanted = self.asked.has_stop and self.is_large and not examined.is_white
         if not (wanted and self.may_go_on()):
             return examined
         found = self.asked_again(base.candidate, self.of_periods_with_a_term)
-        far_less = EXCESS * found.fit.reduced_chi2 < examined.candidate.fit.reduced_chi2
+        far_less = EXCESS * above_noise(found.fit) <= above_noise(examined.candidate.fit)
         return self.examine(found) if far_less else examined
 
     def asked_again(self, about: Candidate, problem: Problem) -> Candidate:
@@ -144,17 +152,25 @@ class Unlisted(Remaining):
 
     def of_periods_with_a_term(self, about: Candidate) -> list[Candidate]:
         """Models with a term of the grammar that periods ahead ask for about one; of one that has
-        a term those with more effects.
+        a term those with more effects. None where nothing is left.
         """
+        if not leaves_something(about.fit):
+            return []
         most = self.most - len(about.effects)
         if any(map(is_formula, about.effects)):
             problem = self.asked.ahead(about, about)
-            return self.fit_sets(problem.fit, problem.best(most))
-        problem = self.asked.ahead_with_terms(about)
-        found = list[Candidate]()
-        for sets in sets_with_a_term_ahead(problem, most):
-            found += self.fit_sets(problem.fit, sets)
-        return found
+            sets = [one.chosen for one in self.stepwise(problem, most)]
+        else:
+            problem = self.asked.ahead_with_terms(about)
+            every = self.stepwise(problem, most, with_terms=True)
+            sets = [one.chosen for one in every if any(map(is_formula, one.chosen.effects))]
+        return self.fit_sets(problem.fit, sets[:FITTED])
+
+    def stepwise(
+        self, problem: PeriodSets, most: int, *, with_terms: bool = False
+    ) -> list[SteppedSet]:
+        """Sets beside a problem's model that steps of each lead to, those that cost least first."""
+        raise NotImplementedError
 
     def leads_on(self, examined: ExaminedModel, larger: Candidate) -> bool:
         """Whether a larger model is the next one; beside a formula, where it leaves far less."""

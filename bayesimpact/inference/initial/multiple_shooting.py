@@ -102,7 +102,13 @@ def multiple_shooting(likelihood: Likelihood, theta: Array) -> MultipleShooting 
         return None
     noise = replace(likelihood.noise, smoothing=None)
     starts = tuple(_starts(o, noise, r, theta) for r in range(o.counts.size))
-    return MultipleShooting(o, noise, starts) if any(s.blocks for s in starts) else None
+    return from_starts(likelihood, starts) if any(s.blocks for s in starts) else None
+
+
+def from_starts(likelihood: Likelihood, starts: tuple[Starts, ...]) -> MultipleShooting:
+    """The likelihood of periods ahead of given starts, with the responses to these."""
+    noise = replace(likelihood.noise, smoothing=None)
+    return MultipleShooting(likelihood.oscillator, noise, starts)
 
 
 def _starts(o: Oscillator, noise: Noise, r: int, theta: Array) -> Starts:

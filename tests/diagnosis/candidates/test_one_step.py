@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import small_rig
 
-from bayesimpact.diagnosis.candidates.one_step import criterion_after_a_step
+from bayesimpact.diagnosis.candidates.one_step import after_steps
 from bayesimpact.diagnosis.candidates.term_sets import EffectSet
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.inference.fit import Fit
@@ -27,7 +27,7 @@ def criterion(base: Fit, *names: str, by: float = 1.0) -> float:
     """Of a set with the true sizes of its effects, or these times a factor."""
     values = {n: by * v for n, v in VALUES.items() if n.split(".")[0] in names}
     chosen = EffectSet(tuple(BY_ID[n] for n in names), values, 0.0)
-    return criterion_after_a_step(base, chosen, campaign_scales(base))
+    return after_steps(base, chosen, campaign_scales(base)).cost
 
 
 def test_the_truth_leaves_least(base: Fit) -> None:
@@ -42,7 +42,7 @@ def test_parameters_are_paid_for(base: Fit) -> None:
     plain = criterion(base, *PHYSICS)
     values = VALUES | {"opposite_stop.gap": 1.0, "opposite_stop.stiffness": 1e3}
     more = EffectSet(tuple(BY_ID[n] for n in (*PHYSICS, "opposite_stop")), values, 0.0)
-    found = criterion_after_a_step(base, more, campaign_scales(base)) - plain
+    found = after_steps(base, more, campaign_scales(base)).cost - plain
     count = sum(r.samples.size for r in base.density.oscillator.campaign.recordings)
     number = len(BY_ID["opposite_stop"].parameters)
     assert found == pytest.approx(0.5 * number * np.log(count), abs=0.5)
@@ -50,4 +50,17 @@ def test_parameters_are_paid_for(base: Fit) -> None:
 
 def test_a_motion_that_runs_away_is_none(base: Fit) -> None:
     chosen = EffectSet((BY_ID["spring_cubic"],), {"spring_cubic.stiffness": -1e12}, 0.0)
-    assert criterion_after_a_step(base, chosen, campaign_scales(base)) == np.inf
+    assert after_steps(base, chosen, campaign_scales(base)).cost == np.inf
+
+
+def test_further_steps_lead_to_the_values(base: Fit) -> None:
+    """From half the true sizes, and no farther where a step has led astray."""
+    scales = campaign_scales(base)
+    values = {name: 0.5 * value for name, value in VALUES.items()}
+    chosen = EffectSet(tuple(BY_ID[n] for n in PHYSICS), values, 0.0)
+    first, last = (after_steps(base, chosen, scales, steps) for steps in (1, 4))
+    assert first.chosen is chosen and last.cost <= first.cost
+    for name, value in VALUES.items():
+        assert last.chosen.values[name] == pytest.approx(value, rel=0.05)
+    far = EffectSet((BY_ID["spring_cubic"],), {"spring_cubic.stiffness": -1e12}, 0.0)
+    assert after_steps(base, far, scales, 3).left == np.inf

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,13 +11,12 @@ import small_rig
 from effect_rigs import BY_ID
 
 from bayesimpact.diagnosis.candidates.period_sets import PeriodSets
-from bayesimpact.diagnosis.candidates.period_terms import periods_with_terms, sets_with_a_term_ahead
+from bayesimpact.diagnosis.candidates.period_terms import periods_with_terms
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.refits.extend import campaign_scales
-from bayesimpact.diagnosis.refits.refit import fit_from
 from bayesimpact.diagnosis.selection import unlisted
 from bayesimpact.diagnosis.thresholds import EXCESS, LARGE
-from bayesimpact.formula.law import is_formula, kind_id
+from bayesimpact.formula.law import is_formula, is_formula_id
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects import SEARCHED
@@ -32,19 +32,6 @@ def rubbing() -> Fit:
     return identify(campaign, rng=np.random.default_rng(0), search=False).fit
 
 
-def test_a_force_in_contact_is_asked_for_beside_an_effect(rubbing: Fit) -> None:
-    assert rubbing.reduced_chi2 > 10 * LARGE**2
-    scales = campaign_scales(rubbing)
-    alone, pairs, *_ = sets_with_a_term_ahead(periods_with_terms(rubbing, SEARCHED, scales), 3)
-    assert all(len(s.effects) == 1 for s in alone) and all(len(s.effects) == 2 for s in pairs)
-    assert {e.id for e in pairs[0].effects} == WANTED
-    kinds = [kind_id(s.effects[-1].id) for s in pairs]
-    assert len(set(kinds)) == len(kinds)
-    reached = fit_from(rubbing, pairs[0].effects, pairs[0].values, scales).fit
-    assert reached.reduced_chi2 < 1.2
-    assert reached.value("formula_sign_v_in_contact.size") == pytest.approx(0.5, rel=0.05)
-
-
 def test_terms_stand_beside_sets_and_are_in_none(rubbing: Fit) -> None:
     """And cost what their formula is long."""
     scales = campaign_scales(rubbing)
@@ -54,7 +41,8 @@ def test_terms_stand_beside_sets_and_are_in_none(rubbing: Fit) -> None:
     )
     own, others = problem.best(3), plain.best(3)
     assert [s.effects for s in own] == [s.effects for s in others]
-    assert not any(i.startswith("formula_") for i in problem.gains())
+    assert not any(map(is_formula_id, problem.gains()))
+    assert any(map(is_formula_id, problem.gains(with_terms=True)))
     t = next(t for t, term in enumerate(problem.terms) if is_formula(term.effect))
     effect, price = problem.terms[t].effect, problem.terms[t].effect.price
     assert effect.price > 0
@@ -69,19 +57,31 @@ def test_a_model_with_a_term_must_leave_far_less(monkeypatch, times: float, take
     """An effect more explains a little of anything; the search goes on with the catalogue then."""
     search = object.__new__(unlisted.Unlisted)
     search.asked = SimpleNamespace(has_stop=True)
+    monkeypatch.setattr(unlisted.Unlisted, "is_large", True)
     monkeypatch.setattr(search, "may_go_on", lambda: True)
-    left = 100.0 * LARGE**2
-    made = lambda chi2: SimpleNamespace(fit=SimpleNamespace(reduced_chi2=chi2))  # noqa: E731
-    with_term = made(left / (times * EXCESS))
+    above = 100.0 * LARGE**2
+    noise = SimpleNamespace(level_error=0.01)
+    density = SimpleNamespace(likelihood=SimpleNamespace(noise=noise))
+
+    def made(above_noise: float, is_white: bool = False) -> Any:
+        fit = SimpleNamespace(reduced_chi2=1.0 + above_noise, density=density)
+        return SimpleNamespace(candidate=SimpleNamespace(fit=fit), is_white=is_white)
+
+    with_term = made(above / (times * EXCESS)).candidate
     monkeypatch.setattr(search, "asked_again", lambda about, problem: with_term)
     monkeypatch.setattr(search, "examine", lambda c: SimpleNamespace(candidate=c))
-    base, examined = (SimpleNamespace(candidate=made(left)) for _ in range(2))
-    found = search.with_a_term_ahead(base, examined)
-    assert (found.candidate is with_term) is taken
+    base, examined = made(above), made(above)
+    assert (search.with_a_term_ahead(base, examined).candidate is with_term) is taken
+    for of, name, value in (
+        (unlisted.Unlisted, "is_large", False),
+        (search, "may_go_on", lambda: False),
+    ):
+        with monkeypatch.context() as changed:
+            changed.setattr(of, name, value)
+            assert search.with_a_term_ahead(base, examined) is examined
+    white = made(above, is_white=True)
+    assert search.with_a_term_ahead(base, white) is white
     search.asked.has_stop = False
-    assert search.with_a_term_ahead(base, examined) is examined
-    search.asked.has_stop = True
-    monkeypatch.setattr(search, "may_go_on", lambda: False)
     assert search.with_a_term_ahead(base, examined) is examined
 
 

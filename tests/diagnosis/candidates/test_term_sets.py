@@ -53,21 +53,3 @@ def test_likeness_is_the_share_that_another_effect_explains(problem) -> None:
     assert shares[QUINTIC] > 0.9 > 0.5 > shares[HUM]
     assert set(shares) == {QUINTIC, HUM}
     assert found.likeness([DRAG], "coulomb_friction") == {}
-
-
-def test_every_effect_is_asked_for_alone(problem) -> None:
-    """Each with the values and the odds of its own least squares, likeliest first."""
-
-    class Sets(TermSets):
-        def set_of(self, chosen, odds):
-            return [self.terms[t].effect.id for t in chosen], odds
-
-    found = problem[0]
-    sets = Sets(found.terms, ("a", "b"), problem[2], np.ones(ROWS), ROWS, 1.0)
-    alone = sets.alone()
-    assert sorted(ids for ids, _ in alone) == sorted([[i] for i in (DRAG, CUBIC, QUINTIC, HUM)])
-    odds = [odds for _, odds in alone]
-    assert odds == sorted(odds, reverse=True)
-    for (effect,), value in alone:
-        assert value == sets.log_odds(sets.shaped([effect])) - sets.log_odds(())
-    assert TermSets((), (), np.zeros((1, 0)), np.zeros(1), 1, 1.0).alone() == []
