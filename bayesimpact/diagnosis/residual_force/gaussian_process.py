@@ -268,6 +268,8 @@ def basis_responses(fit: Fit, effect: Effect, knots: int, scales: Scales) -> tup
         norms = np.sqrt(np.einsum("kn,kn->k", white, white))
         scale = np.where(norms > 0, 1e-7 * np.minimum(1.0 / np.maximum(norms, 1e-12), 1e6), 1e-7)
         change = _change(oscillator, table, q, step * scale, r, n, knots)
+        lost = ~np.isfinite(change).all(axis=1)  # a force large enough to be seen: it runs away
+        change[lost], scale[lost] = np.nan_to_num(first[lost], posinf=0.0, neginf=0.0), 1e-7
         result.append((whitened_one(fit, r, change, sigma) / (step * scale)[:, None]).T)
     return tuple(result)
 

@@ -163,6 +163,8 @@ def _direction(
     sizes = size_parameters(density, effect)
     if not sizes:
         change = [b - a for a, b in zip(fit.seen, density.oscillator.predict(theta), strict=True)]
+        if not all(np.isfinite(c).all() for c in change):  # the motion would run away
+            return None
         parts = tuple(p[:, None] for p in whitened(fit, change))
         return Direction(effect, dict(shapes), (effect.id,), parts, True)
     base = whitened(fit, density.oscillator.predict(theta))
