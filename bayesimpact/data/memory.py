@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.clock import check_rate
-from bayesimpact.data.gaps import on_clock
+from bayesimpact.data.even_clock import on_clock
 from bayesimpact.data.period import crossing_period
 from bayesimpact.data.quantity import RESPONSE_COLUMNS, UNITS, is_angular, order_of, unit_of
 from bayesimpact.data.read import build_campaign

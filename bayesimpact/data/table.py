@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.clock import check_mean_rate, check_rate, taken_evenly
+from bayesimpact.data.even_clock import on_clock
 from bayesimpact.data.fields import fields, unquoted
-from bayesimpact.data.gaps import on_clock
 from bayesimpact.data.quantity import RESPONSE_COLUMNS, UNITS, Quantity
 from bayesimpact.data.readers.channel import name_and_unit, says_time
 from bayesimpact.data.readers.guess import named_quantity

@@ -37,19 +37,24 @@ def find_clipped(recording: Recording) -> list[Fault]:
     unit = max(reading_step(x), noise_level(x))
     found = []
     for extreme, side in ((float(x.max()), "largest"), (float(x.min()), "smallest")):
+        most: list[Flat] = []
         for scatter in (0.0, *([SCATTER * float(np.ptp(x))] if not recording.case else [])):
             at_end = np.where(np.abs(x - extreme) <= scatter, extreme, x)
             least = max(MISSED * unit, FLAT * scatter)
             cut = [
                 run for run in flats(at_end, LEAST) if run.value == extreme and run.missed() > least
             ]
-            if len(cut) >= SEVERAL or any(
-                run.first > 0 and (run.size >= LONG or run.missed() > FLAT * least) for run in cut
+            if len(cut) > len(most) and (
+                len(cut) >= SEVERAL
+                or any(
+                    run.first > 0 and (run.size >= LONG or run.missed() > FLAT * least)
+                    for run in cut
+                )
             ):
                 # what stands alone at the extreme between two runs was cut as well
-                alone = [run for run in flats(at_end, 1) if run.value == extreme]
-                found.append(_fault(recording, side, cut, alone))
-                break
+                most, alone = cut, [run for run in flats(at_end, 1) if run.value == extreme]
+        if most:
+            found.append(_fault(recording, side, most, alone))
     return found
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.clock import check_mean_rate, check_rate, taken_evenly
-from bayesimpact.data.gaps import on_clock
+from bayesimpact.data.even_clock import on_clock
 from bayesimpact.data.input import Kind, unit_factor
 from bayesimpact.data.quantity import UNITS, Quantity, units_of
 from bayesimpact.data.readers.channel import TIME_UNITS, Channel, name_and_unit
