@@ -17,6 +17,7 @@ from bayesimpact.data.faults.slip import find_slips
 from bayesimpact.data.faults.spikes import find_spikes
 from bayesimpact.data.faults.start import find_start
 from bayesimpact.data.faults.tail import without_tail
+from bayesimpact.data.faults.wander import without_wander
 from bayesimpact.data.gaps import without
 from bayesimpact.data.recording import Recording
 
@@ -103,28 +104,29 @@ def set_aside(campaign: Campaign) -> tuple[Campaign, tuple[Fault, ...]]:
 
     With `faults = "keep"` in campaign.toml the campaign stays as it is; faults are told all the
     same. What was done stands in `Campaign.notes`, which reports print; of repeated readings of a
-    motion that has died away (`tail`) there is a notice, too.
+    motion that has died away (`tail`), and of a zero that wanders, there are notices, too.
     """
     faults = find_faults(campaign)
     if campaign.keep_faults:
         return campaign, faults
-    kept, tails = list[Recording](), list[Fault]()
+    kept, changed = list[Recording](), list[Fault]()
     for recording in campaign.recordings:
         own = [f for f in faults if f.recording == recording.name]
         if not any(f.action == "skip" for f in own):
             moving, lost = applied(recording, own)
             rest, tail = without_tail(moving)
+            rest, wander = without_wander(rest)
             kept.append(rest)
-            tails += [_shifted(tail, lost)] if tail else []
+            changed += [_shifted(f, lost) for f in (tail, wander) if f]
     hard = [f for f in faults if f.action != "notice"]
-    if not (hard or tails):
+    if not (hard or changed):
         return campaign, faults
     skipped = {f.recording: f.statement for f in hard if f.action == "skip"}
-    notes = tuple(f"{f.recording}, {f.statement}" for f in (*hard, *tails))
+    notes = tuple(f"{f.recording}, {f.statement}" for f in (*hard, *changed))
     cleaned = replace(
         campaign,
         recordings=tuple(kept),
         skipped={**campaign.skipped, **skipped},
         notes=(*campaign.notes, *notes),
     )
-    return cleaned, (*faults, *tails)
+    return cleaned, (*faults, *changed)
