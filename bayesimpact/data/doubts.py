@@ -37,6 +37,8 @@ def doubts_of(entry: RecordingTable, table: Table, recording: Recording) -> list
     found.append(_hole(entry, table, recording))
     if table.stamped_late:
         found.append(_late(recording))
+    if table.repeated:
+        found.append(_repeated(table))
     found.append(_scale("its readings are", entry.scale, table.unit, units_like(table.unit)))
     given = entry.input
     if given is not None:
@@ -97,6 +99,16 @@ def _late(recording: Recording) -> str:
         "its time stamps are uneven, and its readings follow one another evenly, as behind a "
         "buffer: leave out resample and time_column, and state the rate in campaign.toml, "
         f"sample_rate_hz = {1.0 / recording.interval:.4g}"
+    )
+
+
+def _repeated(table: Table) -> str:
+    """Doubt of rows that repeat because a probe was asked more often than it renews its reading."""
+    rows = table.samples.size + table.repeated
+    return (
+        f"{table.repeated} of its {rows} readings repeat the one before in an even beat, as of a "
+        "probe that is asked more often than it renews its reading: it is read as one every "
+        f"{table.interval:.4g} s, {1.0 / table.interval:.4g} Hz"
     )
 
 

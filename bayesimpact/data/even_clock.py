@@ -12,6 +12,7 @@ from bayesimpact.data.clock import JITTER, even_interval, rounded_interval, take
 from bayesimpact.data.faults.clipped import find_clipped
 from bayesimpact.data.gaps import bridged
 from bayesimpact.data.recording import Recording
+from bayesimpact.data.renewals import renewed
 from bayesimpact.errors import InputError
 
 Array = NDArray[np.float64]
@@ -23,13 +24,15 @@ GAP = 2.5  # typical intervals between two stamps: more is a gap
 @dataclass(frozen=True, eq=False)
 class Even:
     """Readings on an even clock: samples (n,), interval s, used (n,) or None; whether they follow
-    one another evenly as they were, and their stamps are of when they arrived.
+    one another evenly as they were, and their stamps are of when they arrived; and how many of the
+    readings repeated the one before because the probe had no newer one.
     """
 
     samples: Array
     interval: float
     used: Mask | None
     stamped_late: bool = False
+    repeated: int = 0
 
 
 def on_clock(
@@ -40,14 +43,20 @@ def on_clock(
     place: str = "line",
     *,
     resample: bool,
+    alone: bool = False,
 ) -> Even:
-    """Readings with written time stamps (n,), s, whatever they were read from.
+    """Readings with written time stamps (n,), s, whatever they were read from; `alone` where no
+    input or other channel has to stay on the clock of their rows.
 
     Raises
     ------
     InputError
         for an uneven clock, unless `resample` allows it: see `even_interval`, `on_even_clock`.
     """
+    if resample and alone and np.all(np.diff(times) > 0.0):
+        found = renewed(times, samples)
+        if found is not None:
+            return Even(*found, None, repeated=samples.size - found[0].size)
     if resample:
         return on_even_clock(path, times, samples, rows, place)
     return Even(samples, even_interval(path, times, rows, place), None)

@@ -74,6 +74,7 @@ def _wanted(entry: RecordingTable, column: str | int | None) -> Wanted:
         start=entry.start_s,
         end=entry.end_s,
         resample=entry.resample,
+        alone=entry.is_alone,
     )
 
 

@@ -181,10 +181,20 @@ def _samples(where: str, entry: RecordingTable, given: Mapping[str, Any]) -> Tab
     used = None if used is None else used[first:last]
     if entry.resample and used is not None:  # what does not count is a gap in the clock
         times, samples, rows, used = times[used], samples[used], rows[used], None
-    even = on_clock(where, times, samples * factor, rows, "sample", resample=entry.resample)
+    even = on_clock(
+        where,
+        times,
+        samples * factor,
+        rows,
+        "sample",
+        resample=entry.resample,
+        alone=entry.is_alone,
+    )
     check_rate(where, even.interval, entry.sample_rate_hz)
     used = even.used if used is None else used
-    return Table(even.samples, even.interval, float(times[0]), quantity, used)
+    return Table(
+        even.samples, even.interval, float(times[0]), quantity, used, repeated=even.repeated
+    )
 
 
 def _with_input(where: str, entry: RecordingTable, table: Table, given: Mapping[str, Any]) -> Table:

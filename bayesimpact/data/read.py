@@ -219,6 +219,7 @@ def _table(source: Path, entry: RecordingTable, data: bytes) -> Table:
         unit=entry.unit,
         sample_rate=entry.sample_rate_hz,
         resample=entry.resample,
+        alone=entry.is_alone,
         span=(entry.start_s, entry.end_s),
     )
 

@@ -113,6 +113,11 @@ class RecordingTable(_Table):
     )
     skip: Text | None = Field(None, description="the reason to leave it out, in quotes")
 
+    @property
+    def is_alone(self) -> bool:
+        """No input, other channel or stated rate has to stay on the clock of its rows."""
+        return self.input is None and self.motion is None and self.sample_rate_hz is None
+
 
 class SavgolTable(_Table):
     """Savitzky-Golay smoothing; an even window loses one sample, as in MATLAB's `smooth`."""

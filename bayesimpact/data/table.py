@@ -39,6 +39,7 @@ class Table:
         said one
     assumed_seconds : nothing said the unit of the time stamps, and they were taken for s
     stamped_late : readings taken over to an even clock follow one another evenly as they are
+    repeated : readings left out because the probe had answered with the one before again
     """
 
     samples: NDArray[np.float64]
@@ -51,6 +52,7 @@ class Table:
     input_unit: str = ""
     assumed_seconds: bool = False
     stamped_late: bool = False
+    repeated: int = 0
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,7 @@ def read_table(
     unit: str | None = None,
     sample_rate: float | None = None,
     resample: bool = False,
+    alone: bool = False,
     span: tuple[float | None, float | None] = (None, None),
 ) -> Table:
     """Parse the content of a recording's file.
@@ -84,6 +87,7 @@ def read_table(
         `RESPONSE_COLUMNS` or there are several
     sample_rate : Hz, for a file without a time column
     resample : the clock is uneven: take the readings over to even times
+    alone : no input or other channel has to stay on the clock of the rows
     span : start and end of what is used, s; readings and spacing outside are not checked
 
     Raises
@@ -122,12 +126,12 @@ def read_table(
     if sample_rate is not None and not resample and taken_evenly(times, samples):
         check_mean_rate(path, times, sample_rate)
         return Table(samples, 1.0 / sample_rate, float(times[0]), quantity, unit=layout.unit)
-    even = on_clock(path, times, samples, rows, resample=resample)
+    even = on_clock(path, times, samples, rows, resample=resample, alone=alone)
     check_rate(path, even.interval, sample_rate)
     start = float(times[0])
     return Table(
         even.samples, even.interval, start, quantity, even.used,
-        unit=layout.unit, stamped_late=even.stamped_late,
+        unit=layout.unit, stamped_late=even.stamped_late, repeated=even.repeated,
     )  # fmt: skip
 
 

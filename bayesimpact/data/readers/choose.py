@@ -36,7 +36,7 @@ class Wanted:
 
     `column` and `time_column` are names, or numbers counted from 1 in the file's (or block's) own
     order; `start` and `end` in s. `kind`: what is wanted is an input of that kind, no response,
-    and `free` says that its gain is an unknown.
+    and `free` says that its gain is an unknown. `alone`: nothing else has to stay on its clock.
     """
 
     column: str | int | None = None
@@ -51,6 +51,7 @@ class Wanted:
     resample: bool = False
     kind: Kind | None = None
     free: bool = False
+    alone: bool = False
 
 
 def choose(path: Path, channels: Sequence[Channel], wanted: Wanted) -> Table:
@@ -82,12 +83,19 @@ def choose(path: Path, channels: Sequence[Channel], wanted: Wanted) -> Table:
         where = f"{path}, {place} {rows[bad[0]]}, time column"
         raise InputError(where, "no number", "a finite number")
     even = on_clock(
-        path, stamps, samples * factor, rows.astype(np.int64), place, resample=wanted.resample
+        path,
+        stamps,
+        samples * factor,
+        rows.astype(np.int64),
+        place,
+        resample=wanted.resample,
+        alone=wanted.alone,
     )
     check_rate(path, even.interval, wanted.sample_rate)
     return Table(
         even.samples, even.interval, float(stamps[0]), quantity, even.used,
         unit=unit, assumed_seconds=assumed, stamped_late=even.stamped_late,
+        repeated=even.repeated,
     )  # fmt: skip
 
 
