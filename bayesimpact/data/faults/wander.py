@@ -43,12 +43,10 @@ def without_wander(recording: Recording) -> tuple[Recording, Fault | None]:
     """
     if recording.case or recording.input is not None or recording.order == 0:
         return recording, None
-    left, curve = recording.samples, np.zeros(recording.samples.size)
+    left, curve, period = recording.samples, np.zeros(recording.samples.size), 0.0
     for _ in range(TURNS):  # of a large wander the first period is its own
-        period = crossing_period(left, 1.0)
-        if period is None:
-            return recording, None
-        found = _curve(recording, period, noise_level(left))
+        period = crossing_period(left, 1.0) or 0.0
+        found = _curve(recording, period, noise_level(left)) if period else None
         if found is None:
             return recording, None
         settled = np.ptp(found - curve) <= 0.01 * np.ptp(found)
