@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.faults.fault import Fault
 from bayesimpact.diagnosis.budget import Budget, begin
 from bayesimpact.diagnosis.candidates.promising import NEAR_MARGIN, SCORE_UNDERESTIMATE
 from bayesimpact.diagnosis.faults.changes import change_instead
@@ -56,6 +57,7 @@ from bayesimpact.diagnosis.faults.simpler import (
     makes_idle,
     may_be_simpler,
 )
+from bayesimpact.diagnosis.faults.soft_release import soft_releases
 from bayesimpact.diagnosis.faults.unfree_start import BETTER, unfree_starts
 from bayesimpact.diagnosis.loop import Diagnosis, Progress, diagnose_fit
 from bayesimpact.diagnosis.measurement.smoothing import SAVITZKY_GOLAY, whole_campaign
@@ -181,7 +183,7 @@ def _diagnosed(
     say("fitting the base model")
     cleaned = cleaned_campaign(campaign, rng=rng, search=search)
     first = cleaned.identification.fit
-    pushed = pushed_starts(first, effects, campaign_scales(first)) if is_large(first) else ()
+    pushed = _pushed(first, effects) if is_large(first) else ()
     if pushed:
         cleaned = without_faults(cleaned, pushed, campaign, rng=rng)
     elif base_failed(first):
@@ -218,6 +220,14 @@ def _diagnosed(
     found = _without_unfree_start(found, campaign, searches)
     undecided = found.corrected is not None and found.corrected.is_open
     return replace(found, verdict="ambiguous") if undecided and is_complete(found) else found
+
+
+def _pushed(base: Fit, effects: Sequence[Effect]) -> tuple[Fault, ...]:
+    """Starts that the equation of motion shows to be pushed; with a stop, or held."""
+    scales = campaign_scales(base)
+    if base.density.oscillator.campaign.stop:
+        return () if base_failed(base) else soft_releases(base, effects, scales)
+    return pushed_starts(base, effects, scales)
 
 
 def _by_a_free_rest(cleaned: Corrected, as_read: Campaign, rng: np.random.Generator) -> Corrected:

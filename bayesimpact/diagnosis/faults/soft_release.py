@@ -1,0 +1,148 @@
+"""A release that takes a while, by the equation of motion in flight: a magnet's field that fades, a
+thread that stretches, a hand.
+
+Between the first sample and the first contact the mass moves as it does in every later flight, by
+the same laws, but for what still holds it. Its force is seen along the measured motion while it
+acts; what it does to a simulation lasts to the end, and a hysteresis or a drag is found in its
+place. So the laws that stretches of flight ask for are sought with and without first flights. What
+more is left of these than of what follows is held against the flights that come second: missing
+physics leaves more in a larger motion too, but does not end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import f as f_distribution
+
+from bayesimpact.data.faults.fault import FALSE_ALARM, Fault
+from bayesimpact.data.recording import Recording
+from bayesimpact.diagnosis.candidates.equation_error import Path, measured_paths
+from bayesimpact.diagnosis.candidates.likely_sets import LikelySets
+from bayesimpact.diagnosis.faults.forced_start import STEEPER
+from bayesimpact.diagnosis.faults.unfree_start import POWER, start_fault
+from bayesimpact.diagnosis.thresholds import ALPHA
+from bayesimpact.inference.fit import Fit
+from bayesimpact.model.effects.effect import Effect, Scales
+
+MOST = 3  # effects that the equation may have
+LEAST_ROWS = 12  # stretches that have to follow, for the laws of flight
+
+Span = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class _Squares:
+    """What laws, by their ids, leave of some stretches, in units of their noise, and the number of
+    these; of noise alone as much as their number.
+    """
+
+    left: float
+    rows: int
+    laws: Sequence[str]
+
+    def beyond(self, other: _Squares) -> float:
+        """Mean square of what is left of the stretches that the other has not."""
+        more = max(self.rows - other.rows, 1)
+        return max(self.left - other.left, 0.0) / more
+
+
+def soft_releases(fit: Fit, effects: Sequence[Effect], scales: Scales) -> tuple[Fault, ...]:
+    """First flights of free recordings beside a stop in which something holds the mass that no law
+    of flight explains; of motions with one channel each.
+
+    Recordings of one rig are released alike: where it stands out over all of them together, each is
+    asked no more than whether it shows it beside the laws of what follows.
+    """
+    campaign = fit.density.oscillator.campaign
+    channels = any(r.motion_name for r in campaign.recordings)
+    driven = fit.density.oscillator.inputs is not None
+    if not campaign.stop or campaign.keep_faults or driven or channels or scales.stiffness <= 0.0:
+        return ()
+    paths = measured_paths(fit, flight=True)
+    flights = [_flights(path) for path in paths]
+    told = [r for r, own in enumerate(flights) if own]
+    first = {r: flights[r][0] for r in told}
+    whole = _left(fit, effects, scales, {})
+    rest = _left(fit, effects, scales, first)
+    if whole is None or rest is None or rest.rows < LEAST_ROWS or whole.rows == rest.rows:
+        return ()
+    if _chance(whole, rest) > FALSE_ALARM:
+        return ()
+    later = _left(fit, effects, scales, {r: (0, flights[r][1][1]) for r in told})
+    second = 1.0 if later is None else max(rest.beyond(later), 1.0)
+    depth = {r: [abs(float(paths[r].y[a:b].min())) for a, b in flights[r]] for r in told}
+    found = []
+    least = {r: _least_drop(depth[r], second) for r in told}
+    shared = whole.beyond(rest) > max(least.values())
+    for r in told:
+        others = {q: span for q, span in first.items() if q != r}
+        own = _left(fit, effects, scales, others, rest.laws if shared else None)
+        if own is None:
+            continue
+        power, chance = own.beyond(rest), _chance(own, rest)
+        if chance < ALPHA if shared else power > least[r] and chance * len(told) < FALSE_ALARM:
+            fault = start_fault(fit, r, first[r][1], power / second, least[r] / second)
+            words = (
+                f"held on release: the first {fault.size:.3g} s, up to the stop, are no free flight"
+            )
+            found.append(replace(fault, statement=words))
+    return tuple(found)
+
+
+def _flights(path: Path) -> list[Span]:
+    """The first two flights of a motion that begins in one, [first, end) each and the first of them
+    to the last sample before the stop; none where there are not two that hold a stretch.
+    """
+    inside = np.concatenate([[True], path.d > 0.0, [True]]).astype(np.int8)
+    begins, ends = (np.flatnonzero(np.diff(inside) == step) for step in (-1, 1))
+    width = path.rows.phi.size
+    spans = [(int(a), int(b)) for a, b in zip(begins, ends, strict=True) if b - a > width]
+    return spans[:2] if len(spans) > 1 and spans[0][0] == 0 else []
+
+
+def _least_drop(depth: Sequence[float], second: float) -> float:
+    """Mean square that first flights must leave: far more than a force that grows with the third
+    power of the amplitude would, by what second flights leave.
+    """
+    ratio = max(depth[0] / max(depth[1], 1e-300), 1.0)
+    return second * (STEEPER * ratio**POWER) ** 2
+
+
+def _chance(whole: _Squares, rest: _Squares) -> float:
+    """Of so much more left of the stretches that are only in the whole, by noise alone."""
+    more = whole.rows - rest.rows
+    return float(f_distribution.sf(whole.beyond(rest), more, rest.rows)) if more > 0 else 1.0
+
+
+def _left(
+    fit: Fit,
+    effects: Sequence[Effect],
+    scales: Scales,
+    without: dict[int, Span],
+    laws: Sequence[str] | None = None,
+) -> _Squares | None:
+    """What some laws, or the likeliest ones, leave of flights, but for spans of some recordings;
+    None where nothing is told.
+    """
+    recordings = list(fit.density.oscillator.campaign.recordings)
+    for r, span in without.items():
+        recordings[r] = _set_aside(recordings[r], span)
+    problem = LikelySets(fit.with_recordings(recordings), effects, scales, flight=True)
+    if not problem.terms:
+        return None
+    if laws is None:
+        sets = problem.best(MOST)
+        laws = [e.id for e in sets[-1].effects] if sets else []
+    left = float(np.exp(problem.solve(problem.shaped(laws))[1])) * problem.rows
+    return _Squares(left, problem.rows, laws)
+
+
+def _set_aside(recording: Recording, span: Span) -> Recording:
+    used = np.ones(recording.samples.size, bool)
+    if recording.used is not None:
+        used &= recording.used
+    used[span[0] : span[1]] = False
+    return replace(recording, used=used)
