@@ -5,6 +5,9 @@
    recording fits with its readings put where they belong.
 3. The recordings' own parameters are compared (see `together`); the likeliest fault is corrected if
    its log odds against no fault, all faults being equally likely beforehand, pass the threshold.
+   Few recordings whose physics is not known differ anyhow, and no odds pass. There one is enough
+   that is likelier than none, of a recording whose amplitude lies between the others', if that
+   corrected leaves `EXCESS` times less, and leaving out any other recording does not.
 4. The campaign is fitted before and after; a correction that does not improve it is not believed.
 5. Again from 3, until nothing is found, or a third of the recordings has been corrected.
 """
@@ -36,6 +39,7 @@ from bayesimpact.diagnosis.faults.together import (
     hypotheses,
     weigh_all,
 )
+from bayesimpact.diagnosis.thresholds import EXCESS
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.noise.whitening import Noise
 
@@ -237,25 +241,53 @@ def _next(
     prior = -np.log(len(hypotheses(cases, campaign.stop)) - 1)
     best = ranked[0]
     odds = best.log_evidence - none.log_evidence + prior
-    if odds < needed:
+    if odds < min(needed, 0.0):
         return None
     number = known[best.hypothesis.recording][0]
     after = corrected(campaign, number, best)
     value = _chi2(after, model)
-    if log_likelihood_gain(chi2, value, campaign) <= needed:
+    nats = log_likelihood_gain(chi2, value, campaign)
+    if nats <= needed:
         return None
-    fault = as_fault(campaign.recordings[number], best, odds, needed)
-    return Compared(fault, after, chi2, value, _alternatives(ranked, own))
+    if odds >= needed:
+        fault = as_fault(campaign.recordings[number], best, odds, needed)
+        return Compared(fault, after, chi2, value, _alternatives(ranked, own))
+    sizes = [a.amplitude for a in own]
+    is_between = min(sizes) < own[best.hypothesis.recording].amplitude < max(sizes)
+    if not (is_between and _alone_differs(campaign, model, number, chi2, value)):
+        return None
+    fault = as_fault(campaign.recordings[number], best, nats, needed)
+    none = replace(none, log_evidence=none.log_evidence - prior)
+    return Compared(fault, after, chi2, value, _alternatives([*ranked, none], own))
+
+
+def _alone_differs(
+    campaign: Campaign, model: SharedModel, number: int, chi2: float, corrected_chi2: float
+) -> bool:
+    """Whether `EXCESS` times less is left with one recording corrected, and with no other one left
+    out: most of the misfit is of that one, whatever else all of them miss.
+    """
+    if EXCESS * corrected_chi2 > chi2:
+        return False
+    for other in range(len(campaign.recordings)):
+        if other != number:
+            rest = campaign.recordings[:other] + campaign.recordings[other + 1 :]
+            if _chi2(replace(campaign, recordings=rest), model) < EXCESS * corrected_chi2:
+                return False
+    return True
 
 
 def _alternatives(ranked: Sequence[Weighed], own: Sequence[Alone]) -> tuple[tuple[str, float], ...]:
-    """The next explanations with their probabilities among all faults."""
+    """Explanations beside the first with their probabilities among all of them."""
     evidence = np.array([w.log_evidence for w in ranked])
     share = np.exp(evidence - evidence[0])
     share /= share.sum()
     names = []
-    for weighed, p in list(zip(ranked, share, strict=True))[1:4]:
-        if p > 1e-3:
+    others = list(zip(ranked, share, strict=True))[1:]
+    for weighed, p in sorted(others, key=lambda one: -one[1])[:3]:
+        if p > 1e-3 and not weighed.hypothesis.id:
+            names.append(("physics that recordings show differently", float(p)))
+        elif p > 1e-3:
             what = f" ({weighed.hypothesis.what})" if weighed.hypothesis.what else ""
             name = own[weighed.hypothesis.recording].recording
             names.append((f"{weighed.hypothesis.id}{what}, {name}", float(p)))
