@@ -5,7 +5,8 @@ a force of time is part of what the recordings are (`discrepancy`): it scatters 
 does, and the part of it that a parameter can imitate, which no remainder shows, is as large as
 the part that remains (`hidden`). Models that do not stand out from this one make other values of
 a parameter; their scatter is added (`comparable`). Medians stay at the mode, whose motion the
-figures show.
+figures show, also where such a width reaches beyond a bound: it is no posterior's, and a normal cut
+there would tell a median that no model has.
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ class Intervals:
     names : of the parameters
     mean, covariance : (d,) and (d, d), before the cut
     lower, upper : physical bounds (d,)
+    at_mode : the median is the mean, and both ends of an interval stop at the bounds
     """
 
     names: tuple[str, ...]
@@ -43,6 +45,7 @@ class Intervals:
     covariance: Array
     lower: Array
     upper: Array
+    at_mode: bool = False
 
     __repr__ = short_repr
 
@@ -53,13 +56,14 @@ class Intervals:
         i = self.names.index(name)
         middle, sd = float(self.mean[i]), float(np.sqrt(self.covariance[i, i]))
         low, high = float(self.lower[i]), float(self.upper[i])
+        clipped = min(max(middle, low), high)
         if not sd > 0.0:
-            clipped = min(max(middle, low), high)
             return clipped, clipped, clipped
+        if self.at_mode:
+            return max(clipped - NINETY * sd, low), clipped, min(clipped + NINETY * sd, high)
         within = stats.truncnorm((low - middle) / sd, (high - middle) / sd, middle, sd)
         found = [float(within.ppf(q)) for q in (0.05, 0.5, 0.95)]
         if not np.all(np.isfinite(found)):  # all of the mass lies far beyond a bound
-            clipped = min(max(middle, low), high)
             found = [max(clipped - NINETY * sd, low), clipped, min(clipped + NINETY * sd, high)]
         return found[0], found[1], found[2]
 
@@ -84,4 +88,4 @@ def intervals(
     if beside is not None:
         covariance = covariance + beside.between(fit)
     bounds = np.array([(p.lower, p.upper) for p in fit.density.oscillator.layout.parameters])
-    return Intervals(fit.names, mean, covariance, bounds[:, 0], bounds[:, 1])
+    return Intervals(fit.names, mean, covariance, bounds[:, 0], bounds[:, 1], remains)

@@ -13,7 +13,7 @@ from effect_rigs import BY_ID
 from scipy import stats
 
 from bayesimpact.diagnosis.diagnose import diagnose
-from bayesimpact.diagnosis.intervals import Intervals
+from bayesimpact.diagnosis.intervals import Intervals, intervals
 from bayesimpact.diagnosis.loop import Diagnosis
 from bayesimpact.diagnosis.measurement.whiteness import combined, ljung_box, whiteness_p
 from bayesimpact.diagnosis.residual_force.discrepancy import discrepancy
@@ -40,6 +40,17 @@ def test_a_bound_cuts_the_posterior_and_the_median_stays_inside(mean):
         error = 4 / np.sqrt(draws.size)  # of a quantile, over the density there (at least 0.1)
         expected = np.percentile(draws, [5, 50, 95])
         np.testing.assert_allclose([low, median, high], expected, atol=10 * error)
+
+
+def test_a_width_beyond_a_bound_leaves_the_median_at_the_mode(small):
+    """What stays unexplained may be as much as a parameter itself, and more."""
+    found = intervals(small.fit, remains=True)
+    i = found.names.index("k1")
+    wide = found.covariance.copy()
+    wide[i, i] = (30.0 * small.fit.mode[i]) ** 2
+    low, median, high = replace(found, covariance=wide).quantiles("k1")
+    assert median == pytest.approx(small.fit.value("k1"), rel=1e-6)
+    assert low == 0.0 and high == pytest.approx((1 + 30 * 1.645) * median)
 
 
 def test_ljung_box_statistic_and_its_law():
