@@ -45,12 +45,13 @@ class Budget:
         """Whether another fit may begin."""
         return self.left > 0.0
 
-    def may_search_on(self, look: float = 0.0) -> bool:
+    def may_search_on(self, look: float = 0.0, more: float = 0.0) -> bool:
         """Whether another fit of a search may begin: time to compare its answer is kept.
 
         look : s that it takes to score what a model lacks
+        more : s that what begins will take
         """
-        return self.left > max(COMPARISONS, min(LOOKS * look, MOST_KEPT * self.seconds))
+        return self.left - more > max(COMPARISONS, min(LOOKS * look, MOST_KEPT * self.seconds))
 
     def may_compare_on(self, look: float = 0.0) -> bool:
         """Whether another fit that an answer is compared with may begin: where models take long to

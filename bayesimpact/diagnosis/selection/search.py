@@ -39,6 +39,7 @@ from bayesimpact.diagnosis.selection.outcome import (
 )
 from bayesimpact.diagnosis.selection.revision import revised
 from bayesimpact.diagnosis.selection.unknown import learn_force
+from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.refitted import refitted
 from bayesimpact.model.effects.effect import Effect, Scales
@@ -107,20 +108,24 @@ def select_model(
 
 def _beside_hums(fit: Fit, begun: Callable[[], _Search]) -> Fit | None:
     """The model that the recordings less their hums ask for, fitted to them as they are; None where
-    they have none or leave no large misfit, or where that model leaves one.
+    they have none or leave no large misfit, or where that model leaves one and there is as much
+    time again to ask for another.
     """
     quiet = fit_without_hums(fit) if is_large(fit) else None
     if quiet is None:
         return None
     search = begun()
+    at_first = search.budget.left
     search.progress("a hum is taken out of the recordings first")
     search.is_last = True
     base = search.examine(base_candidate(quiet))
     examined = search.asked_for(base)[0] if search.is_large else base
-    if is_large(examined.candidate.fit):
+    left_large = is_large(examined.candidate.fit)
+    if left_large and search.budget.may_search_on(search.look, at_first - search.budget.left):
         return None
     found = refitted(examined.candidate.fit, fit.density.oscillator.campaign)
-    return found if np.isfinite(found.log_posterior) else None
+    least = fit.log_posterior + DECISIVE if left_large else -np.inf
+    return found if np.isfinite(found.log_posterior) and found.log_posterior > least else None
 
 
 class _Search(Asking):

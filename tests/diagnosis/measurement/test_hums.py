@@ -9,15 +9,19 @@ from typing import Any
 import numpy as np
 import pytest
 import small_rig
+from effect_rigs import BY_ID
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.hum import Hum
 from bayesimpact.data.input import Input
+from bayesimpact.diagnosis.budget import Budget
 from bayesimpact.diagnosis.measurement.hums import (
     _shared,
     fit_without_hums,
     recordings_without_hums,
 )
+from bayesimpact.diagnosis.refits.extend import campaign_scales
+from bayesimpact.diagnosis.refits.refit import fit_from
 from bayesimpact.diagnosis.selection import search
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
@@ -67,25 +71,36 @@ def test_a_hum_is_taken_out_only_where_that_leaves_less(
     assert fit_without_hums(humming) is None
 
 
-@pytest.mark.parametrize("left", [1.0, 100.0])
-def test_a_search_begins_with_what_quiet_recordings_ask_for(humming: Fit, left: float) -> None:
-    """Unless that leaves a large misfit; the model is then fitted to the recordings as they are."""
+@pytest.mark.parametrize(
+    ("left", "seconds", "kept"), [(1.0, 150.0, True), (100.0, 150.0, False), (100.0, 80.0, True)]
+)
+def test_a_search_begins_with_what_quiet_recordings_ask_for(
+    humming: Fit, left: float, seconds: float, kept: bool
+) -> None:
+    """Unless that leaves a large misfit, and there is time to ask for something else; the model is
+    then fitted to the recordings as they are.
+    """
     quieter = fit_without_hums(humming)
     assert quieter is not None
+    law = BY_ID["spring_cubic"]
+    values = {"spring_cubic.stiffness": CUBIC["stiffness"]}
+    quieter = fit_from(quieter, (law,), values, campaign_scales(quieter)).fit
     fit = replace(quieter, sums=quieter.sums * left / quieter.reduced_chi2)
     examined = SimpleNamespace(candidate=SimpleNamespace(fit=fit))
+    readings = iter((0.0, 40.0, 40.0))  # asking takes 40 s
     begun = SimpleNamespace(
         progress=lambda words: None,
         examine=lambda c: examined,
         asked_for=lambda s: [s],
         is_large=True,
+        look=1.0,
+        budget=Budget(lambda: next(readings, 40.0), 0.0, seconds),
     )
     found = search._beside_hums(humming, lambda: begun)
-    if left > 1.0:
-        assert found is None
-    else:
+    assert (found is not None) == kept
+    if found is not None:
         own = humming.density.oscillator.campaign
-        assert found is not None and found.density.oscillator.campaign is own
+        assert found.density.oscillator.campaign is own and found.density.oscillator.effects
 
 
 def test_hums_of_different_frequencies_are_shared_by_none() -> None:
