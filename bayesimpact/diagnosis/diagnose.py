@@ -183,7 +183,7 @@ def _diagnosed(
     say("fitting the base model")
     cleaned = cleaned_campaign(campaign, rng=rng, search=search)
     first = cleaned.identification.fit
-    pushed = _pushed(first, effects) if is_large(first) else ()
+    pushed = _pushed(cleaned, effects) if is_large(first) else ()
     if pushed:
         cleaned = without_faults(cleaned, pushed, campaign, rng=rng)
     elif base_failed(first):
@@ -222,12 +222,13 @@ def _diagnosed(
     return replace(found, verdict="ambiguous") if undecided and is_complete(found) else found
 
 
-def _pushed(base: Fit, effects: Sequence[Effect]) -> tuple[Fault, ...]:
-    """Starts that the equation of motion shows to be pushed; with a stop, or held."""
+def _pushed(cleaned: Corrected, effects: Sequence[Effect]) -> tuple[Fault, ...]:
+    """Starts that the equation of motion shows to be pushed, or held."""
+    base = cleaned.identification.fit
     scales = campaign_scales(base)
-    if base.density.oscillator.campaign.stop:
-        return () if base_failed(base) else soft_releases(base, effects, scales)
-    return pushed_starts(base, effects, scales)
+    rested = [f.recording for f in cleaned.own if f.id == "recording_start"]
+    pushed = pushed_starts(base, effects, scales)
+    return pushed or (() if base_failed(base) else soft_releases(base, effects, scales, rested))
 
 
 def _by_a_free_rest(cleaned: Corrected, as_read: Campaign, rng: np.random.Generator) -> Corrected:

@@ -1,17 +1,17 @@
 """A release that takes a while, by the equation of motion in flight: a magnet's field that fades, a
 thread that stretches, a hand.
 
-Between the first sample and the first contact the mass moves as it does in every later flight, by
-the same laws, but for what still holds it. Its force is seen along the measured motion while it
-acts; what it does to a simulation lasts to the end, and a hysteresis or a drag is found in its
-place. So the laws that stretches of flight ask for are sought with and without first flights. What
-more is left of these than of what follows is held against the flights that come second: missing
-physics leaves more in a larger motion too, but does not end.
+Between the first sample and the first contact, or without a stop in the first half period, the mass
+moves as it does in every later flight, by the same laws, but for what still holds it. That force is
+seen along the measured motion while it acts; what it does to a simulation lasts to the end, and a
+hysteresis or a drag is found in its place. So the laws that stretches of flight ask for are sought
+with and without first flights. What more is left of these than of what follows is held against the
+flights that come second: missing physics leaves more in a larger motion too, but does not end.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -49,9 +49,12 @@ class _Squares:
         return max(self.left - other.left, 0.0) / more
 
 
-def soft_releases(fit: Fit, effects: Sequence[Effect], scales: Scales) -> tuple[Fault, ...]:
-    """First flights of free recordings beside a stop in which something holds the mass that no law
-    of flight explains; of motions with one channel each.
+def soft_releases(
+    fit: Fit, effects: Sequence[Effect], scales: Scales, rested: Collection[str] = ()
+) -> tuple[Fault, ...]:
+    """First flights of free recordings in which something holds the mass that no law of flight
+    explains; of motions with one channel each. Without a stop, of recordings that began with a rest
+    only: a push is told otherwise (`pushed_start`), and so is what a release sets off.
 
     Recordings of one rig are released alike: where it stands out over all of them together, each is
     asked no more than whether it shows it beside the laws of what follows.
@@ -59,10 +62,14 @@ def soft_releases(fit: Fit, effects: Sequence[Effect], scales: Scales) -> tuple[
     campaign = fit.density.oscillator.campaign
     channels = any(r.motion_name for r in campaign.recordings)
     driven = fit.density.oscillator.inputs is not None
-    if not campaign.stop or campaign.keep_faults or driven or channels or scales.stiffness <= 0.0:
+    if campaign.keep_faults or driven or channels or scales.stiffness <= 0.0:
         return ()
     paths = measured_paths(fit, flight=True)
-    flights = [_flights(path) for path in paths]
+    half = np.pi * float(np.sqrt(scales.mass / scales.stiffness))
+    flights = [
+        _flights(path) if campaign.stop else _half_periods(path, half, recording.name in rested)
+        for path, recording in zip(paths, campaign.recordings, strict=True)
+    ]
     told = [r for r, own in enumerate(flights) if own]
     first = {r: flights[r][0] for r in told}
     whole = _left(fit, effects, scales, {})
@@ -73,7 +80,7 @@ def soft_releases(fit: Fit, effects: Sequence[Effect], scales: Scales) -> tuple[
         return ()
     later = _left(fit, effects, scales, {r: (0, flights[r][1][1]) for r in told})
     second = 1.0 if later is None else max(rest.beyond(later), 1.0)
-    depth = {r: [abs(float(paths[r].y[a:b].min())) for a, b in flights[r]] for r in told}
+    depth = {r: [float(np.abs(paths[r].y[a:b]).max()) for a, b in flights[r]] for r in told}
     found = []
     least = {r: _least_drop(depth[r], second) for r in told}
     shared = whole.beyond(rest) > max(least.values())
@@ -85,9 +92,8 @@ def soft_releases(fit: Fit, effects: Sequence[Effect], scales: Scales) -> tuple[
         power, chance = own.beyond(rest), _chance(own, rest)
         if chance < ALPHA if shared else power > least[r] and chance * len(told) < FALSE_ALARM:
             fault = start_fault(fit, r, first[r][1], power / second, least[r] / second)
-            words = (
-                f"held on release: the first {fault.size:.3g} s, up to the stop, are no free flight"
-            )
+            until = "the stop" if campaign.stop else "the other side"
+            words = f"held on release: the first {fault.size:.3g} s, up to {until}, are not free"
             found.append(replace(fault, statement=words))
     return tuple(found)
 
@@ -101,6 +107,13 @@ def _flights(path: Path) -> list[Span]:
     width = path.rows.phi.size
     spans = [(int(a), int(b)) for a, b in zip(begins, ends, strict=True) if b - a > width]
     return spans[:2] if len(spans) > 1 and spans[0][0] == 0 else []
+
+
+def _half_periods(path: Path, half: float, rested: bool) -> list[Span]:
+    """The first two half periods, of so many s each, of a motion that began with a rest."""
+    count = round(half / float(path.t[1] - path.t[0]))
+    is_told = rested and path.t.size > 4 * count and count > path.rows.phi.size // 2
+    return [(0, count), (count, 2 * count)] if is_told else []
 
 
 def _least_drop(depth: Sequence[float], second: float) -> float:

@@ -1,6 +1,8 @@
-"""A magnet that lets go over a while, beside a stop."""
+"""A magnet that lets go over a while, with and without a stop."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +26,11 @@ DEPTHS = (6.5e-3, 5.5e-3, 4.5e-3)
 
 
 def recorded(
-    fades: tuple[float, ...] = (0.0, 0.0, 0.0), drag: float = 0.0, bumper: float = 0.0
+    fades: tuple[float, ...] = (0.0, 0.0, 0.0),
+    drag: float = 0.0,
+    bumper: float = 0.0,
+    *,
+    stop: bool = True,
 ) -> Campaign:
     """Three decays with a softening spring; a magnet holds each for 0.15 s and lets go over `fades`
     s; with a quadratic drag, N s2/m2, and a bumper behind -4.6 mm, N/m.
@@ -38,7 +44,7 @@ def recorded(
             force = -held * float(np.clip((HELD + fade - t) / max(fade, 1e-9), 0.0, 1.0))
             force -= RIG.c1 * v + RIG.k1 * y + CUBIC * y**3 + drag * abs(v) * v
             force += bumper * max(-y - 4.6e-3, 0.0)
-            if y > RIG.g:
+            if y > RIG.g and stop:
                 force -= RIG.k2["1"] * (y - RIG.g) + RIG.c2 * v
             return [v, force / RIG.mass]
 
@@ -47,14 +53,15 @@ def recorded(
             rate, (0.0, 3.0), [-depth, 0.0], t_eval=times, rtol=1e-8, atol=1e-11, max_step=5e-4
         ).y[0]
         noise = small_rig.NOISE * rng.standard_normal(y.size)
-        recordings.append(Recording(name, "1", y + noise, 1e-3))
-    return Campaign("held", RIG.mass, tuple(recordings))
+        recordings.append(Recording(name, "1" if stop else "", y + noise, 1e-3))
+    return Campaign("held", RIG.mass, tuple(recordings), stop=stop)
 
 
 def found(campaign: Campaign) -> list[str]:
-    fit = cleaned_campaign(campaign, rng=RNG(0), search=False).identification.fit
+    cleaned = cleaned_campaign(campaign, rng=RNG(0), search=False)
+    fit, rested = cleaned.identification.fit, [f.recording for f in cleaned.own]
     assert fit.reduced_chi2 > 9.0
-    return [f.recording for f in soft_releases(fit, SEARCHED, campaign_scales(fit))]
+    return [f.recording for f in soft_releases(fit, SEARCHED, campaign_scales(fit), rested)]
 
 
 def test_a_release_that_takes_a_while_is_found_where_it_does() -> None:
@@ -62,8 +69,14 @@ def test_a_release_that_takes_a_while_is_found_where_it_does() -> None:
     assert found(recorded(fades=(0.0, 0.04, 0.0))) == ["b"]
 
 
-@pytest.mark.parametrize("law", [{}, {"drag": 2.0}, {"bumper": 500.0}])
-def test_physics_of_large_motions_is_no_release(law: dict[str, float]) -> None:
+def test_without_a_stop_it_is_found_after_a_rest() -> None:
+    assert found(recorded(fades=(0.04, 0.03, 0.035), stop=False)) == ["a", "b", "c"]
+
+
+@pytest.mark.parametrize(
+    "law", [{}, {"drag": 2.0}, {"bumper": 500.0}, {"stop": False}, {"bumper": 500.0, "stop": False}]
+)
+def test_physics_of_large_motions_is_no_release(law: dict[str, Any]) -> None:
     assert found(recorded(**law)) == []
 
 
