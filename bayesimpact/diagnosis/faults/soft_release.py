@@ -57,7 +57,9 @@ def soft_releases(
     only: a push is told otherwise (`pushed_start`), and so is what a release sets off.
 
     Recordings of one rig are released alike: where it stands out over all of them together, each is
-    asked no more than whether it shows it beside the laws of what follows.
+    asked no more than whether it shows it beside the laws of what follows; and where most do, it is
+    left out of all, for what is too little to show would still be taken for a law of the largest
+    motions.
     """
     campaign = fit.density.oscillator.campaign
     channels = any(r.motion_name for r in campaign.recordings)
@@ -70,7 +72,7 @@ def soft_releases(
         _flights(path) if campaign.stop else _half_periods(path, half, recording.name in rested)
         for path, recording in zip(paths, campaign.recordings, strict=True)
     ]
-    told = [r for r, own in enumerate(flights) if own]
+    told = [r for r, own in enumerate(flights) if len(own) > 1]
     first = {r: flights[r][0] for r in told}
     whole = _left(fit, effects, scales, {})
     rest = _left(fit, effects, scales, first)
@@ -81,32 +83,38 @@ def soft_releases(
     later = _left(fit, effects, scales, {r: (0, flights[r][1][1]) for r in told})
     second = 1.0 if later is None else max(rest.beyond(later), 1.0)
     depth = {r: [float(np.abs(paths[r].y[a:b]).max()) for a, b in flights[r]] for r in told}
-    found = []
     least = {r: _least_drop(depth[r], second) for r in told}
     shared = whole.beyond(rest) > max(least.values())
+    power, shown = dict[int, float](), list[int]()
     for r in told:
         others = {q: span for q, span in first.items() if q != r}
         own = _left(fit, effects, scales, others, rest.laws if shared else None)
-        if own is None:
-            continue
-        power, chance = own.beyond(rest), _chance(own, rest)
-        if chance < ALPHA if shared else power > least[r] and chance * len(told) < FALSE_ALARM:
-            fault = start_fault(fit, r, first[r][1], power / second, least[r] / second)
-            until = "the stop" if campaign.stop else "the other side"
-            words = f"held on release: the first {fault.size:.3g} s, up to {until}, are not free"
-            found.append(replace(fault, statement=words))
+        power[r], chance = (0.0, 1.0) if own is None else (own.beyond(rest), _chance(own, rest))
+        if chance < ALPHA if shared else power[r] > least[r] and chance * len(told) < FALSE_ALARM:
+            shown.append(r)
+    until, found = "the stop" if campaign.stop else "the other side", list[Fault]()
+    alike = [r for r, own in enumerate(flights) if own] if 2 * len(shown) > len(told) else shown
+    for r in alike:
+        reached = power.get(r, 0.0), least.get(r, 0.0)
+        fault = start_fault(fit, r, flights[r][0][1], *(one / second for one in reached))
+        words = f"held on release: the first {fault.size:.3g} s, up to {until}, are not free"
+        if r not in shown:
+            words = f"released as the others: the first {fault.size:.3g} s, up to {until}, left out"
+        found.append(replace(fault, statement=words))
     return tuple(found)
 
 
 def _flights(path: Path) -> list[Span]:
-    """The first two flights of a motion that begins in one, [first, end) each and the first of them
-    to the last sample before the stop; none where there are not two that hold a stretch.
+    """The flight that a motion begins in, to the last sample before the stop, and where both hold a
+    stretch the next one that does, [first, end) each; none where it begins elsewhere.
     """
     inside = np.concatenate([[True], path.d > 0.0, [True]]).astype(np.int8)
     begins, ends = (np.flatnonzero(np.diff(inside) == step) for step in (-1, 1))
-    width = path.rows.phi.size
-    spans = [(int(a), int(b)) for a, b in zip(begins, ends, strict=True) if b - a > width]
-    return spans[:2] if len(spans) > 1 and spans[0][0] == 0 else []
+    spans = [(int(a), int(b)) for a, b in zip(begins, ends, strict=True)]
+    long = [(a, b) for a, b in spans if b - a > path.rows.phi.size]
+    if not spans or spans[0][0] > 0:
+        return []
+    return long[:2] if len(long) > 1 and long[0] == spans[0] else spans[:1]
 
 
 def _half_periods(path: Path, half: float, rested: bool) -> list[Span]:

@@ -67,6 +67,7 @@ def found(campaign: Campaign) -> list[str]:
 def test_a_release_that_takes_a_while_is_found_where_it_does() -> None:
     assert found(recorded(fades=(0.04, 0.03, 0.035))) == ["a", "b", "c"]
     assert found(recorded(fades=(0.0, 0.04, 0.0))) == ["b"]
+    assert found(recorded(fades=(0.04, 0.0, 0.035))) == ["a", "b", "c"]  # one rig
 
 
 def test_without_a_stop_it_is_found_after_a_rest() -> None:
