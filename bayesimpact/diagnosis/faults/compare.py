@@ -54,6 +54,12 @@ FEW = 3  # of such recordings: what is missing from all of them is no sign
 SIGNIFICANT = 4.0  # standard errors of a reduced chi-squared that call for a comparison
 SHARE = 1 / 3  # of the recordings, at most, that may be faulty: the others are the majority
 LEAST = 3  # recordings: of two that differ neither is the faulty one
+DIFFERENT = {
+    "recording_gain": "another gain or gap",
+    "recording_clock": "another clock",
+    "recording_case": "another obstacle",
+}
+"""What is different in a recording, in words; of another rig a parameter."""
 FAILED = 0.5  # of the signal's root mean square left: no fit at all
 
 
@@ -288,9 +294,8 @@ def _alternatives(ranked: Sequence[Weighed], own: Sequence[Alone]) -> tuple[tupl
         if p > 1e-3 and not weighed.hypothesis.id:
             names.append(("physics that recordings show differently", float(p)))
         elif p > 1e-3:
-            what = f" ({weighed.hypothesis.what})" if weighed.hypothesis.what else ""
-            name = own[weighed.hypothesis.recording].recording
-            names.append((f"{weighed.hypothesis.id}{what}, {name}", float(p)))
+            what = DIFFERENT.get(weighed.hypothesis.id, f"another {weighed.hypothesis.what}")
+            names.append((f"{what} of {own[weighed.hypothesis.recording].recording}", float(p)))
     return tuple(names)
 
 

@@ -9,8 +9,9 @@ from scipy.integrate import solve_ivp
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.recording import Recording
-from bayesimpact.diagnosis.faults.alone import SharedModel
-from bayesimpact.diagnosis.faults.compare import Compared, compare_recordings
+from bayesimpact.diagnosis.faults.alone import Alone, SharedModel
+from bayesimpact.diagnosis.faults.compare import Compared, _alternatives, compare_recordings
+from bayesimpact.diagnosis.faults.together import Hypothesis, Weighed
 from bayesimpact.diagnosis.selection.outcome import is_large
 from bayesimpact.inference.identify import identify
 
@@ -51,7 +52,8 @@ def test_a_clock_that_is_off_stands_out_of_what_all_of_them_miss() -> None:
     assert one.fault.recording == "c" and 4 * one.after < one.before
     assert one.fault.id == "recording_clock" or "k1" in one.fault.statement
     assert one.fault.strength > one.fault.threshold
-    assert all(name != "recording_other_rig (k1), c" for name, _ in one.alternatives)
+    ((other, probability),) = one.alternatives
+    assert other == "physics that recordings show differently" and probability < 0.1
 
 
 @pytest.mark.parametrize(
@@ -66,3 +68,14 @@ def test_what_all_of_them_show_is_no_fault_of_one(
     clocks: tuple[float, ...], steep: float, first: float
 ) -> None:
     assert found(recorded(clocks, steep, first)) == []
+
+
+def test_other_explanations_are_told_in_words() -> None:
+    alone = [Alone(name, np.zeros(2), np.eye(2), 1.0, 1.0) for name in ("a", "b")]
+    ranked = [
+        Weighed(Hypothesis("recording_other_rig", 0, what="k1"), 0.0),
+        Weighed(Hypothesis("recording_clock", 0), -1.0),
+        Weighed(Hypothesis("recording_other_rig", 1, what="c1"), -2.0),
+    ]
+    told = [words for words, _ in _alternatives(ranked, alone)]
+    assert told == ["another clock of a", "another c1 of b"]
