@@ -48,11 +48,11 @@ def stepwise_sets(
         level = dict.fromkeys(
             ids | {more}
             for ids in beam
-            for more in _promised(problem.gains(ids, with_terms=with_terms), ids, size)
+            for more in _promised(problem.gains(sorted(ids), with_terms=with_terms), ids, size)
         )
         for ids in level:
             if ids not in weighed and may_go_on():
-                weighed[ids] = stepped(problem.set_of(problem.shaped(ids), 0.0), 1)
+                weighed[ids] = stepped(problem.set_of(problem.shaped(sorted(ids)), 0.0), 1)
         cheapest = sorted((i for i in level if i in weighed), key=lambda i: weighed[i].cost)
         for ids in cheapest[:REFINED]:
             if may_go_on():
@@ -73,7 +73,10 @@ def _promised(gains: Mapping[str, float], ids: Iterable[str], size: int) -> list
     ranked = sorted((i for i in gains if np.isfinite(gains[i])), key=lambda i: -gains[i])
     if any(map(is_formula_id, ids)):
         ranked = [i for i in ranked if not is_formula_id(i)]
-    likeliest = list({kind_id(i): i for i in reversed(ranked)}.values())[::-1]
+    kinds = dict[str, str]()
+    for i in ranked:
+        kinds.setdefault(kind_id(i), i)
+    likeliest = list(kinds.values())
     if size > 1:
         return likeliest[:PROMISED]
     terms = [i for i in likeliest if is_formula_id(i)]

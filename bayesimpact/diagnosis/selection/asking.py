@@ -15,7 +15,7 @@ import numpy as np
 
 from bayesimpact.diagnosis.candidates.one_step import SteppedSet, after_steps
 from bayesimpact.diagnosis.candidates.period_sets import PeriodSets
-from bayesimpact.diagnosis.candidates.stepwise_sets import stepwise_sets
+from bayesimpact.diagnosis.candidates.stepwise_sets import STEPS, stepwise_sets
 from bayesimpact.diagnosis.candidates.term_sets import EffectSet
 from bayesimpact.diagnosis.measurement.input_noise import under_input_noise
 from bayesimpact.diagnosis.refits.refit import Candidate
@@ -77,7 +77,7 @@ class Asking(Unlisted):
 
     def promising_sets(self, about: Candidate) -> list[tuple[float, Fit, EffectSet]]:
         """Sets that the equation of motion, in flight and over all stretches, and periods ahead ask
-        for about a model, each with what it costs after one step and the fit it extends, those that
+        for about a model, each with what it costs after steps and the fit it extends, those that
         promise most first; in this order where no period is told. Of periods ahead every effect by
         itself, too: where the fit is far off, another may lead further than the one of which a
         linear problem promises most.
@@ -92,10 +92,10 @@ class Asking(Unlisted):
                 for chosen in problem.best(self.most - len(problem.known))
             ]
             sets += [(ahead.fit, chosen) for chosen in ahead.best(room)]
-            found = [(self.after_steps(fit, chosen).cost, fit, chosen) for fit, chosen in sets]
-            stepwise = self.stepwise(ahead, room)
-            found += [(one.cost, ahead.fit, one.chosen) for one in stepwise]
-            self.promised[key] = sorted(found, key=lambda one: one[0])
+            found = [(fit, self.after_steps(fit, chosen, STEPS)) for fit, chosen in sets]
+            found += [(ahead.fit, one) for one in self.stepwise(ahead, min(room, 1))]
+            ranked = sorted(found, key=lambda one: one[1].cost)
+            self.promised[key] = [(one.cost, fit, one.chosen) for fit, one in ranked]
         return self.promised[key]
 
     def stepwise(
@@ -119,13 +119,13 @@ class Asking(Unlisted):
         return replace(found, price=found.price + prices)
 
     def leads_by_a_step(self, fit: Fit, chosen: EffectSet, about: Candidate) -> bool:
-        """Whether one step promises more of a set than of all that are asked for; without a stop
+        """Whether steps promise more of a set than of all that are asked for; without a stop
         these are not weighed.
         """
         if not self.asked.has_stop:
             return True
         least = min((cost for cost, *_ in self.promising_sets(about)), default=np.inf)
-        return not np.isfinite(least) or self.after_steps(fit, chosen).cost < least
+        return not np.isfinite(least) or self.after_steps(fit, chosen, STEPS).cost < least
 
     def of_motion(self, about: Candidate) -> list[Candidate]:
         """Models that the equation of motion asks for about one."""

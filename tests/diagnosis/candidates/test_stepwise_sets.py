@@ -13,7 +13,7 @@ import small_rig
 
 from bayesimpact.diagnosis.candidates.one_step import SteppedSet, after_steps
 from bayesimpact.diagnosis.candidates.period_terms import periods_with_terms
-from bayesimpact.diagnosis.candidates.stepwise_sets import PROMISED, stepwise_sets
+from bayesimpact.diagnosis.candidates.stepwise_sets import PROMISED, _promised, stepwise_sets
 from bayesimpact.diagnosis.candidates.term_sets import EffectSet
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import fit_from
@@ -26,7 +26,7 @@ RUBBING = {
     "contact_friction": {"force": 0.3},
 }
 TRUTH = {"hunt_crossley", "spring_cubic", "formula_sign_v_in_contact"}
-TERMS = ("formula_v_at_1", "formula_v_at_2", "formula_d")
+TERMS = ("formula_v_at_1", "formula_d", "formula_v_at_2")
 PLAIN = tuple(f"effect_{i}" for i in range(2 * PROMISED))
 
 
@@ -85,6 +85,11 @@ def test_at_most_one_term_is_in_a_set_and_of_a_kind_the_likeliest() -> None:
     with_terms = [ids for ids in found if ids & {*TERMS}]
     assert {len(ids) for ids in with_terms} == {1, 2, 3}
     assert all(len(ids & {*TERMS}) == 1 for ids in with_terms)
+
+
+def test_kinds_of_terms_stand_where_their_likeliest_one_does() -> None:
+    gains = {name: 100.0 - i for i, name in enumerate([*TERMS, *PLAIN])}
+    assert _promised(gains, [PLAIN[0]], 2)[:3] == [TERMS[0], TERMS[1], PLAIN[0]]
 
 
 def test_none_is_weighed_when_time_is_up() -> None:
