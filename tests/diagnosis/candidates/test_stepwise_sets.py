@@ -87,9 +87,12 @@ def test_at_most_one_term_is_in_a_set_and_of_a_kind_the_likeliest() -> None:
     assert all(len(ids & {*TERMS}) == 1 for ids in with_terms)
 
 
-def test_kinds_of_terms_stand_where_their_likeliest_one_does() -> None:
+def test_kinds_of_terms_stand_where_they_promise_least() -> None:
+    """Each by its likeliest one; none beside another term."""
     gains = {name: 100.0 - i for i, name in enumerate([*TERMS, *PLAIN])}
-    assert _promised(gains, [PLAIN[0]], 2)[:3] == [TERMS[0], TERMS[1], PLAIN[0]]
+    assert _promised(gains, [PLAIN[0]], 2)[:3] == [TERMS[1], TERMS[0], PLAIN[0]]
+    assert _promised(gains, [TERMS[1]], 2) == list(PLAIN[:PROMISED])
+    assert _promised(gains, [], 1) == [*PLAIN, TERMS[1], TERMS[0]]
 
 
 def test_none_is_weighed_when_time_is_up() -> None:

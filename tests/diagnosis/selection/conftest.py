@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from made_up_models import EFFECTS, Table
 
+from bayesimpact.diagnosis.candidates.one_step import SteppedSet
 from bayesimpact.diagnosis.selection import (
     asking,
     elimination,
@@ -56,8 +57,10 @@ def run(monkeypatch):
         monkeypatch.setattr(asking, "first_revision", lambda base, fit, say: None)
         monkeypatch.setattr(asking, "under_input_noise", lambda fit: None)
         monkeypatch.setattr(
-            asking, "criterion_after_a_step",
-            lambda base, chosen, scales: -table.gain([e.id for e in chosen.effects]),
+            asking, "after_steps",
+            lambda base, chosen, scales, steps, starts: SteppedSet(
+                -table.gain([e.id for e in chosen.effects]), 0.0, chosen
+            ),
         )  # fmt: skip
         monkeypatch.setattr(elimination, "is_at_an_end", lambda fit, effect: False)
         for force in ("missing_force", "missing_drift"):

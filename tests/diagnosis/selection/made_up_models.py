@@ -106,8 +106,9 @@ class Table:
 
         def ahead(model, about):
             return SimpleNamespace(
-                fit=model.fit, best=lambda most: best(self.asked_ahead),
-                alone=lambda: best(self.alone),
+                fit=model.fit, best=lambda most: best(self.asked_ahead), starts=(), cost=1.0,
+                gains=lambda ids, with_terms: {} if ids else {i: 1.0 for i in self.alone},
+                shaped=lambda ids: ids, set_of=lambda ids, odds: best([" ".join(ids)])[0],
             )  # fmt: skip
 
         def first(model, about, instead=""):
@@ -116,7 +117,9 @@ class Table:
 
         return SimpleNamespace(
             has_stop=bool(self.asked_in_flight), about=about, first=first,
-            ahead=ahead, ahead_with_terms=lambda model: SimpleNamespace(fit=base, terms=()),
+            ahead=ahead, ahead_with_terms=lambda model: SimpleNamespace(
+                fit=base, terms=(), starts=(), cost=1.0, gains=lambda ids, with_terms: {}
+            ),
         )  # fmt: skip
 
     def without(self, candidate, effect, scales, *, enough) -> Candidate:
