@@ -17,6 +17,7 @@ from bayesimpact.diagnosis.selection import (
     ranked,
     remaining,
     search,
+    unlisted,
 )
 
 
@@ -30,8 +31,9 @@ def run(monkeypatch):
         monkeypatch.setattr(models, "Asked", table.asks)
         monkeypatch.setattr(models, "shakes_in_own_band", lambda fit, remains: False)
         monkeypatch.setattr(models, "leaves_something", lambda fit: False)
-        for module in (asking, ranked):
+        for module in (asking, ranked, unlisted):
             monkeypatch.setattr(module, "leaves_something", lambda fit: fit.reduced_chi2 > 1.0)
+        monkeypatch.setattr(unlisted, "above_noise", lambda fit: fit.reduced_chi2 - 1.0)
         monkeypatch.setattr(models, "is_refuted", lambda fit: fit.ids == refuted)
         monkeypatch.setattr(models, "scan", table.scan)
         monkeypatch.setattr(models, "profiled", table.profiled)
