@@ -61,7 +61,7 @@ class Asking(Unlisted):
 
     def of_problems(self, base: ExaminedModel) -> Candidate:
         """The likeliest model that any problem asks for about the base model, then about that, and
-        so on: the sets that one step of their fit promises most of are fitted.
+        so on: the sets that steps of their fit promise most of are fitted.
         """
         best = base.candidate
         while self.may_go_on() and leaves_something(best.fit):

@@ -49,7 +49,7 @@ class Unlisted(Remaining):
     def with_a_line(self, examined: ExaminedModel) -> ExaminedModel:
         """A model, or where its misfit is large one with a harmonic force, where the equation of
         motion leaves `EXCESS` times less by it than by effects that are none; with a stop, where
-        one step over periods ahead promises more of it than of every set without one, too: a mode
+        steps over periods ahead promise more of it than of every set without one, too: a mode
         near the motion's own frequency is a line to the equation of motion, which knows no mode.
         """
         about = examined.candidate

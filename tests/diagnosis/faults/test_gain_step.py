@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import small_rig
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.diagnosis.diagnose import diagnose
+from bayesimpact.diagnosis.faults import changes
 from bayesimpact.diagnosis.faults.change_point import change_scores, parameter_basis
 from bayesimpact.diagnosis.faults.changes import change_instead
 from bayesimpact.diagnosis.faults.gain_step import gain_step_beside
@@ -19,6 +21,7 @@ from bayesimpact.diagnosis.faults.recording_faults import cleaned_campaign, comp
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import fit_from
 from bayesimpact.diagnosis.selection.revision import first_revision
+from bayesimpact.diagnosis.thresholds import EXCESS
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects import EFFECTS
@@ -120,6 +123,23 @@ def test_missing_physics_is_no_change_of_a_gain(effect: str, stop: bool) -> None
     base, _ = fits(recorded({effect: MISSING[effect]}, **how), [])
     assert base.reduced_chi2 > 2.0
     assert gain_step_beside(base) is None
+
+
+@pytest.mark.parametrize("times, knocked", [(0.9, False), (1.1, True)])
+def test_knocks_are_told_where_they_leave_far_less(
+    monkeypatch, times: float, knocked: bool
+) -> None:
+    """Each takes an unknown more than a gain."""
+    gain: Any = SimpleNamespace(after=1.0 + times * EXCESS), "with the gain corrected"
+    knocks: Any = (SimpleNamespace(after=2.0),), "plain", "without what lies beyond"
+    monkeypatch.setattr(changes, "gain_step_beside", lambda found: gain)
+    monkeypatch.setattr(changes, "knocks_beside", lambda base, found: knocks)
+    monkeypatch.setattr(changes, "above_noise", lambda fit, chi2: chi2 - 1.0)
+    fit: Any = object()
+    told = changes.changes_beside(fit, fit)
+    assert told == (knocks if knocked else ((gain[0],), gain[1], gain[1]))
+    monkeypatch.setattr(changes, "gain_step_beside", lambda found: None)
+    assert changes.changes_beside(fit, fit) is knocks
 
 
 def test_adequate_model_shows_none() -> None:
