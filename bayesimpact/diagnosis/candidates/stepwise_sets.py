@@ -2,7 +2,7 @@
 
 A linear problem about a model that is far off promises too much of laws that bend its errors, and
 too little of those that only act together. A step of a set's own simulation (`one_step`) tells
-the sets apart, and takes hundredths of a second; two more tell those apart that are alike in the
+the sets apart, and costs far less than a fit; two more tell those apart that are alike in the
 first. So sets are grown by that measure: beside each of the best ones of a size stand, one at a
 time, the effects of which the linear problem promises most (a beam search; Lowerre 1976).
 """
