@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +64,7 @@ class Diagnosis:
     corrected : faults of the recordings, set aside or corrected before anything else
     formulas : for a learned force, where something is unknown
     either : groups of effects that the recordings cannot tell apart, one of each of which is needed
+    families : of effects of which some are needed, and what of each was fitted
     """
 
     verdict: Verdict
@@ -86,6 +87,7 @@ class Diagnosis:
     corrected: Corrected | None = None
     formulas: Formulas | None = None
     either: tuple[tuple[Effect, ...], ...] = ()
+    families: Mapping[str, tuple[Effect, ...]] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """One line."""
@@ -171,6 +173,7 @@ def diagnose_fit(
         scales,
         formulas=answer.formulas,
         either=decision.either,
+        families=decision.families,
     )
 
 

@@ -228,6 +228,20 @@ def test_a_group_of_which_one_is_needed_is_told():
     assert "rubs. Cubic stiffness of the suspension, gravity pendulum or quintic" in said
 
 
+@pytest.mark.parametrize(
+    ("family", "words"),
+    [
+        ("free damping", "Damping of the suspension that is not viscous is needed"),
+        ("own", "Something of the family 'own' is needed"),
+    ],
+)
+def test_a_family_of_which_some_are_needed_is_told(family: str, words: str):
+    members = tuple(BY_ID[i] for i in ("quadratic_drag", "coulomb_friction"))
+    said = told("unknown", (), (), place("free"), families={family: members})
+    assert f"More is missing than the catalogue holds. {words} by every likely model: " in said
+    assert "quadratic drag or dry friction, or several of these; the recordings cannot" in said
+
+
 def test_what_a_model_with_more_effects_does_is_not_said_of_those_named():
     friction, shifts = (BY_ID["coulomb_friction"],), {"k1": ParameterShift(0.2)}
     for more, cause in ((True, "The fitted model raises"), (False, "Adding it raises")):

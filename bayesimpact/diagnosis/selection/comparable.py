@@ -18,8 +18,11 @@ from numpy.typing import NDArray
 from bayesimpact.diagnosis.refits.extend import owner
 from bayesimpact.diagnosis.refits.refit import Candidate
 from bayesimpact.diagnosis.residual_force.learned import LEARNED
-from bayesimpact.diagnosis.selection.decision import doubtful_misfit, misfit_above_noise
-from bayesimpact.diagnosis.selection.outcome import Selection
+from bayesimpact.diagnosis.selection.outcome import (
+    Selection,
+    doubtful_misfit,
+    misfit_above_noise,
+)
 from bayesimpact.diagnosis.thresholds import EXCESS
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.parameters import is_added

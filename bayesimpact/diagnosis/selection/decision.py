@@ -40,15 +40,16 @@ Let S be the likeliest set of effects that the search reached.
    With needed effects the verdict is `partly`, without any it is `unknown`. Other effects of S stay
    in the fitted model, but are not named. Where every likely set that lacks one of them has another
    of its family, or where a law and the one that it refines are not told apart, and all of the
-   above holds of these together, it is told that one of them is needed.
+   above holds of these together, it is told that one of them is needed. Where none of a family is
+   told, and S cannot spare all of them (`families`), it is told that some of the family are.
 
 A name never rests on one p-value.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -59,8 +60,16 @@ from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import Candidate
 from bayesimpact.diagnosis.residual_force.learned import may_restate
 from bayesimpact.diagnosis.score_test.directions import is_periodic
-from bayesimpact.diagnosis.selection.outcome import ExaminedModel, Selection, leaves_something
-from bayesimpact.diagnosis.thresholds import APART, DECISIVE, DOUBT, EXCESS
+from bayesimpact.diagnosis.selection.families import is_family_needed, members, untold_families
+from bayesimpact.diagnosis.selection.outcome import (
+    ExaminedModel,
+    Selection,
+    doubtful_misfit,
+    exceeds,
+    leaves_something,
+    misfit_above_noise,
+)
+from bayesimpact.diagnosis.thresholds import APART, DECISIVE, EXCESS
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect
 
@@ -80,12 +89,14 @@ class Decision:
     effects : that are named, most important first
     rivals : sets of effects that come within the decisive odds
     either : groups of effects of one family, of each of which every likely set has one
+    families : of which every likely set has some effect, and those that were fitted
     """
 
     verdict: Verdict
     effects: tuple[Effect, ...]
     rivals: tuple[Candidate, ...] = ()
     either: tuple[Group, ...] = ()
+    families: Mapping[str, Group] = field(default_factory=dict)
 
 
 def decide(selection: Selection) -> Decision:
@@ -116,9 +127,11 @@ def decide(selection: Selection) -> Decision:
     needed = tuple(e for e in effects if is_told_apart(selection, e) and is_needed(selection, (e,)))
     groups = (group_of(selection, e) for e in effects if e not in needed)
     either = tuple(g for g in groups if len(g) > 1 and is_needed(selection, g))
+    untold = untold_families(selection, (*needed, *(e for group in either for e in group)))
+    families = {f: members(selection, f) for f in untold if is_family_needed(selection, f)}
     if not needed:
-        return Decision("unknown", (), either=either)
-    return Decision("partly", needed, selection.rivals(), either)
+        return Decision("unknown", (), either=either, families=families)
+    return Decision("partly", needed, selection.rivals(), either, families)
 
 
 def loses_to_nothing(selection: Selection) -> bool:
@@ -317,12 +330,6 @@ def misses(selection: Selection, effect: Effect) -> bool:
     return exceeds(selection, next(c.fit for c in selection.tried if frozenset(c.ids) == smaller))
 
 
-def exceeds(selection: Selection, fit: Fit) -> bool:
-    """Whether a fit leaves `EXCESS` times as much misfit as the chosen model."""
-    with_it = misfit_above_noise(selection, selection.chosen.candidate.fit)
-    return misfit_above_noise(selection, fit) > EXCESS * with_it
-
-
 def stands_out(selection: Selection, effect: Effect) -> bool:
     """Whether `EXCESS` times as much is left without an effect, of misfit or of force."""
     if misses(selection, effect):
@@ -353,30 +360,6 @@ def holds(effects: Sequence[Effect], group: Group) -> bool:
     restatement.
     """
     return any(g.id in (e.id, e.prefer) or g.is_same_law(e) for e in effects for g in group)
-
-
-def misfit_above_noise(selection: Selection, fit: Fit) -> float:
-    """Sum of squares beyond that of the noise, in units of its variance.
-
-    The noise's own sum is what the recordings' noise estimate says, as far as that is certain;
-    within its uncertainty it is what the best hypothesis of all leaves.
-    """
-    chosen = selection.chosen.candidate.fit
-    level = chosen.density.likelihood.noise.level**2
-    own = float(chosen.density.likelihood.sizes.sum())
-    left = float(chosen.sums.sum()) / level
-    if left - own < doubtful_misfit(
-        selection
-    ):  # as small as the estimate of the noise is uncertain
-        own = left - 2 * max(selection.chosen.unknown.gain, 0.0) * chosen.reduced_chi2
-    return max(float(fit.sums.sum()) / level - own, 1.0)
-
-
-def doubtful_misfit(selection: Selection) -> float:
-    """A sum of squares, in units of the noise's variance, that its estimate may be wrong by."""
-    likelihood = selection.chosen.candidate.fit.density.likelihood
-    error = likelihood.noise.level_error
-    return 2 * DOUBT * (error if np.isfinite(error) else 0.0) * float(likelihood.sizes.sum())
 
 
 def ordered(selection: Selection, effects: tuple[Effect, ...]) -> tuple[Effect, ...]:

@@ -242,6 +242,36 @@ def is_more_than_noise(reduced_chi2: float, noise: Noise) -> bool:
     return reduced_chi2 > 1.0 + 2 * DOUBT * (error if np.isfinite(error) else 0.0)
 
 
+def exceeds(selection: Selection, fit: Fit) -> bool:
+    """Whether a fit leaves `EXCESS` times as much misfit as the chosen model."""
+    with_it = misfit_above_noise(selection, selection.chosen.candidate.fit)
+    return misfit_above_noise(selection, fit) > EXCESS * with_it
+
+
+def misfit_above_noise(selection: Selection, fit: Fit) -> float:
+    """Sum of squares beyond that of the noise, in units of its variance.
+
+    The noise's own sum is what the recordings' noise estimate says, as far as that is certain;
+    within its uncertainty it is what the best hypothesis of all leaves.
+    """
+    chosen = selection.chosen.candidate.fit
+    level = chosen.density.likelihood.noise.level**2
+    own = float(chosen.density.likelihood.sizes.sum())
+    left = float(chosen.sums.sum()) / level
+    if left - own < doubtful_misfit(
+        selection
+    ):  # as small as the estimate of the noise is uncertain
+        own = left - 2 * max(selection.chosen.unknown.gain, 0.0) * chosen.reduced_chi2
+    return max(float(fit.sums.sum()) / level - own, 1.0)
+
+
+def doubtful_misfit(selection: Selection) -> float:
+    """A sum of squares, in units of the noise's variance, that its estimate may be wrong by."""
+    likelihood = selection.chosen.candidate.fit.density.likelihood
+    error = likelihood.noise.level_error
+    return 2 * DOUBT * (error if np.isfinite(error) else 0.0) * float(likelihood.sizes.sum())
+
+
 def _is_elaboration(candidate: Candidate, chosen: Candidate) -> bool:
     """True when the candidate only refines the chosen model (`Effect.prefer`)."""
     extra = [e for e in candidate.effects if e.id not in chosen.ids]

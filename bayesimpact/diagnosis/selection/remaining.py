@@ -10,6 +10,7 @@ from bayesimpact.diagnosis.refits.refit import Candidate, in_words
 from bayesimpact.diagnosis.residual_force.discrepancy import Discrepancy, discrepancy
 from bayesimpact.diagnosis.selection.decision import (
     Group,
+    decide,
     group_of,
     in_its_place,
     is_imitated,
@@ -21,6 +22,7 @@ from bayesimpact.diagnosis.selection.decision import (
     ordered,
 )
 from bayesimpact.diagnosis.selection.elimination import EXCHANGES, Elimination
+from bayesimpact.diagnosis.selection.families import family, untold_families
 from bayesimpact.diagnosis.selection.outcome import (
     ExaminedModel,
     Selection,
@@ -89,7 +91,31 @@ class Remaining(Elimination):
             told = is_needed(found, group) and is_told_apart(found, group[0])
             if len(wider) > len(group) and not told:
                 found = self.with_forces(found, rivals_in_place(found, wider))
-        return found
+        return found if is_imitated(found) else self.without_families(found)
+
+    def without_families(self, found: Selection) -> Selection:
+        """With what `families` compares: the chosen model without any effect of a family of which
+        none is told, and that with the likeliest one of another family.
+        """
+        chosen, decision = found.chosen.candidate, decide(found)
+        told = (*decision.effects, *(e for group in decision.either for e in group))
+        for name in untold_families(found, told):
+            if self.budget.may_compare_on(self.look):
+                rest = chosen
+                for effect in chosen.effects:
+                    rest = self.drop(rest, effect) if family(effect) == name else rest
+                scan = self.scanned(rest, self.effects)
+                others = [
+                    s
+                    for s in scan.best()
+                    if family(s.effect) != name
+                    and s.effect.id not in rest.ids
+                    and not is_redundant(rest, s.effect)
+                ]
+                for best in sorted(others, key=lambda s: s.gain)[-1:]:
+                    self.fit_one(rest, scan, best, chosen)
+        tried = tuple(sorted(self.tried.values(), key=found.log_odds, reverse=True))
+        return replace(found, tried=tried)
 
     def likeliest_in_place(self, chosen: Candidate, effect: Effect) -> None:
         """Put the effect of which scores promise most in the place of one that a search which was

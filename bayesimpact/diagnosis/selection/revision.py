@@ -13,18 +13,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.diagnosis.faults.beside_model import fault_beside
+from bayesimpact.diagnosis.faults.beside_model import fault_beside, without_own
 from bayesimpact.diagnosis.faults.changes import changes_beside
-from bayesimpact.diagnosis.faults.compare import Compared
+from bayesimpact.diagnosis.faults.compare import Compared, log_likelihood_gain
 from bayesimpact.diagnosis.faults.outliers import beside_spikes
 from bayesimpact.diagnosis.measurement.growing_noise import growing_noise
 from bayesimpact.diagnosis.measurement.input_noise import input_noise
 from bayesimpact.diagnosis.measurement.slow_noise import remaining_noise
 from bayesimpact.diagnosis.refits.extend import campaign_scales
-from bayesimpact.diagnosis.refits.refit import fit_from
+from bayesimpact.diagnosis.refits.refit import Candidate, fit_from
+from bayesimpact.diagnosis.residual_force.gaussian_process import missing_drift, missing_force
 from bayesimpact.diagnosis.score_test.directions import is_periodic, is_steady
 from bayesimpact.diagnosis.selection.models import Progress
 from bayesimpact.diagnosis.selection.outcome import ExaminedModel, is_large
+from bayesimpact.diagnosis.selection.unknown import with_force
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.noise.whitening import Noise
@@ -121,8 +123,24 @@ def _with_a_recording_corrected(base: Fit, found: Fit, say: Progress) -> Revisio
     if told is None:
         return None
     compared, first = told
+    shared = without_own(base, found)
+    if shared is None or is_free_force(shared, compared):
+        return None
     say(f"{compared.fault.recording}: {compared.fault.statement}: once more with that corrected")
     return Revision(refitted(base, compared.campaign), first, (compared,))
+
+
+def is_free_force(fit: Fit, told: Compared) -> bool:
+    """Whether a free force that all recordings share, of displacement and velocity or of time,
+    explains what a model leaves about as well as the fault of one of them, or better.
+    """
+    rng = np.random.default_rng(0)  # for their odds by chance, which are not asked for here
+    scales = campaign_scales(fit)
+    forces = [missing(fit, scales, rng=rng) for missing in (missing_force, missing_drift)]
+    likelier = max(forces, key=lambda f: f.log_evidence)
+    left = with_force(Candidate(fit.density.oscillator.effects, fit, 0.0), likelier, scales).fit
+    campaign = fit.density.oscillator.campaign
+    return log_likelihood_gain(left.reduced_chi2, told.after, campaign) < DECISIVE
 
 
 def _without_a_change(base: Fit, found: Fit, say: Progress) -> Revision | None:

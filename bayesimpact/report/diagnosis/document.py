@@ -95,6 +95,7 @@ def document(
                 more=len(d.after.density.oscillator.effects) > len(d.effects),
                 unproved=_unproved(d),
                 either=d.either,
+                families=d.families,
                 finished=d.selection.finished,
                 band_limited=d.selection.band_limited,
             )
@@ -108,7 +109,7 @@ def document(
         "formulas": formula_entries(d.formulas, d.scales, angle=angle),
         "effects": (as_effects(d.corrected) if d.corrected else [])
         + [_effect(d, e, text, after) for e, text in zip(d.effects, statements, strict=True)],
-        "either": [[e.id for e in group] for group in d.either],
+        "either": [[e.id for e in group] for group in (*d.either, *d.families.values())],
         "alternatives": [_alternative(d, c) for c in _others(d)],
         "fit": _fit(d),
         "parameters": {"before": before, "after": after},
@@ -204,7 +205,8 @@ def _unproved(d: Diagnosis) -> tuple[str, ...]:
     """Titles of effects that the fitted model holds beside those that are named, or of which one of
     a group is.
     """
-    told = {LEARNED, *(e.id for e in (*d.effects, *(e for group in d.either for e in group)))}
+    groups = (d.effects, *d.either, *d.families.values())
+    told = {LEARNED, *(e.id for group in groups for e in group)}
     effects = d.after.density.oscillator.effects
     return tuple(e.title for e in effects if e.id not in told and not is_formula_id(e.id))
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from bayesimpact.diagnosis.location import Location
+from bayesimpact.diagnosis.selection.families import CONTACT
 from bayesimpact.model.effects import EFFECTS
 from bayesimpact.model.effects.effect import Effect
 from bayesimpact.model.units import two_digits
@@ -26,6 +27,14 @@ BAND_LIMITED = (
     " Between its samples the input is taken for band-limited: lines between them leave more "
     '(hold = "band_limited" in campaign.toml says so from the beginning).'
 )
+FAMILIES = {
+    "free damping": "Damping of the suspension that is not viscous",
+    "free stiffness": "Stiffness of the suspension that is not constant",
+    CONTACT: "Physics of the contact beyond k2 and c2",
+    "gap": "A gap that changes",
+    "modes": "A further mode",
+    "sensor": "Something of the measuring chain",
+}
 MOST_TOLD = 3  # alternatives in one sentence; a table has them all
 
 
@@ -47,6 +56,7 @@ class Findings:
     more : the fitted model has effects that are not named
     unproved : titles of those of the catalogue
     either : groups of effects, of each of which every likely set has one
+    families : of effects, of each of which every likely set has some
     finished : the search was not ended by its limit
     band_limited : a good model asked for inputs that are so between their samples
     """
@@ -66,6 +76,7 @@ class Findings:
     more: bool = False
     unproved: tuple[str, ...] = ()
     either: tuple[tuple[Effect, ...], ...] = ()
+    families: Mapping[str, tuple[Effect, ...]] = field(default_factory=dict)
     finished: bool = True
     band_limited: bool = False
 
@@ -123,7 +134,7 @@ def _unknown(found: Findings, location: Location) -> str:
     seen = found.probe and location.regime != "measurement"
     acts = "Seen as a force it would act" if seen else "It acts"
     head = "Something is missing that the catalogue does not hold."
-    if found.either:
+    if found.either or found.families:
         head = "More is missing than the catalogue holds."
     if not found.finished:
         head = "Something is missing that the search has not found."
@@ -155,6 +166,13 @@ def _groups(found: Findings) -> str:
         told.append(
             f" {_capital(which)} is needed by {found.likely_models}; "
             "the recordings cannot tell which."
+        )
+    for family, members in found.families.items():
+        kind = FAMILIES.get(family, f"Something of the family '{family}'")
+        *some, last = (e.title for e in members)
+        told.append(
+            f" {kind} is needed by {found.likely_models}: {', '.join(some)} or {last}, or several "
+            "of these; the recordings cannot tell which."
         )
     return "".join(told)
 

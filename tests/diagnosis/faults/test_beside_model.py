@@ -18,10 +18,11 @@ from bayesimpact.diagnosis.faults.beside_model import fault_beside
 from bayesimpact.diagnosis.faults.together import Hypothesis
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import fit_from
-from bayesimpact.diagnosis.selection.revision import first_revision, revised
+from bayesimpact.diagnosis.selection.revision import first_revision, is_free_force, revised
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects import EFFECTS
+from bayesimpact.trial.rig.recordings import Release
 
 BY_ID = {e.id: e for e in EFFECTS}
 PHYSICS = {"spring_cubic": {"stiffness": 6e6}, "coulomb_friction": {"force": 0.02}}
@@ -107,6 +108,29 @@ def test_physics_that_is_missing_is_no_fault() -> None:
         found = fit_from(base, [BY_ID[name]], {}, campaign_scales(base)).fit
         assert found.reduced_chi2 > 2.0
         assert fault_beside(base, found) is None
+
+
+@pytest.mark.parametrize(
+    ("place", "amplitudes", "imitated"),
+    [
+        (1e-3, (6.5e-3, 3e-3, 2e-3), ("recording_clock", "c")),
+        (3e-3, (6.5e-3, 3e-3, 2e-3), ("recording_gain", "a")),
+        (1e-3, (6.5e-3, 5e-3, 1.5e-3), ("recording_gain", "c")),
+    ],
+)
+def test_a_fault_that_a_force_of_all_recordings_explains_is_none(
+    place: float, amplitudes: tuple[float, ...], imitated: tuple[str, str]
+) -> None:
+    """A magnetic detent, that no model holds, changes the recording with another amplitude most."""
+    detent = {"stiffness": -40.0, "place": place, "width": 4e-4}
+    effects = {"spring_cubic": PHYSICS["spring_cubic"], "detent": detent}
+    releases = tuple(Release(n, "", -y) for n, y in zip("abc", amplitudes, strict=True))
+    campaign = small_rig.record(3, effects, rig=small_rig.PLAIN, releases=releases)
+    base = identify(campaign, rng=np.random.default_rng(0), search=False).fit
+    found = fit_from(base, [BY_ID["spring_cubic"]], {}, campaign_scales(base)).fit
+    told = fault_beside(base, found)
+    assert told is not None and (told[0].fault.id, told[0].fault.recording) == imitated
+    assert is_free_force(found, told[0]) and first_revision(base, found, print) is None
 
 
 def test_recordings_that_agree_have_none() -> None:
