@@ -89,6 +89,11 @@ class Diagnosis:
     either: tuple[tuple[Effect, ...], ...] = ()
     families: Mapping[str, tuple[Effect, ...]] = field(default_factory=dict)
 
+    @property
+    def groups(self) -> tuple[tuple[Effect, ...], ...]:
+        """Effects of which some are needed: one of each group, one or more of each family."""
+        return (*self.either, *self.families.values())
+
     def __repr__(self) -> str:
         """One line."""
         names = ", ".join(effect.id for effect in self.effects) or "no effect"

@@ -109,7 +109,7 @@ def document(
         "formulas": formula_entries(d.formulas, d.scales, angle=angle),
         "effects": (as_effects(d.corrected) if d.corrected else [])
         + [_effect(d, e, text, after) for e, text in zip(d.effects, statements, strict=True)],
-        "either": [[e.id for e in group] for group in (*d.either, *d.families.values())],
+        "either": [[e.id for e in group] for group in d.groups],
         "alternatives": [_alternative(d, c) for c in _others(d)],
         "fit": _fit(d),
         "parameters": {"before": before, "after": after},
@@ -205,8 +205,7 @@ def _unproved(d: Diagnosis) -> tuple[str, ...]:
     """Titles of effects that the fitted model holds beside those that are named, or of which one of
     a group is.
     """
-    groups = (d.effects, *d.either, *d.families.values())
-    told = {LEARNED, *(e.id for group in groups for e in group)}
+    told = {LEARNED, *(e.id for group in (d.effects, *d.groups) for e in group)}
     effects = d.after.density.oscillator.effects
     return tuple(e.title for e in effects if e.id not in told and not is_formula_id(e.id))
 
