@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 Span = tuple[int, int]
 Action = Literal["exclude", "cut", "skip", "notice"]
 
+NOT_FREE = "the motion is not yet free {time}"
+
 FALSE_ALARM = 1e-6
 """Chance per recording that a detector errs on stationary Gaussian noise.
 
@@ -86,6 +88,30 @@ def gaussian_threshold(count: int) -> float:
 def file_time(recording: Recording, sample: float) -> float:
     """Time of a sample (or of a place between two) on the file's own clock, s."""
     return recording.start + sample * recording.interval
+
+
+def start_fault(
+    recording: Recording, first: int, strength: float, threshold: float, words: str = NOT_FREE
+) -> Fault:
+    """A start that is no free motion: readings before `first`, to be cut. In the `words` stand
+    {seconds} for how long it is, or {time} for the first so many seconds and samples.
+    """
+    seconds = f"{first * recording.interval:.3g} s"
+    time = f"for the first {seconds} ({first} samples)"
+    return Fault(
+        id="recording_start",
+        recording=recording.name,
+        spans=((0, first),),
+        start_s=file_time(recording, 0),
+        end_s=file_time(recording, first - 1),
+        size=first * recording.interval,
+        unit="s",
+        statement=words.format(seconds=seconds, time=time),
+        remedy=f"start_s = {file_time(recording, first - 0.4):.9g}",
+        strength=strength,
+        threshold=threshold,
+        action="cut",
+    )
 
 
 def times_of(recording: Recording, spans: Sequence[Span]) -> str:

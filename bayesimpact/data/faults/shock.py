@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from bayesimpact.data.faults.fault import Fault, file_time
+from bayesimpact.data.faults.fault import Fault, start_fault
 from bayesimpact.data.gaps import shown_period
 from bayesimpact.data.recording import Recording
 
@@ -41,23 +41,8 @@ def find_shock(recording: Recording) -> list[Fault]:
         return []
     rest = errors[:first] > np.sqrt(ABRUPT) * after
     end = int(np.flatnonzero(rest)[-1]) + 1
-    seconds, ratio = end * recording.interval, float(errors[:first].max() / max(after, 1e-300))
-    return [
-        Fault(
-            id="recording_start",
-            recording=recording.name,
-            spans=((0, end),),
-            start_s=file_time(recording, 0),
-            end_s=file_time(recording, end - 1),
-            size=seconds,
-            unit="s",
-            statement=f"the motion is not yet free for the first {seconds:.3g} s ({end} samples)",
-            remedy=f"start_s = {file_time(recording, end - 0.4):.9g}",
-            strength=ratio,
-            threshold=ABRUPT,
-            action="cut",
-        )
-    ]
+    ratio = float(errors[:first].max() / max(after, 1e-300))
+    return [start_fault(recording, end, ratio, ABRUPT)]
 
 
 def _errors(x: np.ndarray, used: np.ndarray | None, first: int) -> np.ndarray:

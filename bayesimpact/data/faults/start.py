@@ -6,7 +6,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 from scipy.stats import norm
 
-from bayesimpact.data.faults.fault import FALSE_ALARM, Array, Fault, amount, file_time
+from bayesimpact.data.faults.fault import FALSE_ALARM, Array, Fault, amount, start_fault
 from bayesimpact.data.faults.flat import reading_step
 from bayesimpact.data.hum import find_hum
 from bayesimpact.data.period import crossing_period, noise_level
@@ -80,23 +80,8 @@ def find_start(recording: Recording) -> list[Fault]:
         return []
     kind = "the motion is not yet free" if hand else "at rest"
     kind = "at rest, then moved" if moved else kind
-    return [
-        Fault(
-            id="recording_start",
-            recording=recording.name,
-            spans=((0, first),),
-            start_s=file_time(recording, 0),
-            end_s=file_time(recording, first - 1),
-            size=first * recording.interval,
-            unit="s",
-            statement=f"{kind} for the first {first * recording.interval:.3g} s ({first} samples); "
-            f"released from {amount(float(x[first]), recording.unit)}",
-            remedy=f"start_s = {file_time(recording, first - 0.4):.9g}",
-            strength=first / max(least, 1.0),
-            threshold=1.0,
-            action="cut",
-        )
-    ]
+    words = f"{kind} {{time}}; released from {amount(float(x[first]), recording.unit)}"
+    return [start_fault(recording, first, first / max(least, 1.0), 1.0, words)]
 
 
 def _is_moved(centred: Array, rest: int, band: float) -> bool:

@@ -22,9 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
 
-from bayesimpact.data.faults.fault import FALSE_ALARM, Fault
+from bayesimpact.data.faults.fault import FALSE_ALARM, Fault, start_fault
 from bayesimpact.data.recording import Recording
-from bayesimpact.diagnosis.faults.unfree_start import start_fault
 from bayesimpact.inference.fit import Fit
 
 Array = NDArray[np.float64]
@@ -75,11 +74,11 @@ def forced_starts(fit: Fit) -> tuple[Fault, ...]:
         return ()
     period = 2 * np.pi * float(np.sqrt(campaign.mass / stiffness))
     found = []
-    for r, recording in enumerate(campaign.recordings):
+    for recording in campaign.recordings:
         start = None if recording.input is not None else start_of_free(recording, period)
         if start is not None and start.is_forced:
             least = STEEPER * start.amplitudes
-            found.append(start_fault(fit, r, start.first, start.drop, least))
+            found.append(start_fault(recording, start.first, start.drop, least))
     return tuple(found)
 
 

@@ -12,9 +12,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bayesimpact.data.faults.fault import Fault
+from bayesimpact.data.faults.fault import Fault, start_fault
 from bayesimpact.diagnosis.candidates.likely_sets import LikelySets
-from bayesimpact.diagnosis.faults.unfree_start import start_fault
 from bayesimpact.diagnosis.thresholds import EXCESS
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
@@ -53,7 +52,7 @@ def pushed_starts(fit: Fit, effects: Sequence[Effect], scales: Scales) -> tuple[
         for first in firsts:
             reached = ratio(first)
             if reached >= max(BETTER, NEARLY * most):
-                found.append(start_fault(fit, r, first, reached, BETTER))
+                found.append(start_fault(recording, first, reached, BETTER))
                 break
     return tuple(found)
 

@@ -17,12 +17,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import f as f_distribution
 
-from bayesimpact.data.faults.fault import FALSE_ALARM, Fault
+from bayesimpact.data.faults.fault import FALSE_ALARM, Fault, start_fault
 from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.candidates.equation_error import Path, measured_paths
 from bayesimpact.diagnosis.candidates.likely_sets import LikelySets
 from bayesimpact.diagnosis.faults.forced_start import STEEPER
-from bayesimpact.diagnosis.faults.unfree_start import POWER, start_fault
+from bayesimpact.diagnosis.faults.unfree_start import POWER
 from bayesimpact.diagnosis.thresholds import ALPHA
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Scales
@@ -96,11 +96,12 @@ def soft_releases(
     alike = [r for r, own in enumerate(flights) if own] if 2 * len(shown) > len(told) else shown
     for r in alike:
         reached = power.get(r, 0.0), least.get(r, 0.0)
-        fault = start_fault(fit, r, flights[r][0][1], *(one / second for one in reached))
-        words = f"held on release: the first {fault.size:.3g} s, up to {until}, are not free"
+        words = f"held on release: the first {{seconds}}, up to {until}, are not free"
         if r not in shown:
-            words = f"released as the others: the first {fault.size:.3g} s, up to {until}, left out"
-        found.append(replace(fault, statement=words))
+            words = f"released as the others: the first {{seconds}}, up to {until}, left out"
+        strength, threshold = (one / second for one in reached)
+        end = flights[r][0][1]
+        found.append(start_fault(campaign.recordings[r], end, strength, threshold, words))
     return tuple(found)
 
 

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.data.faults.fault import Fault, file_time
+from bayesimpact.data.faults.fault import Fault, start_fault
 from bayesimpact.data.recording import Recording
 from bayesimpact.inference.fit import Fit, PosteriorDensity
 from bayesimpact.inference.likelihood import Likelihood
@@ -52,7 +52,7 @@ def unfree_starts(fit: Fit) -> tuple[Fault, ...]:
         ]
         if max(ratios) > BETTER:
             at = next(i for i, x in enumerate(ratios) if x >= max(BETTER, NEARLY * max(ratios)))
-            found.append(start_fault(fit, r, firsts[at], ratios[at], BETTER))
+            found.append(start_fault(recording, firsts[at], ratios[at], BETTER))
     return tuple(found)
 
 
@@ -100,23 +100,3 @@ def _decayed(recording: Recording, first: int) -> float:
         return np.inf
     whole = np.ptp(recording.samples[used])
     return float((whole / max(np.ptp(rest), 1e-300)) ** (2 * POWER))
-
-
-def start_fault(fit: Fit, r: int, first: int, ratio: float, threshold: float) -> Fault:
-    """A start that is not free before a sample, without which so many times less is left."""
-    recording = fit.density.oscillator.campaign.recordings[r]
-    seconds = first * recording.interval
-    return Fault(
-        id="recording_start",
-        recording=recording.name,
-        spans=((0, first),),
-        start_s=file_time(recording, 0),
-        end_s=file_time(recording, first - 1),
-        size=seconds,
-        unit="s",
-        statement=f"the motion is not yet free for the first {seconds:.3g} s ({first} samples)",
-        remedy=f"start_s = {file_time(recording, first - 0.4):.9g}",
-        strength=ratio,
-        threshold=threshold,
-        action="cut",
-    )
