@@ -25,7 +25,7 @@ from bayesimpact.diagnosis.refits.refit import Candidate, fit_from
 from bayesimpact.diagnosis.residual_force.gaussian_process import missing_drift, missing_force
 from bayesimpact.diagnosis.score_test.directions import is_periodic, is_steady
 from bayesimpact.diagnosis.selection.models import Progress
-from bayesimpact.diagnosis.selection.outcome import ExaminedModel, is_large
+from bayesimpact.diagnosis.selection.outcome import ExaminedModel, is_large, leaves_something
 from bayesimpact.diagnosis.selection.unknown import with_force
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.inference.fit import Fit
@@ -118,39 +118,44 @@ def _of_inputs(base: Fit, found: Fit) -> Noise | None:
 
 
 def _with_a_recording_corrected(base: Fit, found: Fit, say: Progress) -> Revision | None:
-    """With the gain or the clock of one recording corrected that the model shows to be off."""
+    """With the gain or the clock of one recording corrected that the model shows to be off, unless
+    a force that all recordings share explains as much.
+    """
     told = fault_beside(base, found)
     if told is None:
         return None
     compared, first = told
     shared = without_own(base, found)
-    if shared is None or is_free_force(shared, compared):
+    campaign = found.density.oscillator.campaign
+    free = np.inf if shared is None else with_free_force(shared).reduced_chi2
+    if log_likelihood_gain(free, compared.after, campaign) < DECISIVE:
         return None
     say(f"{compared.fault.recording}: {compared.fault.statement}: once more with that corrected")
     return Revision(refitted(base, compared.campaign), first, (compared,))
 
 
-def is_free_force(fit: Fit, told: Compared) -> bool:
-    """Whether a free force that all recordings share, of displacement and velocity or of time,
-    explains what a model leaves about as well as the fault of one of them, or better.
+def with_free_force(fit: Fit) -> Fit:
+    """A model with a free force beside it that all recordings share, of displacement and velocity
+    or of time, whichever is likelier.
     """
     rng = np.random.default_rng(0)  # for their odds by chance, which are not asked for here
     scales = campaign_scales(fit)
     forces = [missing(fit, scales, rng=rng) for missing in (missing_force, missing_drift)]
     likelier = max(forces, key=lambda f: f.log_evidence)
-    left = with_force(Candidate(fit.density.oscillator.effects, fit, 0.0), likelier, scales).fit
-    campaign = fit.density.oscillator.campaign
-    return log_likelihood_gain(left.reduced_chi2, told.after, campaign) < DECISIVE
+    return with_force(Candidate(fit.density.oscillator.effects, fit, 0.0), likelier, scales).fit
 
 
 def _without_a_change(base: Fit, found: Fit, say: Progress) -> Revision | None:
     """With the change of a gain in mid-record corrected that the model shows, or without what lies
-    beyond knocks.
+    beyond knocks, unless a force that all recordings share leaves nothing: of several changes one
+    is told at a time, so that another explanation may leave less than it does.
     """
     told = changes_beside(base, found)
     if told is None:
         return None
     compared, plain, first = told
+    if not leaves_something(with_free_force(found)):
+        return None
     for one in compared:
         say(f"{one.fault.recording}: {one.fault.statement}: once more with that put right")
     return Revision(plain, None if found is base else first, compared)

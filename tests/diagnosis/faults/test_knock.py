@@ -23,6 +23,7 @@ from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects import EFFECTS, SEARCHED
 from bayesimpact.trial.rig.measuring_chain import MeasuringChain
+from bayesimpact.trial.rig.recordings import Release
 
 BY_ID = {e.id: e for e in EFFECTS}
 PHYSICS: Mapping[str, Mapping[str, Any]] = {
@@ -164,6 +165,26 @@ def test_missing_physics_is_no_knock(effect: str) -> None:
     base, _ = fits(recorded({effect: MISSING[effect]}))
     assert base.reduced_chi2 > 2.0
     assert knocks_beside(base, base) is None
+
+
+@pytest.mark.parametrize(
+    ("law", "values", "others"),
+    [
+        ("detent", {"stiffness": -160.0, "place": -2e-3, "width": 4e-4}, (3e-3, 2e-3)),
+        ("contact_preload", {"force": 0.1}, (4.5e-3, 5.5e-3)),
+    ],
+)
+def test_a_knock_that_a_force_of_all_recordings_explains_is_none(
+    law: str, values: Mapping[str, float], others: tuple[float, float]
+) -> None:
+    """Beside a stop a force that no model holds puts one contact off, and what follows it."""
+    amplitudes = (6.5e-3, *others)
+    releases = [Release(n, k, -y) for n, k, y in zip("abc", "112", amplitudes, strict=True)]
+    effects = {"spring_cubic": PHYSICS["spring_cubic"], law: values}
+    campaign = small_rig.record(3, effects, releases=releases)
+    base, found = fits(campaign, "spring_cubic")
+    assert knocks_beside(base, found) is not None
+    assert first_revision(base, found, print) is None
 
 
 def test_adequate_model_shows_no_jump() -> None:
