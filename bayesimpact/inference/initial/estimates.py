@@ -31,6 +31,7 @@ from bayesimpact.inference.initial.observe import (
     with_tails,
 )
 from bayesimpact.inference.initial.preloaded import estimate_preloaded, is_preloaded
+from bayesimpact.inference.initial.readings import decay_of_readings
 from bayesimpact.inference.initial.release import RoughOscillator, release
 from bayesimpact.response import local
 from bayesimpact.response.flight import Flight
@@ -116,6 +117,7 @@ def estimate(campaign: Campaign) -> Estimates:
         observed, flight = observe_flights(observed)
     else:
         flight = observe_decay(observed)
+        observed, flight = decay_of_readings(campaign.recordings, observed, flight)
     if flight is None:
         raise InputError(
             f"campaign {campaign.name!r}",

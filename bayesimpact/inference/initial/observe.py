@@ -21,6 +21,7 @@ from bayesimpact.response.rest import rest_position
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
+MOST_LEFT = 0.5  # of the variance, by the fit of an oscillation
 DRIFT = 0.005  # of the motion: what an integrated reading is off, however smooth it looks
 
 
@@ -133,7 +134,9 @@ def observe_decay(observed: Observed) -> Flight | None:
     """
     found = [] if (rate := _rate_of_half_cycles(observed)) is None else [_decay(observed, rate)]
     other = _decay(observed, observed.omega)
-    if other is not None and (found or all(observed.lines) or _explains_most(other, observed)):
+    if other is not None and (
+        found or all(observed.lines) or unexplained(other, observed.samples) < MOST_LEFT
+    ):
         found.append(other)
     return min((f for f in found if f is not None), key=lambda f: f.rms, default=None)
 
@@ -142,10 +145,10 @@ def _decay(observed: Observed, omega: float) -> Flight | None:
     return solve_flight(observed.samples, observed.arcs, observed.intervals, omega, scan=1.05)
 
 
-def _explains_most(flight: Flight, observed: Observed) -> bool:
-    """Whether a fit leaves less than half of the readings' variance."""
-    square = sum(float(np.sum((x - np.mean(x)) ** 2)) for x in observed.samples)
-    return flight.rms**2 < 0.5 * square / sum(x.size for x in observed.samples)
+def unexplained(flight: Flight, samples: Sequence[Floats]) -> float:
+    """Share of the variance of `samples`, (n,) each, that a fit leaves."""
+    square = sum(float(np.sum((x - np.mean(x)) ** 2)) for x in samples)
+    return flight.rms**2 * sum(x.size for x in samples) / max(square, 1e-300)
 
 
 def _rate_of_half_cycles(observed: Observed) -> float | None:
