@@ -25,6 +25,7 @@ from bayesimpact.diagnosis.measurement.input_noise import with_input_noise
 from bayesimpact.diagnosis.measurement.slow_noise import with_slow_noise
 from bayesimpact.diagnosis.measurement.smoothing import proved_smoothing
 from bayesimpact.diagnosis.thresholds import DECISIVE
+from bayesimpact.errors import InputError
 from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.fit import Z90, Fit
 from bayesimpact.inference.identify import Identification, identify
@@ -113,11 +114,14 @@ def cleaned_campaign(campaign: Campaign, *, rng: np.random.Generator, search: bo
 def without_faults(
     found: Corrected, faults: Sequence[Fault], as_read: Campaign, *, rng: np.random.Generator
 ) -> Corrected:
-    """The same with faults set aside that a fit shows."""
+    """The same with faults set aside that a fit shows; as it was where no oscillation is left."""
     before = found.identification
     whole = before.fit.density.oscillator.campaign
     campaign = faults_set_aside(whole, faults)
-    again = replace(_identified(campaign, rng=rng, search=False), search=before.search)
+    try:
+        again = replace(_identified(campaign, rng=rng, search=False), search=before.search)
+    except InputError:
+        return found
     change = before.fit.reduced_chi2, again.fit.reduced_chi2
     told = (fault_as_read(fault, whole, as_read) for fault in faults)
     return replace(

@@ -10,8 +10,20 @@ import small_rig
 from effect_rigs import BY_ID
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.diagnose import diagnose
-from bayesimpact.diagnosis.faults.unfree_start import BETTER, _alone, _ratio, unfree_starts
+from bayesimpact.diagnosis.faults.recording_faults import (
+    Corrected,
+    cleaned_campaign,
+    without_faults,
+)
+from bayesimpact.diagnosis.faults.unfree_start import (
+    BETTER,
+    _alone,
+    _ratio,
+    start_fault,
+    unfree_starts,
+)
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.linear_response.free_changes import motions_beside
@@ -115,3 +127,19 @@ def test_physics_is_named_without_the_push():
 
     assert named(campaign) == ("named", ["sensor_drift"], ["recording_start"])
     assert named(replace(campaign, keep_faults=True), effects[:1])[2] == []
+
+
+def test_what_leaves_no_oscillation_is_not_set_aside() -> None:
+    """A diagnosis of a decay whose start a fit took for unfree once ended there, in a refusal."""
+    t = 0.02 * np.arange(300)
+    samples = 1e-2 * np.exp(-2.5 * t) * np.cos(9.0 * t)
+    samples += 1e-5 * np.random.default_rng(0).standard_normal(t.size)
+    campaign = Campaign("rig", 1.0, (Recording("a", "", samples, 0.02),), stop=False)
+    found = cleaned_campaign(campaign, rng=np.random.default_rng(0), search=False)
+
+    def cut(first: int) -> Corrected:
+        fault = start_fault(found.identification.fit, 0, first, 10.0, 4.0)
+        return without_faults(found, [fault], campaign, rng=np.random.default_rng(0))
+
+    assert cut(200) is found
+    assert cut(30).identification.fit.density.oscillator.campaign.recordings[0].samples.size < 300
