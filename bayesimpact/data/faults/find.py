@@ -11,6 +11,7 @@ from bayesimpact.data.faults.duplicate import find_duplicates
 from bayesimpact.data.faults.fault import Fault, Span
 from bayesimpact.data.faults.held import find_held
 from bayesimpact.data.faults.hum import find_hum_notice
+from bayesimpact.data.faults.loud_part import find_loud_part
 from bayesimpact.data.faults.noise import find_noise, loud_recordings
 from bayesimpact.data.faults.quantised import find_quantised
 from bayesimpact.data.faults.shock import find_shock
@@ -29,13 +30,14 @@ DETECTORS: tuple[Callable[[Recording], list[Fault]], ...] = (
     find_start,
     find_noise,
     find_spikes,
+    find_loud_part,
     find_slips,
     find_shock,
     find_hum_notice,
 )
 """In this order, each on the recording without what the earlier ones found."""
 
-FREE = (find_start, find_noise, find_shock, find_hum_notice)
+FREE = (find_start, find_noise, find_loud_part, find_shock, find_hum_notice)
 """Those that know a free decay only: under an input, rest, loud parts and lines are what it makes
 of them."""
 DRIVEN = tuple(detector for detector in DETECTORS if detector not in FREE)
