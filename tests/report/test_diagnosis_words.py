@@ -22,6 +22,7 @@ from bayesimpact.report.diagnosis.words import (
     parameter_shift,
     parameter_shifts,
     remaining,
+    scatter_words,
     statement,
 )
 
@@ -111,6 +112,25 @@ def test_slow_noise_is_said_where_a_model_s_residual_showed_it():
     assert noise_words(Noise()) == noise_words(Noise(0.4)) == ""
     said = noise_words(Noise(0.96, others=((0.0, 0.4),), is_independent=False))
     assert "60 % AR(1), correlation 0.96, 40 % white" in said
+
+
+def test_scatter_beyond_the_noise_is_said_where_nothing_explains_it() -> None:
+    """Once told "down to the noise" of readings that scattered by a third more than that."""
+
+    def left(chi2: float) -> str:
+        likelihood = SimpleNamespace(noise=Noise(level_error=0.06))
+        fit = SimpleNamespace(reduced_chi2=chi2, density=SimpleNamespace(likelihood=likelihood))
+        return scatter_words(fit)
+
+    assert left(1.3) == "" and "1.3 times as much as their noise" in left(1.7)
+    assert "down to the noise" in told("adequate")
+    for verdict, effects, others in (
+        ("adequate", (), ()),
+        ("ambiguous", (BY_ID["spring_cubic"],), ("spring_quintic",)),
+        ("named", (BY_ID["spring_cubic"],), ()),
+    ):
+        said = told(verdict, effects, ("",), place("free"), others, scatter=left(1.7))
+        assert "times as much" in said and "down to the noise" not in said
 
 
 def test_noise_that_grows_is_said_where_a_model_s_residual_showed_it():

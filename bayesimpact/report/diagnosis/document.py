@@ -37,6 +37,7 @@ from bayesimpact.report.diagnosis.words import (
     noise_words,
     parameter_shifts,
     remaining,
+    scatter_words,
     statement,
 )
 
@@ -98,6 +99,7 @@ def document(
                 families=d.families,
                 finished=d.selection.finished,
                 band_limited=d.selection.band_limited,
+                scatter="" if d.remains else scatter_words(d.after),
             )
         )
         + noise_words(noise)
@@ -211,9 +213,8 @@ def _unproved(d: Diagnosis) -> tuple[str, ...]:
 
 
 def _unfinished(d: Diagnosis) -> str:
-    if d.selection.finished:
-        return ""
-    return " The search ended by its limit: not everything that may be missing was tried."
+    said = " The search ended by its limit: not everything that may be missing was tried."
+    return "" if d.selection.finished else said
 
 
 def _statement(d: Diagnosis, effect: Effect) -> str:

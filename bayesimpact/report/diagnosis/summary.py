@@ -59,6 +59,8 @@ class Findings:
     families : of effects, of each of which every likely set has some
     finished : the search was not ended by its limit
     band_limited : a good model asked for inputs that are so between their samples
+    scatter : where nothing is told beside the fitted model, and readings scatter about it by more
+        than their noise
     """
 
     verdict: str
@@ -79,6 +81,7 @@ class Findings:
     families: Mapping[str, tuple[Effect, ...]] = field(default_factory=dict)
     finished: bool = True
     band_limited: bool = False
+    scatter: str = ""
 
     @property
     def cost(self) -> str:
@@ -100,14 +103,17 @@ def summary(found: Findings) -> str:
 def _found(found: Findings) -> str:
     if found.verdict == "adequate":
         said = "Nothing is missing: the base model describes the recordings down to the noise."
+        if found.scatter:
+            said = f"Nothing was found that the base model leaves out.{found.scatter}"
         return f"{said} {found.detectable}".strip()
     if found.location is None:
         said = "Nothing is missing beside faults of the recordings"
-        return f"{said}:{found.faults} {found.detectable}".strip()
+        return f"{said}:{found.faults}{found.scatter} {found.detectable}".strip()
     if not found.effects:
         return _unknown(found, found.location)
     if found.verdict == "ambiguous" and found.alternatives:
-        return f"{_ambiguous(found, found.location)}{found.cost}{found.faults}"
+        told = f"{_ambiguous(found, found.location)}{found.cost}"
+        return f"{told}{found.scatter}{found.faults}"
     titles, statements = listed(e.title for e in found.effects), " ".join(found.statements)
     if found.verdict == "partly":
         needed = "is needed" if len(found.effects) == 1 else "are needed"
@@ -124,7 +130,7 @@ def _found(found: Findings) -> str:
         place = "which the probe sees beside the oscillator's motion"
     head = "The" if found.verdict == "named" else "Likeliest of what was compared, the"
     told = f"base model leaves out {titles}, {place}. {statements}{found.cost}"
-    return f"{head} {told}{found.faults}"
+    return f"{head} {told}{found.scatter}{found.faults}"
 
 
 def _unknown(found: Findings, location: Location) -> str:

@@ -6,8 +6,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from bayesimpact.diagnosis.faults.compare import base_failed
 from bayesimpact.diagnosis.remainder import Remainder
+from bayesimpact.diagnosis.selection.outcome import leaves_something
 from bayesimpact.formula.law import is_formula_id
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.noise.whitening import Noise
@@ -171,6 +174,19 @@ def noise_words(noise: Noise) -> str:
     return (
         " What the model leaves is taken for noise that is slow as well as white "
         f"({noise.kind}): no force explains it as well."
+    )
+
+
+def scatter_words(fit: Fit) -> str:
+    """A sentence where readings scatter about a model beside which nothing is told by more than
+    their noise, and what that is uncertain by; else empty.
+    """
+    if not leaves_something(fit):
+        return ""
+    over = two_digits(float(np.sqrt(fit.reduced_chi2)))
+    return (
+        f" The readings scatter about it {over} times as much as their noise does within short "
+        "windows; no effect and no force was found that explains the rest."
     )
 
 
