@@ -15,7 +15,7 @@ from bayesimpact.diagnosis.candidates.promising import (
 from bayesimpact.diagnosis.refits.refit import Candidate
 from bayesimpact.diagnosis.score_test.scan import Scan
 from bayesimpact.diagnosis.score_test.scores import Score
-from bayesimpact.diagnosis.selection.models import NOTHING
+from bayesimpact.diagnosis.selection.models import NOTHING, SAME
 from bayesimpact.diagnosis.selection.outcome import ExaminedModel, is_large
 from bayesimpact.diagnosis.selection.ranked import Ranked
 from bayesimpact.diagnosis.thresholds import DECISIVE
@@ -149,6 +149,8 @@ class Elimination(Ranked):
                     self.fit_one(rest, found, score, chosen)
                     if not score.effect.has_size:
                         self.exchange_in_place(chosen, effect, score.effect)
+            for score in promising:
+                self.begin_at_refined(rest, score.effect)
             wanted = _alike(effect, self.effects) if is_at_an_end(chosen.fit, effect) else set()
             if not _is_seen(effect, found, rest, chosen):
                 # where the rest of a large misfit stands in a side minimum, scores see none of them
@@ -179,6 +181,18 @@ class Elimination(Ranked):
                 self.exchange_in_place(chosen, effect, simpler)
                 found.append(self.tried[frozenset(chosen.ids) - {effect.id} | {simpler.id}])
         return found
+
+    def begin_at_refined(self, rest: Candidate, law: Effect) -> None:
+        """A law that has reached less than the one that it refines, in the same place, begins once
+        more from where that one stands: it ended in a side minimum.
+        """
+        own = self.tried.get(frozenset((*rest.ids, law.id)))
+        for simpler in self.effects:
+            less = self.tried.get(frozenset((*rest.ids, simpler.id)))
+            if simpler.id != law.prefer or own is None or less is None or not self.may_go_on():
+                continue
+            if less.fit.log_likelihood > own.fit.log_likelihood + SAME:
+                self.exchange_in_place(less, simpler, law)
 
 
 def _is_seen(effect: Effect, found: Scan, rest: Candidate, chosen: Candidate) -> bool:

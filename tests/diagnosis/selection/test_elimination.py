@@ -53,6 +53,30 @@ def test_laws_that_are_asked_for_take_the_place_where_scores_see_nothing(base, s
     assert ((HYSTERESIS, DRAG) in in_place) == (base > 9.0 and seen < 725.0)
 
 
+@pytest.mark.parametrize(("own", "again"), [(1.2, True), (1.0, False), (0.9, False)])
+def test_a_law_that_ends_below_the_one_it_refines_begins_again_there(own, again) -> None:
+    """A pendulum of 1.4 rad was a cubic spring: with a free share of gravity it had ended in a side
+    minimum, below the one whose torque is all gravity's.
+    """
+    plain, free = "pendulum_sine", "pendulum_with_spring"
+    search: Any = Elimination(SEARCHED, None, RNG(0), lambda words: None)
+    search.examined_models = {frozenset(): SimpleNamespace(candidate=model("", 400.0))}
+    search.asked = SimpleNamespace(first=lambda *about: ((), ()))
+    scores = (Table.score(BY_ID[free], 400.0), Table.score(BY_ID[plain], 300.0))
+    search.drop = lambda chosen, effect: model(FRICTION, 3.9)
+    search.simplified = lambda chosen, effect: []
+    search.scanned = lambda rest, effects: Scan(scores, 1e-6, None, (), ())
+    search.fit_one = lambda rest, found, score, rival: None
+    search.tried = {
+        frozenset((FRICTION, law)): model(f"{FRICTION} {law}", left)
+        for law, left in ((plain, 1.0), (free, own))
+    }
+    in_place = []
+    search.exchange_in_place = lambda chosen, old, new: in_place.append((old.id, new.id))
+    search.exchange(model(f"{FRICTION} {SPRING}", 1.0))
+    assert ((plain, free) in in_place) == again
+
+
 @pytest.mark.parametrize("white", [True, False])
 def test_beside_a_model_that_leaves_nothing_rivals_must_come_near_what_they_replace(white) -> None:
     search: Any = Elimination((), None, RNG(0), lambda words: None)
