@@ -2,7 +2,8 @@
 
 Every hypothesis is a direction of one recording's logarithms (see `hierarchical`), or another
 label: a probe's gain moves the gap alone (the motion scales with the displacement), a clock moves
-k1 and k2 by twice and c1 and c2 by once its logarithm.
+k1 and k2 by twice and c1 and c2 by once its logarithm, and a mass, of which a free motion tells all
+parameters as multiples, all of these by once its own.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ class Hypothesis:
     recording : position of the recording
     direction : of its logarithms, per unit of the unknown; () for a mere change of label
     case : the label it would have; None as given
-    what : the parameter of another rig
+    what : the parameter of another rig, or its mass
     """
 
     id: str = ""
@@ -78,6 +79,8 @@ def hypotheses(cases: Sequence[str], stop: bool) -> list[Hypothesis]:
             unit = tuple(float(i == places[name]) for i in range(size))
             found.append(Hypothesis("recording_other_rig", r, unit, None, name))
         if stop:
+            mass = (-1.0, -1.0, -1.0, 0.0, -1.0)
+            found.append(Hypothesis("recording_other_rig", r, mass, None, "mass"))
             found.append(Hypothesis("recording_clock", r, (-1.0, -2.0, -1.0, 0.0, -2.0)))
             found.append(Hypothesis("recording_gain", r, (0.0, 0.0, 0.0, 1.0, 0.0)))
             found += [Hypothesis("recording_case", r, (), c) for c in known if c != case]

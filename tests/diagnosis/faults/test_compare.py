@@ -147,6 +147,16 @@ def test_another_rig(paper: Campaign, what: str, by: float) -> None:
     assert name not in [r.name for r in found.campaign.recordings]
 
 
+def test_a_sensor_that_was_put_on_is_a_mass_and_no_clock(paper: Campaign) -> None:
+    """All parameters over the mass are less: stiffnesses as under a clock, dampings twice that."""
+    rig = replace(PAPER_RIG, mass=1.02 * PAPER_RIG.mass)
+    found = only(changed(paper, from_rig(rig, ODD)))
+    assert found.fault.id == "recording_other_rig"
+    assert "its mass is +2.0" in found.fault.statement
+    assert found.fault.size == pytest.approx(2.0, abs=0.1)
+    assert "case2_a" not in [r.name for r in found.campaign.recordings]
+
+
 def test_two_of_six_from_other_rigs(paper: Campaign) -> None:
     """A third of the recordings as they were given, not of those that are left."""
     softer, stiffer = (replace(PAPER_RIG, k1=by * PAPER_RIG.k1) for by in (0.97, 1.03))
