@@ -1,9 +1,11 @@
 """Where the model misses: regime, displacement, velocity, time, obstacles and recordings.
 
 Two views. The missing force, integrated along the recorded motion, says where in (displacement,
-velocity) the force acts. The gain in log likelihood of the best extension over the base says when
-and in which recordings it shows. A mismatch of the measuring chain is no force: it is told apart by
-comparing the evidence of a free force with that of a free distortion of the probe's reading.
+velocity) the force acts; that of a problem linearised about a large misfit is not believed, and
+what the better model's effects add takes its place. The gain in log likelihood of the best
+extension over the base says when and in which recordings it shows. A mismatch of the measuring
+chain is no force: it is told apart by comparing the evidence of a free force with that of a free
+distortion of the probe's reading.
 """
 
 from __future__ import annotations
@@ -15,10 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesimpact.data.short_repr import short_repr
+from bayesimpact.diagnosis.added_force import added_force
 from bayesimpact.diagnosis.refits.size import effect_numbers, force_along
 from bayesimpact.diagnosis.residual_force.gaussian_process import MissingForce, trajectory_points
 from bayesimpact.diagnosis.score_test.directions import sigma_of
-from bayesimpact.diagnosis.selection.outcome import Selection
+from bayesimpact.diagnosis.selection.outcome import Selection, is_large
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Effect, Regime
 from bayesimpact.model.parameters import SLOTS
@@ -65,7 +68,8 @@ class Location:
 
 
 def locate(base: Fit, better: Fit, force: MissingForce, effects: tuple[Effect, ...]) -> Location:
-    """Place of what `better` has and `base` lacks; `force` is what is missing from `base`.
+    """Place of what `better` has and `base` lacks; `force` is what is missing from `base`, to first
+    order.
 
     The place of several effects is that of all their forces together, as far as these are forces
     of displacement and velocity; else that of the missing force. What only the measuring chain does
@@ -77,9 +81,15 @@ def locate(base: Fit, better: Fit, force: MissingForce, effects: tuple[Effect, .
     own = [f for f in (own_force(e, better, points, times) for e in effects) if f is not None]
     if own and len(own) == len(effects):
         weights = [np.sum(parts, axis=0) ** 2 for parts in zip(*own, strict=True)]
-        return _place(base, better, weights, None, effects)
+        return _place(base, better, points, weights, None, effects)
+    added = None
+    if not effects and is_large(base) and not base.density.oscillator.effects:
+        added = added_force(better)
+    if added is not None:
+        weights = [f**2 for f in added.forces]
+        return _place(base, better, added.points, weights, None, effects, moved=better)
     weights = [force.force(y, v, t) ** 2 for (y, v), t in zip(points, times, strict=True)]
-    return _place(base, better, weights, force, effects)
+    return _place(base, better, points, weights, force, effects)
 
 
 def locate_effect(selection: Selection, effect: Effect, better: Fit) -> Location:
@@ -110,20 +120,24 @@ def own_force(
 def _place(
     base: Fit,
     better: Fit,
+    points: Sequence[tuple[Array, Array]],
     weights: list[Array],
     force: MissingForce | None,
     effects: tuple[Effect, ...],
+    moved: Fit | None = None,
 ) -> Location:
-    points = trajectory_points(base)
-    gaps = base.density.oscillator.layout.slots(base.mode)[:, _GAP]
-    within = [y >= g for (y, _), g in zip(points, gaps, strict=True)]
+    """Place of a squared force, `weights` (n,) per recording, at `points` of the motion of the
+    fit `moved`, which is `base` where none is given.
+    """
+    within = in_contact(moved or base, points)
     beyond = sum(float(w[c].sum()) for w, c in zip(weights, within, strict=True))
     below = sum(float(w[~c].sum()) for w, c in zip(weights, within, strict=True))
     contact_share = beyond / max(beyond + below, 1e-300)
     seen = regime_seen(contact_share)
     regime = effects[0].regime if effects else seen
     gain = gain_by_time(base, better)
-    chosen = _mask(points, gaps, regime)
+    contact = regime in ("contact", "entry", "exit")  # the suspension's forces act there as well
+    chosen = within if contact else [np.ones(w.size, dtype=bool) for w in weights]
     y, v, w = (np.concatenate(c) for c in ([p[0] for p in points], [p[1] for p in points], weights))
     inside = np.concatenate(chosen)
     place = _ranges(y, v, np.where(inside, w, 0.0))
@@ -146,6 +160,12 @@ def _place(
     )  # fmt: skip
 
 
+def in_contact(fit: Fit, points: Sequence[tuple[Array, Array]]) -> list[NDArray[np.bool_]]:
+    """Samples beyond the gap, per recording."""
+    gaps = fit.density.oscillator.layout.slots(fit.mode)[:, _GAP]
+    return [y >= g for (y, _), g in zip(points, gaps, strict=True)]
+
+
 def regime_seen(contact_share: float) -> Regime:
     """Regime by the missing force alone."""
     if contact_share > MOSTLY:
@@ -166,15 +186,6 @@ def gain_by_time(base: Fit, better: Fit) -> Array:
         difference = 0.5 * (a**2 - b**2) / sigma**2
         rows.append([chunk.sum() for chunk in np.array_split(difference, TIME_BINS)])
     return np.array(rows)
-
-
-def _mask(
-    points: Sequence[tuple[Array, Array]], gaps: Array, regime: Regime
-) -> list[NDArray[np.bool_]]:
-    """Samples in the regime; the suspension's forces act in contact as well."""
-    contact = regime in ("contact", "entry", "exit")
-    pairs = zip(points, gaps, strict=True)
-    return [(y >= g) if contact else np.ones(y.size, dtype=bool) for (y, _), g in pairs]
 
 
 def _ranges(y: Array, v: Array, w: Array) -> tuple[tuple[float, float], tuple[float, float]]:

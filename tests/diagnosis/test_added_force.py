@@ -1,0 +1,88 @@
+"""The force that effects of a model add, less what base parameters do."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import small_rig
+from effect_rigs import BY_ID
+from effect_rigs import with_effect as at_mode
+
+from bayesimpact.data.campaign import SECOND_STOP
+from bayesimpact.diagnosis import location
+from bayesimpact.diagnosis.added_force import added_force
+from bayesimpact.diagnosis.location import locate
+from bayesimpact.diagnosis.refits.extend import campaign_scales
+from bayesimpact.diagnosis.residual_force.gaussian_process import missing_force
+from bayesimpact.inference.identify import identify
+
+
+def with_effect(small, effect: str, **values: float):
+    fit = at_mode(small, effect, **values)
+    return replace(fit, covariance=1e-12 * np.eye(fit.mode.size))
+
+
+def rms(forces) -> float:
+    return float(np.sqrt(np.mean(np.concatenate(forces) ** 2)))
+
+
+def naive_rest(fit, points, forces):
+    """By one least-squares problem: k1, c1, c2, g, k2 of every case, a constant per recording."""
+    recordings = fit.density.oscillator.campaign.recordings
+    cases = list(fit.density.oscillator.campaign.cases)
+    blocks = []
+    for r, (y, v) in enumerate(points):
+        d = y - fit.value("g")
+        inside = d > 0
+        own = [np.where(inside, d, 0.0) * (recordings[r].case == case) for case in cases]
+        gap = np.where(inside, fit.value(f"k2[{recordings[r].case}]"), 0.0)
+        constants = [np.full(y.size, float(i == r)) for i in range(len(points))]
+        blocks.append(np.column_stack([y, v, inside * v, gap, *own, *constants]))
+    columns, force = np.concatenate(blocks), np.concatenate(forces)
+    columns = columns / np.linalg.norm(columns, axis=0)
+    return force - columns @ np.linalg.lstsq(columns, force, rcond=None)[0]
+
+
+def test_the_rest_is_what_no_base_parameter_does(small):
+    fit = with_effect(small, "spring_cubic", stiffness=1e6)
+    found = added_force(fit)
+    whole = [1e6 * y**3 for y, _ in found.points]
+    expected = naive_rest(fit, found.points, whole)
+    np.testing.assert_allclose(np.concatenate(found.forces), expected, atol=1e-4 * rms(whole))
+    assert rms(found.forces) < 0.6 * rms(whole)  # k1 does most of it
+
+
+@pytest.fixture(scope="module")
+def between():
+    """The small rig between two stops, both declared."""
+    second = {"opposite_stop": {"stiffness": 4000.0, "gap": 1.5e-3}}
+    campaign = replace(small_rig.record(3, second, duration=1.0), declared=(SECOND_STOP,))
+    return identify(campaign, rng=np.random.default_rng(0), search=False)
+
+
+def test_a_declared_stop_is_none_that_is_added(between):
+    found = added_force(with_effect(between, "spring_cubic", stiffness=0.0))
+    assert rms(found.forces) == 0.0
+
+
+def test_no_force_along_a_path_is_none_that_is_added(small):
+    assert added_force(small.fit) is None
+    assert added_force(with_effect(small, "sensor_drift", rate=1e-6)) is None
+    assert added_force(with_effect(small, "gap_wear", step=1e-6)) is None
+
+
+def test_about_a_large_misfit_a_place_is_where_the_better_model_adds_a_force(small, monkeypatch):
+    """A force linearised there is arbitrary: here one at the other end of the motion."""
+    scales = campaign_scales(small.fit)
+    force = missing_force(small.fit, scales, rng=np.random.default_rng(0), knots=40)
+    object.__setattr__(force, "mean", np.where(np.arange(80) < 5, 2.0, 0.0))
+    fit = with_effect(small, "contact_hardening", stiffness=1e8)
+    assert locate(small.fit, fit, force, ()).regime == "free"
+    monkeypatch.setattr(location, "is_large", lambda fit: True)
+    found = locate(small.fit, fit, force, ())
+    assert found.regime == "contact" and found.force_sd == 0.0
+    assert found.displacement[1] > small_rig.RIG.g
+    own = locate(small.fit, fit, force, (BY_ID["contact_hardening"],))
+    assert found.force_rms < own.force_rms  # k2 and c2 do a part
