@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesimpact.data.campaign import SECOND_STOP
 from bayesimpact.data.short_repr import short_repr
 from bayesimpact.diagnosis.added_force import added_force
 from bayesimpact.diagnosis.refits.size import effect_numbers, force_along
@@ -129,7 +130,7 @@ def _place(
     """Place of a squared force, `weights` (n,) per recording, at `points` of the motion of the
     fit `moved`, which is `base` where none is given.
     """
-    within = in_contact(moved or base, points)
+    within = in_contact(moved or base, points, either=not effects)
     beyond = sum(float(w[c].sum()) for w, c in zip(weights, within, strict=True))
     below = sum(float(w[~c].sum()) for w, c in zip(weights, within, strict=True))
     contact_share = beyond / max(beyond + below, 1e-300)
@@ -160,10 +161,16 @@ def _place(
     )  # fmt: skip
 
 
-def in_contact(fit: Fit, points: Sequence[tuple[Array, Array]]) -> list[NDArray[np.bool_]]:
-    """Samples beyond the gap, per recording."""
+def in_contact(
+    fit: Fit, points: Sequence[tuple[Array, Array]], *, either: bool
+) -> list[NDArray[np.bool_]]:
+    """Samples beyond the gap, per recording; of `either` stop where the campaign has two."""
     gaps = fit.density.oscillator.layout.slots(fit.mode)[:, _GAP]
-    return [y >= g for (y, _), g in zip(points, gaps, strict=True)]
+    found = [y >= g for (y, _), g in zip(points, gaps, strict=True)]
+    if either and SECOND_STOP in fit.density.oscillator.campaign.declared:
+        other = fit.value(f"{SECOND_STOP}.gap")
+        found = [here | (y < -other) for here, (y, _) in zip(found, points, strict=True)]
+    return found
 
 
 def regime_seen(contact_share: float) -> Regime:

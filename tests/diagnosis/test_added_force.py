@@ -13,9 +13,9 @@ from effect_rigs import with_effect as at_mode
 from bayesimpact.data.campaign import SECOND_STOP
 from bayesimpact.diagnosis import location
 from bayesimpact.diagnosis.added_force import added_force
-from bayesimpact.diagnosis.location import locate
+from bayesimpact.diagnosis.location import in_contact, locate
 from bayesimpact.diagnosis.refits.extend import campaign_scales
-from bayesimpact.diagnosis.residual_force.gaussian_process import missing_force
+from bayesimpact.diagnosis.residual_force.gaussian_process import missing_force, trajectory_points
 from bayesimpact.inference.identify import identify
 
 
@@ -65,6 +65,17 @@ def between():
 def test_a_declared_stop_is_none_that_is_added(between):
     found = added_force(with_effect(between, "spring_cubic", stiffness=0.0))
     assert rms(found.forces) == 0.0
+
+
+def test_the_second_of_two_stops_is_a_contact_too(between):
+    """As what is missing tells it; a law of the catalogue acts at the first one."""
+    points = trajectory_points(between.fit)
+    gap, other = between.fit.value("g"), between.fit.value("opposite_stop.gap")
+    both, first = (in_contact(between.fit, points, either=either) for either in (True, False))
+    for (y, _), here, one in zip(points, both, first, strict=True):
+        np.testing.assert_array_equal(here, (y >= gap) | (y < -other))
+        np.testing.assert_array_equal(one, y >= gap)
+        assert 0 < one.sum() < here.sum() < y.size
 
 
 def test_no_force_along_a_path_is_none_that_is_added(small):
