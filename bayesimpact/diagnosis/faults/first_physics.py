@@ -47,6 +47,7 @@ from bayesimpact.diagnosis.faults.together import CERTAIN, Hypothesis, Weighed
 from bayesimpact.diagnosis.refits.extend import campaign_scales, extend
 from bayesimpact.diagnosis.refits.refit import fit_from
 from bayesimpact.diagnosis.selection.outcome import is_large, is_more_than_noise, leaves_something
+from bayesimpact.diagnosis.selection.unknown import with_free_force
 from bayesimpact.diagnosis.thresholds import EXCESS
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.noise.whitening import Noise
@@ -87,6 +88,8 @@ def faults_beside_physics(
             continue
         steps = comparisons(before, as_read, chosen.effects, values)
         if steps and _leaves_nothing(model.fitted(steps[-1][-1].campaign)):
+            if _leaves_nothing(with_free_force(whole)):
+                return ()  # so is physics that no law of the catalogue is
             changed = change_instead(steps, fit, whole, as_read)
             return (changed,) if changed else steps
     return _label_beside_physics(before, as_read, effects)

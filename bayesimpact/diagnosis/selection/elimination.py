@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -151,7 +151,8 @@ class Elimination(Ranked):
                         self.exchange_in_place(chosen, effect, score.effect)
             for score in promising:
                 self.begin_at_refined(rest, score.effect)
-            wanted = _alike(effect, self.effects) if is_at_an_end(chosen.fit, effect) else set()
+            alike = _alike(effect, self.effects)
+            wanted = set(alike) if is_at_an_end(chosen.fit, effect) else _without_size(alike)
             if not _is_seen(effect, found, rest, chosen):
                 # where the rest of a large misfit stands in a side minimum, scores see none of them
                 wanted |= set(asked)
@@ -217,9 +218,14 @@ def is_at_an_end(fit: Fit, effect: Effect) -> bool:
     return False
 
 
-def _alike(effect: Effect, effects: Sequence[Effect]) -> set[str]:
-    """Ids of an effect's family."""
-    return {e.id for e in effects if e.family == effect.family}
+def _alike(effect: Effect, effects: Sequence[Effect]) -> dict[str, Effect]:
+    """Those of an effect's family, by their ids."""
+    return {e.id: e for e in effects if e.family == effect.family}
+
+
+def _without_size(effects: Mapping[str, Effect]) -> set[str]:
+    """Ids of those that are there or not: no score, which is of first order in a size, tells."""
+    return {i for i, e in effects.items() if not e.has_size}
 
 
 def _unseen(found: Scan, asked: Collection[str], promising: Sequence[Score]) -> list[Effect]:

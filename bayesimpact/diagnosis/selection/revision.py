@@ -21,12 +21,11 @@ from bayesimpact.diagnosis.measurement.growing_noise import growing_noise
 from bayesimpact.diagnosis.measurement.input_noise import input_noise
 from bayesimpact.diagnosis.measurement.slow_noise import remaining_noise
 from bayesimpact.diagnosis.refits.extend import campaign_scales
-from bayesimpact.diagnosis.refits.refit import Candidate, fit_from
-from bayesimpact.diagnosis.residual_force.gaussian_process import missing_drift, missing_force
+from bayesimpact.diagnosis.refits.refit import fit_from
 from bayesimpact.diagnosis.score_test.directions import is_periodic, is_steady
 from bayesimpact.diagnosis.selection.models import Progress
 from bayesimpact.diagnosis.selection.outcome import ExaminedModel, is_large, leaves_something
-from bayesimpact.diagnosis.selection.unknown import with_force
+from bayesimpact.diagnosis.selection.unknown import with_free_force
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.noise.whitening import Noise
@@ -132,17 +131,6 @@ def _with_a_recording_corrected(base: Fit, found: Fit, say: Progress) -> Revisio
         return None
     say(f"{compared.fault.recording}: {compared.fault.statement}: once more with that corrected")
     return Revision(refitted(base, compared.campaign), first, (compared,))
-
-
-def with_free_force(fit: Fit) -> Fit:
-    """A model with a free force beside it that all recordings share, of displacement and velocity
-    or of time, whichever is likelier.
-    """
-    rng = np.random.default_rng(0)  # for their odds by chance, which are not asked for here
-    scales = campaign_scales(fit)
-    forces = [missing(fit, scales, rng=rng) for missing in (missing_force, missing_drift)]
-    likelier = max(forces, key=lambda f: f.log_evidence)
-    return with_force(Candidate(fit.density.oscillator.effects, fit, 0.0), likelier, scales).fit
 
 
 def _without_a_change(base: Fit, found: Fit, say: Progress) -> Revision | None:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.diagnosis.measurement.repetition import residual_repetition
 from bayesimpact.diagnosis.refits.evidence import model_evidence
-from bayesimpact.diagnosis.refits.extend import difference_steps, extend, transfer
+from bayesimpact.diagnosis.refits.extend import campaign_scales, difference_steps, extend, transfer
 from bayesimpact.diagnosis.refits.refit import (
     ITERATIONS,
     LITTLE,
@@ -15,7 +15,12 @@ from bayesimpact.diagnosis.refits.refit import (
     Candidate,
     best_start,
 )
-from bayesimpact.diagnosis.residual_force.gaussian_process import MissingForce, refinement
+from bayesimpact.diagnosis.residual_force.gaussian_process import (
+    MissingForce,
+    missing_drift,
+    missing_force,
+    refinement,
+)
 from bayesimpact.diagnosis.residual_force.learned import LEARNED, knots_of, refined_force
 from bayesimpact.diagnosis.selection.outcome import is_large, leaves_something
 from bayesimpact.inference.fit import Fit, PosteriorDensity
@@ -86,6 +91,17 @@ def with_force(
             break
         best = finer
     return best
+
+
+def with_free_force(fit: Fit) -> Fit:
+    """A model with a free force beside it that all recordings share, of displacement and velocity
+    or of time, whichever is likelier.
+    """
+    rng = np.random.default_rng(0)  # for their odds by chance, which are not asked for here
+    scales = campaign_scales(fit)
+    forces = [missing(fit, scales, rng=rng) for missing in (missing_force, missing_drift)]
+    likelier = max(forces, key=lambda f: f.log_evidence)
+    return with_force(Candidate(fit.density.oscillator.effects, fit, 0.0), likelier, scales).fit
 
 
 def finer_factors(effect: Effect) -> list[int]:

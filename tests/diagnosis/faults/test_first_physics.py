@@ -16,6 +16,7 @@ from bayesimpact.diagnosis.faults import first_physics
 from bayesimpact.diagnosis.faults.first_physics import faults_beside_physics
 from bayesimpact.diagnosis.faults.recording_faults import Corrected, Step, cleaned_campaign
 from bayesimpact.diagnosis.selection.outcome import is_large
+from bayesimpact.trial.rig.recordings import Release
 
 pytestmark = pytest.mark.usefixtures("catalogue_alone")
 
@@ -97,6 +98,14 @@ def test_samples_lost_near_a_turning_point_show_beside_a_law_of_the_contact():
 def test_without_a_fault_or_where_more_is_missing_none_is_found():
     assert found(timed(73, 1.0, FRICTION)) == ()
     assert found(timed(74, 1.004, FRICTION | BUMP)) == ()
+
+
+def test_a_recording_that_alone_reaches_a_force_is_of_no_other_rig():
+    """The brake acts from 3 mm on: the others, of smaller amplitude, need no law."""
+    brake = {"eddy_brake": {"coefficient": 2.0, "low": -3e-3, "high": -1.5e-3}}
+    releases = tuple(Release(n, "", y) for n, y in zip("abc", (-6.5e-3, -3e-3, -2e-3), strict=True))
+    campaign = small_rig.record(4, brake, rig=small_rig.PLAIN, releases=releases)
+    assert not found(campaign)
 
 
 @pytest.mark.parametrize("recordings", [1, 3])

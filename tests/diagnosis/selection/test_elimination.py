@@ -53,6 +53,25 @@ def test_laws_that_are_asked_for_take_the_place_where_scores_see_nothing(base, s
     assert ((HYSTERESIS, DRAG) in in_place) == (base > 9.0 and seen < 725.0)
 
 
+@pytest.mark.parametrize(("effect", "tried"), [(SPRING, True), (HYSTERESIS, False)])
+def test_what_is_there_or_not_takes_the_place_of_its_family(effect: str, tried: bool) -> None:
+    """Beside a large misfit nothing asks for it, and no score tells: a cubic spring beside another
+    one was a pendulum.
+    """
+    search: Any = Elimination(SEARCHED, None, RNG(0), lambda words: None)
+    search.examined_models = {frozenset(): SimpleNamespace(candidate=model("", 400.0))}
+    search.asked = SimpleNamespace(first=lambda *about: ((), ("pendulum_sine",)))
+    score = Table.score(BY_ID["pendulum_sine"], 0.0)
+    search.drop = lambda chosen, effect: model(FRICTION, 40.0)
+    search.simplified = lambda chosen, effect: []
+    search.scanned = lambda rest, effects: Scan((score,), 1e-6, None, (), ())
+    search.fit_one = lambda rest, found, score, rival: None
+    in_place = []
+    search.exchange_in_place = lambda chosen, old, new: in_place.append((old.id, new.id))
+    search.exchange(model(f"{FRICTION} {effect}", 1.0))
+    assert ((effect, "pendulum_sine") in in_place) == tried
+
+
 @pytest.mark.parametrize(("own", "again"), [(1.2, True), (1.0, False), (0.9, False)])
 def test_a_law_that_ends_below_the_one_it_refines_begins_again_there(own, again) -> None:
     """A pendulum of 1.4 rad was a cubic spring: with a free share of gravity it had ended in a side
