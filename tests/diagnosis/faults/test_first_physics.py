@@ -16,6 +16,7 @@ from bayesimpact.diagnosis.faults import first_physics
 from bayesimpact.diagnosis.faults.first_physics import faults_beside_physics
 from bayesimpact.diagnosis.faults.recording_faults import Corrected, Step, cleaned_campaign
 from bayesimpact.diagnosis.selection.outcome import is_large
+from bayesimpact.model.effects import SEARCHED
 from bayesimpact.trial.rig.recordings import Release
 
 pytestmark = pytest.mark.usefixtures("catalogue_alone")
@@ -105,7 +106,7 @@ def test_a_recording_that_alone_reaches_a_force_is_of_no_other_rig():
     brake = {"eddy_brake": {"coefficient": 2.0, "low": -3e-3, "high": -1.5e-3}}
     releases = tuple(Release(n, "", y) for n, y in zip("abc", (-6.5e-3, -3e-3, -2e-3), strict=True))
     campaign = small_rig.record(4, brake, rig=small_rig.PLAIN, releases=releases)
-    assert not found(campaign)
+    assert not faults_beside_physics(cleaned(campaign), campaign, SEARCHED)
 
 
 @pytest.mark.parametrize("recordings", [1, 3])
