@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from bayesimpact.inference.fit import Fit
@@ -27,13 +29,26 @@ def shapes_in_base(fit: Fit, effect: Effect) -> list[tuple[int, float]]:
     """Positions of an effect's shapes in a fit's mode that have a value at which the law is one of
     the base model's, with that value.
     """
+    limits = [(p.name, p.in_base) for p in effect.parameters if p.in_base is not None]
+    return _positions(fit, effect, limits)
+
+
+def shapes_until(fit: Fit, effect: Effect) -> list[tuple[int, float]]:
+    """The same of shapes that have a value from which on the law is not what it is called."""
+    limits = [(p.name, p.until) for p in effect.parameters if p.until is not None]
+    return _positions(fit, effect, limits)
+
+
+def _positions(
+    fit: Fit, effect: Effect, limits: Sequence[tuple[str, float]]
+) -> list[tuple[int, float]]:
+    """Positions of an effect's named parameters in a fit's mode, each with its value."""
     names = fit.density.oscillator.layout.names
     return [
-        (i, p.in_base)
-        for p in effect.parameters
-        if p.in_base is not None
+        (i, value)
+        for own, value in limits
         for i, name in enumerate(names)
-        if name.startswith(f"{effect.id}.") and bare_name(name) == p.name
+        if name.startswith(f"{effect.id}.") and bare_name(name) == own
     ]
 
 

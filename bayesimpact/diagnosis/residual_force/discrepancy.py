@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from bayesimpact.diagnosis.refits.sizes import shapes_in_base, sizes_of
+from bayesimpact.diagnosis.refits.sizes import shapes_in_base, shapes_until, sizes_of
 from bayesimpact.diagnosis.residual_force.gaussian_process import whitened_one
 from bayesimpact.diagnosis.residual_force.hidden import about, parameter_forces
 from bayesimpact.diagnosis.residual_force.marginal import Part, log_evidence_gain, products
@@ -154,8 +154,8 @@ class Discrepancy:
     def apart(self, effect: Effect) -> float:
         """Standard deviations of an effect from none at all: of its largest size, the shape as
         fitted, for without a size no other shape does more; or of a shape, the size as it may be,
-        from where the law is one of the base model's (`EffectParameter.in_base`), whichever is
-        less. Infinite where it has no size.
+        from where the law is one of the base model's (`EffectParameter.in_base`), or below where
+        it is not what it is called (`until`), whichever is less. Infinite where it has no size.
         """
         sizes, shapes = sizes_of(self.fit, effect)
         found = [] if sizes else [np.inf]
@@ -166,7 +166,11 @@ class Discrepancy:
             abs(float(self.fit.mode[i]) - value) / self.posterior[1][i, i] ** 0.5
             for i, value in shapes_in_base(self.fit, effect)
         ]
-        return float(min([max(found), *beside]))
+        below = [
+            (value - float(self.fit.mode[i])) / self.posterior[1][i, i] ** 0.5
+            for i, value in shapes_until(self.fit, effect)
+        ]
+        return float(min([max(found), *beside, *below]))
 
 
 def discrepancy(fit: Fit) -> Discrepancy | None:

@@ -26,7 +26,8 @@ Let S be the likeliest set of effects that the search reached.
      frequencies. An effect that imitates what the catalogue lacks may put the phase right, but
      leaves most of the force,
    - its size is apart from none at all by `APART` of its own standard deviations, with what the
-     remainder may have done to it in them (`discrepancy`),
+     remainder may have done to it in them (`discrepancy`), and a mode's damping as far below the
+     critical one: what does not ring is no mode,
    - where it refines a simpler law (`Effect.prefer`), `EXCESS` times as much is left with that law
      in its place: what remains may be all that tells the two apart; where one of its family has no
      parameters at all, its size is more than one part in `EXCESS` from that at which it does what

@@ -112,6 +112,8 @@ class EffectParameter:
         scales: the prior is log-uniform in it
     in_base : for a shape parameter, the value at which the law is a force that the base model has,
         of whatever size: there it is nothing that is missing
+    until : for a shape parameter, the value from which on the law is not what it is called: a mode
+        that is damped critically does not ring
     circular : a phase, rad
     fixed : a constant of the law, not an unknown
     spectral : a frequency, Hz; a scan should try the peaks of the residual's periodogram as well
@@ -133,6 +135,7 @@ class EffectParameter:
     grid: Callable[[Scales], NDArray[np.float64]] | None = None
     within: Callable[[Scales], tuple[float, float]] | None = None
     in_base: float | None = None
+    until: float | None = None
     circular: bool = False
     fixed: float | None = None
     spectral: bool = False
@@ -173,6 +176,7 @@ def damping_ratio(scale: float) -> EffectParameter:
         lower=0.0,
         null=None,
         grid=lambda s: np.array([0.01, 0.05]),
+        until=1.0,
     )
 
 

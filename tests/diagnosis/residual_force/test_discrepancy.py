@@ -264,6 +264,24 @@ def test_a_law_whose_shape_may_be_one_of_the_base_model_is_not_apart():
     assert left.apart(power) == pytest.approx(by_shape)
 
 
+@pytest.mark.parametrize("below", [4.0, 1.0, -3.0])
+def test_what_may_not_ring_is_no_mode_that_is_apart(below: float):
+    """However sure its size: below critical damping by less than its own error, or above it."""
+    planted = {"frequency": 60.0, "damping": 0.05, "gain": 0.5}
+    fit = plain_fit(small_rig.record(3, {"second_mode": planted}, duration=1.0))
+    effect = next(e for e in EFFECTS if e.id == "second_mode")
+    start = {f"second_mode.{name}": value for name, value in planted.items()}
+    left = left_by(fit_from(fit, (effect,), start, campaign_scales(fit)).fit)
+    assert left.apart(effect) > 4.0
+    mean, covariance = left.posterior
+    at = left.fit.names.index("second_mode.damping")
+    mode = left.fit.mode.copy()
+    mode[at] = 1.0 - below * covariance[at, at] ** 0.5
+    damped = replace(left, fit=replace(left.fit, mode=mode))
+    damped.__dict__["posterior"] = mean, covariance
+    assert damped.apart(effect) == pytest.approx(below)
+
+
 def test_a_motion_that_ran_away_has_none(small):
     """Intervals are then those of the fit, each independent sample counted once."""
     away = replace(small.fit, mode=np.where(np.isin(small.fit.names, "k1"), -1.0, small.fit.mode))
