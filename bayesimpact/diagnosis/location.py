@@ -11,7 +11,7 @@ distortion of the probe's reading.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,11 +45,12 @@ class Location:
     share : of the unexplained force (of the gain, for a measurement) inside the ranges
     displacement, velocity, time : ranges, m, m/s, s
     recordings, cases : where it shows, most first
-    force_rms : over the place, N
+    force_rms : over the place, N; None for a force linearised about a large misfit
     force_sd : how well that is known where no effect tells it, N
     contact_share : share of the squared force beyond the gap
     agrees : both views name the same regime
     gain : log-likelihood gain per recording and time bin, (R, TIME_BINS), nats
+    beyond_base : the force is without what base parameters could imitate
     """
 
     regime: Regime
@@ -59,11 +60,12 @@ class Location:
     time: tuple[float, float]
     recordings: tuple[str, ...]
     cases: tuple[str, ...]
-    force_rms: float
+    force_rms: float | None
     contact_share: float
     agrees: bool
     gain: Array
     force_sd: float = 0.0
+    beyond_base: bool = False
 
     __repr__ = short_repr
 
@@ -83,14 +85,15 @@ def locate(base: Fit, better: Fit, force: MissingForce, effects: tuple[Effect, .
     if own and len(own) == len(effects):
         weights = [np.sum(parts, axis=0) ** 2 for parts in zip(*own, strict=True)]
         return _place(base, better, points, weights, None, effects)
-    added = None
-    if not effects and is_large(base) and not base.density.oscillator.effects:
-        added = added_force(better)
+    large = not effects and is_large(base)
+    added = added_force(better) if large and not base.density.oscillator.effects else None
     if added is not None:
         weights = [f**2 for f in added.forces]
-        return _place(base, better, added.points, weights, None, effects, moved=better)
+        found = _place(base, better, added.points, weights, None, effects, moved=better)
+        return replace(found, beyond_base=True)
     weights = [force.force(y, v, t) ** 2 for (y, v), t in zip(points, times, strict=True)]
-    return _place(base, better, points, weights, force, effects)
+    found = _place(base, better, points, weights, force, effects)
+    return replace(found, force_rms=None) if large else found
 
 
 def locate_effect(selection: Selection, effect: Effect, better: Fit) -> Location:

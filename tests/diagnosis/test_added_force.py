@@ -90,10 +90,13 @@ def test_about_a_large_misfit_a_place_is_where_the_better_model_adds_a_force(sma
     force = missing_force(small.fit, scales, rng=np.random.default_rng(0), knots=40)
     object.__setattr__(force, "mean", np.where(np.arange(80) < 5, 2.0, 0.0))
     fit = with_effect(small, "contact_hardening", stiffness=1e8)
-    assert locate(small.fit, fit, force, ()).regime == "free"
+    found = locate(small.fit, fit, force, ())
+    assert found.regime == "free" and found.force_rms > 0.0 and not found.beyond_base
     monkeypatch.setattr(location, "is_large", lambda fit: True)
     found = locate(small.fit, fit, force, ())
-    assert found.regime == "contact" and found.force_sd == 0.0
+    assert found.regime == "contact" and found.force_sd == 0.0 and found.beyond_base
     assert found.displacement[1] > small_rig.RIG.g
     own = locate(small.fit, fit, force, (BY_ID["contact_hardening"],))
     assert found.force_rms < own.force_rms  # k2 and c2 do a part
+    unseen = with_effect(small, "gap_wear", step=1e-6)  # no force along a path
+    assert locate(small.fit, unseen, force, ()).force_rms is None

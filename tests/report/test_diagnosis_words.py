@@ -13,6 +13,7 @@ from bayesimpact.diagnosis.remainder import Remainder
 from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.report.diagnosis.document import _explained
 from bayesimpact.report.diagnosis.summary import Findings, summary
+from bayesimpact.report.diagnosis.view import _location
 from bayesimpact.report.diagnosis.words import (
     ParameterShift,
     failure,
@@ -274,6 +275,16 @@ def test_a_force_that_is_hardly_known_has_no_size():
     )
     said = told("unknown", (), (), vague, (), {}, "")
     assert "do not tell (0 to 10 N rms)" in said and "3.5" not in said
+    vague.force_rms = None
+    assert "size so large a misfit does not tell." in told("unknown", (), (), vague, (), {}, "")
+
+
+def test_a_force_is_told_with_or_without_what_base_parameters_imitate():
+    for beyond, word in ((True, "without"), (False, "with")):
+        place = {"regime": "free", "force_rms_n": 0.5, "beyond_base": beyond}
+        assert f"N, {word} what" in dict(_location(place, "m", named=False))["force, rms"]
+    place["force_rms_n"] = None
+    assert "force, rms" not in dict(_location(place, "m", named=False))
 
 
 def test_what_comes_nearest():

@@ -236,6 +236,7 @@ def _location(x: Location | None) -> dict[str, Any] | None:
         "recordings": list(x.recordings),
         "cases": list(x.cases),
         "force_rms_n": x.force_rms,
+        "beyond_base": x.beyond_base,
         "contact_share": x.contact_share,
         "views_agree": x.agrees,
     }

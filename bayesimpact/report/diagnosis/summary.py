@@ -238,6 +238,8 @@ def _moved(shifts: Mapping[str, ParameterShift], cause: str) -> str:
 
 
 def _size_of_force(location: Location, unit: str) -> str:
+    if location.force_rms is None:
+        return "with a force whose size so large a misfit does not tell"
     size = two_digits(location.force_rms, unit)
     if location.force_rms > TOLD * location.force_sd:
         return f"with {size} rms"

@@ -142,7 +142,8 @@ def _location(
             rows.append((key + order, ", ".join(str(x) for x in location[key])))
     if location.get("force_rms_n") is not None and not named:
         force = quantity(location["force_rms_n"], "N m" if unit == "rad" else "N", 2)
-        rows.append(("force, rms", f"{force}, with what base parameters could imitate"))
+        which = "without" if location.get("beyond_base") else "with"
+        rows.append(("force, rms", f"{force}, {which} what base parameters could imitate"))
     return rows
 
 
