@@ -37,6 +37,7 @@ STARTS: tuple[tuple[tuple[float, ...], ...], ...] = (
 )
 """Correlations over the largest, beside white noise: of one process, of two, of three."""
 PASSES = 2  # of random forces, given over a noise level that is only then known
+ROUNDING = 1e-20  # of a parameter's information: a few times the square of the unit roundoff, 1e-32
 TOLERANCE = 0.01  # nats, of the likelihood at its best
 
 
@@ -153,14 +154,16 @@ def _integrated(
 class _Spectra:
     """Products of all recordings' derivatives and residuals in narrow bands of frequency, in which
     the noise's spectrum is all but constant: its likelihood by Whittle's method, at once.
+
+    Means are left out, and with them what changes nothing else, as an offset: what it tells of
+    itself then is rounding, and so would be its part of the evidence.
     """
 
     def __init__(self, fit: Fit, linear: tuple[Linearisation, ...]) -> None:
         recordings = fit.density.oscillator.campaign.recordings
         noise, size = fit.density.likelihood.noise, fit.mode.size
         level = noise.level
-        self.free = fit.density.oscillator.layout.roles("physical", "effect", "nuisance")
-        self.bands = []
+        self.bands, whole, left = [], np.zeros(size), np.zeros(size)
         for part, recording in zip(linear, recordings, strict=True):
             rows = np.vstack([part.jacobian.T, part.residual]) / level
             if noise.grows:
@@ -172,10 +175,14 @@ class _Spectra:
             products = np.zeros((band.size, size + 1, size + 1))
             for i, some in enumerate(np.split(waves, band[1:], axis=1)):
                 products[i][at] = (some @ some.conj().T).real
+            whole[part.columns] += np.sum(rows[:-1] ** 2, axis=1)
+            left[part.columns] += np.sum(np.abs(waves[:-1]) ** 2, axis=1)
             widths = np.diff(np.append(band, number.size))
             centres = np.exp(np.add.reduceat(np.log(number), band) / widths)
             frequencies = centres / (rows.shape[1] * recording.interval)
             self.bands.append((frequencies, recording.interval, widths, products))
+        free = fit.density.oscillator.layout.roles("physical", "effect", "nuisance")
+        self.free = free[left[free] > ROUNDING * whole[free]]
 
     def log_evidence(self, noise: Noise) -> float:
         """As `_Whole` has it, but for the ends of the recordings."""

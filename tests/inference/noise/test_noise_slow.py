@@ -12,6 +12,8 @@ from scipy import stats
 from bayesimpact.data.campaign import Campaign, Measurement, Smoothing
 from bayesimpact.diagnosis.measurement.whiteness import ljung_box
 from bayesimpact.inference.identify import identify
+from bayesimpact.inference.likelihood import Likelihood
+from bayesimpact.inference.noise import slow
 from bayesimpact.inference.noise.slow import slow_noise
 from bayesimpact.inference.noise.whitening import Noise
 
@@ -111,3 +113,19 @@ def test_noise_that_rises_over_decades_of_frequency_takes_two_correlation_times(
     found = slow_noise(fitted(replace(campaign, recordings=tuple(recordings))))
     slow = [rho for rho, _ in found.noise.parts if rho > 0.0]
     assert len(slow) == 2 and np.log(min(slow)) < 4 * np.log(max(slow))
+
+
+def test_shapes_are_compared_by_no_rounding(found):
+    """Backwards, readings have the same spectra but for rounding, which an offset's would be."""
+    fit, shapes = fitted(recorded(0)), [f.noise for f in found[:2]]
+    plain = Likelihood(fit.density.oscillator, Noise(level=small_rig.NOISE))
+    linear = plain.linearise(fit.mode, 0.05 * fit.sd)
+    backwards = tuple(
+        replace(p, residual=p.residual[::-1].copy(), jacobian=p.jacobian[::-1].copy())
+        for p in linear
+    )
+    spectra = [slow._Spectra(fit, parts) for parts in (linear, backwards)]
+    one, other = ([s.log_evidence(shape) for shape in shapes] for s in spectra)
+    assert np.diff(one) == pytest.approx(np.diff(other), abs=1e-6)
+    whole = [slow._Whole(fit, linear, shape).log_evidence for shape in shapes]
+    assert np.diff(one) == pytest.approx(np.diff(whole), abs=1.0)  # but for the recordings' ends
