@@ -43,6 +43,7 @@ from bayesimpact.report.diagnosis.words import (
 
 Array = NDArray[np.float64]
 NORMAL_90 = 1.6448536269514722
+UNFINISHED = " The search ended by its limit: not everything that may be missing was tried."
 MOST_OTHERS = 5  # models of the catalogue that are listed beside the answer
 
 
@@ -104,7 +105,7 @@ def document(
         )
         + noise_words(noise)
         + _nearest(d)
-        + _unfinished(d),
+        + UNFINISHED * (not d.selection.finished),
         "location": _location(d.location) or (place(faulty) if faulty else None),
         "faults": fault_entries(d.corrected) if d.corrected else [],
         "remainder": _remainder(left),
@@ -210,11 +211,6 @@ def _unproved(d: Diagnosis) -> tuple[str, ...]:
     told = {LEARNED, *(e.id for group in (d.effects, *d.groups) for e in group)}
     effects = d.after.density.oscillator.effects
     return tuple(e.title for e in effects if e.id not in told and not is_formula_id(e.id))
-
-
-def _unfinished(d: Diagnosis) -> str:
-    said = " The search ended by its limit: not everything that may be missing was tried."
-    return "" if d.selection.finished else said
 
 
 def _statement(d: Diagnosis, effect: Effect) -> str:

@@ -10,6 +10,7 @@ import small_rig
 from effect_rigs import BY_ID
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.faults.fault import start_fault
 from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.diagnosis.faults.recording_faults import (
@@ -21,7 +22,6 @@ from bayesimpact.diagnosis.faults.unfree_start import (
     BETTER,
     _alone,
     _ratio,
-    start_fault,
     unfree_starts,
 )
 from bayesimpact.inference.fit import Fit
@@ -138,7 +138,7 @@ def test_what_leaves_no_oscillation_is_not_set_aside() -> None:
     found = cleaned_campaign(campaign, rng=np.random.default_rng(0), search=False)
 
     def cut(first: int) -> Corrected:
-        fault = start_fault(found.identification.fit, 0, first, 10.0, 4.0)
+        fault = start_fault(campaign.recordings[0], first, 10.0, 4.0)
         return without_faults(found, [fault], campaign, rng=np.random.default_rng(0))
 
     assert cut(200) is found

@@ -16,7 +16,8 @@ S = "contact_second_stage"  # has a depth
 N = "contact_no_tension"  # on or off
 EFFECTS = tuple(BY_ID[i] for i in (A, B, C, D, S))
 ENOUGH = 500.0  # a gain at which nothing is left
-TARGET = SimpleNamespace(likelihood=SimpleNamespace(sizes=np.array([1000])))
+NOISE = SimpleNamespace(level=1.0, level_error=0.01, is_coloured=False)
+TARGET = SimpleNamespace(likelihood=SimpleNamespace(sizes=np.array([1000]), noise=NOISE))
 
 
 class Table:
@@ -73,8 +74,9 @@ class Table:
         return max(parts)
 
     def candidate(self, ids, gain: float) -> Candidate:
+        left = self.left.get(frozenset(ids), self.chi2)
         fit = SimpleNamespace(
-            reduced_chi2=self.left.get(frozenset(ids), self.chi2),
+            reduced_chi2=left, sums=np.array([1000.0 * left]),
             log_likelihood=gain + 10, log_posterior=gain, rms=1.0, ids=tuple(ids), gain=gain,
             converged=frozenset(ids) not in self.unfinished, density=TARGET,
         )  # fmt: skip
