@@ -40,6 +40,7 @@ Array = NDArray[np.float64]
 STEP = 1e-6  # of the largest displacement: free changes so small are linear
 PLACE = 0.5 * float(chi2.isf(1e-3, 2))  # nats: less likely places than this are no candidates
 NEAR = 2  # samples beside these: the blow takes its time
+LASTING = (0.0, 0.125, 0.25, 0.5)  # periods that a blow may last: half of one is a push
 MOST = 4  # knocks that are told together: set by hand
 LEAST_FREE = 1e-3  # of a column squared, that parameters leave of it: less is error of derivatives
 SLACK = 2.0  # times less than a knock must explain, that a score may promise: of first order
@@ -99,6 +100,33 @@ class _Split:
     nats: tuple[float, ...] = ()
 
 
+@dataclass(frozen=True, eq=False)
+class _Longest:
+    """The longest part of every recording with knocks, and all others.
+
+    Attributes
+    ----------
+    told : the knocks, each with the campaign without what lies beyond it
+    fit : of the model to what stays
+    parts : samples [first, end) that stay, by the recording's position
+    """
+
+    told: tuple[tuple[Fault, Campaign], ...]
+    fit: Fit
+    parts: dict[int, tuple[int, int]]
+
+    def is_under_a_knock(self, inner: dict[int, tuple[int, int]]) -> bool:
+        """Whether readings outside of `inner` parts leave more than noise does by chance."""
+        likelihood, outside = self.fit.density.likelihood, list[Array]()
+        for r, (first, end) in inner.items():
+            level = likelihood.noise.level * float(likelihood.scales[r])
+            begun, own = self.parts[r][0], self.fit.residuals[r] / level
+            outside += [own[: max(first - begun, 0)], own[end - begun :]]
+        left = np.concatenate(outside)
+        usual = max(self.fit.reduced_chi2, 1.0)
+        return bool(left @ left > usual * chi2.isf(FALSE_ALARM, max(left.size, 1)))
+
+
 def knocks_beside(base: Fit, found: Fit) -> tuple[tuple[Compared, ...], Fit, Fit] | None:
     """The knocks that explain what a model leaves; the base model's and the model's mode of the
     recordings without what lies beyond them: of each its longest part stays. None where there are
@@ -153,13 +181,52 @@ def _is_enough(found: Fit, split: _Split) -> bool:
 
 
 def _without(base: Fit, found: Fit, split: _Split) -> tuple[tuple[Compared, ...], Fit, Fit] | None:
-    """The faults and both modes, with the longest part of every recording alone."""
+    """The faults and both modes, with the longest part of every recording alone, as far from its
+    knocks as these last.
+    """
+    campaign = found.density.oscillator.campaign
+    period = 2 * np.pi * float(np.sqrt(campaign.mass / max(found.value("k1"), 1e-300)))
+    splits = (_widened(split, share * period, campaign.recordings) for share in LASTING)
+    tried = [one for one in (_longest(found, x) for x in splits) if one is not None]
+    if not tried:
+        return None
+    wider = zip(tried, [*tried[1:], tried[-1]], strict=True)
+    best = next(one for one, other in wider if not one.is_under_a_knock(other.parts))
+    kept = best.fit.density.oscillator.campaign
+    plain = _model(base, base.density.oscillator.effects, {}).fitted(kept)
+    if plain is None:
+        return None
+    change = found.reduced_chi2, best.fit.reduced_chi2
+    return tuple(Compared(fault, after, *change) for fault, after in best.told), plain, best.fit
+
+
+def _widened(split: _Split, seconds: float, recordings: Sequence[Recording]) -> _Split:
+    """The same with so many seconds more left out on either side of every jump, as far as there
+    are readings.
+    """
+    jumps = list[StateJump]()
+    for jump in split.jumps:
+        more = round(seconds / recordings[jump.recording].interval)
+        last = recordings[jump.recording].samples.size - NEAR
+        jumps.append(
+            replace(
+                jump,
+                earliest=max(jump.earliest - more, min(jump.earliest, NEAR)),
+                latest=min(jump.latest + more, max(jump.latest, last)),
+            )
+        )
+    return replace(split, jumps=tuple(jumps))
+
+
+def _longest(found: Fit, split: _Split) -> _Longest | None:
+    """The faults and the model's mode, with the longest part of every recording alone."""
     campaign, own = found.density.oscillator.campaign, dict[str, float]()
     told, kept, values = list[tuple[Fault, Campaign]](), campaign, values_of(split.fit)
+    spans = dict[int, tuple[int, int]]()
     for r in sorted({jump.recording for jump in split.jumps}):
         recording = campaign.recordings[r]
         parts = _parts(recording, [j for j in split.jumps if j.recording == r])
-        longest = max(parts, key=lambda part: recording.part(*part).count)
+        spans[r] = longest = max(parts, key=lambda part: part[1] - part[0])
         cut, gained = 0, zip(split.jumps, split.nats, strict=True)
         for jump, nats in _inwards([(j, n) for j, n in gained if j.recording == r], longest):
             now = kept.recordings[r]
@@ -169,11 +236,7 @@ def _without(base: Fit, found: Fit, split: _Split) -> tuple[tuple[Compared, ...]
         name = f"[{_part_name(recording, longest[0])}]"
         own |= {n.replace(name, f"[{recording.name}]"): values[n] for n in values if name in n}
     again = _model(split.fit, found.density.oscillator.effects, own).fitted(kept)
-    plain = _model(base, base.density.oscillator.effects, {}).fitted(kept)
-    if again is None or plain is None:
-        return None
-    change = found.reduced_chi2, again.reduced_chi2
-    return tuple(Compared(fault, after, *change) for fault, after in told), plain, again
+    return None if again is None else _Longest(tuple(told), again, spans)
 
 
 def _inwards(

@@ -87,6 +87,23 @@ def test_a_knock_is_told_and_what_follows_it_left_out(stop: bool, time: float, k
     assert after[1] > 0.6 * sizes[1]
 
 
+def test_what_stays_is_free_of_a_blow_that_lasts() -> None:
+    """For a quarter of a period: the first readings after it would be a second mode's."""
+    time, width = 0.7, 0.25 * 2 * np.pi * float(np.sqrt(small_rig.PLAIN.mass / small_rig.PLAIN.k1))
+    effects = {
+        "spring_cubic": PHYSICS["spring_cubic"],
+        "knock": {"impulse": 2 * IMPULSE, "time": time, "width": width},
+    }
+    releases = small_rig.PLAIN_RELEASES
+    struck = small_rig.record(5, effects, rig=small_rig.PLAIN, releases=releases, duration=2.0)
+    told = knocks_beside(*fits(struck, "spring_cubic"))
+    assert told is not None and len(told[0]) == 2
+    for one in told[0]:
+        ((first, end),) = one.fault.spans
+        assert first == 0 and time + width < end * struck.recordings[0].interval < time + 2 * width
+    assert told[2].reduced_chi2 < 1.03
+
+
 def knocked_about() -> Campaign:
     """A recording that goes on from another state twice, and another one that does once."""
     releases = (*small_rig.RELEASES[:2], replace(small_rig.RELEASES[2], y0=-4e-3))
