@@ -32,6 +32,8 @@ from bayesimpact.diagnosis.selection.outcome import (
 from bayesimpact.diagnosis.selection.unknown import with_force
 from bayesimpact.model.effects.effect import Effect
 
+INSTEAD = 3  # effects in the place of a family, until one is no refused line
+
 
 class Remaining(Elimination):
     """Models beside a force of time, and beside a residual force."""
@@ -112,8 +114,9 @@ class Remaining(Elimination):
                     and s.effect.id not in rest.ids
                     and not is_redundant(rest, s.effect)
                 ]
-                for best in sorted(others, key=lambda s: s.gain)[-1:]:
-                    self.fit_one(rest, scan, best, chosen)
+                for likeliest in sorted(others, key=lambda s: -s.gain)[:INSTEAD]:
+                    if self.fit_one(rest, scan, likeliest, chosen).refused is None:
+                        break
         tried = tuple(sorted(self.tried.values(), key=found.log_odds, reverse=True))
         return replace(found, tried=tried)
 
