@@ -14,10 +14,17 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.data.faults.fault import Fault, amount, file_time, gaussian_threshold
+from bayesimpact.data.faults.fault import Fault, gaussian_threshold
 from bayesimpact.data.faults.flat import reading_step
-from bayesimpact.data.faults.noise import BLOCKS, EDGE, FACTOR, LEAST_BLOCK, LOUD, SAME, SCATTER
-from bayesimpact.data.gaps import excluded, runs
+from bayesimpact.data.faults.noise import (
+    BLOCKS,
+    FACTOR,
+    LEAST_BLOCK,
+    LOUD,
+    SAME,
+    SCATTER,
+    noise_fault,
+)
 from bayesimpact.data.period import noise_level
 from bayesimpact.data.recording import Recording
 
@@ -70,29 +77,7 @@ def find_loud_part(recording: Recording) -> list[Fault]:
     loud = _loud(levels, x.size / count)
     if not loud.any() or any(_has_line(blocks[k]) for k in np.flatnonzero(loud)):
         return []
-    reach = int(EDGE * x.size / count)
-    samples = np.zeros(x.size, dtype=bool)
-    for k in np.flatnonzero(loud):
-        samples[max(parts[k][0] - reach, 0) : parts[k][1] + reach] = True
-    spans = tuple(runs(samples))
-    worst = float((levels.sixth[loud] / usual).max())
-    return [
-        Fault(
-            id="recording_noise",
-            recording=recording.name,
-            spans=spans,
-            start_s=file_time(recording, spans[0][0]),
-            end_s=file_time(recording, spans[-1][1] - 1),
-            size=worst,
-            unit="times the usual noise",
-            statement=f"noise of {amount(worst * usual, recording.unit)}, {worst:.3g} times the "
-            f"recording's usual level, from {file_time(recording, spans[0][0]):.6g} s",
-            remedy=excluded(recording, spans),
-            strength=worst,
-            threshold=LOUD,
-            action="exclude",
-        )
-    ]
+    return [noise_fault(recording, edges, np.where(loud, levels.sixth, 0.0), usual)]
 
 
 def _loud(levels: _Levels, size: float) -> Flags:

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from bayesimpact.data.faults.fault import Fault, amount, file_time, gaussian_threshold
+from bayesimpact.data.faults.fault import Action, Fault, amount, file_time, gaussian_threshold
 from bayesimpact.data.faults.flat import reading_step
 from bayesimpact.data.gaps import excluded, runs
 from bayesimpact.data.period import noise_level
 from bayesimpact.data.recording import Recording
+
+Floats = NDArray[np.float64]
+Counts = NDArray[np.int64]
 
 BLOCKS = 12
 LEAST_BLOCK = 150  # samples
@@ -51,29 +56,38 @@ def find_noise(recording: Recording) -> list[Fault]:
     motion = np.sqrt(np.maximum(power - ((1.0 + SAME) * sixth) ** 2, 0.0))
     if motion[strong].min() > FACTOR * motion[~strong].max():
         return []
-    reach = int(EDGE * x.size / count)
-    loud = np.zeros(x.size, dtype=bool)
-    for k in np.flatnonzero(strong):
-        loud[max(parts[k][0] - reach, 0) : parts[k][1] + reach] = True
+    action: Action = "exclude" if ratio[strong].max() > LOUD else "notice"
+    found = noise_fault(recording, edges, np.where(strong, sixth, 0.0), usual)
+    strength = (found.size - 1.0) / sd
+    return [replace(found, strength=strength, threshold=least, action=action)]
+
+
+def noise_fault(recording: Recording, edges: Counts, levels: Floats, usual: float) -> Fault:
+    """Blocks of a recording between `edges` (B + 1,), samples, whose noise is too loud, and a part
+    of a block beside them; `levels` (B,) are theirs, 0 of the others, over the `usual` one.
+    """
+    size = recording.samples.size
+    reach = int(EDGE * size / levels.size)
+    loud = np.zeros(size, dtype=bool)
+    for k in np.flatnonzero(levels):
+        loud[max(int(edges[k]) - reach, 0) : int(edges[k + 1]) + reach] = True
     spans = tuple(runs(loud))
-    worst = float(ratio[strong].max())
-    return [
-        Fault(
-            id="recording_noise",
-            recording=recording.name,
-            spans=spans,
-            start_s=file_time(recording, spans[0][0]),
-            end_s=file_time(recording, spans[-1][1] - 1),
-            size=worst,
-            unit="times the usual noise",
-            statement=f"noise of {amount(worst * usual, recording.unit)}, {worst:.3g} times the "
-            f"recording's usual level, from {file_time(recording, spans[0][0]):.6g} s",
-            remedy=excluded(recording, spans),
-            strength=(worst - 1.0) / sd,
-            threshold=least,
-            action="exclude" if worst > LOUD else "notice",
-        )
-    ]
+    worst = float(levels.max() / usual)
+    return Fault(
+        id="recording_noise",
+        recording=recording.name,
+        spans=spans,
+        start_s=file_time(recording, spans[0][0]),
+        end_s=file_time(recording, spans[-1][1] - 1),
+        size=worst,
+        unit="times the usual noise",
+        statement=f"noise of {amount(worst * usual, recording.unit)}, {worst:.3g} times the "
+        f"recording's usual level, from {file_time(recording, spans[0][0]):.6g} s",
+        remedy=excluded(recording, spans),
+        strength=worst,
+        threshold=LOUD,
+        action="exclude",
+    )
 
 
 def _fourth(x: np.ndarray) -> float:

@@ -258,9 +258,7 @@ def misfit_above_noise(selection: Selection, fit: Fit) -> float:
     level = chosen.density.likelihood.noise.level**2
     own = float(chosen.density.likelihood.sizes.sum())
     left = float(chosen.sums.sum()) / level
-    if left - own < doubtful_misfit(
-        selection
-    ):  # as small as the estimate of the noise is uncertain
+    if left - own < doubtful_misfit(selection):  # as small as the noise's estimate is uncertain
         own = left - 2 * max(selection.chosen.unknown.gain, 0.0) * chosen.reduced_chi2
     return max(float(fit.sums.sum()) / level - own, 1.0)
 

@@ -32,7 +32,7 @@ from bayesimpact.diagnosis.selection.outcome import (
 from bayesimpact.diagnosis.selection.unknown import with_force
 from bayesimpact.model.effects.effect import Effect
 
-INSTEAD = 3  # effects in the place of a family, until one is no refused line
+INSTEAD = 3  # effects in the place of a family, until one is no refused line: set by hand
 
 
 class Remaining(Elimination):

@@ -37,7 +37,7 @@ STARTS: tuple[tuple[tuple[float, ...], ...], ...] = (
 )
 """Correlations over the largest, beside white noise: of one process, of two, of three."""
 PASSES = 2  # of random forces, given over a noise level that is only then known
-ROUNDING = 1e-20  # of a parameter's information: a few times the square of the unit roundoff, 1e-32
+ROUNDING = 1e-20  # of a parameter's information: rounding leaves its square, 1e-32, of what is none
 TOLERANCE = 0.01  # nats, of the likelihood at its best
 
 

@@ -14,6 +14,7 @@ from made_up_models import Table
 
 from bayesimpact.diagnosis.refits.refit import Candidate
 from bayesimpact.diagnosis.score_test.scan import Scan
+from bayesimpact.diagnosis.selection import remaining
 from bayesimpact.diagnosis.selection.remaining import Remaining, without_a_force
 
 DRAG, FRICTION, SPRING = "quadratic_drag", "coulomb_friction", "spring_cubic"
@@ -37,6 +38,38 @@ def test_the_effect_that_scores_promise_most_of_takes_the_place(rivals: tuple[st
     search.likeliest_in_place(chosen, BY_ID[DRAG])
     best = rivals[-1:]
     assert fitted == [step for name in best for step in ((rest, name), (DRAG, name))]
+
+
+@pytest.mark.parametrize("refused", [0, 1, 5])
+def test_a_family_is_compared_with_what_may_stand_in_its_place(
+    monkeypatch: pytest.MonkeyPatch, refused: int
+) -> None:
+    """All of it is left out, and what scores promise most of tried until it is no refused line."""
+    search: Any = Remaining(tuple(BY_ID.values()), None, np.random.default_rng(0), print)
+    search.budget = SimpleNamespace(may_compare_on=lambda look: True)
+    fit: Any = SimpleNamespace(reduced_chi2=2.0)
+    chosen = Candidate(tuple(BY_ID[i] for i in (DRAG, FRICTION, SPRING)), fit, 0.0)
+    told = SimpleNamespace(effects=(BY_ID[SPRING],), either=())
+    monkeypatch.setattr(remaining, "decide", lambda found: told)
+    promised = ["power_damping", "sensor_drift", "harmonic_forcing", "base_motion", "sensor_cubic"]
+    scores = tuple(Table.score(BY_ID[i], 50.0 - n) for n, i in enumerate(promised))
+    search.drop = lambda c, effect: Candidate(
+        tuple(e for e in c.effects if e is not effect), fit, 0.0
+    )
+    search.scanned = lambda candidate, effects: Scan(scores, 1e-6, None, (), ())
+    fitted: list[Any] = []
+
+    def fit_one(rest: Candidate, found: Scan, score: Any, rival: Candidate) -> Any:
+        fitted.append((rest.ids, score.effect.id))
+        return SimpleNamespace(refused=1.0 if len(fitted) <= refused else None)
+
+    search.fit_one = fit_one
+    search.tried = {}
+    base = examined(candidate(SPRING, 0.0))
+    found = replace(selection(base), chosen=examined(chosen))
+    search.without_families(found)
+    others = promised[1 : 1 + min(refused + 1, remaining.INSTEAD)]  # none of the family
+    assert fitted == [((SPRING,), i) for i in others]
 
 
 @pytest.mark.parametrize("alone", [-3.0, 3.0])
