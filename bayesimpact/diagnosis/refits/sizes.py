@@ -25,6 +25,16 @@ def sizes_of(fit: Fit, effect: Effect) -> tuple[list[tuple[int, float]], list[in
     return (known if len(known) == len(sizes) else []), shapes
 
 
+def named_size_of(fit: Fit, effect: Effect) -> list[tuple[int, float]]:
+    """The same of the size that an effect is called by, the first that it has: all its instances.
+
+    A damper beside a second spring is no second spring.
+    """
+    sizes, _ = sizes_of(fit, effect)
+    names = [bare_name(fit.names[i]) for i, _ in sizes]
+    return [size for size, name in zip(sizes, names, strict=True) if name == names[0]]
+
+
 def shapes_in_base(fit: Fit, effect: Effect) -> list[tuple[int, float]]:
     """Positions of an effect's shapes in a fit's mode that have a value at which the law is one of
     the base model's, with that value.

@@ -21,7 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from bayesimpact.diagnosis.refits.sizes import shapes_in_base, shapes_until, sizes_of
+from bayesimpact.diagnosis.refits.sizes import (
+    named_size_of,
+    shapes_in_base,
+    shapes_until,
+    sizes_of,
+)
 from bayesimpact.diagnosis.residual_force.gaussian_process import whitened_one
 from bayesimpact.diagnosis.residual_force.hidden import about, parameter_forces
 from bayesimpact.diagnosis.residual_force.marginal import Part, log_evidence_gain, products
@@ -152,12 +157,13 @@ class Discrepancy:
         return mean, scatter + alike * ALIGNED**2 * sum(np.outer(h, h) for h in hidden)
 
     def apart(self, effect: Effect) -> float:
-        """Standard deviations of an effect from none at all: of its largest size, the shape as
-        fitted, for without a size no other shape does more; or of a shape, the size as it may be,
-        from where the law is one of the base model's (`EffectParameter.in_base`), or below where
-        it is not what it is called (`until`), whichever is less. Infinite where it has no size.
+        """Standard deviations of an effect from none at all: of the size that it is called by, its
+        largest instance, the shapes as fitted, for without a size no other shape does more; or of
+        a shape, the size as it may be, from where the law is one of the base model's
+        (`EffectParameter.in_base`), or below where it is not what it is called (`until`), whichever
+        is less. Infinite where it has no size.
         """
-        sizes, shapes = sizes_of(self.fit, effect)
+        sizes, shapes = named_size_of(self.fit, effect), sizes_of(self.fit, effect)[1]
         found = [] if sizes else [np.inf]
         for i, null in sizes:
             part = inverse(self.posterior[1][np.ix_([i, *shapes], [i, *shapes])])

@@ -240,11 +240,13 @@ class _Search(Asking):
         return found
 
     def least_gain(self, chosen: Candidate) -> float:
-        """What an effect's score has to promise beside a model, nats."""
+        """What an effect's score has to promise beside a model, nats: likelihood that makes up for
+        its price and for what the best model is ahead, for no evidence gains more than that.
+        """
         if is_large(chosen.fit):
             return 0.0
         behind = max(map(self.log_odds, self.tried.values())) - self.log_odds(chosen)
-        return behind / SCORE_UNDERESTIMATE
+        return (behind + self.cost) / SCORE_UNDERESTIMATE
 
     def beside(self, examined: ExaminedModel, found: Sequence[Candidate]) -> list[Candidate]:
         """Single effects that are extended beside the best model: each may be half of a pair.

@@ -267,6 +267,7 @@ class Effect(Picklable):
     regime : where it acts
     energy : what it does to mechanical energy
     statement : sentence for the report with `{size}` and `{share}` filled in
+    parameters : of several sizes the first is the one that it is called by
     replaces : term of the base model that it writes in another form; no model holds two forms
     needs_stop : True when it makes no sense without an obstacle
     prefer : id of the simpler effect that this one reduces to, at its null or with a shape of zero

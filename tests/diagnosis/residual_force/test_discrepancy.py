@@ -264,6 +264,25 @@ def test_a_law_whose_shape_may_be_one_of_the_base_model_is_not_apart():
     assert left.apart(power) == pytest.approx(by_shape)
 
 
+def test_a_damper_beside_a_second_spring_is_no_second_spring():
+    """Of two sizes the one that it is called by must be apart, however sure the other is."""
+    planted = {"stiffness": 0.0, "gap": 3e-3, "damping": 1.0}
+    plain = {"rig": small_rig.PLAIN, "releases": small_rig.PLAIN_RELEASES}
+    fit = plain_fit(small_rig.record(3, {"spring_piecewise": planted}, **plain))
+    effect = next(e for e in EFFECTS if e.id == "spring_piecewise")
+    start = {f"spring_piecewise.{name}": value for name, value in planted.items()}
+    left = left_by(fit_from(fit, (effect,), start, campaign_scales(fit)).fit)
+    names, own = list(left.fit.names), left.posterior[1]
+    stiffness, gap, damping = (names.index(f"spring_piecewise.{name}") for name in planted)
+
+    def apart(i: int) -> float:
+        known = np.linalg.inv(own[np.ix_([i, gap], [i, gap])])
+        return abs(left.fit.mode[i]) * known[0, 0] ** 0.5
+
+    assert apart(damping) > 10.0 > 3.0 > apart(stiffness)
+    assert left.apart(effect) == pytest.approx(apart(stiffness))
+
+
 @pytest.mark.parametrize("below", [4.0, 1.0, -3.0])
 def test_what_may_not_ring_is_no_mode_that_is_apart(below: float):
     """However sure its size: below critical damping by less than its own error, or above it."""

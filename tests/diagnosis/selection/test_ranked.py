@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from effect_rigs import BY_ID
 
+from bayesimpact.diagnosis.candidates.promising import SCORE_UNDERESTIMATE
 from bayesimpact.diagnosis.refits.refit import LITTLE, TO_THE_MODE, Candidate
 from bayesimpact.diagnosis.selection import models, ranked
 from bayesimpact.diagnosis.selection.ranked import Ranked
+from bayesimpact.diagnosis.selection.search import _Search
 from bayesimpact.diagnosis.thresholds import DECISIVE, LARGE
 
 REPETITION = 30.0
@@ -90,3 +92,30 @@ def test_a_larger_model_is_of_no_use_below_the_one_that_it_contains(monkeypatch,
     monkeypatch.setattr(search, "keep", lambda candidate: candidate)
     search.start(smaller, [SimpleNamespace(effect=BY_ID["quadratic_drag"], shapes={})])
     assert ends == [70.0 if ids else -np.inf]
+
+
+def test_beside_a_rival_only_what_may_pay_for_itself_too_is_fitted(monkeypatch):
+    """An effect has a price: what makes up for a rival's arrears alone cannot overtake."""
+    catalogue = [BY_ID[i] for i in ("contact_damping_speed", "coulomb_friction", "spring_cubic")]
+    search = _Search(catalogue, None, np.random.default_rng(0), lambda words: None)
+    base, best, rival = (examined(i, 1.0) for i in ("", "spring_cubic", "quadratic_drag"))
+    behind = 6.0
+    odds = {(): -100.0, best.candidate.ids: 0.0, rival.candidate.ids: -behind}
+    search.examined_models[frozenset()] = base
+    for model in (base, best, rival):
+        search.tried[frozenset(model.candidate.ids)] = model.candidate
+    monkeypatch.setattr(search, "log_odds", lambda c: odds[c.ids])
+    least = (behind + search.cost) / SCORE_UNDERESTIMATE
+    effects = (BY_ID["contact_damping_speed"], BY_ID["coulomb_friction"])
+    pairs = zip(effects, (least - 0.1, least + 0.1), strict=True)
+    scores = [SimpleNamespace(effect=e, gain=gain) for e, gain in pairs]
+    rival.scan = SimpleNamespace(best=lambda: scores)
+    fitted = []
+
+    def fit_one(chosen, scan, score):
+        fitted.append(score.effect.id)
+        return examined(f"quadratic_drag {score.effect.id}", 1.0).candidate
+
+    monkeypatch.setattr(search, "fit_one", fit_one)
+    search.extended(rival)
+    assert fitted == ["coulomb_friction"]
