@@ -202,9 +202,9 @@ def _diagnosed(
     while doubtful:
         fit = certain.identification.fit
         promised = promised_gains(fit, effects, rng=rng)
-        if not exceeds(doubtful[0], fit, float(promised.max(initial=0.0))):
+        if not gains_more_than(doubtful[0], fit, float(promised.max(initial=0.0))):
             break
-        proved = proved or exceeds(doubtful[0], fit, float(promised.sum()))
+        proved = proved or gains_more_than(doubtful[0], fit, float(promised.sum()))
         certain = with_steps(certain, [doubtful.pop(0)], rng=rng, search=search)
     searches = Searches(rng, effects, say, begin(clock), campaign)
     found = searches.search(certain)
@@ -250,7 +250,7 @@ def promised_gains(fit: Fit, effects: Sequence[Effect], *, rng: np.random.Genera
     return np.array([score.gain for score in found.best()])
 
 
-def exceeds(step: Step, fit: Fit, promised: float) -> bool:
+def gains_more_than(step: Step, fit: Fit, promised: float) -> bool:
     """Whether correcting faults gains more than `promised`, nats, by effects that are missing.
 
     Where physics is missing, recordings of different amplitude show it each in its own way.

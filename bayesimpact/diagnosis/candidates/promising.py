@@ -40,7 +40,7 @@ def refit_candidates(scan: Scan, least: float = 0.0) -> list[Score]:
 
 def is_discontinuous(effect: Effect) -> bool:
     """Whether an effect does not begin at the base model: its score has no first order."""
-    return not effect.has_size or effect.prefer is not None
+    return not effect.has_size or bool(effect.sets)
 
 
 def is_redundant(candidate: Candidate, effect: Effect) -> bool:

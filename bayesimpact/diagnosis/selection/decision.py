@@ -66,7 +66,7 @@ from bayesimpact.diagnosis.selection.outcome import (
     ExaminedModel,
     Selection,
     doubtful_misfit,
-    exceeds,
+    leaves_far_more,
     leaves_something,
     misfit_above_noise,
 )
@@ -99,6 +99,11 @@ class Decision:
     either: tuple[Group, ...] = ()
     families: Mapping[str, Group] = field(default_factory=dict)
 
+    @property
+    def told(self) -> Group:
+        """Effects that are named, or one of a group of which is."""
+        return (*self.effects, *(e for group in self.either for e in group))
+
 
 def decide(selection: Selection) -> Decision:
     """The verdict on a finished search.
@@ -128,11 +133,11 @@ def decide(selection: Selection) -> Decision:
     needed = tuple(e for e in effects if is_told_apart(selection, e) and is_needed(selection, (e,)))
     groups = (group_of(selection, e) for e in effects if e not in needed)
     either = tuple(g for g in groups if len(g) > 1 and is_needed(selection, g))
-    untold = untold_families(selection, (*needed, *(e for group in either for e in group)))
+    rivals = selection.rivals() if needed else ()
+    found = Decision("partly" if needed else "unknown", needed, rivals, either)
+    untold = untold_families(selection, found.told)
     families = {f: members(selection, f) for f in untold if is_family_needed(selection, f)}
-    if not needed:
-        return Decision("unknown", (), either=either, families=families)
-    return Decision("partly", needed, selection.rivals(), either, families)
+    return replace(found, families=families)
 
 
 def loses_to_nothing(selection: Selection) -> bool:
@@ -177,7 +182,7 @@ def is_told_apart(selection: Selection, effect: Effect) -> bool:
     """
     return not any(
         is_of_fixed_size(selection, effect, law, candidate.fit)
-        or (law.id == effect.prefer and not exceeds(selection, candidate.fit))
+        or (law.id == effect.prefer and not leaves_far_more(selection, candidate.fit))
         for law, candidate in simpler_laws(selection, effect)
     )
 
@@ -328,7 +333,9 @@ def with_its_evidence(candidate: Candidate) -> Candidate:
 def misses(selection: Selection, effect: Effect) -> bool:
     """Whether `EXCESS` times as much misfit is left without an effect."""
     smaller = frozenset(selection.chosen.candidate.ids) - {effect.id}
-    return exceeds(selection, next(c.fit for c in selection.tried if frozenset(c.ids) == smaller))
+    return leaves_far_more(
+        selection, next(c.fit for c in selection.tried if frozenset(c.ids) == smaller)
+    )
 
 
 def stands_out(selection: Selection, effect: Effect) -> bool:

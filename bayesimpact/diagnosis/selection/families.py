@@ -21,7 +21,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bayesimpact.diagnosis.refits.refit import Candidate
-from bayesimpact.diagnosis.selection.outcome import Selection, exceeds
+from bayesimpact.diagnosis.selection.outcome import Selection, leaves_far_more
 from bayesimpact.diagnosis.thresholds import DECISIVE
 from bayesimpact.formula.law import is_formula
 from bayesimpact.model.effects.effect import Effect
@@ -51,7 +51,7 @@ def is_family_needed(selection: Selection, name: str) -> bool:
         return False
     least = selection.log_odds(chosen) - DECISIVE
     return len(members(selection, name)) > 1 and all(
-        selection.log_odds(c) < least and exceeds(selection, c.fit) for c in without
+        selection.log_odds(c) < least and leaves_far_more(selection, c.fit) for c in without
     )
 
 

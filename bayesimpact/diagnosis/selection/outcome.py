@@ -242,7 +242,7 @@ def is_more_than_noise(reduced_chi2: float, noise: Noise) -> bool:
     return reduced_chi2 > 1.0 + 2 * DOUBT * (error if np.isfinite(error) else 0.0)
 
 
-def exceeds(selection: Selection, fit: Fit) -> bool:
+def leaves_far_more(selection: Selection, fit: Fit) -> bool:
     """Whether a fit leaves `EXCESS` times as much misfit as the chosen model."""
     with_it = misfit_above_noise(selection, selection.chosen.candidate.fit)
     return misfit_above_noise(selection, fit) > EXCESS * with_it

@@ -100,8 +100,7 @@ class Remaining(Elimination):
         none is told, and that with the likeliest one of another family.
         """
         chosen, decision = found.chosen.candidate, decide(found)
-        told = (*decision.effects, *(e for group in decision.either for e in group))
-        for name in untold_families(found, told):
+        for name in untold_families(found, decision.told):
             if self.budget.may_compare_on(self.look):
                 rest = chosen
                 for effect in chosen.effects:

@@ -42,6 +42,9 @@ def test_what_explains_less_than_half_cannot_stand_for_an_effect():
         ("stiffness_drift", "contact_no_tension", False),
         ("sensor_hum", "contact_no_tension", False),
         ("harmonic_forcing", "hunt_crossley", False),
+        ("obstacle_mass", "adhesion", True),  # begins at another contact
+        ("coulomb_friction", "hysteresis_bouc_wen", False),  # begins at the base model: has a score
+        ("quadratic_drag", "power_damping", False),
     ],
 )
 def test_what_is_on_or_off_stands_for_its_family_or_for_the_contact(effect, other, kept):

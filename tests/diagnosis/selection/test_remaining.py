@@ -15,6 +15,7 @@ from made_up_models import Table
 from bayesimpact.diagnosis.refits.refit import Candidate
 from bayesimpact.diagnosis.score_test.scan import Scan
 from bayesimpact.diagnosis.selection import remaining
+from bayesimpact.diagnosis.selection.decision import Decision
 from bayesimpact.diagnosis.selection.remaining import Remaining, without_a_force
 
 DRAG, FRICTION, SPRING = "quadratic_drag", "coulomb_friction", "spring_cubic"
@@ -49,7 +50,7 @@ def test_a_family_is_compared_with_what_may_stand_in_its_place(
     search.budget = SimpleNamespace(may_compare_on=lambda look: True)
     fit: Any = SimpleNamespace(reduced_chi2=2.0)
     chosen = Candidate(tuple(BY_ID[i] for i in (DRAG, FRICTION, SPRING)), fit, 0.0)
-    told = SimpleNamespace(effects=(BY_ID[SPRING],), either=())
+    told = Decision("partly", (BY_ID[SPRING],))
     monkeypatch.setattr(remaining, "decide", lambda found: told)
     promised = ["power_damping", "sensor_drift", "harmonic_forcing", "base_motion", "sensor_cubic"]
     scores = tuple(Table.score(BY_ID[i], 50.0 - n) for n, i in enumerate(promised))
