@@ -85,10 +85,13 @@ def test_the_unit_of_a_counter_is_needed(tmp_path: Path) -> None:
     ("name", "lines"),
     [
         ("Angle", ['quantity = "angle"  # ASSUMED: by its name', '# unit = "rad"', "; rad, deg"]),
-        ("Acceleration", ['quantity = "acceleration"', '# unit = "m/s2"', "; m/s2, mm/s2, g"]),
-        ("Position", ['# unit = "mm"', "; m, mm, um, rad, deg\n"]),  # may be an angle's
+        (
+            "Acceleration",
+            ['quantity = "acceleration"', '# unit = "m/s2"', "; m/s2, cm/s2, mm/s2, g"],
+        ),
+        ("Position", ['# unit = "mm"', "; m, cm, mm, um, rad, deg\n"]),  # may be an angle's
         ("Voltage (V)", ['# unit = "mm"', "its unit is V", "# scale = 1.0", "one V is"]),
-        ("laser", ['# unit = "mm"', "the file gives no unit; m, mm"]),
+        ("laser", ['# unit = "mm"', "the file gives no unit; m, cm, mm"]),
     ],
 )
 def test_a_name_says_which_units_there_are(tmp_path: Path, name: str, lines: list[str]) -> None:
@@ -174,3 +177,16 @@ def test_half_cycles_of_few_samples_without_an_obstacle_last_alike(per_period: i
         x = np.exp(-rng.uniform(0, 0.2) * n / per_period) * np.cos(angle)
         found.append(shortened(x + 0.003 * rng.standard_normal(n.size)) or 0.0)
     assert max(found) < 0.03
+
+
+@pytest.mark.parametrize("over", [4.0, 8.0])
+@pytest.mark.parametrize("per_period", [8, 20])
+def test_noise_that_moves_half_cycles_is_no_obstacle(per_period: int, over: float) -> None:
+    """One such decay in five was called shorter to one side by a twentieth and more."""
+    rng, found = np.random.default_rng(3), list[float]()
+    for _ in range(100):
+        n = np.arange(int(per_period * rng.uniform(6, 15)))
+        angle = 2 * np.pi * n / (per_period * rng.uniform(0.97, 1.03)) + rng.uniform(0, 6.28)
+        x = np.exp(-rng.uniform(0, 0.2) * n / per_period) * np.cos(angle)
+        found.append(shortened(x + rng.standard_normal(n.size) / over) or 0.0)
+    assert sum(share > 0.05 for share in found) <= 2

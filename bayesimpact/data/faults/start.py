@@ -32,6 +32,10 @@ WINDOW = 1 / 25  # of a period, in which a speed is told; two samples at least
 RELEASES = np.linspace(0.5, 0.95, 10)  # of a stretch that keeps to the band
 LIKELIER = 1.0  # nats: of a dozen samples hardly more is to be had
 DRIFT = 0.2  # of the band: a parabola through it takes a quarter in the first half of the time
+FOLLOWING = 0.75  # of a period after a stretch, in which any motion is an oscillation, nearly
+ENOUGH = 8  # samples, twice as many as its parameters
+TEMPOS = np.geomspace(0.3, 1.4, 12)  # times the frequency that crossings tell; noise adds crossings
+DAMPINGS = (0.0, 0.03, 0.1, 0.3)  # ratios
 SLOW = 1 / 3  # of a linear free motion's speed: those of a pendulum to 160 degrees are above half
 
 
@@ -64,7 +68,7 @@ def find_start(recording: Recording) -> list[Fault]:
     natural = np.sqrt(2.0 * band / max(height, band)) * period / (2 * np.pi)
     least = max(NATURAL * natural + COARSE, SHORTEST * period, FEWEST)
     moves = order_of(recording.quantity) > 0 and _moves(quiet, band)
-    hand = _grown(x - rest_reading, peak, period)
+    hand = _grown(x - rest_reading, peak, period, band)
     if not hand:
         peak = _pushed(x - rest_reading, band, period)
         hand = peak > 0
@@ -72,6 +76,8 @@ def find_start(recording: Recording) -> list[Fault]:
     if not hand and (
         moves or rest <= least or _moves_on(quiet[:rest], max(noise, step / np.sqrt(12)), band)
     ):
+        return []
+    if not hand and _is_free(quiet, rest, period):
         return []
     soon = not hand and largest < rest + LATE * period and order_of(recording.quantity) == 0
     moved = soon and _is_moved(x - rest_reading, rest, band)
@@ -114,6 +120,24 @@ def _moves_on(x: Array, noise: float, band: float) -> bool:
     return bool(0.5 * x.size * np.log(max(rests, 1e-300) / max(even, 1e-300)) > LIKELIER)
 
 
+def _is_free(x: Array, rest: int, period: float) -> bool:
+    """Whether the motion that follows a stretch, continued backwards, explains its readings as well
+    as a rest does: where the band holds much of the motion, readings keep to it without a rest.
+
+    The motion as a damped oscillation, over what follows nearly to the next turn.
+    """
+    end = min(x.size, rest + max(round(FOLLOWING * period), ENOUGH))
+    t, still = np.arange(float(end)), float(np.sum((x[:rest] - x[:rest].mean()) ** 2))
+    free = rests = np.inf
+    for cycles in TEMPOS / period:
+        for damping in DAMPINGS:
+            wave = np.exp((-damping + 1j) * 2 * np.pi * cycles * (t - rest))
+            columns = np.column_stack([wave.real, wave.imag])
+            free = min(free, _left(columns, x[:end]))
+            rests = min(rests, still + _left(columns[rest:], x[rest:end]))
+    return bool(0.5 * end * np.log(max(free, 1e-300) / max(rests, 1e-300)) < LIKELIER)
+
+
 def _left(columns: Array, x: Array) -> float:
     """Sum of squares that columns (n, k) and a constant leave of x (n,)."""
     design = np.column_stack([np.ones(x.size), columns])
@@ -153,7 +177,7 @@ def _outside(x: Array, band: float) -> int:
     return int(np.argmax(twice)) if twice.any() else int(x.size)
 
 
-def _grown(centred: Array, peak: int, period: float) -> bool:
+def _grown(centred: Array, peak: int, period: float, band: float) -> bool:
     """Whether the largest excursion was reached by a pull, or exceeds all that came before it.
 
     A pull: longer than a free motion takes, the rest was not passed on the way.
@@ -168,7 +192,7 @@ def _grown(centred: Array, peak: int, period: float) -> bool:
     before = np.abs(
         centred[: max(int(peak - 0.25 * period), 1)]
     )  # a free oscillation has two sides
-    return bool(height > GROWTH * float(before.max()))
+    return bool(height > GROWTH * float(before.max()) + band)
 
 
 def _pushed(centred: Array, band: float, period: float) -> int:

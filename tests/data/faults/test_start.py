@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from bayesimpact.data.faults.find import recording_faults
+from bayesimpact.data.faults.start import find_start
 from bayesimpact.data.recording import Recording
 
 
@@ -133,3 +134,30 @@ def test_a_rest_before_a_release_may_creep(creep: float) -> None:
     y = y + 2e-5 * np.random.default_rng(3).standard_normal(t.size)
     (fault,) = recording_faults(Recording("p", "", y, 1 / rate))
     assert fault.id == "recording_start" and fault.end_s == pytest.approx(rest / rate, abs=0.03)
+
+
+def noisy(readings: float, over: float, rest: float, seed: int) -> Recording:
+    """A decay of nine periods, `readings` in each and `over` times its noise, after a rest of
+    `rest` periods at its first turning point; without one it begins anywhere.
+    """
+    rng = np.random.default_rng(seed)
+    t = np.arange(0.0, 9.0 + rest, 1 / readings) - rest
+    phase = 0.0 if rest else rng.uniform(0.0, 2 * np.pi)
+    y = np.exp(-0.15 * np.maximum(t, 0.0)) * np.cos(2 * np.pi * np.maximum(t, 0.0) + phase)
+    y += rng.standard_normal(t.size) / over
+    return Recording("p", "", y, 1 / readings, quantity="angle")
+
+
+@pytest.mark.parametrize("over", [3.0, 6.0])
+@pytest.mark.parametrize("readings", [6, 12, 25, 50])
+def test_a_decay_that_a_few_standard_deviations_of_noise_hide_has_no_rest(
+    readings: int, over: float
+) -> None:
+    found = [find_start(noisy(readings, over, 0.0, seed)) for seed in range(60)]
+    assert sum(map(bool, found)) <= 1
+
+
+@pytest.mark.parametrize("readings", [12, 25, 50])
+def test_a_rest_of_a_period_is_seen_in_loud_noise(readings: int) -> None:
+    found = [find_start(noisy(readings, 6.0, 1.0, seed)) for seed in range(20)]
+    assert all("at rest" in one[0].statement for one in found)
