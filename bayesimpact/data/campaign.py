@@ -157,7 +157,7 @@ class Campaign(Picklable):
         Parameters
         ----------
         recordings : one or more, each a `Recording` (SI units) or a mapping with the keys of a
-            [[recording]]: `name`, `case`, `samples` (n,) and their `unit` (m, mm, um, rad, deg,
+            [[recording]]: `name`, `case`, `samples` (n,) and their `unit` (m, cm, mm, um, rad, deg,
             m/s, mm/s, m/s2, g, ...: the unit tells the quantity), and either `times_s` (n,),
             evenly spaced unless `resample` is true, or `sample_rate_hz`; `start_s`, `end_s`;
             `used` (n,), False where a sample is set aside; `input` with its own `samples` (n,), SI

@@ -21,6 +21,8 @@ FEW_STEPS = 5
 # Units that the stamps of a slow clock differ by from even ones, and a little for the fit of a line
 EVENLY = 1.2
 FINE = 0.2  # of an interval: a coarser unit may hide that a clock is not even
+GAP = 2.5  # typical intervals between two stamps: more is a gap
+RARE = 0.02  # of the steps: stamps of a buffer with more gaps than that are those of batches
 ON_THE_WHOLE = 0.1  # relative: of a few batches the last may be short
 LEAST_TAKEN = 60  # readings that tell it
 SMOOTHER = 1.25
@@ -130,11 +132,28 @@ def check_rate(path: Path | str, interval: float, rate: float | None) -> None:
 
 def check_mean_rate(path: Path | str, times: NDArray[np.float64], rate: float) -> None:
     """Refuse a stated rate that stamps of when readings arrived contradict on the whole."""
-    span = float(times[-1] - times[0])
-    mean = (times.size - 1) / span if span > 0.0 else 0.0
+    mean = mean_rate(times)
     if abs(mean - rate) > ON_THE_WHOLE * rate:
         found = f"sample_rate_hz = {rate:g}, and {mean:.4g} rows a second by the time column"
         raise InputError(str(path), found, "a rate that agrees with the rows on the whole")
+
+
+def mean_rate(times: NDArray[np.float64]) -> float:
+    """Readings per second by stamps (n,), s, of when they arrived; 0 where these do not rise.
+
+    In a gap none were taken where the stamps after it do not catch up: it is then left out.
+    """
+    steps, span = np.diff(times), float(times[-1] - times[0])
+    if span <= 0.0:
+        return 0.0
+    usual = steps <= GAP * np.median(steps)
+    typical, gaps, lost = float(np.mean(steps[usual])), np.flatnonzero(~usual), 0
+    for gap in gaps if gaps.size <= RARE * steps.size else ():
+        missing = round(float(steps[gap]) / typical) - 1
+        after = steps[gap + 1 : gap + 2 + missing][usual[gap + 1 : gap + 2 + missing]]
+        if float(after.sum()) > 0.5 * after.size * typical:
+            lost += missing
+    return (steps.size + lost) / span
 
 
 def taken_evenly(times: NDArray[np.float64], samples: NDArray[np.float64]) -> bool:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bayesimpact.data.clock import even_interval, taken_evenly
+from bayesimpact.data.clock import even_interval, mean_rate, taken_evenly
 from bayesimpact.data.doubts import SLOWEST, likely_unit
 from bayesimpact.data.input import UNITS as INPUT_UNITS
 from bayesimpact.data.input import Kind
@@ -140,7 +140,7 @@ def late_lines(clock: Channel, response: Channel) -> list[str]:
         return []
     if not taken_evenly(times, response.samples):
         return []
-    rate = (times.size - 1) / float(times[-1] - times[0])
+    rate = mean_rate(times)
     why = f"the readings follow one another evenly, the times of {one_line(clock.label)} do not"
     unit = "" if clock.unit else "; in s"
     return [f"sample_rate_hz = {rate:.6g}  # {ASSUMED}: {why}: those of a buffer{unit}"]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.data.clock import JITTER, even_interval, rounded_interval, taken_evenly
+from bayesimpact.data.clock import GAP, JITTER, even_interval, rounded_interval, taken_evenly
 from bayesimpact.data.faults.clipped import find_clipped
 from bayesimpact.data.gaps import bridged
 from bayesimpact.data.recording import Recording
@@ -17,8 +17,6 @@ from bayesimpact.errors import InputError
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-
-GAP = 2.5  # typical intervals between two stamps: more is a gap
 
 
 @dataclass(frozen=True, eq=False)

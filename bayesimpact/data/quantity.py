@@ -29,14 +29,17 @@ STANDARD_GRAVITY = 9.80665
 _DEGREE = math.pi / 180.0
 UNITS: dict[str, tuple[Quantity, float]] = {
     "m": ("displacement", 1.0),
+    "cm": ("displacement", 1e-2),
     "mm": ("displacement", 1e-3),
     "um": ("displacement", 1e-6),
     "rad": ("angle", 1.0),
     "deg": ("angle", _DEGREE),
     "m/s": ("velocity", 1.0),
+    "cm/s": ("velocity", 1e-2),
     "mm/s": ("velocity", 1e-3),
     "um/s": ("velocity", 1e-6),
     "m/s2": ("acceleration", 1.0),
+    "cm/s2": ("acceleration", 1e-2),
     "mm/s2": ("acceleration", 1e-3),
     "g": ("acceleration", STANDARD_GRAVITY),
     "rad/s": ("angular_velocity", 1.0),

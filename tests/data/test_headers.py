@@ -52,6 +52,8 @@ def test_fields_are_those_of_csv(line: str, separator: str | None, found: list[s
     [
         ("Angle, Ch 1+2 (rad) Run #13", ("Angle, Ch 1+2 Run #13", "rad")),
         ("Position [mm] #2", ("Position #2", "mm")),
+        ("Distance (centimeter)", ("Distance", "cm")),
+        ("a [Gal]", ("a", "cm/s2")),
         ("Speed (tip) (mm/s) left", ("Speed (tip) left", "mm/s")),
         ("Position (left) of the tip", ("Position (left) of the tip", "")),
         ("f(m)ax", ("f(m)ax", "")),

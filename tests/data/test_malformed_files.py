@@ -127,7 +127,7 @@ BAD: dict[str, tuple[str, Change, str, tuple[str, ...]]] = {
             p, engine="h5netcdf"
         ),
         f'column = "v"\n{RATE}',
-        ("channel v", "the unit N", "unit = ... in campaign.toml (m, mm, um"),
+        ("channel v", "the unit N", "unit = ... in campaign.toml (m, cm, mm, um"),
     ),
     "UFF text": ("a.uff", _bytes(b"    -1\n    58\nnothing\n"), "", ("a UFF file",)),
     "UFF cut": ("a.uff", _cut("UFF58", 0.3), "", ("a UFF file",)),

@@ -58,6 +58,7 @@ def test_integers_stand_for_numbers(tmp_path: Path) -> None:
     ("header", "scale", "time_scale", "unit"),
     [
         ("time_s,displacement_m", 1.0, 1.0, "m"),
+        ("time_s,displacement_cm", 1e2, 1.0, "m"),
         ("time_s,displacement_mm", 1e3, 1.0, "m"),
         ("time_ms,displacement_um", 1e6, 1e3, "m"),
         ("time_s,angle_rad", 1.0, 1.0, "rad"),

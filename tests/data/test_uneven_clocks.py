@@ -19,7 +19,13 @@ from scipy.io import savemat
 
 import bayesimpact as bi
 from bayesimpact.cli import main
-from bayesimpact.data.clock import FEW_STEPS, rounded_interval, taken_evenly
+from bayesimpact.data.clock import (
+    FEW_STEPS,
+    check_mean_rate,
+    mean_rate,
+    rounded_interval,
+    taken_evenly,
+)
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
 
@@ -283,6 +289,21 @@ def test_readings_that_are_moved_to_stamps_of_a_buffer_are_doubted(tmp_path: Pat
         folder = write(tmp_path, HEAD.format("log.csv") + "resample = true\n", a=None, b=None)
         doubts = " ".join(bi.load(folder).doubts)
         assert ("sample_rate_hz = " in doubts) is late
+
+
+@pytest.mark.parametrize("caught_up", [False, True])
+def test_a_gap_in_such_stamps_is_no_slower_rate(caught_up: bool) -> None:
+    """Readings that a probe did not take, and readings that arrived late together."""
+    rng = np.random.default_rng(5)
+    taken = 0.05 * np.arange(300.0)
+    if not caught_up:
+        taken[100:] += 3.0
+    stamps = taken + 0.01 * rng.standard_normal(300)
+    if caught_up:
+        held = (stamps > 5.0) & (stamps < 8.0)
+        stamps[held] = 8.0 - 1e-3 * np.arange(held.sum())[::-1]
+    assert mean_rate(stamps) == pytest.approx(20.0, rel=0.01)
+    check_mean_rate("a.csv", stamps, 20.0)
 
 
 def test_a_rate_that_such_stamps_contradict_is_refused(tmp_path: Path) -> None:

@@ -23,6 +23,7 @@ MAX_VALUES = 2**27
 
 _UNITS = {
     "µm": "um", "μm": "um", "micron": "um", "microns": "um", "micrometer": "um",
+    "centimeter": "cm", "centimetre": "cm", "cm/s^2": "cm/s2", "cm/s²": "cm/s2", "gal": "cm/s2",
     "millimeter": "mm", "millimetre": "mm", "meter": "m", "metre": "m", "meters": "m",
     "°": "deg", "degree": "deg", "degrees": "deg", "radian": "rad", "radians": "rad",
     "sec": "s", "second": "s", "seconds": "s", "msec": "ms", "µs": "us", "μs": "us",
@@ -33,7 +34,7 @@ _UNITS = {
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
 _QUANTITY_UNITS = (
     *UNITS,
-    *("cm", "nm", "mrad", "V", "mV", "N", "kN", "Hz", "A", "mA", "Pa", "bar", "degC"),
+    *("nm", "mrad", "V", "mV", "N", "kN", "Hz", "A", "mA", "Pa", "bar", "degC"),
 )
 LABEL_UNITS = frozenset((*_QUANTITY_UNITS, *TIME_UNITS))
 """Units that a column's label or a row below it is understood to mean."""
@@ -144,7 +145,7 @@ def name_and_unit(label: str) -> tuple[str, str]:
     if label in RESPONSE_COLUMNS:
         return label, RESPONSE_COLUMNS[label]
     head, _, tail = label.rpartition("_")
-    if head and tail in ("m", "mm", "um", "rad", "deg", "s", "ms", "us"):
+    if head and tail in ("m", "cm", "mm", "um", "rad", "deg", "s", "ms", "us"):
         return label, tail
     return label, ""
 
