@@ -110,6 +110,7 @@ def _look(path: Path, file: str, outside: bool) -> Look:
     channels = read_channels(path, content, encoding=None if headed else encoding)
     names = {channel.name for channel in channels}
     own = not is_instrument_file(path) and encoding == "utf-8" and not text.is_labelled(content)
+    own = own and len({channel.block for channel in channels}) == 1
     own = own and bool(names & set(TIME_COLUMNS)) and len(names & set(RESPONSE_COLUMNS)) == 1
     plain = encoding in (None, "utf-8") or headed
     source = path if outside else None

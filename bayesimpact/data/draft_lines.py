@@ -70,7 +70,9 @@ def channel_lines(
     inside = [c for c in channels if c.block == response.block]
     if len(blocks) > 1:
         block = response.block or str(blocks.index(response.block) + 1)
-        lines.append(f"block = {toml(block)}")
+        more = ", ".join(b or str(blocks.index(b) + 1) for b in blocks if b != response.block)
+        note_of = f"  # {ASSUMED}: the first of several; others: {one_line(more)}"
+        lines.append(f"block = {toml(block)}{note_of if blocks[0] == response.block else ''}")
     lines.append(f"column = {_chosen(inside, response)}{note}")
     return [*lines, *_unit_lines(response, unit), *_clock_lines(inside, response, rate)]
 

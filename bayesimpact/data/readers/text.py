@@ -10,6 +10,7 @@ from pathlib import Path
 from bayesimpact.data.fields import fields, unquoted
 from bayesimpact.data.readers.channel import Channel
 from bayesimpact.data.readers.grid import Cell, channels_of, has_names, has_units, number
+from bayesimpact.data.readers.runs import apart
 from bayesimpact.errors import InputError
 
 LOOKED_AT = 25
@@ -17,12 +18,12 @@ LOOKED_AT = 25
 
 
 def read(path: Path, content: bytes, encoding: str = "utf-8-sig", skip: int = 0) -> list[Channel]:
-    """Channels of a text; `skip` lines at its top are left out."""
+    """Channels of a text, a block for each run; `skip` lines at its top are left out."""
     lines = text_of(path, content, encoding).split("\n")
     if skip >= len(lines):
         raise InputError(f"{path}, key skip_rows", f"{skip} of {len(lines)} lines", "fewer lines")
     rows, numbers = _cells(lines, skip)
-    return channels_of(path, rows, numbers)
+    return apart(channels_of(path, rows, numbers))
 
 
 def is_labelled(content: bytes) -> bool:
