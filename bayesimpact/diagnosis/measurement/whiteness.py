@@ -1,4 +1,4 @@
-"""Is a residual white? Reported, never deciding: refitting hides what is missing."""
+"""Is a residual white? That it is decides nothing: refitting hides what is missing."""
 
 from __future__ import annotations
 

@@ -33,7 +33,12 @@ from bayesimpact.diagnosis.residual_force.gaussian_process import missing_drift,
 from bayesimpact.diagnosis.score_test.own_band import shakes_in_own_band
 from bayesimpact.diagnosis.score_test.scan import Scan, scan
 from bayesimpact.diagnosis.score_test.scores import Score
-from bayesimpact.diagnosis.selection.outcome import ExaminedModel, is_large, leaves_something
+from bayesimpact.diagnosis.selection.outcome import (
+    ExaminedModel,
+    colour_p,
+    is_large,
+    leaves_something,
+)
 from bayesimpact.diagnosis.thresholds import EXCESS, LARGE
 from bayesimpact.formula.law import is_formula
 from bayesimpact.inference.fit import Fit
@@ -114,7 +119,7 @@ class Models:
         force = missing_force(candidate.fit, self.scales, rng=self.rng)
         drift = missing_drift(candidate.fit, self.scales, rng=self.rng)
         self.look = begun - self.budget.left
-        examined = ExaminedModel(candidate, found, force, drift)
+        examined = ExaminedModel(candidate, found, force, drift, colour_p(candidate))
         self.examined_models[frozenset(candidate.ids)] = examined
         unconverged = candidate.effects and not candidate.fit.converged
         # else more is missing than an unfinished fit explains

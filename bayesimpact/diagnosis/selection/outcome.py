@@ -17,6 +17,7 @@ import numpy as np
 
 from bayesimpact.data.short_repr import short_repr
 from bayesimpact.diagnosis.faults.compare import Compared
+from bayesimpact.diagnosis.measurement.whiteness import whiteness_p
 from bayesimpact.diagnosis.refits.refit import Candidate, tempered_evidence
 from bayesimpact.diagnosis.residual_force.discrepancy import Discrepancy
 from bayesimpact.diagnosis.residual_force.gaussian_process import MissingForce
@@ -44,25 +45,29 @@ class ExaminedModel:
     scan : scores of everything it lacks
     force : the force of displacement and velocity that it leaves unexplained
     drift : the change of stiffness and damping with time that it leaves unexplained
+    colour_p : of what it leaves above the noise, see `colour_p`
     """
 
     candidate: Candidate
     scan: Scan
     force: MissingForce
     drift: MissingForce
+    colour_p: float = 1.0
 
     __repr__ = short_repr
 
     @property
     def is_white(self) -> bool:
-        """True when neither the catalogue nor an unknown force explains anything more.
+        """True when neither the catalogue nor an unknown force explains anything more, and what is
+        left above the noise is not of one colour.
 
         What remains needs decisive odds as every name does: each model on the way is tested anew,
         one in a hundred has a small p-value by chance, and where the noise of an instrument is not
         quite what is assumed of it, more.
         """
         forces = (self.force, self.drift)
-        if largest_log_odds(self.scan.p_value) >= DECISIVE:
+        least = min(self.scan.p_value, self.colour_p)
+        if largest_log_odds(least) >= DECISIVE:
             return False
         return not any(f.log_evidence >= DECISIVE and f.p_value < ALPHA for f in forces)
 
@@ -220,6 +225,18 @@ def explains_most(found: Candidate, of: Candidate) -> bool:
     if not is_large(of.fit) or is_large(found.fit) or not np.isfinite(found.log_evidence):
         return False
     return EXCESS * found.fit.reduced_chi2 < of.fit.reduced_chi2
+
+
+def colour_p(candidate: Candidate) -> float:
+    """p-value that readings which are off a model with effects by more than their noise are off
+    independently of one another: else its effects stand for something that no force is.
+
+    1 for the base model, which names nothing, and behind a filter, which colours what it leaves.
+    """
+    fit = candidate.fit
+    if not (candidate.effects and leaves_something(fit)):
+        return 1.0
+    return 1.0 if fit.density.likelihood.noise.smoothing is not None else whiteness_p(fit)
 
 
 def leaves_something(fit: Fit) -> bool:

@@ -16,7 +16,8 @@ S = "contact_second_stage"  # has a depth
 N = "contact_no_tension"  # on or off
 EFFECTS = tuple(BY_ID[i] for i in (A, B, C, D, S))
 ENOUGH = 500.0  # a gain at which nothing is left
-NOISE = SimpleNamespace(level=1.0, level_error=0.01, is_coloured=False)
+# behind a filter, where no residual is asked for its colour
+NOISE = SimpleNamespace(level=1.0, level_error=0.01, is_coloured=False, smoothing="savgol")
 TARGET = SimpleNamespace(likelihood=SimpleNamespace(sizes=np.array([1000]), noise=NOISE))
 
 

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from effect_rigs import BY_ID
 from made_up_evidence import COST, DRAG, FRICTION, candidate, examined, selection, verdict_of
+from scipy.signal import lfilter
 
 from bayesimpact.diagnosis.candidates.promising import refit_candidates
 from bayesimpact.diagnosis.selection.decision import decide, ordered
+from bayesimpact.diagnosis.selection.outcome import colour_p
 from bayesimpact.diagnosis.thresholds import (
     ALPHA,
     DECISIVE,
@@ -188,3 +190,26 @@ def test_the_unknown_force_is_the_likeliest_of_its_forms():
     assert found.unknown is found.base.force
     contact = SimpleNamespace(log_evidence=30.0)
     assert replace(found, contact=contact).unknown is contact
+
+
+@pytest.mark.parametrize(
+    ("ids", "chi2", "correlation", "smoothing", "of_one_colour"),
+    [
+        (FRICTION, 1.7, 0.6, None, True),
+        (FRICTION, 1.7, 0.0, None, False),  # a level of noise that is too low is no colour
+        (FRICTION, 1.3, 0.6, None, False),
+        ("", 1.7, 0.6, None, False),
+        (FRICTION, 1.7, 0.6, "savgol", False),
+    ],
+)
+def test_a_name_leaves_nothing_of_one_colour_above_the_noise(
+    ids: str, chi2: float, correlation: float, smoothing: str | None, of_one_colour: bool
+) -> None:
+    model = candidate(ids, 100.0, chi2)
+    noise = np.random.default_rng(0).standard_normal(200)
+    residual = lfilter([1.0], [1.0, -correlation], noise)
+    likelihood = SimpleNamespace(noise=SimpleNamespace(level_error=0.06, smoothing=smoothing))
+    model.fit.density = SimpleNamespace(likelihood=likelihood)
+    model.fit.linearisation = [SimpleNamespace(residual=residual)]
+    found = replace(examined(model), colour_p=colour_p(model))
+    assert found.is_white is not of_one_colour
