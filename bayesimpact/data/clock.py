@@ -24,6 +24,7 @@ FINE = 0.2  # of an interval: a coarser unit may hide that a clock is not even
 GAP = 2.5  # typical intervals between two stamps: more is a gap
 RARE = 0.02  # of the steps: stamps of a buffer with more gaps than that are those of batches
 ON_THE_WHOLE = 0.1  # relative: of a few batches the last may be short
+MOST_COUNTS = 0.9  # of the readings; where they turn, one is the same twice
 LEAST_TAKEN = 60  # readings that tell it
 SMOOTHER = 1.25
 """Times less that readings are off a cubic over their numbers than over their stamps. Of 8,000
@@ -159,11 +160,20 @@ def mean_rate(times: NDArray[np.float64]) -> float:
 def taken_evenly(times: NDArray[np.float64], samples: NDArray[np.float64]) -> bool:
     """Whether readings (n,) follow one another evenly although their time stamps (n,) do not: those
     of when they arrived, behind a buffer, do not tell when they were taken.
+
+    Not those of an encoder that is read whenever it counts: they follow one another by even steps.
     """
-    if times.size < LEAST_TAKEN or not np.all(np.diff(times) > 0.0):
+    if times.size < LEAST_TAKEN or not np.all(np.diff(times) > 0.0) or _counts(samples):
         return False
     numbers = np.arange(times.size, dtype=np.float64)
     return _off_a_cubic(times, samples) > SMOOTHER * _off_a_cubic(numbers, samples)
+
+
+def _counts(samples: NDArray[np.float64]) -> bool:
+    """Whether most readings differ from the one before by one and the same step."""
+    steps = np.abs(np.diff(samples))
+    step = float(np.median(steps))
+    return step > 0.0 and bool(np.mean(np.abs(steps - step) < 0.01 * step) > MOST_COUNTS)
 
 
 def _off_a_cubic(places: NDArray[np.float64], samples: NDArray[np.float64]) -> float:

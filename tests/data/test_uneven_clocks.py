@@ -313,6 +313,22 @@ def test_a_rate_that_such_stamps_contradict_is_refused(tmp_path: Path) -> None:
         bi.load(write(tmp_path, keys, a=None, b=None))
 
 
+def test_an_encoder_that_is_read_when_it_counts_keeps_its_stamps(tmp_path: Path) -> None:
+    """Once taken for a triangle wave: its readings follow one another by even steps."""
+    fine = np.linspace(0.0, 8.0, 80_001)
+    counts = np.floor(200.0 * np.exp(-0.05 * fine) * np.cos(2 * np.pi * fine + 0.5)).astype(int)
+    new = np.flatnonzero(np.diff(counts)) + 1
+    rows = (f"{t:.6f},{c * 2.5e-3:.4f}" for t, c in zip(fine[new], counts[new], strict=True))
+    (tmp_path / "log.csv").write_text("\n".join(["time_s,angle_rad", *rows]) + "\n")
+    result = CliRunner().invoke(main, ["new", str(tmp_path), str(tmp_path / "log.csv")])
+    assert result.exit_code == 0, result.output
+    assert "resample = true" in (tmp_path / "campaign.toml").read_text()
+    read = bi.load(tmp_path).recordings[0]
+    t = read.start + read.interval * np.arange(read.samples.size)
+    off = read.samples - 0.5 * np.exp(-0.05 * t) * np.cos(2 * np.pi * t + 0.5)
+    assert read.used is not None and np.abs(off[read.used]).max() < 1.2 * 2.5e-3
+
+
 def _intervals(rng: np.random.Generator, kind: str, count: int) -> np.ndarray:
     if kind == "jitter":
         return np.maximum(1.0 + rng.uniform(0.02, 0.4) * rng.standard_normal(count), 0.05)
