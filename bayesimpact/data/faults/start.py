@@ -43,8 +43,9 @@ def find_start(recording: Recording) -> list[Fault]:
     """The sample from which on the motion can be a free decay, where that is not the first one.
 
     Rest: the readings keep to the first one for longer than a free motion can about a turning
-    point, sqrt(2 b / A) of a radian for a band b and an amplitude A, and do not move on
-    meanwhile; where the motion is largest soon after, and by far, the decay begins there. Hand: the
+    point, sqrt(2 b / A) of a radian for a band b and an amplitude A, do not move on meanwhile, and
+    are not what the motion after them came from (`_is_free`, nor is a hand told within the noise);
+    where the motion is largest soon after, and by far, the decay begins there. Hand: the
     largest excursion comes late and exceeds what came before on its side, or the first turning
     point is reached from a speed with which a free motion would not get there; the free decay
     begins where that is left.
