@@ -282,9 +282,9 @@ def test_a_force_that_is_hardly_known_has_no_size():
 def test_a_force_is_told_with_or_without_what_base_parameters_imitate():
     for beyond, word in ((True, "without"), (False, "with")):
         place = {"regime": "free", "force_rms_n": 0.5, "beyond_base": beyond}
-        assert f"N, {word} what" in dict(_location(place, "m", named=False))["force, rms"]
+        assert f"N, {word} what" in dict(_location({"location": place}, "m"))["force, rms"]
     place["force_rms_n"] = None
-    assert "force, rms" not in dict(_location(place, "m", named=False))
+    assert "force, rms" not in dict(_location({"location": place}, "m"))
 
 
 def test_what_comes_nearest():

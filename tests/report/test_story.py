@@ -65,7 +65,10 @@ def test_the_place_is_that_of_the_named_effects_and_not_of_a_fault() -> None:
         ([gap, fault], "the beginning of contact, at"),
         ([fault], "the whole motion, at"),
     ):
-        assert told(diagnosed(effects=effects, location=location))["place"].startswith(words)
+        results = diagnosed(effects=effects, location=location)
+        assert told(results)["place"].startswith(words)
+        regime = dict(diagnosis_view(results)["location"])["regime"]
+        assert regime == words.removesuffix(", at"), "the details said another place"
 
 
 def test_unlikely_alternatives_are_not_told_first() -> None:

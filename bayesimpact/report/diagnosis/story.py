@@ -12,16 +12,16 @@ from bayesimpact.model.units import quantity as amount
 from bayesimpact.report.diagnosis.change_view import NUISANCES, UNTOLD, change_words, estimate
 from bayesimpact.report.diagnosis.formula_text import effect_title
 from bayesimpact.report.diagnosis.view import (
-    REGIMES,
     gain_words,
     likely_others,
     probability,
+    regime_words,
     remainder_rows,
     size_words,
     verdict_words,
 )
-from bayesimpact.report.diagnosis.words import title_of, titles_of, together
-from bayesimpact.report.names import is_fault, of_recordings, own_parameters
+from bayesimpact.report.diagnosis.words import title_of, titles_of
+from bayesimpact.report.names import of_recordings, own_parameters
 from bayesimpact.report.results import Results
 from bayesimpact.report.tables import own_symbol, symbol
 
@@ -63,9 +63,8 @@ def _place(results: Results, diagnosis: Mapping[str, Any]) -> list[str | Markup]
     location = diagnosis.get("location")
     if not location:
         return []
-    regime = str(location["regime"])
-    lines: list[str | Markup] = ["; ".join(REGIMES.get(x, x) for x in _regimes(diagnosis, regime))]
-    if regime != "measurement":
+    lines: list[str | Markup] = [regime_words(diagnosis)]
+    if location["regime"] != "measurement":
         unit = results.length
         lines[0] += (
             f", at {span_of(location['displacement_m'], unit)} and "
@@ -73,13 +72,6 @@ def _place(results: Results, diagnosis: Mapping[str, Any]) -> list[str | Markup]
         )
     lines.append(_shown_in(results, location.get("recordings") or (), location.get("cases") or ()))
     return [line for line in lines if line]
-
-
-def _regimes(diagnosis: Mapping[str, Any], regime: str) -> list[str]:
-    """Where the named effects act, the first one first; else where what is unknown does."""
-    effects = [e for e in diagnosis.get("effects", ()) if not is_fault(e)]
-    own = [(e.get("location") or {}).get("regime") for e in effects]
-    return together(str(x) for x in own if x) or [regime]
 
 
 def _shown_in(results: Results, recordings: Sequence[str], cases: Sequence[str]) -> str:

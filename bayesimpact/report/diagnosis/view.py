@@ -24,8 +24,8 @@ from bayesimpact.report.diagnosis.change_view import NUISANCES, change_row, esti
 from bayesimpact.report.diagnosis.formula_text import effect_title
 from bayesimpact.report.diagnosis.limit_view import limit_row, not_found, seen
 from bayesimpact.report.diagnosis.next_words import next_view
-from bayesimpact.report.diagnosis.words import titles_of
-from bayesimpact.report.names import of_recordings, own_parameters
+from bayesimpact.report.diagnosis.words import titles_of, together
+from bayesimpact.report.names import is_fault, of_recordings, own_parameters
 from bayesimpact.report.results import Results
 from bayesimpact.report.tables import own_symbol
 
@@ -69,9 +69,7 @@ def diagnosis_view(results: Results) -> dict[str, Any] | None:
     return {
         "verdict": verdict_words(diagnosis),
         "changed": diagnosis["verdict"] != "adequate",
-        "location": _location(
-            diagnosis.get("location"), length, named=bool(diagnosis.get("effects"))
-        ),
+        "location": _location(diagnosis, length),
         "effects": [_effect(effect) for effect in diagnosis.get("effects", [])],
         "alternatives": [
             {
@@ -118,16 +116,22 @@ def likely_others(diagnosis: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     return [x for x in others if (x.get("probability") or 0.0) >= LIKELY]
 
 
-def _location(
-    location: Mapping[str, Any] | None, unit: str, *, named: bool
-) -> list[tuple[str, str]]:
+def regime_words(diagnosis: Mapping[str, Any]) -> str:
+    """Where the named effects act, the first one first; else where what is unknown does."""
+    effects = [e for e in diagnosis.get("effects", ()) if not is_fault(e)]
+    own = [(e.get("location") or {}).get("regime") for e in effects]
+    regimes = together(str(x) for x in own if x) or [str(diagnosis["location"]["regime"])]
+    return "; ".join(REGIMES.get(x, x) for x in regimes)
+
+
+def _location(diagnosis: Mapping[str, Any], unit: str) -> list[tuple[str, str]]:
     """Lines on the place, in words and ranges; the force where no effect is named to tell it."""
+    location = diagnosis.get("location")
     if not location:
         return []
-    regime = str(location["regime"])
     share = location.get("share")
     part = "" if share is None else f" ({significant(100 * share, 2)} % of what is unexplained)"
-    rows = [("regime", REGIMES.get(regime, regime) + part)]
+    rows = [("regime", regime_words(diagnosis) + part)]
     ranges = (
         ("displacement_m", "displacement", unit),
         ("velocity_m_s", "velocity", f"{unit}/s"),
@@ -140,7 +144,7 @@ def _location(
         if location.get(key):
             order = ", most first" if len(location[key]) > 1 else ""
             rows.append((key + order, ", ".join(str(x) for x in location[key])))
-    if location.get("force_rms_n") is not None and not named:
+    if location.get("force_rms_n") is not None and not diagnosis.get("effects"):
         force = quantity(location["force_rms_n"], "N m" if unit == "rad" else "N", 2)
         which = "without" if location.get("beyond_base") else "with"
         rows.append(("force, rms", f"{force}, {which} what base parameters could imitate"))
