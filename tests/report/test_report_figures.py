@@ -221,6 +221,18 @@ def test_axis_reads_from_the_last_digits() -> None:
     assert wide.offset == 0.0 and wide.label == "$k_2$[1] (N/m)"
 
 
+def test_traces_are_counted_from_the_median_as_the_table_tells_it() -> None:
+    """Table and posterior had 4776.6, the traces 4776.5: their own middle, coarser."""
+    results = make_results(2, 1)
+    assert results.sampler is not None
+    row = results.rows[0]
+    titles = [a.get_title(loc="left") for a in all_figures(results)["traces"].axes]
+    assert results.sampler.trace_names[0] == row.name == "c1"
+    assert titles[0].startswith(f"$c_1$ − {results.digits(row).value(row.median)} N")
+    own = scaled("c1", row.unit, results.sampler.traces[..., 0].ravel())
+    assert not titles[0].startswith(own.quantity)
+
+
 def test_symbols() -> None:
     assert symbol("k2[beam 1]") == "$k_2$[beam 1]"
     assert symbol("sigma") == r"$\sigma$"

@@ -121,12 +121,11 @@ def _axis(law: Law, before: Law | None, k: int, estimate: Estimate, shown: Digit
     both = [law.values[:, k]]
     if before is not None and name in before.names:
         both.append(before.values[:, before.names.index(name)])
-    axis = scaled(name, unit, np.concatenate(both))
+    axis = scaled(name, unit, np.concatenate(both), (estimate[0], shown))
     if not axis.offset:
         return axis
-    offset = round(estimate[0] * shown.scale, shown.places) / shown.scale
     base = scaled(name, unit, np.zeros(1)).quantity
-    return replace(axis, offset=offset, quantity=f"Δ{base}")
+    return replace(axis, quantity=f"Δ{base}")
 
 
 def _limits(clouds: list[Cloud], k: int, mark: float | None) -> tuple[float, float]:

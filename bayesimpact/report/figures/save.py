@@ -100,7 +100,12 @@ def _search(results: Results) -> dict[str, Figure]:
 
 
 def _traces(results: Results) -> dict[str, Figure]:
-    return {} if results.sampler is None else {"traces": trace_figure(results.sampler)}
+    if results.sampler is None:
+        return {}
+    # where something remains, tables carry it and draws do not
+    rows = () if results.remains else results.rows
+    told = {row.name: (row.median, results.digits(row)) for row in rows}
+    return {"traces": trace_figure(results.sampler, told)}
 
 
 def save_figures(figures: Mapping[str, Figure], folder: Path) -> dict[str, bytes]:

@@ -14,14 +14,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from bayesimpact.model.units import Display, decimals, display, number, readable, reading, typeset
+from bayesimpact.model.units import Display, decimals, display, readable, reading, typeset
 from bayesimpact.report.diagnosis.formula_text import letter
+from bayesimpact.report.digits import Digits
 from bayesimpact.report.names import split
 from bayesimpact.report.results import RecordingResult, Results
 
 Array = NDArray[np.float64]
 P = ParamSpec("P")
 R = TypeVar("R")
+Told = tuple[float, Digits]
+"""A median, SI, and the digits with which tables tell it."""
 
 # Okabe and Ito (2008), Color Universal Design.
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
@@ -198,15 +201,20 @@ class LabScale:
         return np.asarray((values - self.offset) * self.scale)
 
 
-def scaled(name: str, unit: str, values: Array) -> LabScale:
-    """The axis on which draws of a parameter can be read: from zero, or from their middle."""
+def scaled(name: str, unit: str, values: Array, told: Told | None = None) -> LabScale:
+    """The axis on which draws of a parameter can be read: from zero, or from their middle.
+
+    `told` is the median in tables, with its digits: the middle is then that one as it stands there.
+    """
     centre, extent = float(np.median(values)), float(np.ptp(values)) / 4
     if not extent > 0 or abs(centre) < 50 * extent:
         shown = readable(unit, float(np.max(np.abs(values))) if values.size else 0.0)
         return LabScale(0.0, shown.scale, symbol(name), shown.unit)
     about, fine = display(unit, abs(centre)), readable(unit, extent)
-    places = decimals(extent * about.scale, 1)
-    offset = round(centre * about.scale, places) / about.scale
+    if told is None:
+        told = centre, Digits(about.scale, about.unit, decimals(extent * about.scale, 1))
+    median, digits = told
+    offset = round(median * digits.scale, digits.places) / digits.scale
     sign = "\N{MINUS SIGN}" if offset > 0 else "+"
-    middle = f"{number(abs(offset) * about.scale, places)} {typeset(about.unit)}"
+    middle = f"{digits.value(abs(offset))} {typeset(digits.unit)}"
     return LabScale(offset, fine.scale, f"{symbol(name)} {sign} {middle}", fine.unit)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from textwrap import fill
 
 from matplotlib.figure import Figure
@@ -11,6 +12,7 @@ from bayesimpact.model.units import typeset
 from bayesimpact.report.figures.style import (
     CYCLE,
     WIDTH,
+    Told,
     new_figure,
     scaled,
     styled,
@@ -24,8 +26,8 @@ _TITLE_COLUMNS = 60  # characters
 
 
 @styled
-def trace_figure(sampler: SamplerSummary) -> Figure:
-    """One panel per parameter of interest, one colour per ensemble."""
+def trace_figure(sampler: SamplerSummary, told: Mapping[str, Told] | None = None) -> Figure:
+    """One panel per parameter of interest, one colour per ensemble; `told`: see `scaled`."""
     names = sampler.trace_names[:MOST]
     columns = min(2, len(names))
     rows = -(-len(names) // columns)
@@ -35,7 +37,7 @@ def trace_figure(sampler: SamplerSummary) -> Figure:
         axis.remove()
     for k, axis in enumerate(panels.flat[: len(names)]):
         draws = sampler.traces[..., k]
-        shown = scaled(names[k], sampler.trace_units[k], draws.ravel())
+        shown = scaled(names[k], sampler.trace_units[k], draws.ravel(), (told or {}).get(names[k]))
         for e in range(draws.shape[0]):
             axis.plot(sampler.trace_steps, shown(draws[e]), color=CYCLE[e % len(CYCLE)],
                       lw=0.45, alpha=0.6, rasterized=True)  # fmt: skip
