@@ -93,7 +93,7 @@ def test_check_says_what_was_read_and_what_will_be_estimated(run: Run, tmp_path:
     for words in ("k2[1], k2[2]  N/m", "y0[a], y0[c]  m", "v0[a], v0[c]  m/s", "sigma  m"):
         assert words in out
     assert "k1: normal, mean = 800, sd = 50" in out
-    assert "5e-06 m (stated)" in out
+    assert "5.00\N{NO-BREAK SPACE}µm (stated)" in out
     assert "Savitzky-Golay, window 21 samples, order 2" in out
     assert "case 1: 98610 N/m" in out
     assert tree(tmp_path) == before
@@ -124,7 +124,8 @@ def test_stated_noise_is_compared_with_the_recordings(
     code, out, err = run("check", write(tmp_path, toml, a=csv(noisy()), b=csv(noisy(seed=2))))
     (line,) = (line for line in out.splitlines() if "raw noise" in line)
     # 1,200 samples fix the level to 2 %, part of them spent on the polynomials.
-    assert float(line.split()[2]) == pytest.approx(5e-6, rel=0.15)
+    assert float(line.split()[2]) == pytest.approx(5.0, rel=0.15) and line.split()[3] == "µm,"
+    assert "relative uncertainty  none stated\n" in out
     assert code == 0 and ("noise is stated as" in err) == warned
 
 

@@ -71,7 +71,9 @@ def test_readings_are_sketched_from_the_lowest_to_the_highest() -> None:
 
 
 def test_a_fit_shows_what_recordings_share(found: Diagnosis) -> None:
-    assert repr(found.identification).endswith("at rest>, not searched>")
+    said = repr(found.identification)
+    assert said.startswith("<Identification of 'small rig'") and said.count("<") == 1, said
+    assert said.endswith(" parameters, converged, not searched>")
     shown = cells(bi.Identification.of(found.identification)._repr_html_())
     assert shown[:30:5] == ["c1", "k1", "c2", "g", "k2[1]", "k2[2]"]
     assert float(shown[6]) == pytest.approx(found.before.value("k1"), rel=1e-3)

@@ -81,9 +81,14 @@ class Fit:
 
     def __repr__(self) -> str:
         """One line."""
-        state = "at rest" if self.converged else "not converged"
+        return f"<Fit of {self.words}>"
+
+    @property
+    def words(self) -> str:
+        """Campaign, size and state."""
+        state = "converged" if self.converged else "not converged"
         campaign = self.density.oscillator.campaign.name
-        return f"<Fit of {campaign!r}: {self.mode.size} parameters, {state}>"
+        return f"{campaign!r}: {self.mode.size} parameters, {state}"
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -75,7 +75,7 @@ class Identification:
         """One line."""
         ends = "guess and search agree" if self.agree else "guess and search differ"
         ends = "not searched" if self.from_search is None else ends
-        return f"<Identification: {self.fit!r}, {ends}>"
+        return f"<Identification of {self.fit.words}, {ends}>"
 
     @property
     def agree(self) -> bool:

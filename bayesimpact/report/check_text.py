@@ -12,6 +12,7 @@ from bayesimpact.data.text_table import text_table
 from bayesimpact.inference.noise.estimate import unfiltered_noise
 from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.model.parameters import build_layout
+from bayesimpact.model.units import quantity
 
 BARS = "▁▂▃▄▅▆▇█"
 COLUMNS = 40
@@ -165,9 +166,9 @@ def _chain_block(campaign: Campaign, noise: Noise | None) -> str:
     measurement, unit = campaign.measurement, campaign.recordings[0].unit
     levels = []
     if noise is not None:
-        levels.append(f"{noise.level:.3g} {unit}, {noise.kind} (from the recordings alone)")
+        levels.append(f"{quantity(noise.level, unit)}, {noise.kind} (from the recordings alone)")
     if measurement.noise is not None:
-        levels.append(f"{measurement.noise:.3g} {unit} (stated)")
+        levels.append(f"{quantity(measurement.noise, unit)} (stated)")
     level = "; ".join(levels) or "estimated before the fit"
     smoothing = measurement.smoothing
     if smoothing is None:
@@ -176,13 +177,14 @@ def _chain_block(campaign: Campaign, noise: Noise | None) -> str:
         filtered = f"first-order lag, time constant {smoothing.time_constant:g} s"
     else:
         filtered = f"Savitzky-Golay, window {smoothing.window} samples, order {smoothing.polyorder}"
-    sds = f"mass {measurement.mass_sd:.3g}, clock {measurement.clock_sd:.3g}"
+    sds = {"mass": measurement.mass_sd, "clock": measurement.clock_sd, "gain": measurement.gain_sd}
+    stated = ", ".join(f"{name} {sd:.3g}" for name, sd in sds.items() if sd) or "none stated"
     return "\n".join(
         [
             "measuring chain",
             f"  raw noise             {level}",
             f"  smoothing             {filtered}",
-            f"  relative uncertainty  {sds}, gain {measurement.gain_sd:.3g}",
+            f"  relative uncertainty  {stated}",
         ]
     )
 

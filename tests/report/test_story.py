@@ -222,13 +222,13 @@ def test_a_document_with_nulls_is_told() -> None:
 
 def test_a_parametric_bootstrap_is_told_where_there_is_one() -> None:
     found = {"controls": 20, "false_alarms": 1, "planted": 20, "named": 18, "misnamed": 0}
-    story = told(diagnosed(certificate=found))
+    story = told(diagnosed(parametric_bootstrap=found))
     assert (
         "of 20" in story["parametric bootstrap"]
         and "1 raised an alarm" in story["parametric bootstrap"]
     )
     assert "18 were named the same" in story["parametric bootstrap"]
-    assert "parametric bootstrap" not in told(diagnosed(certificate=None))
+    assert "parametric bootstrap" not in told(diagnosed(parametric_bootstrap=None))
 
 
 REMAINDER = {"rms_m": 2e-6, "share_of_signal_percent": 0.1, "over_noise": 4.0, "regime": "free",

@@ -131,7 +131,7 @@ def document(
             for x in d.limits
         ],
         "evidence": _evidence(d),
-        "certificate": None if certified is None else asdict(certified),
+        "parametric_bootstrap": None if certified is None else asdict(certified),
         "reading": {"quantity": reading.quantity, "unit": reading.unit},
         "noise": {
             "sigma_m": noise.level,

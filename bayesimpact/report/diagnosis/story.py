@@ -46,7 +46,7 @@ def story_rows(results: Results) -> list[tuple[str, list[str | Markup]]]:
         ("remains", _remains(results, diagnosis.get("remainder"))),
         ("improvement", _improvement(results, diagnosis)),
         ("could still hide", _hidden(diagnosis)),
-        ("parametric bootstrap", _bootstrap(diagnosis.get("certificate"))),
+        ("parametric bootstrap", _bootstrap(diagnosis.get("parametric_bootstrap"))),
     ]
     return [(question, answer) for question, answer in rows if answer]
 

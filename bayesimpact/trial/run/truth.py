@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,8 @@ from typing import Any
 from bayesimpact.data.text_table import text_table
 from bayesimpact.errors import InputError
 from bayesimpact.inference.fit import Z90
-from bayesimpact.model.units import decimals, display, number, signed, significant, typeset
+from bayesimpact.model.units import display, number, signed, significant, typeset, without_zero
+from bayesimpact.report.digits import digits
 from bayesimpact.trial.rig.files import TRUTH_FILE
 
 NAMES = ("c1", "k1", "c2", "g", "k2")
@@ -48,7 +49,7 @@ def compared(diagnosis: Mapping[str, Any], truth: Mapping[str, Any]) -> list[str
         if name in after or name.partition("[")[0] in NAMES:
             found = before.get(name), after.get(name)
             unit = next((x["unit"] for x in found if x is not None), "")
-            cells = [cell for x in found for cell in _estimate(x, value)]
+            cells = [cell for x in found for cell in _estimate(x, found, value)]
             rows.append((name, *cells, _size(value, unit)))
     named = " + ".join(e["id"] for e in diagnosis["effects"]) or "nothing"
     hidden = " + ".join(truth["effects"]) or "nothing"
@@ -62,17 +63,23 @@ def compared(diagnosis: Mapping[str, Any], truth: Mapping[str, Any]) -> list[str
     ]
 
 
-def _estimate(estimate: Mapping[str, Any] | None, truth: float) -> tuple[str, str]:
-    """Median and half of its interval, and the distance from the truth."""
+def _estimate(
+    estimate: Mapping[str, Any] | None, both: Sequence[Mapping[str, Any] | None], truth: float
+) -> tuple[str, str]:
+    """Median and half of its interval, with the report's digits, and the distance from the truth.
+
+    `both` are the parameter's estimates of the base model and with what was added.
+    """
     if estimate is None:
         return "", ""
+    others = [x for x in both if x is not None and x is not estimate]
+    shown = digits(estimate["unit"], estimate["median"], estimate["ci90"], others)
     low, high = estimate["ci90"]
     half = 0.5 * (high - low)
-    shown = display(estimate["unit"], abs(truth))
-    places = decimals(half * shown.scale)
     off = (estimate["median"] - truth) / (half / Z90) if half > 0 else float("nan")
-    text = f"{number(estimate['median'] * shown.scale, places)} ± "
-    return text + number(half * shown.scale, places), signed(off, 1) if isfinite(off) else ""
+    around = number(half * shown.scale, without_zero(shown.places, half * shown.scale))
+    text = f"{shown.value(estimate['median'])} ± {around}"
+    return text, signed(off, 1) if isfinite(off) else ""
 
 
 def _size(value: float, unit: str) -> str:

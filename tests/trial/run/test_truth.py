@@ -197,15 +197,20 @@ def test_comparison_is_in_standard_deviations() -> None:
         half = 1.6448536 * 0.5
         return {"k2[1]": {"unit": "N/m", "median": median, "ci90": [median - half, median + half]}}
 
+    narrow = {"g": {"unit": "m", "median": 1.10183e-3, "ci90": [1.10177e-3, 1.10189e-3]}}
+    wide = {"g": {"unit": "m", "median": 1.0999e-3, "ci90": [1.0994e-3, 1.1004e-3]}}
     wear = {"gap_wear.step": {"unit": "m", "median": 9e-8, "ci90": [8e-8, 1e-7]}}
     diagnosis = {
         "verdict": "named",
         "effects": [{"id": "gap_wear"}],
-        "parameters": {"before": side(5360.0), "after": side(5350.5) | wear},
+        "parameters": {"before": side(5360.0) | narrow, "after": side(5350.5) | wide | wear},
         "fit": {"before": {"rms_m": 5.1e-6}},
         "noise": {"sigma_m": 5e-6},
     }
-    truth = {"effects": ["gap_wear"], "parameters": {"k2[1]": 5350.0, "gap_wear.step": 8e-8}}
+    truth = {
+        "effects": ["gap_wear"],
+        "parameters": {"k2[1]": 5350.0, "g": 1.1e-3, "gap_wear.step": 8e-8},
+    }
     lines = compared(diagnosis, truth)
     assert lines[:3] == [
         "base fit: what it leaves is 1.020 times the noise", "hidden: gap_wear",
@@ -215,5 +220,8 @@ def test_comparison_is_in_standard_deviations() -> None:
     assert stiffness.split("  ")[0] == "k2[1]"
     for cell in ("5360.0 ± 0.8", "+20.0", "5350.5 ± 0.8", "+1.0", "5350 N/m"):
         assert cell in stiffness, cell
+    (gap,) = (line for line in lines if line.startswith("g "))
+    # as many digits as the report has, which the wider of the two intervals allows
+    assert "1.1018 ± 0.0001" in gap and "1.0999 ± 0.0005" in gap, gap
     (step,) = (line for line in lines if line.startswith("gap_wear.step"))
     assert "0.090 ± 0.010" in step and "+1.6" in step and "0.08 µm" in step
