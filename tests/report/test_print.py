@@ -48,6 +48,9 @@ def test_pages_are_full_and_whole(
     for page in {b.page for b in printed}:
         last = max((b for b in printed if b.page == page), key=lambda b: b.bottom)
         assert last.tag not in HEADS, last
+    heads = [b for b in printed if b.tag == "H2"]
+    placed = sorted(heads, key=lambda b: (b.page, b.top))
+    assert placed == heads, "a heading went with its figure into the section that follows"
     assert max(b.right for b in printed) <= PAGE[0] + 1
     assert {round(b.stretch, 2) for b in printed} == {1.0}
 
