@@ -174,7 +174,7 @@ ROWS = {
     "added": lambda content: [e.replace("_", " ") for e in content["effects"]],
     "samplers": lambda content: [n for n, row in content["samplers"].items() if row["agrees"]],
     "trials": lambda content: [e.replace("_", " ") for e in content["settings"]["effects"]],
-    "power": lambda content: [e.replace("_", " ") for e in content["effects"]],
+    "detection_power": lambda content: [e.replace("_", " ") for e in content["effects"]],
     "limits": lambda content: ["one over square root"],
 }
 

@@ -14,7 +14,7 @@ from benchmarks.detection_power import (
     power_text,
     reaching,
 )
-from benchmarks.power_figures import limits_figure, power_figure
+from benchmarks.detection_power_figures import limits_figure, power_figure
 
 from bayesimpact.diagnosis.selection.outcome import DECISIVE
 from bayesimpact.trial.draw.designs import draw_rig_design

@@ -5,12 +5,21 @@ score at which the corrected test answers. It is named when the evidence beats t
 the decisive odds t: with d = z sqrt(1 - rho^2) the distance between the two, the difference of
 their log likelihoods is normal with mean d^2 / 2 and standard deviation d, so that happens with
 probability Phi((d^2 / 2 - t) / d). Blind trials of fixed strength check both (`observed`).
+
+    python tests/benchmarks/detection_power.py
+
+Writes detection_power.json beside this file; `figures.py` draws it. With `--trials RUN` (folders of
+`bayesimpact trial --kinds single --rig paper --noise white --strength 1 1 ...`) also what those
+runs saw.
 """
 
 from __future__ import annotations
 
+import argparse
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,6 +39,7 @@ from bayesimpact.trial.draw.sensitivity import Sensitivity, clean_readings, misf
 from bayesimpact.trial.draw.sizing import LIMIT, Unsuitable, sized
 from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 from bayesimpact.trial.rig.recordings import Release
+from bayesimpact.trial.run.stamp import origin
 from bayesimpact.trial.score.summary import rate
 
 Array = NDArray[np.float64]
@@ -38,7 +48,8 @@ FAMILIES = 3  # of tests that share the alarm probability: scores, forcing, hum
 NULL_DRAWS = 200_000
 NINETY = 0.9
 STRENGTHS = np.geomspace(0.2, 40.0, 400)
-SHOWN = slice(None, None, 8)  # of STRENGTHS, in power.json
+STORE = Path(__file__).with_suffix(".json")
+SHOWN = slice(None, None, 8)  # of STRENGTHS, in detection_power.json
 
 
 @dataclass(frozen=True)
@@ -160,7 +171,7 @@ def limits_by_recordings(
 def power_table(
     rng: np.random.Generator, counts: Sequence[int] = (3, 6, 9, 18, 27)
 ) -> dict[str, Any]:
-    """The content of power.json, theory only."""
+    """The content of detection_power.json, theory only."""
     sensitivity = Sensitivity(bundled_design(), rng)
     critical = critical_score(sensitivity, rng)
     found = [p for p in (power(sensitivity, e, rng) for e in PLANTED_EFFECTS) if p is not None]
@@ -219,7 +230,7 @@ def observed(results: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
 
 
 def power_text(document: Mapping[str, Any]) -> str:
-    """The table of power.json: limits, and sizes found and named nine times in ten."""
+    """The table of detection_power.json: limits, and sizes found and named nine times in ten."""
     heads = " ".join(f"{head:>10s}" for head in ("limit", "detected", "named"))
     lines = [f"{'effect':30s} {'number':12s} {heads}  nearest rival"]
     for effect, row in document["effects"].items():
@@ -232,3 +243,23 @@ def power_text(document: Mapping[str, Any]) -> str:
         counts = "  ".join(f"{n}: {v:.2f}" for n, v in row.items())
         lines.append(f"{effect:30s} {counts}")
     return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    """Compute, print the table, store the result."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--trials", type=Path, action="append", default=[], metavar="DIR")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--out", type=Path, default=STORE, metavar="FILE")
+    chosen = parser.parse_args()
+    files = [f for folder in chosen.trials for f in sorted((folder / "trials").glob("*.json"))]
+    results = [json.loads(f.read_text(encoding="utf-8")) for f in files]
+    table = power_table(np.random.default_rng(chosen.seed))
+    document = {**origin(), "seed": chosen.seed, **table, "observed": observed(results)}
+    text = json.dumps(document, allow_nan=False) + "\n"
+    chosen.out.write_text(text, encoding="utf-8")
+    print(power_text(document), end="")
+
+
+if __name__ == "__main__":
+    main()

@@ -2,7 +2,7 @@
 
 peers.svg: time of one simulation against its error. samplers.svg: effective draws per second.
 added.svg: the same for the steps of added effects. trials.svg: what the diagnosis said of every
-concealed effect, against its size. power.svg, limits.svg: how large an effect must be to
+concealed effect, against its size. detection_power.svg, limits.svg: how large an effect must be to
 be found and named, and how that falls with the number of recordings.
 """
 
@@ -16,7 +16,7 @@ if __name__ == "__main__":  # imports go by the tests' folder, not by this one
     sys.path[0] = str(Path(__file__).resolve().parents[1])
 
 import matplotlib as mpl
-from benchmarks.power_figures import limits_figure, power_figure
+from benchmarks.detection_power_figures import limits_figure, power_figure
 from benchmarks.tables import stored
 from matplotlib.figure import Figure
 
@@ -129,12 +129,12 @@ FIGURES = {
     "added": added_figure,
     "samplers": samplers_figure,
     "trials": trials_figure,
-    "power": power_figure,
+    "detection_power": power_figure,
     "limits": limits_figure,
 }
 
 
-STORES = {"limits": "power"}  # figure -> result, where the names differ
+STORES = {"limits": "detection_power"}  # figure -> result, where the names differ
 
 
 def draw(folder: Path = HERE) -> None:

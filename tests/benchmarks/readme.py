@@ -180,7 +180,7 @@ def loops_table() -> str:
 
 def power_table() -> str:
     """How large an effect must be."""
-    p = stored("power")
+    p = stored("detection_power")
     rows = []
     for effect, row in p["effects"].items():
         parameter = EFFECTS[effect].parameter(row["size"])
@@ -229,7 +229,7 @@ TABLES = {
     "strong": strong_table,
     "faults": fault_table,
     "next": next_table,
-    "power": power_table,
+    "detection_power": power_table,
     "sbc": sbc_table,
     "robustness": robustness_table,
     "kernel": kernel_table,

@@ -21,7 +21,7 @@ LIMITS = (0.5, 0.7, 1.0, 1.4, 2.0)
 def power_figure(document: Mapping[str, Any]) -> Figure:
     """One panel per effect: probabilities against size, theory as lines, blind trials as points.
 
-    `document` is the content of power.json.
+    `document` is the content of detection_power.json.
     """
     effects = document["effects"]
     rows = -(-len(effects) // COLUMNS)
