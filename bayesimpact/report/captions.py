@@ -31,7 +31,7 @@ DIAGNOSIS = {
         "law of another power of the speed appears as the b(y) that fits it best. What changes of "
         "the base parameters could imitate is taken out of both. Grey area: contact."
     ),
-    "gain": (
+    "likelihood": (
         "Where the extended model explains more: gain in log likelihood over the base model. A "
         "gain of 1 nat makes a stretch e times likelier; it explains less where the gain is "
         "negative, which is chance where it is small."
@@ -91,7 +91,7 @@ def caption(name: str, results: Results) -> str:
 def _more(stem: str, results: Results) -> str:
     """What holds for some diagnoses only."""
     arrays, diagnosis = results.diagnosis_arrays, results.diagnosis or {}
-    if stem == "gain" and "impact_gain" in arrays:
+    if stem == "likelihood" and "impact_gain" in arrays:
         return " Impacts are shown as far as half of the recordings have them."
     if stem == "story":
         contact = " Grey area: contact." if results.stop else ""

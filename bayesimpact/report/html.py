@@ -33,7 +33,7 @@ TEMPLATES = Path(__file__).parent / "template"
 _VERDICT_CLASS = {"adequate": "good", "inadequate": "bad", "slight": "", "overestimated": ""}
 _GROUPS = (
     *("story", "fit", "corner", "backbone", "search", "traces"),
-    *("force", "formula", "gain", "ranking", "limits", "improvement"),
+    *("force", "formula", "likelihood", "ranking", "limits", "improvement"),
     *("bands", "shifts", "designs"),
 )
 _PIXELS_PER_INCH = 96

@@ -26,7 +26,7 @@ from bayesimpact.report.figures.style import AFTER, BLACK
 from bayesimpact.report.results import EffectSummary
 from bayesimpact.report.write import rewrite_report
 
-NAMES = {"force_map", "gain", "ranking", "limits", "improvement", "shifts", "bands"}
+NAMES = {"force_map", "likelihood_gain", "ranking", "limits", "improvement", "shifts", "bands"}
 
 
 def words(figure: Figure) -> str:
@@ -124,7 +124,9 @@ def test_captions_say_what_holds_for_this_diagnosis_only() -> None:
     free = replace(results, diagnosis_arrays={})
     assert "stop" not in caption("force_map", free).replace("towards the stop", "")
     assert "predicted" not in caption("improvement", free)
-    assert "Impacts" in caption("gain", results) and "Impacts" not in caption("gain", free)
+    assert "Impacts" in caption("likelihood_gain", results) and "Impacts" not in caption(
+        "likelihood_gain", free
+    )
     assert "Nothing is missing" in caption("force_map", diagnosed(verdict="adequate"))
     large = diagnosed(fit={"before": {"reduced_chi2": 8510.0}})
     assert "rough guide" in caption("force_map", large)

@@ -59,7 +59,9 @@ def directives() -> dict[str, list[str]]:
 PAGES = {
     "fit": lambda: render(make_results(2, 1, n=200, sampled=False), {"fit_case_1": PNG}),
     "posterior": lambda: render(make_results(3, 2, n=200), {"corner": PNG}),
-    "diagnosis": lambda: render(diagnosed(), {"force_map": PNG, "gain": PNG}, {"x": "KeyError"}),
+    "diagnosis": lambda: render(
+        diagnosed(), {"force_map": PNG, "likelihood_gain": PNG}, {"x": "KeyError"}
+    ),
     "unfinished": lambda: unfinished(make_results(1, 1, n=200), {"report": "KeyError: 'g'"}),
 }
 

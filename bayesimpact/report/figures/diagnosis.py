@@ -10,9 +10,9 @@ from bayesimpact.report.figures.bands import band_figures
 from bayesimpact.report.figures.designs import design_figures
 from bayesimpact.report.figures.force_map import force_figures
 from bayesimpact.report.figures.formula import formula_figures
-from bayesimpact.report.figures.gain import gain_figures
 from bayesimpact.report.figures.gaussian import gaussian_figures
 from bayesimpact.report.figures.improvement import improvement_figures
+from bayesimpact.report.figures.likelihood_gain import likelihood_gain_figures
 from bayesimpact.report.figures.ranking import ranking_figures
 from bayesimpact.report.figures.story import story_figures
 from bayesimpact.report.results import Results
@@ -23,7 +23,7 @@ DRAWERS: tuple[Drawer, ...] = (
     story_figures,
     force_figures,
     formula_figures,
-    gain_figures,
+    likelihood_gain_figures,
     ranking_figures,
     improvement_figures,
     band_figures,

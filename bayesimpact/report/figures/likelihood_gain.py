@@ -15,11 +15,11 @@ from bayesimpact.report.results import Results
 _ROW, _LEAST, _MOST = 0.22, 3.2, 8.0  # in
 
 
-def gain_figures(results: Results) -> Mapping[str, Figure]:
+def likelihood_gain_figures(results: Results) -> Mapping[str, Figure]:
     """Gain in log likelihood by recording, time and impact, where there is one."""
     if "gain" not in results.diagnosis_arrays:
         return {}
-    return {"gain": _figure(results, results.diagnosis_arrays)}
+    return {"likelihood_gain": _figure(results, results.diagnosis_arrays)}
 
 
 @styled
