@@ -114,7 +114,7 @@ def _finite(effect: Effect) -> Answer:
     rng = np.random.default_rng(0)
 
     def drawn(p: EffectParameter) -> float:
-        return float(effect_prior(effect, p, USUAL).ppf(np.array(rng.uniform(*MIDDLE))))
+        return float(effect_prior(p, USUAL).ppf(np.array(rng.uniform(*MIDDLE))))
 
     oscillator = _model(effect)
     thetas = [_theta(oscillator, _values(effect, drawn)) for _ in range(DRAWS)]

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special, stats
 
 from bayesimpact.diagnosis.score_test.scan import Scan
@@ -14,8 +13,6 @@ from bayesimpact.diagnosis.score_test.scores import Score
 from bayesimpact.inference.fit import Fit
 from bayesimpact.model.effects.effect import Scales
 from bayesimpact.model.parameters import unit_for
-
-Array = NDArray[np.float64]
 
 PRACTICAL = 0.1  # of the prior scale: a size that would matter in practice
 DETECTED = 3.5  # standard errors at which the corrected test answers

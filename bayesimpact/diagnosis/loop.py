@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesimpact.diagnosis.budget import Budget, begin
 from bayesimpact.diagnosis.faults.recording_faults import Corrected
@@ -35,7 +34,6 @@ from bayesimpact.model.effects import SEARCHED
 from bayesimpact.model.effects.effect import Effect, Scales
 from bayesimpact.model.jit.threads import linear_algebra_alone
 
-Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 

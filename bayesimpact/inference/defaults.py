@@ -35,7 +35,7 @@ from bayesimpact.inference.prior import (
     Uniform,
 )
 from bayesimpact.inference.priors import Priors, prior_from_table
-from bayesimpact.model.effects.effect import Effect, EffectParameter, Scales
+from bayesimpact.model.effects.effect import EffectParameter, Scales
 from bayesimpact.model.oscillator import Oscillator
 from bayesimpact.model.parameters import GAIN, is_added
 
@@ -71,8 +71,7 @@ def _default(
     campaign = oscillator.campaign
     if is_added(name):
         assert scales is not None
-        effect, parameter = _owner(oscillator, name)
-        return effect_prior(effect, parameter, scales)
+        return effect_prior(_added(oscillator, name), scales)
     kind = name.split("[")[0]
     if kind == "sigma":
         if campaign.measurement.noise is not None:
@@ -98,15 +97,15 @@ def _default(
     return Uniform(*ranges.get(kind, (-reach, reach)))
 
 
-def _owner(oscillator: Oscillator, name: str) -> tuple[Effect, EffectParameter]:
+def _added(oscillator: Oscillator, name: str) -> EffectParameter:
     effect_id, rest = name.split(".", 1)
     for effect in oscillator.acting:
         if effect.id == effect_id:
-            return effect, effect.parameter(rest.split("[")[0])
+            return effect.parameter(rest.split("[")[0])
     raise KeyError(name)
 
 
-def effect_prior(effect: Effect, parameter: EffectParameter, scales: Scales) -> Prior:
+def effect_prior(parameter: EffectParameter, scales: Scales) -> Prior:
     """Prior of an effect's parameter at its physical scale.
 
     Sizes have heavy tails, for on real rigs an effect may be many times what is usual. Values of

@@ -124,7 +124,7 @@ def test_priors_of_the_campaign_win_the_full_name_first(campaign, guess):
 
 def prior_of(effect_id: str, parameter: str) -> Prior:
     effect = BY_ID[effect_id]
-    return effect_prior(effect, effect.parameter(parameter), SCALES)
+    return effect_prior(effect.parameter(parameter), SCALES)
 
 
 def test_priors_of_effects():

@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from bayesimpact.data.campaign import Campaign
@@ -32,8 +31,6 @@ from bayesimpact.diagnosis.selection.outcome import above_noise, leaves_somethin
 from bayesimpact.diagnosis.thresholds import EXCESS, LARGE
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.refitted import refitted
-
-Array = NDArray[np.float64]
 
 PLACE = 0.5 * float(chi2.isf(1e-3, 1))  # nats: less likely places than this are no candidates
 NEAR = 2  # samples beside these: switching takes its time

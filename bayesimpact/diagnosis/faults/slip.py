@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from bayesimpact.data.campaign import Campaign
@@ -21,8 +20,6 @@ from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.faults.alone import SharedModel, own_fit
 from bayesimpact.diagnosis.faults.change_point import change_scores, parameter_basis
 from bayesimpact.inference.fit import Fit
-
-Array = NDArray[np.float64]
 
 PLACE = 0.5 * float(chi2.isf(1e-3, 1))  # nats: less likely places than this are no candidates
 NEAR = 2  # samples beside these places: where many are lost, the score is not linear

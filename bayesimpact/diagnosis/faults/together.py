@@ -12,13 +12,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesimpact.diagnosis.faults.alone import Alone
 from bayesimpact.diagnosis.faults.hierarchical import Differences, Freed
 from bayesimpact.diagnosis.thresholds import DECISIVE
-
-Array = NDArray[np.float64]
 
 WIDTH = {"recording_gain": 1.0, "recording_clock": 0.05, "recording_other_rig": 0.5}
 """Prior standard deviation of the logarithm of what a hypothesis frees."""

@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesimpact.data.faults.fault import Fault, start_fault
 from bayesimpact.data.recording import Recording
@@ -22,8 +21,6 @@ from bayesimpact.inference.likelihood import Likelihood
 from bayesimpact.inference.mode import find_mode
 from bayesimpact.inference.priors import Priors
 from bayesimpact.model.oscillator import build_oscillator
-
-Array = NDArray[np.float64]
 
 INSTANTS = (0.25, 0.5, 1.0, 2.0, 3.0)  # of a free period
 SHARE = 0.25  # of a recording, at most: what follows has to say what it is fitted by

@@ -14,7 +14,6 @@ from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from bayesimpact.data.recording import Recording
@@ -29,8 +28,6 @@ from bayesimpact.inference.noise.forces import RandomForces
 from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.inference.refitted import refitted
 from bayesimpact.model.linear_response.superposition import state_space
-
-Array = NDArray[np.float64]
 
 QUIETEST = 0.1  # of an input's bands: the loudest one of these is its floor
 # ... but for what the median of a band of m ordinates errs by, 1 / (ln 2 m^(1/2)) of itself: the

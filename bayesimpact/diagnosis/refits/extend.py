@@ -102,7 +102,7 @@ def _prior(fit: Fit, effects: Sequence[Effect], name: str, scales: Scales) -> Pr
     if slot_name is not None:
         centre = base_value(fit, slot_name)
         return Normal(centre, WIDEST * parameter.scale(scales))
-    return effect_prior(effect, parameter, scales)
+    return effect_prior(parameter, scales)
 
 
 def base_value(fit: Fit, slot: str) -> float:

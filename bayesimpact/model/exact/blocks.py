@@ -82,7 +82,7 @@ def add_force(
 
 @inner()
 def write_speeds(
-    speeds: Floats, first: int, end: int, tables: Floats, side: int, b: float, K: float, w: float,
+    speeds: Floats, first: int, end: int, tables: Floats, side: int, K: float, w: float,
     u: float, v: float, fs: float, fc: float,
 ) -> None:  # fmt: skip
     """Write velocities of one block, per interval."""
@@ -144,7 +144,7 @@ def pass_plain(
         elif written:
             write(out, i, block, shift, tables, side, b, u, v)
             if speeds.size > 0:
-                write_speeds(speeds, i, block, tables, side, b, K, 0.0, u, v, 0.0, 0.0)
+                write_speeds(speeds, i, block, tables, side, K, 0.0, u, v, 0.0, 0.0)
         u, v = advance(b, K, u, v, tables[side, 0, LENGTH], tables[side, 1, LENGTH])
         i = block
     return total
@@ -184,7 +184,7 @@ def pass_samples(
             write(out, i, block, shift, tables, side, b, ur, vr)
             add_force(out, i, block, tables, side, fsr, fcr)
             if speeds.size > 0:
-                write_speeds(speeds, i, block, tables, side, b, K, w, u, v, fs, fc)
+                write_speeds(speeds, i, block, tables, side, K, w, u, v, fs, fc)
         if block == end:
             return total
         i = block

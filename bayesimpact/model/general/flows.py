@@ -303,7 +303,7 @@ def linearize(
 
 
 @inner(forceinline=True)
-def first_step(y: Any, v: Any, t: Any, longest: Any, flow: Any, w: Any) -> Any:
+def first_step(y: Any, v: Any, t: Any, flow: Any, w: Any) -> Any:
     """Length of the first step, doubled from step to step: small where a law's state starts."""
     if not flow.memory:
         return np.inf

@@ -130,7 +130,7 @@ def section(y: Any, v: Any, t: Any, j: Any, w: Any) -> Any:
     set_directions(y, v, t, w)
     flow, longest = flow_from(y, v, t, w)
     start, event, second, stepped = t, typed(NONE), listens(w), False
-    ramp = first_step(y, v, t, longest, flow, w)
+    ramp = first_step(y, v, t, flow, w)
     n0 = 0.0 if flow.plain else added_force(y, v, t, NOW, flow, w)
     y1, v1, n1 = y, v, n0
     stride = stride_of(longest, w)

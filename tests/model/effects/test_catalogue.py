@@ -165,7 +165,7 @@ def test_priors_scale_with_the_rig(effect):
             continue  # the mains do not scale
         assert parameter.scale(theirs) == pytest.approx(expected, rel=1e-12)
         assert parameter.scale(ours) > 0
-        prior = effect_prior(effect, parameter, ours)
+        prior = effect_prior(parameter, ours)
         assert np.isfinite(prior.log_density(np.array(prior.ppf(np.array(0.4)))))
 
 
@@ -179,7 +179,7 @@ def test_shapes_have_grids_within_their_bounds():
         for parameter, values in zip(shapes, grids, strict=True):
             assert values.size >= 2
             assert np.all((values >= parameter.lower) & (values <= parameter.upper))
-            low, high = effect_prior(effect, parameter, scales).support
+            low, high = effect_prior(parameter, scales).support
             assert np.all((values >= low) & (values <= high))
 
 

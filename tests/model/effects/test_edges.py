@@ -186,9 +186,7 @@ def test_finite_over_the_whole_prior_box(effect):
             for name in oscillator.layout.names:
                 if "." in name:
                     parameter = effect.parameter(name.split(".")[1].split("[")[0])
-                    drawn = float(
-                        effect_prior(effect, parameter, scales).ppf(rng.uniform(0.1, 0.9))
-                    )
+                    drawn = float(effect_prior(parameter, scales).ppf(rng.uniform(0.1, 0.9)))
                     values[name] = min(max(drawn, parameter.lower), parameter.upper)
             thetas.append(rig.theta(oscillator, values))
         for y in oscillator.predict(np.array(thetas)):
