@@ -11,7 +11,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -28,7 +27,6 @@ Variables = dict[str, tuple[tuple[str, ...], NDArray[Any], dict[str, str]]]
 
 SAMPLE_DIMS = ("chain", "draw")
 PART = "half_cycle"
-ENGINE = "h5netcdf"
 PRIOR_DRAWS = 500
 _INDEXED = re.compile(r"(?P<base>[^\[\]]+)\[(?P<key>.+)\]")
 
@@ -208,14 +206,6 @@ def as_arviz(groups: Mapping[str, Any]) -> Any:
     import xarray
 
     return xarray.DataTree.from_dict({f"/{name}": dataset for name, dataset in groups.items()})
-
-
-def open_arviz(path: Path, section: str = "") -> Any:
-    """`posterior.nc` in the same form; `section` "before": the model without missing physics."""
-    arviz = quiet_arviz()
-    if _has_inference_data(arviz):
-        return arviz.InferenceData.from_netcdf(str(path), engine=ENGINE, base_group="/" + section)
-    return arviz.from_netcdf(path, engine=ENGINE, group=section or None).load()
 
 
 def _has_inference_data(arviz: Any) -> bool:

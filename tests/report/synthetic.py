@@ -6,10 +6,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from bayesimpact.inference.fit import Z90
 from bayesimpact.model.units import per_mass_unit
 from bayesimpact.report import checks
+from bayesimpact.report.figures.save import drawers, figures_of
 from bayesimpact.report.results import (
     BackboneCurve,
     BackboneSummary,
@@ -151,3 +153,8 @@ def with_chain(results: Results, chain: MeasuringChainSummary) -> Results:
         for r in results.rows
     )
     return replace(results, chain=chain, rows=table)
+
+
+def all_figures(results: Results) -> dict[str, Figure]:
+    """Every figure that the results allow, by the name of its file, in the order of the page."""
+    return {name: f for draw in drawers(results) for name, f in figures_of(draw, results).items()}

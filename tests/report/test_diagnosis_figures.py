@@ -14,6 +14,7 @@ from matplotlib.collections import PathCollection
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+from synthetic import all_figures
 
 from bayesimpact.report.archive import load_results, save_results
 from bayesimpact.report.captions import caption
@@ -21,7 +22,7 @@ from bayesimpact.report.diagnosis.limit_view import not_found
 from bayesimpact.report.diagnosis.view import diagnosis_view
 from bayesimpact.report.figures.improvement import shifts
 from bayesimpact.report.figures.ranking import FREE_FORCE, MOST, ranked
-from bayesimpact.report.figures.save import all_figures, png
+from bayesimpact.report.figures.save import png
 from bayesimpact.report.figures.style import AFTER, BLACK
 from bayesimpact.report.results import EffectSummary
 from bayesimpact.report.write import rewrite_report

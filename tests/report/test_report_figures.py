@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from diagnosed import diagnosed, diagnosis_figures
 from matplotlib.figure import Figure
-from synthetic import make_results
+from synthetic import all_figures, make_results
 
 from bayesimpact.report.digits import Digits
 from bayesimpact.report.figures.backbone import backbone_figures, deviation
@@ -24,7 +24,6 @@ from bayesimpact.report.figures.recordings import (
     shown_recordings,
 )
 from bayesimpact.report.figures.save import (
-    all_figures,
     file_name,
     png,
     save_all,

@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from synthetic import make_results
+from test_archive_arviz import open_arviz
 
 from bayesimpact.data.bundled import bundled_campaign
 from bayesimpact.data.campaign import Campaign, Measurement
 from bayesimpact.data.read import load_campaign
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
-from bayesimpact.inference.arviz_groups import as_arviz, open_arviz
+from bayesimpact.inference.arviz_groups import as_arviz
 from bayesimpact.inference.fit import Z90
 from bayesimpact.inference.identify import Identification, identify
 from bayesimpact.inference.posterior import Posterior, sample

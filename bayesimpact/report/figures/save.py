@@ -44,11 +44,6 @@ class SavedFigures:
     failed: Mapping[str, str] = field(default_factory=dict)
 
 
-def all_figures(results: Results) -> dict[str, Figure]:
-    """Every figure that the results allow, by the name of its file, in the order of the page."""
-    return {name: f for draw in drawers(results) for name, f in figures_of(draw, results).items()}
-
-
 def figures_of(draw: Drawer, results: Results) -> dict[str, Figure]:
     """What one function draws; names that hold a $ are shown as they are, not as mathematics."""
     return {n.replace(r"\$", "$"): figure for n, figure in draw(escaped(results)).items()}
