@@ -99,7 +99,7 @@ def test_fifty_of_fifty_seeds_reach_the_global_mode(paper):
 
 
 def test_a_guess_far_off_is_mended_by_the_search(paper):
-    """k1, k2 and c2 wrong by factors of two: no local climb recovers from that, the search does."""
+    """k1, k2 and c2 wrong by factors of two: no ascent recovers from that, the search does."""
     density = paper.fit.density
     guess = initial_theta(density.oscillator, paper.estimates, paper.noise)
     layout = density.oscillator.layout

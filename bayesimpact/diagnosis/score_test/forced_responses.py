@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 Responses = Callable[[Array], Array]
 """Of frequencies (F,), Hz: whitened responses to sine and cosine of one newton, (2 F, n)."""
 
-CHECKED = 5  # frequencies at which a simulation is the judge
+CHECKED = 5  # frequencies at which a simulation checks the scan
 AGREE = 0.03  # of a response: a scan's chi-squared then errs by its square, 0.1 %
 SIZE = 1e-3  # of the noise: changes so small are linear, and far above rounding
 

@@ -72,7 +72,7 @@ class Flow(NamedTuple):
     turns: Any  # True when a force has a kink or jump at v = 0
     rough: Any  # True when a force is not smooth at impact
     first_at_turn: Any  # shortest step where the motion turns, over the usual one
-    folds: Any  # True when the damping of a creeping mass may be counted into b
+    linearizes: Any  # True when the damping of a creeping mass may be counted into b
     bodies: Any  # True when a body of `resonator` acts
     joint: Any  # True when nothing else is added, so that `joint` is exact
     hop: Any  # usual length of its steps, s

@@ -165,8 +165,8 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
             longest = min(longest, MAX_ANGLE_OF_TIME / time_rate)
         longest = max(longest, w.interval / MOST_HOPS)
         longest = w.interval / np.ceil(w.interval / longest)
-    folds = first_at_turn < 1.0 and not (placed or memory or forced) and time_rate == 0.0
-    if folds:  # the method is none for a force that changes faster than such a speed settles
+    linearizes = first_at_turn < 1.0 and not (placed or memory or forced) and time_rate == 0.0
+    if linearizes:  # the method is none for a force that changes faster than such a speed settles
         rate = rooted_damping(y, v, t, count, w) / mass
         pull = damping * v + (stiffness - slope) * y - force
         pull += sum_of_laws(y, v, t, count, False, w)
@@ -176,7 +176,7 @@ def flow_from(y: Any, v: Any, t: Any, w: Any) -> Any:
     flow = Flow(
         1.0 / mass, b, K, (force - level) / stiffness, slope, level, drag, s[GAP],
         1.0 if touching else 0.0, count, memory, plain, placed, forced, turns, rough, first_at_turn,
-        folds, bodies > 0.0, joint, longest,
+        linearizes, bodies > 0.0, joint, longest,
     )  # fmt: skip
     if tame and not plain:
         longest *= lengthening(y, v, t, time_rate, longest, flow, w)

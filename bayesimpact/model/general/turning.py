@@ -96,8 +96,8 @@ def is_outdated(rate: Any, y: Any, v: Any, n0: Any, longest: Any, flow: Any) -> 
     that stays, the method would make many times what it does. At the speed that a flow is chosen
     for it is.
     """
-    if not flow.folds or flow.drag > 0.0:
-        return flow.folds
+    if not flow.linearizes or flow.drag > 0.0:
+        return flow.linearizes
     return (
         rate * longest > STIFF
         and rate * graded(v, pull_at(y, v, n0, flow), longest, flow.first_at_turn) > 2.0 * STIFF

@@ -60,17 +60,17 @@ def base_motion(site: Site, p: Mapping[str, float], slot: int) -> RigPart:
     omega, ratio, left = 2 * pi * p["frequency"], p["mass_ratio"], site.mass
     drag, stiffness = 2 * p["damping"] * omega, omega**2
 
-    def hold(state: State) -> float:
+    def restoring(state: State) -> float:
         return drag * state[slot + 1] + stiffness * state[slot]
 
     def felt(acceleration: float, y: float, v: float, state: State) -> tuple[float, ...]:
-        # N = left (hold - y''): then m (y'' + X'') + N = 0 and X'' = -hold + r N / m agree
-        return state[slot + 1], -(hold(state) + ratio * acceleration) / (1 + ratio)
+        # N = left (R - y''): then m (y'' + X'') + N = 0 and X'' = -R + r N / m agree
+        return state[slot + 1], -(restoring(state) + ratio * acceleration) / (1 + ratio)
 
     def struck(state: State, impulse: float) -> None:
         state[slot + 1] += ratio * impulse / (left * (1 + ratio))
 
     def law(piece: Piece) -> Law:
-        return lambda t, y, v, state: -left * hold(state)
+        return lambda t, y, v, state: -left * restoring(state)
 
     return RigPart(law, states=(0.0, 0.0), felt=felt, struck=struck, period=1 / p["frequency"])

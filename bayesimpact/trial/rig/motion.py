@@ -246,11 +246,11 @@ class _Run:
         sign = piece.sign
         if sign == 0:
 
-            def hold(t: float, state: State) -> float:
+            def margin(t: float, state: State) -> float:
                 return forces.level - abs(forces.drive(t, state[0], 0.0, state))
 
-            if hold(stop, last) < 0:
-                event, stop = _SLIP, _crossing(lambda t: hold(t, dense(t).tolist()), start, stop)
+            if margin(stop, last) < 0:
+                event, stop = _SLIP, _crossing(lambda t: margin(t, dense(t).tolist()), start, stop)
                 last = dense(stop).tolist()
         else:
             if sign * last[1] <= 0:

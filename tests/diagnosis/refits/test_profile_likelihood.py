@@ -1,4 +1,4 @@
-"""A search along a narrow, bent valley against a likelihood whose profile is known."""
+"""A search along a narrow, bent ridge against a likelihood whose profile is known."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def problem() -> PosteriorDensity:
 
 
 def unfinished() -> Fit:
-    """An unconverged climb, where the branch is ten times too fast."""
+    """An unconverged ascent, where the branch is ten times too fast."""
     t = 0.002
     start = np.array([1.0 + STIFFNESS * TIME - 2000.0 * t, 2000.0, t, 1e-3])
     return find_mode(problem(), start, max_iterations=2)

@@ -133,7 +133,7 @@ def test_what_leaves_nothing_is_compared_with_no_force(monkeypatch, ids, white, 
 
 
 def test_a_set_that_is_asked_for_must_reach_what_it_contains(monkeypatch):
-    """Its climb is told to: one that began elsewhere and will end lower is of no use."""
+    """Its ascent is told to: one that began elsewhere and will end lower is of no use."""
     goals = []
 
     def fit_from(fit, effects, values, scales, *, goal):

@@ -198,7 +198,7 @@ def test_an_ascent_that_gave_up_near_the_best_is_finished_before_it_loses(run):
 
 @pytest.mark.parametrize(("beside", "finished"), [(0.0, True), (20.0, False)])
 def test_the_best_model_s_profile_is_followed_where_that_may_be_all_it_lacks(run, beside, finished):
-    """A free force beside it gains 50 nats, or 70: more than an unconverged climb fell short of."""
+    """A free force beside it gains 50 nats, or 70: more than it fell short of before."""
     table = Table({A: 470.0}, force=520.0, beside=beside, unfinished={A: 40.0})
     assert run(table).chosen.is_white == finished
     assert table.finished == [frozenset({A})] * finished
