@@ -53,6 +53,9 @@ def test_a_campaign_lists_its_recordings(found: Diagnosis) -> None:
     shown = cells(campaign._repr_html_())
     assert [r.name for r in campaign.recordings] == shown[::7]
     assert shown[2] == str(campaign.recordings[0].samples.size) and shown[3] == "1000"
+    table = campaign.summary()
+    assert list(table.index) == shown[::7] and list(table["case"]) == shown[1::7]
+    assert table["duration, s"].iloc[0] == pytest.approx(campaign.recordings[0].duration)
 
 
 def test_readings_are_sketched_from_the_lowest_to_the_highest() -> None:

@@ -7,13 +7,16 @@ from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from bayesimpact.data.frozen import Picklable
 from bayesimpact.data.html import html_table, sketch
 from bayesimpact.data.recording import Recording
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 SECOND_STOP = "opposite_stop"
 """The effect that `stop = "two-sided"` declares: a stop on the side away from the first."""
@@ -56,6 +59,9 @@ class Measurement:
     clock_sd: float = 0.0
     gain_sd: float = 0.0
     unfiltered: bool = False
+
+
+_COLUMNS = ("recording", "case", "samples", "rate, Hz", "duration, s", "quantity")
 
 
 @dataclass(frozen=True)
@@ -120,13 +126,23 @@ class Campaign(Picklable):
 
     def _repr_html_(self) -> str:
         """Its recordings, for a notebook."""
-        columns = ("recording", "case", "samples", "rate, Hz", "duration, s", "quantity", "")
         rows = [
-            (r.name, r.case, r.samples.size, 1.0 / r.interval, r.duration, r.quantity,
-             sketch(r.samples))
+            (*row, sketch(r.samples)) for row, r in zip(self._rows, self.recordings, strict=True)
+        ]
+        return html_table(f"{self.name}: {self.mass:g} kg", (*_COLUMNS, ""), rows)
+
+    @property
+    def _rows(self) -> list[tuple[str, str, int, float, float, str]]:
+        return [
+            (r.name, r.case, r.samples.size, 1.0 / r.interval, r.duration, r.quantity)
             for r in self.recordings
-        ]  # fmt: skip
-        return html_table(f"{self.name}: {self.mass:g} kg", columns, rows)
+        ]
+
+    def summary(self) -> DataFrame:
+        """Its recordings as a DataFrame indexed by their names."""
+        import pandas
+
+        return pandas.DataFrame(self._rows, columns=list(_COLUMNS)).set_index(_COLUMNS[0])
 
     @property
     def angular(self) -> bool:
