@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from bayesimpact.diagnosis.thresholds import LARGE
 from bayesimpact.report.diagnosis.effect_forces import effect_forces, shown_cycle, without_force
 from bayesimpact.report.diagnosis.force_arrays import QUIET_WIDTH
+from bayesimpact.report.diagnosis.force_in_time import is_rough
 from bayesimpact.report.diagnosis.words import listed
 from bayesimpact.report.figures.corner import MOST as MOST_CORNER
 from bayesimpact.report.figures.traces import MOST as MOST_TRACES
@@ -110,13 +110,12 @@ def _more(stem: str, results: Results) -> str:
             " What was named acts in contact, and need not be darkest there: most of what it does "
             "looks like a change of k2, c2 and g, which is why these are wrong without it."
         )
-    misfit = ((diagnosis.get("fit") or {}).get("before") or {}).get("reduced_chi2")
     if diagnosis.get("verdict") == "adequate":
         words += (
             f" Nothing is missing here: drawn is what the recordings allow of a force of about "
             f"{100 * QUIET_WIDTH:.0f} % of the peak elastic force (its prior)."
         )
-    elif misfit is not None and misfit > LARGE**2:
+    elif is_rough(results):
         words += (
             " The base model misses by far more than the noise, and the force follows from a "
             "linearised problem: here it is a rough guide only."

@@ -24,7 +24,7 @@ from bayesimpact.report.cycles import (
     stop_level,
 )
 from bayesimpact.report.diagnosis.effect_forces import shown_cycle
-from bayesimpact.report.diagnosis.force_in_time import force_in_time
+from bayesimpact.report.diagnosis.force_in_time import force_in_time, is_rough
 from bayesimpact.report.figures.force_map import force_unit
 from bayesimpact.report.figures.recordings import shown_recordings
 from bayesimpact.report.figures.style import response, response_word
@@ -52,7 +52,7 @@ def style() -> str:
 
 
 def explorer_words(results: Results) -> str:
-    """What is in the explorer, where that is not everything."""
+    """What is in the explorer, where that is not everything, and what is rough in it."""
     shown, most = _extent(results)
     words = []
     if len(shown) < len(results.recordings):
@@ -62,6 +62,11 @@ def explorer_words(results: Results) -> str:
         )
     if any(results.recordings[r].samples.size > most for r in shown):
         words.append(f"Of each recording the first {most} samples are here.")
+    if _has_force(results) and is_rough(results):
+        words.append(
+            "The base model misses by far more than the noise: the unexplained force, of a "
+            "linearised problem, is a rough guide only."
+        )
     return " ".join(words)
 
 

@@ -146,7 +146,14 @@ def test_long_campaigns_keep_their_size() -> None:
     assert "12 of 40 recordings" in explorer_words(results)
     long = make_results(1, 1, n=MOST_SAMPLES + 50)
     assert f"first {MOST_SAMPLES} samples" in explorer_words(long)
-    assert explorer_words(make_results()) == ""
+    assert explorer_words(make_results()) == explorer_words(diagnosed()) == ""
+
+
+def test_a_force_from_a_large_misfit_is_called_rough() -> None:
+    """Spikes of 250 mN stood under a friction of 20 mN, as if they were as well known."""
+    large = diagnosed(fit={"before": {"reduced_chi2": 8510.0}})
+    assert "rough guide" in explorer_words(large)
+    assert explorer_words(replace(large, diagnosis_arrays={})) == ""
 
 
 def test_scripts_are_the_same_in_every_page_and_hold_no_address() -> None:

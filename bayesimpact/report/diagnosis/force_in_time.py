@@ -4,8 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from bayesimpact.diagnosis.thresholds import LARGE
 from bayesimpact.report.cycles import offset_of
 from bayesimpact.report.results import Array, Results
+
+
+def is_rough(results: Results) -> bool:
+    """Whether the force follows from a problem that was linearised about a large misfit."""
+    diagnosis = results.diagnosis or {}
+    misfit = ((diagnosis.get("fit") or {}).get("before") or {}).get("reduced_chi2")
+    return diagnosis.get("verdict") != "adequate" and misfit is not None and misfit > LARGE**2
 
 
 def force_in_time(results: Results, r: int, predicted: Array) -> tuple[Array, Array] | None:
