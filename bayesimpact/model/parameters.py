@@ -24,9 +24,10 @@ from bayesimpact.data.recording import Recording
 from bayesimpact.data.short_repr import short_repr
 from bayesimpact.errors import InputError
 from bayesimpact.model.effects.effect import Effect, EffectParameter, catalogued
+from bayesimpact.model.exact.normalized import Q
 from bayesimpact.model.second_stop import DECLARED
 
-BASE_SLOTS = ("c1", "k1", "c2", "g", "k2", "y0", "v0", "A", "w", "phase", "offset")
+BASE_SLOTS = Q
 ADDED_SLOTS = (
     "friction", "contact_mass", "no_tension", "gap_step",
     "second_frequency", "second_damping", "second_gain",
