@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from bayesimpact.data.campaign import Campaign, Smoothing
 from bayesimpact.data.short_repr import short_repr
 from bayesimpact.model import measurement
-from bayesimpact.model.effects.effect import LAW_ROW, Effect, law_row
+from bayesimpact.model.effects.effect import LAW_ROW, Effect
 from bayesimpact.model.exact.arguments import Inputs
+from bayesimpact.model.law_table import law_row
 from bayesimpact.model.motions import general_motions, motions
 from bayesimpact.model.parameters import (
     BASE_SLOTS,

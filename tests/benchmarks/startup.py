@@ -69,7 +69,7 @@ EVERYTHING = (
     + """
 from bayesimpact.model.exact.sensitivities.derivatives import grams
 from bayesimpact.model.effects import EFFECTS
-from bayesimpact.model.effects.effect import law_row
+from bayesimpact.model.law_table import law_row
 from bayesimpact.model.motions import general_motions
 from bayesimpact.model.parameters import BASE_SLOTS
 from bayesimpact.model.exact.simulate import simulate

@@ -32,7 +32,8 @@ from bayesimpact.diagnosis.residual_force.learned import (
 from bayesimpact.diagnosis.score_test.directions import sigma_of, whitened
 from bayesimpact.diagnosis.score_test.projection import Projection, project
 from bayesimpact.inference.fit import Fit, inverse
-from bayesimpact.model.effects.effect import Effect, Scales, law_row
+from bayesimpact.model.effects.effect import Effect, Scales
+from bayesimpact.model.law_table import law_row
 from bayesimpact.model.measurement import smooth
 from bayesimpact.model.motions import general_motions
 from bayesimpact.model.oscillator import Oscillator

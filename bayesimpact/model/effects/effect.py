@@ -358,24 +358,6 @@ def catalogued(id: str) -> Effect | None:
 LAW_ROW = 10  # numbers in a law's row
 
 
-def law_row(law: Law, first: int, initial: int = -1) -> list[int]:
-    """A law's row in the general simulator's table.
-
-    Parameters
-    ----------
-    first : slot at which the law's parameters begin
-    initial : slot of its state at the first sample; -1: that is 0
-    """
-    functions = (law.force, law.rate, law.surface)
-    flags = (law.where == "contact") + 2 * law.kink_at_turn + 4 * law.rough_at_touch
-    flags += 8 * law.polynomial + 16 * law.ignores_speed
-    flags += 32 * law.jump_at_turn + 64 * law.jump_at_surface
-    force, rate, surface = (address(f) if f else 0 for f in functions)
-    extents = (law.time_rate, law.feature_length, law.first_at_turn, law.travel)
-    addresses = [address(f) if f else 0 for f in extents]
-    return [force, rate, surface, flags, first, *addresses, initial]
-
-
 @cache
 def address(function: Callable[..., float]) -> int:
     """Pointer to a law's function, compiled on first use."""

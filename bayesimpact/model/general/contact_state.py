@@ -19,20 +19,10 @@ from bayesimpact.model.general.context import (
     C1,
     C2,
     CONTACT_MASS,
-    CONTACT_ONLY,
     FRICTION,
     GAP_STEP,
-    JUMP_AT_SURFACE,
-    JUMP_AT_TURN,
     K1,
     K2,
-    LAW_COLUMNS,
-    LAW_FIRST,
-    LAW_FLAGS,
-    LAW_FORCE,
-    LAW_INITIAL,
-    LAW_SURFACE,
-    LAW_TRAVEL,
     NO_TENSION,
     NOW,
     RESTITUTION,
@@ -57,6 +47,18 @@ from bayesimpact.model.general.resonator import (
 )
 from bayesimpact.model.jit.callback import call_law
 from bayesimpact.model.jit.compiled import inner
+from bayesimpact.model.law_table import (
+    CONTACT_ONLY,
+    JUMP_AT_SURFACE,
+    JUMP_AT_TURN,
+    LAW_COLUMNS,
+    LAW_FIRST,
+    LAW_FLAGS,
+    LAW_FORCE,
+    LAW_INITIAL,
+    LAW_SURFACE,
+    LAW_TRAVEL,
+)
 
 # what holds between events: gap, kind of motion, direction of sliding (0: held), direction of
 # motion, whether the obstacle has pushed in this contact; displacement and velocity of a second

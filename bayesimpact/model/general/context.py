@@ -8,6 +8,7 @@ import numpy as np
 
 from bayesimpact.model.jit.callback import call_law
 from bayesimpact.model.jit.compiled import inner
+from bayesimpact.model.law_table import LAW_COLUMNS, LAW_FIRST, LAW_TRAVEL
 
 # slots of q: bayesimpact.model.parameters.SLOTS
 C1, K1, C2, G, K2, Y0, V0, FORCE, OMEGA, PHASE, OFFSET = range(11)
@@ -15,11 +16,6 @@ FRICTION, CONTACT_MASS, NO_TENSION, GAP_STEP = range(11, 15)
 SECOND_FREQUENCY, SECOND_DAMPING, SECOND_GAIN = range(15, 18)
 OBSTACLE_MASS, OBSTACLE_FREQUENCY, OBSTACLE_DAMPING = range(18, 21)
 FRAME_RATIO, FRAME_FREQUENCY, FRAME_DAMPING, ADHESION, RESTITUTION = range(21, 26)
-# columns of the table of laws, and its flags: bayesimpact.model.effects.effect.law_row
-LAW_FORCE, LAW_RATE, LAW_SURFACE, LAW_FLAGS = range(4)
-LAW_FIRST, LAW_TIME_RATE, LAW_FEATURE, LAW_TURN, LAW_TRAVEL, LAW_INITIAL, LAW_COLUMNS = range(4, 11)
-CONTACT_ONLY, KINK_AT_TURN, ROUGH_AT_TOUCH, POLYNOMIAL, PLACED = 1, 2, 4, 8, 16
-JUMP_AT_TURN, JUMP_AT_SURFACE = 32, 64
 # columns of the work array, one row per law and two per body of `resonator`: a law's state at the
 # start of a step, at a stage and at the end; the rates of six stages; exp(-lambda h / 4), lambda,
 # alpha, x_u, x_v; where the motion last turned, and which way it goes since, for a state that

@@ -16,8 +16,6 @@ from bayesimpact.model.general.context import (
     ALPHA,
     FADE,
     LAMBDA,
-    LAW_COLUMNS,
-    LAW_RATE,
     NOW,
     STATE_RATE,
     WORK_COLUMNS,
@@ -34,6 +32,7 @@ from bayesimpact.model.general.resonator import (
     remember_bodies,
 )
 from bayesimpact.model.jit.compiled import inner
+from bayesimpact.model.law_table import LAW_COLUMNS, LAW_RATE
 
 
 @inner()

@@ -31,8 +31,6 @@ from bayesimpact.model.general.context import (
     CONTACT_MASS,
     K1,
     K2,
-    LAW_COLUMNS,
-    LAW_RATE,
     NOW,
     SECOND_DAMPING,
     SECOND_FREQUENCY,
@@ -49,6 +47,7 @@ from bayesimpact.model.general.resonator import (
     shift_bodies,
 )
 from bayesimpact.model.jit.compiled import compiled, inner
+from bayesimpact.model.law_table import LAW_COLUMNS, LAW_RATE
 
 TERMS = 14  # of a power series over a time of at most half a radian: the rest is below 1e-18
 SHORT = 1e-6  # of a step, for the slope of the contact force along the motion

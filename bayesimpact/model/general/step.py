@@ -9,20 +9,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from bayesimpact.model.general.context import (
-    AHEAD,
-    LAW_FORCE,
-    NOW,
-    STAGE,
-    WORK_COLUMNS,
-    forcing,
-    law_value,
-)
+from bayesimpact.model.general.context import AHEAD, NOW, STAGE, WORK_COLUMNS, forcing, law_value
 from bayesimpact.model.general.joint import joint_step
 from bayesimpact.model.general.memory import begin_memory, remember, state_rate
 from bayesimpact.model.general.method import place_stage, stage
 from bayesimpact.model.general.resonator import bodies_force
 from bayesimpact.model.jit.compiled import inner
+from bayesimpact.model.law_table import LAW_FORCE
 
 
 @inner(forceinline=True)

@@ -13,16 +13,10 @@ from typing import Any
 import numpy as np
 
 from bayesimpact.model.general.contact_state import GAP, MODE, TOUCHING
-from bayesimpact.model.general.context import (
-    LAW_COLUMNS,
-    LAW_FORCE,
-    LAW_TURN,
-    NOW,
-    WORK_COLUMNS,
-    law_value,
-)
+from bayesimpact.model.general.context import NOW, WORK_COLUMNS, law_value
 from bayesimpact.model.general.step import added_force
 from bayesimpact.model.jit.compiled import inner
+from bayesimpact.model.law_table import LAW_COLUMNS, LAW_FORCE, LAW_TURN
 
 # where a force is not smooth at a turning point, for times in units of the longest step: step over
 # the 3/4th power of the time since then, or until then; not much longer than the time itself

@@ -14,7 +14,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.model.general.context import (
+from bayesimpact.model.jit.threads import in_shares
+from bayesimpact.model.law_table import (
     CONTACT_ONLY,
     JUMP_AT_SURFACE,
     JUMP_AT_TURN,
@@ -23,7 +24,6 @@ from bayesimpact.model.general.context import (
     LAW_RATE,
     LAW_TRAVEL,
 )
-from bayesimpact.model.jit.threads import in_shares
 from bayesimpact.model.linear_response.path_forces import add_forces
 from bayesimpact.model.linear_response.superposition import Motion, answers, motion_along
 from bayesimpact.model.oscillator import Oscillator

@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from bayesimpact.model.general.context import (
+from bayesimpact.model.jit.callback import call_law
+from bayesimpact.model.jit.compiled import compiled
+from bayesimpact.model.law_table import (
     CONTACT_ONLY,
     JUMP_AT_SURFACE,
     JUMP_AT_TURN,
@@ -16,8 +18,6 @@ from bayesimpact.model.general.context import (
     LAW_INITIAL,
     LAW_SURFACE,
 )
-from bayesimpact.model.jit.callback import call_law
-from bayesimpact.model.jit.compiled import compiled
 from bayesimpact.model.linear_response.path_states import follow
 
 

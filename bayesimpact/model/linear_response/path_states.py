@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from bayesimpact.model.general.context import LAW_RATE, LAW_TRAVEL
 from bayesimpact.model.jit.callback import call_law
 from bayesimpact.model.jit.compiled import compiled
+from bayesimpact.model.law_table import LAW_RATE, LAW_TRAVEL
 
 PARTS = 4  # of a sampling interval: an impact begins and ends within one
 

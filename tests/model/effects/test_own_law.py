@@ -8,8 +8,8 @@ from effect_rigs import BY_ID, TestRig, moved
 from scipy.integrate import solve_ivp
 
 from bayesimpact.model.effects import Effect, EffectParameter, Law
-from bayesimpact.model.effects.effect import LAW_ROW, law_row
-from bayesimpact.model.general.context import LAW_COLUMNS
+from bayesimpact.model.effects.effect import LAW_ROW
+from bayesimpact.model.law_table import LAW_COLUMNS, law_row
 
 RIG = TestRig(k2=(5350.0,), y0=(-6.5e-3,), v0=(0.0,), duration=1.0)
 
