@@ -46,6 +46,10 @@ def _without(*lines: int) -> str:
 BEAM = "length_mm = 110\nwidth_mm = 20\nthickness_mm = 5\n"
 
 BAD_TOML = [
+    _more("a corner of zero", "high_pass_hz = 0\n", "key high_pass_hz", "above 0"),
+    _more("a corner below zero", "high_pass_hz = -0.5\n", "key high_pass_hz", "above 0"),
+    _more("a corner in words", 'high_pass_hz = "AC"\n', "key high_pass_hz", "above 0"),
+    _more("a corner beyond the band", "high_pass_hz = 250.0\n", "key high_pass_hz", "below half"),
     _toml("deep lists", "0.503", "[" * 9000 + "]" * 9000, "nested without end"),
     _toml("deep keys", "mass_kg", "a" + ".a" * 9000 + " = 1\nmass_kg", "unknown key"),
     _toml("a key without end", "mass_kg", "a" + ".a" * 60_000 + " = 1", "line 2", "in a line"),

@@ -129,6 +129,7 @@ def _entry(where: str, given: object) -> dict[str, Any]:
         entry["used"] = given.used
         entry["gain"] = "free" if given.free_gain else "known"
         entry["motion"] = given.motion_name or None
+        entry["high_pass_hz"] = given.high_pass or None
         if given.input is not None:
             gain = "free" if given.input.free else "known"
             stated = "first_order" if given.input.lines_stated else None

@@ -44,6 +44,8 @@ def prior_names(stop: bool, recordings: Sequence[Recording]) -> list[str]:
         names += [f"k2[{case}]" for case in dict.fromkeys(r.case for r in recordings)]
     freed = [f"gain[{r.name}]" for r in recordings if r.free_gain]
     names += ["gain", *freed] if freed else []
+    passed = [f"high_pass_state[{r.name}]" for r in recordings if r.high_pass]
+    names += ["high_pass_state", *passed] if passed else []
     for family in ("y0", "v0", "offset", "sigma"):
         names += [family, *(f"{family}[{r.name}]" for r in recordings)]
     return names
@@ -66,6 +68,7 @@ def parameter_ranges(mass: float, recordings: Sequence[Recording]) -> dict[str, 
         "y0": (-reach, reach),
         "v0": (-reach * fast, reach * fast),
         "offset": (float(min(readings)) - beyond, float(max(readings)) + beyond),
+        "high_pass_state": (-beyond, beyond),
         "sigma": (FINEST * beyond, beyond),
         "gain": (1.0 / FARTHER, FARTHER),
     }

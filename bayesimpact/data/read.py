@@ -258,15 +258,20 @@ def _recording(
         input=input_of(where, entry, given, table.quantity, table.input_unit),
         motion_name=entry.motion or "",
         free_gain=entry.gain == "free",
+        high_pass=entry.high_pass_hz or 0.0,
     )
     key = "exclude_s" if entry.exclude_s else "resample"
     recording = excluded_spans(f"{where}, key {key}", recording, entry.exclude_s or ())
     if entry.resample:
         recording = after_lone_readings(recording)
     _check_motion(source, recording)
-    if entry.clock_ratio is None:
-        return recording
-    return replace(recording, interval=interval * entry.clock_ratio)
+    if entry.clock_ratio is not None:
+        recording = replace(recording, interval=interval * entry.clock_ratio)
+    highest = 0.5 / recording.interval
+    if recording.high_pass >= highest:
+        accepted = f"below half the sampling rate, {highest:g} Hz"
+        raise InputError(f"{where}, key high_pass_hz", f"{recording.high_pass:g} Hz", accepted)
+    return recording
 
 
 def _check_motion(where: str, recording: Recording) -> None:

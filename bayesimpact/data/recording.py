@@ -29,6 +29,8 @@ class Recording:
     input : what drove the motion, cut to the samples in the same way; None for a free decay
     motion_name : of the motion of which this is one channel of several; "" where it is the only one
     free_gain : the probe's gain is an unknown near 1, `gain[name]`; else it is 1
+    high_pass : corner of the first-order high-pass that the readings came through, Hz; 0 for none.
+        What it had settled on at the first sample is an unknown, `high_pass_state[name]`
     """
 
     name: str
@@ -41,6 +43,7 @@ class Recording:
     input: Input | None = None
     motion_name: str = ""
     free_gain: bool = False
+    high_pass: float = 0.0
 
     def __repr__(self) -> str:
         """One line."""

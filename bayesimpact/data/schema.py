@@ -93,6 +93,9 @@ class RecordingTable(_Table):
     gain: Literal["known", "free"] = Field(
         "known", description='"known" (1) or "free": an unknown near 1, gain[<recording>]'
     )
+    high_pass_hz: Rate | None = Field(
+        None, description=f"{POSITIVE}, Hz {_from(bounds.RATE)}, below half the sampling rate"
+    )
     start_s: Time | None = Field(None, description=f"{NUMBER}, s on the file's own clock")
     end_s: Time | None = Field(None, description=f"{NUMBER}, s on the file's own clock")
     exclude_s: list[Annotated[list[Time], Field(min_length=2, max_length=2)]] | None = Field(

@@ -49,6 +49,8 @@ def write_campaign(
             lines.append(f"motion = {toml(recording.motion_name)}")
         if recording.free_gain:
             lines.append('gain = "free"')
+        if recording.high_pass:
+            lines.append(f"high_pass_hz = {toml(float(recording.high_pass))}")
         if recording.input is not None:
             lines.append(f"input = {toml(_input(recording.input))}")
         if recording.used is not None:

@@ -60,6 +60,7 @@ from bayesimpact.diagnosis.faults.simpler import (
 from bayesimpact.diagnosis.faults.soft_release import soft_releases
 from bayesimpact.diagnosis.faults.unfree_start import BETTER, unfree_starts
 from bayesimpact.diagnosis.loop import Diagnosis, Progress, diagnose_fit
+from bayesimpact.diagnosis.measurement.high_pass import through_high_pass
 from bayesimpact.diagnosis.measurement.smoothing import SAVITZKY_GOLAY, whole_campaign
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.score_test.scan import scan
@@ -183,19 +184,22 @@ def _diagnosed(
     say("fitting the base model")
     cleaned = cleaned_campaign(campaign, rng=rng, search=search)
     first = cleaned.identification.fit
-    pushed = _pushed(cleaned, effects) if is_large(first) else ()
+    passed = through_high_pass(first, effects, failed=base_failed(first))
+    pushed = _pushed(cleaned, effects) if is_large(first) and passed is None else ()
     if pushed:
         cleaned = without_faults(cleaned, pushed, campaign, rng=rng)
-    elif base_failed(first):
+    elif base_failed(first) and passed is None:
         cleaned = _by_a_free_rest(cleaned, campaign, rng)
     say("comparing the recordings")
-    doubtful = list(comparisons(cleaned, campaign))
+    doubtful = list(_compared(cleaned, campaign, passed))
     fit = cleaned.identification.fit
     if changed := change_instead(doubtful, fit, fit, campaign):
         cleaned = with_steps(cleaned, [changed], rng=rng, search=search)
-        doubtful = list(comparisons(cleaned, campaign))
+        passed, doubtful = None, list(comparisons(cleaned, campaign))
     certain, proved = cleaned, False
-    beside_physics = faults_beside_physics(cleaned, campaign, effects, doubtful)
+    beside_physics = (
+        faults_beside_physics(cleaned, campaign, effects, doubtful) if passed is None else ()
+    )
     if beside_physics:
         certain = with_steps(cleaned, beside_physics, rng=rng, search=search)
         doubtful, proved = [], True
@@ -207,7 +211,7 @@ def _diagnosed(
         proved = proved or gains_more_than(doubtful[0], fit, float(promised.sum()))
         certain = with_steps(certain, [doubtful.pop(0)], rng=rng, search=search)
     searches = Searches(rng, effects, say, begin(clock), campaign)
-    found = searches.search(certain)
+    found = searches.search(certain, passed if certain is cleaned else None)
     beside = [e for e in found.effects if e in found.after.density.oscillator.effects]
     if shared_effects(beside) and is_doubtful(found):
         say("comparing the recordings beside what is missing")
@@ -220,6 +224,13 @@ def _diagnosed(
     found = _without_unfree_start(found, campaign, searches)
     undecided = found.corrected is not None and found.corrected.is_open
     return replace(found, verdict="ambiguous") if undecided and is_complete(found) else found
+
+
+def _compared(cleaned: Corrected, as_read: Campaign, passed: Fit | None) -> tuple[Step, ...]:
+    """`comparisons`, beside the high-pass of a fit where there is one."""
+    if passed is None:
+        return comparisons(cleaned, as_read)
+    return comparisons(cleaned, as_read, passed.density.oscillator.effects, values_of(passed))
 
 
 def _pushed(cleaned: Corrected, effects: Sequence[Effect]) -> tuple[Fault, ...]:

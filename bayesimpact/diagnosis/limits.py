@@ -60,7 +60,8 @@ def _limit(fit: Fit, score: Score, scan: Scan, scales: Scales) -> Limit:
     direction = next(d for d, s in zip(scan.found, scan.scores, strict=True) if s is score)
     name = score.names[0].split(".", 1)[1].split("[")[0]
     parameter = score.effect.parameter(name)
-    size, sd = np.atleast_1d(score.size), np.atleast_1d(score.size_sd)
+    alike = [n.split(".", 1)[1].split("[")[0] == name for n in score.names]
+    size, sd = np.atleast_1d(score.size)[alike], np.atleast_1d(score.size_sd)[alike]
     upper = float(
         np.max([upper_limit(m, s, direction.one_sided) for m, s in zip(size, sd, strict=True)])
     )

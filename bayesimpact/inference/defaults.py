@@ -37,7 +37,7 @@ from bayesimpact.inference.prior import (
 from bayesimpact.inference.priors import Priors, prior_from_table
 from bayesimpact.model.effects.effect import EffectParameter, Scales
 from bayesimpact.model.oscillator import Oscillator
-from bayesimpact.model.parameters import GAIN, is_added
+from bayesimpact.model.parameters import GAIN, HIGH_PASS_STATE, is_added
 
 GAIN_WIDTH = 0.1  # a calibration that is farther off is a wrong unit, and a fault
 SHAPE_WIDTH = 1.5  # of the log-normal prior of a depth, a time constant, a frequency
@@ -79,6 +79,9 @@ def _default(
         return LogUniform(1e-4 * noise.level, 1e4 * noise.level)
     if kind == GAIN:
         return Normal(1.0, GAIN_WIDTH)
+    if kind == HIGH_PASS_STATE:  # between the rest and where a mass was held
+        own = {r.name: r.samples for r in campaign.recordings}[name[len(kind) + 1 : -1]]
+        return Normal(0.0, float(np.ptp(own)))
     mass, k1 = campaign.mass, estimates.k1
     reach = 20 * max(r.motion(np.sqrt(k1 / mass)) for r in campaign.recordings)
     if kind == "offset":  # what is added to a reading is limited by the readings

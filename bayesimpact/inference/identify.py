@@ -23,6 +23,7 @@ from bayesimpact.inference.defaults import default_priors
 from bayesimpact.inference.fit import Fit, PosteriorDensity
 from bayesimpact.inference.initial.estimates import Estimates, estimate
 from bayesimpact.inference.initial.from_periods import or_by_periods
+from bayesimpact.inference.initial.high_pass import campaign_before_high_pass, of_readings
 from bayesimpact.inference.initial.horizon import best_ascent
 from bayesimpact.inference.initial.rough import rough_estimates
 from bayesimpact.inference.likelihood import Likelihood
@@ -111,7 +112,7 @@ def identify(
     values of parameters are `known`, from which to begin.
     Raises `InputError` when a recording shows no oscillation.
     """
-    estimates = rough_estimates(campaign) if campaign.declared else estimate(campaign)
+    estimates = _estimates(campaign)
     given, noise = noise is not None, noise or about_average(estimate_noise(campaign), campaign)
     oscillator = build_oscillator(campaign, sigma_per_recording=sigma_per_recording)
     if oscillator.acting:
@@ -144,6 +145,12 @@ def identify(
         noise = refined
         best = find_mode(PosteriorDensity(Likelihood(oscillator, noise), priors), best.mode)
     return Identification(best, estimates, noise, result, from_guess, from_search)
+
+
+def _estimates(campaign: Campaign) -> Estimates:
+    """Initial estimates, from what came into a high-pass where the campaign declares one."""
+    seen = campaign_before_high_pass(campaign)
+    return of_readings(rough_estimates(seen) if seen.declared else estimate(seen), campaign)
 
 
 def _with_declared(
@@ -226,9 +233,10 @@ def global_search(
         callback=callback,
     )
     winner = profile.complete(result.best[None])[0]
-    driven = [r.input is not None for r in oscillator.campaign.recordings]
-    own = profile.columns[driven][:, NUISANCE_SLOTS]
-    winner[own] = guess[own]  # the excerpt of a driven recording begins somewhere
+    other = [bool(r.input or r.high_pass) for r in oscillator.campaign.recordings]
+    own = profile.columns[other][:, NUISANCE_SLOTS]
+    # the excerpt of a driven recording begins somewhere, the rest before a high-pass is another
+    winner[own] = guess[own]
     return result, winner
 
 
@@ -253,7 +261,8 @@ class _ProfiledObjective:
     ) -> None:
         layout = oscillator.layout
         self.weights = 1.0 / (np.ones(oscillator.counts.size) if scales is None else scales) ** 2
-        short = oscillator.campaign.excerpt(duration).thinned(duration / SEARCH_SAMPLES)
+        whole = campaign_before_high_pass(oscillator.campaign)
+        short = whole.excerpt(duration).thinned(duration / SEARCH_SAMPLES)
         self.short = Oscillator(short, (), layout, None)
         self.guess = guess
         self.physical = layout.roles("physical")

@@ -21,7 +21,7 @@ from bayesimpact.inference.noise.whitening import Noise
 from bayesimpact.model.exact.sensitivities.derivatives import trajectories_and_derivatives
 from bayesimpact.model.exact.simulate import sums_of_squares
 from bayesimpact.model.linear_response.nearby import readings_near
-from bayesimpact.model.measurement import smooth
+from bayesimpact.model.measurement import high_passed, remembered, smooth
 from bayesimpact.model.oscillator import Oscillator
 from bayesimpact.model.parameters import BASE_SLOTS, SLOTS, Layout
 from bayesimpact.model.rounding import Rounding, average_square, coarse_step, likeliest_rounding
@@ -296,6 +296,8 @@ class Likelihood:
             rows, places = np.vstack([predicted, jacobian[used]]), columns[r, used]
             if (own := o.gains[r]) >= 0:
                 rows, places = _with_gain(rows, places, o.layout, theta, r, int(own))
+            if (own := o.high_pass_states[r]) >= 0:
+                rows, places = _with_high_pass(rows, places, o, theta, r, int(own))
             stacked = smooth(rows, o.smoothing, float(o.intervals[r]))
             result.append(self._whitened(r, stacked[0], stacked[1:], places))
         return tuple(result)
@@ -337,3 +339,19 @@ def _with_gain(
     rest = 1 + np.flatnonzero(places == layout.columns[r, _OFFSET])
     scaled[rest] = rows[rest]
     return np.vstack([scaled, motion]), np.append(places, gain)
+
+
+def _with_high_pass(
+    rows: Array, places: Index, o: Oscillator, theta: Array, r: int, state: int
+) -> tuple[Array, Index]:
+    """Reading and derivatives (1 + k, n) of recording r after its high-pass, and that by what this
+    had settled on. The rest reading is added behind the filter.
+    """
+    corner, interval = o.campaign.recordings[r].high_pass, float(o.intervals[r])
+    kept = remembered(corner, interval, rows.shape[1])
+    offset = o.layout.offsets(r, theta)
+    rest = 1 + np.flatnonzero(places == o.layout.columns[r, _OFFSET])
+    passed = high_passed(np.vstack([rows[:1] - offset, rows[1:]]), corner, interval)
+    passed[0] += offset - theta[state] * kept
+    passed[rest] = rows[rest]
+    return np.vstack([passed, -kept]), np.append(places, state)

@@ -1,4 +1,4 @@
-"""The measuring chain after the probe: linear filters that smooth a recording."""
+"""The measuring chain after the probe: linear filters that a recording passes."""
 
 from __future__ import annotations
 
@@ -66,6 +66,40 @@ def _kept(values: Array) -> Array:
     found = np.asarray(values, dtype=np.float64)
     found.setflags(write=False)
     return found
+
+
+def high_passed(samples: Array, corner: float, interval: float) -> Array:
+    """Samples (..., n) after a first-order high-pass of a corner in Hz that takes nothing off the
+    first. What it takes off, z with z' = w (y - z), follows y between two samples as the mean of
+    the parabolas through three: exact for a line, else to the fourth order of the interval.
+    """
+    from scipy import signal  # slow to import
+
+    step = 2.0 * np.pi * corner * interval
+    if step == 0.0:
+        return samples.copy()
+    gone = -np.expm1(-step)  # share of a constant that an interval takes off
+    new = 1.0 - gone / step  # of which by the later sample
+    between = samples.copy()
+    between[..., 1:-1] -= np.diff(samples, 2, axis=-1) / 12.0
+    first = -new * between[..., :1]
+    constant, _ = signal.lfilter([new, gone - new], [1.0, gone - 1.0], between, axis=-1, zi=first)
+    return np.asarray(samples - constant)
+
+
+def remembered(corner: float, interval: float, count: int) -> Array:
+    """Share (count,) of what a high-pass had settled on at the first sample that it still takes off
+    at each.
+    """
+    return np.asarray(np.exp(-2.0 * np.pi * corner * interval * np.arange(count)))
+
+
+def settling(corner: Array, times: Array) -> Array:
+    """What a high-pass of a corner (..., 1), Hz, makes at `times` (n,) of a line of slope 1, (...,
+    n), s: (1 - exp(-w t)) / w.
+    """
+    turns = np.maximum(2.0 * np.pi * corner * times, 1e-300)
+    return np.asarray(times * -np.expm1(-turns) / turns)
 
 
 def magnitude_response(smoothing: Smoothing | None, interval: float, frequency: Array) -> Array:

@@ -24,6 +24,7 @@ from bayesimpact.model.motions import general_motions, motions
 from bayesimpact.model.parameters import (
     BASE_SLOTS,
     GAIN,
+    HIGH_PASS_STATE,
     SLOTS,
     WITHOUT,
     Layout,
@@ -159,21 +160,39 @@ class Oscillator:
     @cached_property
     def gains(self) -> NDArray[np.int64]:
         """Position in theta of every probe's gain, (R,); -1 where it is 1."""
+        return self._positions(GAIN)
+
+    @cached_property
+    def high_pass_states(self) -> NDArray[np.int64]:
+        """Position in theta of what every recording's high-pass had settled on, (R,); -1 for none.
+
+        Whose corner that is: `Recording.high_pass`.
+        """
+        return self._positions(HIGH_PASS_STATE)
+
+    def _positions(self, nuisance: str) -> NDArray[np.int64]:
+        """Positions in theta of a nuisance that not every recording has, (R,), or -1."""
         positions = {name: i for i, name in enumerate(self.layout.names)}
-        names = [f"{GAIN}[{r.name}]" for r in self.campaign.recordings]
+        names = [f"{nuisance}[{r.name}]" for r in self.campaign.recordings]
         return np.array([positions.get(name, -1) for name in names], dtype=np.int64)
+
+    def settled_on(self, r: int, theta: Array) -> float:
+        """What the high-pass of recording `r` had settled on for parameters (d,); 0 without one."""
+        own = self.high_pass_states[r]
+        return float(theta[own]) if own >= 0 else 0.0
 
     def recording_columns(self, r: int) -> NDArray[np.int64]:
         """Positions in theta of everything that recording `r` depends on, sorted, (k,)."""
         used = [self.layout.columns[r][self.layout.columns[r] >= 0]]
         used += [positions[r] for _, positions in self.sensors]
-        used += [self.gains[r : r + 1]] if self.gains[r] >= 0 else []
+        used += [own[r : r + 1] for own in (self.gains, self.high_pass_states) if own[r] >= 0]
         return np.unique(np.concatenate(used))
 
     @property
     def is_plain(self) -> bool:
         """True when predictions are the base simulator's plus the offset, and nothing else."""
-        measured = not self.sensors and self.smoothing is None and bool(np.all(self.gains < 0))
+        nuisances = np.concatenate([self.gains, self.high_pass_states])
+        measured = not self.sensors and self.smoothing is None and bool(np.all(nuisances < 0))
         return self.is_base and measured
 
     def predict(self, theta: Array) -> tuple[Array, ...]:
@@ -215,19 +234,26 @@ class Oscillator:
         return self.read(r, motions, theta)
 
     def read(self, r: int, motion: Array, theta: Array) -> Array:
-        """Gain, sensor, rest offset and filter on true displacements (or their time derivatives,
-        as the probe reads them), (B, n), of recording `r`.
+        """Gain, sensor, high-pass, rest offset and filter on true displacements (or their time
+        derivatives, as the probe reads them), (B, n), of recording `r`.
 
         What effects of the probe add to what it sees is summed: a set of them has no order.
         """
         if self.gains[r] >= 0:
             motion = motion * theta[:, self.gains[r], None]
-        times = np.arange(motion.shape[1]) * self.intervals[r]
-        reading = motion + self.layout.offsets(r, theta)[:, None]
+        interval = float(self.intervals[r])
+        times: Array = np.arange(motion.shape[1], dtype=np.float64) * interval
+        seen = motion
         for effect, positions in self.sensors:
             assert effect.observe is not None
-            reading += effect.observe(motion, times, theta[:, positions[r]]) - motion
-        return measurement.smooth(reading, self.smoothing, float(self.intervals[r]))
+            seen = seen + (effect.observe(motion, times, theta[:, positions[r]]) - motion)
+        if self.high_pass_states[r] >= 0:
+            corner = self.campaign.recordings[r].high_pass
+            state = theta[:, self.high_pass_states[r], None]
+            passed = measurement.high_passed(seen, corner, interval)
+            seen = passed - state * measurement.remembered(corner, interval, times.size)
+        reading = seen + self.layout.offsets(r, theta)[:, None]
+        return measurement.smooth(reading, self.smoothing, interval)
 
     def displacements(self, theta: Array) -> tuple[Array, ...]:
         """True displacements of all recordings, (n_r,), m, for one parameter vector (d,)."""

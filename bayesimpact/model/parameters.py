@@ -41,6 +41,7 @@ WITHOUT = {"restitution": 1.0}
 
 INPUT_GAIN = "input_gain"
 GAIN = "gain"
+HIGH_PASS_STATE = "high_pass_state"
 
 Role = Literal["physical", "effect", "nuisance", "noise"]
 _SHARED_UNITS = {"c1": "N s/m", "k1": "N/m", "c2": "N s/m", "g": "m"}
@@ -160,6 +161,9 @@ def build_layout(
             add(_nuisances(recording, keeper)[nuisance], unit, "nuisance")
         if recording.free_gain:
             add(f"{GAIN}[{recording.name}]", "-", "nuisance", 0.0)
+        if recording.high_pass:
+            unit = reading_unit("m", recording.order)
+            add(f"{HIGH_PASS_STATE}[{recording.name}]", unit, "nuisance")
     orders = [r.order for r in campaign.recordings]
     for name, order in zip(sigma_names(campaign, sigma_per_recording), orders, strict=False):
         add(name, reading_unit("m", order), "noise", 0.0)

@@ -27,6 +27,7 @@ _MEANINGS = {
     "v0": "velocity at the first sample",
     "offset": "rest reading of the probe",
     "gain": "gain of the probe",
+    "high_pass_state": "what the high-pass had settled on at the first sample",
     "input_gain": "gain of the measured input",
     "sigma": "noise of the probe",
 }

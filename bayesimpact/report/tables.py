@@ -29,6 +29,9 @@ from bayesimpact.report.names import split
 from bayesimpact.report.results import Results, Row
 
 GAIN = "gain"  # of a probe
+HIGH_PASS_STATE = "high_pass_state"
+WITHOUT = {GAIN: "1, known", HIGH_PASS_STATE: "no high-pass"}
+"""What stands for a nuisance that not every recording has."""
 
 
 @dataclass(frozen=True)
@@ -176,9 +179,9 @@ def release_views(results: Results) -> list[dict[str, str]]:
     for r in results.recordings:
         cells = {"name": r.name, "case": r.case}
         for key, (scale, unit) in columns.items():
-            owner = r.name if key in ("offset", GAIN) else r.state or r.name
-            if key == GAIN and GAIN + f"[{owner}]" not in known:
-                cells[key] = "1, known"
+            owner = (r.state or r.name) if key in ("y0", "v0") else r.name
+            if key in WITHOUT and f"{key}[{owner}]" not in known:
+                cells[key] = WITHOUT[key]
                 continue
             row = results.row(f"{key}[{owner}]")
             shown = Display(scale, "") if unit else display(row.unit, _largest([row]))
@@ -202,7 +205,7 @@ def _largest(rows: Sequence[Row]) -> float:
 def release_columns(results: Results) -> dict[str, tuple[float, str]]:
     """Nuisance -> (scale, unit) that suits all recordings; no unit where theirs differ."""
     columns = {}
-    for key in ("y0", "v0", "offset", GAIN):
+    for key in ("y0", "v0", "offset", GAIN, HIGH_PASS_STATE):
         rows = [row for row in results.rows if row.name.startswith(f"{key}[")]
         if len({row.unit for row in rows}) > 1:
             columns[key] = (1.0, "")

@@ -93,6 +93,7 @@ KEYS: dict[str, dict[str, tuple[str, str]]] = {
         "quantity": (f'{TOP}{ENTRY}quantity = "velocity"\n', "two sensors"),
         "motion": (f'{TOP}{ENTRY}motion = "first"\n', ""),
         "gain": (f'{TOP}{ENTRY}name = "a"\n{ENTRY}name = "b"\ngain = "free"\n', ""),
+        "high_pass_hz": (f"{TOP}{ENTRY}high_pass_hz = 0.35\n", ""),
         "start_s": (f"{TOP}{ENTRY}start_s = 115.2\n", "shifted"),
         "end_s": (f"{TOP}{ENTRY}end_s = 116.0\n", "shifted"),
         "exclude_s": (f"{TOP}{ENTRY}exclude_s = [[115.1, 115.15], [115.5, 115.5]]\n", "shifted"),

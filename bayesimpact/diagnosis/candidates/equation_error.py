@@ -40,7 +40,7 @@ from bayesimpact.model.effects.effect import Effect, Scales
 from bayesimpact.model.linear_response.path_forces import add_forces
 from bayesimpact.model.oscillator import Oscillator
 from bayesimpact.model.parameters import INPUT_GAIN, SLOTS, instance_name
-from bayesimpact.response.measured_motion import from_rest, measured_motion
+from bayesimpact.response.measured_motion import before_high_pass, from_rest, measured_motion
 from bayesimpact.response.weak_form import Rows, products, rows_of
 
 Array = NDArray[np.float64]
@@ -85,7 +85,10 @@ def measured_paths(fit: Fit, *, flight: bool = False) -> list[Path]:
     """
     o, noise = fit.density.oscillator, fit.density.likelihood.noise
     found = []
-    for r, q in zip(o.campaign.recordings, o.layout.slots(fit.mode), strict=True):
+    for i, q in enumerate(o.layout.slots(fit.mode)):
+        r = before_high_pass(
+            o.campaign.recordings[i], q[_OFFSET], o.settled_on(i, fit.mode) + q[_OFFSET]
+        )
         period = 2 * np.pi * float(np.sqrt(o.campaign.mass / q[_K1]))
         level = noise.level * noise.scales[r.order]
         y, v, reading = measured_motion(from_rest(r, q[_OFFSET]), period, level)

@@ -125,15 +125,14 @@ def _finer(axis: Array, times: int) -> Array:
 
 
 def size_parameters(density: PosteriorDensity, effect: Effect) -> list[tuple[str, EffectParameter]]:
-    """Names in theta and records of an effect's size parameters."""
+    """Names in theta and records of the parameters by which an effect begins at its null."""
     campaign = density.oscillator.campaign
     keys: dict[str, list[str | None]] = {
         "campaign": [None],
         "case": list(campaign.cases),
         "recording": [r.name for r in campaign.recordings],
     }
-    sizes = [p for p in effect.parameters if p.is_size]
-    return [(instance_name(effect, p, key), p) for p in sizes for key in keys[p.scope]]
+    return [(instance_name(effect, p, key), p) for p in effect.scored for key in keys[p.scope]]
 
 
 def size_steps(

@@ -10,7 +10,7 @@ onto a wrong phase.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -56,6 +56,7 @@ class Estimates(Picklable):
         do not tell, for example k2 of an obstacle that was never touched
     impacts : recording -> number of cycles with an impact
     input_gain : of the inputs whose gain is free, None without any
+    high_pass_state : recording -> what a declared high-pass had settled on, from rest
     """
 
     k1: float
@@ -70,6 +71,7 @@ class Estimates(Picklable):
     sd: Mapping[str, float]
     impacts: Mapping[str, int]
     input_gain: float | None = None
+    high_pass_state: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
 
     __repr__ = short_repr
 
@@ -82,7 +84,8 @@ class Estimates(Picklable):
             named |= {f"k2[{case}]": value for case, value in self.k2.items()}
         if self.input_gain is not None:
             named["input_gain"] = self.input_gain
-        for kind, table in (("y0", self.y0), ("v0", self.v0), ("offset", self.offset)):
+        for kind in ("y0", "v0", "offset", "high_pass_state"):
+            table: Mapping[str, float] = getattr(self, kind)
             named |= {f"{kind}[{name}]": value for name, value in table.items()}
         return named
 

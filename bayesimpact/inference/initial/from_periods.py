@@ -61,7 +61,8 @@ def _reach(found: Fit, r: int) -> float:
     recording, gain = o.campaign.recordings[r], o.gains[r]
     offset = float(o.layout.slots(found.mode)[r, _OFFSET])
     own = float(found.mode[gain]) if gain >= 0 else 1.0
-    moved = displacement_of(from_rest(recording, offset, own or 1.0)).samples
+    state = o.settled_on(r, found.mode)
+    moved = displacement_of(from_rest(recording, offset, own or 1.0, state)).samples
     used = slice(None) if recording.used is None else recording.used
     return float(np.max(moved[used]))
 

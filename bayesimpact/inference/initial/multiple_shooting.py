@@ -116,7 +116,8 @@ def _starts(o: Oscillator, noise: Noise, r: int, theta: Array) -> Starts:
     period = 2 * np.pi * float(np.sqrt(o.campaign.mass / q[_K1]))
     gain = theta[o.gains[r]] if o.gains[r] >= 0 else 1.0
     level = noise.level * noise.scales[recording.order] / abs(gain)
-    y, v, _ = measured_motion(from_rest(recording, q[_OFFSET], gain), period, level)
+    motion = from_rest(recording, q[_OFFSET], gain, o.settled_on(r, theta))
+    y, v, _ = measured_motion(motion, period, level)
     as_displacement = level * (period / (2 * np.pi)) ** recording.order
     at = lowest_points(y, recording.interval, period, as_displacement)
     if recording.used is not None:

@@ -120,9 +120,10 @@ class EffectParameter:
     replaces : base parameter (c2, g) in whose place this one stands: the effect vanishes when all
         its instances equal that parameter; `null` is then None, the prior normal about `centre`
     centre : centre of that prior, from the scales
-    initial : the law's state at a recording's first sample, which no score looks for: a law has it
+    initial : a state at a recording's first sample, the law's or the probe's, which an effect has
         as a recording has its y0 and v0. The null is what it is without one, and the prior normal
-        about it with a spread that all recordings share
+        about it with a spread that all recordings share. At the effect's null a law's state moves
+        nothing, and no score looks for it
     """
 
     name: str
@@ -337,6 +338,12 @@ class Effect(Picklable):
     def is_same_law(self, other: Effect) -> bool:
         """True for two effects that differ in the names and ranges of their numbers only."""
         return self.restates == other.id or other.restates == self.id
+
+    @property
+    def scored(self) -> tuple[EffectParameter, ...]:
+        """Parameters by which it begins at its null: sizes, and states of the probe."""
+        probe = self.observe is not None
+        return tuple(p for p in self.parameters if p.is_size or (probe and p.initial))
 
     def parameter(self, name: str) -> EffectParameter:
         """The parameter called `name`; KeyError when there is none."""

@@ -15,7 +15,7 @@ from bayesimpact.report.tables import symbol
 
 UNTOLD = ("–", "not clear")
 """What stands for a change where none is proved."""
-NUISANCES = ("y0", "v0", "offset", "gain", "sigma")
+NUISANCES = ("y0", "v0", "offset", "gain", "high_pass_state", "sigma")
 
 
 def estimate(content: Mapping[str, Any], *, like: Mapping[str, Any] | None = None) -> str:

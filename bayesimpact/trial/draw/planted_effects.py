@@ -282,6 +282,21 @@ def _released_mode(design: DrawnRig, rng: Rng) -> EffectForm:
     return EffectForm(build, 1e-6 * reach, largest=0.1 * reach)
 
 
+def _high_pass(design: DrawnRig, rng: Rng) -> EffectForm:
+    """Settled somewhere between the rest and the place of the release."""
+    shares = {r.name: float(rng.uniform(0.0, 1.0)) for r in design.releases}
+    natural = design.omega / (2 * pi)
+
+    def build(size: float) -> Parameters:
+        w = 2 * pi * size
+        return {
+            "corner": size,
+            "rate": {r.name: w * shares[r.name] * r.y0 for r in design.releases},
+        }
+
+    return EffectForm(build, 1e-6 * natural, largest=0.5 * natural)
+
+
 def _smoothing(design: DrawnRig, rng: Rng) -> EffectForm:
     """An undeclared Savitzky-Golay filter; on or off, its window drawn."""
     contact = pi / design.contact_omega * design.rate
@@ -351,6 +366,7 @@ PLANTED_EFFECTS: Mapping[str, PlantedEffect] = {
         ("measurement",), one_number("gain", lambda d: 0.3 / d.amplitude**2, signed=True)
     ),
     "sensor_hum": PlantedEffect(("measurement",), _hum, slots=("hum",)),
+    "sensor_high_pass": PlantedEffect(("measurement",), _high_pass),
     "released_mode": PlantedEffect(("measurement",), _released_mode, slots=("hum",), free=True),
     "pendulum_sine": PlantedEffect(
         ("free",), lambda d, r: EffectForm(lambda s: {}, 0.0), angle=True

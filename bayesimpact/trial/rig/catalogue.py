@@ -271,6 +271,10 @@ def _released_mode(probe: Probe, p: Numbers) -> Probe:
     return replace(_hum(probe, p), hum_decay=p["decay"])
 
 
+def _high_pass(probe: Probe, p: Numbers) -> Probe:
+    return replace(probe, corner=p["corner"], settling=p["rate"])
+
+
 CATALOGUE: Mapping[str, Planted] = {
     "contact_damping_indentation": Planted(
         ("coefficient",), obstacle=True, part=_damping_indentation
@@ -334,6 +338,7 @@ CATALOGUE: Mapping[str, Planted] = {
     ),
     "sensor_cubic": Planted(("gain",), probe=lambda probe, p: replace(probe, cubic=p["gain"])),
     "sensor_hum": Planted(("amplitude", "frequency"), per_recording=("phase",), probe=_hum),
+    "sensor_high_pass": Planted(("corner",), per_recording=("rate",), probe=_high_pass),
     "released_mode": Planted(
         ("frequency", "decay"), per_recording=("amplitude", "phase"), probe=_released_mode
     ),

@@ -1,7 +1,8 @@
 """The rig's measuring chain: probe, rest reading, noise, smoothing, digits, in this order.
 
 measured = round(smooth(y + gain2 y^2 + gain3 y^3 + drift t + hum exp(-r t) sin(2 pi f t + phase)
-                        + offset + noise))
+                        - z + offset + noise))
+with z of the high-pass, see `Probe`.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter, savgol_filter
+from scipy.signal import lfilter, lsim, savgol_filter
 
 from bayesimpact.data.campaign import Smoothing
 from bayesimpact.errors import InputError
@@ -65,6 +66,9 @@ class Probe:
     quadratic, cubic : gains of y^2 (1/m) and y^3 (1/m2)
     drift : m/s
     hum, hum_frequency, hum_phase, hum_decay : m, Hz, rad, 1/s
+    corner, settling : of a first-order high-pass, Hz, which takes off z, z' = w (y - z) with
+        w = 2 pi corner, from z = 0 on; and the rate in m/s at which the zero moves at first for
+        what it took for the constant before. Exact for lines between samples
     """
 
     quadratic: float = 0.0
@@ -74,6 +78,8 @@ class Probe:
     hum_frequency: float = 0.0
     hum_phase: float = 0.0
     hum_decay: float = 0.0
+    corner: float = 0.0
+    settling: float = 0.0
 
     def reads(self, displacement: Series, times: Series) -> Series:
         """Reading of the probe, (n,), m; the true displacement is not rescaled."""
@@ -81,7 +87,15 @@ class Probe:
         wave = np.sin(2 * pi * self.hum_frequency * times + self.hum_phase)
         wave = wave * np.exp(-self.hum_decay * times)
         distorted = y + self.quadratic * y**2 + self.cubic * y**3
-        return distorted + self.drift * times + self.hum * wave
+        return distorted + self.drift * times + self.hum * wave - self.taken_off(y, times)
+
+    def taken_off(self, signal: Series, times: Series) -> Series:
+        """What the high-pass takes off (n,), the constant of the first sample apart."""
+        if self.corner == 0.0:
+            return -self.settling * times
+        w = 2 * pi * self.corner
+        constant = lsim(([w], [1.0, w]), signal, times - times[0])[1]
+        return np.asarray(constant - self.settling * (1 - np.exp(-w * times)) / w)
 
 
 def measure(

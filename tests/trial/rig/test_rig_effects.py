@@ -62,7 +62,10 @@ MODES = {
     "obstacle_mode",
     "base_motion",
 }  # the naive twin's steps are coarse for them
-SENSOR = ("sensor_drift", "sensor_quadratic", "sensor_cubic", "sensor_hum", "released_mode")
+SENSOR = (
+    "sensor_drift", "sensor_quadratic", "sensor_cubic", "sensor_hum", "sensor_high_pass",
+    "released_mode",
+)  # fmt: skip
 CHAIN = ("smoothing", "noise_correlated")
 SINE = "pendulum_sine"  # nothing at these amplitudes, and pendulum_with_spring with K = k1
 RELEASE = Release("r", "1", -6e-3, 0.01)

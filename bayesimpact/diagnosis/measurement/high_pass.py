@@ -1,0 +1,75 @@
+"""A high-pass that the recordings came through, told before anything else is asked of them.
+
+What a filter had settled on before a mass was let go is as large as the motion, and dies away in
+the readings beneath it: a base model that knows nothing of it fits no motion at all, and what
+follows from that fit (comparisons of recordings, scores, forces along the motion) means nothing.
+But with a corner that is known the base model's own start values and fit serve as ever. So corners
+are tried one by one, as if campaign.toml declared them, and the best of them is where a fit of the
+effect begins.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bayesimpact.data.campaign import Campaign
+from bayesimpact.diagnosis.refits.extend import campaign_scales
+from bayesimpact.diagnosis.refits.refit import fit_from
+from bayesimpact.diagnosis.selection.outcome import is_large
+from bayesimpact.diagnosis.thresholds import EXCESS
+from bayesimpact.errors import InputError
+from bayesimpact.inference.fit import Fit
+from bayesimpact.inference.identify import identify
+from bayesimpact.model.effects import sensor_high_pass
+from bayesimpact.model.effects.effect import Effect
+
+ID = sensor_high_pass.EFFECT.id
+CORNERS = np.geomspace(0.01, 1.0, 7)
+"""Over the natural frequency: neighbours are so close that a fit from one finds what lies between;
+below the first one a base model still fits the motion."""
+
+
+def through_high_pass(base: Fit, effects: Sequence[Effect], *, failed: bool) -> Fit | None:
+    """The base model's fit with a high-pass, where this leaves `EXCESS` times less of a large
+    misfit, and no large one beside it or where the base model `failed`; None elsewhere.
+    """
+    chosen = [e for e in effects if e.id == ID]
+    campaign, scales = base.density.oscillator.campaign, campaign_scales(base)
+    declared = campaign.declared or any(r.high_pass for r in campaign.recordings)
+    if not (chosen and is_large(base)) or declared or not chosen[0].admissible(scales):
+        return None
+    known = [_known(base, campaign, f * scales.natural_frequency) for f in CORNERS]
+    nearest = min((k for k in known if k), key=lambda k: k.reduced_chi2, default=None)
+    if nearest is None or not nearest.reduced_chi2 < base.reduced_chi2:
+        return None
+    found = fit_from(base, chosen, _values(nearest), scales).fit
+    far_less = EXCESS * found.reduced_chi2 < base.reduced_chi2
+    return found if far_less and (failed or not is_large(found)) else None
+
+
+def _known(base: Fit, campaign: Campaign, corner: float) -> Fit | None:
+    """The base model's fit to recordings that came through a known high-pass, Hz; None where that
+    shows no oscillation.
+    """
+    passed = tuple(replace(r, high_pass=corner) for r in campaign.recordings)
+    noise, rng = base.density.likelihood.noise, np.random.default_rng(0)  # draws nothing
+    try:
+        return identify(
+            replace(campaign, recordings=passed), rng=rng, noise=noise, search=False
+        ).fit
+    except InputError:
+        return None
+
+
+def _values(known: Fit) -> dict[str, float]:
+    """Values of the effect's and all other parameters that say the same as a known corner's."""
+    values = dict(zip(known.names, map(float, known.mode), strict=True))
+    for recording in known.density.oscillator.campaign.recordings:
+        state = values.pop(f"high_pass_state[{recording.name}]")
+        values[f"offset[{recording.name}]"] -= state
+        values[f"{ID}.rate[{recording.name}]"] = 2 * np.pi * recording.high_pass * state
+        values[f"{ID}.corner"] = recording.high_pass
+    return values
