@@ -107,6 +107,13 @@ def test_check_saves_its_plot(run: Run, tmp_path: Path) -> None:
     assert plot.read_bytes().startswith(b"\x89PNG")
 
 
+def test_check_tells_a_stated_high_pass(run: Run, tmp_path: Path) -> None:
+    files = {"a": csv(noisy()), "b": csv(noisy(seed=2))}
+    _, plain, _ = run("check", write(tmp_path / "plain", **files))
+    _, out, _ = run("check", write(tmp_path / "passed", TOML + "high_pass_hz = 0.35\n", **files))
+    assert "high-pass             b 0.35 Hz\n" in out and "high-pass" not in plain
+
+
 def test_quiet_check_prints_warnings_only(run: Run, tmp_path: Path) -> None:
     files = {"a": csv(noisy()), "b": csv(noisy(seed=2))}
     assert run("check", write(tmp_path, **files), "--quiet") == (0, "", "")

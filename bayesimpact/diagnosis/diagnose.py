@@ -60,7 +60,7 @@ from bayesimpact.diagnosis.faults.simpler import (
 from bayesimpact.diagnosis.faults.soft_release import soft_releases
 from bayesimpact.diagnosis.faults.unfree_start import BETTER, unfree_starts
 from bayesimpact.diagnosis.loop import Diagnosis, Progress, diagnose_fit
-from bayesimpact.diagnosis.measurement.high_pass import through_high_pass
+from bayesimpact.diagnosis.measurement.high_pass import behind_high_pass
 from bayesimpact.diagnosis.measurement.smoothing import SAVITZKY_GOLAY, whole_campaign
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.score_test.scan import scan
@@ -183,8 +183,8 @@ def _diagnosed(
     """Stage by stage, see above."""
     say("fitting the base model")
     cleaned = cleaned_campaign(campaign, rng=rng, search=search)
+    cleaned, passed = behind_high_pass(cleaned, campaign, effects, rng=rng, search=search)
     first = cleaned.identification.fit
-    passed = through_high_pass(first, effects, failed=base_failed(first))
     pushed = _pushed(cleaned, effects) if is_large(first) and passed is None else ()
     if pushed:
         cleaned = without_faults(cleaned, pushed, campaign, rng=rng)

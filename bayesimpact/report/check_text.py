@@ -179,11 +179,13 @@ def _chain_block(campaign: Campaign, noise: Noise | None) -> str:
         filtered = f"Savitzky-Golay, window {smoothing.window} samples, order {smoothing.polyorder}"
     sds = {"mass": measurement.mass_sd, "clock": measurement.clock_sd, "gain": measurement.gain_sd}
     stated = ", ".join(f"{name} {sd:.3g}" for name, sd in sds.items() if sd) or "none stated"
+    passed = [f"{r.name} {r.high_pass:g} Hz" for r in campaign.recordings if r.high_pass]
     return "\n".join(
         [
             "measuring chain",
             f"  raw noise             {level}",
             f"  smoothing             {filtered}",
+            *([f"  high-pass             {', '.join(passed)}"] if passed else []),
             f"  relative uncertainty  {stated}",
         ]
     )

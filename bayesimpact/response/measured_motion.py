@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import cumulative_trapezoid
 from scipy.signal import find_peaks, savgol_filter
 
+from bayesimpact.data.high_pass import before_high_pass
 from bayesimpact.data.recording import Recording
 from bayesimpact.response.displacement import displacement_of
 
@@ -43,18 +43,6 @@ def from_rest(
     seen = before_high_pass(recording, offset, state)
     rest = 0.0 if recording.high_pass else offset
     return replace(seen, samples=(seen.samples - rest) / gain)
-
-
-def before_high_pass(recording: Recording, offset: float, state: float = 0.0) -> Recording:
-    """What came into a recording's high-pass, which had settled on `state`, where the readings
-    after it are counted from `offset`; the recording itself where it has none.
-    """
-    if not recording.high_pass:
-        return recording
-    passed = recording.samples - offset
-    taken = cumulative_trapezoid(passed, dx=recording.interval, initial=0.0)
-    samples = passed + 2.0 * np.pi * recording.high_pass * taken + state
-    return replace(recording, samples=samples, high_pass=0.0)
 
 
 def smoothed(samples: Array, interval: float, period: float, noise: float) -> tuple[Array, Array]:

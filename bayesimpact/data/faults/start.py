@@ -8,6 +8,7 @@ from scipy.stats import norm
 
 from bayesimpact.data.faults.fault import FALSE_ALARM, Array, Fault, amount, start_fault
 from bayesimpact.data.faults.flat import reading_step
+from bayesimpact.data.high_pass import as_it_came
 from bayesimpact.data.hum import find_hum
 from bayesimpact.data.period import crossing_period, noise_level
 from bayesimpact.data.quantity import order_of
@@ -52,8 +53,8 @@ def find_start(recording: Recording) -> list[Fault]:
     """
     if recording.used is not None and not recording.used[:3].all():
         return []
-    hum = find_hum(recording.samples, 1.0)
-    quiet = recording.samples
+    quiet = as_it_came(recording).samples
+    hum = find_hum(quiet, 1.0)
     if hum is not None:
         quiet = quiet - hum.readings(np.arange(quiet.size, dtype=np.float64))
     period = crossing_period(quiet, 1.0)

@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cholesky_banded, solve_banded
 
+from bayesimpact.data.high_pass import before_high_pass
 from bayesimpact.diagnosis.candidates.term_sets import EffectColumns
 from bayesimpact.diagnosis.refits.extend import at_null, extend, transfer
 from bayesimpact.diagnosis.score_test.directions import (
@@ -40,7 +41,7 @@ from bayesimpact.model.effects.effect import Effect, Scales
 from bayesimpact.model.linear_response.path_forces import add_forces
 from bayesimpact.model.oscillator import Oscillator
 from bayesimpact.model.parameters import INPUT_GAIN, SLOTS, instance_name
-from bayesimpact.response.measured_motion import before_high_pass, from_rest, measured_motion
+from bayesimpact.response.measured_motion import from_rest, measured_motion
 from bayesimpact.response.weak_form import Rows, products, rows_of
 
 Array = NDArray[np.float64]

@@ -33,7 +33,7 @@ Known = tuple[Effect, Mapping[str, float]]
 
 def shapes_of(fit: Fit, effect: Effect) -> dict[str, float]:
     """The values that a fit has found of what is no size of one of its effects."""
-    own = {f"{effect.id}.{p.name}" for p in effect.parameters if not p.is_size}
+    own = {f"{effect.id}.{p.name}" for p in effect.parameters if p not in effect.scored}
     values = zip(fit.names, map(float, fit.mode), strict=True)
     return {name: value for name, value in values if name.split("[")[0] in own}
 

@@ -101,7 +101,7 @@ def cleaned_campaign(campaign: Campaign, *, rng: np.random.Generator, search: bo
     cleaned, filtered = _through_filter(cleaned, None)
     if filtered is not None:  # what was cut before it reaches further
         cleaned, own = set_aside(replace(campaign, measurement=cleaned.measurement))
-    found = Corrected(_identified(cleaned, rng=rng, search=search), own, filtered=filtered)
+    found = Corrected(identified(cleaned, rng=rng, search=search), own, filtered=filtered)
     fit = found.identification.fit
     spikes = () if campaign.keep_faults or base_failed(fit) else residual_spikes(fit)
     if not spikes:
@@ -119,7 +119,7 @@ def without_faults(
     whole = before.fit.density.oscillator.campaign
     campaign = faults_set_aside(whole, faults)
     try:
-        again = replace(_identified(campaign, rng=rng, search=False), search=before.search)
+        again = replace(identified(campaign, rng=rng, search=False), search=before.search)
     except InputError:
         return found
     change = before.fit.reduced_chi2, again.fit.reduced_chi2
@@ -200,12 +200,12 @@ def with_steps(
 ) -> Corrected:
     """The same with the next steps of `comparisons` corrected, each after all before it."""
     campaign, filtered = _through_filter(steps[-1][-1].campaign, before.filtered)
-    identification = _identified(campaign, rng=rng, search=search)
+    identification = identified(campaign, rng=rng, search=search)
     compared = (*before.compared, *chain.from_iterable(steps))
     return Corrected(identification, before.own, compared, filtered)
 
 
-def _identified(campaign: Campaign, *, rng: np.random.Generator, search: bool) -> Identification:
+def identified(campaign: Campaign, *, rng: np.random.Generator, search: bool) -> Identification:
     """The base model's mode, under slow noise where it leaves that and nothing else, and that of
     measured inputs.
     """

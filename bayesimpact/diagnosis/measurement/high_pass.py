@@ -16,6 +16,9 @@ from dataclasses import replace
 import numpy as np
 
 from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.faults.find import set_aside
+from bayesimpact.diagnosis.faults.compare import base_failed
+from bayesimpact.diagnosis.faults.recording_faults import Corrected, identified
 from bayesimpact.diagnosis.refits.extend import campaign_scales
 from bayesimpact.diagnosis.refits.refit import fit_from
 from bayesimpact.diagnosis.selection.outcome import is_large
@@ -26,15 +29,40 @@ from bayesimpact.inference.identify import identify
 from bayesimpact.model.effects import sensor_high_pass
 from bayesimpact.model.effects.effect import Effect
 
+START = "recording_start"
 ID = sensor_high_pass.EFFECT.id
 CORNERS = np.geomspace(0.01, 1.0, 7)
 """Over the natural frequency: neighbours are so close that a fit from one finds what lies between;
 below the first one a base model still fits the motion."""
 
 
-def through_high_pass(base: Fit, effects: Sequence[Effect], *, failed: bool) -> Fit | None:
+def behind_high_pass(
+    cleaned: Corrected,
+    as_read: Campaign,
+    effects: Sequence[Effect],
+    *,
+    rng: np.random.Generator,
+    search: bool,
+) -> tuple[Corrected, Fit | None]:
+    """The base model's fit with a high-pass, None where nothing asks for one; and the campaign,
+    where starts were cut that are none in what came into that filter, with these.
+    """
+    passed = through_high_pass(cleaned.identification.fit, effects)
+    if passed is None or not any(f.id == START for f in cleaned.own):
+        return cleaned, passed
+    measurement = cleaned.identification.fit.density.oscillator.campaign.measurement
+    stated = _stated(as_read, passed.value(f"{ID}.corner"))
+    kept, own = set_aside(replace(stated, measurement=measurement))
+    again = identified(_stated(kept, 0.0), rng=rng, search=search)
+    whole = through_high_pass(again.fit, effects)
+    if whole is None:
+        return cleaned, passed
+    return replace(cleaned, identification=again, own=own), whole
+
+
+def through_high_pass(base: Fit, effects: Sequence[Effect]) -> Fit | None:
     """The base model's fit with a high-pass, where this leaves `EXCESS` times less of a large
-    misfit, and no large one beside it or where the base model `failed`; None elsewhere.
+    misfit: no large one, or where the base model failed; None elsewhere.
     """
     chosen = [e for e in effects if e.id == ID]
     campaign, scales = base.density.oscillator.campaign, campaign_scales(base)
@@ -47,21 +75,24 @@ def through_high_pass(base: Fit, effects: Sequence[Effect], *, failed: bool) -> 
         return None
     found = fit_from(base, chosen, _values(nearest), scales).fit
     far_less = EXCESS * found.reduced_chi2 < base.reduced_chi2
-    return found if far_less and (failed or not is_large(found)) else None
+    return found if far_less and (base_failed(base) or not is_large(found)) else None
 
 
 def _known(base: Fit, campaign: Campaign, corner: float) -> Fit | None:
     """The base model's fit to recordings that came through a known high-pass, Hz; None where that
     shows no oscillation.
     """
-    passed = tuple(replace(r, high_pass=corner) for r in campaign.recordings)
     noise, rng = base.density.likelihood.noise, np.random.default_rng(0)  # draws nothing
     try:
-        return identify(
-            replace(campaign, recordings=passed), rng=rng, noise=noise, search=False
-        ).fit
+        return identify(_stated(campaign, corner), rng=rng, noise=noise, search=False).fit
     except InputError:
         return None
+
+
+def _stated(campaign: Campaign, corner: float) -> Campaign:
+    """The campaign as if campaign.toml stated this corner, Hz, for all recordings."""
+    passed = tuple(replace(r, high_pass=corner) for r in campaign.recordings)
+    return replace(campaign, recordings=passed)
 
 
 def _values(known: Fit) -> dict[str, float]:

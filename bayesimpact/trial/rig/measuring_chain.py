@@ -14,12 +14,14 @@ from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter, lsim, savgol_filter
 
 from bayesimpact.data.campaign import Smoothing
 from bayesimpact.errors import InputError
 
 Series = NDArray[np.float64]
+FINER = 8  # steps of a high-pass in an interval
 
 
 @dataclass(frozen=True)
@@ -68,7 +70,7 @@ class Probe:
     hum, hum_frequency, hum_phase, hum_decay : m, Hz, rad, 1/s
     corner, settling : of a first-order high-pass, Hz, which takes off z, z' = w (y - z) with
         w = 2 pi corner, from z = 0 on; and the rate in m/s at which the zero moves at first for
-        what it took for the constant before. Exact for lines between samples
+        what it took for the constant before. Between samples the signal is a cubic spline
     """
 
     quadratic: float = 0.0
@@ -94,8 +96,9 @@ class Probe:
         if self.corner == 0.0:
             return -self.settling * times
         w = 2 * pi * self.corner
-        constant = lsim(([w], [1.0, w]), signal, times - times[0])[1]
-        return np.asarray(constant - self.settling * (1 - np.exp(-w * times)) / w)
+        fine = np.linspace(times[0], times[-1], FINER * (times.size - 1) + 1)
+        constant = lsim(([w], [1.0, w]), CubicSpline(times, signal)(fine), fine - fine[0])[1]
+        return np.asarray(constant[::FINER] - self.settling * (1 - np.exp(-w * times)) / w)
 
 
 def measure(

@@ -47,6 +47,14 @@ def test_a_wander_is_taken_off_and_told(seed: int, steady: bool) -> None:
     assert notice.size == pytest.approx(np.ptp(curve), rel=0.1)
 
 
+def test_behind_a_stated_high_pass_a_zero_that_settles_stays() -> None:
+    settles = 3.0 * np.exp(-2 * np.pi * 0.3 * T)
+    given = recording(decay() + settles)
+    assert without_wander(given)[1] is not None
+    stated = replace(given, high_pass=0.3)
+    assert without_wander(stated) == (stated, None)
+
+
 def test_a_wander_larger_than_the_motion_is_taken_off_too() -> None:
     given = recording(decay() + 40 * wander(1))
     left, notice = without_wander(given)

@@ -326,7 +326,7 @@ def test_a_recording_in_another_unit_is_not_loud() -> None:
 def test_several_steps_are_corrected_with_one_fit(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each step's campaign has all before it corrected: only the last one is fitted."""
     fitted: list[str] = []
-    monkeypatch.setattr(faults, "_identified", lambda campaign, **_: fitted.append(campaign))
+    monkeypatch.setattr(faults, "identified", lambda campaign, **_: fitted.append(campaign))
     monkeypatch.setattr(faults, "_through_filter", lambda campaign, known: (campaign, known))
     first, second, third = (SimpleNamespace(campaign=name) for name in ("one", "two", "three"))
     before: Any = SimpleNamespace(own=("own",), compared=("known",), filtered=None)

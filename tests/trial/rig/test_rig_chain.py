@@ -57,6 +57,20 @@ def test_probe_distorts_the_true_displacement_before_the_offset(
     assert np.abs(want - 1e-3 - truth.displacement).max() > 4e-6
 
 
+@pytest.mark.parametrize("held", [0.0, 1.0])
+def test_a_high_pass_is_its_equation_in_fine_steps(truth, held):
+    corner, finer = 0.8, 32
+    w, y = 2 * np.pi * corner, motion(PAPER_RIG, RELEASE, rate=1000 * finer, duration=0.5)
+    first = constant = held * RELEASE.y0
+    read = []
+    for a, b in zip(y.displacement, [*y.displacement[1:], 0.0], strict=True):
+        read.append(a - constant + first)  # the rest reading is that of the first sample
+        constant += (0.5 * (a + b) - constant) * w / (1000 * finer + 0.5 * w)
+    got = recorded({"sensor_high_pass": {"corner": corner, "rate": {"r": w * first}}})
+    assert np.abs(got - read[::finer]).max() < 2e-9
+    assert np.abs(got - truth.displacement).max() > 1e-4
+
+
 def test_offset_belongs_to_its_recording(truth):
     assert np.array_equal(
         recorded(chain=MeasuringChain(offsets={"other": 1e-3})), truth.displacement
