@@ -112,7 +112,7 @@ def identify(
     values of parameters are `known`, from which to begin.
     Raises `InputError` when a recording shows no oscillation.
     """
-    estimates = _estimates(campaign)
+    estimates = first_estimates(campaign)
     given, noise = noise is not None, noise or about_average(estimate_noise(campaign), campaign)
     oscillator = build_oscillator(campaign, sigma_per_recording=sigma_per_recording)
     if oscillator.acting:
@@ -147,7 +147,7 @@ def identify(
     return Identification(best, estimates, noise, result, from_guess, from_search)
 
 
-def _estimates(campaign: Campaign) -> Estimates:
+def first_estimates(campaign: Campaign) -> Estimates:
     """Initial estimates, from what came into a high-pass where the campaign declares one."""
     seen = campaign_before_high_pass(campaign)
     return of_readings(rough_estimates(seen) if seen.declared else estimate(seen), campaign)

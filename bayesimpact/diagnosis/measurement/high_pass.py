@@ -24,16 +24,24 @@ from bayesimpact.diagnosis.refits.refit import fit_from
 from bayesimpact.diagnosis.selection.outcome import is_large
 from bayesimpact.diagnosis.thresholds import EXCESS
 from bayesimpact.errors import InputError
-from bayesimpact.inference.fit import Fit
-from bayesimpact.inference.identify import identify
+from bayesimpact.inference.defaults import default_priors
+from bayesimpact.inference.fit import Fit, PosteriorDensity
+from bayesimpact.inference.identify import first_estimates, initial_theta
+from bayesimpact.inference.likelihood import Likelihood
+from bayesimpact.inference.mode import find_mode
 from bayesimpact.model.effects import sensor_high_pass
 from bayesimpact.model.effects.effect import Effect
+from bayesimpact.model.oscillator import build_oscillator
 
 START = "recording_start"
 ID = sensor_high_pass.EFFECT.id
 CORNERS = np.geomspace(0.01, 1.0, 7)
 """Over the natural frequency: neighbours are so close that a fit from one finds what lies between;
 below the first one a base model still fits the motion."""
+
+PERIODS = 10.0
+"""Natural periods over which corners are tried: what a filter had settled on is gone by then, or
+was no more than a drift."""
 
 
 def behind_high_pass(
@@ -69,7 +77,8 @@ def through_high_pass(base: Fit, effects: Sequence[Effect]) -> Fit | None:
     declared = campaign.declared or any(r.high_pass for r in campaign.recordings)
     if not (chosen and is_large(base)) or declared or not chosen[0].admissible(scales):
         return None
-    known = [_known(base, campaign, f * scales.natural_frequency) for f in CORNERS]
+    short = campaign.truncated(PERIODS / scales.natural_frequency)
+    known = [_known(base, short, f * scales.natural_frequency) for f in CORNERS]
     nearest = min((k for k in known if k), key=lambda k: k.reduced_chi2, default=None)
     if nearest is None or not nearest.reduced_chi2 < base.reduced_chi2:
         return None
@@ -79,14 +88,18 @@ def through_high_pass(base: Fit, effects: Sequence[Effect]) -> Fit | None:
 
 
 def _known(base: Fit, campaign: Campaign, corner: float) -> Fit | None:
-    """The base model's fit to recordings that came through a known high-pass, Hz; None where that
-    shows no oscillation.
+    """The base model's mode for recordings that came through a known high-pass, Hz, from their own
+    start values; None where these show no oscillation.
     """
-    noise, rng = base.density.likelihood.noise, np.random.default_rng(0)  # draws nothing
+    noise, stated = base.density.likelihood.noise, _stated(campaign, corner)
     try:
-        return identify(_stated(campaign, corner), rng=rng, noise=noise, search=False).fit
+        estimates = first_estimates(stated)
     except InputError:
         return None
+    oscillator = replace(build_oscillator(stated), smoothing=base.density.oscillator.smoothing)
+    priors = default_priors(oscillator, estimates, noise)
+    density = PosteriorDensity(Likelihood(oscillator, noise), priors)
+    return find_mode(density, initial_theta(oscillator, estimates, noise))
 
 
 def _stated(campaign: Campaign, corner: float) -> Campaign:
