@@ -70,7 +70,8 @@ class Probe:
     hum, hum_frequency, hum_phase, hum_decay : m, Hz, rad, 1/s
     corner, settling : of a first-order high-pass, Hz, which takes off z, z' = w (y - z) with
         w = 2 pi corner, from z = 0 on; and the rate in m/s at which the zero moves at first for
-        what it took for the constant before. Between samples the signal is a cubic spline
+        what it took for the constant before. Between samples the signal is a cubic spline: an
+        acceleration that jumps at a touch does so within an interval of its place
     """
 
     quadratic: float = 0.0

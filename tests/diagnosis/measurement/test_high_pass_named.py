@@ -19,6 +19,7 @@ from bayesimpact.model.effects import SEARCHED
 from bayesimpact.trial.rig.measuring_chain import MeasuringChain
 
 NOISE = {"displacement": 5e-6, "acceleration": 2e-2}
+FINER = 8
 DRAG = {"quadratic_drag": {"coefficient": 0.05}}
 CUBIC = {"spring_cubic": {"stiffness": 3e6}}
 NEAR = tuple(
@@ -39,8 +40,14 @@ def recorded(
     if corner:
         rates = {name: 2 * np.pi * corner * y for name, y in at.items()}
         planted["sensor_high_pass"] = {"corner": corner, "rate": rates}
-    chain = MeasuringChain(noise=NOISE[quantity])
-    return small_rig.record(2, planted, chain=chain, quantity=quantity)
+    rate = 1000.0 * FINER  # in the rig, too, a filter sees jumps of an acceleration at its samples
+    fine = small_rig.record(2, planted, chain=MeasuringChain(), rate=rate, quantity=quantity)
+    rng, thin = np.random.default_rng(2), []
+    for r in fine.recordings:
+        samples = r.samples[::FINER]
+        noise = NOISE[quantity] * rng.standard_normal(samples.size)
+        thin.append(replace(r, samples=samples + noise, interval=FINER * r.interval))
+    return replace(fine, recordings=tuple(thin))
 
 
 def first_look(campaign: Campaign) -> float | None:
