@@ -53,13 +53,14 @@ class Naive:
     def number(self, effect: str, name: str, default: float = 0.0) -> float:
         return self.effects.get(effect, {}).get(name, default)
 
-    def in_contact(self, y: float, v: float, z: float) -> float:
+    def in_contact(self, t: float, y: float, v: float, z: float) -> float:
         """Everything that acts between obstacle and mass, N."""
         d, p = y - self.gap, self.number
         force = self.c2 * v + self.k2 * d
         force += p("contact_damping_indentation", "coefficient") * d * v
         force += p("contact_damping_speed", "coefficient") * abs(v) * v
         force += p("contact_hardening", "stiffness") * d**3
+        force += self.k2 * p("contact_stiffness_drift", "rate") * t * d
         n = p("contact_power_law", "exponent", 1.0)
         force += self.k2 * d * ((abs(d) / 1e-3) ** (n - 1) - 1) if d != 0 else 0.0
         if "hunt_crossley" in self.effects:
@@ -107,10 +108,10 @@ class Naive:
         place, speed = (state[0] - self.gap, state[1]) if self.mode == CONTACT else (0.0, 0.0)
         return W * (place - state[5]) + drag * (speed - state[6])
 
-    def obstacle(self, state: list[float]) -> float:
+    def obstacle(self, t: float, state: list[float]) -> float:
         """Everything between obstacle and mass, the mass inside the obstacle included, N."""
         inside = self.number("obstacle_mode", "mass") * self.ringing(state)
-        return self.in_contact(*state[:3]) + inside
+        return self.in_contact(t, *state[:3]) + inside
 
     def frame_pull(self, state: list[float]) -> float:
         """What spring and damper of the frame do to it, per kg of it."""
@@ -122,13 +123,13 @@ class Naive:
         force = self.everywhere(t, *state[:2]) + self.friction * self.slide + self.slipping(state)
         touching, rest = self.mode == CONTACT, 1 + self.ratio
         if touching:
-            force += self.obstacle(state)
+            force += self.obstacle(t, state)
         inertia = self.mass + rest * self.m2 * touching
         return -(rest * force + self.mass * self.frame_pull(state)) / inertia
 
     def reaction(self, t: float, state: list[float]) -> float:
         """Force of the obstacle on the mass, N: what moves the obstacle's own mass comes on top."""
-        return self.obstacle(state) + self.m2 * self.acceleration(t, state)
+        return self.obstacle(t, state) + self.m2 * self.acceleration(t, state)
 
     def right_hand_side(self, t: float, state: list[float]) -> list[float]:
         v, z = state[1:3]
@@ -159,7 +160,7 @@ class Naive:
         """Rates of the mode that the contact force excites."""
         p, force = self.number, 0.0
         if self.mode == CONTACT:
-            force = self.obstacle(state) if held else self.reaction(t, state)
+            force = self.obstacle(t, state) if held else self.reaction(t, state)
         W, drag = self.mode_of("second_mode")
         return [state[4], p("second_mode", "gain") * force - W * state[3] - drag * state[4]]
 

@@ -18,6 +18,7 @@ LISTED: Mapping[Term, str] = {
     Term("everywhere", Power(5.0, True)): "spring_quintic",
     Term("everywhere", LINEAR, drift=1): "stiffness_drift",
     Term("contact", Power(3.0, False)): "contact_hardening",
+    Term("contact", DEEP, drift=1): "contact_stiffness_drift",
     Term("contact", DEEP, V): "contact_damping_indentation",
     Term("contact", ONE, DRAG): "contact_damping_speed",
 }

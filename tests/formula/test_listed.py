@@ -20,7 +20,7 @@ GAP = 2e-3
 RNG = np.random.default_rng(4)
 Y, W, T = RNG.uniform(-6e-3, 4e-3, 400), RNG.uniform(-0.3, 0.3, 400), RNG.uniform(0, 2, 400)
 SLOT = np.zeros(len(SLOTS))
-SLOT[SLOTS.index("g")], SLOT[SLOTS.index("k1")] = GAP, 1.0
+SLOT[[SLOTS.index(name) for name in ("g", "k1", "k2")]] = GAP, 1.0, 1.0
 
 
 def terms() -> tuple[Term, ...]:

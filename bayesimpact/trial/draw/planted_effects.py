@@ -323,6 +323,9 @@ PLANTED_EFFECTS: Mapping[str, PlantedEffect] = {
     ),
     "contact_power_law": PlantedEffect(("contact",), _exponent, 1, slots=("k2 d",)),
     "contact_second_stage": PlantedEffect(("contact",), _second_stage, 1),
+    "contact_stiffness_drift": PlantedEffect(
+        ("contact",), one_number("rate", lambda d: 0.3 / d.duration, signed=True), 1
+    ),
     "hunt_crossley": PlantedEffect(("contact",), _hunt_crossley, 1, slots=("c2", "k2 d")),
     "contact_no_tension": PlantedEffect(
         ("contact",), lambda d, r: EffectForm(lambda s: {}, 0.0), 1, slots=("end",)

@@ -23,7 +23,7 @@ SORTS: Mapping[str, tuple[str, ...]] = {
     "dry": ("coulomb_friction", "structural_damping", "presliding_friction", "hysteresis_bouc_wen"),
     "odd spring": ("pendulum_sine", "spring_cubic", "spring_quintic"),
     "even spring": ("spring_quadratic", "spring_piecewise", "opposite_stop"),
-    "slow change": ("stiffness_drift",),
+    "slow change": ("stiffness_drift", "contact_stiffness_drift"),
     "forcing": ("harmonic_forcing", "sensor_hum"),
     "probe": ("sensor_quadratic", "sensor_cubic"),
     "probe drift": ("sensor_drift",),
@@ -52,7 +52,7 @@ SHARES: Mapping[str, Range] = {
 SHARE: Range = (0.05, 0.7)
 """Sizes of an effect, as shares of the largest physical one; `SHARE` for those not listed."""
 
-TIMED = ("stiffness_drift", "sensor_drift", "damping_drift", "knock")
+TIMED = ("stiffness_drift", "contact_stiffness_drift", "sensor_drift", "damping_drift", "knock")
 """Effects that count time from the first sample: none in a recording that begins at rest."""
 
 

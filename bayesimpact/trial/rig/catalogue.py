@@ -118,6 +118,17 @@ def _second_stage(site: Site, p: Numbers, slot: int) -> RigPart:
     return RigPart(law, in_reaction=True, depths=(depth,))
 
 
+def _contact_stiffness_drift(site: Site, p: Numbers, slot: int) -> RigPart:
+    """What k2 (1 + r t) adds to k2."""
+    growth = site.k2 * p["rate"]
+
+    def law(piece: Piece) -> Law | None:
+        gap = piece.gap
+        return (lambda t, y, v, state: growth * t * (y - gap)) if piece.contact else None
+
+    return RigPart(law, in_reaction=True)
+
+
 def _relaxation(site: Site, p: Numbers, slot: int) -> RigPart:
     """Maxwell branch: force z, z' = kz v - z/tau in contact, z' = -z/tau in flight."""
     kz, decay = p["stiffness"], 1 / p["time"]
@@ -286,6 +297,7 @@ CATALOGUE: Mapping[str, Planted] = {
     "contact_hardening": Planted(("stiffness",), obstacle=True, part=_hardening),
     "contact_power_law": Planted(("exponent",), obstacle=True, part=_power_law),
     "contact_second_stage": Planted(("stiffness", "depth"), obstacle=True, part=_second_stage),
+    "contact_stiffness_drift": Planted(("rate",), obstacle=True, part=_contact_stiffness_drift),
     "hunt_crossley": Planted(
         ("exponent", "damping"),
         obstacle=True,

@@ -71,6 +71,7 @@ OF_ANGLES = {"pendulum_sine", "pendulum_with_spring"}
 SIGNED = {
     "contact_hardening.stiffness", "spring_quadratic.stiffness", "spring_cubic.stiffness",
     "stiffness_drift.rate", "sensor_drift.rate", "sensor_quadratic.gain", "sensor_cubic.gain",
+    "contact_stiffness_drift.rate",
     "spring_quintic.stiffness", "second_mode.gain",
 }  # fmt: skip
 

@@ -186,6 +186,22 @@ def test_drifting_spring_is_airys_equation():
     np.testing.assert_allclose(y, expected, rtol=0, atol=3e-10)
 
 
+def test_an_obstacle_whose_stiffness_drifts_follows_airys_equation():
+    """One contact from y = g on, nothing else pulling."""
+    rate, w = 8.0, np.sqrt(5350.0 / 0.503)
+    rig = TestRig(
+        mass=0.503, c1=0.0, k1=1e-9, c2=0.0, k2=(5350.0,), g=0.0, y0=(0.0,), v0=(0.3,),
+        duration=0.025,
+    )  # fmt: skip
+    y = one("contact_stiffness_drift", rig, rate=rate)
+    scale = (w / rate) ** (2 / 3)
+    t = np.arange(y.size) / rig.rate
+    (ai, slope_ai, bi, slope_bi), now = airy(-scale), airy(-scale * (1 + rate * t))
+    expected = -0.3 / (scale * rate) * (ai * now[2] - bi * now[0]) / (ai * slope_bi - slope_ai * bi)
+    np.testing.assert_allclose(y, expected, rtol=0, atol=3e-11)
+    assert np.abs(y - 0.3 / w * np.sin(w * t)).max() > 1e-4
+
+
 @pytest.mark.parametrize(("frequency", "rate"), [(7.3, 1000.0), (230.0, 1000.0), (480.0, 200.0)])
 def test_forcing_against_the_closed_form(frequency, rate):
     """Also far above the oscillator's own frequency, and above what the samples resolve."""

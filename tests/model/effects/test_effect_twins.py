@@ -30,6 +30,7 @@ COMBINATIONS = (
     ("contact_relaxation", "contact_no_tension"),
     ("contact_power_law", "gap_wear"),
     ("contact_second_stage", "opposite_stop", "coulomb_friction"),
+    ("contact_stiffness_drift", "obstacle_mass", "quadratic_drag"),
     ("harmonic_forcing", "coulomb_friction", "contact_damping_speed"),
     ("stiffness_drift", "contact_hardening", "gap_per_recording"),
     ("obstacle_mass", "contact_damping_indentation", "gap_wear", "spring_quadratic"),

@@ -24,7 +24,7 @@ def sign(x):
     return (x > 0) - (x < 0)
 
 
-def contact_forces(e, rig, k2, d, v, s):
+def contact_forces(e, rig, k2, t, d, v, s):
     """What the obstacle does to the mass, c2 and k2 included."""
     total = rig.c2 * v
     n = e.get("contact_power_law", {}).get("exponent", 1.0)
@@ -39,6 +39,8 @@ def contact_forces(e, rig, k2, d, v, s):
         total += e["contact_damping_speed"]["coefficient"] * abs(v) * v
     if "contact_hardening" in e:
         total += e["contact_hardening"]["stiffness"] * d**3
+    if "contact_stiffness_drift" in e:
+        total += k2 * e["contact_stiffness_drift"]["rate"] * t * d
     if "contact_second_stage" in e:
         p = e["contact_second_stage"]
         total += p["stiffness"] * max(d - p["depth"], 0.0)
@@ -176,7 +178,7 @@ class NaiveRig:
         s = self.named(state)
         push = 0.0
         if self.touching:
-            push = contact_forces(self.e, self.rig, self.k2, y - self.gap, v, s)
+            push = contact_forces(self.e, self.rig, self.k2, t, y - self.gap, v, s)
             if "obstacle_mode" in self.e:
                 p = self.e["obstacle_mode"]
                 push += p["mass"] * obstacle_pull(p, y - self.gap, v, s)

@@ -55,6 +55,21 @@ def test_stiffness_drift_moves_the_frequency():
     assert frequency[-1] / frequency[0] == pytest.approx(expected[-1] / expected[0], rel=8e-3)
 
 
+def test_drift_of_an_obstacle_shortens_its_contacts():
+    rig = Rig(mass=0.5, c1=0.0, k1=800.0, c2=0.0, g=0.0, k2={"1": 20000.0})
+    effects = {"contact_stiffness_drift": {"rate": 0.1}}
+    run = motion(rig, Release("r", "1", -5e-3), effects, rate=20000, duration=6)
+    y, t = run.displacement, run.times
+    crossing = np.flatnonzero(y[1:] * y[:-1] < 0)
+    at = t[crossing] - y[crossing] / (y[crossing + 1] - y[crossing]) * np.diff(t)[crossing]
+    inside = y[crossing] < 0
+    onset, leave = at[inside], at[~inside]
+    lasted = leave[: onset.size] - onset[: leave.size]
+    middle = onset[: leave.size] + lasted / 2
+    assert lasted.size > 50
+    assert lasted == pytest.approx(pi / np.sqrt((800 + 20000 * (1 + 0.1 * middle)) / 0.5), rel=1e-4)
+
+
 def test_knock_hands_over_its_impulse():
     effects = {"knock": {"impulse": 0.02, "time": 0.1, "width": 1e-4}}
     rig = Rig(mass=0.5, c1=0.0, k1=800.0)
