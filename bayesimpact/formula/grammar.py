@@ -91,7 +91,10 @@ class Term:
     position, speed : powers of the coordinate and of the velocity
     side : -1 or 1: the sign of the displacement at `place`
     place, width : m; 0 where the region has none
-    fade : speed, m/s, at which the term has fallen to 1 / e; 0 where it does not
+    fade : speed u, m/s, over which the term falls as exp(-|v| / u); 0 where it does not
+    lorentzian : it falls as 1 / (1 + (v / u)^2) instead: the drag of an eddy-current brake
+        (Wouterse 1991, IEE Proc. B 138:153), the Stribeck curve of Hess and Soom 1990, J. Tribol.
+        112:147
     drift : 1 for a term that grows with time
     """
 
@@ -103,13 +106,14 @@ class Term:
     width: float = 0.0
     fade: float = 0.0
     drift: int = 0
+    lorentzian: bool = False
 
     @property
     def kind(self) -> tuple[object, ...]:
         """The term without the numbers of its shape."""
         return (
             self.region, self.position, self.speed, self.side if self.place else 0,
-            self.place > 0, self.fade > 0, self.drift,
+            self.place > 0, self.fade > 0, self.drift, self.lorentzian,
         )  # fmt: skip
 
     @property
@@ -129,7 +133,7 @@ class Term:
         """Symbols in the term, its size and the plus before it among them."""
         where = {"everywhere": 0, "contact": 1, "beyond": 3, "bump": 7, "box": 5}[self.region]
         deeper = 2 if self.region == "contact" and self.place > 0 else 0
-        fading = 4 if self.fade > 0 else 0
+        fading = (6 if self.lorentzian else 4) if self.fade > 0 else 0
         return 2 + where + deeper + fading + 2 * self.drift + self.position.nodes + self.speed.nodes
 
     @property
@@ -191,11 +195,18 @@ class Term:
 
     def of_speed(self, v: Array) -> Array:
         """Factors of the speed, (n,)."""
-        fading = np.exp(-np.abs(v) / self.fade) if self.fade > 0 else 1.0
+        fading = self._fading(v)
         m = self.speed.exponent
         if m.is_integer():
             return np.asarray(self.speed(v) * fading)
         return np.asarray((v * v + SLOW**2) ** (0.5 * (m - 1.0)) * v * fading)
+
+    def _fading(self, v: Array) -> Array | float:
+        if self.fade == 0.0:
+            return 1.0
+        if self.lorentzian:
+            return 1.0 / (1.0 + (v / self.fade) ** 2)
+        return np.asarray(np.exp(-np.abs(v) / self.fade))
 
     def force(self, y: Array, v: Array, d: Array, t: Array) -> Array:
         """Force per unit of size at displacements m, velocities, indentations, times (n,)."""
@@ -210,7 +221,9 @@ class Term:
             fade = f"{_short(self.fade)} {'rad' if angle else 'm'}/s"
         x, before, after = self._where(place, width)
         position = self.position.text(x, positive=self.region in ("contact", "beyond"))
-        fading = f"exp(-|v|/({fade}))" if self.fade else ""
+        speed = f"({fade})" if numbers else fade
+        fading = f"/ (1 + (v/{speed})^2)" if self.lorentzian else f"exp(-|v|/({fade}))"
+        fading = fading if self.fade else ""
         words = ["t" if self.drift else "", before, position, self.speed.text("v"), fading, after]
         return " ".join(w for w in words if w)
 

@@ -30,8 +30,9 @@ def force(y, v, d, t, z, touching, p, q):  # type: ignore[no-untyped-def]
     """Force of a term, N.
 
     p = (size, place, width, fade, region, side, exponent and parity of the coordinate, of the
-    speed, drift); regions are numbered as in `grammar.REGIONS`. z is the side of a surface (box,
-    beyond, second stage) or the direction of the motion (dry friction; 0 beyond a surface).
+    speed, drift, lorentzian); regions are numbered as in `grammar.REGIONS`. z is the side of a
+    surface (box, beyond, second stage) or the direction of the motion (dry friction; 0 beyond a
+    surface).
     """
     inside, beyond = 1.0, z <= 0.0
     if p[8] == 0.0 and p[9] > 0.0:
@@ -83,7 +84,8 @@ def force(y, v, d, t, z, touching, p, q):  # type: ignore[no-untyped-def]
     elif m == 2.0:
         inside *= v * v
     if p[3] > 0.0:
-        inside *= math.exp(-abs(v) / p[3])
+        fallen = v / p[3]
+        inside *= 1.0 / (1.0 + fallen * fallen) if p[11] > 0.0 else math.exp(-abs(fallen))
     if p[10] > 0.0:
         inside *= t
     return p[0] * inside
@@ -196,6 +198,7 @@ def constants(term: Term) -> dict[str, float]:
         "speed_exponent": term.speed.exponent,
         "speed_odd": float(term.speed.odd),
         "drift": float(term.drift),
+        "lorentzian": float(term.lorentzian),
     }
 
 
@@ -209,13 +212,14 @@ def law_of(term: Term) -> Law:
     m = term.speed
     jumps = m == Power(0.0, True)
     rooted = not m.exponent.is_integer()
+    cusped = term.fade > 0 and not term.lorentzian
     return Law(
         force,
         where="contact" if term.region == "contact" else "everywhere",
         surface=surface,
         jump_at_surface=surface in (edges, deeper) or term.region == "beyond",
         jump_at_turn=jumps,
-        kink_at_turn=not jumps and (rooted or term.fade > 0 or m in KINKED),
+        kink_at_turn=not jumps and (rooted or cusped or m in KINKED),
         first_at_turn=first_at_turn if rooted else None,
         rough_at_touch=term.region == "contact" and not term.position.exponent.is_integer(),
         feature_length=feature_length if term.region in ("bump", "box") else None,
@@ -279,6 +283,7 @@ def term_of(effect: Effect, values: Mapping[str, float]) -> Term:
         Power(told["speed_exponent"], bool(told["speed_odd"])),
         side=int(told["side"]),
         drift=int(told["drift"]),
+        lorentzian=bool(told["lorentzian"]),
         **shape,
     )
 

@@ -1,6 +1,6 @@
 """The library: every term of the grammar that a campaign of given sizes could show.
 
-Some 390 terms. What the base model has already (k1 y, c1 v, k2 d, c2 v in contact, a constant) is
+Some 400 terms. What the base model has already (k1 y, c1 v, k2 d, c2 v in contact, a constant) is
 left out. Shape parameters stand on grids: places where the mass has been, widths of a sixteenth to
 a quarter of the amplitude; a refit sets them free.
 """
@@ -65,8 +65,9 @@ def _everywhere(scales: Scales) -> Iterator[Term]:
         if (position, speed) not in BASE:
             yield Term("everywhere", position, speed)
     for speed, shares in ((SIGN, FADES), (V, MAXIMA)):
-        for share in shares:
-            yield Term("everywhere", ONE, speed, fade=share * scales.speed)
+        for share, lorentzian in itertools.product(shares, (False, True)):
+            fade = share * scales.speed
+            yield Term("everywhere", ONE, speed, fade=fade, lorentzian=lorentzian)
 
 
 def _drifts(scales: Scales) -> Iterator[Term]:

@@ -67,10 +67,10 @@ def forces_along(path: Along, terms: Sequence[Term]) -> Array:
     out = np.empty((len(terms), y.size))
     known: dict[object, Array] = {}
     for i, term in enumerate(terms):
-        where = replace(term, speed=ONE, fade=0.0, drift=0)
+        where = replace(term, speed=ONE, fade=0.0, drift=0, lorentzian=False)
         if where not in known:
             known[where] = where.of_position(y, d)
-        speed = (term.speed, term.fade)
+        speed = (term.speed, term.fade, term.lorentzian)
         if speed not in known:
             known[speed] = term.of_speed(v)
         np.multiply(known[where], known[speed], out=out[i])

@@ -199,7 +199,9 @@ def _force(term: Term, law: Law) -> str:
         factors.append(f"math.exp(-(({x} / {places['width']}) ** 2))")
     factors += _factor(x, term.position) + _speed_factor(term)
     if term.fade > 0:
-        factors.append(f"math.exp(-abs(v) / {places['fade']})")
+        fallen = f"v / {places['fade']}"
+        slow = term.lorentzian
+        factors.append(f"1.0 / (1.0 + ({fallen}) ** 2)" if slow else f"math.exp(-abs({fallen}))")
     product = " * ".join(factors)
     if law.jump_at_surface and not law.jump_at_turn:
         return f"{product} if z > 0.0 else 0.0"

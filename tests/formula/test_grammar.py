@@ -155,6 +155,11 @@ def test_effects_pass_the_checks_of_effects_of_ones_own_and_can_be_pickled() -> 
         (Term("everywhere", V, V), "y v", "N s/m2", "either"),
         (Term("everywhere", ONE, V, drift=1), "t v", "N/m", "dissipates"),
         (Term("everywhere", V, drift=1), "t y", "N/m/s", "either"),
+        (
+            Term("everywhere", ONE, V, fade=0.1, lorentzian=True),
+            "v / (1 + (v/(0.1 m/s))^2)", "N s/m", "dissipates",
+        ),
+        (Term("everywhere", ONE, SIGN, fade=0.1), "sign(v) exp(-|v|/(0.1 m/s))", "N", "dissipates"),
         (Term("contact", Power(1.5, False)), "d^1.5 in contact", "N/m1.5", "conserves"),
         (
             Term("bump", V, ONE, -1, 2e-3, 5e-4),
@@ -179,6 +184,17 @@ def test_energy_is_as_stated_at_all_states() -> None:
             assert power.min() >= 0.0, term.text()
         if term.energy == "conserves":  # the same force at either direction
             np.testing.assert_array_equal(term.force(y, v, d, t), term.force(y, -v, d, t))
+
+
+def test_the_drag_of_an_eddy_current_brake_has_its_maximum_at_the_critical_speed() -> None:
+    brake = Term("everywhere", ONE, V, fade=0.2, lorentzian=True)
+    v = np.linspace(0.0, 1.0, 1001)
+    force = brake.force(0 * v, v, 0 * v, 0 * v)
+    assert v[np.argmax(force)] == pytest.approx(0.2)
+    assert force.max() == pytest.approx(0.1)
+    assert force[-1] == pytest.approx(1.0 / 26.0)  # 2 F / (v / u + u / v) with F = u / 2
+    faster = replace(brake, fade=0.1)
+    assert brake.kind == faster.kind != replace(brake, lorentzian=False).kind
 
 
 def test_longer_formulas_cost_more() -> None:

@@ -13,7 +13,7 @@ from bayesimpact.data.input import Input
 from bayesimpact.data.recording import Recording
 from bayesimpact.formula.grammar import ONE, Power, Term
 from bayesimpact.formula.law import effect_id, effect_of, starts_of
-from bayesimpact.formula.responses import largest_force, motion_of, responses
+from bayesimpact.formula.responses import forces_along, largest_force, motion_of, responses
 from bayesimpact.inference.fit import Fit
 from bayesimpact.inference.identify import identify
 from bayesimpact.model.oscillator import build_oscillator
@@ -26,6 +26,8 @@ FREE = (
     Term("everywhere", Power(1.0, True), SIGN),
     Term("everywhere", ONE, V, drift=1),
     Term("everywhere", ONE, SIGN, fade=0.05),
+    Term("everywhere", ONE, V, fade=0.1),
+    Term("everywhere", ONE, V, fade=0.1, lorentzian=True),
     Term("beyond", Power(1.0, False), side=-1, place=3e-3),
     Term("bump", Power(1.0, True), ONE, -1, 2e-3, 7e-4),
     Term("bump", ONE, V, -1, 2e-3, 7e-4),
@@ -108,3 +110,10 @@ def test_response_to_an_input_outlasts_what_began_the_motion(driven: Fit, term: 
 @pytest.mark.parametrize("term", (*FREE, *CONTACT), ids=effect_id)
 def test_response_is_that_of_a_simulation_with_a_stop(with_stop: Fit, term: Term) -> None:
     assert away(with_stop, term) < 0.02
+
+
+def test_forces_that_share_factors_are_those_of_the_terms_alone() -> None:
+    y, v, t = (np.random.default_rng(i).uniform(-1, 1, 50) for i in range(3))
+    path = 6e-3 * y, 0.3 * v, 6e-3 * y - 1e-3, 1 + t
+    for term, force in zip((*FREE, *CONTACT), forces_along(path, (*FREE, *CONTACT)), strict=True):
+        np.testing.assert_allclose(force, term.force(*path), rtol=1e-12, err_msg=term.text())
