@@ -86,7 +86,7 @@ def locate(base: Fit, better: Fit, force: MissingForce, effects: tuple[Effect, .
         weights = [np.sum(parts, axis=0) ** 2 for parts in zip(*own, strict=True)]
         return _place(base, better, points, weights, None, effects)
     large = not effects and is_large(base)
-    added = added_force(better) if large and not base.density.oscillator.effects else None
+    added = added_force(base, better) if large and not base.density.oscillator.effects else None
     if added is not None:
         weights = [f**2 for f in added.forces]
         found = _place(base, better, added.points, weights, None, effects, moved=better)
