@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from bayesimpact.data.campaign import Campaign
 from bayesimpact.data.channels import keepers
+from bayesimpact.data.recording import Recording
 from bayesimpact.inference.defaults import default_priors
 from bayesimpact.inference.fit import Fit, PosteriorDensity
 from bayesimpact.inference.initial.estimates import Estimates
@@ -30,6 +31,7 @@ from bayesimpact.model.effects.effect import Effect, EffectParameter, Scales
 from bayesimpact.model.oscillator import Oscillator
 from bayesimpact.model.parameters import is_added
 from bayesimpact.response.driven_displacement import seen_displacement
+from bayesimpact.response.half_cycles import spectral_period
 
 Array = NDArray[np.float64]
 
@@ -47,7 +49,7 @@ STEP = 1e-6  # of a parameter's reach: first step for differences, refined as er
 def campaign_sizes(campaign: Campaign, estimates: Estimates) -> Scales:
     """Physical sizes of a campaign from its initial estimates alone."""
     rate = float(np.sqrt(estimates.k1 / campaign.mass))
-    reach = max(r.motion(rate) for r in campaign.recordings)
+    reach = max(float(np.ptp(r.samples)) for r in seen_displacements(campaign))
     stiffness = float(np.mean([*estimates.k2.values()])) if estimates.k2 else 0.0
     gap = estimates.g if campaign.stop else 0.0
     return Scales(
@@ -149,7 +151,7 @@ class FirstCycles:
     def __init__(self, density: PosteriorDensity, guess: Array, lower: Array, upper: Array) -> None:
         self.levels = density.likelihood.scales
         layout, campaign = density.oscillator.layout, density.oscillator.campaign
-        period = 2 * np.pi / np.sqrt(guess[layout.index("k1")] / campaign.mass)
+        period = usual_cycle(campaign)
         short = campaign.excerpt(CYCLES * period).thinned(CYCLES * period / SAMPLES)
         self.short = replace(density.oscillator, campaign=short)
         self.guess, self.elsewhere = _at_excerpt(self.short, guess, period)
@@ -195,6 +197,21 @@ def further_sizes(effect: Effect) -> list[str]:
     """
     sizes = [p for p in effect.parameters if p.is_size and p.null is not None]
     return [f"{effect.id}.{p.name}" for p in sizes[1:]]
+
+
+def seen_displacements(campaign: Campaign) -> list[Recording]:
+    """The displacements behind all recordings. Accelerations are largest in contact, and tell
+    nothing of the reach as if they were of the free frequency.
+    """
+    return [seen_displacement(r, both=True) for r in campaign.recordings]
+
+
+def usual_cycle(campaign: Campaign) -> float:
+    """Duration of a cycle as recordings show it, s; between two stops far shorter than of free
+    vibration, and many impacts at once have many side minima.
+    """
+    seen = seen_displacements(campaign)
+    return float(np.median([spectral_period(r.samples) * r.interval for r in seen]))
 
 
 def _at_excerpt(short: Oscillator, guess: Array, period: float) -> tuple[Array, list[int]]:

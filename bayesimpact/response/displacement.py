@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
+from scipy.ndimage import uniform_filter1d
 
 from bayesimpact.data.recording import Recording
 from bayesimpact.response import local
@@ -24,6 +25,7 @@ from bayesimpact.response.half_cycles import HalfCycles, half_cycles, spectral_p
 
 Floats = NDArray[np.float64]
 
+BRIEF = 1 / 24  # of a period, as where `half_cycles` looks for turning points
 AVERAGED = 9  # extremes of a velocity, flat as they are, that share one straight drift
 
 
@@ -44,12 +46,14 @@ class Displacement:
     noise: float
 
 
-def displacement_of(recording: Recording) -> Displacement:
-    """The displacement of a recording of any quantity."""
-    return displacement(recording.samples, recording.interval, recording.order)
+def displacement_of(recording: Recording, *, both: bool = False) -> Displacement:
+    """The displacement of a recording of any quantity; `both` says that there are two stops."""
+    return displacement(recording.samples, recording.interval, recording.order, both=both)
 
 
-def displacement(samples: Floats, interval: float, order: int) -> Displacement:
+def displacement(
+    samples: Floats, interval: float, order: int, *, both: bool = False
+) -> Displacement:
     """The displacement of which `samples` (n,) are the `order`-th time derivative.
 
     Parameters
@@ -57,13 +61,15 @@ def displacement(samples: Floats, interval: float, order: int) -> Displacement:
     samples : (n,) m, m/s or m/s2, offset and noise included
     interval : s
     order : 0, 1 or 2
+    both : there are two stops, between which flights may be short
     """
     period = spectral_period(samples, order)
     noise = local.noise_level(samples, period)
     if order == 0:
         return Displacement(samples, None, noise)
-    bias = _bias(samples, period, noise)
-    halves = half_cycles(samples, bias, period, noise)
+    slow = without_brief(samples, period) if order == 2 and both else samples
+    bias = _bias(samples, slow, period, noise)
+    halves = half_cycles(slow, bias, period, noise)
     rate = samples - bias
     if order == 2:
         still = halves.peaks[halves.side > 0]  # the stop is on the side of negative acceleration
@@ -72,11 +78,18 @@ def displacement(samples: Floats, interval: float, order: int) -> Displacement:
     return Displacement(_integral(rate, interval, halves.peaks, period, AVERAGED), bias, noise)
 
 
-def _bias(samples: Floats, period: float, noise: float) -> float:
+def without_brief(samples: Floats, period: float) -> Floats:
+    """Accelerations (n,) without what is too brief to be a half cycle: a dashpot that pulls where
+    the mass leaves a stop, or pushes where it comes.
+    """
+    return np.asarray(uniform_filter1d(samples, max(int(BRIEF * period), 1), mode="nearest"))
+
+
+def _bias(samples: Floats, slow: Floats, period: float, noise: float) -> float:
     """Mean over whole cycles: a derivative of a motion that stays in place has none."""
     bias = float(samples.mean())
     for _ in range(3):
-        halves: HalfCycles = half_cycles(samples, bias, period, noise)
+        halves: HalfCycles = half_cycles(slow, bias, period, noise)
         whole = 2 * (halves.side.size // 2)
         if whole == 0:
             break

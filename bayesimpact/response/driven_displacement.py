@@ -113,7 +113,9 @@ def seen_displacement(recording: Recording, *, both: bool = False) -> Recording:
         return recording
     if recording.input is None:
         quantity: Quantity = "angle" if recording.angular else "displacement"
-        return replace(recording, samples=displacement_of(recording).samples, quantity=quantity)
+        return replace(
+            recording, samples=displacement_of(recording, both=both).samples, quantity=quantity
+        )
     guess = replace(first_guess([recording], 1.0, stop=True, free=True), both=both)
     return displacement_under(recording, guess, float(recording.samples.mean()))
 

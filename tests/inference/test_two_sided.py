@@ -19,7 +19,9 @@ from bayesimpact.data.read import load_campaign
 from bayesimpact.data.recording import Recording
 from bayesimpact.diagnosis.diagnose import diagnose
 from bayesimpact.errors import InputError
+from bayesimpact.inference.declared import campaign_sizes, usual_cycle
 from bayesimpact.inference.identify import identify
+from bayesimpact.inference.initial.rough import rough_estimates
 from bayesimpact.model.parameters import build_layout
 
 SECOND = {"stiffness": 4000.0, "gap": 1.5e-3}
@@ -72,6 +74,32 @@ def test_the_mode_is_the_truth(
     off = [(fit.value(n) - value) / fit.sd[fit.names.index(n)] for n, value in truth.items()]
     assert np.abs(off).max() < 4.0
     assert fit.reduced_chi2 == pytest.approx(1.0, abs=0.15)
+
+
+def test_sizes_of_a_rig_are_those_of_its_motion_whatever_is_read() -> None:
+    """Between two buffers that are met in every half cycle accelerations say nothing of the free
+    frequency: as an oscillation of that they were many times the motion, and no gap of a search
+    was as small as the rig's.
+    """
+    rig = small_rig.Rig(0.25, 0.25, 300.0, 3.0, 1e-3, {"1": 9000.0})
+    second = {"stiffness": 14000.0, "gap": 1.4e-3, "damping": 4.0}
+    releases = [small_rig.Release("a", "1", -2e-4, 0.35), small_rig.Release("b", "1", -2e-4, -0.3)]
+    found = {}
+    for quantity, noise in NOISE.items():
+        chain = small_rig.MeasuringChain(noise=noise, offsets=dict.fromkeys("ab", 0.0))
+        campaign = small_rig.record(
+            5, {"spring_piecewise": second}, rig=rig, quantity=quantity, rate=5000.0,
+            duration=0.6, releases=releases, chain=chain,
+        )  # fmt: skip
+        campaign = replace(campaign, declared=(SECOND_STOP,))
+        estimates = rough_estimates(campaign)
+        found[quantity] = campaign_sizes(campaign, estimates).amplitude, usual_cycle(campaign)
+        assert estimates.v0["a"] == pytest.approx(0.35, rel=0.2)
+        assert estimates.v0["b"] == pytest.approx(-0.3, rel=0.2)
+    reach, cycle = found.pop("displacement")
+    for other in found.values():
+        assert other == pytest.approx((reach, cycle), rel=0.2)
+    assert cycle < 0.4 * 2 * np.pi * np.sqrt(rig.mass / rig.k1)
 
 
 def test_the_second_stop_has_a_damper_of_its_own() -> None:

@@ -35,6 +35,19 @@ def test_displacement(moved, order, bias):
     assert found.noise == pytest.approx(NOISE[order], rel=0.3)
 
 
+def test_what_a_dashpot_pulls_for_an_instant_is_no_half_cycle():
+    """Between two stops flights are short; at the end of a contact the acceleration turns over."""
+    second = {"spring_piecewise": {"stiffness": 14000.0, "gap": 1.4e-3, "damping": 4.0}}
+    rig = small_rig.Rig(0.25, 0.25, 300.0, 3.0, 1e-3, {"1": 9000.0})
+    moved = motion(rig, small_rig.Release("r", "1", -2e-4, 0.35), second, rate=5000.0, duration=0.5)
+    for seed in (1, 2, 3):
+        noise = 0.15 * np.random.default_rng(seed).standard_normal(moved.acceleration.size)
+        found = displacement(moved.acceleration + noise, 2e-4, 2, both=True)
+        error = found.samples - moved.displacement
+        assert np.std(error) < 0.04 * np.ptp(moved.displacement)
+        assert np.abs(error).max() < 0.2 * np.ptp(moved.displacement)
+
+
 def test_a_displacement_is_itself(moved):
     found = displacement(moved.displacement, 1e-3, 0)
     assert found.samples is moved.displacement and found.bias is None

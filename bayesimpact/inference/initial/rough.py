@@ -14,7 +14,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesimpact.data.campaign import Campaign
+from bayesimpact.data.campaign import SECOND_STOP, Campaign
 from bayesimpact.data.gaps import before_gap
 from bayesimpact.data.recording import Recording
 from bayesimpact.errors import InputError
@@ -39,7 +39,8 @@ def rough_estimates(campaign: Campaign) -> Estimates:
     if any(r.input is not None for r in campaign.recordings):
         return estimate(campaign)
     campaign = replace(campaign, recordings=tuple(map(before_gap, campaign.recordings)))
-    seen = [_seen(r) for r in campaign.recordings]
+    both = SECOND_STOP in campaign.declared
+    seen = [_seen(r, both) for r in campaign.recordings]
     seconds = np.concatenate([one.halves.durations * one.interval for one in seen])
     if seconds.size < 3:
         found = "no oscillation above the noise"
@@ -89,8 +90,8 @@ class _Seen:
     halves: HalfCycles
 
 
-def _seen(recording: Recording) -> _Seen:
-    found = displacement_of(recording)
+def _seen(recording: Recording, both: bool) -> _Seen:
+    found = displacement_of(recording, both=both)
     period = spectral_period(found.samples)
     rest = _rest(found.samples, period)
     samples = found.samples - rest
