@@ -58,7 +58,7 @@ def test_every_effect_has_a_size(small, effect_id):
     if not effect.admissible(scales):
         pytest.skip("not on this rig")
     value, unit, share = size(effect, small.fit, with_effect(small, effect_id), scales)
-    assert np.isfinite([value, share]).all() and unit in ("N", "m", "kg", "N s/m", "s", "%")
+    assert np.isfinite([value, share]).all() and unit in ("N", "m", "kg", "N s/m", "s", "Hz", "%")
 
 
 def test_sizes_that_effects_define(small):
