@@ -93,7 +93,7 @@ def test_check_says_what_was_read_and_what_will_be_estimated(run: Run, tmp_path:
     for words in ("k2[1], k2[2]  N/m", "y0[a], y0[c]  m", "v0[a], v0[c]  m/s", "sigma  m"):
         assert words in out
     assert "k1: normal, mean = 800, sd = 50" in out
-    assert "5.00\N{NO-BREAK SPACE}µm (stated)" in out
+    assert "5.00 µm (stated)" in out
     assert "Savitzky-Golay, window 21 samples, order 2" in out
     assert "case 1: 98610 N/m" in out
     assert tree(tmp_path) == before

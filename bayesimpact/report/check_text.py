@@ -180,7 +180,7 @@ def _chain_block(campaign: Campaign, noise: Noise | None) -> str:
     sds = {"mass": measurement.mass_sd, "clock": measurement.clock_sd, "gain": measurement.gain_sd}
     stated = ", ".join(f"{name} {sd:.3g}" for name, sd in sds.items() if sd) or "none stated"
     passed = [f"{r.name} {r.high_pass:g} Hz" for r in campaign.recordings if r.high_pass]
-    return "\n".join(
+    lines = "\n".join(
         [
             "measuring chain",
             f"  raw noise             {level}",
@@ -189,6 +189,7 @@ def _chain_block(campaign: Campaign, noise: Noise | None) -> str:
             f"  relative uncertainty  {stated}",
         ]
     )
+    return lines.replace("\N{NO-BREAK SPACE}", " ")  # terminals break lines where they like
 
 
 def _unknowns_block(campaign: Campaign) -> str:

@@ -41,7 +41,7 @@ def formula_class(text: str) -> tuple[str, str]:
         return place, "power of v"
     if "sign(v)" in rest:
         return place, "sign(v)"
-    if "exp(-|v|" in rest:
+    if "exp(-|v|" in rest or "/ (1 + (v/" in rest:
         return place, "fading v"
     found = re.search(r"(?<![a-z|])v(\^\d)?", rest)
     return place, found.group(0) if found else ""

@@ -39,6 +39,7 @@ def test_every_term_of_the_library_has_its_place_and_speed() -> None:
         ("sign(v) in contact", "contact_friction", True),
         ("d sign(v)", "contact_friction", False),
         ("v exp(-|v|/(0.1 m/s))", "eddy_brake", False),
+        ("v / (1 + (v/(0.1 m/s))^2)", "eddy_brake", False),
         ("t v", "damping_drift", True),
         ("|v| v", "damping_drift", False),
         ("in contact", "contact_preload", True),
