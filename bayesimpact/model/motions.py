@@ -66,7 +66,7 @@ def general_motions(
     inputs: Inputs | None = None,
     restarts: Sequence[Array] = (),
 ) -> Array:
-    """The same for oscillators with added effects: slots (K, Q), table of laws (L, 7).
+    """The same for oscillators with added effects: slots (K, Q), table of laws (L, LAW_COLUMNS).
 
     Every row may begin anew, see `integrate_many`.
     """

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from bayesimpact.data.campaign import Campaign, Smoothing
 from bayesimpact.data.short_repr import short_repr
 from bayesimpact.model import measurement
-from bayesimpact.model.effects.effect import LAW_ROW, Effect
+from bayesimpact.model.effects.effect import Effect
 from bayesimpact.model.exact.arguments import Inputs
-from bayesimpact.model.law_table import law_row
+from bayesimpact.model.law_table import LAW_COLUMNS, law_row
 from bayesimpact.model.motions import general_motions, motions
 from bayesimpact.model.parameters import (
     BASE_SLOTS,
@@ -115,14 +115,14 @@ class Oscillator:
 
     @cached_property
     def laws(self) -> NDArray[np.int64]:
-        """Table of force laws for the general simulator, (L, LAW_ROW)."""
+        """Table of force laws for the general simulator, (L, LAW_COLUMNS)."""
         rows, first = [], len(SLOTS)
         for effect in self.acting:
             if effect.law is not None:
                 own = [first + i for i, p in enumerate(effect.parameters) if p.initial]
                 rows.append(law_row(effect.law, first, *own))
                 first += len(effect.parameters)
-        return np.array(rows, dtype=np.int64).reshape(-1, LAW_ROW)
+        return np.array(rows, dtype=np.int64).reshape(-1, LAW_COLUMNS)
 
     @cached_property
     def is_base(self) -> bool:

@@ -20,7 +20,7 @@ EVEN = 0.5  # of the median step, by which most steps of an unnamed clock differ
 MOST = 0.9
 
 
-def apart(channels: Sequence[Channel]) -> list[Channel]:
+def separate_runs(channels: Sequence[Channel]) -> list[Channel]:
     """Channels of one table, those of each run apart where its clock starts over."""
     clock = next((c for c in channels if c.is_called_time or says_time(c.name)), None)
     if clock is None and channels and channels[0].name.isdigit():

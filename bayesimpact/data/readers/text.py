@@ -10,7 +10,7 @@ from pathlib import Path
 from bayesimpact.data.fields import fields, unquoted
 from bayesimpact.data.readers.channel import Channel
 from bayesimpact.data.readers.grid import Cell, channels_of, has_names, has_units, number
-from bayesimpact.data.readers.runs import apart
+from bayesimpact.data.readers.runs import separate_runs
 from bayesimpact.errors import InputError
 
 LOOKED_AT = 25
@@ -23,7 +23,7 @@ def read(path: Path, content: bytes, encoding: str = "utf-8-sig", skip: int = 0)
     if skip >= len(lines):
         raise InputError(f"{path}, key skip_rows", f"{skip} of {len(lines)} lines", "fewer lines")
     rows, numbers = _cells(lines, skip)
-    return apart(channels_of(path, rows, numbers))
+    return separate_runs(channels_of(path, rows, numbers))
 
 
 def is_labelled(content: bytes) -> bool:

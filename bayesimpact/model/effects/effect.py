@@ -362,9 +362,6 @@ def catalogued(id: str) -> Effect | None:
     return effect
 
 
-LAW_ROW = 10  # numbers in a law's row
-
-
 @cache
 def address(function: Callable[..., float]) -> int:
     """Pointer to a law's function, compiled on first use."""

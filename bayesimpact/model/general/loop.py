@@ -335,7 +335,7 @@ def integrate_many(
     q : (K, Q) slots, then the parameters of the laws, SI units
     mass : kg
     intervals, counts : (K,) sampling intervals, s, and numbers of samples
-    laws : (L, LAW_ROW) table of laws, see `bayesimpact.model.law_table.law_row`
+    laws : (L, LAW_COLUMNS) table of laws, see `bayesimpact.model.law_table.law_row`
     out : (K, n) receives displacements, m, or what `orders` says, without the sensor's offset
     orders : (K,) which time derivative of the displacement; None: 0 throughout
     inputs : measured forces, where recordings have any; the slot A is then their gain

@@ -8,7 +8,6 @@ from effect_rigs import BY_ID, TestRig, moved
 from scipy.integrate import solve_ivp
 
 from bayesimpact.model.effects import Effect, EffectParameter, Law
-from bayesimpact.model.effects.effect import LAW_ROW
 from bayesimpact.model.law_table import LAW_COLUMNS, law_row
 
 RIG = TestRig(k2=(5350.0,), y0=(-6.5e-3,), v0=(0.0,), duration=1.0)
@@ -184,4 +183,4 @@ def test_rows_say_what_the_law_says(where):
     assert row[4] == 17
     assert law_row(Law(layer_edge_force, rough_at_touch=True, polynomial=True), 0)[3] == 4 + 8
     assert law_row(Law(layer_edge_force, ignores_speed=True), 0)[3] == 16
-    assert len(row) == LAW_ROW == LAW_COLUMNS  # the simulator reads as many
+    assert len(row) == LAW_COLUMNS  # the simulator reads as many
